@@ -1,0 +1,20 @@
+// Function qualifiers shared by g++ and nvcc, and the library's symbol visibility.
+#pragma once
+
+#include <cstdint>
+
+// Formulas are always inlined: a kernel file is compiled once per instruction set, and an
+// out-of-line copy built for AVX-512 must never be the one that the linker keeps for all.
+#if defined(__CUDACC__)
+#define SPLITNERF_HD __host__ __device__ __forceinline__
+#elif defined(__GNUC__)
+#define SPLITNERF_HD inline __attribute__((always_inline))
+#else
+#define SPLITNERF_HD inline
+#endif
+
+#if defined(__GNUC__)
+#define SPLITNERF_API __attribute__((visibility("default")))
+#else
+#define SPLITNERF_API
+#endif

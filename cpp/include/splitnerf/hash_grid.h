@@ -1,0 +1,101 @@
+// Multiresolution hash grid: geometry of the levels, index functions, and one point's encoding.
+// Source: Mueller et al. 2022, section 3; progressive levels: Li et al. 2023 (Neuralangelo).
+#pragma once
+
+#include "splitnerf/vec.h"
+
+namespace splitnerf {
+
+inline constexpr int kMaxLevels = 32;
+
+struct HashGridShape {
+  int n_levels;
+  int n_features;        // per level: 1, 2, 4 or 8
+  int base_resolution;   // cells along an edge of the coarsest level
+  double growth;         // factor between the resolutions of neighbouring levels
+  int log2_table_size;   // entries of a level at most: 2^log2_table_size
+};
+
+struct HashLevel {
+  int64_t offset;      // first entry of the level in the table
+  int64_t n_entries;
+  int resolution;      // cells along an edge; resolution + 1 nodes
+  bool dense;          // every node has an entry of its own
+};
+
+// Level l has floor(base growth^l + 1e-6) cells along an edge; the small term keeps exact powers.
+SPLITNERF_HD int level_resolution(const HashGridShape& shape, int level) {
+  return static_cast<int>(std::floor(shape.base_resolution * std::pow(shape.growth, level) + 1e-6));
+}
+
+// Fills levels[0 .. n_levels) and returns the number of entries of the whole table.
+inline int64_t hash_levels(const HashGridShape& shape, HashLevel* levels) {
+  int64_t offset = 0;
+  for (int l = 0; l < shape.n_levels; ++l) {
+    const int resolution = level_resolution(shape, l);
+    const int64_t nodes = static_cast<int64_t>(resolution) + 1, capacity = int64_t{1} << shape.log2_table_size;
+    // nodes^3 may exceed 2^63 only for resolutions past 2 million; compare without multiplying.
+    const bool dense = nodes <= capacity && nodes * nodes <= capacity && nodes * nodes * nodes <= capacity;
+    levels[l] = {offset, dense ? nodes * nodes * nodes : capacity, resolution, dense};
+    offset += levels[l].n_entries;
+  }
+  return offset;
+}
+
+SPLITNERF_HD int64_t dense_index(int64_t x, int64_t y, int64_t z, int64_t resolution) {
+  return (x * (resolution + 1) + y) * (resolution + 1) + z;
+}
+
+// Source: Teschner et al. 2003 (the primes as instant-ngp uses them). n_entries is a power of two.
+SPLITNERF_HD uint32_t spatial_hash(uint32_t x, uint32_t y, uint32_t z, uint32_t n_entries) {
+  return (x ^ y * 2654435761u ^ z * 805459861u) & (n_entries - 1u);
+}
+
+// The cell of a level that holds a point of the unit cube, and the eight corners' entries.
+template <class T> struct HashCell {
+  int64_t index[8];  // entry of corner (i & 1, i >> 1 & 1, i >> 2), counted in the whole table
+  Vec3<T> f;         // position inside the cell, in [0, 1]
+  Vec3<T> scale;     // d f / d position: the resolution, or 0 where the position was clamped
+};
+
+template <class T> SPLITNERF_HD HashCell<T> hash_cell(const HashLevel& level, Vec3<T> position) {
+  HashCell<T> cell;
+  const T resolution = T(level.resolution);
+  uint32_t node[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const T p = position[axis];
+    const bool inside = p >= T(0) && p <= T(1);
+    const T x = (inside ? p : p > T(1) ? T(1) : T(0)) * resolution;
+    node[axis] = min_of(static_cast<uint32_t>(x), static_cast<uint32_t>(level.resolution - 1));
+    cell.f[axis] = p == p ? x - T(node[axis]) : p;  // NaN stays NaN, with an index that exists
+    cell.scale[axis] = inside ? resolution : T(0);
+  }
+  for (int i = 0; i < 8; ++i) {
+    const uint32_t x = node[0] + (i & 1), y = node[1] + (i >> 1 & 1), z = node[2] + (i >> 2);
+    cell.index[i] = level.offset + (level.dense ? dense_index(x, y, z, level.resolution)
+                                                : spatial_hash(x, y, z, static_cast<uint32_t>(level.n_entries)));
+  }
+  return cell;
+}
+
+// Trilinear weight of corner i, and its first and mixed second derivatives in the position.
+// (The pure second derivatives vanish.)
+template <class T> struct CornerWeight {
+  T value;
+  Vec3<T> d;         // d/dx, d/dy, d/dz
+  T dxy, dxz, dyz;
+};
+
+template <class T> SPLITNERF_HD T corner_weight(const HashCell<T>& cell, int i) {
+  return (i & 1 ? cell.f.x : T(1) - cell.f.x) * (i & 2 ? cell.f.y : T(1) - cell.f.y) *
+         (i & 4 ? cell.f.z : T(1) - cell.f.z);
+}
+
+template <class T> SPLITNERF_HD CornerWeight<T> corner_weight_derivatives(const HashCell<T>& cell, int i) {
+  const T wx = i & 1 ? cell.f.x : T(1) - cell.f.x, sx = i & 1 ? cell.scale.x : -cell.scale.x;
+  const T wy = i & 2 ? cell.f.y : T(1) - cell.f.y, sy = i & 2 ? cell.scale.y : -cell.scale.y;
+  const T wz = i & 4 ? cell.f.z : T(1) - cell.f.z, sz = i & 4 ? cell.scale.z : -cell.scale.z;
+  return {wx * wy * wz, {sx * wy * wz, wx * sy * wz, wx * wy * sz}, sx * sy * wz, sx * wy * sz, wx * sy * sz};
+}
+
+}  // namespace splitnerf

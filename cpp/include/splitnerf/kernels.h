@@ -1,0 +1,50 @@
+// The inner loops that are compiled once per instruction set and chosen when first used.
+#pragma once
+
+#include <cstdint>
+
+#include "splitnerf/config.h"
+#include "splitnerf/hash_grid.h"
+
+namespace splitnerf {
+
+template <class T> struct HashEncodeArgs {
+  const HashLevel* levels;
+  int n_features;       // of one level
+  int n_levels;         // all levels: columns of the output = n_levels * n_features
+  int n_active;         // levels [0, n_active) are open
+  int64_t n_points;
+  const T* positions;   // [n, 3] in the unit cube
+  const T* table;       // [n_entries, n_features]
+};
+
+// Weights of all (query, source) pairs of the pre-integration lobe, structure of arrays.
+template <class T> struct LobeSide {
+  const T *x, *y, *z;     // unit directions
+  const T* alpha_squared; // ggx_alpha^2 on the query side, null on the light side
+  const T *r, *g, *b;     // what is summed over this side
+  int64_t n;
+};
+
+template <class T> struct Kernels {
+  const char* name;
+
+  // features [n, C]; jacobian [n, 3, C] or null. Points [begin, end).
+  void (*hash_encode)(const HashEncodeArgs<T>&, int64_t begin, int64_t end, T* features, T* jacobian);
+  // Adds to grad_table. grad_features and grad_jacobian may be null. Level `level`, all points.
+  void (*hash_scatter)(const HashEncodeArgs<T>&, int level, const T* grad_features, const T* grad_jacobian,
+                       T* grad_table);
+  // grad_positions [n, 3], overwritten. Points [begin, end).
+  void (*hash_position_gradient)(const HashEncodeArgs<T>&, int64_t begin, int64_t end, const T* grad_features,
+                                 const T* grad_jacobian, T* grad_positions);
+  // sums[i - begin] = {sum K r, sum K g, sum K b, sum K} over the sources, for queries [begin, end).
+  void (*lobe_gather)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
+  // sums[i - begin] = {sum K r, sum K g, sum K b} over the queries, for lights [begin, end).
+  void (*lobe_scatter)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
+};
+
+// Those for this processor. SPLITNERF_ISA = base | avx2 | avx512 in the environment picks a lower
+// set (a set that the processor lacks is refused with std::runtime_error).
+template <class T> SPLITNERF_API const Kernels<T>& kernels();
+
+}  // namespace splitnerf

@@ -1,0 +1,80 @@
+// NeuS volume rendering of a signed distance function, in log space.
+#pragma once
+
+#include "splitnerf/vec.h"
+
+namespace splitnerf {
+
+template <class T> SPLITNERF_HD T sigmoid(T x) {
+  const T e = std::exp(-std::abs(x));
+  return x >= T(0) ? T(1) / (T(1) + e) : e / (T(1) + e);
+}
+template <class T> SPLITNERF_HD T softplus(T x) { return max_of(x, T(0)) + std::log1p(std::exp(-std::abs(x))); }
+
+// Optical depth of one interval, tau = -log(1 - alpha), alpha = (Phi(f_prev) - Phi(f_next))+ / Phi(f_prev),
+// Phi(f) = sigmoid(s f). In terms of d = s (f_prev - f_next)+ and x = s f_prev,
+//   1 - alpha = Phi(f_next) / Phi(f_prev) = 1 / (1 + X),   X = expm1(d) sigmoid(-x),
+// so tau = log1p(X); for d > 20, where expm1 would overflow, tau = softplus(-s f_next) - softplus(-x).
+// Source: NeuS Eq. (13); the published form adds 1e-5 to both sides of the fraction.
+template <class T> SPLITNERF_HD T neus_optical_depth(T f_prev, T f_next, T s) {
+  const T d = s * (f_prev - f_next);
+  if (!(d > T(0))) return d <= T(0) ? T(0) : d;  // a NaN goes on to the caller
+  if (d > T(20)) return max_of(softplus(-s * f_next) - softplus(-s * f_prev), T(0));
+  return std::log1p(std::expm1(d) * sigmoid(-s * f_prev));
+}
+
+template <class T> struct OpticalDepthGrad {
+  T f_prev, f_next, s;
+};
+// tau = softplus(-s f_next) - softplus(-s f_prev) where f_prev > f_next, else 0.
+template <class T> SPLITNERF_HD OpticalDepthGrad<T> neus_optical_depth_backward(T f_prev, T f_next, T s, T grad_tau) {
+  if (f_prev <= f_next) return {T(0), T(0), T(0)};
+  const T p = sigmoid(-s * f_prev), n = sigmoid(-s * f_next);
+  return {grad_tau * s * p, -grad_tau * s * n, grad_tau * (f_prev * p - f_next * n)};
+}
+
+// Weights w_i = T_i alpha_i of the samples of one ray and its opacity A = sum w = -expm1(-sum tau).
+// Samples behind transmittance < min_transmittance get weight 0.
+template <class T>
+SPLITNERF_HD T neus_ray_weights(const T* f_prev, const T* f_next, T s, int64_t n, T min_transmittance, T* weights) {
+  T depth = T(0);
+  const T depth_limit = min_transmittance > T(0) ? -std::log(min_transmittance) : T(INFINITY);
+  for (int64_t i = 0; i < n; ++i) {
+    if (depth > depth_limit) {
+      weights[i] = T(0);
+      continue;
+    }
+    const T tau = neus_optical_depth(f_prev[i], f_next[i], s);
+    weights[i] = std::exp(-depth) * -std::expm1(-tau);
+    depth += tau;
+  }
+  return -std::expm1(-depth);
+}
+
+// d w_i / d tau_i = T_{i+1};  d w_j / d tau_i = -w_j for j > i;  d A / d tau_i = 1 - A.
+// Walks from the last sample to the first, so that sum_{j > i} grad_j w_j is a running sum.
+// Returns the gradient to s.
+template <class T>
+SPLITNERF_HD T neus_ray_weights_backward(const T* f_prev, const T* f_next, T s, int64_t n, T min_transmittance,
+                                         const T* weights, T opacity, const T* grad_weights, T grad_opacity,
+                                         T* grad_f_prev, T* grad_f_next) {
+  const T depth_limit = min_transmittance > T(0) ? -std::log(min_transmittance) : T(INFINITY);
+  T depth = T(0);
+  int64_t n_live = 0;  // samples that the forward pass looked at; their total depth
+  for (; n_live < n && !(depth > depth_limit); ++n_live) depth += neus_optical_depth(f_prev[n_live], f_next[n_live], s);
+  for (int64_t i = n_live; i < n; ++i) grad_f_prev[i] = grad_f_next[i] = T(0);
+  T behind = T(0), grad_s = T(0);
+  for (int64_t i = n_live - 1; i >= 0; --i) {
+    const T transmittance_after = std::exp(-depth);
+    depth -= neus_optical_depth(f_prev[i], f_next[i], s);
+    const T grad_tau = grad_weights[i] * transmittance_after - behind + grad_opacity * (T(1) - opacity);
+    behind += grad_weights[i] * weights[i];
+    const OpticalDepthGrad<T> g = neus_optical_depth_backward(f_prev[i], f_next[i], s, grad_tau);
+    grad_f_prev[i] = g.f_prev;
+    grad_f_next[i] = g.f_next;
+    grad_s += g.s;
+  }
+  return grad_s;
+}
+
+}  // namespace splitnerf

@@ -1,0 +1,110 @@
+// The operators on the CPU over plain arrays: what the torch glue, gtest and other programs call.
+// All arrays are dense and row-major; T is float or double. Threads come from parallel.h.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "splitnerf/hash_grid.h"
+#include "splitnerf/march.h"
+#include "splitnerf/occlusion.h"
+#include "splitnerf/scene.h"
+#include "splitnerf/split_sum.h"
+
+namespace splitnerf::cpu {
+
+// ---- hash grid. C = n_levels * n_features; columns of closed levels are written as 0. ----
+
+// positions [n, 3], table [n_entries, n_features] -> features [n, C], jacobian [n, 3, C] or null.
+template <class T>
+SPLITNERF_API void hash_encode(const HashGridShape& shape, int n_active, int64_t n, const T* positions, const T* table,
+                               T* features, T* jacobian);
+// grad_features [n, C] and grad_jacobian [n, 3, C] (either may be null) -> grad_table, overwritten.
+// Levels are spread over the threads, so that no two threads write one entry: no atomics, and the same bits each time.
+template <class T>
+SPLITNERF_API void hash_encode_backward(const HashGridShape& shape, int n_active, int64_t n, const T* positions,
+                                        const T* grad_features, const T* grad_jacobian, T* grad_table);
+template <class T>
+SPLITNERF_API void hash_encode_backward_positions(const HashGridShape& shape, int n_active, int64_t n,
+                                                  const T* positions, const T* table, const T* grad_features,
+                                                  const T* grad_jacobian, T* grad_positions);
+
+// ---- shading; lut: brdf_lut()'s layout ----
+
+template <class T>
+SPLITNERF_API void query_direction(const float* lut, bool mean, int64_t n, const T* normals, const T* view_dirs,
+                                   const T* roughness, T* directions);
+template <class T>
+SPLITNERF_API void query_direction_backward(const float* lut, bool mean, int64_t n, const T* normals,
+                                            const T* view_dirs, const T* roughness, const T* grad_directions,
+                                            T* grad_normals, T* grad_view_dirs, T* grad_roughness);
+
+// The fields of ShadePoint as arrays; occlusion factors are [n, n_channels] with n_channels 1 or 3.
+template <class T> struct ShadeArrays {
+  T *normals, *view_dirs, *albedo, *roughness, *metallic, *specular, *diffuse, *occlusion_s, *occlusion_d;
+};
+template <class T>
+SPLITNERF_API void split_sum_shade(const float* lut, ShadeOptions options, int64_t n, int n_channels,
+                                   const ShadeArrays<const T>& in, T* radiance);
+template <class T>
+SPLITNERF_API void split_sum_shade_backward(const float* lut, ShadeOptions options, int64_t n, int n_channels,
+                                            const ShadeArrays<const T>& in, const T* grad_radiance,
+                                            const ShadeArrays<T>& grad);
+
+// ---- pre-integrated light ----
+
+// query_dirs [s, 3], roughness [s], light_dirs [n, 3], light [n, 3] -> gbar [s, 3], total [s] (sum of
+// the weights, for the backward pass). Memory O(s + n).
+template <class T>
+SPLITNERF_API void prefilter_light(int64_t n_queries, const T* query_dirs, const T* roughness, int64_t n_lights,
+                                   const T* light_dirs, const T* light, T* gbar, T* total);
+template <class T>
+SPLITNERF_API void prefilter_light_backward(int64_t n_queries, const T* query_dirs, const T* roughness, const T* total,
+                                            const T* grad_gbar, int64_t n_lights, const T* light_dirs, T* grad_light);
+
+// axes [n, 3], roughness [n] -> directions [n, n_samples, 3] with density proportional to D(w)(w.axis)+: the
+// mean of the light over them is gbar without weights. A shifted Fibonacci lattice for each axis.
+template <class T>
+SPLITNERF_API void sample_ggx_lobe(int64_t n, const T* axes, const T* roughness, int n_samples, uint32_t seed,
+                                   T* directions);
+
+// ---- rays ----
+
+// jitter [n_rays] in [0, 1). offsets [n_rays + 1] is filled with the exclusive sum of the counts.
+template <class T>
+SPLITNERF_API void march_rays_count(const MarchOptions& options, const uint8_t* cells, int64_t n_rays, const T* rays_o,
+                                    const T* rays_d, const T* jitter, int64_t* offsets);
+template <class T>
+SPLITNERF_API void march_rays_fill(const MarchOptions& options, const uint8_t* cells, int64_t n_rays, const T* rays_o,
+                                   const T* rays_d, const T* jitter, const int64_t* offsets, int64_t* ray_indices,
+                                   T* t_starts, T* t_ends);
+
+// f_prev, f_next [n], offsets [n_rays + 1] -> weights [n], opacity [n_rays].
+template <class T>
+SPLITNERF_API void neus_weights(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s,
+                                T min_transmittance, T* weights, T* opacity);
+// grad_s_rays [n_rays]: each ray's share of the gradient to s.
+template <class T>
+SPLITNERF_API void neus_weights_backward(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s,
+                                         T min_transmittance, const T* weights, const T* opacity,
+                                         const T* grad_weights, const T* grad_opacity, T* grad_f_prev, T* grad_f_next,
+                                         T* grad_s_rays);
+
+// weights [n], values [n, c] -> sums [n_rays, c].
+template <class T>
+SPLITNERF_API void composite(int64_t n_rays, int64_t n_channels, const int64_t* offsets, const T* weights,
+                             const T* values, T* sums);
+template <class T>
+SPLITNERF_API void composite_backward(int64_t n_rays, int64_t n_channels, const int64_t* offsets, const T* weights,
+                                      const T* values, const T* grad_sums, T* grad_weights, T* grad_values);
+
+// ---- occlusion ----
+
+// positions, normals, lobe_dirs [n, 3], roughness [n], environment [height, width, 3] (radiance at
+// rho = 0, equirectangular) -> occlusion_d, occlusion_s [n, 3]. Each thread holds one point's rays.
+template <class T>
+SPLITNERF_API void occlusion_factors(const Scene& scene, const OcclusionOptions& options, int64_t n, const T* positions,
+                                     const T* normals, const T* lobe_dirs, const T* roughness, int height, int width,
+                                     const T* environment, T* occlusion_d, T* occlusion_s);
+
+}  // namespace splitnerf::cpu

@@ -1,0 +1,64 @@
+// Forward path tracer for metallic-roughness meshes under an environment light: renders the demo
+// data and relights assets, and is the ground truth that split-sum shading approximates.
+//
+// BSDF, as Blender's Principled reads a glTF material (F0 = .04 (1 - m) + m albedo):
+//   f = D V F(v.h) gain + (1 - m)(1 - E) albedo / pi
+//   gain = 1 + F0 (1 / (F1 + F2) - 1),  E = (F0 F1 + F2) gain
+// with GGX D, height-correlated Smith V and the table of split_sum.h; gain restores the energy of
+// multiple scattering (Turquin 2019).
+#pragma once
+
+#include <cstdint>
+
+#include "splitnerf/config.h"
+#include "splitnerf/scene.h"
+
+namespace splitnerf {
+
+// Pinhole camera; OpenGL axes (x right, y up, looking along -z), pixel centres at +0.5.
+struct Camera {
+  float camera_to_world[12];  // row-major [3, 4]
+  float fx, fy, cx, cy;       // pixels
+  int width, height;          // pixels
+};
+
+// Materials and normals of a mesh. All arrays are read during the call only.
+struct Surface {
+  const float* albedo;     // [n, 3] linear, in [0, 1]
+  const float* roughness;  // [n] perceptual, in [0, 1]
+  const float* metallic;   // [n] in [0, 1]
+  bool per_triangle;       // n = number of triangles; else one entry a vertex, interpolated
+  const float* normals;    // [n_vertices, 3] shading normals, or null for flat shading
+};
+
+// Equirectangular map, see environment.h.
+struct EnvironmentMap {
+  const float* radiance;  // [height, width, 3] linear, finite, not negative
+  int height, width;
+};
+
+struct PathTracerParams {
+  int samples_per_pixel = 64;  // paths a pixel, jittered over the pixel's box
+  int max_bounces = 4;         // scattering events after the first one; 0: direct light only
+  uint32_t seed = 0;           // equal seeds give equal images, whatever the number of threads
+  bool light_sampling = true;  // sample the light too, combined by multiple importance sampling
+};
+
+// Outputs, all required. The features are those of the first hit, averaged over the sub-samples
+// that hit the mesh, and 0 where none does.
+struct RenderTargets {
+  float* radiance;   // [height, width, 3] linear, premultiplied by alpha
+  float* alpha;      // [height, width] covered fraction of the pixel; the light itself is transparent
+  float* albedo;     // [height, width, 3]
+  float* roughness;  // [height, width]
+  float* metallic;   // [height, width]
+  float* normal;     // [height, width, 3] world space, shading normal turned to the camera
+  float* depth;      // [height, width] distance from the camera's centre along the ray
+};
+
+// Throws std::invalid_argument for unusable inputs and std::runtime_error for a path whose
+// radiance is not finite.
+SPLITNERF_API void render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment,
+                          const Camera& camera, const PathTracerParams& params, const RenderTargets& targets);
+
+}  // namespace splitnerf

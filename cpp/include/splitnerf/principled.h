@@ -1,0 +1,60 @@
+// The metallic-roughness BSDF in the local frame of a shading point (normal along +z): value,
+// sampling and density. See path_tracer.h for the equations.
+#pragma once
+
+#include "splitnerf/sampling.h"
+#include "splitnerf/split_sum.h"
+
+namespace splitnerf {
+
+template <class T> struct BsdfValue {
+  Vec3<T> f_cos;  // f (n.l), sr^-1
+  T pdf;          // density of sample() at l, sr^-1
+};
+
+template <class T> class PrincipledBsdf {
+ public:
+  // view: unit, local, view.z > 0, towards the viewer.
+  SPLITNERF_HD PrincipledBsdf(const float* lut, Vec3<T> albedo, T roughness, T metallic, Vec3<T> view)
+      : view_(view), ggx_alpha_(max_of(ggx_alpha_from_roughness(roughness), T(1e-3))) {
+    // Below ggx_alpha = 1e-3 rounding of h in float dominates D.
+    const Vec3<T> table = lookup_brdf_lut(lut, view.z, roughness);
+    Vec3<T> directional;
+    for (int c = 0; c < 3; ++c) {
+      f0_[c] = T(kDielectricF0) * (T(1) - metallic) + metallic * albedo[c];
+      directional[c] = specular_albedo(f0_[c], table.x, table.y, true).value;
+      const T single = specular_albedo(f0_[c], table.x, table.y, false).value;
+      gain_[c] = single > T(0) ? directional[c] / single : T(1);
+      diffuse_[c] = (T(1) - metallic) * max_of(T(1) - directional[c], T(0)) * albedo[c];
+    }
+    // Each lobe is sampled in proportion to what it reflects.
+    specular_probability_ = sum(directional) / max_of(sum(directional) + sum(diffuse_), T(1e-20));
+  }
+
+  SPLITNERF_HD BsdfValue<T> evaluate(Vec3<T> light) const {
+    if (!(light.z > T(0))) return {{T(0), T(0), T(0)}, T(0)};
+    const Vec3<T> h = normalize(view_ + light);
+    const T v_dot_h = dot(view_, h);
+    const T d_v = ggx_d(ggx_alpha_, h.x * h.x + h.y * h.y) * smith_v(ggx_alpha_, view_.z, light.z);
+    const T cosine_pdf = pdf_cosine_hemisphere(light.z);
+    BsdfValue<T> out;
+    for (int c = 0; c < 3; ++c) {
+      out.f_cos[c] = d_v * schlick(f0_[c], v_dot_h) * gain_[c] * light.z + diffuse_[c] * cosine_pdf;
+    }
+    out.pdf = lerp(cosine_pdf, pdf_ggx_vndf(view_, h, ggx_alpha_), specular_probability_);
+    return out;
+  }
+
+  // A direction from the mixture of both lobes; it may lie below the horizon, where evaluate()
+  // returns zero.
+  SPLITNERF_HD Vec3<T> sample(T u_lobe, T u1, T u2) const {
+    if (u_lobe >= specular_probability_) return sample_cosine_hemisphere(u1, u2);
+    return reflect(sample_ggx_vndf(view_, u1, u2, ggx_alpha_), view_);
+  }
+
+ private:
+  Vec3<T> view_, f0_, gain_, diffuse_;
+  T ggx_alpha_, specular_probability_;
+};
+
+}  // namespace splitnerf

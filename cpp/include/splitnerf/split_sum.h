@@ -1,0 +1,238 @@
+// Split-sum shading: the F1 / F2 / chi table, the direction at which the pre-integrated light is
+// asked, and the shading of one point, each with its adjoint directly below it.
+//
+// Source: SplitNeRF Eq. (6)-(10), (17); Karis 2013 for the split sum.
+#pragma once
+
+#include "splitnerf/ggx.h"
+#include "splitnerf/vec.h"
+
+namespace splitnerf {
+
+inline constexpr int kLutSize = 32;        // texels along sqrt(n.v) and along roughness
+inline constexpr double kMinNdotV = 1e-4;  // n.v is clamped to [kMinNdotV, 1]
+
+// [kLutSize roughness][kLutSize sqrt(n.v)][F1, F2, chi] float32, computed once per process.
+// Texel i stands at i / (kLutSize - 1) on both axes.
+//   F1 = int D V (1 - (1 - v.h)^5) 4 ... dl,  F2 the same with (1 - v.h)^5:  E = F0 F1 + F2
+//   chi places the mean direction of the lobe between normal and reflection, see query_direction.
+SPLITNERF_API const float* brdf_lut();
+
+// One entry of the table by quadrature over n_u x n_phi microfacet normals. F1, F2, chi.
+SPLITNERF_API Vec3<double> integrate_brdf(double n_dot_v, double roughness, int n_u, int n_phi);
+
+// Values and partial derivatives of the table at one point.
+template <class T> struct LutSample {
+  Vec3<T> value;        // F1, F2, chi
+  Vec3<T> d_n_dot_v;    // d value / d n.v, zero where n.v is clamped
+  Vec3<T> d_roughness;  // d value / d roughness, zero outside [0, 1]
+};
+
+// Bilinear in (sqrt(n.v), roughness).
+template <class T> SPLITNERF_HD LutSample<T> sample_brdf_lut(const float* lut, T n_dot_v, T roughness) {
+  const T nv = clamp(n_dot_v, T(kMinNdotV), T(1));
+  const T root = std::sqrt(nv);
+  const T x = root * T(kLutSize - 1), y = clamp(roughness, T(0), T(1)) * T(kLutSize - 1);
+  const int x0 = clamp(static_cast<int>(x), 0, kLutSize - 2), y0 = clamp(static_cast<int>(y), 0, kLutSize - 2);
+  const T fx = x - T(x0), fy = y - T(y0);
+  const bool nv_free = n_dot_v > T(kMinNdotV) && n_dot_v < T(1);
+  const bool roughness_free = roughness >= T(0) && roughness <= T(1);
+  const T dx = nv_free ? T(kLutSize - 1) * T(0.5) / root : T(0), dy = roughness_free ? T(kLutSize - 1) : T(0);
+  const float* row0 = lut + (y0 * kLutSize + x0) * 3;
+  const float* row1 = row0 + kLutSize * 3;
+  LutSample<T> s;
+  for (int c = 0; c < 3; ++c) {
+    const T a = lerp(T(row0[c]), T(row0[c + 3]), fx), b = lerp(T(row1[c]), T(row1[c + 3]), fx);
+    s.value[c] = lerp(a, b, fy);
+    s.d_n_dot_v[c] = lerp(T(row0[c + 3]) - T(row0[c]), T(row1[c + 3]) - T(row1[c]), fy) * dx;
+    s.d_roughness[c] = (b - a) * dy;
+  }
+  return s;
+}
+
+template <class T> SPLITNERF_HD Vec3<T> lookup_brdf_lut(const float* lut, T n_dot_v, T roughness) {
+  return sample_brdf_lut(lut, n_dot_v, roughness).value;
+}
+
+// ---- the direction at which g is asked -------------------------------------------------------
+//
+// g assumes n = v = w_r. Asking it at the mean direction of the true lobe,
+//   d = normalize((1 - k) n + k w_r),  k = lerp(1, chi(n.v, roughness), smoothstep(.3, .4, roughness)),
+// removes most of that assumption's error; k = 1 (w_r itself) is the paper's form. The normal is
+// turned towards the viewer first.
+
+template <class T> SPLITNERF_HD T smoothstep(T lo, T hi, T x) {
+  const T t = clamp((x - lo) / (hi - lo), T(0), T(1));
+  return t * t * (T(3) - T(2) * t);
+}
+template <class T> SPLITNERF_HD T smoothstep_derivative(T lo, T hi, T x) {
+  const T t = clamp((x - lo) / (hi - lo), T(0), T(1));
+  return T(6) * t * (T(1) - t) / (hi - lo);
+}
+
+// +1 where the normal faces the viewer, -1 where it must be turned.
+template <class T> SPLITNERF_HD T facing(Vec3<T> normal, Vec3<T> view) { return dot(normal, view) < T(0) ? T(-1) : T(1); }
+
+template <class T> SPLITNERF_HD Vec3<T> reflect(Vec3<T> normal, Vec3<T> view) {
+  return normal * (T(2) * dot(normal, view)) - view;
+}
+
+inline constexpr double kQueryBlendStart = 0.3, kQueryBlendEnd = 0.4;
+
+template <class T>
+SPLITNERF_HD Vec3<T> query_direction(const float* lut, bool mean, Vec3<T> normal, Vec3<T> view, T roughness) {
+  const Vec3<T> n = normal * facing(normal, view);
+  const Vec3<T> w_r = reflect(n, view);
+  if (!mean) return w_r;
+  const T blend = smoothstep(T(kQueryBlendStart), T(kQueryBlendEnd), roughness);
+  const T k = lerp(T(1), lookup_brdf_lut(lut, dot(n, view), roughness).z, blend);
+  return normalize(n * (T(1) - k) + w_r * k);
+}
+
+template <class T> struct QueryDirectionGrad {
+  Vec3<T> normal, view;
+  T roughness;
+};
+
+template <class T>
+SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bool mean, Vec3<T> normal, Vec3<T> view,
+                                                            T roughness, Vec3<T> grad) {
+  const T sign = facing(normal, view);
+  const Vec3<T> n = normal * sign;
+  const T nv = dot(n, view);
+  const Vec3<T> w_r = reflect(n, view);
+  QueryDirectionGrad<T> out{{T(0), T(0), T(0)}, {T(0), T(0), T(0)}, T(0)};
+  Vec3<T> grad_n{T(0), T(0), T(0)}, grad_w_r = grad;
+  T grad_nv = T(0);
+  if (mean) {
+    const T lo = T(kQueryBlendStart), hi = T(kQueryBlendEnd), blend = smoothstep(lo, hi, roughness);
+    const LutSample<T> s = sample_brdf_lut(lut, nv, roughness);
+    const T k = lerp(T(1), s.value.z, blend);
+    // d = normalize(n (1 - k) + w_r k)
+    const Vec3<T> grad_a = normalize_backward(n * (T(1) - k) + w_r * k, grad);
+    grad_n = grad_a * (T(1) - k);
+    grad_w_r = grad_a * k;
+    // k = 1 + blend (chi - 1)
+    const T grad_k = dot(grad_a, w_r - n);
+    grad_nv = grad_k * blend * s.d_n_dot_v.z;
+    out.roughness = grad_k * (smoothstep_derivative(lo, hi, roughness) * (s.value.z - T(1)) + blend * s.d_roughness.z);
+  }
+  // w_r = 2 nv n - view,  nv = n . view
+  grad_n += grad_w_r * (T(2) * nv);
+  grad_nv += T(2) * dot(grad_w_r, n);
+  out.view = view * T(0) - grad_w_r + n * grad_nv;
+  grad_n += view * grad_nv;
+  out.normal = grad_n * sign;
+  return out;
+}
+
+// ---- shading ---------------------------------------------------------------------------------
+
+enum class FresnelMode : int { kExact = 0, kPaper = 1, kCode = 2 };
+
+struct ShadeOptions {
+  FresnelMode fresnel = FresnelMode::kExact;
+  // Multiple-scattering energy compensation E [1 + F0 (1 / (F1 + F2) - 1)], what Blender's
+  // Principled BSDF does. Source: Turquin 2019, Eq. (16).
+  bool compensate = false;
+};
+
+inline constexpr double kDielectricF0 = 0.04;
+
+// Effective Fresnel colour Fr of one channel that multiplies F1, and its partial derivatives.
+//   exact: Fr = F0 (F1 and F2 already hold Schlick's term)
+//   paper: Fr = F0 + (1 - rho - F0)(1 - n.v)^5                     SplitNeRF Eq. (7)
+//   code:  Fr = F0 + (max(1 - rho, F0) - F0)(1 - n.v)^5            the released code
+template <class T> struct FresnelTerm {
+  T value, d_f0, d_roughness, d_n_dot_v;
+};
+template <class T> SPLITNERF_HD FresnelTerm<T> fresnel_term(FresnelMode mode, T f0, T roughness, T n_dot_v) {
+  if (mode == FresnelMode::kExact) return {f0, T(1), T(0), T(0)};
+  const T c = clamp(T(1) - n_dot_v, T(0), T(1)), c5 = pow5(c);
+  const T smooth = T(1) - roughness;
+  const bool floored = mode == FresnelMode::kCode && smooth < f0;
+  const T edge = (floored ? f0 : smooth) - f0;
+  const bool nv_free = n_dot_v > T(0) && n_dot_v < T(1);
+  return {f0 + edge * c5, floored ? T(1) : T(1) - c5, floored ? T(0) : -c5,
+          nv_free ? T(-5) * edge * square(c * c) : T(0)};
+}
+
+// Directional albedo E of the specular lobe for one channel, and its partial derivatives.
+//   E0 = Fr F1 + F2;  E = E0 or, compensated, E0 (1 + Fr (1 / (F1 + F2) - 1))
+template <class T> struct SpecularAlbedo {
+  T value, d_fr, d_f1, d_f2;
+};
+template <class T> SPLITNERF_HD SpecularAlbedo<T> specular_albedo(T fr, T f1, T f2, bool compensate) {
+  const T single = fr * f1 + f2;
+  if (!compensate) return {single, f1, fr, T(1)};
+  const T inv_s = T(1) / (f1 + f2), gain = T(1) + fr * (inv_s - T(1)), d_s = -single * fr * inv_s * inv_s;
+  return {single * gain, f1 * gain + single * (inv_s - T(1)), fr * gain + d_s, gain + d_s};
+}
+
+template <class T> struct ShadePoint {
+  Vec3<T> normal, view, albedo;
+  T roughness, metallic;
+  Vec3<T> specular, diffuse;              // g(query direction, roughness) and g(n, 1)
+  Vec3<T> occlusion_s, occlusion_d;       // the paper's o: 1 = open
+};
+
+// L = o_d (1 - m)(1 - E) albedo g(n, 1) + o_s E g(d, rho), with F0 = .04 (1 - m) + m albedo.
+// paper and code modes use k_d = (1 - m)(1 - Fr).        Source: SplitNeRF Eq. (6)-(10), (17).
+template <class T> SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, const ShadePoint<T>& p) {
+  const T nv = dot(p.normal, p.view) * facing(p.normal, p.view), m = p.metallic;
+  const Vec3<T> table = lookup_brdf_lut(lut, nv, p.roughness);
+  Vec3<T> radiance;
+  for (int c = 0; c < 3; ++c) {
+    const T f0 = T(kDielectricF0) * (T(1) - m) + m * p.albedo[c];
+    const T fr = fresnel_term(options.fresnel, f0, p.roughness, nv).value;
+    const T e = specular_albedo(fr, table.x, table.y, options.compensate).value;
+    const T k_d = (T(1) - m) * (T(1) - (options.fresnel == FresnelMode::kExact ? e : fr));
+    radiance[c] = p.occlusion_d[c] * k_d * p.albedo[c] * p.diffuse[c] + p.occlusion_s[c] * e * p.specular[c];
+  }
+  return radiance;
+}
+
+// Gradients to every field of the point; recomputes the forward pass and so needs nothing saved.
+template <class T>
+SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptions options, const ShadePoint<T>& p,
+                                                    Vec3<T> grad) {
+  const T sign = facing(p.normal, p.view), nv = dot(p.normal, p.view) * sign, m = p.metallic;
+  const LutSample<T> table = sample_brdf_lut(lut, nv, p.roughness);
+  const bool exact = options.fresnel == FresnelMode::kExact;
+  ShadePoint<T> out{};
+  T grad_f1 = T(0), grad_f2 = T(0), grad_nv = T(0);
+  for (int c = 0; c < 3; ++c) {
+    const T albedo = p.albedo[c], l_d = p.diffuse[c], l_s = p.specular[c], o_d = p.occlusion_d[c], o_s = p.occlusion_s[c];
+    const T f0 = T(kDielectricF0) * (T(1) - m) + m * albedo;
+    const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
+    const SpecularAlbedo<T> e = specular_albedo(fr.value, table.value.x, table.value.y, options.compensate);
+    const T kept = T(1) - (exact ? e.value : fr.value), k_d = (T(1) - m) * kept;
+    // radiance = o_d k_d albedo l_d + o_s e l_s
+    const T g = grad[c];
+    out.occlusion_d[c] = g * k_d * albedo * l_d;
+    out.occlusion_s[c] = g * e.value * l_s;
+    out.diffuse[c] = g * o_d * k_d * albedo;
+    out.specular[c] = g * o_s * e.value;
+    const T grad_k_d = g * o_d * albedo * l_d;
+    // k_d = (1 - m)(1 - e) or (1 - m)(1 - fr)
+    const T grad_kept = grad_k_d * (T(1) - m);
+    const T grad_e = g * o_s * l_s - (exact ? grad_kept : T(0));
+    const T grad_fr = grad_e * e.d_fr - (exact ? T(0) : grad_kept);
+    // f0 = .04 (1 - m) + m albedo
+    const T grad_f0 = grad_fr * fr.d_f0;
+    out.albedo[c] = g * o_d * k_d * l_d + grad_f0 * m;
+    out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - grad_k_d * kept;
+    out.roughness += grad_fr * fr.d_roughness;
+    grad_nv += grad_fr * fr.d_n_dot_v;
+    grad_f1 += grad_e * e.d_f1;
+    grad_f2 += grad_e * e.d_f2;
+  }
+  // F1, F2 = table(n.v, roughness)
+  out.roughness += grad_f1 * table.d_roughness.x + grad_f2 * table.d_roughness.y;
+  grad_nv += grad_f1 * table.d_n_dot_v.x + grad_f2 * table.d_n_dot_v.y;
+  out.normal = p.view * (sign * grad_nv);
+  out.view = p.normal * (sign * grad_nv);
+  return out;
+}
+
+}  // namespace splitnerf

@@ -1,0 +1,18 @@
+#include "kernel_set.h"
+
+#define SPLITNERF_NAME_OF(isa) #isa
+#define SPLITNERF_NAME(isa) SPLITNERF_NAME_OF(isa)
+
+namespace splitnerf::SPLITNERF_ISA {
+
+Kernels<float> kernels_float32() {
+  return {SPLITNERF_NAME(SPLITNERF_ISA), hash_encode<float>, hash_scatter<float>, hash_position_gradient<float>,
+          lobe_gather<float>, lobe_scatter<float>};
+}
+
+Kernels<double> kernels_float64() {
+  return {SPLITNERF_NAME(SPLITNERF_ISA), hash_encode<double>, hash_scatter<double>, hash_position_gradient<double>,
+          lobe_gather<double>, lobe_scatter<double>};
+}
+
+}  // namespace splitnerf::SPLITNERF_ISA

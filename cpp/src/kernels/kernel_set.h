@@ -1,0 +1,21 @@
+// Declares the kernels inside the namespace of the instruction set that this file is compiled for.
+#pragma once
+
+#include "splitnerf/kernels.h"
+
+#ifndef SPLITNERF_ISA
+#define SPLITNERF_ISA base
+#endif
+
+namespace splitnerf::SPLITNERF_ISA {
+
+template <class T> void hash_encode(const HashEncodeArgs<T>&, int64_t, int64_t, T*, T*);
+template <class T> void hash_scatter(const HashEncodeArgs<T>&, int, const T*, const T*, T*);
+template <class T> void hash_position_gradient(const HashEncodeArgs<T>&, int64_t, int64_t, const T*, const T*, T*);
+template <class T> void lobe_gather(const LobeSide<T>&, const LobeSide<T>&, int64_t, int64_t, T*);
+template <class T> void lobe_scatter(const LobeSide<T>&, const LobeSide<T>&, int64_t, int64_t, T*);
+
+Kernels<float> kernels_float32();
+Kernels<double> kernels_float64();
+
+}  // namespace splitnerf::SPLITNERF_ISA

@@ -1,0 +1,84 @@
+#include "splitnerf/occlusion.h"
+
+#include <vector>
+
+#include "splitnerf/environment.h"
+#include "splitnerf/ops_cpu.h"
+#include "splitnerf/parallel.h"
+#include "splitnerf/sampling.h"
+
+namespace splitnerf::cpu {
+namespace {
+
+constexpr int64_t kGrain = 32;  // points
+
+// The rays of one point, traced together so that Embree's packets are coherent.
+template <class T> class RayFan {
+ public:
+  RayFan(const Scene& scene, int height, int width, const T* environment)
+      : scene_(scene), height_(height), width_(width), environment_(environment) {}
+
+  // Factor over n_rays directions frame.to_world(sample(u1, u2)) that leave `origin` above the
+  // horizon of `normal`.
+  template <class Sampler>
+  Vec3<T> factor(Vec3<T> origin, Vec3<T> normal, const Frame<T>& frame, int n_rays, Vec2<T> shift, Sampler sample) {
+    origins_.resize(3 * n_rays), directions_.resize(3 * n_rays), active_.resize(n_rays), visible_.resize(n_rays);
+    for (int i = 0; i < n_rays; ++i) {
+      const Vec2<T> u = fibonacci_lattice<T>(i, n_rays, shift);
+      const Vec3<T> w = frame.to_world(sample(u.x, u.y));
+      active_[i] = dot(w, normal) > T(0);
+      for (int c = 0; c < 3; ++c) {
+        origins_[3 * i + c] = static_cast<float>(origin[c]);
+        directions_[3 * i + c] = static_cast<float>(w[c]);
+      }
+    }
+    scene_.trace_visibility(origins_.data(), directions_.data(), n_rays, INFINITY, active_.data(), visible_.data());
+    OcclusionSum<T> total;
+    for (int i = 0; i < n_rays; ++i) {
+      if (!active_[i]) continue;
+      const Vec3<float> w = load3(&directions_[3 * i]);
+      total.add(lookup_environment(environment_, height_, width_, Vec3<T>{T(w.x), T(w.y), T(w.z)}), visible_[i]);
+    }
+    return total.factor();
+  }
+
+ private:
+  const Scene& scene_;
+  int height_, width_;
+  const T* environment_;
+  std::vector<float> origins_, directions_;
+  std::vector<uint8_t> active_, visible_;
+};
+
+}  // namespace
+
+template <class T>
+void occlusion_factors(const Scene& scene, const OcclusionOptions& options, int64_t n, const T* positions,
+                       const T* normals, const T* lobe_dirs, const T* roughness, int height, int width,
+                       const T* environment, T* occlusion_d, T* occlusion_s) {
+  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
+    RayFan<T> fan(scene, height, width, environment);
+    for (int64_t i = begin; i < end; ++i) {
+      const auto counter = static_cast<uint32_t>(i);
+      const auto shift = [&](uint32_t dimension) {
+        return Vec2<T>{random_unit<T>(options.seed, counter, dimension), random_unit<T>(options.seed, counter, dimension + 1)};
+      };
+      const Vec3<T> normal = load3(normals + 3 * i), axis = load3(lobe_dirs + 3 * i);
+      const Vec3<T> origin = load3(positions + 3 * i) + normal * T(options.offset);
+      const T ggx_alpha = ggx_alpha_from_roughness(roughness[i]);
+      store3(occlusion_d + 3 * i, fan.factor(origin, normal, Frame<T>(normal), options.n_diffuse_rays, shift(0),
+                                             [](T u1, T u2) { return sample_cosine_hemisphere(u1, u2); }));
+      store3(occlusion_s + 3 * i, fan.factor(origin, normal, Frame<T>(axis), options.n_specular_rays, shift(2),
+                                             [&](T u1, T u2) { return splitnerf::sample_ggx_lobe(u1, u2, ggx_alpha); }));
+    }
+  });
+}
+
+#define SPLITNERF_INSTANTIATE(T)                                                                                 \
+  template void occlusion_factors<T>(const Scene&, const OcclusionOptions&, int64_t, const T*, const T*, const T*, \
+                                     const T*, int, int, const T*, T*, T*);
+SPLITNERF_INSTANTIATE(float)
+SPLITNERF_INSTANTIATE(double)
+#undef SPLITNERF_INSTANTIATE
+
+}  // namespace splitnerf::cpu

@@ -1,0 +1,111 @@
+#include <algorithm>
+
+#include "splitnerf/neus.h"
+#include "splitnerf/ops_cpu.h"
+#include "splitnerf/parallel.h"
+
+namespace splitnerf::cpu {
+namespace {
+
+constexpr int64_t kGrain = 64;  // rays
+
+}  // namespace
+
+template <class T>
+void march_rays_count(const MarchOptions& options, const uint8_t* cells, int64_t n_rays, const T* rays_o,
+                      const T* rays_d, const T* jitter, int64_t* offsets) {
+  parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t r = begin; r < end; ++r)
+      offsets[r + 1] = march_ray(load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], cells, options, [](T, T) {});
+  });
+  offsets[0] = 0;
+  for (int64_t r = 0; r < n_rays; ++r) offsets[r + 1] += offsets[r];
+}
+
+template <class T>
+void march_rays_fill(const MarchOptions& options, const uint8_t* cells, int64_t n_rays, const T* rays_o,
+                     const T* rays_d, const T* jitter, const int64_t* offsets, int64_t* ray_indices, T* t_starts,
+                     T* t_ends) {
+  parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t r = begin; r < end; ++r) {
+      int64_t i = offsets[r];
+      march_ray(load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], cells, options, [&](T t_start, T t_end) {
+        ray_indices[i] = r;
+        t_starts[i] = t_start;
+        t_ends[i] = t_end;
+        ++i;
+      });
+    }
+  });
+}
+
+template <class T>
+void neus_weights(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s, T min_transmittance,
+                  T* weights, T* opacity) {
+  parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t r = begin; r < end; ++r) {
+      const int64_t first = offsets[r], n = offsets[r + 1] - first;
+      opacity[r] = neus_ray_weights(f_prev + first, f_next + first, s, n, min_transmittance, weights + first);
+    }
+  });
+}
+
+template <class T>
+void neus_weights_backward(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s,
+                           T min_transmittance, const T* weights, const T* opacity, const T* grad_weights,
+                           const T* grad_opacity, T* grad_f_prev, T* grad_f_next, T* grad_s_rays) {
+  parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t r = begin; r < end; ++r) {
+      const int64_t first = offsets[r], n = offsets[r + 1] - first;
+      grad_s_rays[r] = neus_ray_weights_backward(f_prev + first, f_next + first, s, n, min_transmittance,
+                                                 weights + first, opacity[r], grad_weights + first, grad_opacity[r],
+                                                 grad_f_prev + first, grad_f_next + first);
+    }
+  });
+}
+
+template <class T>
+void composite(int64_t n_rays, int64_t n_channels, const int64_t* offsets, const T* weights, const T* values, T* sums) {
+  parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t r = begin; r < end; ++r) {
+      T* out = sums + r * n_channels;
+      std::fill(out, out + n_channels, T(0));
+      for (int64_t i = offsets[r]; i < offsets[r + 1]; ++i)
+        for (int64_t c = 0; c < n_channels; ++c) out[c] += weights[i] * values[i * n_channels + c];
+    }
+  });
+}
+
+template <class T>
+void composite_backward(int64_t n_rays, int64_t n_channels, const int64_t* offsets, const T* weights, const T* values,
+                        const T* grad_sums, T* grad_weights, T* grad_values) {
+  parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t r = begin; r < end; ++r) {
+      const T* g = grad_sums + r * n_channels;
+      for (int64_t i = offsets[r]; i < offsets[r + 1]; ++i) {
+        T grad_weight = T(0);
+        for (int64_t c = 0; c < n_channels; ++c) {
+          grad_weight += g[c] * values[i * n_channels + c];
+          grad_values[i * n_channels + c] = g[c] * weights[i];
+        }
+        grad_weights[i] = grad_weight;
+      }
+    }
+  });
+}
+
+#define SPLITNERF_INSTANTIATE(T)                                                                                      \
+  template void march_rays_count<T>(const MarchOptions&, const uint8_t*, int64_t, const T*, const T*, const T*,       \
+                                    int64_t*);                                                                        \
+  template void march_rays_fill<T>(const MarchOptions&, const uint8_t*, int64_t, const T*, const T*, const T*,        \
+                                   const int64_t*, int64_t*, T*, T*);                                                 \
+  template void neus_weights<T>(int64_t, const int64_t*, const T*, const T*, T, T, T*, T*);                           \
+  template void neus_weights_backward<T>(int64_t, const int64_t*, const T*, const T*, T, T, const T*, const T*,       \
+                                         const T*, const T*, T*, T*, T*);                                             \
+  template void composite<T>(int64_t, int64_t, const int64_t*, const T*, const T*, T*);                               \
+  template void composite_backward<T>(int64_t, int64_t, const int64_t*, const T*, const T*, const T*, T*, T*);
+SPLITNERF_INSTANTIATE(float)
+SPLITNERF_INSTANTIATE(double)
+#undef SPLITNERF_INSTANTIATE
+
+}  // namespace splitnerf::cpu

@@ -1,0 +1,23 @@
+// What every Scene holds, whichever library traces it.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "splitnerf/scene.h"
+
+namespace splitnerf {
+
+struct Scene::Impl {
+  // Copies and validates the mesh; throws std::invalid_argument.
+  Impl(const float* vertices, int64_t n_vertices, const int32_t* triangles, int64_t n_triangles);
+
+  int64_t n_vertices, n_triangles;
+  std::vector<float> vertices;     // n_vertices * 3 and one float of padding: Embree loads 16 bytes a vertex
+  std::vector<int32_t> triangles;  // n_triangles * 3
+  std::shared_ptr<void> tracer;    // the acceleration structure, owned through its own deleter
+};
+
+TraceCallback trace_callback();  // what set_trace_callback registered last, or null
+
+}  // namespace splitnerf

@@ -1,0 +1,39 @@
+// Scene in a build without Embree: rays go to the callback that the Python module registers.
+#include <stdexcept>
+#include <vector>
+
+#include "scene_impl.h"
+
+namespace splitnerf {
+
+Scene::Scene(const float* vertices, int64_t n_vertices, const int32_t* triangles, int64_t n_triangles)
+    : impl_(std::make_unique<Impl>(vertices, n_vertices, triangles, n_triangles)) {}
+
+void Scene::trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far, Hit* hits) const {
+  const TraceCallback callback = trace_callback();
+  if (!callback) {
+    throw std::runtime_error("Scene: this build has no Embree and no trace callback is registered (set_trace_callback)");
+  }
+  if (n_rays > 0) callback(*this, impl_->tracer, origins, directions, n_rays, t_far, hits);
+}
+
+void Scene::trace_visibility(const float* origins, const float* directions, int64_t n_rays, float t_far,
+                             const uint8_t* active, uint8_t* visible) const {
+  std::vector<Hit> hits(n_rays);
+  trace_closest(origins, directions, n_rays, t_far, hits.data());
+  for (int64_t i = 0; i < n_rays; ++i) visible[i] = (active && !active[i]) || hits[i].t < 0.f;
+}
+
+Hit Scene::trace_closest(Vec3<float> origin, Vec3<float> direction, float t_far) const {
+  Hit hit;
+  trace_closest(&origin.x, &direction.x, 1, t_far, &hit);
+  return hit;
+}
+
+bool Scene::occluded(Vec3<float> origin, Vec3<float> direction, float t_far) const {
+  return trace_closest(origin, direction, t_far).t >= 0.f;
+}
+
+const char* embree_version() { return ""; }
+
+}  // namespace splitnerf

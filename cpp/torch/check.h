@@ -1,0 +1,81 @@
+// Argument checks and allocation for the operators. Errors read
+//   hash_encode: positions must be [n, 3] float32, got [8, 2] float64
+#pragma once
+
+#include <torch/csrc/stable/library.h>
+#include <torch/csrc/stable/ops.h>
+#include <torch/csrc/stable/tensor.h>
+#include <torch/headeronly/core/ScalarType.h>
+
+#include <initializer_list>
+#include <stdexcept>
+#include <string>
+
+namespace splitnerf::glue {
+
+using torch::headeronly::ScalarType;
+using torch::stable::Tensor;
+
+inline std::string describe(ScalarType type) {
+  switch (type) {
+    case ScalarType::Float: return "float32";
+    case ScalarType::Double: return "float64";
+    case ScalarType::Long: return "int64";
+    case ScalarType::Byte: return "uint8";
+    case ScalarType::Bool: return "bool";
+    default: return "another dtype";
+  }
+}
+
+inline constexpr int64_t kAny = -1;  // a dimension that may have any size
+
+// The tensor as a contiguous one of the given shape and dtype, or std::invalid_argument.
+inline Tensor checked(const char* op, const char* name, const Tensor& t, std::initializer_list<int64_t> shape,
+                      ScalarType type) {
+  bool fits = t.scalar_type() == type && t.dim() == static_cast<int64_t>(shape.size()) && t.is_cpu();
+  int64_t axis = 0;
+  for (int64_t size : shape) {
+    if (!fits) break;
+    fits = size == kAny || t.size(axis) == size;
+    ++axis;
+  }
+  if (!fits) {
+    std::string wanted, got;
+    for (int64_t size : shape) wanted += (wanted.empty() ? "" : ", ") + (size == kAny ? "n" : std::to_string(size));
+    for (int64_t i = 0; i < t.dim(); ++i) got += (got.empty() ? "" : ", ") + std::to_string(t.size(i));
+    throw std::invalid_argument(std::string(op) + ": " + name + " must be [" + wanted + "] " + describe(type) +
+                                " on the CPU, got [" + got + "] " + describe(t.scalar_type()) +
+                                (t.is_cpu() ? "" : " on another device"));
+  }
+  return torch::stable::contiguous(t);
+}
+
+// The floating dtype that an operator computes in: that of its first tensor.
+inline ScalarType real_type(const char* op, const char* name, const Tensor& t) {
+  const ScalarType type = t.scalar_type();
+  if (type != ScalarType::Float && type != ScalarType::Double)
+    throw std::invalid_argument(std::string(op) + ": " + name + " must be float32 or float64, got " + describe(type));
+  return type;
+}
+
+inline void require(bool condition, const char* op, const std::string& what) {
+  if (!condition) throw std::invalid_argument(std::string(op) + ": " + what);
+}
+
+template <class T> const T* in(const Tensor& t) { return static_cast<const T*>(t.const_data_ptr()); }
+template <class T> T* out(Tensor& t) { return static_cast<T*>(t.mutable_data_ptr()); }
+
+inline Tensor empty_like_type(const Tensor& like, std::initializer_list<int64_t> shape, ScalarType type) {
+  return torch::stable::new_empty(like, shape, type);
+}
+
+// Calls body(T{}) with T = float or double.
+template <class Body> void dispatch_real(ScalarType type, Body&& body) {
+  if (type == ScalarType::Float) {
+    body(float{});
+  } else {
+    body(double{});
+  }
+}
+
+}  // namespace splitnerf::glue

@@ -1,0 +1,74 @@
+// The pybind11 module splitnerf._core: what is no tensor operator.
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <array>
+
+#include "bindings_scene.h"
+#include "splitnerf/environment.h"
+#include "splitnerf/hash_grid.h"
+#include "splitnerf/kernels.h"
+#include "splitnerf/sampling.h"
+#include "splitnerf/split_sum.h"
+
+namespace py = pybind11;
+
+PYBIND11_MODULE(_core, m) {
+  m.doc() = "Embree scenes, the path tracer and build information of SplitNeRF.";
+
+  m.def(
+      "hash_grid_levels",
+      [](int n_levels, int n_features, int base_resolution, double growth, int log2_table_size) {
+        if (n_levels < 1 || n_levels > splitnerf::kMaxLevels)
+          throw py::value_error("hash_grid_levels: n_levels must be in [1, 32], got " + std::to_string(n_levels));
+        std::array<splitnerf::HashLevel, splitnerf::kMaxLevels> levels;
+        splitnerf::hash_levels({n_levels, n_features, base_resolution, growth, log2_table_size}, levels.data());
+        py::list out;
+        for (int l = 0; l < n_levels; ++l)
+          out.append(py::make_tuple(levels[l].resolution, levels[l].offset, levels[l].n_entries, levels[l].dense));
+        return out;
+      },
+      py::arg("n_levels"), py::arg("n_features"), py::arg("base_resolution"), py::arg("growth"),
+      py::arg("log2_table_size"),
+      "Geometry of a hash grid: a list of (resolution, offset, n_entries, dense), one per level.");
+
+  m.def(
+      "brdf_lut",
+      [] {
+        constexpr int n = splitnerf::kLutSize;
+        py::array_t<float> lut({n, n, 3});
+        std::copy_n(splitnerf::brdf_lut(), n * n * 3, lut.mutable_data());
+        return lut;
+      },
+      "F1, F2 and chi over (roughness, sqrt(n.v)) as a [32, 32, 3] float32 array.");
+
+  m.def(
+      "fibonacci_sphere",
+      [](uint32_t n) {
+        py::array_t<double> points({static_cast<py::ssize_t>(n), static_cast<py::ssize_t>(3)});
+        for (uint32_t i = 0; i < n; ++i) splitnerf::store3(points.mutable_data(i, 0), splitnerf::fibonacci_sphere<double>(i, n));
+        return points;
+      },
+      py::arg("n"), "The n-point Fibonacci lattice on the unit sphere as an [n, 3] float64 array.");
+
+  m.def(
+      "equirect_directions",
+      [](int height, int width) {
+        if (height < 1 || width < 1) throw py::value_error("equirect_directions: height and width must be positive");
+        py::array_t<double> directions({height, width, 3});
+        for (int row = 0; row < height; ++row)
+          for (int column = 0; column < width; ++column)
+            splitnerf::store3(directions.mutable_data(row, column, 0),
+                              splitnerf::equirect_to_direction(
+                                  splitnerf::Vec2<double>{(column + 0.5) / width, (row + 0.5) / height}));
+        return directions;
+      },
+      py::arg("height"), py::arg("width"),
+      "Unit directions of the texel centres of an equirectangular map as a [height, width, 3] float64 array.");
+
+  m.def(
+      "instruction_set", [] { return splitnerf::kernels<float>().name; },
+      "The instruction set that the kernels run on: base, avx2 or avx512.");
+
+  bind_scene(m);
+}

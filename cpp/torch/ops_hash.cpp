@@ -1,0 +1,143 @@
+// hash_encode and its derivatives as torch operators.
+#include <array>
+#include <tuple>
+
+#include "check.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf::glue {
+namespace {
+
+HashGridShape checked_shape(const char* op, int64_t n_levels, int64_t base_resolution, double growth,
+                            int64_t log2_table_size, int64_t n_features, int64_t n_active) {
+  require(n_levels >= 1 && n_levels <= kMaxLevels, op, "n_levels must be in [1, 32], got " + std::to_string(n_levels));
+  require(base_resolution >= 1, op, "base_resolution must be at least 1, got " + std::to_string(base_resolution));
+  require(growth >= 1.0, op, "growth must be at least 1, got " + std::to_string(growth));
+  require(log2_table_size >= 1 && log2_table_size <= 30, op,
+          "log2_table_size must be in [1, 30], got " + std::to_string(log2_table_size));
+  require(n_features == 1 || n_features == 2 || n_features == 4 || n_features == 8, op,
+          "the table must have 1, 2, 4 or 8 features an entry, got " + std::to_string(n_features));
+  require(n_active >= 0 && n_active <= n_levels, op,
+          "n_active must be in [0, n_levels], got " + std::to_string(n_active));
+  const double finest = base_resolution * std::pow(growth, double(n_levels - 1));
+  require(finest < double(1 << 30), op, "the finest level would have " + std::to_string(finest) + " cells along an edge");
+  return {static_cast<int>(n_levels), static_cast<int>(n_features), static_cast<int>(base_resolution), growth,
+          static_cast<int>(log2_table_size)};
+}
+
+int64_t n_entries(const HashGridShape& shape) {
+  std::array<HashLevel, kMaxLevels> levels;
+  return hash_levels(shape, levels.data());
+}
+
+struct Encoding {
+  Tensor features, jacobian;
+};
+
+Encoding encode(const char* op, bool with_jacobian, const Tensor& positions, const Tensor& table, int64_t n_levels,
+                int64_t base_resolution, double growth, int64_t log2_table_size, int64_t n_active) {
+  const ScalarType type = real_type(op, "table", table);
+  require(table.dim() == 2, op, "table must be [n_entries, n_features]");
+  const auto shape = checked_shape(op, n_levels, base_resolution, growth, log2_table_size, table.size(1), n_active);
+  const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
+  const Tensor t = checked(op, "table", table, {n_entries(shape), shape.n_features}, type);
+  const int64_t n = x.size(0), columns = n_levels * shape.n_features;
+  Encoding e{empty_like_type(x, {n, columns}, type), empty_like_type(x, {with_jacobian ? n : 0, 3, columns}, type)};
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::hash_encode(shape, static_cast<int>(n_active), n, in<T>(x), in<T>(t), out<T>(e.features),
+                     with_jacobian ? out<T>(e.jacobian) : nullptr);
+  });
+  return e;
+}
+
+Tensor hash_encode(Tensor positions, Tensor table, int64_t n_levels, int64_t base_resolution, double growth,
+                   int64_t log2_table_size, int64_t n_active) {
+  return encode("hash_encode", false, positions, table, n_levels, base_resolution, growth, log2_table_size, n_active)
+      .features;
+}
+
+std::tuple<Tensor, Tensor> hash_encode_jacobian(Tensor positions, Tensor table, int64_t n_levels,
+                                                int64_t base_resolution, double growth, int64_t log2_table_size,
+                                                int64_t n_active) {
+  Encoding e = encode("hash_encode_jacobian", true, positions, table, n_levels, base_resolution, growth,
+                      log2_table_size, n_active);
+  return {e.features, e.jacobian};
+}
+
+Tensor scatter(const char* op, const Tensor& positions, const Tensor& grad_features, const Tensor* grad_jacobian,
+               int64_t n_levels, int64_t base_resolution, double growth, int64_t log2_table_size, int64_t n_active) {
+  const ScalarType type = real_type(op, "positions", positions);
+  require(grad_features.dim() == 2 && n_levels > 0 && grad_features.size(1) % n_levels == 0, op,
+          "grad_features must be [n, n_levels * n_features]");
+  const int64_t columns = grad_features.size(1);
+  const auto shape =
+      checked_shape(op, n_levels, base_resolution, growth, log2_table_size, columns / n_levels, n_active);
+  const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
+  const Tensor g = checked(op, "grad_features", grad_features, {x.size(0), columns}, type);
+  const Tensor gj = grad_jacobian ? checked(op, "grad_jacobian", *grad_jacobian, {x.size(0), 3, columns}, type) : g;
+  Tensor grad_table = empty_like_type(x, {n_entries(shape), shape.n_features}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::hash_encode_backward(shape, static_cast<int>(n_active), x.size(0), in<T>(x), in<T>(g),
+                              grad_jacobian ? in<T>(gj) : nullptr, out<T>(grad_table));
+  });
+  return grad_table;
+}
+
+Tensor hash_encode_backward(Tensor positions, Tensor grad_features, int64_t n_levels, int64_t base_resolution,
+                            double growth, int64_t log2_table_size, int64_t n_active) {
+  return scatter("hash_encode_backward", positions, grad_features, nullptr, n_levels, base_resolution, growth,
+                 log2_table_size, n_active);
+}
+
+Tensor hash_encode_jacobian_backward(Tensor positions, Tensor grad_features, Tensor grad_jacobian, int64_t n_levels,
+                                     int64_t base_resolution, double growth, int64_t log2_table_size,
+                                     int64_t n_active) {
+  return scatter("hash_encode_jacobian_backward", positions, grad_features, &grad_jacobian, n_levels, base_resolution,
+                 growth, log2_table_size, n_active);
+}
+
+Tensor hash_encode_jacobian_backward_positions(Tensor positions, Tensor table, Tensor grad_features,
+                                               Tensor grad_jacobian, int64_t n_levels, int64_t base_resolution,
+                                               double growth, int64_t log2_table_size, int64_t n_active) {
+  const char* op = "hash_encode_jacobian_backward_positions";
+  const ScalarType type = real_type(op, "table", table);
+  require(table.dim() == 2, op, "table must be [n_entries, n_features]");
+  const auto shape = checked_shape(op, n_levels, base_resolution, growth, log2_table_size, table.size(1), n_active);
+  const int64_t columns = n_levels * shape.n_features;
+  const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
+  const Tensor t = checked(op, "table", table, {n_entries(shape), shape.n_features}, type);
+  const Tensor g = checked(op, "grad_features", grad_features, {x.size(0), columns}, type);
+  const Tensor gj = checked(op, "grad_jacobian", grad_jacobian, {x.size(0), 3, columns}, type);
+  Tensor grad_positions = empty_like_type(x, {x.size(0), 3}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::hash_encode_backward_positions(shape, static_cast<int>(n_active), x.size(0), in<T>(x), in<T>(t), in<T>(g),
+                                        in<T>(gj), out<T>(grad_positions));
+  });
+  return grad_positions;
+}
+
+}  // namespace
+
+#define SPLITNERF_GRID "int n_levels, int base_resolution, float growth, int log2_table_size, int n_active"
+STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
+  m.def("hash_encode(Tensor positions, Tensor table, " SPLITNERF_GRID ") -> Tensor");
+  m.def("hash_encode_backward(Tensor positions, Tensor grad_features, " SPLITNERF_GRID ") -> Tensor");
+  m.def("hash_encode_jacobian(Tensor positions, Tensor table, " SPLITNERF_GRID ") -> (Tensor, Tensor)");
+  m.def("hash_encode_jacobian_backward(Tensor positions, Tensor grad_features, Tensor grad_jacobian, " SPLITNERF_GRID
+        ") -> Tensor");
+  m.def("hash_encode_jacobian_backward_positions(Tensor positions, Tensor table, Tensor grad_features, "
+        "Tensor grad_jacobian, " SPLITNERF_GRID ") -> Tensor");
+}
+
+STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+  m.impl("hash_encode", TORCH_BOX(&hash_encode));
+  m.impl("hash_encode_backward", TORCH_BOX(&hash_encode_backward));
+  m.impl("hash_encode_jacobian", TORCH_BOX(&hash_encode_jacobian));
+  m.impl("hash_encode_jacobian_backward", TORCH_BOX(&hash_encode_jacobian_backward));
+  m.impl("hash_encode_jacobian_backward_positions", TORCH_BOX(&hash_encode_jacobian_backward_positions));
+}
+
+}  // namespace splitnerf::glue

@@ -1,0 +1,115 @@
+// prefilter_light, sample_ggx_lobe, trace_visibility and occlusion_factors as torch operators.
+#include <tuple>
+
+#include "check.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf::glue {
+namespace {
+
+std::tuple<Tensor, Tensor> prefilter_light(Tensor query_dirs, Tensor roughness, Tensor light_dirs, Tensor light) {
+  const char* op = "prefilter_light";
+  const ScalarType type = real_type(op, "light", light);
+  const Tensor q = checked(op, "query_dirs", query_dirs, {kAny, 3}, type);
+  const Tensor rho = checked(op, "roughness", roughness, {q.size(0), 1}, type);
+  const Tensor d = checked(op, "light_dirs", light_dirs, {kAny, 3}, type);
+  const Tensor l = checked(op, "light", light, {d.size(0), 3}, type);
+  require(d.size(0) > 0 || q.size(0) == 0, op, "light_dirs must hold at least one direction");
+  Tensor gbar = empty_like_type(q, {q.size(0), 3}, type), total = empty_like_type(q, {q.size(0)}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::prefilter_light(q.size(0), in<T>(q), in<T>(rho), d.size(0), in<T>(d), in<T>(l), out<T>(gbar), out<T>(total));
+  });
+  return {gbar, total};
+}
+
+Tensor prefilter_light_backward(Tensor query_dirs, Tensor roughness, Tensor total, Tensor grad_gbar,
+                                Tensor light_dirs) {
+  const char* op = "prefilter_light_backward";
+  const ScalarType type = real_type(op, "grad_gbar", grad_gbar);
+  const Tensor q = checked(op, "query_dirs", query_dirs, {kAny, 3}, type);
+  const Tensor rho = checked(op, "roughness", roughness, {q.size(0), 1}, type);
+  const Tensor w = checked(op, "total", total, {q.size(0)}, type);
+  const Tensor g = checked(op, "grad_gbar", grad_gbar, {q.size(0), 3}, type);
+  const Tensor d = checked(op, "light_dirs", light_dirs, {kAny, 3}, type);
+  Tensor grad_light = empty_like_type(q, {d.size(0), 3}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::prefilter_light_backward(q.size(0), in<T>(q), in<T>(rho), in<T>(w), in<T>(g), d.size(0), in<T>(d),
+                                  out<T>(grad_light));
+  });
+  return grad_light;
+}
+
+Tensor trace_visibility(int64_t scene, Tensor origins, Tensor directions, double t_far) {
+  const char* op = "trace_visibility";
+  const Tensor o = checked(op, "origins", origins, {kAny, 3}, ScalarType::Float);
+  const Tensor d = checked(op, "directions", directions, {o.size(0), 3}, ScalarType::Float);
+  Tensor visible = empty_like_type(o, {o.size(0)}, ScalarType::Bool);
+  get_scene(scene)->trace_visibility(in<float>(o), in<float>(d), o.size(0), static_cast<float>(t_far), nullptr,
+                                     out<uint8_t>(visible));
+  return visible;
+}
+
+std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Tensor normals, Tensor lobe_dirs,
+                                             Tensor roughness, Tensor environment, int64_t n_diffuse_rays,
+                                             int64_t n_specular_rays, double offset, int64_t seed) {
+  const char* op = "occlusion_factors";
+  const ScalarType type = real_type(op, "positions", positions);
+  const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
+  const Tensor n = checked(op, "normals", normals, {x.size(0), 3}, type);
+  const Tensor d = checked(op, "lobe_dirs", lobe_dirs, {x.size(0), 3}, type);
+  const Tensor rho = checked(op, "roughness", roughness, {x.size(0), 1}, type);
+  const Tensor env = checked(op, "environment", environment, {kAny, kAny, 3}, type);
+  require(env.size(0) > 0 && env.size(1) > 0, op, "environment must hold at least one texel");
+  require(n_diffuse_rays > 0 && n_specular_rays > 0 && n_diffuse_rays <= 1 << 20 && n_specular_rays <= 1 << 20, op,
+          "n_diffuse_rays and n_specular_rays must be in [1, 2^20]");
+  const OcclusionOptions options{static_cast<int>(n_diffuse_rays), static_cast<int>(n_specular_rays),
+                                 static_cast<float>(offset), static_cast<uint32_t>(seed)};
+  Tensor o_d = empty_like_type(x, {x.size(0), 3}, type), o_s = empty_like_type(x, {x.size(0), 3}, type);
+  const auto mesh = get_scene(scene);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::occlusion_factors(*mesh, options, x.size(0), in<T>(x), in<T>(n), in<T>(d), in<T>(rho),
+                           static_cast<int>(env.size(0)), static_cast<int>(env.size(1)), in<T>(env), out<T>(o_d),
+                           out<T>(o_s));
+  });
+  return {o_d, o_s};
+}
+
+Tensor sample_ggx_lobe(Tensor axes, Tensor roughness, int64_t n_samples, int64_t seed) {
+  const char* op = "sample_ggx_lobe";
+  const ScalarType type = real_type(op, "axes", axes);
+  const Tensor a = checked(op, "axes", axes, {kAny, 3}, type);
+  const Tensor rho = checked(op, "roughness", roughness, {a.size(0), 1}, type);
+  require(n_samples > 0 && n_samples <= 1 << 20, op, "n_samples must be in [1, 2^20]");
+  Tensor directions = empty_like_type(a, {a.size(0), n_samples, 3}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::sample_ggx_lobe(a.size(0), in<T>(a), in<T>(rho), static_cast<int>(n_samples), static_cast<uint32_t>(seed),
+                         out<T>(directions));
+  });
+  return directions;
+}
+
+}  // namespace
+
+STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
+  m.def("prefilter_light(Tensor query_dirs, Tensor roughness, Tensor light_dirs, Tensor light) -> (Tensor, Tensor)");
+  m.def("prefilter_light_backward(Tensor query_dirs, Tensor roughness, Tensor total, Tensor grad_gbar, "
+        "Tensor light_dirs) -> Tensor");
+  m.def("sample_ggx_lobe(Tensor axes, Tensor roughness, int n_samples, int seed) -> Tensor");
+  m.def("trace_visibility(int scene, Tensor origins, Tensor directions, float t_far) -> Tensor");
+  m.def("occlusion_factors(int scene, Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, "
+        "Tensor environment, int n_diffuse_rays, int n_specular_rays, float offset, int seed) -> (Tensor, Tensor)");
+}
+
+STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+  m.impl("prefilter_light", TORCH_BOX(&prefilter_light));
+  m.impl("prefilter_light_backward", TORCH_BOX(&prefilter_light_backward));
+  m.impl("sample_ggx_lobe", TORCH_BOX(&sample_ggx_lobe));
+  m.impl("trace_visibility", TORCH_BOX(&trace_visibility));
+  m.impl("occlusion_factors", TORCH_BOX(&occlusion_factors));
+}
+
+}  // namespace splitnerf::glue

@@ -1,0 +1,137 @@
+// march_rays, neus_weights and composite as torch operators.
+#include <tuple>
+
+#include "check.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf::glue {
+namespace {
+
+std::tuple<Tensor, Tensor, Tensor, Tensor> march_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells,
+                                                      double box, double step, int64_t max_samples) {
+  const char* op = "march_rays";
+  const ScalarType type = real_type(op, "rays_o", rays_o);
+  const Tensor o = checked(op, "rays_o", rays_o, {kAny, 3}, type);
+  const int64_t n_rays = o.size(0);
+  const Tensor d = checked(op, "rays_d", rays_d, {n_rays, 3}, type);
+  const Tensor u = checked(op, "jitter", jitter, {n_rays}, type);
+  require(cells.dim() == 3 && cells.size(0) > 0, op, "cells must be [r, r, r] uint8 with r > 0");
+  const int64_t resolution = cells.size(0);
+  const Tensor grid = checked(op, "cells", cells, {resolution, resolution, resolution}, ScalarType::Byte);
+  require(box > 0 && step > 0, op, "box and step must be positive");
+  const MarchOptions options{static_cast<float>(box), static_cast<int>(resolution), static_cast<float>(step), max_samples};
+  Tensor offsets = empty_like_type(o, {n_rays + 1}, ScalarType::Long), ray_indices, t_starts, t_ends;
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::march_rays_count(options, in<uint8_t>(grid), n_rays, in<T>(o), in<T>(d), in<T>(u), out<int64_t>(offsets));
+    const int64_t n = in<int64_t>(offsets)[n_rays];
+    ray_indices = empty_like_type(o, {n}, ScalarType::Long);
+    t_starts = empty_like_type(o, {n}, type);
+    t_ends = empty_like_type(o, {n}, type);
+    cpu::march_rays_fill(options, in<uint8_t>(grid), n_rays, in<T>(o), in<T>(d), in<T>(u), in<int64_t>(offsets),
+                         out<int64_t>(ray_indices), out<T>(t_starts), out<T>(t_ends));
+  });
+  return {ray_indices, t_starts, t_ends, offsets};
+}
+
+// The sample ranges of the rays: offsets is non-decreasing, from 0 to n_samples.
+Tensor checked_offsets(const char* op, const Tensor& offsets, int64_t n_samples) {
+  const Tensor o = checked(op, "offsets", offsets, {kAny}, ScalarType::Long);
+  require(o.size(0) >= 1, op, "offsets must be [n_rays + 1]");
+  const int64_t *p = in<int64_t>(o), n_rays = o.size(0) - 1;
+  bool sorted = p[0] == 0 && p[n_rays] == n_samples;
+  for (int64_t r = 0; r < n_rays; ++r) sorted = sorted && p[r] <= p[r + 1];
+  require(sorted, op, "offsets must rise from 0 to the number of samples, " + std::to_string(n_samples));
+  return o;
+}
+
+template <class T> T scalar_value(const Tensor& t) { return *in<T>(t); }
+
+std::tuple<Tensor, Tensor> neus_weights(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets,
+                                        double min_transmittance) {
+  const char* op = "neus_weights";
+  const ScalarType type = real_type(op, "f_prev", f_prev);
+  const Tensor p = checked(op, "f_prev", f_prev, {kAny}, type), q = checked(op, "f_next", f_next, {p.size(0)}, type);
+  const Tensor sharpness = checked(op, "s", s, {}, type), o = checked_offsets(op, offsets, p.size(0));
+  Tensor weights = empty_like_type(p, {p.size(0)}, type), opacity = empty_like_type(p, {o.size(0) - 1}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::neus_weights(o.size(0) - 1, in<int64_t>(o), in<T>(p), in<T>(q), scalar_value<T>(sharpness),
+                      T(min_transmittance), out<T>(weights), out<T>(opacity));
+  });
+  return {weights, opacity};
+}
+
+std::tuple<Tensor, Tensor, Tensor> neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets,
+                                                         double min_transmittance, Tensor weights, Tensor opacity,
+                                                         Tensor grad_weights, Tensor grad_opacity) {
+  const char* op = "neus_weights_backward";
+  const ScalarType type = real_type(op, "f_prev", f_prev);
+  const Tensor p = checked(op, "f_prev", f_prev, {kAny}, type), q = checked(op, "f_next", f_next, {p.size(0)}, type);
+  const Tensor sharpness = checked(op, "s", s, {}, type), o = checked_offsets(op, offsets, p.size(0));
+  const int64_t n_rays = o.size(0) - 1;
+  const Tensor w = checked(op, "weights", weights, {p.size(0)}, type);
+  const Tensor a = checked(op, "opacity", opacity, {n_rays}, type);
+  const Tensor gw = checked(op, "grad_weights", grad_weights, {p.size(0)}, type);
+  const Tensor ga = checked(op, "grad_opacity", grad_opacity, {n_rays}, type);
+  Tensor grad_p = empty_like_type(p, {p.size(0)}, type), grad_q = empty_like_type(p, {p.size(0)}, type);
+  Tensor grad_s = empty_like_type(p, {n_rays}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::neus_weights_backward(n_rays, in<int64_t>(o), in<T>(p), in<T>(q), scalar_value<T>(sharpness),
+                               T(min_transmittance), in<T>(w), in<T>(a), in<T>(gw), in<T>(ga), out<T>(grad_p),
+                               out<T>(grad_q), out<T>(grad_s));
+  });
+  return {grad_p, grad_q, grad_s};
+}
+
+Tensor composite(Tensor weights, Tensor values, Tensor offsets) {
+  const char* op = "composite";
+  const ScalarType type = real_type(op, "weights", weights);
+  const Tensor w = checked(op, "weights", weights, {kAny}, type), v = checked(op, "values", values, {w.size(0), kAny}, type);
+  const Tensor o = checked_offsets(op, offsets, w.size(0));
+  Tensor sums = empty_like_type(w, {o.size(0) - 1, v.size(1)}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::composite(o.size(0) - 1, v.size(1), in<int64_t>(o), in<T>(w), in<T>(v), out<T>(sums));
+  });
+  return sums;
+}
+
+std::tuple<Tensor, Tensor> composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor grad_sums) {
+  const char* op = "composite_backward";
+  const ScalarType type = real_type(op, "weights", weights);
+  const Tensor w = checked(op, "weights", weights, {kAny}, type), v = checked(op, "values", values, {w.size(0), kAny}, type);
+  const Tensor o = checked_offsets(op, offsets, w.size(0));
+  const Tensor g = checked(op, "grad_sums", grad_sums, {o.size(0) - 1, v.size(1)}, type);
+  Tensor grad_w = empty_like_type(w, {w.size(0)}, type), grad_v = empty_like_type(w, {w.size(0), v.size(1)}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::composite_backward(o.size(0) - 1, v.size(1), in<int64_t>(o), in<T>(w), in<T>(v), in<T>(g), out<T>(grad_w),
+                            out<T>(grad_v));
+  });
+  return {grad_w, grad_v};
+}
+
+}  // namespace
+
+STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
+  m.def("march_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, float box, float step, "
+        "int max_samples) -> (Tensor, Tensor, Tensor, Tensor)");
+  m.def("neus_weights(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance) -> "
+        "(Tensor, Tensor)");
+  m.def("neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance, "
+        "Tensor weights, Tensor opacity, Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
+  m.def("composite(Tensor weights, Tensor values, Tensor offsets) -> Tensor");
+  m.def("composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor grad_sums) -> (Tensor, Tensor)");
+}
+
+STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+  m.impl("march_rays", TORCH_BOX(&march_rays));
+  m.impl("neus_weights", TORCH_BOX(&neus_weights));
+  m.impl("neus_weights_backward", TORCH_BOX(&neus_weights_backward));
+  m.impl("composite", TORCH_BOX(&composite));
+  m.impl("composite_backward", TORCH_BOX(&composite_backward));
+}
+
+}  // namespace splitnerf::glue

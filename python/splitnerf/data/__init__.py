@@ -1,0 +1,1 @@
+"""Images, posed datasets and the truth that may come with them."""

@@ -1,0 +1,216 @@
+"""Image files through OpenImageIO, the sRGB curve, and downscaling in linear light."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+
+from splitnerf.errors import InputError
+
+LDR_SUFFIXES = (".png", ".jpg", ".jpeg")
+HDR_SUFFIXES = (".exr", ".hdr")
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
+    """Yields a temporary name beside `path` that takes its place when the block succeeds.
+
+    On any error the temporary file is removed and what stood at `path` stays untouched.
+
+    Args:
+        path: The file to write; missing parent folders are made.
+
+    Yields:
+        A path in the same folder, with the same suffix.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def read_image(path: str | os.PathLike) -> np.ndarray:
+    """Reads a PNG, JPEG, EXR or HDR image.
+
+    Alpha is kept as the file stores it: straight in PNG, associated in EXR.
+
+    Args:
+        path: The image file.
+
+    Returns:
+        [H, W, C] float32, top row first. 8- and 16-bit files in [0, 1], the others as stored.
+
+    Raises:
+        InputError: The file is missing, unreadable or truncated.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such image; check the path")
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    source = oiio.ImageInput.open(str(path), config)
+    if source is None:
+        raise InputError(f"{path}: cannot be read as an image ({_first_line(oiio.geterror())}); replace it")
+    try:
+        pixels = source.read_image(0, 0, 0, source.spec().nchannels, "float")
+        if pixels is None or source.has_error:
+            raise InputError(f"{path}: truncated or damaged image ({_first_line(source.geterror())}); replace it")
+    finally:
+        source.close()
+    height, width = source.spec().height, source.spec().width
+    return np.ascontiguousarray(pixels, dtype=np.float32).reshape(height, width, -1)
+
+
+def read_hdr(path: str | os.PathLike) -> np.ndarray:
+    """Reads linear radiance from an EXR or HDR file.
+
+    Args:
+        path: The image file.
+
+    Returns:
+        [H, W, 3] float32, linear, finite and >= 0.
+
+    Raises:
+        InputError: The file is unreadable, or holds NaN, infinite or negative pixels.
+    """
+    pixels = read_image(path)
+    radiance = np.repeat(pixels, 3, axis=2) if pixels.shape[2] < 3 else pixels[..., :3]
+    if not np.isfinite(radiance).all():
+        raise InputError(f"{path}: has NaN or infinite pixels; clean or re-export it")
+    if radiance.min() < 0:
+        raise InputError(f"{path}: has negative pixels, radiance cannot be negative; clean or re-export it")
+    return np.ascontiguousarray(radiance)
+
+
+def write_image(path: str | os.PathLike, pixels: np.ndarray, *, half: bool = False) -> None:
+    """Writes an image atomically; the suffix decides the format.
+
+    Args:
+        path: Ends in .png or .jpg (8 bit, values clipped to [0, 1], alpha straight), .exr or .hdr (linear, as given).
+        pixels: [H, W, C] or [H, W], C = 1, 3 or 4.
+        half: Whether an EXR is stored as half instead of float.
+
+    Raises:
+        ValueError: Unknown suffix, wrong shape, or non-finite pixels.
+        OSError: The file cannot be written.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    pixels = np.asarray(pixels)
+    pixels = pixels[..., None] if pixels.ndim == 2 else pixels
+    if suffix not in LDR_SUFFIXES + HDR_SUFFIXES:
+        raise ValueError(f"{path}: unknown image format, use one of {', '.join(LDR_SUFFIXES + HDR_SUFFIXES)}")
+    if pixels.ndim != 3 or pixels.shape[2] not in (1, 3, 4) or 0 in pixels.shape:
+        raise ValueError(f"{path}: pixels must be [H, W, 1 | 3 | 4], got {list(pixels.shape)}")
+    if not np.isfinite(pixels).all():
+        raise ValueError(f"{path}: pixels must be finite")
+    if suffix in LDR_SUFFIXES:
+        pixels, kind = to_uint8(pixels), oiio.UINT8
+    else:
+        pixels, kind = pixels.astype(np.float32), oiio.HALF if half else oiio.FLOAT
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, kind)
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    spec.attribute("oiio:ColorSpace", "sRGB" if suffix in LDR_SUFFIXES else "Linear")
+    with atomic_path(path) as temporary:
+        sink = oiio.ImageOutput.create(str(temporary))
+        if sink is None:
+            raise OSError(f"{path}: OpenImageIO cannot write it ({_first_line(oiio.geterror())})")
+        written = sink.open(str(temporary), spec) and sink.write_image(np.ascontiguousarray(pixels))
+        closed = sink.close()
+        if not (written and closed):
+            raise OSError(f"{path}: writing failed ({_first_line(sink.geterror())})")
+
+
+def encode_png(pixels: np.ndarray) -> bytes:
+    """Encodes an image as the bytes of a PNG file; arguments as for `write_image`."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "image.png"
+        write_image(path, pixels)
+        return path.read_bytes()
+
+
+def to_uint8(pixels: np.ndarray) -> np.ndarray:
+    """Rounds values in [0, 1] to 8 bit, clipping what lies outside; any shape."""
+    return np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
+
+
+def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
+    """Decodes the IEC 61966-2-1 curve; any shape, values >= 0."""
+    srgb = np.asarray(srgb)
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4).astype(srgb.dtype)
+
+
+def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
+    """Encodes the IEC 61966-2-1 curve; any shape, values >= 0, not clipped above 1."""
+    linear = np.asarray(linear)
+    curve = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(linear <= 0.0031308, 12.92 * linear, curve).astype(linear.dtype)
+
+
+def area_average(pixels: np.ndarray, factor: int) -> np.ndarray:
+    """Averages blocks of factor x factor pixels; rows and columns that fill no block are cropped at the bottom and right.
+
+    Args:
+        pixels: [H, W] or [H, W, C].
+        factor: At least 1, at most min(H, W).
+
+    Returns:
+        [H // factor, W // factor] or with C, same dtype.
+    """
+    if factor == 1:
+        return pixels
+    height, width = pixels.shape[0] // factor, pixels.shape[1] // factor
+    blocks = pixels[: height * factor, : width * factor].reshape(height, factor, width, factor, *pixels.shape[2:])
+    return blocks.mean(axis=(1, 3), dtype=np.float32).astype(pixels.dtype)
+
+
+def downscale_rgba(rgba: np.ndarray, factor: int) -> np.ndarray:
+    """Downscales an sRGB image with straight alpha by averaging premultiplied linear light.
+
+    Args:
+        rgba: [H, W, 4] float32, sRGB colour in [0, 1], straight alpha.
+        factor: Integer factor, 1 returns the input unchanged.
+
+    Returns:
+        [H // factor, W // factor, 4] float32; colour is 0 where alpha is 0.
+    """
+    if factor == 1:
+        return rgba
+    alpha = rgba[..., 3:]
+    averaged = area_average(np.concatenate([srgb_to_linear(rgba[..., :3]) * alpha, alpha], axis=-1), factor)
+    linear = averaged[..., :3] / np.maximum(averaged[..., 3:], 1e-8)
+    return np.concatenate([linear_to_srgb(linear), averaged[..., 3:]], axis=-1)
+
+
+def over_background(srgb: np.ndarray, alpha: np.ndarray, background: float = 1.0) -> np.ndarray:
+    """Composites a straight-alpha image over a grey background, in sRGB values as the protocol demands.
+
+    Args:
+        srgb: [..., 3] colours in [0, 1].
+        alpha: [...] coverage in [0, 1].
+        background: Grey level, 1 is white.
+
+    Returns:
+        [..., 3] colours.
+    """
+    return srgb * alpha[..., None] + background * (1 - alpha[..., None])
+
+
+def _first_line(message: str) -> str:
+    return message.strip().splitlines()[0] if message.strip() else "no reason given"

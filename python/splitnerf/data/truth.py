@@ -1,0 +1,175 @@
+"""The truth that may lie beside a dataset: material and normal maps per test view, the light, the mesh.
+
+Files, `r_N` standing for the image's own name, each optional:
+    r_N_albedo.png   base colour, sRGB, straight alpha
+    r_N_orm.png      linear; G roughness, B metallic
+    r_N_normal.exr   world-space normals, multiplied by coverage; alpha is the coverage
+    r_N_normal.png   world-space normals, negative components clipped to 0, sRGB-encoded (the NeRF Blender scenes)
+    light.hdr, mesh.ply   in the dataset's folder
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.images import area_average, downscale_rgba, read_hdr, read_image, srgb_to_linear
+from splitnerf.errors import InputError
+
+OPAQUE = 0.9
+
+
+@dataclass
+class ViewTruth:
+    """Truth of one view at the dataset's downscale; what does not exist is None.
+
+    Attributes:
+        name: The frame's name.
+        albedo: [H, W, 3] float32, linear, straight.
+        roughness: [H, W] float32, perceptual, in [0, 1].
+        metallic: [H, W] float32 in [0, 1].
+        normal: [H, W, 3] float32, unit, world; 0 where `normal_mask` is false.
+        normal_mask: [H, W] bool, the pixels whose normal can be scored.
+    """
+
+    name: str
+    albedo: np.ndarray | None = None
+    roughness: np.ndarray | None = None
+    metallic: np.ndarray | None = None
+    normal: np.ndarray | None = None
+    normal_mask: np.ndarray | None = None
+
+
+@dataclass
+class SceneTruth:
+    """Truth of the whole scene: `light` [H, W, 3] float32 linear equirectangular, `mesh` in the data's world; or None."""
+
+    light: np.ndarray | None = None
+    mesh: trimesh.Trimesh | None = None
+
+
+def load_scene_truth(root: str | os.PathLike) -> SceneTruth:
+    """Loads `light.hdr` and `mesh.ply` from a dataset's folder where they exist.
+
+    Raises:
+        InputError: One exists but cannot be used.
+    """
+    light, mesh = Path(root) / "light.hdr", Path(root) / "mesh.ply"
+    return SceneTruth(
+        light=read_hdr(light) if light.is_file() else None,
+        mesh=read_mesh(mesh) if mesh.is_file() else None,
+    )
+
+
+def read_mesh(path: str | os.PathLike) -> trimesh.Trimesh:
+    """Reads a triangle mesh, vertices as stored.
+
+    Args:
+        path: Any format that trimesh reads.
+
+    Returns:
+        One mesh with finite vertices and at least one triangle of non-zero area.
+
+    Raises:
+        InputError: The file is missing or unreadable, or the mesh is degenerate or empty.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such mesh; check the path")
+    try:
+        mesh = trimesh.load_mesh(path, process=False)
+    except Exception as error:  # trimesh's loaders raise whatever their parser meets
+        raise InputError(f"{path}: cannot be read as a mesh ({error}); replace it") from None
+    usable = isinstance(mesh, trimesh.Trimesh) and len(mesh.faces) and np.isfinite(mesh.vertices).all() and mesh.area > 0
+    if not usable:
+        raise InputError(f"{path}: degenerate or empty mesh; replace it")
+    return mesh
+
+
+def load_view_truths(dataset: Dataset) -> list[ViewTruth]:
+    """Loads the truth maps of every view of a split, downscaled like its images.
+
+    Args:
+        dataset: A loaded split.
+
+    Returns:
+        One `ViewTruth` per frame, in order.
+
+    Raises:
+        InputError: A map exists but is unreadable, has too few channels or another size than its image.
+    """
+    return [_load_view(path, dataset) for path in dataset.image_paths]
+
+
+def decode_clipped_normals(encoded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Restores normals whose negative components were clipped to 0 before sRGB encoding.
+
+    Where exactly one component is 0 it is -sqrt(1 - the others squared); where more are, the normal is unknown.
+
+    Args:
+        encoded: [..., 3] float32 in [0, 1], sRGB-encoded.
+
+    Returns:
+        Unit normals [..., 3] float32, 0 where unknown, and the known pixels [...] bool.
+    """
+    components = srgb_to_linear(encoded)
+    clipped = components <= 0
+    known = clipped.sum(axis=-1) <= 1
+    missing = np.sqrt(np.maximum(1 - (components**2).sum(axis=-1, keepdims=True), 0))
+    normals = np.where(clipped, -missing, components)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-8)
+    return np.where(known[..., None], normals, 0).astype(np.float32), known
+
+
+def _load_view(image_path: Path, dataset: Dataset) -> ViewTruth:
+    factor, size = dataset.downscale, (dataset.height, dataset.width)
+    truth = ViewTruth(image_path.stem)
+
+    albedo = _read_map(image_path, "_albedo.png", 4, factor, size)
+    if albedo is not None:
+        truth.albedo = srgb_to_linear(downscale_rgba(albedo, factor)[..., :3])
+
+    orm = _read_map(image_path, "_orm.png", 4, factor, size)
+    if orm is not None:
+        alpha = area_average(orm[..., 3], factor)
+        averaged = area_average(orm[..., 1:3] * orm[..., 3:], factor) / np.maximum(alpha, 1e-8)[..., None]
+        truth.roughness, truth.metallic = averaged[..., 0], averaged[..., 1]
+
+    exact = _read_map(image_path, "_normal.exr", 4, factor, size)
+    if exact is not None:
+        averaged = area_average(exact, factor)
+        truth.normal, truth.normal_mask = _unit(averaged[..., :3], averaged[..., 3] > OPAQUE)
+        return truth
+    encoded = _read_map(image_path, "_normal.png", 3, factor, size)
+    if encoded is not None:
+        normals, known = decode_clipped_normals(encoded[..., :3])
+        alpha = read_image(image_path)[..., -1]
+        known &= alpha > OPAQUE
+        share = area_average(known.astype(np.float32), factor)
+        truth.normal, truth.normal_mask = _unit(area_average(normals * known[..., None], factor), share >= 0.5)
+    return truth
+
+
+def _read_map(image_path: Path, ending: str, channels: int, factor: int, size: tuple[int, int]) -> np.ndarray | None:
+    path = image_path.with_name(image_path.stem + ending)
+    if not path.is_file():
+        return None
+    pixels = read_image(path)
+    if pixels.shape[2] < channels:
+        raise InputError(f"{path}: needs {channels} channels, has {pixels.shape[2]}; re-export it")
+    if (pixels.shape[0] // factor, pixels.shape[1] // factor) != size:
+        raise InputError(f"{path}: is {pixels.shape[1]}x{pixels.shape[0]}, not the size of {image_path.name}; re-export it")
+    if not np.isfinite(pixels).all():
+        raise InputError(f"{path}: has NaN or infinite pixels; re-export it")
+    return pixels
+
+
+def _unit(vectors: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    mask = mask & (lengths[..., 0] > 1e-3)
+    return np.where(mask[..., None], vectors / np.maximum(lengths, 1e-8), 0).astype(np.float32), mask

@@ -1,0 +1,1 @@
+"""Error metrics and the protocol that `splitnerf evaluate` follows."""

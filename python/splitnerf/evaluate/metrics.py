@@ -1,0 +1,182 @@
+"""Image, light, normal and mesh errors. Arrays are float, NumPy; colours and roughness in [0, 1]."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+from splitnerf.data.images import area_average
+
+MSE_FLOOR = 1e-10
+LIGHT_SIZE = (128, 256)
+MESH_SAMPLES = 100_000
+F_SCORE_SHARE = 0.01
+
+
+def psnr(prediction: np.ndarray, truth: np.ndarray) -> float:
+    """-10 log10(MSE) in dB, data range 1; equal images give 100 dB.
+
+    Args:
+        prediction: Any shape.
+        truth: The same shape.
+    """
+    mse = np.mean((np.asarray(prediction, np.float64) - truth) ** 2)
+    return float(-10 * np.log10(max(mse, MSE_FLOOR)))
+
+
+def ssim(prediction: np.ndarray, truth: np.ndarray) -> float:
+    """Structural similarity: 11 x 11 Gaussian window of sigma 1.5, data range 1, mean over full windows and channels.
+
+    Images smaller than the window are compared with the largest window that fits.
+
+    Args:
+        prediction: [H, W, C].
+        truth: [H, W, C].
+
+    Returns:
+        At most 1.
+
+    Source: Wang et al., Image quality assessment: from error visibility to structural similarity, 2004.
+    """
+    x, y = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
+    radius = min(5, (min(x.shape[:2]) - 1) // 2)
+    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / 1.5) ** 2)
+    kernel /= kernel.sum()
+    mean_x, mean_y = _filter(x, kernel), _filter(y, kernel)
+    var_x = _filter(x * x, kernel) - mean_x**2
+    var_y = _filter(y * y, kernel) - mean_y**2
+    covariance = _filter(x * y, kernel) - mean_x * mean_y
+    c1, c2 = 0.01**2, 0.03**2
+    similarity = (2 * mean_x * mean_y + c1) * (2 * covariance + c2) / ((mean_x**2 + mean_y**2 + c1) * (var_x + var_y + c2))
+    return float(similarity.mean())
+
+
+def lsq_scale(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+    """The factor per channel that brings the prediction nearest to the truth: sum w x y / sum w x^2.
+
+    Args:
+        prediction: [m, C] linear.
+        truth: [m, C] linear.
+        weights: [m], 1 by default.
+
+    Returns:
+        [C] float64; 1 for a channel that is 0 everywhere.
+    """
+    x, y = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
+    w = np.ones(len(x)) if weights is None else weights
+    square = (w[:, None] * x * x).sum(axis=0)
+    return np.where(square > 0, (w[:, None] * x * y).sum(axis=0) / np.where(square > 0, square, 1), 1.0)
+
+
+def median_scale(prediction: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """The median per channel of truth / prediction; arguments as for `lsq_scale`, [C] float64, 1 without pixels."""
+    if len(prediction) == 0:
+        return np.ones(prediction.shape[1])
+    return np.median(truth / np.maximum(np.asarray(prediction, np.float64), 1e-6), axis=0)
+
+
+def normal_mae_deg(prediction: np.ndarray, truth: np.ndarray) -> float:
+    """Mean angle in degrees between unit normals [m, 3], stable near 0 and 180: 2 atan2(|a - b|, |a + b|)."""
+    a, b = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
+    angles = 2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    return float(np.degrees(angles).mean())
+
+
+def balanced_accuracy(prediction: np.ndarray, truth: np.ndarray, threshold: float = 0.5) -> float:
+    """Mean recall over the classes (metal, not metal) that the truth has.
+
+    Args:
+        prediction: [m] in [0, 1].
+        truth: [m] in [0, 1].
+        threshold: Above it is metal, in both.
+    """
+    predicted, actual = np.asarray(prediction) > threshold, np.asarray(truth) > threshold
+    return float(np.mean([(predicted == actual)[actual == c].mean() for c in (False, True) if (actual == c).any()]))
+
+
+def light_psnr(light: np.ndarray, truth: np.ndarray) -> float:
+    """PSNR of an environment map after the scale that albedo and light share was taken out.
+
+    Both are brought to 256 x 128, the prediction is scaled per channel by least squares, both are divided by the
+    truth's 99th percentile and clipped to [0, 1]; pixels weigh by their solid angle.
+
+    Args:
+        light: [H, W, 3] linear radiance, equirectangular.
+        truth: [H, W, 3] linear radiance, equirectangular.
+
+    Returns:
+        dB, at most 100.
+    """
+    x, y = (resize_environment(image, *LIGHT_SIZE).reshape(-1, 3).astype(np.float64) for image in (light, truth))
+    weights = np.repeat(solid_angle_weights(LIGHT_SIZE[0]), LIGHT_SIZE[1])
+    white = max(np.percentile(y, 99), 1e-8)
+    x, y = (np.clip(image / white, 0, 1) for image in (x * lsq_scale(x, y, weights), y))
+    mse = np.average(((x - y) ** 2).mean(axis=1), weights=weights)
+    return float(-10 * np.log10(max(mse, MSE_FLOOR)))
+
+
+def solid_angle_weights(height: int) -> np.ndarray:
+    """The share of the sphere's solid angle of each row of an equirectangular map, [height] float64, sum 1."""
+    edges = np.cos(np.linspace(0, np.pi, height + 1))
+    return (edges[:-1] - edges[1:]) / 2
+
+
+def resize_environment(image: np.ndarray, height: int, width: int) -> np.ndarray:
+    """Resizes an equirectangular map: whole blocks are averaged, the rest is bilinear, wrapping around in u.
+
+    Args:
+        image: [H, W, C].
+        height: Rows of the result.
+        width: Columns of the result.
+
+    Returns:
+        [height, width, C] float32.
+    """
+    image = np.asarray(image, np.float32)
+    factor = min(image.shape[0] // height, image.shape[1] // width)
+    if factor > 1 and image.shape[0] % factor == 0 and image.shape[1] % factor == 0:
+        image = area_average(image, factor)
+    rows, columns = image.shape[:2]
+    if (rows, columns) == (height, width):
+        return image
+    y = np.clip((np.arange(height) + 0.5) * rows / height - 0.5, 0, rows - 1)
+    x = (np.arange(width) + 0.5) * columns / width - 0.5
+    y0, x0 = np.floor(y).astype(int), np.floor(x).astype(int)
+    fy, fx = (y - y0)[:, None, None].astype(np.float32), (x - x0)[None, :, None].astype(np.float32)
+    y1, x1 = np.minimum(y0 + 1, rows - 1), (x0 + 1) % columns
+    upper = image[y0][:, x0] * (1 - fx) + image[y0][:, x1] * fx
+    lower = image[y1][:, x0] * (1 - fx) + image[y1][:, x1] * fx
+    return upper * (1 - fy) + lower * fy
+
+
+def mesh_distances(
+    mesh: trimesh.Trimesh, truth: trimesh.Trimesh, samples: int = MESH_SAMPLES, seed: int = 0
+) -> tuple[float, float]:
+    """Chamfer distance and F-score between two surfaces, by points spread over them.
+
+    Args:
+        mesh: The reconstruction.
+        truth: The true mesh, in the same frame.
+        samples: Points on each.
+        seed: Fixes the points.
+
+    Returns:
+        The mean of both directions' mean nearest distance, in units of the meshes, and the harmonic mean of the shares
+        of points that lie within 1 % of the diagonal of the truth's bounding box, in [0, 1].
+    """
+    points, targets = (np.asarray(trimesh.sample.sample_surface(m, samples, seed=seed)[0]) for m in (mesh, truth))
+    to_truth, _ = cKDTree(targets).query(points)
+    to_mesh, _ = cKDTree(points).query(targets)
+    threshold = F_SCORE_SHARE * np.linalg.norm(np.ptp(truth.bounds, axis=0))
+    precision, recall = (to_truth < threshold).mean(), (to_mesh < threshold).mean()
+    f_score = 2 * precision * recall / max(precision + recall, 1e-12)
+    return float((to_truth.mean() + to_mesh.mean()) / 2), float(f_score)
+
+
+def _filter(image: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+    """Separable convolution over rows and columns, full windows only."""
+    n = len(kernel)
+    height, width = image.shape[0] - n + 1, image.shape[1] - n + 1
+    image = sum(k * image[i : i + height] for i, k in enumerate(kernel))
+    return sum(k * image[:, i : i + width] for i, k in enumerate(kernel))

@@ -1,0 +1,1 @@
+"""Writers of meshes and environment maps."""

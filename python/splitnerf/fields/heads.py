@@ -1,0 +1,76 @@
+"""Small networks on top of the SDF's outputs: materials and occlusion factors."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+MIN_ROUGHNESS = 0.05  # below it a mirror's lobe is narrower than what images of this size resolve
+
+
+def relu_mlp(n_inputs: int, width: int, n_layers: int, n_outputs: int) -> nn.Sequential:
+    """``n_layers`` hidden ReLU layers of ``width`` units and a linear output that starts near 0."""
+    layers: list[nn.Module] = []
+    for i in range(n_layers):
+        layers += [nn.Linear(n_inputs if i == 0 else width, width), nn.ReLU(inplace=True)]
+        nn.init.kaiming_uniform_(layers[-2].weight, nonlinearity="relu")
+        nn.init.zeros_(layers[-2].bias)
+    layers.append(nn.Linear(width, n_outputs))
+    nn.init.normal_(layers[-1].weight, std=0.01)
+    nn.init.zeros_(layers[-1].bias)
+    return nn.Sequential(*layers)
+
+
+class MaterialHead(nn.Module):
+    """Albedo (linear), roughness (perceptual) and metallic of a point, each in [0, 1] by a sigmoid.
+
+    Source: SplitNeRF, section 4.2.
+    """
+
+    def __init__(self, n_inputs: int, width: int = 256, n_layers: int = 2):
+        super().__init__()
+        self.net = relu_mlp(n_inputs, width, n_layers, 5)
+        with torch.no_grad():
+            self.net[-1].bias[4] = -2.0  # most of the world is no metal
+
+    def forward(self, features: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """features [n, n_inputs] -> albedo [n, 3], roughness [n, 1], metallic [n, 1]."""
+        out = torch.sigmoid(self.net(features))
+        return out[:, :3], MIN_ROUGHNESS + (1.0 - MIN_ROUGHNESS) * out[:, 3:4], out[:, 4:5]
+
+
+class OcclusionHead(nn.Module):
+    """Occlusion factors o_d and o_s of a point, 1 = open.
+
+    With ``directional`` the specular factor also reads the lobe's axis and width, so that it is a
+    function of the reflection; without it the head is the paper's, which depends on position alone.
+
+    Source: SplitNeRF Eq. (12)-(15).
+    """
+
+    def __init__(self, n_inputs: int, width: int, n_layers: int, n_channels: int, directional: bool):
+        super().__init__()
+        self.n_channels, self.directional = n_channels, directional
+        self.net = relu_mlp(n_inputs + (10 if directional else 0), width, n_layers, 2 * n_channels)
+        with torch.no_grad():
+            self.net[-1].bias.fill_(2.0)  # mostly open
+
+    def forward(self, features: Tensor, lobe_dirs: Tensor, roughness: Tensor) -> tuple[Tensor, Tensor]:
+        """-> o_d, o_s, [n, n_channels] each."""
+        if self.directional:
+            x, y, z = lobe_dirs.unbind(-1)
+            second_order = torch.stack([x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1, z * z * z], dim=-1)
+            features = torch.cat([features, lobe_dirs, second_order, roughness], dim=-1)
+        out = torch.sigmoid(self.net(features))
+        return out[:, : self.n_channels], out[:, self.n_channels :]
+
+
+def sharpness(variance: Tensor) -> Tensor:
+    """s = exp(10 v) of the NeuS density, exponent clamped to [0, 9]."""
+    return torch.exp(torch.clamp(10.0 * variance, 0.0, 9.0))
+
+
+def smooth_l1_elements(a: Tensor, b: Tensor) -> Tensor:
+    """Smooth L1 element by element, as the released code takes for light and occlusion."""
+    return F.smooth_l1_loss(a, b, reduction="none")

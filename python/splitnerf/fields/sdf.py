@@ -1,0 +1,126 @@
+"""The signed distance field: a progressive hash grid and one hidden layer."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from splitnerf.ops import HashGrid, HashGridSpec
+
+SOFTPLUS_BETA = 100.0
+
+
+class SdfSample(NamedTuple):
+    """The field at a batch of points.
+
+    Attributes:
+        outputs: [n, 13], the first of which is the signed distance (scene units, negative inside).
+        features: [n, C] hash-grid features.
+        gradient: [n, 3] d sdf / d position.
+    """
+
+    outputs: Tensor
+    features: Tensor
+    gradient: Tensor
+
+    @property
+    def sdf(self) -> Tensor:
+        return self.outputs[:, 0]
+
+
+class SdfField(nn.Module):
+    """sdf(x) = W2 softplus_100(W1 [x, hash(x)] + b1) + b2, with weight normalisation.
+
+    One hidden layer has its gradient in closed form, so normals need a single backward pass:
+    ``d sdf / d input = (W2[0] * sigmoid(100 pre)) W1``; the hash grid's part goes through its Jacobian.
+
+    Args:
+        spec: Shape of the hash grid.
+        box: Half size of the cube that the grid covers, scene units.
+        width: Hidden units.
+        n_outputs: Outputs, the distance included.
+        radius: The field starts as a sphere of this radius, scene units.
+
+    Source: SplitNeRF, section 4.1; sphere initialisation: Atzmon and Lipman 2020.
+    """
+
+    def __init__(self, spec: HashGridSpec, box: float, width: int = 64, n_outputs: int = 13, radius: float = 0.5):
+        super().__init__()
+        self.box = box
+        self.grid = HashGrid(spec)
+        hidden = torch.zeros(width, 3 + spec.n_outputs)
+        hidden[:, :3] = torch.randn(width, 3) * math.sqrt(2.0 / width)
+        out = torch.randn(n_outputs, width) * math.sqrt(1.0 / width)
+        out[0] = math.sqrt(math.pi / width) + torch.randn(width) * 1e-4
+        bias = torch.zeros(n_outputs)
+        bias[0] = -radius
+        # The columns of the hash features start at 0: a floor keeps the rows' directions trainable.
+        self.hidden_direction = nn.Parameter(hidden)
+        self.hidden_length = nn.Parameter(hidden.norm(dim=1, keepdim=True))
+        self.hidden_bias = nn.Parameter(torch.zeros(width))
+        self.out_direction = nn.Parameter(out)
+        self.out_length = nn.Parameter(out.norm(dim=1, keepdim=True))
+        self.out_bias = nn.Parameter(bias)
+
+    def _weights(self) -> tuple[Tensor, Tensor]:
+        """Weight normalisation: each row is length * direction / |direction|."""
+        return (
+            F.normalize(self.hidden_direction, dim=1) * self.hidden_length,
+            F.normalize(self.out_direction, dim=1) * self.out_length,
+        )
+
+    def _to_unit(self, positions: Tensor) -> Tensor:
+        return positions * (0.5 / self.box) + 0.5
+
+    def forward(self, positions: Tensor) -> Tensor:
+        """outputs [n, n_outputs] at positions [n, 3], scene units."""
+        hidden, out = self._weights()
+        x = torch.cat([positions, self.grid(self._to_unit(positions))], dim=1)
+        return F.linear(F.softplus(F.linear(x, hidden, self.hidden_bias), SOFTPLUS_BETA), out, self.out_bias)
+
+    def sdf(self, positions: Tensor) -> Tensor:
+        """Signed distance [n] at positions [n, 3], scene units."""
+        hidden, out = self._weights()
+        x = torch.cat([positions, self.grid(self._to_unit(positions))], dim=1)
+        h = F.softplus(F.linear(x, hidden, self.hidden_bias), SOFTPLUS_BETA)
+        return (h @ out[0]) + self.out_bias[0]
+
+    def sample(self, positions: Tensor, with_features: bool = True) -> SdfSample:
+        """Outputs, grid features and the analytic gradient in one pass.
+
+        Differentiable once in all parameters (not in positions).
+        """
+        hidden, out = self._weights()
+        features, jacobian = self.grid.jacobian(self._to_unit(positions))
+        x = torch.cat([positions, features], dim=1)
+        pre = F.linear(x, hidden, self.hidden_bias)
+        outputs = F.linear(F.softplus(pre, SOFTPLUS_BETA), out, self.out_bias)
+        slope = (torch.sigmoid(SOFTPLUS_BETA * pre) * out[0]) @ hidden  # d sdf / d input, [n, 3 + C]
+        gradient = slope[:, :3] + (jacobian * slope[:, None, 3:]).sum(-1) * (0.5 / self.box)
+        return SdfSample(outputs, features, gradient)
+
+    def sample_finite_difference(self, positions: Tensor) -> SdfSample:
+        """As :meth:`sample` with the gradient by six taps, eps = the finest open level's cell.
+
+        Source: SplitNeRF, section 4.1 (Neuralangelo's numerical gradients).
+        """
+        levels = self.grid.spec.levels()
+        resolution = levels[max(0, self.grid.n_active - 1)][0]
+        eps = 2.0 * self.box / resolution
+        steps = eps * torch.cat([torch.eye(3), -torch.eye(3)]).to(positions)
+        taps = self.sdf((positions[:, None, :] + steps).reshape(-1, 3)).view(-1, 2, 3)
+        features = self.grid(self._to_unit(positions))
+        hidden, out = self._weights()
+        h = F.softplus(F.linear(torch.cat([positions, features], 1), hidden, self.hidden_bias), SOFTPLUS_BETA)
+        return SdfSample(F.linear(h, out, self.out_bias), features, (taps[:, 0] - taps[:, 1]) / (2.0 * eps))
+
+
+def unit_normals(gradient: Tensor) -> Tensor:
+    """gradient / sqrt(|gradient|^2 + 1e-12); where |gradient| < 1e-3 no gradient flows back."""
+    squared = (gradient * gradient).sum(-1, keepdim=True)
+    gradient = torch.where(squared < 1e-6, gradient.detach(), gradient)
+    return gradient * torch.rsqrt((gradient * gradient).sum(-1, keepdim=True) + 1e-12)

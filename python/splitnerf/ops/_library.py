@@ -1,0 +1,36 @@
+"""Loads the operator library and holds what every wrapper needs to register one operator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import torch
+
+from splitnerf import _core
+
+
+def _load() -> None:
+    """Loads the operators into torch; their library stands beside the compiled module."""
+    folder = Path(_core.__file__).parent
+    found = sorted(folder.glob("libsplitnerf_ops.*"))
+    if not found:
+        raise ImportError(f"libsplitnerf_ops is missing in {folder}: reinstall with `pip install --no-build-isolation .`")
+    torch.ops.load_library(str(found[0]))
+
+
+_load()
+lib = torch.ops.splitnerf
+
+
+def register(name: str, *, fake, backward=None, setup_context=None) -> None:
+    """Registers the fake implementation and the gradient of ``splitnerf::name``.
+
+    An operator without ``backward`` raises when a gradient is asked of it; it never returns zeros.
+    """
+    qualified = f"splitnerf::{name}"
+    torch.library.register_fake(qualified, fake)
+
+    def refuse(ctx, *grads):
+        raise RuntimeError(f"{name}: no gradient is defined for this operator; see the table in docs/ops.md")
+
+    torch.library.register_autograd(qualified, backward or refuse, setup_context=setup_context)

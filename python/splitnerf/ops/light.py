@@ -1,0 +1,98 @@
+"""The Monte Carlo estimate of the pre-integrated light.
+
+Differentiable once in ``light``; a gradient to directions or roughness raises.
+
+Source: SplitNeRF Eq. (11).
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from splitnerf import _core
+from splitnerf.ops._library import lib, register
+
+
+def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, light: Tensor) -> Tensor:
+    """Estimates gbar(w_s, rho) from light samples that all queries share.
+
+    ``gbar = sum_i D(w_i, w_s, rho) L_i (w_i.w_s)+ / sum_i D (w_i.w_s)+``. The light directions should
+    cover the sphere uniformly (:func:`fibonacci_directions` with a random rotation). Each pair's
+    weight is computed where it is used: memory is O(s + n), never O(s n).
+
+    Args:
+        query_dirs: [s, 3] unit.
+        roughness: [s, 1], in [0, 1].
+        light_dirs: [n, 3] unit, n > 0.
+        light: [n, 3] radiance at rho = 0.
+
+    Returns:
+        [s, 3] radiance.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+    """
+    return lib.prefilter_light(query_dirs, roughness, light_dirs, light)[0]
+
+
+def fibonacci_directions(n: int, generator: torch.Generator | None = None, dtype=torch.float32) -> Tensor:
+    """[n, 3] uniform lattice on the sphere under a random rotation (Haar measure).
+
+    At equal n its error in gbar is 2 to 10 times below that of independent directions.
+    """
+    lattice = torch.from_numpy(_core.fibonacci_sphere(n)).to(dtype)
+    q, r = torch.linalg.qr(torch.randn(3, 3, dtype=dtype, generator=generator))
+    return lattice @ (q * torch.sign(torch.diagonal(r)))
+
+
+def sample_ggx_lobe(axes: Tensor, roughness: Tensor, n_samples: int, seed: int = 0) -> Tensor:
+    """Directions with density proportional to D(w)(w.axis)+, for narrow lobes that a shared set would miss.
+
+    The plain mean of the light over them estimates gbar: sampling is exact, so no weights are left.
+    A random shift by axis and seed makes the mean unbiased. No gradient.
+
+    Args:
+        axes: [s, 3] unit.
+        roughness: [s, 1], in [0, 1].
+        n_samples: Directions an axis.
+        seed: Of the random shifts.
+
+    Returns:
+        [s, n_samples, 3] unit directions.
+
+    Raises:
+        ValueError: A shape, dtype or count does not fit.
+    """
+    return lib.sample_ggx_lobe(axes, roughness, n_samples, seed)
+
+
+def _keep(ctx, inputs, output):
+    query_dirs, roughness, light_dirs, _ = inputs
+    ctx.save_for_backward(query_dirs, roughness, light_dirs, output[1])
+
+
+def _backward(ctx, grad_gbar, grad_total):
+    query_dirs, roughness, light_dirs, total = ctx.saved_tensors
+    if any(ctx.needs_input_grad[:3]):
+        raise RuntimeError("prefilter_light: a gradient exists to light alone, not to directions or roughness")
+    return None, None, None, lib.prefilter_light_backward(query_dirs, roughness, total, grad_gbar, light_dirs)
+
+
+register(
+    "prefilter_light",
+    fake=lambda query_dirs, roughness, light_dirs, light: (
+        torch.empty_like(query_dirs),
+        query_dirs.new_empty(query_dirs.shape[0]),
+    ),
+    setup_context=_keep,
+    backward=_backward,
+)
+register(
+    "prefilter_light_backward",
+    fake=lambda query_dirs, roughness, total, grad_gbar, light_dirs: torch.empty_like(light_dirs),
+)
+register(
+    "sample_ggx_lobe",
+    fake=lambda axes, roughness, n_samples, seed: axes.new_empty(axes.shape[0], n_samples, 3),
+)

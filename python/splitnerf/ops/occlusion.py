@@ -1,0 +1,111 @@
+"""Visibility and occlusion factors by tracing a triangle mesh.
+
+Neither operator has a gradient: its outputs are targets. Asking for one raises.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from splitnerf import _core
+from splitnerf.ops._library import lib, register
+
+
+class MeshScene:
+    """A triangle mesh ready to be traced; ``handle`` is what the operators take.
+
+    A changed mesh needs a new scene. The acceleration structure lives as long as the object.
+
+    Args:
+        vertices: [n, 3] float32, scene units.
+        faces: [m, 3] int32.
+
+    Raises:
+        ValueError: The mesh is empty, an index is out of range or a vertex is not finite.
+    """
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray):
+        self._scene = _core.Scene(
+            np.ascontiguousarray(vertices, dtype=np.float32), np.ascontiguousarray(faces, dtype=np.int32)
+        )
+        self.handle: int = self._scene.handle
+
+
+def trace_visibility(scene: MeshScene, origins: Tensor, directions: Tensor, t_far: float = math.inf) -> Tensor:
+    """True where a ray meets no triangle.
+
+    Args:
+        scene: The mesh.
+        origins, directions: [n, 3] float32; neighbours in the arrays should be neighbours in space, since
+            rays are traced in packets of 16.
+        t_far: Length of the rays in multiples of ``directions``.
+
+    Returns:
+        [n] bool, True = open.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+        IndexError: The scene no longer exists.
+    """
+    return lib.trace_visibility(scene.handle, origins, directions, t_far)
+
+
+def occlusion_factors(
+    scene: MeshScene,
+    positions: Tensor,
+    normals: Tensor,
+    lobe_dirs: Tensor,
+    roughness: Tensor,
+    environment: Tensor,
+    *,
+    n_diffuse_rays: int = 64,
+    n_specular_rays: int = 64,
+    offset: float = 0.0125,
+    seed: int = 0,
+    n_channels: int = 1,
+) -> tuple[Tensor, Tensor]:
+    """Shares of the diffuse and specular light that reach points past the mesh.
+
+    ``o_d = sum L_i V_i / sum L_i`` over cosine-weighted directions about the normal; o_s the same over the
+    lobe D(w)(w.d)+ about ``lobe_dirs``. Samples, traces, weighs and sums point by point: no
+    [points, rays] array exists. Black light falls back to the geometric share.
+
+    Args:
+        scene: The mesh.
+        positions, normals: [n, 3]; normals unit.
+        lobe_dirs: [n, 3] unit: the axis of the specular lobe (:func:`splitnerf.ops.query_direction`).
+        roughness: [n, 1].
+        environment: [height, width, 3] radiance, equirectangular (z up, centre column along +x).
+        n_diffuse_rays, n_specular_rays: Rays a point.
+        offset: Rays start this far off the point along its normal, scene units.
+        seed: The rays' lattice is shifted at random by point and seed.
+        n_channels: 1 averages the factors over the colour channels, 3 keeps them.
+
+    Returns:
+        o_d and o_s, [n, n_channels] in [0, 1], 1 = open.
+
+    Raises:
+        ValueError: A shape, dtype or count does not fit.
+        IndexError: The scene no longer exists.
+
+    Source: SplitNeRF Eq. (14), (15), with the specular lobe about the reflection.
+    """
+    o_d, o_s = lib.occlusion_factors(
+        scene.handle, positions, normals, lobe_dirs, roughness, environment,
+        n_diffuse_rays, n_specular_rays, offset, seed,
+    )  # fmt: skip
+    return (o_d, o_s) if n_channels == 3 else (o_d.mean(-1, keepdim=True), o_s.mean(-1, keepdim=True))
+
+
+register(
+    "trace_visibility",
+    fake=lambda scene, origins, directions, t_far: origins.new_empty(origins.shape[0], dtype=torch.bool),
+)
+register(
+    "occlusion_factors",
+    fake=lambda scene, positions, *rest: (torch.empty_like(positions), torch.empty_like(positions)),
+)

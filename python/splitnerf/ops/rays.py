@@ -1,0 +1,158 @@
+"""Packed samples along rays: marching, NeuS weights and compositing.
+
+Samples of all rays lie in one array, ray after ray; ``offsets`` [n_rays + 1] says where each begins.
+``neus_weights`` is differentiable once in f_prev, f_next and s; ``composite`` once in weights and
+values; a second derivative raises. ``march_rays`` has no gradient.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from splitnerf.ops._library import lib, register
+
+CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE = 0, 1, 2
+
+
+class PackedSamples(NamedTuple):
+    """Samples of a batch of rays.
+
+    Attributes:
+        ray_indices: [n] int64, the ray of each sample.
+        t_starts, t_ends: [n] distances along the ray, scene units.
+        offsets: [n_rays + 1] int64, samples of ray r are offsets[r] to offsets[r + 1].
+    """
+
+    ray_indices: Tensor
+    t_starts: Tensor
+    t_ends: Tensor
+    offsets: Tensor
+
+
+def march_rays(
+    rays_o: Tensor, rays_d: Tensor, jitter: Tensor, cells: Tensor, box: float, step: float, max_samples: int = 1024
+) -> PackedSamples:
+    """Steps rays through an occupancy grid and keeps the samples in occupied cells.
+
+    Args:
+        rays_o, rays_d: [n_rays, 3]; directions unit. Origins may stand outside the box.
+        jitter: [n_rays] in [0, 1): shifts each ray's lattice of samples by a fraction of the step.
+        cells: [r, r, r] uint8 over [x, y, z]: CELL_EMPTY is skipped, CELL_OCCUPIED sampled, CELL_OPAQUE (so deep
+            inside that nothing behind it is seen) ends the ray.
+        box: Half size of the cube that the cells cover.
+        step: Length of a sample, scene units.
+        max_samples: Of one ray.
+
+    Returns:
+        PackedSamples, front to back.
+
+    Raises:
+        ValueError: A shape, dtype or size does not fit.
+    """
+    return PackedSamples(*lib.march_rays(rays_o, rays_d, jitter, cells, box, step, max_samples))
+
+
+def neus_weights(
+    f_prev: Tensor, f_next: Tensor, s: Tensor, offsets: Tensor, min_transmittance: float = 0.0
+) -> tuple[Tensor, Tensor]:
+    """Rendering weights of an SDF's samples, in log space.
+
+    ``alpha = (Phi(f_prev) - Phi(f_next))+ / Phi(f_prev)``, ``Phi(f) = sigmoid(s f)``, computed as
+    ``tau = log1p(expm1(d) sigmoid(-s f_prev))``, ``d = s (f_prev - f_next)+``; the transmittance is a sum of tau.
+
+    Args:
+        f_prev, f_next: [n] signed distance at the start and the end of each sample.
+        s: [] sharpness, positive.
+        offsets: [n_rays + 1] int64.
+        min_transmittance: Samples behind less than this get weight 0; the pixel's error is at most this.
+
+    Returns:
+        weights [n] and opacity [n_rays], the sum of a ray's weights.
+
+    Raises:
+        ValueError: A shape, dtype or the order of the offsets does not fit.
+
+    Source: NeuS Eq. (13); SplitNeRF Eq. (1)-(2).
+    """
+    return lib.neus_weights(f_prev, f_next, s, offsets, min_transmittance)
+
+
+def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:
+    """Weighted sum of the samples' values along each ray.
+
+    Args:
+        weights: [n].
+        values: [n, c].
+        offsets: [n_rays + 1] int64.
+
+    Returns:
+        [n_rays, c]; 0 for a ray without samples.
+
+    Raises:
+        ValueError: A shape, dtype or the order of the offsets does not fit.
+    """
+    return lib.composite(weights, values, offsets)
+
+
+def _fake_march(rays_o, rays_d, jitter, cells, box, step, max_samples):
+    n = torch.library.get_ctx().new_dynamic_size()
+    return (
+        rays_o.new_empty(n, dtype=torch.int64),
+        rays_o.new_empty(n),
+        rays_o.new_empty(n),
+        rays_o.new_empty(rays_o.shape[0] + 1, dtype=torch.int64),
+    )
+
+
+def _keep_weights(ctx, inputs, output):
+    f_prev, f_next, s, offsets, ctx.min_transmittance = inputs
+    ctx.save_for_backward(f_prev, f_next, s, offsets, *output)
+
+
+def _weights_backward(ctx, grad_weights, grad_opacity):
+    f_prev, f_next, s, offsets, weights, opacity = ctx.saved_tensors
+    grad_prev, grad_next, grad_s = lib.neus_weights_backward(
+        f_prev, f_next, s, offsets, ctx.min_transmittance, weights, opacity, grad_weights, grad_opacity
+    )
+    return grad_prev, grad_next, grad_s.sum(), None, None
+
+
+def _keep_composite(ctx, inputs, output):
+    ctx.save_for_backward(*inputs)
+
+
+def _composite_backward(ctx, grad):
+    return *lib.composite_backward(*ctx.saved_tensors, grad), None
+
+
+register("march_rays", fake=_fake_march)
+register(
+    "neus_weights",
+    fake=lambda f_prev, f_next, s, offsets, eps: (
+        torch.empty_like(f_prev),
+        f_prev.new_empty(offsets.shape[0] - 1),
+    ),
+    setup_context=_keep_weights,
+    backward=_weights_backward,
+)
+register(
+    "neus_weights_backward",
+    fake=lambda f_prev, f_next, s, offsets, eps, weights, opacity, *grads: (
+        torch.empty_like(f_prev),
+        torch.empty_like(f_next),
+        torch.empty_like(opacity),
+    ),
+)
+register(
+    "composite",
+    fake=lambda weights, values, offsets: values.new_empty(offsets.shape[0] - 1, values.shape[1]),
+    setup_context=_keep_composite,
+    backward=_composite_backward,
+)
+register(
+    "composite_backward",
+    fake=lambda weights, values, offsets, grad: (torch.empty_like(weights), torch.empty_like(values)),
+)

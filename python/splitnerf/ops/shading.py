@@ -1,0 +1,144 @@
+"""Split-sum shading: where the pre-integrated light is asked, and the radiance that follows.
+
+Both operators are differentiable once in every floating input (``view_dirs`` included, the table
+excluded); a second derivative raises.
+
+Source: SplitNeRF Eq. (6)-(10), (17); Karis 2013.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import torch
+from torch import Tensor
+
+from splitnerf import _core
+from splitnerf.ops._library import lib, register
+
+FRESNEL_MODES = ("exact", "paper", "code")
+QUERIES = ("mean", "reflection")
+
+
+@functools.lru_cache(maxsize=8)
+def _brdf_lut(device: torch.device) -> Tensor:
+    return torch.from_numpy(_core.brdf_lut()).to(device)
+
+
+def brdf_lut(device: torch.device | str = "cpu") -> Tensor:
+    """The table of the split sum: [32 roughness, 32 sqrt(n.v), (F1, F2, chi)] float32, computed once.
+
+    The specular directional albedo is ``E = F0 F1 + F2`` (height-correlated Smith GGX, ggx_alpha =
+    roughness squared); chi places the lobe's mean direction between normal and reflection.
+    """
+    return _brdf_lut(torch.device(device))
+
+
+def query_direction(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean") -> Tensor:
+    """Direction at which the pre-integrated light is asked for the specular lobe.
+
+    ``d = normalize((1 - k) n + k w_r)``, w_r the mirror direction, ``k = lerp(1, chi(n.v, rho),
+    smoothstep(.3, .4, rho))``; the normal is first turned towards the viewer.
+
+    Args:
+        normals: [n, 3] unit.
+        view_dirs: [n, 3] unit, from the surface to the camera.
+        roughness: [n, 1] perceptual, in [0, 1].
+        query: ``mean`` (above) or ``reflection`` (w_r itself, the paper's form).
+
+    Returns:
+        [n, 3] unit directions.
+
+    Raises:
+        ValueError: A shape, dtype or the name of the query does not fit.
+    """
+    if query not in QUERIES:
+        raise ValueError(f"query_direction: query must be one of {QUERIES}, got {query!r}")
+    return lib.query_direction(normals, view_dirs, roughness, brdf_lut(normals.device), query == "mean")
+
+
+def split_sum_shade(
+    normals: Tensor,
+    view_dirs: Tensor,
+    albedo: Tensor,
+    roughness: Tensor,
+    metallic: Tensor,
+    specular: Tensor,
+    diffuse: Tensor,
+    occlusion_s: Tensor,
+    occlusion_d: Tensor,
+    fresnel_mode: str = "exact",
+    compensate: bool = False,
+) -> Tensor:
+    """Outgoing linear radiance of points under the pre-integrated light, in one pass.
+
+    ``L = o_d (1 - m)(1 - E) albedo g(n, 1) + o_s E g(d, rho)``, ``E = F0 F1 + F2``,
+    ``F0 = .04 (1 - m) + m albedo``. g(n, 1) is irradiance / pi, so no further pi appears.
+
+    Args:
+        normals, view_dirs: [n, 3] unit; the normal is turned towards the viewer.
+        albedo: [n, 3] linear, in [0, 1].
+        roughness, metallic: [n, 1], in [0, 1].
+        specular: [n, 3] g(d, rho), radiance; d from :func:`query_direction`.
+        diffuse: [n, 3] g(n, 1), radiance.
+        occlusion_s, occlusion_d: [n, 1] or [n, 3] occlusion factors, 1 = open.
+        fresnel_mode: ``exact``, ``paper`` or ``code`` (the latter two count Fresnel's term twice, as published).
+        compensate: Multiple-scattering compensation ``E [1 + F0 (1/(F1 + F2) - 1)]`` (Turquin 2019), as
+            Blender's Principled BSDF has it.
+
+    Returns:
+        [n, 3] linear radiance.
+
+    Raises:
+        ValueError: A shape, dtype or mode does not fit.
+    """
+    if fresnel_mode not in FRESNEL_MODES:
+        raise ValueError(f"split_sum_shade: fresnel_mode must be one of {FRESNEL_MODES}, got {fresnel_mode!r}")
+    return lib.split_sum_shade(
+        normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
+        brdf_lut(normals.device), FRESNEL_MODES.index(fresnel_mode), compensate,
+    )  # fmt: skip
+
+
+def _keep_query(ctx, inputs, output):
+    ctx.save_for_backward(*inputs[:4])
+    ctx.mean = inputs[4]
+
+
+def _query_backward(ctx, grad):
+    grads = lib.query_direction_backward(*ctx.saved_tensors, ctx.mean, grad)
+    return *grads, None, None
+
+
+def _keep_shade(ctx, inputs, output):
+    ctx.save_for_backward(*inputs[:10])
+    ctx.options = inputs[10:]
+
+
+def _shade_backward(ctx, grad):
+    grads = lib.split_sum_shade_backward(*ctx.saved_tensors, *ctx.options, grad)
+    return *grads, None, None, None
+
+
+register(
+    "query_direction",
+    fake=lambda normals, *rest: torch.empty_like(normals),
+    setup_context=_keep_query,
+    backward=_query_backward,
+)
+register(
+    "query_direction_backward",
+    fake=lambda normals, view_dirs, roughness, lut, mean, grad: tuple(
+        torch.empty_like(t) for t in (normals, view_dirs, roughness)
+    ),
+)
+register(
+    "split_sum_shade",
+    fake=lambda normals, *rest: torch.empty_like(normals),
+    setup_context=_keep_shade,
+    backward=_shade_backward,
+)
+register(
+    "split_sum_shade_backward",
+    fake=lambda *inputs: tuple(torch.empty_like(t) for t in inputs[:9]),
+)

@@ -1,0 +1,325 @@
+// The path tracer against energy conservation and closed forms.
+#include "splitnerf/path_tracer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+#include <vector>
+
+#include "meshes.h"
+#include "splitnerf/environment.h"
+#include "splitnerf/parallel.h"
+#include "splitnerf/principled.h"
+
+namespace splitnerf {
+namespace {
+
+using Vec = Vec3<float>;
+
+struct Image {
+  std::vector<float> radiance, alpha, albedo, roughness, metallic, normal, depth;
+  RenderTargets targets(size_t n) {
+    for (auto* image : {&radiance, &albedo, &normal}) image->assign(n * 3, -1.f);
+    for (auto* image : {&alpha, &roughness, &metallic, &depth}) image->assign(n, -1.f);
+    return {radiance.data(), alpha.data(), albedo.data(), roughness.data(), metallic.data(), normal.data(), depth.data()};
+  }
+};
+
+struct RenderJob {
+  TestMesh mesh;
+  bool smooth = false;  // the vertices are the normals (unit sphere)
+  Vec albedo{1, 1, 1};
+  float roughness = 0.5f, metallic = 0.f;
+  int map_height = 2, map_width = 4;
+  std::vector<float> map = std::vector<float>(2 * 4 * 3, 1.f);
+  Camera camera{};
+  PathTracerParams params;
+
+  Image render() const {
+    const size_t n = mesh.vertices.size() / 3;
+    std::vector<float> colours;
+    for (size_t i = 0; i < n; ++i) colours.insert(colours.end(), {albedo.x, albedo.y, albedo.z});
+    const std::vector<float> rough(n, roughness), metal(n, metallic);
+    const Surface surface{colours.data(), rough.data(), metal.data(), false, smooth ? mesh.vertices.data() : nullptr};
+    Image image;
+    const RenderTargets targets = image.targets(size_t(camera.width) * camera.height);
+    splitnerf::render(make_scene(mesh), surface, {map.data(), map_height, map_width}, camera, params, targets);
+    return image;
+  }
+  void set_map(int height, int width, const std::function<float(Vec)>& radiance) {
+    map_height = height, map_width = width;
+    map.clear();
+    for (int i = 0; i < height * width; ++i) {
+      const Vec d = equirect_to_direction(Vec2<float>{(i % width + 0.5f) / width, (i / width + 0.5f) / height});
+      map.insert(map.end(), 3, radiance(d));
+    }
+  }
+};
+
+// A camera at `eye` that looks at the origin, `size` pixels, about `span` wide at the origin.
+Camera look_at_origin(Vec eye, int size, float span) {
+  const Vec back = normalize(eye), right = normalize(cross(std::abs(back.z) > 0.99f ? Vec{0, 1, 0} : Vec{0, 0, 1}, back));
+  const Vec up = cross(back, right);
+  Camera c{};
+  for (int r = 0; r < 3; ++r) {
+    const float row[4] = {right[r], up[r], back[r], eye[r]};
+    for (int k = 0; k < 4; ++k) c.camera_to_world[r * 4 + k] = row[k];
+  }
+  c.fx = c.fy = size * length(eye) / span;
+  c.cx = c.cy = size / 2.f;
+  c.width = c.height = size;
+  return c;
+}
+
+RenderJob sphere_setup(int size = 24) {
+  RenderJob s;
+  s.mesh = sphere_mesh(128, 256);
+  s.smooth = true;
+  s.camera = look_at_origin({3, 1, 1.5f}, size, 2.5f);
+  s.params.samples_per_pixel = 256;
+  return s;
+}
+
+// Mean of radiance / alpha, and the largest deviation from `expected`, over covered pixels.
+struct Furnace {
+  double mean = 0, worst = 0;
+};
+Furnace compare(const Image& image, float expected) {
+  Furnace f;
+  int n = 0;
+  for (size_t i = 0; i < image.alpha.size(); ++i) {
+    if (image.alpha[i] < 1) continue;
+    for (int c = 0; c < 3; ++c, ++n) {
+      f.mean += image.radiance[i * 3 + c];
+      f.worst = std::max(f.worst, std::abs(double(image.radiance[i * 3 + c]) - expected));
+    }
+  }
+  EXPECT_GT(n, 300);
+  f.mean /= n;
+  return f;
+}
+
+TEST(PathTracer, WhiteFurnaceReturnsWhite) {
+  // Nothing is absorbed, so a white object vanishes in a white room. Errors: F1 + F2 of the table
+  // (.003, which is .7 % of a rough metal), noise, and bent normals at the silhouette.
+  for (float metallic : {0.f, 1.f}) {  // in between, the model itself loses m (1 - E)
+    for (float roughness : {0.05f, 0.25f, 0.5f, 0.75f, 1.f}) {
+      RenderJob s = sphere_setup();
+      s.metallic = metallic, s.roughness = roughness;
+      const Furnace f = compare(s.render(), 1.f);
+      EXPECT_NEAR(f.mean, 1, 0.006) << "metallic " << metallic << " roughness " << roughness;
+      EXPECT_LT(f.worst, 0.03) << "metallic " << metallic << " roughness " << roughness;
+    }
+  }
+}
+
+TEST(PathTracer, WhiteFurnaceHoldsInConcavities) {
+  // A white floor and wall under a white sky and ground: all bounces bring back 1, up to what
+  // remains on the path when it is cut off.
+  RenderJob s;
+  add_quad(s.mesh, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
+  add_quad(s.mesh, {-1, -1, 0}, {0, 2, 0}, {0, 0, 1});
+  s.camera = look_at_origin({2, 1, 2}, 16, 1.f);
+  s.params.samples_per_pixel = 256;
+  s.params.max_bounces = 24;
+  s.roughness = 0.6f, s.metallic = 1.f;
+  EXPECT_NEAR(compare(s.render(), 1.f).mean, 1, 0.004);
+  s.metallic = 0.f;
+  EXPECT_NEAR(compare(s.render(), 1.f).mean, 1, 0.004);
+}
+
+TEST(PathTracer, GreySphereUnderConstantLightReflectsItsDirectionalAlbedo) {
+  // Under light 2 a convex surface sends back 2 (E + (1 - E) albedo), E the coated layer's albedo.
+  RenderJob s = sphere_setup(9);
+  s.camera = look_at_origin({0, -3, 0}, 9, 0.05f);  // head on: n.v = 1 within 3e-4
+  s.albedo = {0.2f, 0.5f, 0.8f}, s.roughness = 1.f;
+  for (float& texel : s.map) texel = 2.f;
+  s.params.samples_per_pixel = 1024;
+  const Image image = s.render();
+  const Vec table = lookup_brdf_lut(brdf_lut(), 1.f, 1.f);
+  const float e = specular_albedo(0.04f, table.x, table.y, true).value;
+  for (int c = 0; c < 3; ++c) {
+    double mean = 0;
+    for (size_t i = 0; i < image.alpha.size(); ++i) mean += image.radiance[i * 3 + c] / double(image.alpha.size());
+    EXPECT_NEAR(mean, 2 * (e + (1 - e) * s.albedo[c]), 0.003);
+  }
+}
+
+TEST(PathTracer, DiffuseSphereUnderTheSkyFollowsTheCosineLaw) {
+  // Irradiance of a half-bright sky on a plane tilted by theta: pi (1 + cos theta) / 2. The
+  // specular layer of F0 = .04 is taken off by the difference of a white and a black sphere.
+  RenderJob s = sphere_setup(48);
+  s.roughness = 1.f;
+  s.set_map(128, 256, [](Vec d) { return d.z > 0 ? 1.f : 0.f; });
+  s.albedo = {0.5f, 0.5f, 0.5f};
+  const Image grey = s.render();
+  s.albedo = {0.f, 0.f, 0.f};
+  const Image black = s.render();
+  double mean_error = 0;
+  int n = 0;
+  for (size_t i = 0; i < grey.alpha.size(); ++i) {
+    if (grey.alpha[i] < 1) continue;
+    const Vec normal = normalize(load3(&grey.normal[i * 3]));
+    const Vec eye{s.camera.camera_to_world[3], s.camera.camera_to_world[7], s.camera.camera_to_world[11]};
+    const float cosine = dot(normal, normalize(eye - normal));
+    if (cosine < 0.3f) continue;
+    const Vec table = lookup_brdf_lut(brdf_lut(), cosine, 1.f);
+    const float e = specular_albedo(0.04f, table.x, table.y, true).value;
+    const double expected = (1 - e) * 0.5 * (1 + normal.z) / 2;
+    mean_error += std::abs(grey.radiance[i * 3] - black.radiance[i * 3] - expected);
+    ++n;
+  }
+  EXPECT_GT(n, 500);
+  EXPECT_LT(mean_error / n, 0.004);
+}
+
+TEST(PathTracer, EndlessWallHidesHalfTheHemisphere) {
+  // Looking straight down, every azimuth counts alike: a wall as good as infinite takes half.
+  RenderJob s;
+  add_quad(s.mesh, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
+  s.camera = look_at_origin({0, 0, 3}, 1, 1e-4f);
+  s.params.max_bounces = 0;
+  s.params.samples_per_pixel = 16384;
+  const float open = s.render().radiance[0];
+  add_quad(s.mesh, {2e-3f, -500, 0}, {0, 1000, 0}, {0, 0, 500});
+  const float half = s.render().radiance[0];
+  EXPECT_NEAR(open, 1, 0.005);
+  EXPECT_NEAR(half / open, 0.5, 0.005);
+}
+
+// A metal ball over a floor under a small bright sun and a dim sky.
+RenderJob sun_setup(float roughness, float metallic) {
+  RenderJob s;
+  s.mesh = sphere_mesh(32, 64);
+  add_quad(s.mesh, {-2, -2, -1}, {4, 0, 0}, {0, 4, 0});
+  s.roughness = roughness, s.metallic = metallic, s.albedo = {0.7f, 0.6f, 0.5f};
+  s.camera = look_at_origin({3, 2, 2}, 12, 3.f);
+  const Vec sun = normalize(Vec{1, -0.5f, 1.5f});
+  s.set_map(32, 64, [=](Vec d) { return dot(d, sun) > 0.97f ? 30.f : 0.3f + 0.2f * d.z; });
+  return s;
+}
+
+TEST(PathTracer, LightSamplingAgreesWithBsdfSampling) {
+  for (float metallic : {0.f, 1.f}) {
+    for (float roughness : {0.2f, 0.6f}) {
+      RenderJob s = sun_setup(roughness, metallic);
+      s.params.samples_per_pixel = 1024;
+      const Image both = s.render();
+      s.params.light_sampling = false;
+      s.params.samples_per_pixel = 8192;
+      const Image single = s.render();
+      double sum_both = 0, sum_single = 0;
+      for (size_t i = 0; i < both.radiance.size(); ++i) sum_both += both.radiance[i], sum_single += single.radiance[i];
+      EXPECT_NEAR(sum_both / sum_single, 1, 0.01) << "metallic " << metallic << " roughness " << roughness;
+    }
+  }
+}
+
+TEST(PathTracer, SameSeedSameImageWhateverTheThreads) {
+  RenderJob s = sun_setup(0.3f, 0.f);
+  s.params.samples_per_pixel = 16;
+  const Image first = s.render();
+  set_parallel_backend([](int64_t n, int64_t, RangeBody body, void* context) { body(0, n, context); });
+  const Image serial = s.render();
+  set_parallel_backend(nullptr);
+  EXPECT_EQ(first.radiance, serial.radiance);
+  s.params.seed = 1;
+  EXPECT_NE(first.radiance, s.render().radiance);
+}
+
+TEST(PathTracer, FeaturesDescribeTheFirstHit) {
+  RenderJob s = sphere_setup(33);
+  s.albedo = {0.1f, 0.2f, 0.3f}, s.roughness = 0.4f, s.metallic = 0.7f;
+  s.params.samples_per_pixel = 64;
+  s.params.max_bounces = 0;
+  const Image image = s.render();
+  const size_t centre = 16 * 33 + 16;
+  EXPECT_EQ(image.alpha[centre], 1.f);
+  EXPECT_EQ(image.alpha[0], 0.f);
+  EXPECT_EQ(image.depth[0], 0.f);
+  EXPECT_EQ(image.radiance[0], 0.f);
+  const Vec eye{3, 1, 1.5f}, normal = load3(&image.normal[centre * 3]);
+  EXPECT_LT(length(normal - normalize(eye)), 0.02f);
+  EXPECT_NEAR(image.depth[centre], length(eye) - 1, 0.002f);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(image.albedo[centre * 3 + c], s.albedo[c], 1e-5f);
+  EXPECT_NEAR(image.roughness[centre], 0.4f, 1e-5f);
+  EXPECT_NEAR(image.metallic[centre], 0.7f, 1e-5f);
+  // Covered area: a sphere of radius 1 at distance d has an outline of radius 1 / sqrt(d^2 - 1) at unit distance.
+  double area = 0;
+  for (float a : image.alpha) area += a / (s.camera.fx * s.camera.fy);
+  EXPECT_NEAR(area * (dot(eye, eye) - 1) / kPi, 1, 0.003);
+}
+
+TEST(PathTracer, CameraAxesFollowOpenGl) {
+  // A triangle towards +x of the camera and +y (up) appears right of and above the centre.
+  RenderJob s;
+  s.mesh.vertices = {0.25f, 0.25f, -2, 0.75f, 0.25f, -2, 0.5f, 0.75f, -2};
+  s.mesh.triangles = {0, 1, 2};
+  s.camera = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, 8, 8, 4, 4, 8, 8};
+  s.params.samples_per_pixel = 1024;
+  const Image image = s.render();
+  double x = 0, y = 0, total = 0;
+  for (int i = 0; i < 64; ++i) {
+    x += (i % 8 + 0.5) * image.alpha[i], y += (i / 8 + 0.5) * image.alpha[i], total += image.alpha[i];
+  }
+  // Its centroid (0.5, 1.25 / 3) and its area, scaled by fx / depth = 4. The positions of the
+  // pixels that it covers in part are only known to the pixel.
+  EXPECT_NEAR(x / total, 4 + 4 * 0.5, 0.1);
+  EXPECT_NEAR(y / total, 4 - 4 * 1.25 / 3, 0.1);
+  EXPECT_NEAR(total, 0.5 * 2 * 2, 0.02);
+}
+
+TEST(PathTracer, ExtremeMaterialsStayFinite) {
+  for (float roughness : {0.f, 1.f}) {
+    for (float metallic : {0.f, 1.f}) {
+      for (float albedo : {0.f, 1.f}) {
+        RenderJob s = sun_setup(roughness, metallic);
+        s.albedo = {albedo, albedo, albedo};
+        s.params.samples_per_pixel = 64;
+        EXPECT_NO_THROW(s.render());
+      }
+    }
+  }
+  RenderJob s = sun_setup(0.5f, 0.f);
+  s.map.assign(s.map.size(), 0.f);  // a black light
+  for (float value : s.render().radiance) ASSERT_EQ(value, 0.f);
+}
+
+TEST(PathTracer, RejectsUnusableInputs) {
+  RenderJob s = sphere_setup(2);
+  s.roughness = 1.5f;
+  EXPECT_THROW(s.render(), std::invalid_argument);
+  s = sphere_setup(2);
+  s.albedo.y = std::nanf("");
+  EXPECT_THROW(s.render(), std::invalid_argument);
+  s = sphere_setup(2);
+  s.map[3] = -1.f;
+  EXPECT_THROW(s.render(), std::invalid_argument);
+  s = sphere_setup(2);
+  s.params.samples_per_pixel = 0;
+  EXPECT_THROW(s.render(), std::invalid_argument);
+  s = sphere_setup(2);
+  s.camera.fx = 0;
+  EXPECT_THROW(s.render(), std::invalid_argument);
+}
+
+TEST(Principled, DensityIsNormalisedAndReciprocal) {
+  for (float roughness : {0.3f, 0.8f}) {
+    const Vec3<double> view = normalize(Vec3<double>{0.5, 0.3, 0.6}), albedo{0.6, 0.5, 0.4};
+    const PrincipledBsdf<double> bsdf(brdf_lut(), albedo, double(roughness), 0.2, view);
+    double total = 0;
+    constexpr uint32_t kPoints = 400000;
+    for (uint32_t i = 0; i < kPoints; ++i) total += bsdf.evaluate(fibonacci_sphere<double>(i, kPoints)).pdf * 4 * kPi / kPoints;
+    // What is missing are specular samples below the horizon.
+    double below = 0;
+    for (uint32_t i = 0; i < 100000; ++i) {
+      below += bsdf.sample(random_unit<double>(i, 0), random_unit<double>(i, 1), random_unit<double>(i, 2)).z <= 0 ? 1e-5 : 0;
+    }
+    EXPECT_NEAR(total + below, 1, 0.003) << roughness;
+  }
+}
+
+}  // namespace
+}  // namespace splitnerf

@@ -1,0 +1,259 @@
+// Samplers against their densities, lattices, random numbers.
+#include "splitnerf/sampling.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <set>
+#include <vector>
+
+namespace splitnerf {
+namespace {
+
+using Vec = Vec3<double>;
+using Density = std::function<double(Vec)>;
+using Sampler = std::function<Vec(double, double)>;
+
+constexpr int kAzimuths = 8;
+
+// Cells of the sphere: edges in 1 - cos(theta) that are fine where the lobe is (1 - cos is about
+// width^2 there), coarse elsewhere, times equal azimuths.
+std::vector<double> polar_edges(double width) {
+  std::vector<double> edges{0};
+  for (double t = std::min(0.05, 0.1 * width * width); t < 0.1; t *= 1.6) edges.push_back(t);
+  for (int k = 1; k <= 19; ++k) edges.push_back(0.1 * k);
+  edges.push_back(2);
+  return edges;
+}
+
+// Integral of the density over every cell by a midpoint rule.
+std::vector<double> cell_masses(const Density& pdf, const std::vector<double>& edges) {
+  constexpr int kFine = 40;
+  std::vector<double> masses;
+  for (size_t i = 0; i + 1 < edges.size(); ++i) {
+    for (int j = 0; j < kAzimuths; ++j) {
+      double mass = 0;
+      for (int a = 0; a < kFine; ++a) {
+        for (int b = 0; b < kFine; ++b) {
+          const double t = lerp(edges[i], edges[i + 1], (a + 0.5) / kFine);
+          mass += pdf(direction_from_cosine(t, (j + (b + 0.5) / kFine) / kAzimuths));
+        }
+      }
+      masses.push_back(mass / (kFine * kFine) * (edges[i + 1] - edges[i]) * 2 * kPi / kAzimuths);
+    }
+  }
+  return masses;
+}
+
+// The 1 - 1e-4 quantile of chi-square with k degrees of freedom (Wilson and Hilferty 1931).
+double chi_square_limit(double k) { return k * std::pow(1 - 2 / (9 * k) + 3.719 * std::sqrt(2 / (9 * k)), 3); }
+
+void expect_matches_density(const Sampler& sample, const Density& pdf, double width) {
+  constexpr int kSamples = 400000;
+  const std::vector<double> edges = polar_edges(width), masses = cell_masses(pdf, edges);
+  double total = 0;
+  for (double mass : masses) total += mass;
+  EXPECT_NEAR(total, 1, 2e-3) << "the density does not integrate to 1";
+
+  std::vector<int> counts(masses.size());
+  for (uint32_t i = 0; i < kSamples; ++i) {
+    const Vec w = sample(random_unit<double>(i, 0, 7), random_unit<double>(i, 1, 7));
+    ASSERT_NEAR(length(w), 1, 1e-9);
+    const double t = dot(w - Vec{0, 0, 1}, w - Vec{0, 0, 1}) / 2;
+    const auto ring = std::clamp<int64_t>(std::upper_bound(edges.begin(), edges.end(), t) - edges.begin() - 1, 0,
+                                          int64_t(edges.size()) - 2);
+    const double turn = std::atan2(w.y, w.x) / (2 * kPi);
+    ++counts[ring * kAzimuths + std::min(int((turn < 0 ? turn + 1 : turn) * kAzimuths), kAzimuths - 1)];
+  }
+  // Cells that expect fewer than ten samples are pooled into one.
+  double chi_square = 0, pooled_expected = 0, pooled_count = 0;
+  int n_cells = 0;
+  for (size_t i = 0; i < masses.size(); ++i) {
+    const double expected = masses[i] / total * kSamples;
+    if (expected < 10) {
+      pooled_expected += expected;
+      pooled_count += counts[i];
+      continue;
+    }
+    chi_square += square(counts[i] - expected) / expected;
+    ++n_cells;
+  }
+  EXPECT_LE(pooled_count, pooled_expected + 4 * std::sqrt(pooled_expected) + 10) << "samples where the density is 0";
+  if (pooled_expected >= 10) chi_square += square(pooled_count - pooled_expected) / pooled_expected;
+  EXPECT_LT(chi_square, chi_square_limit(n_cells)) << n_cells << " cells";
+}
+
+TEST(Sampling, UniformSphereMatchesItsDensity) {
+  expect_matches_density(sample_uniform_sphere<double>, [](Vec) { return 1 / (4 * kPi); }, 1);
+}
+
+TEST(Sampling, CosineHemisphereMatchesItsDensity) {
+  expect_matches_density(sample_cosine_hemisphere<double>, [](Vec w) { return pdf_cosine_hemisphere(w.z); }, 1);
+}
+
+TEST(Sampling, GgxLobeMatchesItsDensity) {
+  for (double a : {0.01, 0.09, 0.25, 0.5, 0.9, 0.9995, 1.0}) {
+    SCOPED_TRACE(a);
+    expect_matches_density([a](double u1, double u2) { return sample_ggx_lobe(u1, u2, a); },
+                           [a](Vec w) { return pdf_ggx_lobe(w, a); }, a);
+  }
+}
+
+TEST(Sampling, VisibleNormalsMatchTheirDensity) {
+  for (double a : {0.05, 0.3, 1.0}) {
+    for (double cosine : {1.0, 0.6, 0.05}) {
+      SCOPED_TRACE(testing::Message() << "a = " << a << ", v.z = " << cosine);
+      const Vec v{std::sqrt(1 - cosine * cosine) * 0.8, std::sqrt(1 - cosine * cosine) * 0.6, cosine};
+      // Density of h: that of the reflection times dl/dh = 4 v.h.
+      expect_matches_density([&](double u1, double u2) { return sample_ggx_vndf(v, u1, u2, a); },
+                             [&](Vec h) { return h.z > 0 && dot(v, h) > 0 ? pdf_ggx_vndf(v, h, a) * 4 * dot(v, h) : 0; },
+                             a);
+    }
+  }
+}
+
+TEST(Sampling, VisibleNormalWeightIsSmithsMaskingRatio) {
+  // f (n.l) / pdf without Fresnel is G2 / G1 <= 1, and exactly 1 for a smooth surface.
+  for (uint32_t i = 0; i < 2000; ++i) {
+    const Vec v = sample_cosine_hemisphere(random_unit<double>(i, 0, 1), random_unit<double>(i, 1, 1));
+    const double a = 1e-3 + random_unit<double>(i, 2, 1);
+    const Vec h = sample_ggx_vndf(v, random_unit<double>(i, 3, 1), random_unit<double>(i, 4, 1), a);
+    const Vec l = h * (2 * dot(v, h)) - v;
+    if (l.z <= 0) continue;
+    const double sin2 = h.x * h.x + h.y * h.y;
+    const double weight = ggx_d(a, sin2) * smith_v(a, v.z, l.z) * l.z / pdf_ggx_vndf(v, h, a);
+    EXPECT_LE(weight, 1 + 1e-9);
+    if (a < 2e-3) { EXPECT_NEAR(weight, 1, 1e-2); }
+  }
+}
+
+TEST(Sampling, InversionSolvesItsEquation) {
+  for (double t = 1e-14; t < 1e9; t *= 3.7) {
+    const double y = invert_y_minus_log1p(t);
+    EXPECT_NEAR(y_minus_log1p(y) / t, 1, 1e-10) << t;
+    const float yf = invert_y_minus_log1p(float(t));
+    EXPECT_NEAR(yf / y, 1, 1e-5) << t;
+  }
+  EXPECT_EQ(invert_y_minus_log1p(0.), 0);
+}
+
+TEST(Sampling, SeriesMeetsTheLogarithm) {
+  for (double y : {0.0999999, 0.1}) {
+    EXPECT_NEAR(y_minus_log1p(y) / (y - std::log1p(y)), 1, 1e-12) << y;
+  }
+}
+
+TEST(Sampling, GgxLobeIntegralMatchesQuadrature) {
+  for (double a : {0.02, 0.2, 0.7, 0.999, 1.0}) {
+    double integral = 0;
+    constexpr int kSteps = 2000000;
+    for (int i = 0; i < kSteps; ++i) {
+      const double c = (i + 0.5) / kSteps;
+      integral += 2 * kPi * c * ggx_d(a, (1 - c) / 2) / kSteps;
+    }
+    EXPECT_NEAR(ggx_lobe_integral(a) / integral, 1, 2e-3) << a;
+  }
+}
+
+TEST(Sampling, LobeEndsAreExact) {
+  for (float a : {1e-4f, 0.01f, 0.5f, 1.f}) {
+    const Vec3<float> centre = sample_ggx_lobe(0.f, 0.3f, a);
+    EXPECT_NEAR(centre.z, 1.f, 1e-6f);
+    const Vec3<float> edge = sample_ggx_lobe(unit_from_bits<float>(0xffffffffu), 0.3f, a);
+    EXPECT_GE(edge.z, -1e-6f);
+    EXPECT_NEAR(length(edge), 1.f, 1e-5f);
+  }
+}
+
+TEST(Sampling, RandomUnitStaysBelowOneAndIsUniform) {
+  EXPECT_LT(unit_from_bits<float>(0xffffffffu), 1.f);
+  EXPECT_EQ(unit_from_bits<float>(0u), 0.f);
+  // Consecutive counters in each of the three places fill 64 bins evenly.
+  for (int place = 0; place < 3; ++place) {
+    std::vector<int> counts(64);
+    constexpr int kSamples = 64000;
+    for (uint32_t i = 0; i < kSamples; ++i) {
+      const uint32_t c[3] = {place == 0 ? i : 5u, place == 1 ? i : 6u, place == 2 ? i : 7u};
+      ++counts[int(random_unit<double>(c[0], c[1], c[2]) * 64)];
+    }
+    double chi_square = 0;
+    for (int count : counts) chi_square += square(count - kSamples / 64.) / (kSamples / 64.);
+    EXPECT_LT(chi_square, chi_square_limit(63)) << "place " << place;
+  }
+}
+
+TEST(Sampling, NeighbouringCountersAreUncorrelated) {
+  double covariance = 0;
+  constexpr int kSamples = 100000;
+  for (uint32_t i = 0; i < kSamples; ++i) {
+    covariance += (random_unit<double>(i, 0) - 0.5) * (random_unit<double>(i, 1) - 0.5) / kSamples;
+  }
+  EXPECT_LT(std::abs(covariance), 4. / 12 / std::sqrt(double(kSamples)));
+}
+
+// Largest gap between the lattice's share of anchored boxes and their area.
+double discrepancy(const std::vector<Vec2<double>>& points) {
+  double worst = 0;
+  for (double x = 0.1; x < 1; x += 0.1) {
+    for (double y = 0.1; y < 1; y += 0.1) {
+      int inside = 0;
+      for (const auto& p : points) inside += p.x < x && p.y < y;
+      worst = std::max(worst, std::abs(double(inside) / double(points.size()) - x * y));
+    }
+  }
+  return worst;
+}
+
+TEST(Sampling, LatticesFillTheSquareEvenly) {
+  constexpr uint32_t kPoints = 1024;
+  const Vec2<double> shift{0.37, 0.81};
+  std::vector<Vec2<double>> fibonacci, r2;
+  for (uint32_t i = 0; i < kPoints; ++i) {
+    fibonacci.push_back(fibonacci_lattice(i, kPoints, shift));
+    r2.push_back(r2_lattice(i, shift));
+  }
+  // Random points would leave about .02.
+  EXPECT_LT(discrepancy(fibonacci), 0.005);
+  EXPECT_LT(discrepancy(r2), 0.006);
+  for (const auto& p : fibonacci) EXPECT_TRUE(p.x >= 0 && p.x < 1 && p.y >= 0 && p.y < 1);
+}
+
+TEST(Sampling, WrapStaysBelowOne) {
+  const float below = unit_from_bits<float>(0xffffffffu);
+  EXPECT_LT(wrap_unit(below, below), 1.f);
+  EXPECT_EQ(wrap_unit(1.f, 0.f), 0.f);
+  EXPECT_LT(wrap_unit(0.5f, std::nextafter(0.5f, 0.f)), 1.f);
+}
+
+TEST(Sampling, FibonacciSphereIsBalanced) {
+  constexpr uint32_t kPoints = 8192;
+  Vec mean{0, 0, 0};
+  double second = 0;
+  for (uint32_t i = 0; i < kPoints; ++i) {
+    const Vec w = fibonacci_sphere<double>(i, kPoints);
+    mean += w / double(kPoints);
+    second += w.x * w.x / kPoints;
+  }
+  EXPECT_LT(length(mean), 1e-3);
+  EXPECT_NEAR(second, 1. / 3, 1e-4);
+  EXPECT_NEAR(length(fibonacci_sphere<float>(0, 1)), 1.f, 1e-6f);
+}
+
+TEST(Sampling, RandomRotationIsARotationAndUnbiased) {
+  Vec mean_x{0, 0, 0}, mean_z{0, 0, 0};
+  constexpr uint32_t kDraws = 20000;
+  for (uint32_t i = 0; i < kDraws; ++i) {
+    const auto r = random_rotation(random_unit<double>(i, 0), random_unit<double>(i, 1), random_unit<double>(i, 2));
+    EXPECT_NEAR(dot(cross(r.tangent, r.bitangent), r.normal), 1, 1e-9);
+    EXPECT_NEAR(dot(r.tangent, r.bitangent), 0, 1e-9);
+    mean_x += r.tangent / double(kDraws);
+    mean_z += r.normal / double(kDraws);
+  }
+  EXPECT_LT(length(mean_x), 0.03);
+  EXPECT_LT(length(mean_z), 0.03);
+}
+
+}  // namespace
+}  // namespace splitnerf

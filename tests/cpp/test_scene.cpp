@@ -1,0 +1,185 @@
+// Rays against meshes whose visibility is known in closed form.
+#include "splitnerf/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "meshes.h"
+#include "splitnerf/sampling.h"
+
+namespace splitnerf {
+namespace {
+
+using Vec = Vec3<float>;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+std::vector<uint8_t> visibility(const Scene& scene, const std::vector<Vec>& origins, const std::vector<Vec>& directions,
+                                float t_far = kInfinity, const uint8_t* active = nullptr) {
+  std::vector<uint8_t> visible(origins.size(), 7);
+  scene.trace_visibility(reinterpret_cast<const float*>(origins.data()), reinterpret_cast<const float*>(directions.data()),
+                         int64_t(origins.size()), t_far, active, visible.data());
+  return visible;
+}
+
+TEST(Scene, CubeHitsStandAtTheirClosedFormDistance) {
+  const Scene scene = make_scene(cube_mesh());
+  for (uint32_t i = 0; i < 2000; ++i) {
+    // From the centre a ray leaves the cube [-1, 1]^3 at t = 1 / max |d|.
+    const Vec d = fibonacci_sphere<float>(i, 2000);
+    const float expected = 1.f / max_of(std::abs(d.x), max_of(std::abs(d.y), std::abs(d.z)));
+    const Hit hit = scene.trace_closest({0, 0, 0}, d, kInfinity);
+    ASSERT_NEAR(hit.t, expected, 1e-5f) << i;
+    ASSERT_LT(hit.triangle, 12u);
+    EXPECT_TRUE(hit.u >= -1e-5f && hit.v >= -1e-5f && hit.u + hit.v <= 1 + 1e-5f);
+    EXPECT_TRUE(scene.occluded({0, 0, 0}, d, expected * 1.001f));
+    EXPECT_FALSE(scene.occluded({0, 0, 0}, d, expected * 0.999f));
+  }
+  EXPECT_LT(scene.trace_closest({3, 0, 0}, {1, 0, 0}, kInfinity).t, 0);
+}
+
+TEST(Scene, BarycentricsGiveTheHitPoint) {
+  const TestMesh mesh = cube_mesh();
+  const Scene scene = make_scene(mesh);
+  const Vec o{0.1f, -0.2f, 0.3f}, d = normalize(Vec{0.3f, 0.5f, -0.8f});
+  const Hit hit = scene.trace_closest(o, d, kInfinity);
+  const int32_t* corners = &mesh.triangles[hit.triangle * 3];
+  const auto corner = [&](int k) { return load3(&mesh.vertices[corners[k] * 3]); };
+  const Vec p = corner(0) * (1 - hit.u - hit.v) + corner(1) * hit.u + corner(2) * hit.v;
+  EXPECT_LT(length(p - (o + d * hit.t)), 1e-5f);
+}
+
+TEST(Scene, NoRayFromInsideSlipsThroughEdgesAndCorners) {
+  const Scene scene = make_scene(cube_mesh());
+  std::vector<Vec> origins, directions;
+  for (int i = -100; i <= 100; ++i) {
+    for (const float s : {-1.f, 1.f}) {
+      for (const Vec target : {Vec{s, 1, i / 100.f}, {s, i / 100.f, -1}, {i / 100.f, s, 1}, {i / 100.f, i / 100.f, s}}) {
+        origins.push_back({0.013f, -0.27f, 0.11f});
+        directions.push_back(normalize(target - origins.back()));
+      }
+    }
+  }
+  for (uint8_t v : visibility(scene, origins, directions)) ASSERT_EQ(v, 0);
+}
+
+TEST(Scene, PointsOnAConvexSurfaceSeeTheWholeHemisphere) {
+  const Scene scene = make_scene(cube_mesh());
+  std::vector<Vec> origins, directions;
+  for (uint32_t i = 0; i < 1000; ++i) {
+    // 1e-3 above the top face, over its edges and its diagonal as well.
+    const float x = random_unit<float>(i, 0) * 2 - 1, y = i % 3 == 0 ? x : i % 3 == 1 ? 1.f : random_unit<float>(i, 1);
+    origins.push_back({x, y, 1.001f});
+    directions.push_back(sample_cosine_hemisphere(random_unit<float>(i, 2), random_unit<float>(i, 3)));
+  }
+  for (uint8_t v : visibility(scene, origins, directions)) ASSERT_EQ(v, 1);
+  for (Vec& d : directions) d.z = -d.z;
+  const auto below = visibility(scene, origins, directions);
+  int open = 0;
+  for (size_t i = 0; i < below.size(); ++i) open += i % 3 != 1 && below[i];  // points on the edge see half
+  EXPECT_LT(open, 10);  // only rays that pass the edge within 1e-3 miss the cube
+}
+
+TEST(Scene, SphereOccludesItsCone) {
+  // From distance r a unit sphere blocks directions within asin(1/r) of its centre.
+  const Scene scene = make_scene(sphere_mesh(200, 400));
+  const Vec o{0, 0, 2};
+  std::vector<Vec> origins, directions;
+  std::vector<uint8_t> expected;
+  const double edge = std::cos(std::asin(0.5));
+  for (uint32_t i = 0; i < 20000; ++i) {
+    const Vec d = fibonacci_sphere<float>(i, 20000);
+    const double cosine = -d.z;
+    if (std::abs(cosine - edge) < 2e-4) continue;  // the tessellation's error
+    origins.push_back(o);
+    directions.push_back(d);
+    expected.push_back(cosine > edge ? 0 : 1);
+  }
+  EXPECT_EQ(visibility(scene, origins, directions), expected);
+}
+
+TEST(Scene, FarEndLimitsTheSegment) {
+  const Scene scene = make_scene(cube_mesh());
+  const std::vector<Vec> origins{{3, 0.1f, 0.2f}}, directions{{-1, 0, 0}};
+  EXPECT_EQ(visibility(scene, origins, directions, 1.99f)[0], 1);
+  EXPECT_EQ(visibility(scene, origins, directions, 2.01f)[0], 0);
+}
+
+TEST(Scene, EveryCountAndMaskIsHandled) {
+  const Scene scene = make_scene(cube_mesh());
+  for (int n : {0, 1, 15, 16, 17, 4095, 4097}) {
+    std::vector<Vec> origins(n, Vec{0, 0, 0}), directions(n);
+    std::vector<uint8_t> active(n);
+    for (int i = 0; i < n; ++i) {
+      if (i % 5 == 0) origins[i] = {0, 0, 5};
+      directions[i] = {0, 0, 1};
+      active[i] = i % 3 != 0;
+    }
+    const auto all = visibility(scene, origins, directions), masked = visibility(scene, origins, directions, kInfinity, active.data());
+    for (int i = 0; i < n; ++i) {
+      ASSERT_EQ(all[i], i % 5 == 0) << n << " " << i;
+      ASSERT_EQ(masked[i], i % 5 == 0 || i % 3 == 0) << n << " " << i;
+    }
+  }
+}
+
+TEST(Scene, PacketsAgreeWithSingleRays) {
+  const Scene scene = make_scene(sphere_mesh(20, 40));
+  std::vector<Vec> origins, directions;
+  for (uint32_t i = 0; i < 5003; ++i) {
+    origins.push_back(fibonacci_sphere<float>(i, 5003) * (0.5f + 2 * random_unit<float>(i, 0)));
+    directions.push_back(sample_uniform_sphere(random_unit<float>(i, 1), random_unit<float>(i, 2)));
+  }
+  const auto visible = visibility(scene, origins, directions);
+  std::vector<Hit> hits(origins.size());
+  scene.trace_closest(&origins[0].x, &directions[0].x, int64_t(origins.size()), kInfinity, hits.data());
+  for (size_t i = 0; i < origins.size(); ++i) {
+    ASSERT_EQ(visible[i], !scene.occluded(origins[i], directions[i], kInfinity)) << i;
+    ASSERT_EQ(visible[i], hits[i].t < 0) << i;
+  }
+}
+
+TEST(Scene, RejectsUnusableMeshes) {
+  TestMesh mesh = cube_mesh();
+  mesh.triangles[4] = 8;
+  EXPECT_THROW(make_scene(mesh), std::invalid_argument);
+  mesh.triangles[4] = -1;
+  EXPECT_THROW(make_scene(mesh), std::invalid_argument);
+  mesh = cube_mesh();
+  mesh.vertices[7] = std::nanf("");
+  EXPECT_THROW(make_scene(mesh), std::invalid_argument);
+  mesh = cube_mesh();
+  EXPECT_THROW(Scene(mesh.vertices.data(), 8, mesh.triangles.data(), 0), std::invalid_argument);
+  EXPECT_THROW(Scene(mesh.vertices.data(), 0, mesh.triangles.data(), 12), std::invalid_argument);
+}
+
+TEST(Scene, KeepsACopyOfTheMesh) {
+  TestMesh mesh = cube_mesh();
+  const Scene scene = make_scene(mesh);
+  EXPECT_EQ(scene.n_vertices(), 8);
+  EXPECT_EQ(scene.n_triangles(), 12);
+  mesh.vertices.assign(mesh.vertices.size(), 100.f);
+  EXPECT_EQ(scene.vertices()[0], -1.f);
+  EXPECT_TRUE(scene.occluded({0, 0, 0}, {1, 0, 0}, kInfinity));
+}
+
+TEST(Scene, RegistryNamesScenesUntilTheyAreReleased) {
+  const TestMesh mesh = cube_mesh();
+  auto scene = std::make_shared<const Scene>(mesh.vertices.data(), 8, mesh.triangles.data(), 12);
+  const int64_t first = register_scene(scene), second = register_scene(scene);
+  EXPECT_NE(first, second);
+  EXPECT_EQ(get_scene(first), scene);
+  release_scene(first);
+  EXPECT_THROW(get_scene(first), std::out_of_range);
+  EXPECT_EQ(get_scene(second), scene);
+  release_scene(second);
+  release_scene(second);  // releasing twice is harmless
+  EXPECT_EQ(scene.use_count(), 1);
+  EXPECT_NE(register_scene(scene), first);
+}
+
+}  // namespace
+}  // namespace splitnerf
