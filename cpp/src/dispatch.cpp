@@ -1,6 +1,7 @@
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "splitnerf/kernels.h"
 
@@ -34,23 +35,11 @@ Isa best_isa() {
   return Isa::kBase;
 }
 
-Isa chosen_isa() {
-  const Isa best = best_isa();
-  const char* wish = std::getenv("SPLITNERF_ISA");
-  if (!wish) return best;
-  const std::string name = wish;
-  const Isa isa = name == "avx512" ? Isa::kAvx512 : name == "avx2" ? Isa::kAvx2 : Isa::kBase;
-  if ((isa == Isa::kBase && name != "base") || isa > best)
-    throw std::runtime_error("SPLITNERF_ISA=" + name + ": this build and processor take base" +
-                             (best >= Isa::kAvx2 ? ", avx2" : "") + (best >= Isa::kAvx512 ? ", avx512" : ""));
-  return isa;
-}
-
-template <class T> Kernels<T> load_kernels();
+template <class T> Kernels<T> load_kernels(Isa isa);
 
 #ifdef SPLITNERF_HAS_X86_KERNELS
 #define SPLITNERF_SELECT(function)                           \
-  switch (chosen_isa()) {                                    \
+  switch (isa) {                                             \
     case Isa::kAvx512: return avx512::function();            \
     case Isa::kAvx2: return avx2::function();                \
     case Isa::kBase: break;                                  \
@@ -58,17 +47,37 @@ template <class T> Kernels<T> load_kernels();
   return base::function();
 #else
 #define SPLITNERF_SELECT(function) \
-  chosen_isa();                    \
+  (void)isa;                       \
   return base::function();
 #endif
-template <> Kernels<float> load_kernels<float>() { SPLITNERF_SELECT(kernels_float32) }
-template <> Kernels<double> load_kernels<double>() { SPLITNERF_SELECT(kernels_float64) }
+template <> Kernels<float> load_kernels<float>(Isa isa) { SPLITNERF_SELECT(kernels_float32) }
+template <> Kernels<double> load_kernels<double>(Isa isa) { SPLITNERF_SELECT(kernels_float64) }
 #undef SPLITNERF_SELECT
+
+template <class T> Kernels<T> wished_kernels() {
+  const char* wish = std::getenv("SPLITNERF_ISA");
+  if (!wish) return load_kernels<T>(best_isa());
+  const std::vector<Kernels<T>> usable = usable_kernels<T>();
+  std::string names;
+  for (const Kernels<T>& set : usable) {
+    if (set.name == std::string(wish)) return set;
+    names += (names.empty() ? "" : ", ") + std::string(set.name);
+  }
+  throw std::runtime_error("SPLITNERF_ISA=" + std::string(wish) + ": this build and processor take " + names);
+}
 
 }  // namespace
 
+template <class T> std::vector<Kernels<T>> usable_kernels() {
+  std::vector<Kernels<T>> sets;
+  for (int isa = 0; isa <= static_cast<int>(best_isa()); ++isa) sets.push_back(load_kernels<T>(static_cast<Isa>(isa)));
+  return sets;
+}
+template std::vector<Kernels<float>> usable_kernels<float>();
+template std::vector<Kernels<double>> usable_kernels<double>();
+
 template <class T> const Kernels<T>& kernels() {
-  static const Kernels<T> chosen = load_kernels<T>();
+  static const Kernels<T> chosen = wished_kernels<T>();
   return chosen;
 }
 template const Kernels<float>& kernels<float>();

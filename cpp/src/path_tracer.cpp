@@ -18,9 +18,9 @@ namespace {
 using Vec = Vec3<float>;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr int kRouletteStart = 3;     // bounces before Russian roulette may end a path
+constexpr int kRouletteStart = 3;  // bounces before Russian roulette may end a path
 constexpr int64_t kPixelsPerTask = 64;
-constexpr int kPairsPerBounce = 3;    // light direction; BSDF direction; lobe choice and roulette
+constexpr int kPairsPerBounce = 3;  // light direction; BSDF direction; lobe choice and roulette
 
 // Well-spread sample points: every pair of dimensions holds the spp-point Fibonacci lattice in a
 // random order of its own; each pixel starts at a random place of the order and shifts the points
@@ -83,8 +83,12 @@ class PathTracer {
  public:
   PathTracer(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
              const PathTracerParams& params)
-      : scene_(scene), surface_(surface), light_(environment.radiance, environment.height, environment.width),
-        camera_(camera), params_(params), lut_(brdf_lut()),
+      : scene_(scene),
+        surface_(surface),
+        light_(environment.radiance, environment.height, environment.width),
+        camera_(camera),
+        params_(params),
+        lut_(brdf_lut()),
         pattern_(params.samples_per_pixel, 1 + kPairsPerBounce * (params.max_bounces + 1), params.seed) {
     float extent = 0;
     for (int64_t i = 0; i < scene.n_vertices() * 3; ++i) extent = max_of(extent, std::abs(scene.vertices()[i]));
@@ -129,7 +133,8 @@ class PathTracer {
 
  private:
   // L = sum over vertices of throughput x (light sampled there + light that the BSDF sample finds).
-  Vec trace_path(int x, int y, int sample, const std::vector<SamplePattern::Offset>& offsets, FirstHit* first) const {
+  Vec trace_path(int x, int y, int sample, const std::vector<SamplePattern::Offset>& offsets,
+                 FirstHit* first) const {
     Vec radiance{0, 0, 0}, throughput{1, 1, 1};
     Vec origin = camera_centre(), direction = camera_ray(x, y, pattern_.get(offsets, sample, 0));
     float bsdf_pdf = 0;
@@ -139,7 +144,7 @@ class PathTracer {
         if (bounce > 0) {
           const bool both = params_.light_sampling && !light_.black();
           const float weight = both ? mis_weight(bsdf_pdf, light_.pdf(direction)) : 1.f;
-          radiance += throughput * light_.radiance(direction) * weight;
+          radiance += limited(throughput * light_.radiance(direction) * weight, bounce > 1);
         }
         return radiance;
       }
@@ -148,7 +153,8 @@ class PathTracer {
       const ShadingPoint point = shading_point(hit, -direction);
       if (bounce == 0) *first = {true, point, hit.t};
       const Frame<float> frame(point.shading_normal);
-      const PrincipledBsdf<float> bsdf(lut_, point.albedo, point.roughness, point.metallic, frame.to_local(-direction));
+      const PrincipledBsdf<float> bsdf(lut_, point.albedo, point.roughness, point.metallic,
+                                       frame.to_local(-direction));
       const Vec start = point.position + point.geometric_normal * ray_offset_;
       const int pair = 1 + kPairsPerBounce * bounce;
 
@@ -159,7 +165,8 @@ class PathTracer {
         if (dot(to_light, point.geometric_normal) > 0) {
           const BsdfValue<float> f = bsdf.evaluate(frame.to_local(to_light));
           if (f.pdf > 0 && !scene_.occluded(start, to_light, kInfinity)) {
-            radiance += throughput * f.f_cos * light_.radiance(to_light) * (mis_weight(light_pdf, f.pdf) / light_pdf);
+            const float weight = mis_weight(light_pdf, f.pdf) / light_pdf;
+            radiance += limited(throughput * f.f_cos * light_.radiance(to_light) * weight, bounce > 0);
           }
         }
       }
@@ -179,6 +186,12 @@ class PathTracer {
       bsdf_pdf = f.pdf;
       origin = start;
     }
+  }
+
+  Vec limited(Vec contribution, bool indirect) const {
+    const float largest = max_of(contribution.x, max_of(contribution.y, contribution.z));
+    if (!indirect || params_.clamp_indirect <= 0 || !(largest > params_.clamp_indirect)) return contribution;
+    return contribution * (params_.clamp_indirect / largest);
   }
 
   Vec camera_centre() const {
@@ -267,6 +280,7 @@ void render(const Scene& scene, const Surface& surface, const EnvironmentMap& en
   require(environment.height > 0 && environment.width > 0, "the environment map must not be empty");
   require(params.samples_per_pixel > 0, "samples_per_pixel must be positive");
   require(params.max_bounces >= 0, "max_bounces must not be negative");
+  require(params.clamp_indirect >= 0, "clamp_indirect must not be negative");
   const int64_t n = surface.per_triangle ? scene.n_triangles() : scene.n_vertices();
   require_range(surface.albedo, n * 3, 1.f, "albedo must lie in [0, 1]");
   require_range(surface.roughness, n, 1.f, "roughness must lie in [0, 1]");

@@ -20,6 +20,9 @@ template <class T> struct Planes {
   }
 };
 
+// A query above whose horizon no light stands is black.
+template <class T> T inverse(T total) { return total == T(0) ? T(0) : T(1) / total; }
+
 template <class T> std::vector<T> squared_alphas(const T* roughness, int64_t n) {
   std::vector<T> out(n);
   for (int64_t i = 0; i < n; ++i) out[i] = square(ggx_alpha_from_roughness(roughness[i]));
@@ -43,7 +46,7 @@ void prefilter_light(int64_t n_queries, const T* query_dirs, const T* roughness,
     for (int64_t i = begin; i < end; ++i) {
       const T* s = &sums[4 * (i - begin)];
       total[i] = s[3];
-      for (int c = 0; c < 3; ++c) gbar[3 * i + c] = s[c] / s[3];
+      for (int c = 0; c < 3; ++c) gbar[3 * i + c] = s[c] * inverse(s[3]);
     }
   });
 }
@@ -56,7 +59,7 @@ void prefilter_light_backward(int64_t n_queries, const T* query_dirs, const T* r
   Planes<T> share(grad_gbar, n_queries);
   const std::vector<T> alpha_squared = squared_alphas(roughness, n_queries);
   for (int64_t i = 0; i < n_queries; ++i) {
-    const T inv = T(1) / total[i];
+    const T inv = inverse(total[i]);
     share.x[i] *= inv, share.y[i] *= inv, share.z[i] *= inv;
   }
   const LobeSide<T> queries{query.x.data(), query.y.data(), query.z.data(), alpha_squared.data(),

@@ -114,7 +114,8 @@ void Scene::trace_visibility(const float* origins, const float* directions, int6
   });
 }
 
-void Scene::trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far, Hit* hits) const {
+void Scene::trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far,
+                          Hit* hits) const {
   parallel_for(n_rays, kPacket * kPacketsPerTask, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       hits[i] = trace_closest(load3(origins + i * 3), load3(directions + i * 3), t_far);

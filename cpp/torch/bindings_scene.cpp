@@ -3,6 +3,7 @@
 
 #include <pybind11/numpy.h>
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <string>
@@ -18,7 +19,8 @@ namespace {
 using splitnerf::Hit;
 using splitnerf::Scene;
 
-template <class T> using Array = py::array_t<T, py::array::c_style>;
+template <class T>
+using Array = py::array_t<T, py::array::c_style>;
 
 constexpr py::ssize_t kAny = -1;
 
@@ -35,8 +37,8 @@ std::string shape_text(const std::vector<py::ssize_t>& shape, const char* any) {
 template <class T>
 Array<T> checked(const char* function, const char* argument, const py::object& values,
                  const std::vector<py::ssize_t>& shape) {
-  const std::string expected = std::string(function) + ": " + argument + " must be " + shape_text(shape, "n") + " " +
-                               py::cast<std::string>(py::str(py::dtype::of<T>())) + ", got ";
+  const std::string expected = std::string(function) + ": " + argument + " must be " + shape_text(shape, "n") +
+                               " " + py::cast<std::string>(py::str(py::dtype::of<T>())) + ", got ";
   if (!py::isinstance<py::array>(values)) {
     throw py::value_error(expected + py::cast<std::string>(py::type::of(values).attr("__name__")));
   }
@@ -44,7 +46,8 @@ Array<T> checked(const char* function, const char* argument, const py::object& v
   const std::vector<py::ssize_t> got(array.shape(), array.shape() + array.ndim());
   bool good = array.dtype().equal(py::dtype::of<T>()) && got.size() == shape.size();
   for (size_t i = 0; good && i < shape.size(); ++i) good = shape[i] == kAny || shape[i] == got[i];
-  if (!good) throw py::value_error(expected + shape_text(got, "") + " " + py::cast<std::string>(py::str(array.dtype())));
+  if (!good)
+    throw py::value_error(expected + shape_text(got, "") + " " + py::cast<std::string>(py::str(array.dtype())));
   return Array<T>::ensure(array);
 }
 
@@ -76,7 +79,8 @@ py::array_t<bool> trace_visibility(const PyScene& self, const py::object& origin
   return visible;
 }
 
-py::tuple trace_closest(const PyScene& self, const py::object& origins, const py::object& directions, float t_far) {
+py::tuple trace_closest(const PyScene& self, const py::object& origins, const py::object& directions,
+                        float t_far) {
   const auto o = checked<float>("trace_closest", "origins", origins, {kAny, 3});
   const auto d = checked<float>("trace_closest", "directions", directions, {o.shape(0), 3});
   const py::ssize_t n = o.shape(0);
@@ -96,10 +100,11 @@ py::tuple trace_closest(const PyScene& self, const py::object& origins, const py
   return py::make_tuple(t, triangle, u, v);
 }
 
-py::dict render(const PyScene& self, const py::object& albedo, const py::object& roughness, const py::object& metallic,
-                const py::object& environment, const py::object& camera_to_world, float fx, float fy, float cx, float cy,
-                int width, int height, const py::object& normals, const std::string& materials_per, int spp,
-                int max_bounces, uint32_t seed, bool light_sampling) {
+py::dict render(const PyScene& self, const py::object& albedo, const py::object& roughness,
+                const py::object& metallic, const py::object& environment, const py::object& camera_to_world,
+                float fx, float fy, float cx, float cy, int width, int height, const py::object& normals,
+                const std::string& materials_per, int spp, int max_bounces, uint32_t seed, bool light_sampling,
+                float clamp_indirect) {
   if (materials_per != "vertex" && materials_per != "triangle") {
     throw py::value_error("render: materials_per must be 'vertex' or 'triangle', got '" + materials_per + "'");
   }
@@ -122,7 +127,7 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
   const splitnerf::Surface surface{albedos.data(), roughnesses.data(), metallics.data(), per_triangle,
                                    normals.is_none() ? nullptr : shading.data()};
   const splitnerf::EnvironmentMap light{map.data(), int(map.shape(0)), int(map.shape(1))};
-  const splitnerf::PathTracerParams params{spp, max_bounces, seed, light_sampling};
+  const splitnerf::PathTracerParams params{spp, max_bounces, seed, light_sampling, clamp_indirect};
 
   py::dict images;
   const auto allocate = [&](const char* name, int channels) {
@@ -132,7 +137,7 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
     images[name] = image;
     return image.mutable_data();
   };
-  const splitnerf::RenderTargets targets{allocate("radiance", 3), allocate("alpha", 1),    allocate("albedo", 3),
+  const splitnerf::RenderTargets targets{allocate("radiance", 3),  allocate("alpha", 1),    allocate("albedo", 3),
                                          allocate("roughness", 1), allocate("metallic", 1), allocate("normal", 3),
                                          allocate("depth", 1)};
   {
@@ -144,8 +149,8 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
 
 // Traces with embreex where the library was built without Embree. The embreex scene is built with
 // the first rays and stays with the scene.
-void trace_with_embreex(const Scene& scene, std::shared_ptr<void>& tracer, const float* origins, const float* directions,
-                        int64_t n_rays, float t_far, Hit* hits) {
+void trace_with_embreex(const Scene& scene, std::shared_ptr<void>& tracer, const float* origins,
+                        const float* directions, int64_t n_rays, float t_far, Hit* hits) {
   py::gil_scoped_acquire acquire;
   if (!tracer) {
     py::object built = py::module_::import("embreex.rtcore_scene").attr("EmbreeScene")();
@@ -159,9 +164,11 @@ void trace_with_embreex(const Scene& scene, std::shared_ptr<void>& tracer, const
   }
   Array<float> t_fars(n_rays);
   std::fill_n(t_fars.mutable_data(), n_rays, t_far);
-  const py::dict found = static_cast<py::object*>(tracer.get())->attr("run")(
-      Array<float>({n_rays, int64_t(3)}, origins), Array<float>({n_rays, int64_t(3)}, directions),
-      py::arg("dists") = t_fars, py::arg("query") = "INTERSECT", py::arg("output") = true);
+  const py::dict found =
+      static_cast<py::object*>(tracer.get())
+          ->attr("run")(Array<float>({n_rays, int64_t(3)}, origins),
+                        Array<float>({n_rays, int64_t(3)}, directions), py::arg("dists") = t_fars,
+                        py::arg("query") = "INTERSECT", py::arg("output") = true);
   const Array<float> t(found["tfar"]), u(found["u"]), v(found["v"]);
   const Array<int32_t> triangle(found["primID"]);
   for (int64_t i = 0; i < n_rays; ++i) {
@@ -176,31 +183,38 @@ void bind_scene(py::module_& m) {
   splitnerf::set_trace_callback(trace_with_embreex);
 
   constexpr float infinity = std::numeric_limits<float>::infinity();
-  py::class_<PyScene>(m, "Scene",
-                      "A triangle mesh ready for ray tracing: vertices [n, 3] float32, triangles [m, 3] int32 (copied).")
+  py::class_<PyScene>(
+      m, "Scene",
+      "A triangle mesh ready for ray tracing: vertices [n, 3] float32, triangles [m, 3] int32 (copied).")
       .def(py::init<const py::object&, const py::object&>(), py::arg("vertices"), py::arg("triangles"))
-      .def_readonly("handle", &PyScene::handle, "The integer that names the scene to torch operators while it lives.")
+      .def_readonly("handle", &PyScene::handle,
+                    "The integer that names the scene to torch operators while it lives.")
       .def_property_readonly("n_vertices", [](const PyScene& s) { return s.scene->n_vertices(); })
       .def_property_readonly("n_triangles", [](const PyScene& s) { return s.scene->n_triangles(); })
-      .def("trace_visibility", &trace_visibility, py::arg("origins"), py::arg("directions"), py::arg("t_far") = infinity,
+      .def("trace_visibility", &trace_visibility, py::arg("origins"), py::arg("directions"),
+           py::arg("t_far") = infinity,
            "[n] bool: True where the segment origin + t direction, t in (0, t_far), meets nothing.\n\n"
            "origins, directions: [n, 3] float32. Neighbours in the arrays should be neighbours in space.")
       .def("trace_closest", &trace_closest, py::arg("origins"), py::arg("directions"), py::arg("t_far") = infinity,
-           "The nearest hits as (t [n] float32, triangle [n] int64, u [n], v [n]); t = triangle = -1 for a miss.\n\n"
+           "The nearest hits as (t [n] float32, triangle [n] int64, u [n], v [n]); t = triangle = -1 for a "
+           "miss.\n\n"
            "u and v are the barycentric coordinates of the triangle's second and third vertex.");
 
-  m.def("render", &render, py::arg("scene"), py::arg("albedo"), py::arg("roughness"), py::arg("metallic"),
-        py::arg("environment"), py::arg("camera_to_world"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
-        py::arg("width"), py::arg("height"), py::kw_only(), py::arg("normals") = py::none(),
-        py::arg("materials_per") = "vertex", py::arg("spp") = 64, py::arg("max_bounces") = 4, py::arg("seed") = 0,
-        py::arg("light_sampling") = true,
-        "Path-traces the scene under an equirectangular light; float32 arrays in, a dict of float32 arrays out.\n\n"
-        "albedo [n, 3], roughness [n], metallic [n]: in [0, 1], linear, per vertex or per triangle (materials_per).\n"
-        "environment: [h, w, 3] linear radiance. camera_to_world: [3, 4], OpenGL axes; fx ... cy in pixels.\n"
-        "normals: [n_vertices, 3] shading normals, or None for flat shading.\n"
-        "Returns radiance [h, w, 3] (linear, premultiplied), alpha [h, w], and of the first hit, averaged over the\n"
-        "sub-samples that hit: albedo, roughness, metallic, normal (world space), depth (along the ray).\n"
-        "Equal seeds give equal images.");
+  m.def(
+      "render", &render, py::arg("scene"), py::arg("albedo"), py::arg("roughness"), py::arg("metallic"),
+      py::arg("environment"), py::arg("camera_to_world"), py::arg("fx"), py::arg("fy"), py::arg("cx"),
+      py::arg("cy"), py::arg("width"), py::arg("height"), py::kw_only(), py::arg("normals") = py::none(),
+      py::arg("materials_per") = "vertex", py::arg("spp") = 64, py::arg("max_bounces") = 4, py::arg("seed") = 0,
+      py::arg("light_sampling") = true, py::arg("clamp_indirect") = 0.f,
+      "Path-traces the scene under an equirectangular light; float32 arrays in, a dict of float32 arrays out.\n\n"
+      "albedo [n, 3], roughness [n], metallic [n]: in [0, 1], linear, per vertex or per triangle "
+      "(materials_per).\n"
+      "environment: [h, w, 3] linear radiance. camera_to_world: [3, 4], OpenGL axes; fx ... cy in pixels.\n"
+      "normals: [n_vertices, 3] shading normals, or None for flat shading.\n"
+      "clamp_indirect: largest channel of one indirect contribution, 0 for no limit (unbiased).\n"
+      "Returns radiance [h, w, 3] (linear, premultiplied), alpha [h, w], and of the first hit, averaged over the\n"
+      "sub-samples that hit: albedo, roughness, metallic, normal (world space), depth (along the ray).\n"
+      "Equal seeds give equal images.");
 
   m.def(
       "embree_version", [] { return std::string(splitnerf::embree_version()); },

@@ -15,11 +15,11 @@ using Vec = Vec3<double>;
 
 TEST(Environment, KnownDirections) {
   const auto at = [](double x, double y, double z) { return direction_to_equirect(Vec{x, y, z}); };
-  EXPECT_DOUBLE_EQ(at(1, 0, 0).x, 0.5);   // +x is the centre column
+  EXPECT_DOUBLE_EQ(at(1, 0, 0).x, 0.5);  // +x is the centre column
   EXPECT_DOUBLE_EQ(at(1, 0, 0).y, 0.5);
   EXPECT_DOUBLE_EQ(at(0, 1, 0).x, 0.25);  // u grows clockwise seen from above
   EXPECT_DOUBLE_EQ(at(0, -1, 0).x, 0.75);
-  EXPECT_DOUBLE_EQ(at(0, 0, 1).y, 0);     // up is the top row
+  EXPECT_DOUBLE_EQ(at(0, 0, 1).y, 0);  // up is the top row
   EXPECT_DOUBLE_EQ(at(0, 0, -1).y, 1);
   EXPECT_NEAR(std::abs(at(-1, 1e-9, 0).x - 0.5), 0.5, 1e-9);  // -x is the seam
 }
@@ -36,11 +36,13 @@ TEST(Environment, MappingsAreInverse) {
 TEST(Environment, SolidAnglesSumToTheSphere) {
   for (int height : {1, 2, 7, 128}) {
     double total = 0;
-    for (int row = 0; row < height; ++row) total += 2 * height * texel_solid_angle<double>(row, height, 2 * height);
+    for (int row = 0; row < height; ++row)
+      total += 2 * height * texel_solid_angle<double>(row, height, 2 * height);
     EXPECT_NEAR(total, 4 * kPi, 1e-12) << height;
   }
   // One row near the equator against (2 pi / W)(cos top - cos bottom).
-  EXPECT_NEAR(texel_solid_angle<double>(3, 8, 16), 2 * kPi / 16 * (std::cos(3 * kPi / 8) - std::cos(4 * kPi / 8)), 1e-14);
+  EXPECT_NEAR(texel_solid_angle<double>(3, 8, 16), 2 * kPi / 16 * (std::cos(3 * kPi / 8) - std::cos(4 * kPi / 8)),
+              1e-14);
 }
 
 std::vector<double> random_map(int height, int width) {
@@ -66,7 +68,9 @@ TEST(Environment, LookupIsLinearBetweenCentresAndWrapsAcrossTheSeam) {
   const auto map = random_map(kHeight, kWidth);
   const auto texel = [&](int row, int column) { return map[(row * kWidth + column) * 3]; };
   const auto lookup = [&](double x, double y) {
-    return lookup_environment(map.data(), kHeight, kWidth, equirect_to_direction(Vec2<double>{x / kWidth, y / kHeight})).x;
+    return lookup_environment(map.data(), kHeight, kWidth,
+                              equirect_to_direction(Vec2<double>{x / kWidth, y / kHeight}))
+        .x;
   };
   EXPECT_NEAR(lookup(2.75, 1.5), 0.75 * texel(1, 2) + 0.25 * texel(1, 3), 1e-12);
   EXPECT_NEAR(lookup(2.5, 1.75), 0.75 * texel(1, 2) + 0.25 * texel(2, 2), 1e-12);
@@ -77,7 +81,8 @@ TEST(Environment, LookupIsLinearBetweenCentresAndWrapsAcrossTheSeam) {
 }
 
 TEST(Environment, FootprintWeightsSumToOneInEveryDirection) {
-  for (const Vec3<float> d : {Vec3<float>{0, 0, 1}, {0, 0, -1}, {-1, 0.f, 0}, {-1, -0.f, 0}, {1, 0, 0}, {0, 1, 0}}) {
+  for (const Vec3<float> d :
+       {Vec3<float>{0, 0, 1}, {0, 0, -1}, {-1, 0.f, 0}, {-1, -0.f, 0}, {1, 0, 0}, {0, 1, 0}}) {
     const auto f = equirect_footprint(direction_to_equirect(d), 5, 7);
     float total = 0;
     for (int k = 0; k < 4; ++k) {
@@ -120,10 +125,13 @@ TEST(EnvironmentSampler, DensityIntegratesToOneAndMatchesTheSamples) {
     const Vec3<float> d = sampler.sample({random_unit<float>(i, 0), random_unit<float>(i, 1)}, &pdf);
     const Vec2<float> uv = direction_to_equirect(d);
     ++counts[min_of(int(uv.y * kHeight), kHeight - 1) * kWidth + min_of(int(uv.x * kWidth), kWidth - 1)];
-    if (i < 2000) { EXPECT_NEAR(sampler.pdf(d) / pdf, 1, 1e-3) << i; }
+    if (i < 2000) {
+      EXPECT_NEAR(sampler.pdf(d) / pdf, 1, 1e-3) << i;
+    }
   }
   double chi_square = 0;
-  for (size_t i = 0; i < masses.size(); ++i) chi_square += square(counts[i] - masses[i] * kSamples) / (masses[i] * kSamples);
+  for (size_t i = 0; i < masses.size(); ++i)
+    chi_square += square(counts[i] - masses[i] * kSamples) / (masses[i] * kSamples);
   const double k = double(masses.size() - 1);
   EXPECT_LT(chi_square, k + 4 * std::sqrt(2 * k));
 }

@@ -80,17 +80,20 @@ void expect_matches_density(const Sampler& sample, const Density& pdf, double wi
     chi_square += square(counts[i] - expected) / expected;
     ++n_cells;
   }
-  EXPECT_LE(pooled_count, pooled_expected + 4 * std::sqrt(pooled_expected) + 10) << "samples where the density is 0";
+  EXPECT_LE(pooled_count, pooled_expected + 4 * std::sqrt(pooled_expected) + 10)
+      << "samples where the density is 0";
   if (pooled_expected >= 10) chi_square += square(pooled_count - pooled_expected) / pooled_expected;
   EXPECT_LT(chi_square, chi_square_limit(n_cells)) << n_cells << " cells";
 }
 
 TEST(Sampling, UniformSphereMatchesItsDensity) {
-  expect_matches_density(sample_uniform_sphere<double>, [](Vec) { return 1 / (4 * kPi); }, 1);
+  expect_matches_density(
+      sample_uniform_sphere<double>, [](Vec) { return 1 / (4 * kPi); }, 1);
 }
 
 TEST(Sampling, CosineHemisphereMatchesItsDensity) {
-  expect_matches_density(sample_cosine_hemisphere<double>, [](Vec w) { return pdf_cosine_hemisphere(w.z); }, 1);
+  expect_matches_density(
+      sample_cosine_hemisphere<double>, [](Vec w) { return pdf_cosine_hemisphere(w.z); }, 1);
 }
 
 TEST(Sampling, GgxLobeMatchesItsDensity) {
@@ -107,9 +110,9 @@ TEST(Sampling, VisibleNormalsMatchTheirDensity) {
       SCOPED_TRACE(testing::Message() << "a = " << a << ", v.z = " << cosine);
       const Vec v{std::sqrt(1 - cosine * cosine) * 0.8, std::sqrt(1 - cosine * cosine) * 0.6, cosine};
       // Density of h: that of the reflection times dl/dh = 4 v.h.
-      expect_matches_density([&](double u1, double u2) { return sample_ggx_vndf(v, u1, u2, a); },
-                             [&](Vec h) { return h.z > 0 && dot(v, h) > 0 ? pdf_ggx_vndf(v, h, a) * 4 * dot(v, h) : 0; },
-                             a);
+      expect_matches_density(
+          [&](double u1, double u2) { return sample_ggx_vndf(v, u1, u2, a); },
+          [&](Vec h) { return h.z > 0 && dot(v, h) > 0 ? pdf_ggx_vndf(v, h, a) * 4 * dot(v, h) : 0; }, a);
     }
   }
 }
@@ -125,7 +128,9 @@ TEST(Sampling, VisibleNormalWeightIsSmithsMaskingRatio) {
     const double sin2 = h.x * h.x + h.y * h.y;
     const double weight = ggx_d(a, sin2) * smith_v(a, v.z, l.z) * l.z / pdf_ggx_vndf(v, h, a);
     EXPECT_LE(weight, 1 + 1e-9);
-    if (a < 2e-3) { EXPECT_NEAR(weight, 1, 1e-2); }
+    if (a < 2e-3) {
+      EXPECT_NEAR(weight, 1, 1e-2);
+    }
   }
 }
 
@@ -220,6 +225,11 @@ TEST(Sampling, LatticesFillTheSquareEvenly) {
   for (const auto& p : fibonacci) EXPECT_TRUE(p.x >= 0 && p.x < 1 && p.y >= 0 && p.y < 1);
 }
 
+TEST(Sampling, GoldenFractionsFollowTheGoldenRatio) {
+  EXPECT_NEAR(golden_fraction<double>(1), (std::sqrt(5.) - 1) / 2, 1e-7);
+  EXPECT_NEAR(golden_fraction<double>(100000u), 0.6180339887498949 * 100000 - 61803, 2e-5);
+}
+
 TEST(Sampling, WrapStaysBelowOne) {
   const float below = unit_from_bits<float>(0xffffffffu);
   EXPECT_LT(wrap_unit(below, below), 1.f);
@@ -245,7 +255,8 @@ TEST(Sampling, RandomRotationIsARotationAndUnbiased) {
   Vec mean_x{0, 0, 0}, mean_z{0, 0, 0};
   constexpr uint32_t kDraws = 20000;
   for (uint32_t i = 0; i < kDraws; ++i) {
-    const auto r = random_rotation(random_unit<double>(i, 0), random_unit<double>(i, 1), random_unit<double>(i, 2));
+    const auto r =
+        random_rotation(random_unit<double>(i, 0), random_unit<double>(i, 1), random_unit<double>(i, 2));
     EXPECT_NEAR(dot(cross(r.tangent, r.bitangent), r.normal), 1, 1e-9);
     EXPECT_NEAR(dot(r.tangent, r.bitangent), 0, 1e-9);
     mean_x += r.tangent / double(kDraws);

@@ -17,11 +17,13 @@ namespace {
 using Vec = Vec3<float>;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-std::vector<uint8_t> visibility(const Scene& scene, const std::vector<Vec>& origins, const std::vector<Vec>& directions,
-                                float t_far = kInfinity, const uint8_t* active = nullptr) {
+std::vector<uint8_t> visibility(const Scene& scene, const std::vector<Vec>& origins,
+                                const std::vector<Vec>& directions, float t_far = kInfinity,
+                                const uint8_t* active = nullptr) {
   std::vector<uint8_t> visible(origins.size(), 7);
-  scene.trace_visibility(reinterpret_cast<const float*>(origins.data()), reinterpret_cast<const float*>(directions.data()),
-                         int64_t(origins.size()), t_far, active, visible.data());
+  scene.trace_visibility(reinterpret_cast<const float*>(origins.data()),
+                         reinterpret_cast<const float*>(directions.data()), int64_t(origins.size()), t_far, active,
+                         visible.data());
   return visible;
 }
 
@@ -57,7 +59,8 @@ TEST(Scene, NoRayFromInsideSlipsThroughEdgesAndCorners) {
   std::vector<Vec> origins, directions;
   for (int i = -100; i <= 100; ++i) {
     for (const float s : {-1.f, 1.f}) {
-      for (const Vec target : {Vec{s, 1, i / 100.f}, {s, i / 100.f, -1}, {i / 100.f, s, 1}, {i / 100.f, i / 100.f, s}}) {
+      for (const Vec target :
+           {Vec{s, 1, i / 100.f}, {s, i / 100.f, -1}, {i / 100.f, s, 1}, {i / 100.f, i / 100.f, s}}) {
         origins.push_back({0.013f, -0.27f, 0.11f});
         directions.push_back(normalize(target - origins.back()));
       }
@@ -71,7 +74,9 @@ TEST(Scene, PointsOnAConvexSurfaceSeeTheWholeHemisphere) {
   std::vector<Vec> origins, directions;
   for (uint32_t i = 0; i < 1000; ++i) {
     // 1e-3 above the top face, over its edges and its diagonal as well.
-    const float x = random_unit<float>(i, 0) * 2 - 1, y = i % 3 == 0 ? x : i % 3 == 1 ? 1.f : random_unit<float>(i, 1);
+    const float x = random_unit<float>(i, 0) * 2 - 1, y = i % 3 == 0   ? x
+                                                          : i % 3 == 1 ? 1.f
+                                                                       : random_unit<float>(i, 1);
     origins.push_back({x, y, 1.001f});
     directions.push_back(sample_cosine_hemisphere(random_unit<float>(i, 2), random_unit<float>(i, 3)));
   }
@@ -118,7 +123,8 @@ TEST(Scene, EveryCountAndMaskIsHandled) {
       directions[i] = {0, 0, 1};
       active[i] = i % 3 != 0;
     }
-    const auto all = visibility(scene, origins, directions), masked = visibility(scene, origins, directions, kInfinity, active.data());
+    const auto all = visibility(scene, origins, directions),
+               masked = visibility(scene, origins, directions, kInfinity, active.data());
     for (int i = 0; i < n; ++i) {
       ASSERT_EQ(all[i], i % 5 == 0) << n << " " << i;
       ASSERT_EQ(masked[i], i % 5 == 0 || i % 3 == 0) << n << " " << i;

@@ -11,7 +11,11 @@ namespace splitnerf {
 class EnvironmentSampler {
  public:
   EnvironmentSampler(const float* map, int height, int width)
-      : map_(map), height_(height), width_(width), row_cdf_(height + 1, 0.), cdf_(size_t(height) * (width + 1), 0.f) {
+      : map_(map),
+        height_(height),
+        width_(width),
+        row_cdf_(height + 1, 0.),
+        cdf_(size_t(height) * (width + 1), 0.f) {
     // The mean of the bilinear map over texel i is (L[i-1] + 6 L[i] + L[i+1]) / 8 on either axis,
     // so the density follows what a lookup returns, and is positive wherever that is.
     std::vector<double> weights(width);
@@ -41,7 +45,9 @@ class EnvironmentSampler {
   }
 
   bool black() const { return !(total_ > 0); }
-  Vec3<float> radiance(Vec3<float> direction) const { return lookup_environment(map_, height_, width_, direction); }
+  Vec3<float> radiance(Vec3<float> direction) const {
+    return lookup_environment(map_, height_, width_, direction);
+  }
 
   // Density per steradian of sample() at a direction.
   float pdf(Vec3<float> direction) const {
@@ -75,7 +81,8 @@ class EnvironmentSampler {
   }
 
   // The interval [cdf[i], cdf[i + 1]) that holds u; empty intervals are never chosen.
-  template <class T> static int find(const T* cdf, int n, T u) {
+  template <class T>
+  static int find(const T* cdf, int n, T u) {
     return static_cast<int>(clamp<int64_t>(std::upper_bound(cdf, cdf + n + 1, u) - cdf - 1, 0, n - 1));
   }
 

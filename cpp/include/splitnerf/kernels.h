@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "splitnerf/config.h"
 #include "splitnerf/hash_grid.h"
@@ -46,5 +47,8 @@ template <class T> struct Kernels {
 // Those for this processor. SPLITNERF_ISA = base | avx2 | avx512 in the environment picks a lower
 // set (a set that the processor lacks is refused with std::runtime_error).
 template <class T> SPLITNERF_API const Kernels<T>& kernels();
+
+// Every set that this build and processor can run, base first: for tests that hold one against another.
+template <class T> SPLITNERF_API std::vector<Kernels<T>> usable_kernels();
 
 }  // namespace splitnerf

@@ -34,6 +34,7 @@ template <class T> SPLITNERF_HD void clip_slab(T origin, T direction, T box, T& 
 template <class T, class Emit>
 SPLITNERF_HD int64_t march_ray(Vec3<T> o, Vec3<T> d, T jitter, const uint8_t* cells, MarchOptions options, Emit emit) {
   const T box = T(options.box), step = T(options.step), cells_per_unit = T(options.resolution) / (T(2) * box);
+  if (!(dot(o, o) + dot(d, d) < T(INFINITY))) return 0;  // a ray that is not finite meets nothing
   T t_near = T(0), t_far = T(INFINITY);
   for (int axis = 0; axis < 3; ++axis) clip_slab(o[axis], d[axis], box, t_near, t_far);
   if (!(t_near < t_far) || !(t_far < T(INFINITY))) return 0;

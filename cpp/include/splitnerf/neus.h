@@ -52,21 +52,22 @@ SPLITNERF_HD T neus_ray_weights(const T* f_prev, const T* f_next, T s, int64_t n
 }
 
 // d w_i / d tau_i = T_{i+1};  d w_j / d tau_i = -w_j for j > i;  d A / d tau_i = 1 - A.
-// Walks from the last sample to the first, so that sum_{j > i} grad_j w_j is a running sum.
-// Returns the gradient to s.
+// Walks from the last sample to the first, so that sum_{j > i} grad_j w_j is a running sum. The depth
+// behind each sample waits in grad_f_next until then: subtracting tau again would lose the small depths in
+// front of a deep one. Returns the gradient to s.
 template <class T>
 SPLITNERF_HD T neus_ray_weights_backward(const T* f_prev, const T* f_next, T s, int64_t n, T min_transmittance,
                                          const T* weights, T opacity, const T* grad_weights, T grad_opacity,
                                          T* grad_f_prev, T* grad_f_next) {
   const T depth_limit = min_transmittance > T(0) ? -std::log(min_transmittance) : T(INFINITY);
   T depth = T(0);
-  int64_t n_live = 0;  // samples that the forward pass looked at; their total depth
-  for (; n_live < n && !(depth > depth_limit); ++n_live) depth += neus_optical_depth(f_prev[n_live], f_next[n_live], s);
+  int64_t n_live = 0;  // samples that the forward pass looked at
+  for (; n_live < n && !(depth > depth_limit); ++n_live)
+    grad_f_next[n_live] = depth += neus_optical_depth(f_prev[n_live], f_next[n_live], s);
   for (int64_t i = n_live; i < n; ++i) grad_f_prev[i] = grad_f_next[i] = T(0);
   T behind = T(0), grad_s = T(0);
   for (int64_t i = n_live - 1; i >= 0; --i) {
-    const T transmittance_after = std::exp(-depth);
-    depth -= neus_optical_depth(f_prev[i], f_next[i], s);
+    const T transmittance_after = std::exp(-grad_f_next[i]);
     const T grad_tau = grad_weights[i] * transmittance_after - behind + grad_opacity * (T(1) - opacity);
     behind += grad_weights[i] * weights[i];
     const OpticalDepthGrad<T> g = neus_optical_depth_backward(f_prev[i], f_next[i], s, grad_tau);

@@ -42,6 +42,9 @@ struct PathTracerParams {
   int max_bounces = 4;         // scattering events after the first one; 0: direct light only
   uint32_t seed = 0;           // equal seeds give equal images, whatever the number of threads
   bool light_sampling = true;  // sample the light too, combined by multiple importance sampling
+  // Largest channel that one indirect contribution may add to a path (a brighter one is scaled
+  // down); 0: no limit, unbiased. It trades caustics, which few samples show as specks, for noise.
+  float clamp_indirect = 0;
 };
 
 // Outputs, all required. The features are those of the first hit, averaged over the sub-samples

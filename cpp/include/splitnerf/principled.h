@@ -7,28 +7,34 @@
 
 namespace splitnerf {
 
-template <class T> struct BsdfValue {
+template <class T>
+struct BsdfValue {
   Vec3<T> f_cos;  // f (n.l), sr^-1
   T pdf;          // density of sample() at l, sr^-1
 };
 
-template <class T> class PrincipledBsdf {
+template <class T>
+class PrincipledBsdf {
  public:
   // view: unit, local, view.z > 0, towards the viewer.
   SPLITNERF_HD PrincipledBsdf(const float* lut, Vec3<T> albedo, T roughness, T metallic, Vec3<T> view)
       : view_(view), ggx_alpha_(max_of(ggx_alpha_from_roughness(roughness), T(1e-3))) {
     // Below ggx_alpha = 1e-3 rounding of h in float dominates D.
     const Vec3<T> table = lookup_brdf_lut(lut, view.z, roughness);
-    Vec3<T> directional;
+    T single = T(0), total = T(0);
     for (int c = 0; c < 3; ++c) {
       f0_[c] = T(kDielectricF0) * (T(1) - metallic) + metallic * albedo[c];
-      directional[c] = specular_albedo(f0_[c], table.x, table.y, true).value;
-      const T single = specular_albedo(f0_[c], table.x, table.y, false).value;
-      gain_[c] = single > T(0) ? directional[c] / single : T(1);
-      diffuse_[c] = (T(1) - metallic) * max_of(T(1) - directional[c], T(0)) * albedo[c];
+      const T e = specular_albedo(f0_[c], table.x, table.y, true).value;
+      const T e_single = specular_albedo(f0_[c], table.x, table.y, false).value;
+      gain_[c] = e_single > T(0) ? e / e_single : T(1);
+      diffuse_[c] = (T(1) - metallic) * max_of(T(1) - e, T(0)) * albedo[c];
+      single += e_single;
+      total += e + diffuse_[c];
     }
-    // Each lobe is sampled in proportion to what it reflects.
-    specular_probability_ = sum(directional) / max_of(sum(directional) + sum(diffuse_), T(1e-20));
+    // Visible normals are sampled in proportion to single scattering, the cosine lobe for the
+    // rest: where gain is large most of their reflections end below the horizon, and the few
+    // above would carry weights of gain > 1 from bounce to bounce.
+    specular_probability_ = single / max_of(total, T(1e-20));
   }
 
   SPLITNERF_HD BsdfValue<T> evaluate(Vec3<T> light) const {

@@ -18,8 +18,8 @@ inline constexpr double kMinNdotV = 1e-4;  // n.v is clamped to [kMinNdotV, 1]
 //   chi places the mean direction of the lobe between normal and reflection, see query_direction.
 SPLITNERF_API const float* brdf_lut();
 
-// One entry of the table by quadrature over n_u x n_phi microfacet normals. F1, F2, chi.
-SPLITNERF_API Vec3<double> integrate_brdf(double n_dot_v, double roughness, int n_u, int n_phi);
+// One entry of the table, F1, F2 and chi, by quadrature over 2 n_points microfacet normals.
+SPLITNERF_API Vec3<double> integrate_brdf(double n_dot_v, double roughness, int n_points);
 
 // Values and partial derivatives of the table at one point.
 template <class T> struct LutSample {
@@ -120,7 +120,7 @@ SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bo
   // w_r = 2 nv n - view,  nv = n . view
   grad_n += grad_w_r * (T(2) * nv);
   grad_nv += T(2) * dot(grad_w_r, n);
-  out.view = view * T(0) - grad_w_r + n * grad_nv;
+  out.view = n * grad_nv - grad_w_r;
   grad_n += view * grad_nv;
   out.normal = grad_n * sign;
   return out;

@@ -46,7 +46,8 @@ def build_scene() -> DemoScene:
     """Builds the demo mesh: four closed parts that touch, each with its own material."""
     lift = 0.004  # the parts sink this deep into the plinth, so that no light passes below them
     ball = _moved(_ball(0.34), (-0.30, -0.14, PLINTH_TOP + 0.34 - lift))
-    box = _moved(_turned(_rounded_box((0.19, 0.19, 0.35), 0.06), np.radians(28)), (0.22, 0.34, PLINTH_TOP + 0.35 - lift))
+    box = _turned(_rounded_box((0.19, 0.19, 0.35), 0.06), np.radians(28))
+    box = _moved(box, (0.22, 0.34, PLINTH_TOP + 0.35 - lift))
     torus = _moved(_torus(0.20, 0.09), (0.32, -0.32, PLINTH_TOP + 0.09 - lift))
     plinth = _plinth(radius=0.84, height=0.18, bevel=0.035)
 
@@ -96,7 +97,7 @@ def build_environment(height: int = 128, width: int = 256) -> np.ndarray:
     radiance = earth + (sky - earth) * _smoothstep(-0.04, 0.04, up)
 
     sun = _direction(azimuth=35, elevation=48)
-    radiance = radiance + np.array([105.0, 88.0, 66.0]) * np.exp((d @ sun - 1) / np.radians(3.5) ** 2)[..., None]
+    radiance = radiance + np.array([80.0, 67.0, 50.0]) * np.exp((d @ sun - 1) / np.radians(4.0) ** 2)[..., None]
     radiance = radiance + np.array([1.6, 1.0, 0.5]) * _soft_box(d, _direction(azimuth=-105, elevation=28), 0.36, 0.26)
     radiance = radiance + np.array([0.5, 0.9, 1.4]) * _soft_box(d, _direction(azimuth=160, elevation=40), 0.24, 0.40)
     return radiance.astype(np.float32)
@@ -169,7 +170,7 @@ def write_demo_dataset(
             images = _core.render(
                 scene, demo.albedo, demo.roughness, demo.metallic, environment, pose[:3].astype(np.float32),
                 focal, focal, size / 2, size / 2, size, size,
-                normals=demo.normals, spp=spp, seed=(seed * 2 + (split == "test")) * 65536 + i,
+                normals=demo.normals, spp=spp, clamp_indirect=1.0, seed=(seed * 2 + (split == "test")) * 65536 + i,
             )  # fmt: skip
             _write_view(out / split / f"r_{i:03d}", images, with_truth=split == "test")
             frames.append({"file_path": f"./{split}/r_{i:03d}", "transform_matrix": pose.tolist()})
@@ -208,7 +209,7 @@ def _ball(radius: float) -> Shape:
 
 
 def _rounded_box(half: tuple[float, float, float], rounding: float) -> Shape:
-    """All points at distance `rounding` from a smaller box: each grid point is pushed out from its nearest one there."""
+    """All points at distance `rounding` from a smaller box, pushed out from the point of it that is nearest."""
     cube = trimesh.creation.box(extents=(2, 2, 2))
     for _ in range(5):
         cube = cube.subdivide()
@@ -221,7 +222,8 @@ def _rounded_box(half: tuple[float, float, float], rounding: float) -> Shape:
 
 def _torus(major: float, minor: float) -> Shape:
     n_major, n_minor = 160, 80
-    u, v = np.meshgrid(np.arange(n_major) * 2 * np.pi / n_major, np.arange(n_minor) * 2 * np.pi / n_minor, indexing="ij")
+    turns = [np.arange(n) * 2 * np.pi / n for n in (n_major, n_minor)]
+    u, v = np.meshgrid(*turns, indexing="ij")
     normals = np.stack([np.cos(u) * np.cos(v), np.sin(u) * np.cos(v), np.sin(v)], axis=-1).reshape(-1, 3)
     centres = np.stack([np.cos(u), np.sin(u), np.zeros_like(u)], axis=-1).reshape(-1, 3) * major
     return centres + minor * normals, _grid_triangles(n_major, n_minor, wrap_columns=True), normals
@@ -238,7 +240,8 @@ def _plinth(*, radius: float, height: float, bevel: float) -> Shape:
             profile.append((flat + bevel * c, centre + bevel * s, c, s))
     profile += [(r, top, 0.0, 1.0) for r in np.linspace(flat, 0, 160)]
     # Where a rim meets a flat or the wall both name the same ring once.
-    profile = np.array([p for i, p in enumerate(profile) if i == 0 or np.abs(np.subtract(p, profile[i - 1])).max() > 1e-9])
+    repeats = [i > 0 and np.allclose(p, profile[i - 1], atol=1e-9) for i, p in enumerate(profile)]
+    profile = np.array([p for p, repeat in zip(profile, repeats) if not repeat])
     turn = np.arange(n_turn) * 2 * np.pi / n_turn
     r, z, normal_r, normal_z = (profile[None, :, k] for k in range(4))
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]

@@ -28,7 +28,7 @@ def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, l
         light: [n, 3] radiance at rho = 0.
 
     Returns:
-        [s, 3] radiance.
+        [s, 3] radiance; 0 for a query above whose horizon no light direction stands.
 
     Raises:
         ValueError: A shape or dtype does not fit.

@@ -1,0 +1,7 @@
+"""``python -m splitnerf`` is the command ``splitnerf``."""
+
+import sys
+
+from splitnerf.cli import main
+
+sys.exit(main())

@@ -1,0 +1,195 @@
+"""Every setting of a training run in one place, its presets, and its TOML form."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import tomli_w
+
+from splitnerf.data.images import atomic_path
+from splitnerf.errors import InputError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
+@dataclass
+class Config:
+    """Settings of one run. Lengths are in scene units of the box [-1.5, 1.5]^3; fractions are of the whole run.
+
+    The defaults are the preset ``cpu``.
+    """
+
+    preset: str = "cpu"
+    seed: int = 0
+    steps: int = 6000
+    box: float = 1.5
+
+    # Surface: hash grid, progressive levels, one hidden layer.
+    n_levels: int = 10
+    n_features: int = 2
+    base_resolution: int = 16
+    growth: float = 1.4697344922755988  # 16 to 512 cells along an edge
+    log2_table_size: int = 16
+    start_levels: int = 4
+    levels_open_by: float = 0.4  # the finest level opens at this fraction
+    sdf_width: int = 64
+    sdf_outputs: int = 13
+    sphere_radius: float = 0.7
+    normals: str = "analytic"  # analytic | finite_difference
+    initial_variance: float = 0.3  # s = exp(10 v)
+    cos_anneal_by: float = 0.4
+
+    # Materials, occlusion and light.
+    material_width: int = 64
+    material_layers: int = 2
+    head_inputs: str = "grid"  # outputs: the SDF's outputs (the paper) | grid: the hash features as well
+    occlusion: str = "mlp"  # mlp | off
+    occlusion_channels: int = 1
+    occlusion_directional: bool = True  # o_s as a function of the reflection; false: of position alone (the paper)
+    occlusion_width: int = 64
+    occlusion_layers: int = 2
+    light_width: int = 64
+    light_layers: int = 3
+    light_direction_frequencies: int = 6
+    light_roughness_frequencies: int = 3
+    light_activation: str = "exp"  # softplus (the paper) | exp
+    fresnel_mode: str = "exact"  # exact | paper | code
+    query: str = "mean"  # mean | reflection (the paper)
+    compensate: bool = True  # multiple-scattering compensation, as Blender has it
+    compositing: str = "linear"  # linear | srgb (the paper)
+
+    # Rays and samples.
+    initial_rays: int = 1024
+    max_rays: int = 8192
+    target_samples: int = 16384
+    max_samples_per_ray: int = 1024
+    step_scale: float = 1.0  # sample length = step_scale / s, between the two bounds below
+    min_step: float = 0.005
+    max_step: float = 0.04
+    min_transmittance: float = 1e-3
+    shade_above: float = 1e-3  # samples of less weight are not shaded; 0 shades all
+    grid_resolution: int = 96
+    grid_every: int = 32
+    hull_until: float = 0.1  # the masks' visual hull is sampled until then
+    foreground_share: float = 0.85  # of the rays, drawn near the masks
+
+    # Losses.
+    colour_weight: float = 10.0
+    light_weight: float = 1.0
+    occlusion_weight: float = 0.1
+    eikonal_weight: float = 0.1
+    metal_weight: float = 0.001
+    metal_regulariser: bool = True
+    mask_weight: float = 1.0
+    light_samples: int = 2048
+    light_queries: int = 512
+    light_every: int = 1
+    light_lobe_below: float = 0.25  # narrower lobes are sampled exactly
+    light_lobe_samples: int = 16
+    eikonal_points: int = 1024  # uniform in the box, beside the rays' samples
+
+    # Occlusion by tracing the mesh.
+    mesh_every: float = 0.1
+    mesh_resolution: int = 96
+    occlusion_share: float = 0.1  # of the shaded samples
+    occlusion_rays: int = 32
+    occlusion_offset: float = 0.0125
+    environment_height: int = 32
+
+    # Optimiser.
+    learning_rate: float = 0.01
+    variance_learning_rate: float = 0.001
+    warmup_steps: int = 100
+    final_learning_rate: float = 0.1  # factor at the end
+    weight_decay: float = 0.01
+
+    # Output.
+    export_resolution: int = 192
+    export_environment_height: int = 128
+    preview_every: float = 0.1
+    checkpoint_minutes: float = 2.0
+
+    def __post_init__(self) -> None:
+        choices = {
+            "normals": ("analytic", "finite_difference"),
+            "head_inputs": ("outputs", "grid"),
+            "occlusion": ("mlp", "off"),
+            "occlusion_channels": (1, 3),
+            "light_activation": ("softplus", "exp"),
+            "fresnel_mode": ("exact", "paper", "code"),
+            "query": ("mean", "reflection"),
+            "compositing": ("linear", "srgb"),
+        }
+        for key, allowed in choices.items():
+            if getattr(self, key) not in allowed:
+                raise InputError(f"{key} must be one of {', '.join(map(str, allowed))}, got {getattr(self, key)!r}")
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if field.type in ("int", "float") and field.name != "seed" and value < 0:
+                raise InputError(f"{field.name} must not be negative, got {value}")
+        if self.steps < 1:
+            raise InputError(f"steps must be at least 1, got {self.steps}")
+
+    def replace(self, settings: dict[str, object]) -> Config:
+        """A copy with some settings changed. Unknown keys and values of another type raise InputError."""
+        known = {f.name: f.type for f in dataclasses.fields(self)}
+        for key, value in settings.items():
+            if key not in known:
+                raise InputError(f"unknown setting {key!r}; `splitnerf info --settings` lists them")
+            if type(value).__name__ != known[key] and not (known[key] == "float" and type(value) is int):
+                raise InputError(f"setting {key} takes a {known[key]}, got {value!r}")
+        return dataclasses.replace(self, **settings)
+
+    def write(self, path: Path) -> None:
+        with atomic_path(path) as temporary:
+            temporary.write_text(tomli_w.dumps(dataclasses.asdict(self)))
+
+    @staticmethod
+    def read(path: Path) -> Config:
+        try:
+            table = tomllib.loads(path.read_text())
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise InputError(f"{path}: not a readable run configuration ({error})") from error
+        return Config().replace(table)
+
+
+# Section 4 and supplement of the paper; fractions stand for 20,000 steps.
+PAPER = dict(
+    preset="paper", steps=20000, n_levels=16, base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4,
+    levels_open_by=0.6, sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0, material_width=256,
+    head_inputs="outputs", occlusion_directional=False, occlusion_width=256, light_width=256, light_layers=5,
+    light_direction_frequencies=10, light_roughness_frequencies=5, light_activation="softplus", fresnel_mode="paper",
+    query="reflection", compensate=False, compositing="srgb", initial_rays=256, target_samples=262144, step_scale=0.0,
+    min_step=3**0.5 * 3 / 1024, min_transmittance=0.0, shade_above=0.0, grid_resolution=128, grid_every=16,
+    hull_until=0.0, foreground_share=0.0, light_weight=10.0, occlusion_weight=0.01, mask_weight=0.0,
+    light_samples=8129, light_queries=8129, light_lobe_below=0.0, eikonal_points=0, mesh_resolution=512,
+    occlusion_rays=64, environment_height=128, warmup_steps=500, export_resolution=512,
+)  # fmt: skip
+
+PRESETS: dict[str, dict] = {"cpu": {}, "paper": PAPER}
+
+
+def preset(name: str) -> Config:
+    """The settings of a preset. Raises InputError for an unknown name."""
+    if name not in PRESETS:
+        raise InputError(f"unknown preset {name!r}; there are {', '.join(PRESETS)}")
+    return Config().replace(PRESETS[name])
+
+
+def parse_setting(text: str) -> tuple[str, object]:
+    """``key=value`` with a TOML value; a bare word counts as a string. Raises InputError."""
+    key, separator, value = text.partition("=")
+    if not separator or not key:
+        raise InputError(f"--set takes key=value, got {text!r}")
+    for candidate in (value, f'"{value}"'):
+        try:
+            return key.strip(), tomllib.loads(f"value = {candidate}")["value"]
+        except tomllib.TOMLDecodeError:
+            continue
+    raise InputError(f"--set {key}: cannot read the value {value!r}")

@@ -1,0 +1,103 @@
+"""The terms of the training loss."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from splitnerf.config import Config
+from splitnerf.fields import LightMlp
+from splitnerf.fields.heads import smooth_l1_elements
+from splitnerf.ops import MeshScene, fibonacci_directions, occlusion_factors, prefilter_light, sample_ggx_lobe
+from splitnerf.render.renderer import RenderedRays
+
+SATURATED = 254.0 / 255.0
+
+
+def colour_loss(ray: RenderedRays, target: Tensor, background: Tensor) -> Tensor:
+    """Mean squared sRGB error over the pixels, both over the same background.
+
+    A channel that the photo clipped says only that the truth is at least as bright: there, and only
+    there, the prediction is clipped too.
+
+    Args:
+        ray: The rendered rays.
+        target: [n_rays, 4] sRGB, straight alpha.
+        background: [n_rays, 3] sRGB.
+
+    Source: SplitNeRF Eq. (3).
+    """
+    colour = torch.where(target[:, :3] >= SATURATED, ray.colour.clamp(max=1.0), ray.colour)
+    opacity, alpha = ray.opacity[:, None], target[:, 3:]
+    predicted = colour * opacity + background * (1.0 - opacity)
+    return F.mse_loss(predicted, target[:, :3] * alpha + background * (1.0 - alpha))
+
+
+def mask_loss(ray: RenderedRays, alpha: Tensor) -> Tensor:
+    """Binary cross entropy of the opacity against the mask [n_rays]. Source: NeuS Eq. (17)."""
+    return F.binary_cross_entropy(ray.opacity.clamp(1e-3, 1.0 - 1e-3), alpha)
+
+
+def eikonal_loss(gradients: Tensor) -> Tensor:
+    """Mean (|grad f| - 1)^2. Source: Gropp et al. 2020."""
+    return (torch.sqrt((gradients * gradients).sum(-1) + 1e-12) - 1.0).square().mean()
+
+
+def metal_loss(ray: RenderedRays) -> Tensor:
+    """Mean w m^2 of the shaded samples. Source: SplitNeRF Eq. (18)."""
+    weights = ray.weights[ray.shaded].detach()
+    return (weights[:, None] * ray.points.metallic.square()).mean()
+
+
+def light_loss(light: LightMlp, config: Config, generator: torch.Generator, seed: int) -> Tensor:
+    """Distance of g(w, rho) from the Monte Carlo integral of g(w, 0), for random directions and roughness.
+
+    Half of the queries ask at rho = 1, the rest uniformly in [0, 1]. Broad lobes share one rotated
+    lattice of light directions; those below ``light_lobe_below`` sample their own lobe exactly. The
+    gradient flows into both sides.
+
+    Source: SplitNeRF Eq. (11).
+    """
+    c = config
+    directions = fibonacci_directions(c.light_samples, generator)
+    queries = F.normalize(torch.randn(c.light_queries, 3, generator=generator), dim=1)
+    roughness = torch.ones(c.light_queries, 1)
+    roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, generator=generator)
+    narrow = roughness[:, 0] < c.light_lobe_below
+    queries, roughness = torch.cat([queries[narrow], queries[~narrow]]), torch.cat([roughness[narrow], roughness[~narrow]])
+    n_narrow = int(narrow.sum())
+    own = sample_ggx_lobe(queries[:n_narrow], roughness[:n_narrow], c.light_lobe_samples, seed).reshape(-1, 3)
+    asked = torch.cat([directions, own, queries])
+    g = light(asked, torch.cat([torch.zeros(len(directions) + len(own), 1), roughness]))
+    shared, lobes, prefiltered = g.split([len(directions), len(own), len(queries)])
+    g_bar = torch.cat([
+        lobes.view(n_narrow, c.light_lobe_samples, 3).mean(1),
+        prefilter_light(queries[n_narrow:], roughness[n_narrow:], directions, shared),
+    ])  # fmt: skip
+    return smooth_l1_elements(prefiltered, g_bar).sum(-1).mean()
+
+
+def occlusion_loss(
+    ray: RenderedRays, scene: MeshScene, environment: Tensor, config: Config, generator: torch.Generator, seed: int
+) -> Tensor:
+    """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples.
+
+    Source: SplitNeRF Eq. (12)-(16).
+    """
+    c = config
+    chosen = (torch.rand(len(ray.shaded), generator=generator) < c.occlusion_share).nonzero().squeeze(1)
+    if len(chosen) == 0:
+        return torch.zeros(())
+    with torch.no_grad():
+        normals = ray.normals[chosen]
+        on_surface = ray.positions[chosen] - normals * ray.sdf[chosen, None]
+        o_d, o_s = occlusion_factors(
+            scene, on_surface, normals, ray.points.lobe_dirs[chosen], ray.points.roughness[chosen], environment,
+            n_diffuse_rays=c.occlusion_rays, n_specular_rays=c.occlusion_rays, offset=c.occlusion_offset, seed=seed,
+            n_channels=c.occlusion_channels,
+        )  # fmt: skip
+        weights = ray.weights[ray.shaded[chosen], None]
+        weights = weights / weights.mean().clamp(min=1e-8)
+    error = (ray.points.occlusion_d[chosen] - o_d).square() + (ray.points.occlusion_s[chosen] - o_s).square()
+    return (weights * error).mean()

@@ -1,0 +1,1 @@
+"""Rays, the occupancy grid and volume rendering of the fields."""

@@ -1,0 +1,152 @@
+"""Volume rendering of a scene: from rays to pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from splitnerf.fields.sdf import unit_normals
+from splitnerf.ops import PackedSamples, composite, march_rays, neus_weights
+from splitnerf.render.model import SceneModel, ShadedPoints
+from splitnerf.render.rays import image_rays
+
+MIN_OPACITY = 1e-4
+
+
+@dataclass
+class RenderedRays:
+    """What one batch of rays leaves behind.
+
+    Attributes:
+        colour: [n_rays, 3] sRGB of the object alone, un-premultiplied, not clipped above 1.
+        opacity: [n_rays].
+        samples: The packed samples.
+        weights: [n].
+        gradients: [n, 3] d sdf / d position of all samples.
+        shaded: [m] indices of the samples that were shaded.
+        positions: [m, 3] of the shaded samples, on the level set through the sample.
+        normals: [m, 3].
+        sdf: [m].
+        points: Their materials and light.
+    """
+
+    colour: Tensor
+    opacity: Tensor
+    samples: PackedSamples
+    weights: Tensor
+    gradients: Tensor
+    shaded: Tensor
+    positions: Tensor
+    normals: Tensor
+    sdf: Tensor
+    points: ShadedPoints
+
+
+def sample_step(model: SceneModel) -> float:
+    """Length of a sample: it follows the width 1/s of the density, within the configured bounds."""
+    c = model.config
+    return min(max(c.step_scale / model.s_value, c.min_step), max(c.max_step, c.min_step))
+
+
+def annealed_cosine(cosine: Tensor, anneal: float) -> Tensor:
+    """-[relu(1/2 - c/2)(1 - t) + relu(-c) t]: early on, back-facing samples keep a gradient. Source: NeuS."""
+    return -(torch.relu(0.5 - 0.5 * cosine) * (1.0 - anneal) + torch.relu(-cosine) * anneal)
+
+
+def render_rays(
+    model: SceneModel, cells: Tensor, rays_o: Tensor, rays_d: Tensor, jitter: Tensor, anneal: float, step: float
+) -> RenderedRays:
+    """Renders rays through the occupied cells.
+
+    Args:
+        model: The scene.
+        cells: [r, r, r] uint8 occupancy.
+        rays_o, rays_d: [n_rays, 3]; directions unit.
+        jitter: [n_rays] in [0, 1).
+        anneal: Of the cosine, 0 at the start, 1 when done.
+        step: Length of a sample.
+
+    Source: SplitNeRF Eq. (1)-(2), (17).
+    """
+    c = model.config
+    samples = march_rays(rays_o, rays_d, jitter, cells, c.box, step, c.max_samples_per_ray)
+    directions = rays_d[samples.ray_indices]
+    middle = 0.5 * (samples.t_starts + samples.t_ends)
+    positions = rays_o[samples.ray_indices] + directions * middle[:, None]
+    field = model.surface(positions)
+    normals = unit_normals(field.gradient)
+    half = 0.5 * step * annealed_cosine((directions * normals).sum(-1), anneal)
+    weights, opacity = neus_weights(field.sdf - half, field.sdf + half, model.s, samples.offsets, c.min_transmittance)
+
+    shaded = (weights.detach() > c.shade_above).nonzero().squeeze(1) if c.shade_above > 0 else torch.arange(len(weights))
+    points = model.shade(
+        positions[shaded], field.outputs[shaded], field.features[shaded], normals[shaded], -directions[shaded]
+    )
+    radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
+    values = _fill_skipped(radiance, shaded, weights, samples)
+    mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
+    colour = linear_to_srgb(mean) if c.compositing == "linear" else mean
+    return RenderedRays(
+        colour, opacity, samples, weights, field.gradient, shaded, positions[shaded], normals[shaded],
+        field.sdf[shaded], points,
+    )  # fmt: skip
+
+
+def _fill_skipped(radiance: Tensor, shaded: Tensor, weights: Tensor, samples: PackedSamples) -> Tensor:
+    """Radiance of all samples: the skipped ones count as their ray's mean, so that their weights' gradient is not
+    that of black."""
+    n = len(weights)
+    if len(shaded) == n:
+        return radiance
+    with torch.no_grad():
+        seen = torch.zeros(n, 4)
+        seen[shaded] = torch.cat([radiance.detach(), torch.ones(len(shaded), 1)], dim=1)
+        sums = composite(weights.detach(), seen, samples.offsets)
+        mean = sums[:, :3] / sums[:, 3:].clamp(min=MIN_OPACITY)
+        filled = mean[samples.ray_indices]
+    return filled.index_copy(0, shaded, radiance)
+
+
+def linear_to_srgb(linear: Tensor) -> Tensor:
+    """IEC 61966-2-1, not clipped above 1; values below 0 count as 0. Finite gradient at 0."""
+    power = 1.055 * linear.clamp(min=0.0031308) ** (1.0 / 2.4) - 0.055
+    return torch.where(linear <= 0.0031308, 12.92 * linear.clamp(min=0.0), power)
+
+
+@torch.no_grad()
+def render_view(
+    model: SceneModel, cells: Tensor, pose: Tensor, intrinsics: Tensor, height: int, width: int, chunk: int = 8192
+) -> dict[str, Tensor]:
+    """Renders a whole view with its maps.
+
+    Returns:
+        rgb [H, W, 3] sRGB un-premultiplied in [0, 1], alpha [H, W], albedo [H, W, 3] linear, roughness, metallic,
+        occlusion_d, occlusion_s [H, W], normal [H, W, 3] unit, world.
+    """
+    rays_o, rays_d = image_rays(pose, intrinsics, height, width)
+    step = sample_step(model)
+    rows = []
+    for o, d in zip(rays_o.split(chunk), rays_d.split(chunk)):
+        ray = render_rays(model, cells, o, d, torch.full((len(o),), 0.5), 1.0, step)
+        p = ray.points
+        maps = torch.cat(
+            [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), ray.normals], 1
+        )
+        values = torch.zeros(len(ray.weights), maps.shape[1] + 1)
+        values[ray.shaded] = torch.cat([maps, torch.ones(len(maps), 1)], 1)
+        sums = composite(ray.weights, values, ray.samples.offsets)
+        mean = sums[:, :-1] / sums[:, -1:].clamp(min=MIN_OPACITY)
+        rows.append(torch.cat([ray.colour.clamp(0, 1), ray.opacity[:, None], mean], 1))
+    image = torch.cat(rows).view(height, width, -1)
+    return {
+        "rgb": image[..., :3],
+        "alpha": image[..., 3],
+        "albedo": image[..., 4:7],
+        "roughness": image[..., 7],
+        "metallic": image[..., 8],
+        "occlusion_d": image[..., 9],
+        "occlusion_s": image[..., 10],
+        "normal": torch.nn.functional.normalize(image[..., 11:14], dim=-1),
+    }

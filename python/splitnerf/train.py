@@ -1,0 +1,299 @@
+"""Training: from posed images to a surface, its materials and the light. Reads top to bottom."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import Tensor
+from tqdm import tqdm
+
+from splitnerf import losses
+from splitnerf.checkpoint import load_checkpoint, save_checkpoint
+from splitnerf.config import Config
+from splitnerf.data.dataset import Dataset, dataset_fingerprint
+from splitnerf.errors import InputError
+from splitnerf.export.meshing import EmptyMesh, extract_mesh
+from splitnerf.ops import MeshScene
+from splitnerf.outputs import write_preview
+from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import OccupancyGrid, visual_hull
+from splitnerf.render.rays import pixel_rays
+from splitnerf.render.renderer import render_rays, sample_step
+
+LOG_EVERY = 20  # steps between lines of metrics.jsonl
+ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion rays
+
+
+class Diverged(RuntimeError):
+    """A loss or a gradient is no longer finite."""
+
+
+@dataclass
+class TrainedScene:
+    """What a finished (or interrupted) training leaves in memory."""
+
+    model: SceneModel
+    grid: OccupancyGrid
+    step: int
+    seconds: float
+    finished: bool
+
+
+class PixelSource:
+    """Draws training rays: most of them near the objects' masks, the rest anywhere.
+
+    Args:
+        dataset: The train split.
+        foreground_share: Share of the rays drawn within a few pixels of a mask.
+    """
+
+    def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator):
+        self.pixels = torch.from_numpy(dataset.images).reshape(-1, 4)
+        self.poses, self.intrinsics = torch.from_numpy(dataset.poses), torch.from_numpy(dataset.intrinsics)
+        self.height, self.width = dataset.height, dataset.width
+        self.share, self.generator = foreground_share, generator
+        margin = max(2, self.width // 50)
+        masks = torch.from_numpy(dataset.images[..., 3])[:, None]
+        near = torch.nn.functional.max_pool2d(masks, 2 * margin + 1, stride=1, padding=margin) > 0
+        self.foreground = near.reshape(-1).nonzero().squeeze(1)
+
+    def draw(self, n: int) -> tuple[Tensor, Tensor, Tensor]:
+        """rays_o [n, 3], rays_d [n, 3] and the pixels [n, 4] (sRGB, straight alpha)."""
+        n_near = int(n * self.share) if len(self.foreground) else 0
+        near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), generator=self.generator)]
+        anywhere = torch.randint(len(self.pixels), (n - n_near,), generator=self.generator)
+        index = torch.cat([near, anywhere])
+        view, row, column = index // (self.height * self.width), index // self.width % self.height, index % self.width
+        rays_o, rays_d = pixel_rays(self.poses[view], self.intrinsics[view], column + 0.5, row + 0.5)
+        return rays_o, rays_d, self.pixels[index]
+
+
+def train(dataset: Dataset, config: Config, run: Path, *, max_minutes: float = 0.0, resume: bool = False) -> TrainedScene:
+    """Trains a scene and keeps a checkpoint, a log and previews in the run's folder.
+
+    The schedule (learning rate, levels, annealing, meshes) follows the progress: the share of steps
+    done or of minutes used, whichever is more. Ctrl-C ends the run after the current step with a checkpoint.
+
+    Args:
+        dataset: The train split.
+        config: Settings; with ``resume`` those of the checkpoint are meant to be passed.
+        run: The run's folder, which exists.
+        max_minutes: Budget of training time; 0 for none.
+        resume: Continue from ``run/checkpoint.pt``.
+
+    Raises:
+        InputError: The checkpoint belongs to another scene or cannot be read.
+        Diverged: A loss is no longer finite; the last checkpoint stands.
+        OSError: The disk is full; the last checkpoint stands.
+    """
+    c = config
+    torch.manual_seed(c.seed)
+    generator = torch.Generator().manual_seed(c.seed)
+    fingerprint = dataset_fingerprint(dataset)
+    source = PixelSource(dataset, c.foreground_share, generator)
+    model = SceneModel(c)
+    optimiser = make_optimiser(model, c)
+    hull = None
+    if c.hull_until > 0:
+        hull = visual_hull(c.grid_resolution, c.box, torch.from_numpy(dataset.images[..., 3]), source.poses, source.intrinsics)
+    grid = OccupancyGrid(c.grid_resolution, c.box, hull)
+    scene: MeshScene | None = None
+    environment: Tensor | None = None
+    step, seconds, n_rays, meshed_at, previewed_at = 0, 0.0, c.initial_rays, 0.0, 0.0
+
+    if resume:
+        content = load_checkpoint(run / "checkpoint.pt")
+        check_same_scene(content, fingerprint, run)
+        model.load_state_dict(content["model"])
+        optimiser.load_state_dict(content["optimiser"])
+        generator.set_state(content["generator"])
+        torch.set_rng_state(content["torch_generator"])
+        grid.sdf = content["occupancy"]
+        step, seconds, n_rays = content["step"], content["seconds"], content["n_rays"]
+        meshed_at, previewed_at = content["meshed_at"], content["previewed_at"]
+        if content["mesh_vertices"] is not None:
+            scene = MeshScene(content["mesh_vertices"].numpy(), content["mesh_faces"].numpy())
+            model.occlusion_ready = model.occlusion is not None
+            environment = model.light.panorama(c.environment_height)
+    mesh: tuple[Tensor, Tensor] | tuple[None, None] = (content["mesh_vertices"], content["mesh_faces"]) if resume else (None, None)
+
+    def save() -> None:
+        save_checkpoint(
+            run / "checkpoint.pt",
+            config=c,
+            fingerprint=fingerprint,
+            state=dict(
+                step=step, seconds=seconds, n_rays=n_rays, meshed_at=meshed_at, previewed_at=previewed_at,
+                model=model.state_dict(), optimiser=optimiser.state_dict(), generator=generator.get_state(),
+                torch_generator=torch.get_rng_state(), occupancy=grid.sdf,
+                mesh_vertices=mesh[0], mesh_faces=mesh[1],
+            ),
+        )  # fmt: skip
+
+    def progress_now() -> float:
+        by_time = seconds / (60.0 * max_minutes) if max_minutes > 0 else 0.0
+        return min(1.0, max(step / c.steps, by_time))
+
+    started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True
+    psnr_mean = samples_mean = None
+    with Interrupt() as interrupt, Progress(progress_now()) as bar, open(run / "metrics.jsonl", "a") as log:
+        while (progress := progress_now()) < 1.0 and not interrupt.asked:
+            model.open_levels(progress)
+            set_learning_rate(optimiser, c, step, progress)
+            if first or step % c.grid_every == 0:
+                grid.update(model.sdf_field.sdf, model.s_value, 1.0 if first else 0.1, progress < c.hull_until)
+            if model.occlusion is not None and progress - meshed_at >= c.mesh_every:
+                meshed_at = progress
+                scene, mesh = remesh(model, c, scene, mesh)
+            if scene is not None and (environment is None or step % ENVIRONMENT_EVERY == 0):
+                environment = model.light.panorama(c.environment_height)
+
+            rays_o, rays_d, target = source.draw(n_rays)
+            background = torch.rand(n_rays, 3, generator=generator)
+            jitter = torch.rand(n_rays, generator=generator)
+            anneal = min(1.0, progress / c.cos_anneal_by) if c.cos_anneal_by > 0 else 1.0
+            ray = render_rays(model, grid.cells, rays_o, rays_d, jitter, anneal, sample_step(model))
+
+            terms = {"colour": c.colour_weight * losses.colour_loss(ray, target, background)}
+            gradients = ray.gradients
+            if c.eikonal_points:
+                points = (torch.rand(c.eikonal_points, 3, generator=generator) * 2 - 1) * c.box
+                gradients = torch.cat([gradients, model.surface(points).gradient])
+            terms["eikonal"] = c.eikonal_weight * losses.eikonal_loss(gradients)
+            if c.mask_weight:
+                terms["mask"] = c.mask_weight * losses.mask_loss(ray, target[:, 3])
+            if c.light_weight and step % c.light_every == 0:
+                terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
+            if c.metal_regulariser:
+                terms["metal"] = c.metal_weight * losses.metal_loss(ray)
+            if scene is not None and model.occlusion_ready:
+                terms["occlusion"] = c.occlusion_weight * losses.occlusion_loss(ray, scene, environment, c, generator, step)
+            loss = sum(terms.values())
+            if not math.isfinite(loss.item()):
+                bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term.item()))
+                raise Diverged(f"step {step}: the loss is not finite ({bad}); lower --set learning_rate and --resume")
+            optimiser.zero_grad(set_to_none=True)
+            loss.backward()
+            optimiser.step()
+
+            n_samples = len(ray.weights)
+            n_rays = next_ray_count(n_rays, n_samples, c)
+            step, first, seconds = step + 1, False, time.monotonic() - started
+            psnr = -10.0 * math.log10(max(terms["colour"].item() / max(c.colour_weight, 1e-12), 1e-10))
+            psnr_mean = psnr if psnr_mean is None else 0.95 * psnr_mean + 0.05 * psnr
+            samples_mean = n_samples / len(rays_o)
+            bar.show(progress_now(), step, psnr_mean, samples_mean)
+            if step % LOG_EVERY == 0 or progress_now() >= 1.0:
+                log.write(json.dumps({
+                    "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss.item(),
+                    **{f"loss_{name}": term.item() for name, term in terms.items()}, "psnr": psnr_mean,
+                    "rays": len(rays_o), "samples_per_ray": samples_mean, "shaded": len(ray.shaded) / max(1, n_samples),
+                    "s": model.s_value,
+                }) + "\n")  # fmt: skip
+                log.flush()
+            if progress_now() - previewed_at >= c.preview_every:
+                previewed_at = progress_now()
+                write_preview(run, model, grid, dataset, step)
+            if time.monotonic() - saved_at > 60.0 * c.checkpoint_minutes:
+                save()
+                saved_at = time.monotonic()
+        finished = progress_now() >= 1.0
+        grid.update(model.sdf_field.sdf, model.s_value)
+        save()
+    return TrainedScene(model, grid, step, seconds, finished)
+
+
+def make_optimiser(model: SceneModel, config: Config) -> torch.optim.AdamW:
+    """AdamW with the paper's settings; the sharpness has a rate of its own and no decay."""
+    others = [p for name, p in model.named_parameters() if name != "variance"]
+    return torch.optim.AdamW(
+        [
+            {"params": others, "lr": config.learning_rate, "weight_decay": config.weight_decay},
+            {"params": [model.variance], "lr": config.variance_learning_rate, "weight_decay": 0.0},
+        ],
+        betas=(0.9, 0.99),
+        eps=1e-15,
+        fused=True,
+    )
+
+
+def set_learning_rate(optimiser: torch.optim.Optimizer, config: Config, step: int, progress: float) -> None:
+    """Linear warm-up over ``warmup_steps``, then exponential decay to ``final_learning_rate``."""
+    factor = min(1.0, (step + 1) / max(1, config.warmup_steps)) * config.final_learning_rate**progress
+    rates = (config.learning_rate, config.variance_learning_rate)
+    for group, rate in zip(optimiser.param_groups, rates):
+        group["lr"] = rate * factor
+
+
+def next_ray_count(n_rays: int, n_samples: int, config: Config) -> int:
+    """As many rays as fill the budget of samples, moving by at most a factor of 1.25 a step."""
+    wanted = n_rays * config.target_samples / max(1, n_samples)
+    return int(min(config.max_rays, max(64, min(1.25 * n_rays, max(0.8 * n_rays, wanted)))))
+
+
+def remesh(model: SceneModel, config: Config, scene: MeshScene | None, mesh: tuple) -> tuple[MeshScene | None, tuple]:
+    """The current surface as a scene to trace; the old one stays while the field has no surface."""
+    try:
+        vertices, faces = extract_mesh(model.sdf_field.sdf, config.box, config.mesh_resolution)
+    except EmptyMesh:
+        return scene, mesh
+    model.occlusion_ready = True
+    return MeshScene(vertices, faces), (torch.from_numpy(vertices), torch.from_numpy(faces))
+
+
+def check_same_scene(content: dict, fingerprint: str, run: Path) -> None:
+    """Raises InputError where a checkpoint was trained on other images."""
+    if content["fingerprint"] != fingerprint:
+        raise InputError(
+            f"{run / 'checkpoint.pt'}: was trained on other images or another --downscale; give those, or another --out"
+        )
+
+
+class Interrupt:
+    """Turns the first Ctrl-C (or SIGTERM) into a request; a second one ends the program at once."""
+
+    def __enter__(self) -> Interrupt:
+        self.asked = False
+        self._previous = {s: signal.signal(s, self._ask) for s in (signal.SIGINT, signal.SIGTERM)}
+        return self
+
+    def _ask(self, number, frame) -> None:
+        self.asked = True
+        signal.signal(number, self._previous[number])
+
+    def __exit__(self, *exception) -> None:
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)
+
+
+class Progress:
+    """The progress bar: share done, time left, PSNR of the batch and samples a ray."""
+
+    def __init__(self, start: float):
+        self._bar = tqdm(
+            total=100.0, initial=100.0 * start, file=sys.stderr,
+            bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining} {postfix}",
+        )  # fmt: skip
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def show(self, progress: float, step: int, psnr: float, samples_per_ray: float) -> None:
+        self._bar.set_postfix_str(f"step {step} PSNR {psnr:.2f} dB, {samples_per_ray:.1f} samples/ray", refresh=False)
+        self._bar.update(100.0 * progress - self._bar.n)
+
+    def __exit__(self, *exception) -> None:
+        self._bar.close()
+
+
+if __name__ == "__main__":
+    from splitnerf.cli import main
+
+    sys.exit(main(["train", *sys.argv[1:]]))

@@ -1,0 +1,161 @@
+"""Whole jobs: reconstruct a dataset into a run folder, evaluate a run again, and the demo."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from splitnerf.checkpoint import config_of, load_checkpoint
+from splitnerf.config import Config
+from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.data.truth import load_scene_truth, load_view_truths
+from splitnerf.errors import InputError
+from splitnerf.export.meshing import EmptyMesh
+from splitnerf.outputs import evaluate_scene, light_panels, write_assets, write_json
+from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import OccupancyGrid
+from splitnerf.report.html import write_report
+from splitnerf.train import TrainedScene, train
+
+RUN_FILES = (
+    "config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
+    "evaluation.json", "report.html",
+)  # fmt: skip
+REPORT_VIEWS = 4
+
+
+def load_splits(data: Path, downscale: int) -> tuple[Dataset, Dataset | None]:
+    """The train split, and the test split where the data have one.
+
+    Raises:
+        InputError: Something about the data cannot be used.
+    """
+    has_test = (data / "transforms_test.json").exists() or not (data / "transforms_train.json").exists()
+    return load_dataset(data, "train", downscale), load_dataset(data, "test", downscale) if has_test else None
+
+
+def prepare_run(run: Path, *, resume: bool, overwrite: bool) -> None:
+    """Makes the run's folder, or refuses one that holds a run.
+
+    Raises:
+        InputError: A run stands there, or something that is no folder.
+    """
+    if run.exists() and not run.is_dir():
+        raise InputError(f"{run}: is a file; give --out a folder")
+    present = [name for name in RUN_FILES if (run / name).exists()]
+    if present and overwrite:
+        for name in present:
+            (run / name).unlink()
+        for preview in (run / "previews").glob("step_*.png"):
+            preview.unlink()
+    elif present and not resume:
+        raise InputError(f"{run}: holds a run already; go on with --resume, replace it with --overwrite, or give another --out")
+    run.mkdir(parents=True, exist_ok=True)
+
+
+def reconstruct(
+    data: Path, run: Path, config: Config, *, downscale: int = 1, max_minutes: float = 0.0, resume: bool = False,
+    overwrite: bool = False,
+) -> tuple[TrainedScene, dict | None]:  # fmt: skip
+    """Trains on a dataset and fills the run's folder. Returns the scene and, when finished, its evaluation.
+
+    Raises:
+        InputError: The data, the settings or the run's folder cannot be used; nothing was written.
+        Diverged, EmptyMesh, OSError: See :func:`splitnerf.train.train`.
+    """
+    dataset, test = load_splits(data, downscale)
+    prepare_run(run, resume=resume, overwrite=overwrite)
+    config.write(run / "config.toml")
+    trained = train(dataset, config, run, max_minutes=max_minutes, resume=resume)
+    if not trained.finished:
+        return trained, None
+    return trained, finish(trained.model, trained.grid, dataset, test, run, {"training": trained.seconds})
+
+
+def finish(
+    model: SceneModel, grid: OccupancyGrid, dataset: Dataset, test: Dataset | None, run: Path, timings: dict[str, float]
+) -> dict:
+    """Writes meshes, environment, evaluation and report of a trained scene. Returns the evaluation.
+
+    Without a surface (:class:`EmptyMesh`) the environment, the evaluation and the report are still written.
+    """
+    clock = time.monotonic()
+    failure: EmptyMesh | None = None
+    mesh: trimesh.Trimesh | None = None
+    try:
+        mesh = write_assets(run, model, dataset)
+    except EmptyMesh as error:
+        failure = error
+    timings["export"] = time.monotonic() - clock
+    clock = time.monotonic()
+    views = test if test is not None else dataset
+    evaluation, predictions = evaluate_scene(model, grid, views, mesh, timings["training"])
+    write_json(run / "evaluation.json", evaluation)
+    timings["evaluation"] = time.monotonic() - clock
+    write_run_report(model, views, predictions, evaluation, run, timings)
+    if failure:
+        raise failure
+    return evaluation
+
+
+def write_run_report(
+    model: SceneModel, views: Dataset, predictions: list[dict], evaluation: dict, run: Path, timings: dict[str, float]
+) -> None:
+    """report.html: maps beside the truth, the light beside its Monte Carlo estimate, curves and settings."""
+    truths = load_view_truths(views)
+    shown = np.unique(np.linspace(0, len(views) - 1, REPORT_VIEWS).round().astype(int))
+    pages = []
+    for i in shown:
+        prediction = dict(predictions[i])
+        prediction["occlusion_diffuse"] = prediction.pop("occlusion_d")
+        prediction["occlusion_specular"] = prediction.pop("occlusion_s")
+        truth = {key: value for key, value in vars(truths[i]).items() if key != "name"}
+        truth |= {"rgb": views.images[i, ..., :3], "alpha": views.images[i, ..., 3]}
+        pages.append({"name": views.frame_names[i], "truth": truth, "prediction": prediction})
+    lines = (run / "metrics.jsonl").read_text().splitlines()
+    headline = {key: value for key, value in evaluation.items() if value is not None}
+    write_report(
+        run / "report.html",
+        title=views.name,
+        summary={"Result": headline, "Settings": asdict(model.config)},
+        views=pages,
+        lights=light_panels(model),
+        light_truth=load_scene_truth(views.root).light,
+        history=[json.loads(line) for line in lines],
+        timings=timings,
+    )
+
+
+def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
+    """The trained scene of a run's checkpoint, ready to render, and the checkpoint itself.
+
+    Raises:
+        InputError: There is no run, or its checkpoint cannot be read.
+    """
+    if not run.is_dir():
+        raise InputError(f"{run}: no such run; train one with `splitnerf train DATA --out {run}`")
+    content = load_checkpoint(run / "checkpoint.pt")
+    config = config_of(content)
+    model = SceneModel(config)
+    model.load_state_dict(content["model"])
+    model.open_levels(1.0)
+    model.occlusion_ready = model.occlusion is not None and content["mesh_vertices"] is not None
+    grid = OccupancyGrid(config.grid_resolution, config.box)
+    grid.update(model.sdf_field.sdf, model.s_value)
+    return model, grid, content
+
+
+def evaluate_run(run: Path, data: Path, downscale: int) -> dict:
+    """Renders a run's test views again, writes evaluation.json and report.html, and returns the evaluation.
+
+    Raises:
+        InputError: The run or the data cannot be used.
+    """
+    model, grid, content = load_run(run)
+    dataset, test = load_splits(data, downscale)
+    return finish(model, grid, dataset, test, run, {"training": content["seconds"]})

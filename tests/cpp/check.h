@@ -1,0 +1,66 @@
+// What the tests of formulas share: seeded inputs, and gradients by central differences.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "splitnerf/vec.h"
+
+namespace splitnerf {
+
+class Random {
+ public:
+  explicit Random(uint32_t seed) : engine_(seed) {}
+  double uniform(double lo = 0, double hi = 1) { return std::uniform_real_distribution<double>(lo, hi)(engine_); }
+  double normal() { return std::normal_distribution<double>()(engine_); }
+  int below(int n) { return std::uniform_int_distribution<int>(0, n - 1)(engine_); }
+  template <class T = double> Vec3<T> direction() {
+    const Vec3<double> d = normalize(Vec3<double>{normal(), normal(), normal()});
+    return {T(d.x), T(d.y), T(d.z)};
+  }
+  template <class T = double> std::vector<T> uniforms(size_t n, double lo = 0, double hi = 1) {
+    std::vector<T> out(n);
+    for (T& x : out) x = T(uniform(lo, hi));
+    return out;
+  }
+  template <class T = double> std::vector<T> directions(size_t n) {
+    std::vector<T> out(3 * n);
+    for (size_t i = 0; i < n; ++i) store3(&out[3 * i], direction<T>());
+    return out;
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+inline double inner(const std::vector<double>& a, const std::vector<double>& b) {
+  double total = 0;
+  for (size_t i = 0; i < a.size(); ++i) total += a[i] * b[i];
+  return total;
+}
+
+// `gradient` against central differences of the scalar function f() in the numbers x that it reads;
+// the error counts relative to the largest component.
+template <class F>
+void expect_gradient(F f, std::vector<double>& x, const std::vector<double>& gradient, double tolerance,
+                     const char* what, double step = 1e-5) {
+  ASSERT_EQ(x.size(), gradient.size()) << what;
+  double largest = 1e-6;
+  for (double g : gradient) largest = std::max(largest, std::abs(g));
+  for (size_t i = 0; i < x.size(); ++i) {
+    const double kept = x[i];
+    x[i] = kept + step;
+    const double above = f();
+    x[i] = kept - step;
+    const double below = f();
+    x[i] = kept;
+    EXPECT_NEAR(gradient[i], (above - below) / (2 * step), tolerance * largest) << what << "[" << i << "]";
+  }
+}
+
+}  // namespace splitnerf

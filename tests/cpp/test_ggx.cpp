@@ -1,0 +1,109 @@
+// GGX against long double, its normalisation, and the masking term against its definition.
+#include "splitnerf/ggx.h"
+
+#include "check.h"
+#include "splitnerf/sampling.h"
+
+namespace splitnerf {
+namespace {
+
+using Wide = long double;
+
+Vec3<Wide> widen(Vec3<float> v) {
+  const Wide x = v.x, y = v.y, z = v.z, inv = 1 / std::sqrt(x * x + y * y + z * z);
+  return {x * inv, y * inv, z * inv};
+}
+
+// D of the very vectors that the float formula is given, with sin^2 from the cross product.
+Wide reference_d(Wide ggx_alpha, Vec3<float> h, Vec3<float> n) {
+  const Vec3<Wide> c = cross(widen(h), widen(n));
+  const Wide a2 = ggx_alpha * ggx_alpha, q = a2 + (1 - a2) * dot(c, c);
+  return a2 / (Wide(kPi) * q * q);
+}
+
+TEST(Ggx, DFollowsLongDoubleDownToNarrowLobes) {
+  double worst = 0;
+  for (uint32_t i = 0; i < 64; ++i) {
+    const Vec3<float> n = fibonacci_sphere<float>(i, 64);
+    for (int k = 0; k < 200; ++k) {
+      const float angle = k == 0 ? 0.f : 1e-5f * std::pow(10.f, 5.19f * k / 199), phi = 2.399963f * k;
+      const Vec3<float> local{std::sin(angle) * std::cos(phi), std::sin(angle) * std::sin(phi), std::cos(angle)};
+      const Vec3<float> h = Frame<float>(n).to_world(local);
+      for (const float ggx_alpha : {1e-3f, 3e-3f, 0.01f, 0.1f, 0.5f, 0.9f, 1.f}) {
+        const Wide expected = reference_d(ggx_alpha, h, n);
+        const double error = double(std::abs(ggx_d(ggx_alpha, sin2_between(h, n)) / expected - 1));
+        worst = std::max(worst, error);
+        ASSERT_LT(error, 1e-6) << "ggx_alpha " << ggx_alpha << ", angle " << angle << ", normal " << i;
+      }
+    }
+  }
+  RecordProperty("worst_relative_error", std::to_string(worst));
+}
+
+// int D (n.h) dh = pi int_0^1 D(s) ds with s = sin^2; s = x^4 resolves the narrow lobes.
+TEST(Ggx, DIntegratesToOne) {
+  for (const double ggx_alpha : {kMinGgxAlpha, 1e-3, 0.01, 0.1, 0.5, 1.0}) {
+    const int n = 200000;
+    double total = 0;
+    for (int i = 0; i < n; ++i) {
+      const double x = (i + 0.5) / n;
+      total += kPi * ggx_d(ggx_alpha, x * x * x * x) * 4 * x * x * x / n;
+    }
+    EXPECT_NEAR(total, 1, 1e-6) << ggx_alpha;
+  }
+}
+
+// With n = v = w_r the density D/4 of the reflected direction covers the whole sphere.
+TEST(Ggx, QuarterDOfTheHalfAngleIntegratesToOneOverTheSphere) {
+  const Vec3<double> axis = normalize(Vec3<double>{0.3, -0.5, 0.8});
+  for (const double roughness : {0.4, 0.7, 1.0}) {
+    const int n = 200000;
+    double total = 0;
+    for (int i = 0; i < n; ++i)
+      total += ggx_d(ggx_alpha_from_roughness(roughness), sin2_half_angle(fibonacci_sphere<double>(i, n), axis)) / 4;
+    EXPECT_NEAR(total * 4 * kPi / n, 1, 1e-3) << roughness;
+  }
+}
+
+TEST(Ggx, HalfAngleIsThatOfTheMicrofacet) {
+  Random random(1);
+  for (int i = 0; i < 100; ++i) {
+    const Vec3<double> a = random.direction(), b = random.direction(), h = normalize(a + b);
+    EXPECT_NEAR(sin2_half_angle(a, b), sin2_between(h, a), 1e-12);
+    EXPECT_NEAR(sin2_between(a, b), 1 - square(dot(a, b)), 1e-12);
+  }
+}
+
+// V = 1 / (4 (n.v)(n.l)(1 + Lambda(v) + Lambda(l))), Lambda = (sqrt(1 + a^2 tan^2) - 1) / 2.
+TEST(Ggx, SmithFollowsItsDefinition) {
+  const auto lambda = [](double a, double c) { return (std::sqrt(1 + a * a * (1 - c * c) / (c * c)) - 1) / 2; };
+  for (const double a : {1e-3, 0.1, 0.5, 1.0}) {
+    for (const double nv : {1e-3, 0.2, 0.7, 1.0}) {
+      for (const double nl : {1e-3, 0.3, 1.0}) {
+        const double expected = 1 / (4 * nv * nl * (1 + lambda(a, nv) + lambda(a, nl)));
+        EXPECT_NEAR(smith_v(a, nv, nl) / expected, 1, 1e-12);
+        EXPECT_NEAR(smith_v(float(a), float(nv), float(nl)) / expected, 1, 1e-5);
+        EXPECT_EQ(smith_v(a, nv, nl), smith_v(a, nl, nv));
+      }
+    }
+  }
+  EXPECT_TRUE(std::isfinite(smith_v(0.f, 0.f, 0.f)));
+}
+
+TEST(Ggx, SchlickRunsFromF0ToOne) {
+  EXPECT_DOUBLE_EQ(schlick(0.04, 1.0), 0.04);
+  EXPECT_DOUBLE_EQ(schlick(0.04, 0.0), 1.0);
+  EXPECT_DOUBLE_EQ(schlick(0.04, 0.5), 0.04 + 0.96 / 32);
+  EXPECT_DOUBLE_EQ(schlick(0.04, 1.5), 0.04);  // rounding may push the cosine past 1
+}
+
+TEST(Ggx, ZeroRoughnessStaysFinite) {
+  const float a = ggx_alpha_from_roughness(0.f);
+  EXPECT_EQ(a, float(kMinGgxAlpha));
+  EXPECT_NEAR(ggx_d(a, 0.f) * float(kPi) * a * a, 1, 1e-6);
+  EXPECT_TRUE(std::isfinite(ggx_d(a, 1.f)));
+  EXPECT_FLOAT_EQ(ggx_alpha_from_roughness(0.5f), 0.25f);
+}
+
+}  // namespace
+}  // namespace splitnerf

@@ -1,0 +1,283 @@
+// The hash grid's geometry, exact encodings, edge cases, adjoints, and its kernels on every instruction set.
+#include "splitnerf/hash_grid.h"
+
+#include <sys/mman.h>
+
+#include <array>
+#include <limits>
+
+#include "check.h"
+#include "splitnerf/kernels.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf {
+namespace {
+
+constexpr HashGridShape kSmall{4, 2, 4, 1.7, 8};  // two dense levels, two hashed ones
+
+std::vector<HashLevel> levels_of(const HashGridShape& shape) {
+  std::vector<HashLevel> levels(shape.n_levels);
+  hash_levels(shape, levels.data());
+  return levels;
+}
+int64_t n_entries(const HashGridShape& shape) {
+  std::array<HashLevel, kMaxLevels> levels;
+  return hash_levels(shape, levels.data());
+}
+
+// ---- geometry and index functions ----
+
+TEST(HashLevels, ResolutionsGrowGeometrically) {
+  const HashGridShape doubling{12, 2, 16, 2.0, 14};
+  for (int l = 0; l < 12; ++l) EXPECT_EQ(level_resolution(doubling, l), 16 << l);
+  // 16 levels from 32 by 1.3195079 end at 2048.
+  const HashGridShape paper{16, 2, 32, 1.3195079, 19};
+  EXPECT_EQ(level_resolution(paper, 0), 32);
+  EXPECT_EQ(level_resolution(paper, 15), 2047);
+}
+
+TEST(HashLevels, DenseWhereEveryNodeFits) {
+  const std::vector<HashLevel> levels = levels_of({4, 2, 4, 1.7, 8});
+  // Resolutions 4, 6, 11, 19: 125 nodes fit into 256 entries, 343 do not.
+  const int resolutions[] = {4, 6, 11, 19};
+  int64_t offset = 0;
+  for (int l = 0; l < 4; ++l) {
+    EXPECT_EQ(levels[l].resolution, resolutions[l]);
+    EXPECT_EQ(levels[l].dense, l == 0);
+    EXPECT_EQ(levels[l].n_entries, l == 0 ? 125 : 256);
+    EXPECT_EQ(levels[l].offset, offset);
+    offset += levels[l].n_entries;
+  }
+  EXPECT_EQ(n_entries(kSmall), offset);
+}
+
+TEST(HashLevels, OffsetsPassTwoToThe31) {
+  const HashGridShape huge{32, 2, 2048, 1.0, 30};
+  const std::vector<HashLevel> levels = levels_of(huge);
+  for (int l = 0; l < 32; ++l) EXPECT_EQ(levels[l].offset, int64_t(l) << 30);
+  EXPECT_EQ(n_entries(huge), int64_t(1) << 35);
+}
+
+TEST(HashIndex, DenseIndexCountsEveryNodeOnceAndPassesTwoToThe31) {
+  std::vector<int> seen(6 * 6 * 6);
+  for (int x = 0; x < 6; ++x)
+    for (int y = 0; y < 6; ++y)
+      for (int z = 0; z < 6; ++z) ++seen.at(dense_index(x, y, z, 5));
+  for (int count : seen) EXPECT_EQ(count, 1);
+  EXPECT_EQ(dense_index(1290, 1290, 1290, 1290), int64_t(1291) * 1291 * 1291 - 1);
+  EXPECT_GT(dense_index(1290, 1290, 1290, 1290), int64_t(1) << 31);
+}
+
+TEST(HashIndex, SpatialHashIsTheXorOfPrimeMultiplesModuloTwoToThe32) {
+  EXPECT_EQ(spatial_hash(1, 0, 0, 1u << 20), 1u);
+  EXPECT_EQ(spatial_hash(0, 1, 0, 1u << 31), 2654435761u & 0x7fffffffu);
+  EXPECT_EQ(spatial_hash(0, 0, 1, 1u << 31), 805459861u);
+  Random random(1);
+  for (int i = 0; i < 1000; ++i) {
+    const auto x = uint64_t(random.below(1 << 30)), y = uint64_t(random.below(1 << 30)), z = uint64_t(random.below(1 << 30));
+    const uint64_t wide = x ^ (y * 2654435761ull & 0xffffffffull) ^ (z * 805459861ull & 0xffffffffull);
+    EXPECT_EQ(spatial_hash(uint32_t(x), uint32_t(y), uint32_t(z), 1u << 19), wide % (1u << 19));
+  }
+}
+
+TEST(HashIndex, EveryCornerStaysInsideItsLevel) {
+  Random random(2);
+  for (const HashLevel& level : levels_of({16, 2, 32, 1.3195079, 14})) {
+    for (int i = 0; i < 200; ++i) {
+      const Vec3<float> p{float(random.uniform(-0.5, 1.5)), i % 3 ? float(random.uniform()) : 1.f, i % 5 ? float(random.uniform()) : 0.f};
+      const HashCell<float> cell = hash_cell(level, p);
+      for (int64_t index : cell.index) EXPECT_TRUE(index >= level.offset && index < level.offset + level.n_entries);
+      for (int axis = 0; axis < 3; ++axis) EXPECT_TRUE(cell.f[axis] >= 0 && cell.f[axis] <= 1);
+    }
+  }
+}
+
+// Entries past 2^32 floats, in memory that is reserved but only touched where it is read.
+TEST(HashIndex, KernelsReachEntriesPastTwoToThe32) {
+  const HashLevel level{(int64_t(1) << 31) + 7, 8, 1, true};
+  const size_t bytes = size_t(level.offset + 8) * 2 * sizeof(float);
+  void* memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (memory == MAP_FAILED) GTEST_SKIP() << "this system reserves no 16 GiB of address space";
+  auto* table = static_cast<float*>(memory);
+  for (int i = 0; i < 16; ++i) table[level.offset * 2 + i] = float(i);
+  const float position[] = {1, 0, 1}, gradient[] = {1, 10};
+  for (const Kernels<float>& k : usable_kernels<float>()) {
+    const HashEncodeArgs<float> args{&level, 2, 1, 1, 1, position, table};
+    float features[2];
+    k.hash_encode(args, 0, 1, features, nullptr);
+    EXPECT_EQ(features[0], 10) << k.name;  // node (1, 0, 1) is entry 5
+    EXPECT_EQ(features[1], 11) << k.name;
+  }
+  usable_kernels<float>()[0].hash_scatter({&level, 2, 1, 1, 1, position, nullptr}, 0, gradient, nullptr, table);
+  EXPECT_EQ(table[level.offset * 2 + 10], 11);
+  EXPECT_EQ(table[level.offset * 2 + 11], 21);
+  munmap(memory, bytes);
+}
+
+// ---- encodings that are known exactly ----
+
+struct Encoding {
+  std::vector<double> features, jacobian;
+};
+Encoding encode(const HashGridShape& shape, int n_active, const std::vector<double>& x, const std::vector<double>& table) {
+  const size_t n = x.size() / 3, columns = size_t(shape.n_levels * shape.n_features);
+  Encoding e{std::vector<double>(n * columns, -7), std::vector<double>(3 * n * columns, -7)};
+  cpu::hash_encode(shape, n_active, int64_t(n), x.data(), table.data(), e.features.data(), e.jacobian.data());
+  return e;
+}
+
+constexpr double kSlope[2][3] = {{1, -2, 3}, {0.5, 0.25, -4}};
+double linear(int f, const double* p) { return f + kSlope[f][0] * p[0] + kSlope[f][1] * p[1] + kSlope[f][2] * p[2]; }
+
+// Two dense levels whose nodes hold a linear field.
+constexpr HashGridShape kDense{2, 2, 5, 2.0, 12};
+std::vector<double> linear_table() {
+  std::vector<double> table(size_t(n_entries(kDense)) * 2);
+  for (const HashLevel& level : levels_of(kDense)) {
+    for (int x = 0; x <= level.resolution; ++x)
+      for (int y = 0; y <= level.resolution; ++y)
+        for (int z = 0; z <= level.resolution; ++z) {
+          const double p[] = {double(x) / level.resolution, double(y) / level.resolution, double(z) / level.resolution};
+          for (int f = 0; f < 2; ++f) table[size_t(level.offset + dense_index(x, y, z, level.resolution)) * 2 + f] = linear(f, p);
+        }
+  }
+  return table;
+}
+
+TEST(HashEncode, ReproducesALinearFieldAndItsJacobian) {
+  Random random(3);
+  std::vector<double> x = random.uniforms(3 * 500);
+  x.insert(x.end(), {0, 0, 0, 1, 1, 1, 0.2, 0.4, 1, 0.6, 0, 0.5});  // corners and nodes
+  const Encoding e = encode(kDense, 2, x, linear_table());
+  for (size_t i = 0; i < x.size() / 3; ++i) {
+    for (int column = 0; column < 4; ++column) {
+      EXPECT_NEAR(e.features[4 * i + column], linear(column % 2, &x[3 * i]), 1e-12);
+      for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(e.jacobian[12 * i + 4 * axis + column], kSlope[column % 2][axis], 1e-11);
+    }
+  }
+}
+
+TEST(HashEncode, ClampsOutsideWithAZeroGradientAlongThatAxis) {
+  const std::vector<double> x{-0.5, 0.3, 0.7, 0.4, 2.0, 0.1, 0.4, 0.6, -1e30}, inside{0, 0.3, 0.7, 0.4, 1, 0.1, 0.4, 0.6, 0};
+  const Encoding e = encode(kDense, 2, x, linear_table()), at = encode(kDense, 2, inside, linear_table());
+  for (int point = 0; point < 3; ++point) {
+    for (int column = 0; column < 4; ++column) {
+      EXPECT_EQ(e.features[4 * point + column], at.features[4 * point + column]);
+      for (int axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(e.jacobian[12 * point + 4 * axis + column], axis == point ? 0 : kSlope[column % 2][axis], 1e-11);
+    }
+  }
+}
+
+TEST(HashEncode, NanPositionsGiveNanThereAndNowhereElse) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  const std::vector<double> x{nan, 0.5, 0.5, 0.5, 0.5, 0.5, nan, nan, nan, inf, -inf, 0.5};
+  const Encoding e = encode(kDense, 2, x, linear_table());
+  for (int column = 0; column < 4; ++column) {
+    EXPECT_TRUE(std::isnan(e.features[column]));
+    EXPECT_FALSE(std::isnan(e.features[4 + column]));
+    EXPECT_TRUE(std::isnan(e.features[8 + column]));
+    EXPECT_FALSE(std::isnan(e.features[12 + column]));  // infinities clamp
+  }
+  std::vector<double> gradient(size_t(n_entries(kDense)) * 2), ones(16, 1);
+  cpu::hash_encode_backward<double>(kDense, 2, 4, x.data(), ones.data(), nullptr, gradient.data());  // does not crash
+}
+
+TEST(HashEncode, ClosedLevelsAreZeroAndTheOpenOnesUnchanged) {
+  Random random(4);
+  const std::vector<double> x = random.uniforms(3 * 50), table = random.uniforms(size_t(n_entries(kSmall)) * 2, -1);
+  const Encoding all = encode(kSmall, 4, x, table);
+  for (int n_active = 0; n_active < 4; ++n_active) {
+    const Encoding e = encode(kSmall, n_active, x, table);
+    for (size_t i = 0; i < e.features.size(); ++i)
+      EXPECT_EQ(e.features[i], i % 8 < size_t(2 * n_active) ? all.features[i] : 0);
+    for (size_t i = 0; i < e.jacobian.size(); ++i)
+      EXPECT_EQ(e.jacobian[i], i % 8 < size_t(2 * n_active) ? all.jacobian[i] : 0);
+    std::vector<double> gradient(table.size(), -7);
+    cpu::hash_encode_backward<double>(kSmall, n_active, 50, x.data(), all.features.data(), nullptr, gradient.data());
+    const size_t open = n_active == 0 ? 0 : size_t(levels_of(kSmall)[n_active - 1].offset + levels_of(kSmall)[n_active - 1].n_entries) * 2;
+    for (size_t i = open; i < gradient.size(); ++i) EXPECT_EQ(gradient[i], 0);
+  }
+}
+
+// ---- adjoints ----
+
+TEST(HashEncode, TableGradientIsTheTranspose) {
+  Random random(5);
+  for (const int features : {1, 2, 4, 8}) {
+    const HashGridShape shape{5, features, 3, 1.9, 7};
+    const size_t n = 60, columns = size_t(5 * features);
+    const std::vector<double> x = random.uniforms(3 * n, -0.1, 1.1), table = random.uniforms(size_t(n_entries(shape) * features), -1);
+    const std::vector<double> g = random.uniforms(n * columns, -1), gj = random.uniforms(3 * n * columns, -1);
+    const Encoding e = encode(shape, 4, x, table);  // linear in the table
+    std::vector<double> both(table.size()), values(table.size());
+    cpu::hash_encode_backward(shape, 4, int64_t(n), x.data(), g.data(), gj.data(), both.data());
+    cpu::hash_encode_backward<double>(shape, 4, int64_t(n), x.data(), g.data(), nullptr, values.data());
+    EXPECT_NEAR(inner(both, table), inner(g, e.features) + inner(gj, e.jacobian), 1e-9) << features;
+    EXPECT_NEAR(inner(values, table), inner(g, e.features), 1e-10) << features;
+  }
+}
+
+TEST(HashEncode, PositionGradientsFollowCentralDifferences) {
+  Random random(6);
+  const size_t n = 30;
+  const std::vector<double> table = random.uniforms(size_t(n_entries(kSmall)) * 2, -1);
+  const std::vector<double> g = random.uniforms(n * 8, -1), gj = random.uniforms(3 * n * 8, -1);
+  std::vector<double> x = random.uniforms(3 * n, 0.01, 0.99), gradient(x.size());
+  cpu::hash_encode_backward_positions(kSmall, 4, int64_t(n), x.data(), table.data(), g.data(), gj.data(), gradient.data());
+  expect_gradient([&] { const Encoding e = encode(kSmall, 4, x, table); return inner(g, e.features) + inner(gj, e.jacobian); },
+                  x, gradient, 1e-6, "positions", 1e-7);
+  const Encoding e = encode(kSmall, 4, x, table);
+  for (size_t axis = 0; axis < 3; ++axis) {  // the Jacobian itself, point 0
+    std::vector<double> jacobian(e.jacobian.begin() + 8 * axis, e.jacobian.begin() + 8 * axis + 8);
+    std::vector<double> above = x, below = x;
+    above[axis] += 1e-7, below[axis] -= 1e-7;
+    const Encoding a = encode(kSmall, 4, above, table), b = encode(kSmall, 4, below, table);
+    for (int c = 0; c < 8; ++c) EXPECT_NEAR(jacobian[c], (a.features[c] - b.features[c]) / 2e-7, 1e-5);
+  }
+}
+
+// ---- instruction sets ----
+
+// Fused multiply-adds round the position inside a cell differently: close relative to the largest value.
+template <class T> void expect_close(const std::vector<T>& a, const std::vector<T>& b, const std::string& what) {
+  double largest = 0;
+  for (T x : b) largest = std::max(largest, std::abs(double(x)));
+  const double tolerance = (sizeof(T) == 4 ? 2e-5 : 1e-13) * largest;
+  for (size_t i = 0; i < a.size(); ++i) ASSERT_NEAR(a[i], b[i], tolerance) << what << " " << i;
+}
+
+template <class T> void every_set_agrees_with_base() {
+  const std::vector<Kernels<T>> sets = usable_kernels<T>();
+  ASSERT_STREQ(sets[0].name, "base");
+  Random random(7);
+  for (const int features : {1, 2, 4, 8}) {
+    const HashGridShape shape{6, features, 4, 1.6, 9};
+    const std::vector<HashLevel> levels = levels_of(shape);
+    const int64_t n = 700, columns = 6 * features;
+    const auto x = random.uniforms<T>(size_t(3 * n), -0.05, 1.05), table = random.uniforms<T>(size_t(n_entries(shape) * features), -1);
+    const auto g = random.uniforms<T>(size_t(n * columns), -1), gj = random.uniforms<T>(size_t(3 * n * columns), -1);
+    const HashEncodeArgs<T> args{levels.data(), features, 6, 6, n, x.data(), table.data()};
+    std::vector<std::vector<T>> expected;
+    for (const Kernels<T>& k : sets) {
+      std::vector<std::vector<T>> got{std::vector<T>(size_t(n * columns)), std::vector<T>(size_t(n * columns)),
+                                      std::vector<T>(size_t(3 * n * columns)), std::vector<T>(table.size()),
+                                      std::vector<T>(x.size())};
+      k.hash_encode(args, 0, n, got[0].data(), nullptr);
+      k.hash_encode(args, 0, n, got[1].data(), got[2].data());
+      for (int l = 0; l < 6; ++l) k.hash_scatter(args, l, g.data(), gj.data(), got[3].data());
+      k.hash_position_gradient(args, 0, n, g.data(), gj.data(), got[4].data());
+      if (expected.empty()) expected = got;
+      for (size_t i = 0; i < got.size(); ++i)
+        expect_close(got[i], expected[i], std::string(k.name) + " F = " + std::to_string(features) + " output " + std::to_string(i));
+    }
+  }
+}
+
+TEST(HashKernels, EveryInstructionSetAgreesWithBase) {
+  every_set_agrees_with_base<float>();
+  every_set_agrees_with_base<double>();
+}
+
+}  // namespace
+}  // namespace splitnerf

@@ -1,0 +1,190 @@
+// NeuS weights against long double, the telescoped product, limits, and adjoints.
+#include "splitnerf/neus.h"
+
+#include <limits>
+
+#include "check.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf {
+namespace {
+
+using Wide = long double;
+
+Wide wide_softplus(Wide x) { return (x > 0 ? x : 0) + std::log1p(std::exp(-std::abs(x))); }
+
+// alpha = 1 - Phi(f_next) / Phi(f_prev) of the very numbers that the float formula is given. Where the
+// difference of softplus would cancel, their integral sigmoid(-s f) ds f by Simpson's rule.
+Wide reference_alpha(Wide f_prev, Wide f_next, Wide s) {
+  if (f_prev <= f_next) return 0;
+  const Wide d = s * (f_prev - f_next);
+  if (d > 1e-3L) return -std::expm1(wide_softplus(-s * f_prev) - wide_softplus(-s * f_next));
+  const auto sigmoid = [](Wide x) { return x >= 0 ? 1 / (1 + std::exp(-x)) : std::exp(x) / (1 + std::exp(x)); };
+  return -std::expm1(-d / 6 * (sigmoid(-s * f_prev) + 4 * sigmoid(-s * (f_prev + f_next) / 2) + sigmoid(-s * f_next)));
+}
+
+constexpr double kFaint = 1e-29;  // sigmoid(-s f_prev) leaves float's normal range below; nobody sees such alphas
+
+TEST(Neus, AlphaFollowsLongDouble) {
+  double worst = 0;
+  for (const float s : {1.f, 20.f, 64.f, 500.f, 8103.f, 1e6f}) {
+    for (int i = -120; i <= 120; ++i) {
+      // s |f| from 1e-6 to 1e6 on both sides of the surface
+      const float f_prev = (i < 0 ? -1.f : 1.f) * std::pow(10.f, float(std::abs(i)) / 10 - 6) / s;
+      for (int k = 0; k <= 60; ++k) {
+        const float f_next = f_prev - std::pow(10.f, float(k) / 5 - 6) / s;
+        const Wide expected = reference_alpha(f_prev, f_next, s);
+        const float alpha = -std::expm1(-neus_optical_depth(f_prev, f_next, s));
+        ASSERT_TRUE(alpha >= 0 && alpha <= 1) << f_prev << " " << f_next << " " << s;
+        if (expected < kFaint) {
+          EXPECT_LT(alpha, 2 * kFaint);
+          continue;
+        }
+        worst = std::max(worst, double(std::abs(alpha / expected - 1)));
+        ASSERT_LT(worst, 1e-5) << f_prev << " " << f_next << " " << s;
+      }
+    }
+  }
+  RecordProperty("worst_relative_error", std::to_string(worst));
+}
+
+TEST(Neus, NothingWhereTheDistanceRises) {
+  EXPECT_EQ(neus_optical_depth(0.1f, 0.1f, 100.f), 0);
+  EXPECT_EQ(neus_optical_depth(-0.1f, 0.2f, 100.f), 0);
+  EXPECT_EQ(neus_optical_depth(-1e6f, 1e6f, 1e6f), 0);
+  EXPECT_TRUE(std::isnan(neus_optical_depth(std::numeric_limits<float>::quiet_NaN(), 0.f, 1.f)));
+}
+
+template <class T> struct Ray {
+  std::vector<T> f_prev, f_next, weights;
+  T opacity;
+};
+
+// n samples of a ray along which the distance falls from f0 by `slope` in all.
+template <class T> Ray<T> falling_ray(double f0, double slope, int n, T s, T min_transmittance = 0) {
+  Ray<T> ray;
+  for (int i = 0; i < n; ++i) {
+    ray.f_prev.push_back(T(f0 - slope * i / n));
+    ray.f_next.push_back(T(f0 - slope * (i + 1) / n));
+  }
+  ray.weights.resize(n);
+  ray.opacity = neus_ray_weights(ray.f_prev.data(), ray.f_next.data(), s, n, min_transmittance, ray.weights.data());
+  return ray;
+}
+
+TEST(Neus, OpacityIsTheSumOfWeightsAndTheTelescopedRatio) {
+  for (const double s : {5., 64., 8103.}) {
+    for (const double slope : {0.01, 0.4, 1.5}) {
+      const Ray<float> ray = falling_ray(0.3, slope, 100, float(s));
+      double total = 0;
+      for (float w : ray.weights) total += w;
+      const double expected = double(reference_alpha(0.3L, 0.3L - slope, s));
+      EXPECT_NEAR(total, ray.opacity, 3e-6) << s << " " << slope;
+      EXPECT_NEAR(ray.opacity, expected, 2e-5 * expected + 1e-30) << s << " " << slope;
+    }
+  }
+}
+
+TEST(Neus, FaintRaysKeepTheirDigits) {
+  // 1e-5 of opacity in 1024 samples: a running product of (1 - alpha) in float loses a fifth of it.
+  const Ray<float> ray = falling_ray(0.2, 0.05, 1024, 68.f);
+  const double expected = double(reference_alpha(0.2L, 0.15L, 68));
+  EXPECT_LT(expected, 1e-4);
+  EXPECT_NEAR(ray.opacity / expected, 1, 1e-5);
+}
+
+TEST(Neus, SamplesBehindTheMinimalTransmittanceAreZero) {
+  const Ray<double> full = falling_ray(0.1, 0.5, 200, 100.), cut = falling_ray(0.1, 0.5, 200, 100., 1e-3);
+  int dropped = 0;
+  for (int i = 0; i < 200; ++i) {
+    EXPECT_TRUE(cut.weights[i] == full.weights[i] || cut.weights[i] == 0);
+    dropped += cut.weights[i] != full.weights[i];
+  }
+  EXPECT_GT(dropped, 50);
+  EXPECT_NEAR(cut.opacity, full.opacity, 1e-3);
+}
+
+TEST(Neus, NanReachesTheCaller) {
+  Ray<float> ray = falling_ray(0.1, 0.5, 10, 10.f);
+  ray.f_next[4] = std::numeric_limits<float>::quiet_NaN();
+  const float opacity = neus_ray_weights(ray.f_prev.data(), ray.f_next.data(), 10.f, 10, 0.f, ray.weights.data());
+  EXPECT_TRUE(std::isnan(opacity));
+  EXPECT_FALSE(std::isnan(ray.weights[3]));
+  EXPECT_TRUE(std::isnan(ray.weights[4]));
+}
+
+// ---- adjoints ----
+
+struct Batch {
+  std::vector<int64_t> offsets{0};
+  std::vector<double> x;  // f_prev, f_next, s
+  int64_t n = 0;
+};
+
+// Rays that cross the surface, with a sample in each that rises; one ray is empty.
+Batch crossing_rays(Random& random, double s) {
+  Batch batch;
+  for (const int length : {12, 0, 1, 20}) batch.offsets.push_back(batch.offsets.back() + length);
+  batch.n = batch.offsets.back();
+  batch.x = random.uniforms(size_t(2 * batch.n + 1));
+  for (int64_t i = 0; i < batch.n; ++i) {
+    batch.x[i] = 2 / s * (1 - 0.2 * double(i % 12) + 0.2 * batch.x[i]);
+    batch.x[batch.n + i] = batch.x[i] - (i % 5 == 4 ? -0.2 : 0.6) / s * (0.2 + batch.x[batch.n + i]);
+  }
+  batch.x.back() = s;
+  return batch;
+}
+
+TEST(Neus, AdjointFollowsCentralDifferences) {
+  Random random(1);
+  for (const double s : {3., 20.}) {
+    for (const double min_transmittance : {0., 0.05}) {
+      Batch b = crossing_rays(random, s);
+      const std::vector<double> gw = random.uniforms(size_t(b.n), -1), ga = random.uniforms(4, -1);
+      std::vector<double> weights(b.n), opacity(4), gradient(b.x.size()), grad_s(4);
+      const auto f = [&] {
+        cpu::neus_weights(4, b.offsets.data(), &b.x[0], &b.x[b.n], b.x.back(), min_transmittance, weights.data(), opacity.data());
+        return inner(gw, weights) + inner(ga, opacity);
+      };
+      f();
+      cpu::neus_weights_backward(4, b.offsets.data(), &b.x[0], &b.x[b.n], b.x.back(), min_transmittance, weights.data(),
+                                 opacity.data(), gw.data(), ga.data(), &gradient[0], &gradient[b.n], grad_s.data());
+      for (double g : grad_s) gradient.back() += g;
+      expect_gradient(f, b.x, gradient, 1e-6, "neus", 1e-6);
+    }
+  }
+}
+
+// Behind a sample of great depth the transmittance of those before it must not lose its digits.
+TEST(Neus, FloatAdjointFollowsDoubleAlongOpaqueRays) {
+  const int n = 350;
+  const Ray<float> ray = falling_ray(0.0041, 1.4, n, 4000.f);
+  const std::vector<double> f_prev(ray.f_prev.begin(), ray.f_prev.end()), f_next(ray.f_next.begin(), ray.f_next.end());
+  std::vector<double> gw(n), weights(n), prev(n), next(n);
+  std::vector<float> gw32(n), prev32(n), next32(n);
+  for (int i = 0; i < n; ++i) gw32[i] = std::cos(float(i)), gw[i] = gw32[i];
+  const double opacity = neus_ray_weights(f_prev.data(), f_next.data(), 4000., n, 0., weights.data());
+  neus_ray_weights_backward(f_prev.data(), f_next.data(), 4000., n, 0., weights.data(), opacity, gw.data(), 0., prev.data(), next.data());
+  neus_ray_weights_backward(ray.f_prev.data(), ray.f_next.data(), 4000.f, n, 0.f, ray.weights.data(), ray.opacity, gw32.data(), 0.f, prev32.data(), next32.data());
+  double largest = 0;
+  for (double g : next) largest = std::max(largest, std::abs(g));
+  for (int i = 0; i < n; ++i) {
+    EXPECT_NEAR(prev32[i], prev[i], 1e-5 * largest) << i;
+    EXPECT_NEAR(next32[i], next[i], 1e-5 * largest) << i;
+  }
+}
+
+TEST(Composite, SumsEachRayAndItsAdjointIsExact) {
+  const std::vector<int64_t> offsets{0, 2, 2, 3};
+  std::vector<double> w{1, 2, 3}, v{1, 10, 2, 20, 3, 30}, sums(6, -7);
+  cpu::composite(3, 2, offsets.data(), w.data(), v.data(), sums.data());
+  EXPECT_EQ(sums, (std::vector<double>{5, 50, 0, 0, 9, 90}));
+  const std::vector<double> g{1, 2, 3, 4, 5, 6};
+  std::vector<double> gw(3), gv(6);
+  cpu::composite_backward(3, 2, offsets.data(), w.data(), v.data(), g.data(), gw.data(), gv.data());
+  EXPECT_EQ(gw, (std::vector<double>{21, 42, 195}));
+  EXPECT_EQ(gv, (std::vector<double>{1, 2, 2, 4, 15, 18}));
+}
+
+}  // namespace
+}  // namespace splitnerf

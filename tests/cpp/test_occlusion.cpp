@@ -1,0 +1,158 @@
+// Occlusion factors against closed forms of geometry and light.
+#include "splitnerf/occlusion.h"
+
+#include "check.h"
+#include "meshes.h"
+#include "splitnerf/environment.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf {
+namespace {
+
+constexpr int kHeight = 16, kWidth = 32;
+constexpr OcclusionOptions kFine{8192, 8192, 0.0125f, 1};
+
+template <class Light> std::vector<double> environment(Light light) {
+  std::vector<double> map;
+  for (int row = 0; row < kHeight; ++row)
+    for (int column = 0; column < kWidth; ++column)
+      for (int c = 0; c < 3; ++c)
+        map.push_back(light(equirect_to_direction(Vec2<double>{(column + 0.5) / kWidth, (row + 0.5) / kHeight}), c));
+  return map;
+}
+std::vector<double> constant(double value) {
+  return environment([=](Vec3<double>, int) { return value; });
+}
+
+struct Factors {
+  std::vector<double> d, s;
+};
+Factors factors(const Scene& scene, const std::vector<double>& positions, const std::vector<double>& normals,
+                const std::vector<double>& lobes, double roughness, const std::vector<double>& map,
+                OcclusionOptions options = kFine) {
+  const size_t n = positions.size() / 3;
+  Factors out{std::vector<double>(3 * n, -7), std::vector<double>(3 * n, -7)};
+  const std::vector<double> rho(n, roughness);
+  cpu::occlusion_factors(scene, options, int64_t(n), positions.data(), normals.data(), lobes.data(), rho.data(), kHeight,
+                         kWidth, map.data(), out.d.data(), out.s.data());
+  return out;
+}
+
+// Unit sphere with its centre at height `height` over the origin.
+TestMesh lifted_sphere(float height) {
+  TestMesh mesh = sphere_mesh(128, 256);
+  for (size_t i = 2; i < mesh.vertices.size(); i += 3) mesh.vertices[i] += height;
+  return mesh;
+}
+
+// The scene needs a tracer; a build without Embree leaves that to its host program.
+class Occlusion : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!*embree_version()) GTEST_SKIP() << "this build has no Embree";
+  }
+};
+
+TEST_F(Occlusion, ALoneConvexBodyIsOpenEverywhere) {
+  const TestMesh mesh = sphere_mesh(32, 64);
+  const Scene scene = make_scene(mesh);
+  const std::vector<double> points(mesh.vertices.begin(), mesh.vertices.end());
+  const auto map = environment([](Vec3<double> w, int c) { return 1 + w.z + c * square(w.x); });
+  for (const double roughness : {0.1, 0.5, 1.0}) {
+    const Factors o = factors(scene, points, points, points, roughness, map, {64, 64, 0.0125f, 7});
+    for (size_t i = 0; i < points.size(); ++i) {
+      ASSERT_EQ(o.d[i], 1) << i;
+      ASSERT_EQ(o.s[i], 1) << i;
+    }
+  }
+}
+
+// A sphere of half angle theta straight above hides sin^2 theta of the cosine-weighted hemisphere.
+TEST_F(Occlusion, UnderASphereIsClosedForm) {
+  for (const float height : {1.2f, 2.f, 5.f}) {
+    TestMesh mesh = lifted_sphere(height);
+    add_quad(mesh, {-50, -50, 0}, {100, 0, 0}, {0, 100, 0});
+    const Factors o = factors(make_scene(mesh), {0, 0, 0}, {0, 0, 1}, {0, 0, 1}, 1.0, constant(3));
+    const double expected = 1 - 1 / square(height - 0.0125);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(o.d[c], expected, 2e-3) << height;
+      EXPECT_NEAR(o.s[c], expected, 2e-3) << height;  // the lobe of roughness 1 about n is the cosine's
+    }
+  }
+}
+
+// A wall of height H at distance x hides (1 - x / sqrt(x^2 + H^2)) / 2 of a floor point's hemisphere.
+TEST_F(Occlusion, RightAngledCornerIsClosedForm) {
+  TestMesh mesh;
+  add_quad(mesh, {-10, -1000, 0}, {20, 0, 0}, {0, 2000, 0});   // floor z = 0
+  add_quad(mesh, {0, -1000, 0}, {0, 2000, 0}, {0, 0, 3});      // wall x = 0
+  const Scene scene = make_scene(mesh);
+  for (const double x : {0.1, 1., 4.}) {
+    const double height = 3 - 0.0125;
+    const Factors o = factors(scene, {x, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1));
+    EXPECT_NEAR(o.d[0], 1 - (1 - x / std::sqrt(x * x + height * height)) / 2, 2e-3) << x;
+  }
+  // In the corner of two infinite planes half of it is left.
+  TestMesh tall;
+  add_quad(tall, {0, -1000, -1000}, {0, 2000, 0}, {0, 0, 2000});
+  EXPECT_NEAR(factors(make_scene(tall), {0.01, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1)).d[0], 0.5, 2e-3);
+}
+
+TEST_F(Occlusion, BlackLightFallsBackToGeometry) {
+  const Scene scene = make_scene(lifted_sphere(2));
+  const Factors black = factors(scene, {0, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(0));
+  const Factors white = factors(scene, {0, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1));
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(black.d[c], white.d[c], 1e-9);
+    EXPECT_NEAR(black.s[c], white.s[c], 1e-9);
+  }
+}
+
+// Each channel weighs with its own light: one that only shines where the sphere stands is blocked.
+TEST_F(Occlusion, EachChannelWeighsWithItsOwnLight) {
+  const Scene scene = make_scene(lifted_sphere(1.2f));
+  const auto map = environment([](Vec3<double> w, int c) { return c == 0 ? w.z > 0.9 : c == 1 ? w.z < 0.2 : 0.; });
+  const Factors o = factors(scene, {0, 0, 0}, {0, 0, 1}, {0, 0, 1}, 1.0, map);
+  EXPECT_LT(o.d[0], 1e-3);
+  EXPECT_GT(o.d[1], 0.99);
+}
+
+TEST_F(Occlusion, NarrowLobesSeeWhatTheyPointAt) {
+  const Scene scene = make_scene(lifted_sphere(2));
+  const double s = std::sqrt(0.5);
+  const Factors o = factors(scene, {0, 0, 0, 0, 0, 0}, {0, 0, 1, 0, 0, 1}, {0, 0, 1, s, 0, s}, 0.1, constant(1));
+  EXPECT_LT(o.s[0], 1e-2);
+  EXPECT_GT(o.s[3], 0.98);
+  EXPECT_NEAR(o.d[0], o.d[3], 2e-3);
+}
+
+// Rays below the surface's horizon count in neither sum.
+TEST_F(Occlusion, TheSurfaceItselfIsNoOccluder) {
+  TestMesh mesh;
+  add_quad(mesh, {-50, -50, 0}, {100, 0, 0}, {0, 100, 0});
+  const double tilt = 0.2, c = std::sqrt(1 - tilt * tilt);
+  const Factors o = factors(make_scene(mesh), {0, 0, 0}, {0, 0, 1}, {c, 0, tilt}, 0.7, constant(1));
+  EXPECT_EQ(o.d[0], 1);
+  EXPECT_EQ(o.s[0], 1);
+}
+
+TEST_F(Occlusion, TheSeedDecidesTheRays) {
+  const Scene scene = make_scene(lifted_sphere(2));
+  const auto with_seed = [&](uint32_t seed) {
+    return factors(scene, {0.9, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1), {48, 48, 0.0125f, seed}).d[0];
+  };
+  EXPECT_EQ(with_seed(1), with_seed(1));
+  double mean = 0;
+  int different = 0;
+  for (uint32_t seed = 0; seed < 200; ++seed) mean += with_seed(seed) / 200, different += with_seed(seed) != with_seed(1);
+  EXPECT_GT(different, 50);
+  EXPECT_NEAR(mean, factors(scene, {0.9, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1), {1 << 16, 1, 0.0125f, 0}).d[0], 3e-3);
+}
+
+TEST_F(Occlusion, NoRayAboveTheHorizonLeavesThePointOpen) {
+  const Scene scene = make_scene(lifted_sphere(2));
+  EXPECT_EQ(factors(scene, {0, 0, 0}, {0, 0, 1}, {0, 0, -1}, 0.05, constant(1)).s[0], 1);
+}
+
+}  // namespace
+}  // namespace splitnerf

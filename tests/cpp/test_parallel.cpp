@@ -1,0 +1,54 @@
+// parallel_for: every index once, exceptions reach the caller, and the pool can be replaced.
+#include "splitnerf/parallel.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <vector>
+
+namespace splitnerf {
+namespace {
+
+TEST(Parallel, VisitsEveryIndexOnce) {
+  for (const int64_t n : {0, 1, 7, 64, 1000, 100003}) {
+    for (const int64_t grain : {0, 1, 64, 200000}) {
+      std::vector<std::atomic<int>> visits(n);
+      parallel_for(n, grain, [&](int64_t begin, int64_t end) {
+        ASSERT_TRUE(0 <= begin && begin < end && end <= n);
+        for (int64_t i = begin; i < end; ++i) ++visits[i];
+      });
+      for (int64_t i = 0; i < n; ++i) ASSERT_EQ(visits[i], 1) << i << " of " << n;
+    }
+  }
+}
+
+TEST(Parallel, ExceptionsReachTheCaller) {
+  const auto fail_at = [](int64_t bad) {
+    parallel_for(10000, 16, [=](int64_t begin, int64_t end) {
+      if (begin <= bad && bad < end) throw std::runtime_error("bad index");
+    });
+  };
+  EXPECT_THROW(fail_at(0), std::runtime_error);
+  EXPECT_THROW(fail_at(9999), std::runtime_error);
+  EXPECT_NO_THROW(fail_at(10000));
+}
+
+TEST(Parallel, BackendCanBeReplacedAndRestored) {
+  static int calls;
+  calls = 0;
+  set_parallel_backend([](int64_t n, int64_t, RangeBody body, void* context) {
+    ++calls;
+    body(0, n, context);
+  });
+  std::atomic<int64_t> total{0};
+  parallel_for(100, 1, [&](int64_t begin, int64_t end) { total += end - begin; });
+  set_parallel_backend(nullptr);
+  EXPECT_EQ(calls, 1);
+  parallel_for(100, 1, [&](int64_t begin, int64_t end) { total += end - begin; });
+  EXPECT_EQ(calls, 1);
+  EXPECT_EQ(total, 200);
+}
+
+}  // namespace
+}  // namespace splitnerf

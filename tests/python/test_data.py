@@ -1,0 +1,310 @@
+"""Datasets: both layouts, the shared frame, the truth maps, and one clear line per kind of bad input."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from splitnerf.data.dataset import dataset_fingerprint, load_dataset
+from splitnerf.data.images import linear_to_srgb, write_image
+from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths, read_mesh
+from splitnerf.errors import InputError
+
+SIZE = 48
+ANGLE = 0.7
+REAL = Path(os.environ.get("SPLITNERF_DATA", "../shared/data"))
+
+
+def look_at(position, target):
+    back = np.subtract(position, target) / np.linalg.norm(np.subtract(position, target))
+    right = np.cross([0, 0, 1], back)
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3] = np.stack([right, np.cross(back, right), back, position], axis=1)
+    return pose
+
+
+def sphere_alpha(pose, centre, radius, size=SIZE):
+    """Coverage of a sphere seen by a pinhole camera, straight from the quadratic."""
+    focal = 0.5 * size / np.tan(0.5 * ANGLE)
+    y, x = np.mgrid[:size, :size] + 0.5
+    rays = np.stack([(x - size / 2) / focal, -(y - size / 2) / focal, -np.ones_like(x)], axis=-1) @ pose[:3, :3].T
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    offset = pose[:3, 3] - centre
+    return ((rays @ offset) ** 2 > offset @ offset - radius**2).astype(np.float32)
+
+
+def poses_around(centre, radius, count):
+    golden = np.pi * (3 - np.sqrt(5))
+    heights = np.linspace(-0.6, 0.8, count)
+    directions = [[np.cos(golden * i) * np.sqrt(1 - z * z), np.sin(golden * i) * np.sqrt(1 - z * z), z] for i, z in enumerate(heights)]
+    return [look_at(centre + 4 * radius * np.array(d), centre) for d in directions]
+
+
+def make_blender(root, centre=(0, 0, 0), radius=1.0, train=12, test=3):
+    """A grey sphere in the NeRF-Blender layout."""
+    centre = np.array(centre, dtype=float)
+    poses = poses_around(centre, radius, train + test)
+    for split, chosen in (("train", poses[:train]), ("test", poses[train:])):
+        frames = []
+        for i, pose in enumerate(chosen):
+            image = np.full((SIZE, SIZE, 4), 0.5)
+            image[..., 3] = sphere_alpha(pose, centre, radius)
+            write_image(root / split / f"r_{i}.png", image)
+            frames.append({"file_path": f"./{split}/r_{i}", "transform_matrix": pose.tolist()})
+        meta = {"camera_angle_x": ANGLE, "frames": frames}
+        (root / f"transforms_{split}.json").write_text(json.dumps(meta))
+    return root
+
+
+def make_single(root, count=16):
+    """The same sphere as JPEGs with masks in one transforms.json, intrinsics given for twice the size."""
+    frames = []
+    for i, pose in enumerate(poses_around(np.zeros(3), 1.0, count)):
+        write_image(root / f"images/f{i}.jpg", np.full((SIZE, SIZE, 3), 0.5))
+        write_image(root / f"masks/f{i}.png", sphere_alpha(pose, np.zeros(3), 1.0))
+        frames.append({"file_path": f"images/f{i}.jpg", "mask_path": f"masks/f{i}.png", "transform_matrix": pose.tolist()})
+    focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
+    lens = {"fl_x": 2 * focal, "fl_y": 2 * focal, "cx": SIZE + 2, "cy": SIZE, "w": 2 * SIZE, "h": 2 * SIZE}
+    (root / "transforms.json").write_text(json.dumps(lens | {"frames": frames}))
+    return root
+
+
+@pytest.fixture
+def scene(tmp_path):
+    return make_blender(tmp_path / "ball")
+
+
+def edit(root, change, name="transforms_train.json"):
+    meta = json.loads((root / name).read_text())
+    change(meta)
+    (root / name).write_text(json.dumps(meta))
+
+
+def test_blender_layout(scene):
+    data = load_dataset(scene, "train")
+    assert (data.name, len(data), data.images.shape) == ("ball", 12, (12, SIZE, SIZE, 4))
+    assert data.images.dtype == data.poses.dtype == data.intrinsics.dtype == np.float32
+    assert data.frame_names[:2] == ["r_0", "r_1"]
+    focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
+    assert data.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
+    assert np.array_equal(data.box_from_world, np.eye(4))
+
+
+def test_single_file_layout_takes_every_eighth_frame_for_testing(tmp_path):
+    root = make_single(tmp_path)
+    train, test = load_dataset(root, "train"), load_dataset(root, "test", downscale=2)
+    assert test.frame_names == ["f0", "f8"]
+    assert len(train) == 14 and not set(train.frame_names) & {"f0", "f8"}
+    focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
+    assert train.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2 + 1, SIZE / 2])
+    assert test.intrinsics[0] == pytest.approx(train.intrinsics[0] / 2)
+    assert set(np.unique(train.images[..., 3])) == {0, 1}
+
+
+def test_downscale_divides_size_and_intrinsics(scene):
+    data = load_dataset(scene, "train", downscale=5)
+    assert data.images.shape[1:3] == (SIZE // 5, SIZE // 5)
+    assert data.intrinsics[0] * 5 == pytest.approx(load_dataset(scene, "train").intrinsics[0])
+
+
+def test_far_small_object_is_brought_into_the_box(tmp_path):
+    centre, radius = np.array([5.0, -3.0, 2.0]), 0.05
+    root = make_blender(tmp_path / "far", centre, radius)
+    data = load_dataset(root, "train")
+    inside = data.box_from_world[:3, :3] @ centre + data.box_from_world[:3, 3]
+    assert np.linalg.norm(inside) < 0.15
+    assert 0.8 < data.box_from_world[0, 0] * radius <= 1.05
+    assert data.transform_to_world(inside[None]) == pytest.approx(centre[None])
+    world = np.array(json.loads((root / "transforms_train.json").read_text())["frames"][3]["transform_matrix"])
+    assert data.poses[3, :3, :3] == pytest.approx(world[:3, :3], abs=1e-6)
+    assert data.transform_to_world(data.poses[3, :3, 3]) == pytest.approx(world[:3, 3], abs=1e-4)
+
+
+def test_splits_and_downscales_share_one_frame(tmp_path):
+    root = make_blender(tmp_path / "far", (5.0, -3.0, 2.0), 0.05)
+    frames = [load_dataset(root, split, factor).box_from_world for split in ("train", "test") for factor in (1, 3)]
+    assert all(np.array_equal(frame, frames[0]) for frame in frames)
+
+
+def test_fingerprint_tells_scenes_apart_and_not_folders(scene, tmp_path):
+    fingerprint = dataset_fingerprint(load_dataset(scene))
+    assert fingerprint == dataset_fingerprint(load_dataset(make_blender(tmp_path / "moved")))
+    assert fingerprint != dataset_fingerprint(load_dataset(make_blender(tmp_path / "other", radius=0.9)))
+
+
+def test_truth_maps(scene):
+    shape = (SIZE, SIZE)
+    data = load_dataset(scene, "test", downscale=2)
+    write_image(scene / "test/r_0_albedo.png", np.full((*shape, 4), [0.5, 0.25, 1, 1]))
+    write_image(scene / "test/r_0_orm.png", np.full((*shape, 4), [1, 0.2, 0.8, 1]))
+    coverage = np.ones((*shape, 1))
+    coverage[0] = 0
+    write_image(scene / "test/r_0_normal.exr", np.concatenate([np.full((*shape, 3), [0, 0.6, 0.8]), coverage], -1) * coverage)
+    write_image(scene / "light.hdr", np.ones((4, 8, 3)))
+    trimesh.creation.box().export(scene / "mesh.ply")
+    truth, empty = load_view_truths(data)[:2]
+    assert truth.albedo[5, 5] == pytest.approx([0.2158605, 0.0512695, 1], abs=1e-4)  # of the levels 128, 64, 255
+    assert (truth.roughness[5, 5], truth.metallic[5, 5]) == pytest.approx((0.2, 0.8))
+    assert truth.normal[5, 5] == pytest.approx([0, 0.6, 0.8])
+    assert truth.normal_mask[1:].all() and not truth.normal_mask[0].any()
+    assert truth.albedo.shape == (SIZE // 2, SIZE // 2, 3)
+    assert empty.albedo is empty.roughness is empty.metallic is empty.normal is empty.normal_mask is None
+    scene_truth = load_scene_truth(scene)
+    assert scene_truth.light.shape == (4, 8, 3) and len(scene_truth.mesh.faces) == 12
+    assert load_scene_truth(scene / "test").light is None and load_scene_truth(scene / "test").mesh is None
+
+
+def test_clipped_normals_are_restored_where_one_component_is_unknown():
+    normals = np.array([[0.6, -0.48, 0.64], [0.6, 0.48, 0.64], [-0.6, -0.48, 0.64]])
+    restored, known = decode_clipped_normals(linear_to_srgb(np.maximum(normals, 0)).astype(np.float32))
+    assert known.tolist() == [True, True, False]
+    assert restored[:2] == pytest.approx(normals[:2], abs=1e-5)
+    assert not restored[2].any()
+
+
+def test_truth_of_another_size_is_named(scene):
+    write_image(scene / "test/r_0_albedo.png", np.ones((8, 8, 4)))
+    with pytest.raises(InputError, match="r_0_albedo.png: is 8x8"):
+        load_view_truths(load_dataset(scene, "test"))
+
+
+def test_degenerate_mesh_is_named(tmp_path):
+    trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False).export(tmp_path / "flat.ply")
+    with pytest.raises(InputError, match="flat.ply: degenerate or empty mesh"):
+        read_mesh(tmp_path / "flat.ply")
+    (tmp_path / "text.ply").write_text("no mesh")
+    with pytest.raises(InputError, match="text.ply"):
+        read_mesh(tmp_path / "text.ply")
+
+
+def set_pose(index, value):
+    def change(meta):
+        pose = np.array(meta["frames"][index]["transform_matrix"])
+        meta["frames"][index]["transform_matrix"] = value(pose)
+
+    return change
+
+
+def nan_at_corner(pose):
+    pose[0, 3] = np.nan
+    return pose.tolist()
+
+
+BAD_JSON = {
+    "no frames key": (lambda m: m.pop("frames"), "transforms_train.json: missing key 'frames'"),
+    "no angle": (lambda m: m.pop("camera_angle_x"), "transforms_train.json: missing key 'camera_angle_x'"),
+    "bad angle": (lambda m: m.update(camera_angle_x="wide"), "'camera_angle_x' must be a positive number"),
+    "no file path": (lambda m: m["frames"][1].pop("file_path"), "missing key 'file_path' in frame 1"),
+    "no pose": (lambda m: m["frames"][1].pop("transform_matrix"), "missing key 'transform_matrix' in frame 1"),
+    "zero frames": (lambda m: m["frames"].clear(), "transforms_train.json: has no frames"),
+    "frames no list": (lambda m: m.update(frames={"a": 1}), "'frames' must be a list"),
+    "NaN pose": (set_pose(2, nan_at_corner), r"frame 2 \(r_2.png\) has NaN"),
+    "scaled pose": (set_pose(2, lambda p: (p * [[2], [2], [2], [1]]).tolist()), r"frame 2 \(r_2.png\) is not a rigid"),
+    "mirrored pose": (set_pose(2, lambda p: (p * [-1, 1, 1, 1]).tolist()), r"frame 2 \(r_2.png\) is not a rigid"),
+    "3x3 pose": (set_pose(2, lambda p: p[:3, :3].tolist()), r"frame 2 \(r_2.png\) is not a 4x4"),
+    "text pose": (set_pose(2, lambda p: "identity"), r"frame 2 \(r_2.png\) is not a 4x4"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_JSON)
+def test_bad_json_contents(scene, case):
+    change, message = BAD_JSON[case]
+    edit(scene, change)
+    with pytest.raises(InputError, match=message) as caught:
+        load_dataset(scene)
+    assert "\n" not in str(caught.value)
+
+
+def test_no_such_folder(tmp_path):
+    with pytest.raises(InputError, match="gone: no such folder"):
+        load_dataset(tmp_path / "gone")
+
+
+def test_folder_without_transforms(tmp_path):
+    with pytest.raises(InputError, match="has neither transforms_train.json nor transforms.json"):
+        load_dataset(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["{not json", "[1, 2]", "\xff\xfe"])
+def test_json_that_is_not_json(scene, text):
+    (scene / "transforms_train.json").write_bytes(text.encode("latin-1"))
+    with pytest.raises(InputError, match="transforms_train.json: (is not valid json|must hold a json object)"):
+        load_dataset(scene)
+
+
+def test_missing_image(scene):
+    (scene / "train/r_4.png").unlink()
+    with pytest.raises(InputError, match="r_4: no such image"):
+        load_dataset(scene)
+
+
+def test_truncated_image(scene):
+    path = scene / "train/r_4.png"
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(InputError, match="r_4.png: .*(truncated|cannot be read)"):
+        load_dataset(scene)
+
+
+def test_images_of_different_sizes(scene):
+    write_image(scene / "train/r_4.png", np.ones((SIZE, SIZE + 1, 4)))
+    with pytest.raises(InputError, match=f"r_4.png: is {SIZE + 1}x{SIZE}, but r_0.png is {SIZE}x{SIZE}"):
+        load_dataset(scene)
+
+
+def test_image_with_neither_alpha_nor_mask(scene):
+    write_image(scene / "train/r_4.png", np.ones((SIZE, SIZE, 3)))
+    with pytest.raises(InputError, match="r_4.png: has no alpha channel and its frame no mask_path"):
+        load_dataset(scene)
+
+
+def test_mask_of_another_size(tmp_path):
+    root = make_single(tmp_path)
+    write_image(root / "masks/f3.png", np.ones((SIZE, 8)))
+    with pytest.raises(InputError, match=f"f3.png: is 8x{SIZE}, its image f3.jpg is {SIZE}x{SIZE}"):
+        load_dataset(root)
+
+
+@pytest.mark.parametrize(("alpha", "reason"), [(0, "every mask is empty"), (1, "every mask is full")])
+def test_masks_without_an_object(scene, alpha, reason):
+    for path in (scene / "train").iterdir():
+        write_image(path, np.full((SIZE, SIZE, 4), float(alpha)))
+    with pytest.raises(InputError, match=f"train: {reason}"):
+        load_dataset(scene)
+
+
+def test_masks_that_contradict_the_poses(scene):
+    for i, path in enumerate(sorted((scene / "train").iterdir())):
+        image = np.zeros((SIZE, SIZE, 4))
+        image[:2 + i, -2:, 3] = 1
+        write_image(path, image)
+    with pytest.raises(InputError, match="masks and poses contradict each other"):
+        load_dataset(scene)
+
+
+@pytest.mark.parametrize(("factor", "message"), [(0, "at least 1"), (-2, "at least 1"), (1.5, "whole number"), (SIZE + 1, "too small for downscale")])
+def test_bad_downscale(scene, factor, message):
+    with pytest.raises(InputError, match=message):
+        load_dataset(scene, downscale=factor)
+
+
+def test_unknown_split(scene):
+    with pytest.raises(InputError, match="no split 'val'"):
+        load_dataset(scene, "val")
+
+
+@pytest.mark.parametrize("name", ["nerf_synthetic_400/chair", "scenes/boombox", "real/moldGoldCape"])
+def test_real_scenes_fit_the_box_as_they_are(name):
+    if not (REAL / name).is_dir():
+        pytest.skip(f"{REAL / name} is absent; set SPLITNERF_DATA to the folder of real inputs")
+    data = load_dataset(REAL / name, "test", downscale=4)
+    assert np.array_equal(data.box_from_world, np.eye(4))
+    for view, truth, pose in zip(data.images, load_view_truths(data), data.poses):
+        if truth.normal is not None:
+            seen = truth.normal_mask & (view[..., 3] > 0.99)
+            assert (truth.normal[seen] @ pose[:3, 2] > -0.1).mean() > 0.98

@@ -1,0 +1,108 @@
+"""Image files: what is read is what was written, averages are in linear light, damage is named."""
+
+from __future__ import annotations
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from splitnerf.data import images
+from splitnerf.errors import InputError
+
+
+def write_raw_float(path, pixels):
+    """Writes floats as they are, unlike write_image without looking at them."""
+    height, width, channels = pixels.shape
+    sink = oiio.ImageOutput.create(str(path))
+    sink.open(str(path), oiio.ImageSpec(width, height, channels, oiio.FLOAT))
+    sink.write_image(pixels.astype(np.float32))
+    sink.close()
+
+
+def test_straight_alpha_survives_a_png_exactly(tmp_path):
+    levels = np.random.default_rng(0).integers(0, 256, (7, 9, 4))
+    levels[0, :, 3] = 0
+    levels[1, :, 3] = 1
+    images.write_image(tmp_path / "a.png", levels / 255)
+    assert np.array_equal(images.to_uint8(images.read_image(tmp_path / "a.png")), levels)
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_png_without_alpha_round_trip(tmp_path, channels):
+    levels = np.arange(12 * channels).reshape(3, 4, channels)
+    images.write_image(tmp_path / "a.png", levels / 255)
+    assert np.array_equal(images.to_uint8(images.read_image(tmp_path / "a.png")), levels)
+
+
+def test_exr_is_exact_and_hdr_within_its_mantissa(tmp_path):
+    radiance = np.exp(np.random.default_rng(1).normal(0, 2, (8, 16, 3))).astype(np.float32)
+    images.write_image(tmp_path / "a.exr", radiance)
+    assert np.array_equal(images.read_hdr(tmp_path / "a.exr"), radiance)
+    images.write_image(tmp_path / "a.hdr", radiance)
+    error = np.abs(images.read_hdr(tmp_path / "a.hdr") - radiance)
+    assert (error <= radiance.max(axis=-1, keepdims=True) / 128).all()
+
+
+def test_srgb_curve_values_and_inverse():
+    # IEC 61966-2-1: 0.5 -> 0.21404, and 0.04045 / 12.92 at the joint.
+    assert images.srgb_to_linear(np.array([0, 0.04045, 0.5, 1.0])) == pytest.approx([0, 0.0031308, 0.2140411, 1], abs=1e-6)
+    values = np.linspace(0, 1, 1001)
+    assert images.linear_to_srgb(images.srgb_to_linear(values)) == pytest.approx(values, abs=1e-6)
+
+
+def test_downscale_averages_premultiplied_linear_light():
+    # One opaque white, one opaque black pixel above two transparent red ones: linear 0.5 at coverage 0.5.
+    rgba = np.array([[[1, 1, 1, 1], [0, 0, 0, 1]], [[1, 0, 0, 0], [1, 0, 0, 0]]], dtype=np.float32)
+    result = images.downscale_rgba(rgba, 2)
+    assert result.shape == (1, 1, 4)
+    assert result[0, 0] == pytest.approx([0.7353570] * 3 + [0.5], abs=1e-5)
+
+
+def test_downscale_crops_what_fills_no_block():
+    assert images.downscale_rgba(np.ones((7, 5, 4), np.float32), 2).shape == (3, 2, 4)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".exr", ".hdr"])
+def test_truncated_file_is_named(tmp_path, suffix):
+    path = tmp_path / f"cut{suffix}"
+    images.write_image(path, np.random.default_rng(2).random((64, 64, 3)).astype(np.float32))
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(InputError, match=f"cut{suffix}: .*(truncated|cannot be read)"):
+        images.read_image(path)
+
+
+def test_missing_and_foreign_files_are_named(tmp_path):
+    with pytest.raises(InputError, match="gone.png: no such image"):
+        images.read_image(tmp_path / "gone.png")
+    (tmp_path / "text.png").write_text("no image")
+    with pytest.raises(InputError, match="text.png: cannot be read"):
+        images.read_image(tmp_path / "text.png")
+
+
+@pytest.mark.parametrize(("value", "reason"), [(np.nan, "NaN"), (np.inf, "infinite"), (-1.0, "negative")])
+def test_bad_radiance_is_named(tmp_path, value, reason):
+    pixels = np.ones((4, 8, 3), np.float32)
+    pixels[1, 2, 0] = value
+    write_raw_float(tmp_path / "bad.exr", pixels)
+    with pytest.raises(InputError, match=f"bad.exr: has .*{reason}"):
+        images.read_hdr(tmp_path / "bad.exr")
+
+
+def test_failed_write_keeps_the_old_file_and_leaves_nothing_behind(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    with pytest.raises(OSError, match="disk full"), images.atomic_path(path) as temporary:
+        temporary.write_text("half")
+        raise OSError("disk full")
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_write_rejects_what_it_cannot_store(tmp_path):
+    with pytest.raises(ValueError, match="unknown image format"):
+        images.write_image(tmp_path / "a.bmp", np.ones((2, 2, 3)))
+    with pytest.raises(ValueError, match="finite"):
+        images.write_image(tmp_path / "a.png", np.full((2, 2, 3), np.nan))
+    with pytest.raises(ValueError, match=r"\[H, W"):
+        images.write_image(tmp_path / "a.png", np.ones((2, 2, 5)))
+    assert not list(tmp_path.iterdir())

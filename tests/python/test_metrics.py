@@ -1,0 +1,178 @@
+"""Metrics against values worked out by hand, and the protocol's dictionary."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.truth import ViewTruth
+from splitnerf.evaluate import metrics
+from splitnerf.evaluate.protocol import evaluate_maps
+
+
+def test_psnr():
+    # An error of 0.1 everywhere: MSE 0.01, 20 dB.
+    assert metrics.psnr(np.full((4, 4, 3), 0.6), np.full((4, 4, 3), 0.5)) == pytest.approx(20)
+    assert metrics.psnr(np.ones(3), np.ones(3)) == 100
+
+
+def test_ssim_of_constants_is_the_luminance_term():
+    # No variance: (2 x y + c1) / (x^2 + y^2 + c1), with x = 0.2 and y = 0.8.
+    value = metrics.ssim(np.full((16, 16, 3), 0.2), np.full((16, 16, 3), 0.8))
+    assert value == pytest.approx((0.32 + 1e-4) / (0.68 + 1e-4))
+
+
+def test_ssim_agrees_with_scikit_image():
+    structural_similarity = pytest.importorskip("skimage.metrics").structural_similarity
+    rng = np.random.default_rng(0)
+    x = rng.random((40, 30, 3))
+    y = np.clip(x + rng.normal(0, 0.1, x.shape), 0, 1)
+    options = {"channel_axis": -1, "gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False, "data_range": 1}
+    assert metrics.ssim(x, y) == pytest.approx(structural_similarity(x, y, **options), abs=1e-9)
+
+
+def test_ssim_of_images_smaller_than_the_window():
+    assert metrics.ssim(np.full((6, 6, 1), 0.3), np.full((6, 6, 1), 0.3)) == pytest.approx(1)
+
+
+def test_scales():
+    x = np.array([[1.0, 0], [2, 0], [3, 0]])
+    y = np.array([[2.0, 1], [4, 1], [9, 1]])
+    # sum xy / sum xx = (2 + 8 + 27) / 14; a black channel keeps 1.
+    assert metrics.lsq_scale(x, y) == pytest.approx([37 / 14, 1])
+    assert metrics.lsq_scale(x, y, np.array([1.0, 0, 0])) == pytest.approx([2, 1])
+    assert metrics.median_scale(x[:, :1], y[:, :1]) == pytest.approx([2])
+    assert metrics.median_scale(np.empty((0, 3)), np.empty((0, 3))) == pytest.approx([1, 1, 1])
+
+
+def test_normal_error():
+    truth = np.array([[0.0, 0, 1], [0, 0, 1], [0, 0, 1]])
+    normals = np.array([[0.0, 0, 1], [0, 1, 0], [0, 0, -1]])
+    assert metrics.normal_mae_deg(normals, truth) == pytest.approx((0 + 90 + 180) / 3)
+
+
+def test_balanced_accuracy():
+    truth = np.array([1, 0, 0, 0, 0])
+    # Recall 1 of metal, 3/4 of the rest; plain accuracy would be 4/5.
+    assert metrics.balanced_accuracy(np.array([0.9, 0.9, 0.1, 0.1, 0.1]), truth) == pytest.approx(0.875)
+    assert metrics.balanced_accuracy(np.array([0.1, 0.9]), np.array([0, 0])) == pytest.approx(0.5)
+
+
+def test_solid_angle_weights():
+    # Two rows, hemispheres of equal size; four rows: (1 - cos 45) / 2 at the poles.
+    assert metrics.solid_angle_weights(2) == pytest.approx([0.5, 0.5])
+    assert metrics.solid_angle_weights(4)[0] == pytest.approx((1 - np.sqrt(0.5)) / 2)
+
+
+def test_light_psnr_ignores_a_scale_per_channel_and_resolution():
+    light = np.exp(np.random.default_rng(0).normal(0, 1, (128, 256, 3))).astype(np.float32)
+    assert metrics.light_psnr(light * [0.5, 2, 7], light) == pytest.approx(100)
+    assert metrics.light_psnr(np.repeat(np.repeat(light, 2, 0), 2, 1), light) == pytest.approx(100)
+
+
+def test_light_psnr_weighs_rows_by_solid_angle():
+    # Truth 1 everywhere but 0 in the topmost eighth; a flat prediction. With w = (1 - cos(pi / 8)) / 2 the scale is
+    # 1 - w, the errors w and 1 - w: MSE = (1 - w) w^2 + w (1 - w)^2 = w (1 - w).
+    truth = np.ones((128, 256, 3))
+    truth[:16] = 0
+    w = (1 - np.cos(np.pi / 8)) / 2
+    assert metrics.light_psnr(np.ones((128, 256, 3)), truth) == pytest.approx(-10 * np.log10(w * (1 - w)), abs=1e-6)
+
+
+def test_resize_environment_wraps_around_and_keeps_constants():
+    image = np.zeros((2, 4, 1), np.float32)
+    image[:, 0] = 1
+    wide = metrics.resize_environment(image, 2, 8)[0, :, 0]
+    assert wide == pytest.approx([0.75, 0.75, 0.25, 0, 0, 0, 0, 0.25])
+    assert metrics.resize_environment(np.ones((5, 7, 3)), 4, 9) == pytest.approx(np.ones((4, 9, 3)))
+
+
+def test_mesh_distances():
+    square = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    near, far = square.copy(), square.copy()
+    near.apply_translation([0, 0, 0.005])
+    far.apply_translation([0, 0, 0.5])
+    chamfer, f_score = metrics.mesh_distances(near, square)
+    assert chamfer == pytest.approx(0.005, rel=0.1) and f_score == 1
+    chamfer, f_score = metrics.mesh_distances(far, square)
+    assert chamfer == pytest.approx(0.5, rel=0.01) and f_score == 0
+    assert metrics.mesh_distances(far, square) == (chamfer, f_score)
+
+
+def make_inputs():
+    shape = (16, 16)
+    rng = np.random.default_rng(0)
+    images = np.concatenate([rng.random((2, *shape, 3)), np.ones((2, *shape, 1))], -1).astype(np.float32)
+    images[:, :4, :, 3] = 0
+    normals = np.broadcast_to(np.array([0, 0, 1], np.float32), (*shape, 3))
+    truths, predictions = [], []
+    for image in images:
+        mask = image[..., 3] > 0.9
+        metallic = (np.arange(16) % 2 * np.ones(shape)).astype(np.float32)
+        maps = {"albedo": 0.2 + 0.5 * image[..., :3], "roughness": np.full(shape, 0.5), "metallic": metallic}
+        truths.append(ViewTruth("r", **maps, normal=normals, normal_mask=mask))
+        predictions.append({"rgb": image[..., :3], "alpha": image[..., 3], "normal": normals} | maps)
+    eye = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
+    lens = np.ones((2, 4), np.float32)
+    data = Dataset("toy", None, "test", 1, images, eye, lens, ["a", "b"], [], np.eye(4))
+    return predictions, data, truths
+
+
+KEYS = [
+    "novel_view", "albedo", "relight", "normal_mae_deg", "roughness_mae", "metallic_balanced_accuracy",
+    "light_psnr", "chamfer", "f_score", "seconds",
+]  # fmt: skip
+
+
+def test_protocol_scores_the_truth_as_perfect():
+    predictions, data, truths = make_inputs()
+    light, box = np.ones((8, 16, 3)), trimesh.creation.box()
+    result = evaluate_maps(predictions, data, truths, light, light, box, box, seconds=3.0)
+    assert list(result) == KEYS
+    assert result["novel_view"] == {"psnr": 100, "ssim": pytest.approx(1), "lpips": None}
+    assert result["albedo"]["psnr"] == result["albedo"]["raw"]["psnr"] == 100
+    errors = [result[k] for k in ("normal_mae_deg", "roughness_mae", "chamfer")]
+    assert errors == [0, 0, 0]
+    assert (result["metallic_balanced_accuracy"], result["f_score"], result["light_psnr"]) == (1, 1, 100)
+    json.dumps(result, allow_nan=False)
+
+
+def test_protocol_frees_one_scale_of_albedo():
+    predictions, data, truths = make_inputs()
+    for prediction in predictions:
+        prediction["albedo"] = prediction["albedo"] * np.array([0.5, 0.8, 1.25])
+    albedo = evaluate_maps(predictions, data, truths)["albedo"]
+    assert albedo["raw"]["psnr"] < 30
+    assert albedo["lsq"]["scale"] == pytest.approx([2, 1.25, 0.8], rel=1e-6)
+    assert albedo["median"]["scale"] == pytest.approx([2, 1.25, 0.8], rel=1e-6)
+    assert albedo["psnr"] == albedo["lsq"]["psnr"] > 99
+
+
+def test_protocol_composites_on_white_and_ignores_hidden_colour():
+    predictions, data, truths = make_inputs()
+    for prediction in predictions:
+        prediction["rgb"] = np.where(prediction["alpha"][..., None] > 0, prediction["rgb"], 0)
+    assert evaluate_maps(predictions, data, truths)["novel_view"]["psnr"] == 100
+    # A quarter of the pixels is background; a prediction opaque black there errs by 1: MSE 1/4.
+    for prediction in predictions:
+        prediction["alpha"] = np.ones((16, 16), np.float32)
+    assert evaluate_maps(predictions, data, truths)["novel_view"]["psnr"] == pytest.approx(-10 * np.log10(0.25))
+
+
+def test_protocol_is_null_without_truth():
+    predictions, data, _ = make_inputs()
+    result = evaluate_maps(predictions, data, [ViewTruth("a"), ViewTruth("b")], light=np.ones((8, 16, 3)))
+    assert [key for key in KEYS if result[key] is not None] == ["novel_view"]
+
+
+def test_protocol_rejects_numbers_and_sizes_that_differ():
+    predictions, data, truths = make_inputs()
+    with pytest.raises(ValueError, match="1 predictions for 2 images"):
+        evaluate_maps(predictions[:1], data, truths)
+    predictions[0]["rgb"] = predictions[0]["rgb"][:8]
+    with pytest.raises(ValueError, match="prediction is"):
+        evaluate_maps(predictions, data, truths)

@@ -1,0 +1,245 @@
+"""Training as a user runs it: files, exit codes, resume, interruption, a full disk."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from splitnerf.checkpoint import load_checkpoint
+from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
+from splitnerf.config import Config, parse_setting, preset
+from splitnerf.demo.scene import write_demo_dataset
+from splitnerf.errors import InputError
+
+SMALL = [
+    "--set", "n_levels=4", "--set", "log2_table_size=10", "--set", "target_samples=512", "--set", "initial_rays=64",
+    "--set", "grid_resolution=16", "--set", "light_samples=64", "--set", "light_queries=16", "--set", "eikonal_points=32",
+    "--set", "mesh_resolution=24", "--set", "export_resolution=32", "--set", "export_environment_height=16",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def data(tmp_path_factory) -> Path:
+    """A dataset small enough that a step takes milliseconds."""
+    return write_demo_dataset(tmp_path_factory.mktemp("data") / "tiny", size=24, n_train=6, n_test=2, spp=4)
+
+
+@pytest.fixture(scope="session")
+def other_data(tmp_path_factory) -> Path:
+    return write_demo_dataset(tmp_path_factory.mktemp("data") / "other", size=24, n_train=5, n_test=2, spp=4)
+
+
+def train(data: Path, run: Path, *options: str) -> int:
+    return main(["train", str(data), "--out", str(run), *SMALL, *options])
+
+
+def test_a_run_holds_every_file(data, tmp_path, capsys):
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "25") == DONE
+    for name in ("config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr",
+                 "environment.hdr", "evaluation.json", "report.html"):  # fmt: skip
+        assert (run / name).stat().st_size > 0, name
+    assert list((run / "previews").glob("step_*.png"))
+    evaluation = json.loads((run / "evaluation.json").read_text())
+    assert {"novel_view", "albedo", "relight", "normal_mae_deg", "roughness_mae", "metallic_balanced_accuracy",
+            "light_psnr", "chamfer", "f_score", "seconds"} <= set(evaluation)  # fmt: skip
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    assert lines[-1]["step"] == 25 and all(np.isfinite(line["loss"]) for line in lines)
+    assert "PSNR" in capsys.readouterr().out
+
+
+def test_the_error_falls(data, tmp_path):
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "120") == DONE
+    psnr = [json.loads(line)["psnr"] for line in (run / "metrics.jsonl").read_text().splitlines()]
+    assert psnr[-1] > psnr[0] + 2.0
+
+
+def test_one_seed_gives_one_result(data, tmp_path):
+    states = []
+    for name in "ab":
+        assert train(data, tmp_path / name, "--steps", "12", "--seed", "3") == DONE
+        states.append(load_checkpoint(tmp_path / name / "checkpoint.pt")["model"])
+    for key, value in states[0].items():
+        assert torch.equal(value, states[1][key]), key
+
+
+def test_resume_goes_on_where_the_run_stopped(data, tmp_path):
+    """Interrupted and resumed, the steps that follow are those of a run that was never interrupted."""
+    from splitnerf.data.dataset import load_dataset
+    from splitnerf.train import train as train_scene
+
+    dataset = load_dataset(data)
+    config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {"steps": 14, "grid_every": 1000})
+    for name in ("whole", "halves"):
+        (tmp_path / name).mkdir()
+    whole = train_scene(dataset, config, tmp_path / "whole")
+
+    with pytest.raises(KeyboardInterrupt):
+        _stop_after(7, lambda: train_scene(dataset, config, tmp_path / "halves"))
+    assert load_checkpoint(tmp_path / "halves" / "checkpoint.pt")["step"] == 7
+    halves = train_scene(dataset, config, tmp_path / "halves", resume=True)
+    assert halves.step == whole.step == 14
+    for (name, a), b in zip(whole.model.state_dict().items(), halves.model.state_dict().values()):
+        torch.testing.assert_close(a, b, rtol=2e-2, atol=2e-3, msg=name)
+
+
+def _stop_after(steps: int, run) -> None:
+    """Sends SIGINT to this process when the given step begins; raises KeyboardInterrupt once training returned."""
+    from splitnerf import train as module
+
+    original, count = module.set_learning_rate, 0
+
+    def counting(*args):
+        nonlocal count
+        count += 1
+        if count == steps:
+            os.kill(os.getpid(), signal.SIGINT)
+        return original(*args)
+
+    module.set_learning_rate = counting
+    try:
+        result = run()
+    finally:
+        module.set_learning_rate = original
+    assert not result.finished
+    raise KeyboardInterrupt
+
+
+def test_ctrl_c_saves_and_exits_with_130(data, tmp_path):
+    run = tmp_path / "run"
+    command = [sys.executable, "-m", "splitnerf.train", str(data), "--out", str(run), *SMALL, "--steps", "100000"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 120
+    while not ((run / "metrics.jsonl").exists() and (run / "metrics.jsonl").stat().st_size):
+        assert process.poll() is None and time.monotonic() < deadline, process.communicate()
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == INTERRUPTED, err
+    assert "--resume" in out
+    step = load_checkpoint(run / "checkpoint.pt")["step"]
+    assert step > 0
+    assert main(["train", str(data), "--out", str(run), "--resume", "--steps", str(step + 5)]) == DONE
+
+
+def test_a_full_disk_keeps_the_last_checkpoint(data, tmp_path):
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "5") == DONE
+    before = (run / "checkpoint.pt").read_bytes()
+    limited = (
+        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000));"
+        "from splitnerf.cli import main; sys.exit(main(sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", limited, "train", str(data), "--out", str(run), "--resume", "--steps", "10"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert result.returncode == FAILED, result.stderr
+    assert "checkpoint" in result.stderr.splitlines()[-1]
+    assert (run / "checkpoint.pt").read_bytes() == before
+    assert not list(run.glob(".checkpoint*"))
+
+
+def test_an_existing_run_is_not_written_over(data, tmp_path, capsys):
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "2") == DONE
+    before = (run / "checkpoint.pt").read_bytes()
+    assert train(data, run, "--steps", "2") == BAD_INPUT
+    assert "--overwrite" in capsys.readouterr().err
+    assert (run / "checkpoint.pt").read_bytes() == before
+    assert train(data, run, "--steps", "3", "--overwrite") == DONE
+    assert load_checkpoint(run / "checkpoint.pt")["step"] == 3
+
+
+def test_resume_from_another_scene_is_refused(data, other_data, tmp_path, capsys):
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "2") == DONE
+    assert main(["train", str(other_data), "--out", str(run), "--resume", "--steps", "4"]) == BAD_INPUT
+    assert "other images" in capsys.readouterr().err
+
+
+def test_bad_data_writes_nothing(tmp_path, capsys):
+    run = tmp_path / "run"
+    assert main(["train", str(tmp_path / "nowhere"), "--out", str(run)]) == BAD_INPUT
+    error = capsys.readouterr().err
+    assert "nowhere" in error and len(error.splitlines()) == 1
+    assert not run.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["--set", "no_such_key=1"], "no_such_key"),
+        (["--set", "n_levels=many"], "n_levels"),
+        (["--set", "n_levels"], "key=value"),
+        (["--set", "query=sideways"], "query"),
+        (["--steps", "0"], "steps"),
+        (["--resume", "--overwrite"], "exclude"),
+        (["--resume"], "no checkpoint"),
+        (["--max-minutes", "-1"], "max-minutes"),
+    ],
+)
+def test_bad_options_exit_with_2(data, tmp_path, capsys, options, word):
+    assert main(["train", str(data), "--out", str(tmp_path / "run"), *options]) == BAD_INPUT
+    assert word in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_checkpoint_cannot_run_code(data, tmp_path, capsys):
+    class Payload:
+        def __reduce__(self):
+            return os.system, ("touch " + str(tmp_path / "owned"),)
+
+    run = tmp_path / "run"
+    run.mkdir()
+    torch.save({"format": 1, "model": Payload()}, run / "checkpoint.pt")
+    assert main(["train", str(data), "--out", str(run), "--resume"]) == BAD_INPUT
+    assert "checkpoint.pt" in capsys.readouterr().err
+    assert not (tmp_path / "owned").exists()
+
+
+def test_a_learning_rate_that_diverges_says_so(data, tmp_path, capsys):
+    run = tmp_path / "run"
+    code = train(data, run, "--steps", "60", "--set", "learning_rate=1e6", "--set", "warmup_steps=1")
+    if code == FAILED:
+        error = capsys.readouterr().err
+        assert "not finite" in error or "empty" in error
+    else:
+        assert code == DONE
+
+
+def test_evaluate_repeats_the_result_of_training(data, tmp_path):
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "25") == DONE
+    first = json.loads((run / "evaluation.json").read_text())
+    assert main(["evaluate", str(run), "--data", str(data)]) == DONE
+    again = json.loads((run / "evaluation.json").read_text())
+    assert again["novel_view"]["psnr"] == pytest.approx(first["novel_view"]["psnr"], abs=0.05)
+
+
+def test_the_paper_preset_takes_steps(data, tmp_path):
+    """The published widths and levels, with few samples: every one of its switches runs."""
+    run = tmp_path / "run"
+    options = ["--set", "target_samples=2048", "--set", "initial_rays=32", "--set", "light_samples=128", "--set",
+               "light_queries=64", "--set", "mesh_resolution=32", "--set", "export_resolution=32", "--set",
+               "grid_resolution=32", "--set", "log2_table_size=14", "--set", "mesh_every=0.3"]  # fmt: skip
+    assert main(["train", str(data), "--out", str(run), "--preset", "paper", "--steps", "6", *options]) == DONE
+    assert Config.read(run / "config.toml").fresnel_mode == "paper"
+
+
+def test_a_config_survives_its_file(tmp_path):
+    config = preset("paper").replace({"seed": 5})
+    config.write(tmp_path / "config.toml")
+    assert Config.read(tmp_path / "config.toml") == config
+    (tmp_path / "config.toml").write_text("steps = [")
+    with pytest.raises(InputError, match="config.toml"):
+        Config.read(tmp_path / "config.toml")
