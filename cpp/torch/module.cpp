@@ -18,11 +18,14 @@ PYBIND11_MODULE(_core, m) {
 
   m.def(
       "hash_grid_levels",
-      [](int n_levels, int n_features, int base_resolution, double growth, int log2_table_size) {
-        if (n_levels < 1 || n_levels > splitnerf::kMaxLevels)
-          throw py::value_error("hash_grid_levels: n_levels must be in [1, 32], got " + std::to_string(n_levels));
+      [](int64_t n_levels, int64_t n_features, int64_t base_resolution, double growth, int64_t log2_table_size) {
+        const std::string error =
+            splitnerf::hash_shape_error(n_levels, n_features, base_resolution, growth, log2_table_size);
+        if (!error.empty()) throw py::value_error("hash_grid_levels: " + error);
+        const splitnerf::HashGridShape shape{static_cast<int>(n_levels), static_cast<int>(n_features),
+                                             static_cast<int>(base_resolution), growth, static_cast<int>(log2_table_size)};
         std::array<splitnerf::HashLevel, splitnerf::kMaxLevels> levels;
-        splitnerf::hash_levels({n_levels, n_features, base_resolution, growth, log2_table_size}, levels.data());
+        splitnerf::hash_levels(shape, levels.data());
         py::list out;
         for (int l = 0; l < n_levels; ++l)
           out.append(py::make_tuple(levels[l].resolution, levels[l].offset, levels[l].n_entries, levels[l].dense));

@@ -10,17 +10,10 @@ namespace {
 
 HashGridShape checked_shape(const char* op, int64_t n_levels, int64_t base_resolution, double growth,
                             int64_t log2_table_size, int64_t n_features, int64_t n_active) {
-  require(n_levels >= 1 && n_levels <= kMaxLevels, op, "n_levels must be in [1, 32], got " + std::to_string(n_levels));
-  require(base_resolution >= 1, op, "base_resolution must be at least 1, got " + std::to_string(base_resolution));
-  require(growth >= 1.0, op, "growth must be at least 1, got " + std::to_string(growth));
-  require(log2_table_size >= 1 && log2_table_size <= 30, op,
-          "log2_table_size must be in [1, 30], got " + std::to_string(log2_table_size));
-  require(n_features == 1 || n_features == 2 || n_features == 4 || n_features == 8, op,
-          "the table must have 1, 2, 4 or 8 features an entry, got " + std::to_string(n_features));
+  const std::string error = hash_shape_error(n_levels, n_features, base_resolution, growth, log2_table_size);
+  require(error.empty(), op, error);
   require(n_active >= 0 && n_active <= n_levels, op,
           "n_active must be in [0, n_levels], got " + std::to_string(n_active));
-  const double finest = base_resolution * std::pow(growth, double(n_levels - 1));
-  require(finest < double(1 << 30), op, "the finest level would have " + std::to_string(finest) + " cells along an edge");
   return {static_cast<int>(n_levels), static_cast<int>(n_features), static_cast<int>(base_resolution), growth,
           static_cast<int>(log2_table_size)};
 }

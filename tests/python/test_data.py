@@ -42,18 +42,19 @@ def sphere_alpha(pose, centre, radius, size=SIZE):
 def poses_around(centre, radius, count):
     golden = np.pi * (3 - np.sqrt(5))
     heights = np.linspace(-0.6, 0.8, count)
-    directions = [[np.cos(golden * i) * np.sqrt(1 - z * z), np.sin(golden * i) * np.sqrt(1 - z * z), z] for i, z in enumerate(heights)]
-    return [look_at(centre + 4 * radius * np.array(d), centre) for d in directions]
+    angles, rings = golden * np.arange(count), np.sqrt(1 - heights**2)
+    directions = np.stack([np.cos(angles) * rings, np.sin(angles) * rings, heights], axis=1)
+    return [look_at(centre + 4 * radius * direction, centre) for direction in directions]
 
 
-def make_blender(root, centre=(0, 0, 0), radius=1.0, train=12, test=3):
-    """A grey sphere in the NeRF-Blender layout."""
+def make_blender(root, centre=(0, 0, 0), radius=1.0, train=12, test=3, aim=None, grey=0.5):
+    """A grey sphere in the NeRF-Blender layout; the cameras look at `aim`, by default its centre."""
     centre = np.array(centre, dtype=float)
-    poses = poses_around(centre, radius, train + test)
+    poses = poses_around(centre if aim is None else np.array(aim, dtype=float), radius, train + test)
     for split, chosen in (("train", poses[:train]), ("test", poses[train:])):
         frames = []
         for i, pose in enumerate(chosen):
-            image = np.full((SIZE, SIZE, 4), 0.5)
+            image = np.full((SIZE, SIZE, 4), grey)
             image[..., 3] = sphere_alpha(pose, centre, radius)
             write_image(root / split / f"r_{i}.png", image)
             frames.append({"file_path": f"./{split}/r_{i}", "transform_matrix": pose.tolist()})
@@ -68,7 +69,8 @@ def make_single(root, count=16):
     for i, pose in enumerate(poses_around(np.zeros(3), 1.0, count)):
         write_image(root / f"images/f{i}.jpg", np.full((SIZE, SIZE, 3), 0.5))
         write_image(root / f"masks/f{i}.png", sphere_alpha(pose, np.zeros(3), 1.0))
-        frames.append({"file_path": f"images/f{i}.jpg", "mask_path": f"masks/f{i}.png", "transform_matrix": pose.tolist()})
+        files = {"file_path": f"images/f{i}.jpg", "mask_path": f"masks/f{i}.png"}
+        frames.append(files | {"transform_matrix": pose.tolist()})
     focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
     lens = {"fl_x": 2 * focal, "fl_y": 2 * focal, "cx": SIZE + 2, "cy": SIZE, "w": 2 * SIZE, "h": 2 * SIZE}
     (root / "transforms.json").write_text(json.dumps(lens | {"frames": frames}))
@@ -126,6 +128,14 @@ def test_far_small_object_is_brought_into_the_box(tmp_path):
     assert data.transform_to_world(data.poses[3, :3, 3]) == pytest.approx(world[:3, 3], abs=1e-4)
 
 
+def test_object_beside_the_optical_axes_is_found(tmp_path):
+    centre, radius = np.array([2.0, 0.0, 1.0]), 0.5
+    data = load_dataset(make_blender(tmp_path / "aside", centre, radius, aim=centre + [0.2, -0.1, 0.3]))
+    inside = data.box_from_world[:3, :3] @ centre + data.box_from_world[:3, 3]
+    assert np.linalg.norm(inside) < 0.15
+    assert 0.8 < data.box_from_world[0, 0] * radius <= 1.05
+
+
 def test_splits_and_downscales_share_one_frame(tmp_path):
     root = make_blender(tmp_path / "far", (5.0, -3.0, 2.0), 0.05)
     frames = [load_dataset(root, split, factor).box_from_world for split in ("train", "test") for factor in (1, 3)]
@@ -135,7 +145,8 @@ def test_splits_and_downscales_share_one_frame(tmp_path):
 def test_fingerprint_tells_scenes_apart_and_not_folders(scene, tmp_path):
     fingerprint = dataset_fingerprint(load_dataset(scene))
     assert fingerprint == dataset_fingerprint(load_dataset(make_blender(tmp_path / "moved")))
-    assert fingerprint != dataset_fingerprint(load_dataset(make_blender(tmp_path / "other", radius=0.9)))
+    assert fingerprint != dataset_fingerprint(load_dataset(make_blender(tmp_path / "moved", radius=0.9)))
+    assert fingerprint != dataset_fingerprint(load_dataset(make_blender(tmp_path / "painted", grey=0.4)))
 
 
 def test_truth_maps(scene):
@@ -145,7 +156,8 @@ def test_truth_maps(scene):
     write_image(scene / "test/r_0_orm.png", np.full((*shape, 4), [1, 0.2, 0.8, 1]))
     coverage = np.ones((*shape, 1))
     coverage[0] = 0
-    write_image(scene / "test/r_0_normal.exr", np.concatenate([np.full((*shape, 3), [0, 0.6, 0.8]), coverage], -1) * coverage)
+    normals = np.concatenate([np.full((*shape, 3), [0, 0.6, 0.8]), coverage], axis=-1)
+    write_image(scene / "test/r_0_normal.exr", normals * coverage)
     write_image(scene / "light.hdr", np.ones((4, 8, 3)))
     trimesh.creation.box().export(scene / "mesh.ply")
     truth, empty = load_view_truths(data)[:2]
@@ -287,7 +299,10 @@ def test_masks_that_contradict_the_poses(scene):
         load_dataset(scene)
 
 
-@pytest.mark.parametrize(("factor", "message"), [(0, "at least 1"), (-2, "at least 1"), (1.5, "whole number"), (SIZE + 1, "too small for downscale")])
+@pytest.mark.parametrize(
+    ("factor", "message"),
+    [(0, "at least 1"), (-2, "at least 1"), (1.5, "whole number"), (SIZE + 1, "too small for downscale")],
+)
 def test_bad_downscale(scene, factor, message):
     with pytest.raises(InputError, match=message):
         load_dataset(scene, downscale=factor)

@@ -72,10 +72,15 @@ def test_faces_point_outward_whatever_came_in(tmp_path, ball, flip):
         assert trimesh.load(tmp_path / name, force="mesh").volume > 20
 
 
-def test_winding_does_not_depend_on_where_the_mesh_stands(tmp_path, ball):
+@pytest.mark.parametrize("flip", [False, True])
+def test_winding_of_an_open_mesh_does_not_depend_on_where_it_stands(tmp_path, ball, flip):
     vertices, faces, _, _ = ball
-    write_mesh_ply(tmp_path / "a.ply", vertices + [1000, -500, 300], faces[:, ::-1])
-    assert trimesh.load(tmp_path / "a.ply").volume > 20
+    faces = faces[vertices[faces].mean(axis=1)[:, 0] > -0.5]
+    moved = vertices + [-100, 50, 30]
+    write_mesh_ply(tmp_path / "a.ply", moved, faces[:, ::-1] if flip else faces)
+    mesh = trimesh.load(tmp_path / "a.ply", process=False)
+    outward = mesh.triangles_center - [-100, 50, 30]
+    assert ((mesh.face_normals * outward).sum(axis=1) > 0).all()
 
 
 def test_ply_keeps_the_frame_and_encodes_colours(tmp_path, ball):
@@ -91,10 +96,12 @@ BAD_MESHES = {
     "no faces": (np.eye(3), np.zeros((0, 3), int)),
     "no area": (np.zeros((3, 3)), np.array([[0, 1, 2]])),
     "NaN": (np.full((3, 3), np.nan), np.array([[0, 1, 2]])),
+    "infinite": (np.array([[np.inf, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 1, 2]])),
     "index too large": (np.eye(3), np.array([[0, 1, 3]])),
 }
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("case", BAD_MESHES)
 def test_degenerate_mesh_writes_nothing(tmp_path, case):
     vertices, faces = BAD_MESHES[case]

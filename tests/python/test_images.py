@@ -45,7 +45,8 @@ def test_exr_is_exact_and_hdr_within_its_mantissa(tmp_path):
 
 def test_srgb_curve_values_and_inverse():
     # IEC 61966-2-1: 0.5 -> 0.21404, and 0.04045 / 12.92 at the joint.
-    assert images.srgb_to_linear(np.array([0, 0.04045, 0.5, 1.0])) == pytest.approx([0, 0.0031308, 0.2140411, 1], abs=1e-6)
+    decoded = images.srgb_to_linear(np.array([0, 0.04045, 0.5, 1.0]))
+    assert decoded == pytest.approx([0, 0.0031308, 0.2140411, 1], abs=1e-6)
     values = np.linspace(0, 1, 1001)
     assert images.linear_to_srgb(images.srgb_to_linear(values)) == pytest.approx(values, abs=1e-6)
 

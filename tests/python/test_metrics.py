@@ -31,8 +31,10 @@ def test_ssim_agrees_with_scikit_image():
     rng = np.random.default_rng(0)
     x = rng.random((40, 30, 3))
     y = np.clip(x + rng.normal(0, 0.1, x.shape), 0, 1)
-    options = {"channel_axis": -1, "gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False, "data_range": 1}
-    assert metrics.ssim(x, y) == pytest.approx(structural_similarity(x, y, **options), abs=1e-9)
+    expected = structural_similarity(
+        x, y, channel_axis=-1, gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1
+    )
+    assert metrics.ssim(x, y) == pytest.approx(expected, abs=1e-9)
 
 
 def test_ssim_of_images_smaller_than_the_window():
@@ -88,6 +90,9 @@ def test_resize_environment_wraps_around_and_keeps_constants():
     image[:, 0] = 1
     wide = metrics.resize_environment(image, 2, 8)[0, :, 0]
     assert wide == pytest.approx([0.75, 0.75, 0.25, 0, 0, 0, 0, 0.25])
+    blocks = np.arange(18.0).reshape(3, 6, 1) ** 2
+    # (0+1+4 + 36+49+64 + 144+169+196) / 9 and (9+16+25 + 81+100+121 + 225+256+289) / 9.
+    assert metrics.resize_environment(blocks, 1, 2)[0, :, 0] == pytest.approx([663 / 9, 1122 / 9])
     assert metrics.resize_environment(np.ones((5, 7, 3)), 4, 9) == pytest.approx(np.ones((4, 9, 3)))
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,7 +55,9 @@ def write(tmp_path, **changes):
         "views": [make_view(True)],
         "lights": [{"roughness": r, "g": light, "g_bar": light} for r in (0, 0.25, 0.5, 1)],
         "light_truth": light,
-        "history": [{"step": s, "loss": 1 / (s + 1), "psnr": 20 + s, "loss_light": 0.1, "loss_nan": np.nan} for s in range(9)],
+        "history": [
+            {"step": s, "loss": 1 / (s + 1), "psnr": 20 + s, "loss_light": 0.1, "loss_nan": np.nan} for s in range(9)
+        ],
         "timings": {"hash_encode": 3.0, "other": 1.0},
     } | changes
     write_report(tmp_path / "report.html", **contents)
@@ -69,6 +73,7 @@ def test_report_holds_every_part(tmp_path):
     # 5 maps of truth and 7 of the prediction; 4 lights with estimates and the true one.
     assert len(pictures) == 12 + 9
     assert page.count("<svg") == 3
+    assert ">0.1</text>" in re.search(r"Loss</figcaption>.*", page)[0]  # decades, not quarters
     for text in ("20.00 dB", "29.32", "nested.on", "ρ = 0.25", "true light", "hash_encode", "width:75.0%"):
         assert text in page
 
@@ -86,11 +91,19 @@ def test_report_without_truth_or_history(tmp_path):
     assert "<h2>Light</h2>" not in page and "<svg" not in page and "dB<" not in page
 
 
-def test_failed_report_keeps_the_old_one(tmp_path):
+def test_failed_report_keeps_the_old_one(tmp_path, monkeypatch):
+    def replace_unless_page(source, target, replace=os.replace):
+        if Path(target).suffix == ".html":
+            raise OSError("no space left")
+        replace(source, target)
+
     write(tmp_path)
     before = (tmp_path / "report.html").read_bytes()
     with pytest.raises(KeyError):
         write(tmp_path, lights=[{"g": np.ones((4, 8, 3))}])
+    monkeypatch.setattr("os.replace", replace_unless_page)
+    with pytest.raises(OSError, match="no space"):
+        write(tmp_path, title="new")
     assert (tmp_path / "report.html").read_bytes() == before
     assert len(list(tmp_path.iterdir())) == 1
 

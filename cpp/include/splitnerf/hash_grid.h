@@ -2,6 +2,8 @@
 // Source: Mueller et al. 2022, section 3; progressive levels: Li et al. 2023 (Neuralangelo).
 #pragma once
 
+#include <string>
+
 #include "splitnerf/vec.h"
 
 namespace splitnerf {
@@ -22,6 +24,21 @@ struct HashLevel {
   int resolution;      // cells along an edge; resolution + 1 nodes
   bool dense;          // every node has an entry of its own
 };
+
+// What is wrong with a shape, in words; empty for one that can be built.
+inline std::string hash_shape_error(int64_t n_levels, int64_t n_features, int64_t base_resolution, double growth,
+                                    int64_t log2_table_size) {
+  const auto wrong = [](const char* rule, auto got) { return rule + (", got " + std::to_string(got)); };
+  if (n_levels < 1 || n_levels > kMaxLevels) return wrong("n_levels must be in [1, 32]", n_levels);
+  if (n_features != 1 && n_features != 2 && n_features != 4 && n_features != 8)
+    return wrong("n_features must be 1, 2, 4 or 8", n_features);
+  if (base_resolution < 1) return wrong("base_resolution must be at least 1", base_resolution);
+  if (!(growth >= 1.0)) return wrong("growth must be at least 1", growth);
+  if (log2_table_size < 1 || log2_table_size > 30) return wrong("log2_table_size must be in [1, 30]", log2_table_size);
+  const double finest = static_cast<double>(base_resolution) * std::pow(growth, static_cast<double>(n_levels - 1));
+  if (!(finest < double(1 << 30))) return wrong("the finest level must have less than 2^30 cells along an edge", finest);
+  return "";
+}
 
 // Level l has floor(base growth^l + 1e-6) cells along an edge; the small term keeps exact powers.
 SPLITNERF_HD int level_resolution(const HashGridShape& shape, int level) {

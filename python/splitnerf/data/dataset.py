@@ -1,8 +1,10 @@
 """Posed images of one object: the two layouts, their checks, and the frame that training uses.
 
 Layouts:
-    NeRF-Blender   `transforms_train.json`, `transforms_test.json`; `file_path` without extension, `camera_angle_x`; RGBA images.
-    single file    `transforms.json`; `fl_x fl_y cx cy w h`, `mask_path` beside `file_path`; every 8th frame is the test split.
+    NeRF-Blender   `transforms_train.json`, `transforms_test.json`; `file_path` without extension, `camera_angle_x`;
+                   RGBA images.
+    single file    `transforms.json`; `fl_x fl_y cx cy w h`, `mask_path` beside `file_path`; every 8th frame is the test
+                   split.
 """
 
 from __future__ import annotations
@@ -189,7 +191,7 @@ def _read_frames(root: Path, split: str) -> list[_Frame]:
     elif single.is_file():
         path = single
     else:
-        raise InputError(f"{root}: has neither transforms_{split}.json nor transforms.json; give the folder that holds one")
+        raise InputError(f"{root}: has neither {own.name} nor {single.name}; give the folder that holds one")
     meta = _read_json(path)
     entries = _need(meta, "frames", path)
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
@@ -270,7 +272,7 @@ def _load_images(frames: list[_Frame], downscale: int) -> list[_Image]:
     if not any(image.silhouette.any() for image in loaded):
         raise InputError(f"{folder}: every mask is empty, no pixel is foreground; check alpha or mask_path")
     if all(image.silhouette.all() for image in loaded):
-        raise InputError(f"{folder}: every mask is full, no pixel is background; cut the object out (alpha or mask_path)")
+        raise InputError(f"{folder}: every mask is full, no pixel is background; check alpha or mask_path")
     return loaded
 
 

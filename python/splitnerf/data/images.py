@@ -164,7 +164,7 @@ def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
 
 
 def area_average(pixels: np.ndarray, factor: int) -> np.ndarray:
-    """Averages blocks of factor x factor pixels; rows and columns that fill no block are cropped at the bottom and right.
+    """Averages blocks of factor x factor pixels; what fills no block is cropped at the bottom and right.
 
     Args:
         pixels: [H, W] or [H, W, C].

@@ -38,7 +38,7 @@ def estimate_box(silhouettes: np.ndarray, poses: np.ndarray, intrinsics: np.ndar
         points = _grid(centre, half, cell)
         points = points[_inside(points, cell, tables, poses, intrinsics)]
         if len(points) == 0:
-            raise ValueError("masks and poses contradict each other, no point lies in all masks; check the poses' convention")
+            raise ValueError("masks and poses contradict each other, no point lies in all masks; check the poses")
         low, high = points.min(axis=0), points.max(axis=0)
         centre, half = (low + high) / 2, (high - low) / 2 + cell
     if FITS_RADIUS[0] < np.linalg.norm(points, axis=1).max() <= FITS_RADIUS[1]:
@@ -71,7 +71,9 @@ def _grid(centre: np.ndarray, half: np.ndarray, cell: float) -> np.ndarray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def _inside(points: np.ndarray, cell: float, tables: np.ndarray, poses: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
+def _inside(
+    points: np.ndarray, cell: float, tables: np.ndarray, poses: np.ndarray, intrinsics: np.ndarray
+) -> np.ndarray:
     """Indices of the points that at most one view in twenty puts on background.
 
     Points that few views see, far in front of or behind the object, are dropped: what stays is seen by at least three

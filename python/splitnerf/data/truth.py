@@ -47,7 +47,7 @@ class ViewTruth:
 
 @dataclass
 class SceneTruth:
-    """Truth of the whole scene: `light` [H, W, 3] float32 linear equirectangular, `mesh` in the data's world; or None."""
+    """`light` [H, W, 3] float32 linear equirectangular and `mesh` in the data's world, or None."""
 
     light: np.ndarray | None = None
     mesh: trimesh.Trimesh | None = None
@@ -85,8 +85,8 @@ def read_mesh(path: str | os.PathLike) -> trimesh.Trimesh:
         mesh = trimesh.load_mesh(path, process=False)
     except Exception as error:  # trimesh's loaders raise whatever their parser meets
         raise InputError(f"{path}: cannot be read as a mesh ({error}); replace it") from None
-    usable = isinstance(mesh, trimesh.Trimesh) and len(mesh.faces) and np.isfinite(mesh.vertices).all() and mesh.area > 0
-    if not usable:
+    filled = isinstance(mesh, trimesh.Trimesh) and len(mesh.faces) > 0
+    if not filled or not np.isfinite(mesh.vertices).all() or not mesh.area > 0:
         raise InputError(f"{path}: degenerate or empty mesh; replace it")
     return mesh
 
@@ -163,7 +163,8 @@ def _read_map(image_path: Path, ending: str, channels: int, factor: int, size: t
     if pixels.shape[2] < channels:
         raise InputError(f"{path}: needs {channels} channels, has {pixels.shape[2]}; re-export it")
     if (pixels.shape[0] // factor, pixels.shape[1] // factor) != size:
-        raise InputError(f"{path}: is {pixels.shape[1]}x{pixels.shape[0]}, not the size of {image_path.name}; re-export it")
+        found = f"{pixels.shape[1]}x{pixels.shape[0]}"
+        raise InputError(f"{path}: is {found}, not the size of {image_path.name}; re-export it")
     if not np.isfinite(pixels).all():
         raise InputError(f"{path}: has NaN or infinite pixels; re-export it")
     return pixels

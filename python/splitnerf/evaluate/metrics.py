@@ -48,8 +48,9 @@ def ssim(prediction: np.ndarray, truth: np.ndarray) -> float:
     var_y = _filter(y * y, kernel) - mean_y**2
     covariance = _filter(x * y, kernel) - mean_x * mean_y
     c1, c2 = 0.01**2, 0.03**2
-    similarity = (2 * mean_x * mean_y + c1) * (2 * covariance + c2) / ((mean_x**2 + mean_y**2 + c1) * (var_x + var_y + c2))
-    return float(similarity.mean())
+    luminance = (2 * mean_x * mean_y + c1) / (mean_x**2 + mean_y**2 + c1)
+    structure = (2 * covariance + c2) / (var_x + var_y + c2)
+    return float((luminance * structure).mean())
 
 
 def lsq_scale(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:

@@ -67,7 +67,9 @@ def evaluate_maps(
             return None
         return error(np.concatenate([x for x, _ in pairs]), np.concatenate([y for _, y in pairs]))
 
-    opaque = [(p["alpha"] > OPAQUE) & t.normal_mask if t.normal_mask is not None else None for p, t in zip(predictions, truths)]
+    opaque = [
+        None if t.normal_mask is None else (p["alpha"] > OPAQUE) & t.normal_mask for p, t in zip(predictions, truths)
+    ]
     return {
         "novel_view": _similarity(
             [over_background(p["rgb"], p["alpha"]) for p in predictions],

@@ -15,7 +15,8 @@ def write_environment(run_dir: str | os.PathLike, radiance: np.ndarray) -> tuple
 
     Args:
         run_dir: The run's folder.
-        radiance: [H, W, 3] linear radiance >= 0, equirectangular: u = 0.5 - atan2(y, x)/(2 pi), v = acos(z)/pi from the top.
+        radiance: [H, W, 3] linear radiance >= 0, equirectangular: u = 0.5 - atan2(y, x)/(2 pi), v = acos(z)/pi from
+            the top.
 
     Returns:
         Both paths.

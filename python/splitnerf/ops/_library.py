@@ -22,6 +22,13 @@ _load()
 lib = torch.ops.splitnerf
 
 
+def refuse_gradients(ctx, op: str, **arguments: int) -> None:
+    """Raises where a gradient is asked to one of these arguments (name = position), for which none is defined."""
+    for name, position in arguments.items():
+        if ctx.needs_input_grad[position]:
+            raise RuntimeError(f"{op}: no gradient to {name} is defined; see the table in docs/ops.md")
+
+
 def register(name: str, *, fake, backward=None, setup_context=None) -> None:
     """Registers the fake implementation and the gradient of ``splitnerf::name``.
 

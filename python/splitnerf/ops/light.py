@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from splitnerf import _core
-from splitnerf.ops._library import lib, register
+from splitnerf.ops._library import lib, refuse_gradients, register
 
 
 def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, light: Tensor) -> Tensor:
@@ -74,15 +74,14 @@ def _keep(ctx, inputs, output):
 
 def _backward(ctx, grad_gbar, grad_total):
     query_dirs, roughness, light_dirs, total = ctx.saved_tensors
-    if any(ctx.needs_input_grad[:3]):
-        raise RuntimeError("prefilter_light: a gradient exists to light alone, not to directions or roughness")
+    refuse_gradients(ctx, "prefilter_light", query_dirs=0, roughness=1, light_dirs=2)
     return None, None, None, lib.prefilter_light_backward(query_dirs, roughness, total, grad_gbar, light_dirs)
 
 
 register(
     "prefilter_light",
     fake=lambda query_dirs, roughness, light_dirs, light: (
-        torch.empty_like(query_dirs),
+        query_dirs.new_empty(query_dirs.shape),
         query_dirs.new_empty(query_dirs.shape[0]),
     ),
     setup_context=_keep,
@@ -90,7 +89,7 @@ register(
 )
 register(
     "prefilter_light_backward",
-    fake=lambda query_dirs, roughness, total, grad_gbar, light_dirs: torch.empty_like(light_dirs),
+    fake=lambda query_dirs, roughness, total, grad_gbar, light_dirs: light_dirs.new_empty(light_dirs.shape),
 )
 register(
     "sample_ggx_lobe",

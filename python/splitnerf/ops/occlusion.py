@@ -94,6 +94,8 @@ def occlusion_factors(
 
     Source: SplitNeRF Eq. (14), (15), with the specular lobe about the reflection.
     """
+    if n_channels not in (1, 3):
+        raise ValueError(f"occlusion_factors: n_channels must be 1 or 3, got {n_channels}")
     o_d, o_s = lib.occlusion_factors(
         scene.handle, positions, normals, lobe_dirs, roughness, environment,
         n_diffuse_rays, n_specular_rays, offset, seed,
@@ -107,5 +109,8 @@ register(
 )
 register(
     "occlusion_factors",
-    fake=lambda scene, positions, *rest: (torch.empty_like(positions), torch.empty_like(positions)),
+    fake=lambda scene, positions, *rest: (
+        positions.new_empty(positions.shape),
+        positions.new_empty(positions.shape),
+    ),
 )

@@ -132,7 +132,7 @@ register("march_rays", fake=_fake_march)
 register(
     "neus_weights",
     fake=lambda f_prev, f_next, s, offsets, eps: (
-        torch.empty_like(f_prev),
+        f_prev.new_empty(f_prev.shape),
         f_prev.new_empty(offsets.shape[0] - 1),
     ),
     setup_context=_keep_weights,
@@ -141,9 +141,9 @@ register(
 register(
     "neus_weights_backward",
     fake=lambda f_prev, f_next, s, offsets, eps, weights, opacity, *grads: (
-        torch.empty_like(f_prev),
-        torch.empty_like(f_next),
-        torch.empty_like(opacity),
+        f_prev.new_empty(f_prev.shape),
+        f_next.new_empty(f_next.shape),
+        opacity.new_empty(opacity.shape),
     ),
 )
 register(
@@ -154,5 +154,5 @@ register(
 )
 register(
     "composite_backward",
-    fake=lambda weights, values, offsets, grad: (torch.empty_like(weights), torch.empty_like(values)),
+    fake=lambda weights, values, offsets, grad: (weights.new_empty(weights.shape), values.new_empty(values.shape)),
 )

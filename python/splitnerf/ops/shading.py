@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from splitnerf import _core
-from splitnerf.ops._library import lib, register
+from splitnerf.ops._library import lib, refuse_gradients, register
 
 FRESNEL_MODES = ("exact", "paper", "code")
 QUERIES = ("mean", "reflection")
@@ -22,7 +22,8 @@ QUERIES = ("mean", "reflection")
 
 @functools.lru_cache(maxsize=8)
 def _brdf_lut(device: torch.device) -> Tensor:
-    return torch.from_numpy(_core.brdf_lut()).to(device)
+    with torch.inference_mode(False):  # whoever asks first, autograd may keep the table later
+        return torch.from_numpy(_core.brdf_lut()).to(device)
 
 
 def brdf_lut(device: torch.device | str = "cpu") -> Tensor:
@@ -106,6 +107,7 @@ def _keep_query(ctx, inputs, output):
 
 
 def _query_backward(ctx, grad):
+    refuse_gradients(ctx, "query_direction", lut=3)
     grads = lib.query_direction_backward(*ctx.saved_tensors, ctx.mean, grad)
     return *grads, None, None
 
@@ -116,29 +118,30 @@ def _keep_shade(ctx, inputs, output):
 
 
 def _shade_backward(ctx, grad):
+    refuse_gradients(ctx, "split_sum_shade", lut=9)
     grads = lib.split_sum_shade_backward(*ctx.saved_tensors, *ctx.options, grad)
     return *grads, None, None, None
 
 
 register(
     "query_direction",
-    fake=lambda normals, *rest: torch.empty_like(normals),
+    fake=lambda normals, *rest: normals.new_empty(normals.shape),
     setup_context=_keep_query,
     backward=_query_backward,
 )
 register(
     "query_direction_backward",
     fake=lambda normals, view_dirs, roughness, lut, mean, grad: tuple(
-        torch.empty_like(t) for t in (normals, view_dirs, roughness)
+        t.new_empty(t.shape) for t in (normals, view_dirs, roughness)
     ),
 )
 register(
     "split_sum_shade",
-    fake=lambda normals, *rest: torch.empty_like(normals),
+    fake=lambda normals, *rest: normals.new_empty(normals.shape),
     setup_context=_keep_shade,
     backward=_shade_backward,
 )
 register(
     "split_sum_shade_backward",
-    fake=lambda *inputs: tuple(torch.empty_like(t) for t in inputs[:9]),
+    fake=lambda *inputs: tuple(t.new_empty(t.shape) for t in inputs[:9]),
 )

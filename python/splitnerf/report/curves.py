@@ -54,13 +54,14 @@ def line_chart(title: str, series: Mapping[str, Series], *, log: bool = False) -
     for tick in x_ticks:
         if tick <= x_high:
             label = f"{tick / 1000:g}k" if tick >= 1000 else f"{tick:g}"
-            parts.append(f'<text x="{place_x(tick):.1f}" y="{HEIGHT - BOTTOM + 16}" text-anchor="middle">{label}</text>')
+            x, y = place_x(tick), HEIGHT - BOTTOM + 16
+            parts.append(f'<text x="{x:.1f}" y="{y}" text-anchor="middle">{label}</text>')
     parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 3}" text-anchor="end">step</text>')
     legend = []
     for index, (name, points) in enumerate(kept.items()):
         colour = PALETTE[index % len(PALETTE)]
         path = " ".join(f"{place_x(x):.1f},{place_y(scale(y)):.1f}" for x, y in points)
-        parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.8" stroke-linejoin="round"/>')
+        parts.append(f'<polyline class="curve" points="{path}" stroke="{colour}"/>')
         x, y = points[-1]
         parts.append(f'<circle cx="{place_x(x):.1f}" cy="{place_y(scale(y)):.1f}" r="2.6" fill="{colour}"/>')
         legend.append(f'<li><i style="background:{colour}"></i>{escape(name)} <b>{y:.4g}</b></li>')

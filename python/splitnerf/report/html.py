@@ -50,7 +50,8 @@ def write_report(
             [H, W, 3] sRGB straight, `alpha` [H, W], `albedo` [H, W, 3] linear, `roughness` [H, W], `metallic` [H, W],
             `normal` [H, W, 3] unit world, `occlusion_diffuse` and `occlusion_specular` [H, W] or [H, W, 1 | 3];
             in a truth also `normal_mask` [H, W] bool. None counts as absent.
-        lights: Per roughness `roughness`, `g` [h, w, 3] linear, and `g_bar` [h, w, 3], its Monte Carlo estimate, or None.
+        lights: Per roughness `roughness`, `g` [h, w, 3] linear, and `g_bar` [h, w, 3], its Monte Carlo estimate, or
+            None.
         light_truth: [h, w, 3] linear radiance, or None.
         history: Lines of `metrics.jsonl`: `step`, `loss`, `psnr`, `loss_*`; each but `step` optional.
         timings: Seconds by part of the run.

@@ -1,0 +1,76 @@
+"""What the tests of all operators share: devices, opcheck, and the refusal of missing gradients."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from splitnerf import ops  # noqa: F401  (loads torch.ops.splitnerf)
+
+lib = torch.ops.splitnerf
+
+
+def _cuda_skip_reason() -> str | None:
+    if not torch.cuda.is_available():
+        return "no CUDA device"
+    if not torch._C._dispatch_has_kernel_for_dispatch_key("splitnerf::hash_encode", "CUDA"):
+        return "the operators were built without CUDA kernels"
+    return None
+
+
+DEVICES = [
+    "cpu",
+    pytest.param("cuda", marks=pytest.mark.skipif(_cuda_skip_reason() is not None, reason=str(_cuda_skip_reason()))),
+]
+
+
+def generator(seed: int = 0) -> torch.Generator:
+    return torch.Generator().manual_seed(seed)
+
+
+def unit(x: torch.Tensor) -> torch.Tensor:
+    return x / x.norm(dim=-1, keepdim=True)
+
+
+def grad_leaves(inputs: tuple, names_or_indices) -> tuple:
+    """The inputs, those at the given positions as leaves that require a gradient."""
+    wanted = set(names_or_indices)
+    return tuple(x.detach().clone().requires_grad_() if i in wanted else x for i, x in enumerate(inputs))
+
+
+def check_op(op, inputs: tuple, differentiable: tuple = ()) -> None:
+    """torch.library.opcheck with and without gradients, and on inputs that are not contiguous."""
+    torch.library.opcheck(op, inputs)
+    if differentiable:
+        torch.library.opcheck(op, grad_leaves(inputs, differentiable))
+    strided = tuple(
+        x.t().contiguous().t() if isinstance(x, torch.Tensor) and x.dim() == 2 and x.numel() else x for x in inputs
+    )
+    torch.library.opcheck(op, strided, test_utils=("test_schema", "test_faketensor"))
+    for got, expected in zip(as_tuple(op(*strided)), as_tuple(op(*inputs))):
+        torch.testing.assert_close(got, expected, rtol=0, atol=0)
+
+
+def as_tuple(x) -> tuple:
+    return x if isinstance(x, (tuple, list)) else (x,)
+
+
+def floats(outputs) -> list[torch.Tensor]:
+    return [x for x in as_tuple(outputs) if x.is_floating_point()]
+
+
+def check_no_gradient(op, inputs: tuple, index: int) -> None:
+    """A gradient to this input raises; it is never zeros and never silently absent."""
+    leaves = grad_leaves(inputs, [index])
+    outputs = floats(op(*leaves))
+    with pytest.raises(RuntimeError, match="gradient|does not require grad"):
+        sum(x.sum() for x in outputs).backward()
+    assert leaves[index].grad is None
+
+
+def check_error(call, *parts: str) -> None:
+    """A ValueError whose message holds every part: operator, argument, what was expected, what came."""
+    with pytest.raises(ValueError) as error:
+        call()
+    for part in parts:
+        assert part in str(error.value), f"{part!r} is missing in {error.value!s}"

@@ -1,0 +1,120 @@
+"""prefilter_light, fibonacci_directions and sample_ggx_lobe."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import reference
+import torch
+from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
+
+from splitnerf.ops import fibonacci_directions, prefilter_light, sample_ggx_lobe
+
+
+def sample_inputs(device, dtype, n_queries: int = 6, n_lights: int = 40) -> tuple:
+    """Arguments of ``prefilter_light``: a lattice of lights, so that every lobe meets some."""
+    queries = unit(torch.randn(n_queries, 3, generator=generator(), dtype=torch.float64))
+    roughness = torch.rand(n_queries, 1, generator=generator(1), dtype=torch.float64) * 0.8 + 0.2
+    lights = fibonacci_directions(n_lights, generator(2), torch.float64)
+    light = torch.rand(n_lights, 3, generator=generator(3), dtype=torch.float64) * 5
+    return tuple(x.to(device, dtype) for x in (queries, roughness, lights, light))
+
+
+def backward_inputs(device, dtype) -> tuple:
+    queries, roughness, lights, light = sample_inputs(device, dtype)
+    total = lib.prefilter_light(queries, roughness, lights, light)[1]
+    return queries, roughness, total, torch.randn(6, 3, generator=generator(4)).to(device, dtype), lights
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_prefilter_matches_the_reference(device):
+    inputs = sample_inputs(device, torch.float64, 100, 900)
+    got = prefilter_light(*inputs)
+    np.testing.assert_allclose(got.cpu(), reference.prefilter_light(*(x.cpu().numpy() for x in inputs)), rtol=1e-10)
+    single = prefilter_light(*sample_inputs(device, torch.float32, 100, 900))
+    torch.testing.assert_close(single.double(), got, rtol=1e-4, atol=0)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_constant_light_stays_itself(device):
+    queries, _, lights, light = sample_inputs(device, torch.float32, 50, 300)
+    for roughness in (0.0, 0.05, 0.5, 1.0):
+        out = prefilter_light(queries, torch.full_like(queries[:, :1], roughness), lights, torch.full_like(light, 3.0))
+        torch.testing.assert_close(out, torch.full_like(out, 3.0))
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_opcheck(device):
+    for dtype in (torch.float32, torch.float64):
+        queries, roughness, lights, light = sample_inputs(device, dtype)
+        check_op(lib.prefilter_light, (queries, roughness, lights, light), (3,))
+        check_op(lib.prefilter_light_backward, backward_inputs(device, dtype))
+        check_op(lib.sample_ggx_lobe, (queries, roughness, 5, 3))
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_gradcheck(device):
+    inputs = grad_leaves(sample_inputs(device, torch.float64), (3,))
+    torch.autograd.gradcheck(lambda light: prefilter_light(*inputs[:3], light), inputs[3])
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_missing_gradients_raise(device):
+    inputs = sample_inputs(device, torch.float64)
+    for index in range(3):
+        check_no_gradient(lib.prefilter_light, inputs, index)
+    for index in range(5):
+        check_no_gradient(lib.prefilter_light_backward, backward_inputs(device, torch.float64), index)
+    for index in range(2):
+        check_no_gradient(lib.sample_ggx_lobe, (*inputs[:2], 4, 0), index)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_empty_batch(device):
+    queries, roughness, lights, light = grad_leaves(sample_inputs(device, torch.float32, 0), (3,))
+    out = prefilter_light(queries, roughness, lights, light)
+    out.sum().backward()
+    assert out.shape == (0, 3) and not light.grad.any()
+    assert sample_ggx_lobe(queries, roughness, 4).shape == (0, 4, 3)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_no_light_above_the_horizon_gives_black(device):
+    up, down = (torch.tensor([[0.0, 0, z]], device=device) for z in (1, -1))
+    light = torch.ones(1, 3, device=device, requires_grad=True)
+    out = prefilter_light(up, torch.full((1, 1), 0.5, device=device), down, light)
+    out.sum().backward()
+    assert not out.any() and not light.grad.any()
+
+
+def test_fibonacci_directions_are_uniform_and_seeded():
+    directions = fibonacci_directions(4096, generator(5), torch.float64)
+    torch.testing.assert_close(directions.norm(dim=1), torch.ones(4096, dtype=torch.float64))
+    torch.testing.assert_close(directions.T @ directions / 4096, torch.eye(3, dtype=torch.float64) / 3, rtol=0, atol=1e-3)
+    assert directions.mean(0).abs().max() < 1e-3
+    assert torch.equal(directions, fibonacci_directions(4096, generator(5), torch.float64))
+    assert not torch.equal(directions, fibonacci_directions(4096, generator(6), torch.float64))
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_lobe_samples_estimate_the_prefiltered_light(device):
+    queries, _, lights, _ = sample_inputs(device, torch.float64, 20, 60000)
+    smooth = lambda w: 1 + torch.sin(2 * w)  # noqa: E731
+    for rho in (0.2, 0.6, 1.0):
+        roughness = torch.full_like(queries[:, :1], rho)
+        samples = sample_ggx_lobe(queries, roughness, 2048, seed=1)
+        torch.testing.assert_close(samples.norm(dim=-1), torch.ones_like(samples[..., 0]))
+        expected = prefilter_light(queries, roughness, lights, smooth(lights))
+        torch.testing.assert_close(smooth(samples).mean(1), expected, rtol=0, atol=2e-3)
+    assert not torch.equal(samples, sample_ggx_lobe(queries, roughness, 2048, seed=2))
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_errors_name_what_is_wrong(device):
+    queries, roughness, lights, light = sample_inputs(device, torch.float32)
+    check_error(lambda: prefilter_light(queries, roughness[:, 0], lights, light), "prefilter_light", "roughness", "[6, 1] float32", "[6]")
+    check_error(lambda: prefilter_light(queries, roughness, lights, light[1:]), "prefilter_light", "light", "[40, 3]", "[39, 3]")
+    check_error(lambda: prefilter_light(queries.double(), roughness, lights, light), "query_dirs", "float32", "float64")
+    check_error(lambda: prefilter_light(queries, roughness, lights[:0], light[:0]), "prefilter_light", "light_dirs", "at least one")
+    check_error(lambda: sample_ggx_lobe(queries[:, :2], roughness, 4), "sample_ggx_lobe", "axes", "[n, 3]", "[6, 2]")
+    check_error(lambda: sample_ggx_lobe(queries, roughness, 0), "sample_ggx_lobe", "n_samples", "[1, 2^20]")

@@ -1,0 +1,191 @@
+"""march_rays, neus_weights and composite."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import reference
+import torch
+from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
+
+from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE, composite, march_rays, neus_weights
+
+OFFSETS = [0, 9, 9, 10, 24]  # one ray without samples
+
+
+def sample_inputs(device, dtype, min_transmittance: float = 0.0) -> tuple:
+    """Arguments of ``neus_weights``: rays that cross the surface, with some samples along which f rises."""
+    n = OFFSETS[-1]
+    draw = generator()
+    f_prev = torch.linspace(0.5, -0.3, n, dtype=torch.float64) + 0.1 * torch.rand(n, generator=draw, dtype=torch.float64)
+    f_next = f_prev - 0.1 + 0.15 * torch.rand(n, generator=draw, dtype=torch.float64)
+    offsets = torch.tensor(OFFSETS, device=device)
+    return f_prev.to(device, dtype), f_next.to(device, dtype), torch.tensor(8.0, device=device, dtype=dtype), offsets, min_transmittance
+
+
+def composite_inputs(device, dtype) -> tuple:
+    weights = torch.rand(OFFSETS[-1], generator=generator(1), dtype=torch.float64)
+    values = torch.randn(OFFSETS[-1], 4, generator=generator(2), dtype=torch.float64)
+    return weights.to(device, dtype), values.to(device, dtype), torch.tensor(OFFSETS, device=device)
+
+
+def march_inputs(device, dtype, n: int = 40) -> tuple:
+    """Arguments of ``march_rays``: cameras inside and outside the box, some rays parallel to an axis."""
+    draw = generator(3)
+    origins = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64)) * (1 + 2 * torch.rand(n, 1, generator=draw, dtype=torch.float64))
+    directions = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64) * 0.4 - origins)
+    directions[::8] = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64)
+    jitter = torch.rand(n, generator=draw, dtype=torch.float64)
+    cells = torch.randint(0, 12, (7, 7, 7), generator=draw)
+    cells = torch.where(cells == 11, CELL_OPAQUE, torch.where(cells > 5, CELL_OCCUPIED, 0)).to(torch.uint8)
+    return *(x.to(device, dtype) for x in (origins, directions, jitter)), cells.to(device), 1.5, 0.03, 64
+
+
+# ---- march_rays ----
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_march_matches_the_reference(device):
+    origins, directions, jitter, cells, *rest = march_inputs(device, torch.float64)
+    rays, starts, ends, offsets = march_rays(origins, directions, jitter, cells, *rest)
+    box, step, max_samples = float(np.float32(rest[0])), float(np.float32(rest[1])), rest[2]
+    total = 0
+    for r, (o, d, j) in enumerate(zip(origins.cpu().numpy(), directions.cpu().numpy(), jitter.tolist())):
+        expected = reference.march_ray(o, d, j, cells.cpu().numpy(), box, step, max_samples)
+        got = slice(int(offsets[r]), int(offsets[r + 1]))
+        np.testing.assert_allclose(starts[got].cpu(), expected, atol=1e-9)
+        assert (rays[got] == r).all()
+        total += len(expected)
+    assert total == len(starts) > 100
+    torch.testing.assert_close(ends - starts, torch.full_like(starts, step))
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_march_opcheck_empty_and_gradients(device):
+    for dtype in (torch.float32, torch.float64):
+        check_op(lib.march_rays, march_inputs(device, dtype))
+    samples = march_rays(*march_inputs(device, torch.float32, 0))
+    assert samples.offsets.tolist() == [0] and samples.t_starts.shape == (0,)
+    for index in range(3):
+        check_no_gradient(lib.march_rays, march_inputs(device, torch.float32), index)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_march_errors(device):
+    origins, directions, jitter, cells, *rest = march_inputs(device, torch.float32)
+    check_error(lambda: march_rays(origins, directions[:, :2], jitter, cells, *rest), "march_rays", "rays_d", "[40, 3]", "[40, 2]")
+    check_error(lambda: march_rays(origins, directions, jitter[:, None], cells, *rest), "jitter", "[40] float32", "[40, 1]")
+    check_error(lambda: march_rays(origins, directions, jitter, cells[:, :3], *rest), "cells", "[7, 7, 7] uint8", "[7, 3, 7]")
+    check_error(lambda: march_rays(origins, directions, jitter, cells.float(), *rest), "cells", "uint8", "float32")
+    check_error(lambda: march_rays(origins, directions, jitter, cells, 1.5, 0.0), "march_rays", "step", "positive")
+    check_error(lambda: march_rays(origins, directions, jitter, cells, -1.0, 0.1), "march_rays", "box", "positive")
+
+
+# ---- neus_weights ----
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_neus_matches_the_reference(device):
+    inputs = sample_inputs(device, torch.float64)
+    weights, opacity = neus_weights(*inputs)
+    expected = reference.neus_weights(*(x.cpu() for x in inputs[:3]), OFFSETS)
+    torch.testing.assert_close(weights.cpu(), expected[0])
+    torch.testing.assert_close(opacity.cpu(), expected[1])
+    single = neus_weights(*sample_inputs(device, torch.float32))
+    torch.testing.assert_close(single[0].double(), weights, rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize("min_transmittance", [0.0, 0.3])
+def test_neus_gradcheck(device, min_transmittance):
+    inputs = grad_leaves(sample_inputs(device, torch.float64, min_transmittance), (0, 1, 2))
+    torch.autograd.gradcheck(lib.neus_weights, inputs)
+    torch.autograd.gradcheck(lambda *x: lib.neus_weights(*x)[1], inputs)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_neus_gradient_matches_the_reference(device):
+    got, expected = (grad_leaves(sample_inputs(d, torch.float64), (0, 1, 2)) for d in (device, "cpu"))
+    g = torch.randn(OFFSETS[-1], generator=generator(5), dtype=torch.float64)
+    (neus_weights(*got)[0] * g.to(device)).sum().backward()
+    (reference.neus_weights(*expected[:3], OFFSETS)[0] * g).sum().backward()
+    for a, b in zip(got[:3], expected[:3]):
+        torch.testing.assert_close(a.grad.cpu(), b.grad)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_neus_opcheck(device):
+    for dtype in (torch.float32, torch.float64):
+        inputs = sample_inputs(device, dtype)
+        outputs = lib.neus_weights(*inputs)
+        check_op(lib.neus_weights, inputs, (0, 1, 2))
+        check_op(lib.neus_weights_backward, (*inputs, *outputs, *(torch.ones_like(x) for x in outputs)))
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_neus_missing_gradients_raise(device):
+    inputs = sample_inputs(device, torch.float64)
+    outputs = lib.neus_weights(*inputs)
+    backward = (*inputs, *outputs, *(torch.ones_like(x) for x in outputs))
+    for index in (0, 1, 2, 5, 6, 7, 8):
+        check_no_gradient(lib.neus_weights_backward, backward, index)
+    leaves = grad_leaves(inputs, (0,))
+    (first,) = torch.autograd.grad(neus_weights(*leaves)[1].sum(), leaves[0], create_graph=True)
+    with pytest.raises(RuntimeError, match="neus_weights_backward: no gradient is defined"):
+        first.sum().backward()
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_neus_empty_batches(device):
+    f = torch.zeros(0, device=device, requires_grad=True)
+    s = torch.tensor(10.0, device=device, requires_grad=True)
+    for n_rays in (0, 3):
+        weights, opacity = neus_weights(f, f, s, torch.zeros(n_rays + 1, dtype=torch.int64, device=device))
+        assert weights.shape == (0,) and opacity.tolist() == [0.0] * n_rays
+        (weights.sum() + opacity.sum()).backward()
+    assert s.grad.item() == 0
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_neus_errors(device):
+    f_prev, f_next, s, offsets, _ = sample_inputs(device, torch.float32)
+    check_error(lambda: neus_weights(f_prev, f_next[1:], s, offsets), "neus_weights", "f_next", "[24] float32", "[23]")
+    check_error(lambda: neus_weights(f_prev, f_next, s[None], offsets), "neus_weights", "s must be [] float32", "[1]")
+    check_error(lambda: neus_weights(f_prev, f_next, s, offsets.int()), "neus_weights", "offsets", "int64")
+    check_error(lambda: neus_weights(f_prev, f_next, s, offsets + 1), "neus_weights", "offsets must rise from 0", "24")
+    check_error(lambda: neus_weights(f_prev, f_next, s, offsets[[0, 2, 3, 1, 4]]), "offsets must rise")
+    check_error(lambda: neus_weights(f_prev, f_next, s, offsets[:0]), "offsets")
+
+
+# ---- composite ----
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_composite_matches_the_reference(device):
+    weights, values, offsets = composite_inputs(device, torch.float64)
+    expected = reference.composite(weights.cpu(), values.cpu(), OFFSETS)
+    torch.testing.assert_close(composite(weights, values, offsets).cpu(), expected)
+    single = composite(*composite_inputs(device, torch.float32))
+    torch.testing.assert_close(single.cpu().double(), expected, rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_composite_opcheck_and_gradients(device):
+    for dtype in (torch.float32, torch.float64):
+        inputs = composite_inputs(device, dtype)
+        grad = torch.randn(4, 4, generator=generator(6)).to(device, dtype)
+        check_op(lib.composite, inputs, (0, 1))
+        check_op(lib.composite_backward, (*inputs, grad))
+    torch.autograd.gradcheck(lib.composite, grad_leaves(inputs, (0, 1)))
+    for index in (0, 1, 3):
+        check_no_gradient(lib.composite_backward, (*inputs, grad), index)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_composite_empty_and_errors(device):
+    empty = composite(torch.zeros(0, device=device), torch.zeros(0, 3, device=device), torch.zeros(3, dtype=torch.int64, device=device))
+    assert empty.tolist() == [[0.0] * 3] * 2
+    weights, values, offsets = composite_inputs(device, torch.float32)
+    check_error(lambda: composite(weights, values[1:], offsets), "composite", "values", "[24, n] float32", "[23, 4]")
+    check_error(lambda: composite(weights, values.double(), offsets), "composite", "values", "float32", "float64")
+    check_error(lambda: composite(weights, values, offsets[:-1]), "composite", "offsets must rise")

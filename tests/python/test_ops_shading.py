@@ -1,0 +1,153 @@
+"""query_direction and split_sum_shade."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import reference
+import torch
+from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
+
+from splitnerf.ops import FRESNEL_MODES, brdf_lut, query_direction, split_sum_shade
+
+MODES = [(mode, compensate, channels) for mode in range(3) for compensate in (False, True) for channels in (1, 3)]
+
+
+def query_inputs(device, dtype, mean: bool = True, n: int = 7) -> tuple:
+    """Arguments of ``query_direction``; some normals face away from the viewer."""
+    normals, views = (unit(torch.randn(n, 3, generator=generator(i), dtype=torch.float64)) for i in (0, 1))
+    roughness = torch.rand(n, 1, generator=generator(2), dtype=torch.float64) * 0.8 + 0.1
+    return *(x.to(device, dtype) for x in (normals, views, roughness)), brdf_lut(device), mean
+
+
+def sample_inputs(device, dtype, mode: int = 0, compensate: bool = False, channels: int = 1, n: int = 7) -> tuple:
+    """Arguments of ``split_sum_shade``."""
+    normals, views, roughness, lut, _ = query_inputs(device, dtype, n=n)
+    draw = generator(3)
+    rest = [torch.rand(n, k, generator=draw, dtype=torch.float64) for k in (3, 1, 3, 3, channels, channels)]
+    albedo, metallic, specular, diffuse, occlusion_s, occlusion_d = (x.to(device, dtype) for x in rest)
+    return (normals, views, albedo, roughness, metallic, 3 * specular, 2 * diffuse, occlusion_s, occlusion_d, lut,
+            mode, compensate)  # fmt: skip
+
+
+def arrays(inputs) -> list:
+    return [x.double().cpu().numpy() if isinstance(x, torch.Tensor) else x for x in inputs]
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize("mean", [True, False])
+def test_query_matches_the_reference(device, mean):
+    inputs = query_inputs(device, torch.float64, mean, 200)
+    np.testing.assert_allclose(lib.query_direction(*inputs).cpu(), reference.query_direction(*arrays(inputs)), atol=1e-12)
+    single = lib.query_direction(*query_inputs(device, torch.float32, mean, 200))
+    torch.testing.assert_close(single.double(), lib.query_direction(*inputs), rtol=0, atol=2e-5)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize(("mode", "compensate", "channels"), MODES)
+def test_shade_matches_the_reference(device, mode, compensate, channels):
+    inputs = sample_inputs(device, torch.float64, mode, compensate, channels, 200)
+    values = arrays(inputs)
+    values[10] = FRESNEL_MODES[mode]
+    got = lib.split_sum_shade(*inputs)
+    np.testing.assert_allclose(got.cpu(), reference.split_sum_shade(*values), atol=1e-12)
+    single = lib.split_sum_shade(*sample_inputs(device, torch.float32, mode, compensate, channels, 200))
+    torch.testing.assert_close(single.double(), got, rtol=0, atol=2e-5)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_opcheck(device):
+    for dtype in (torch.float32, torch.float64):
+        grad = torch.randn(7, 3, generator=generator(9)).to(device, dtype)
+        for mean in (True, False):
+            check_op(lib.query_direction, query_inputs(device, dtype, mean), (0, 1, 2))
+            check_op(lib.query_direction_backward, (*query_inputs(device, dtype, mean), grad))
+        for channels in (1, 3):
+            inputs = sample_inputs(device, dtype, channels=channels)
+            check_op(lib.split_sum_shade, inputs, tuple(range(9)))
+            check_op(lib.split_sum_shade_backward, (*inputs, grad))
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize("mean", [True, False])
+def test_query_gradcheck(device, mean):
+    torch.autograd.gradcheck(lib.query_direction, grad_leaves(query_inputs(device, torch.float64, mean), (0, 1, 2)))
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize(("mode", "compensate", "channels"), MODES)
+def test_shade_gradcheck(device, mode, compensate, channels):
+    inputs = sample_inputs(device, torch.float64, mode, compensate, channels, 4)
+    torch.autograd.gradcheck(lib.split_sum_shade, grad_leaves(inputs, range(9)))
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_missing_gradients_raise(device):
+    query, shade = query_inputs(device, torch.float64), sample_inputs(device, torch.float64)
+    grad = torch.ones(7, 3, dtype=torch.float64, device=device)
+    for index in (0, 1, 2, 5):
+        check_no_gradient(lib.query_direction_backward, (*query, grad), index)
+    for index in (*range(9), 12):
+        check_no_gradient(lib.split_sum_shade_backward, (*shade, grad), index)
+    # The table is data, not a parameter.
+    check_no_gradient(lib.query_direction, query, 3)
+    check_no_gradient(lib.split_sum_shade, shade, 9)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_empty_batch(device):
+    for op, inputs, n in ((lib.query_direction, query_inputs(device, torch.float32, n=0), 3),
+                          (lib.split_sum_shade, sample_inputs(device, torch.float32, n=0), 9)):  # fmt: skip
+        leaves = grad_leaves(inputs, range(n))
+        out = op(*leaves)
+        assert out.shape == (0, 3)
+        out.sum().backward()
+        assert leaves[0].grad.shape == (0, 3)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_white_furnace(device):
+    normals, views, _, roughness, *_ = sample_inputs(device, torch.float64, n=500)
+    one = torch.ones_like(normals)
+    single = torch.ones_like(roughness)
+    dielectric = split_sum_shade(normals, views, one, roughness, 0 * single, one, one, single, single)
+    metal = split_sum_shade(normals, views, one, roughness, single, one, one, single, single, compensate=True)
+    torch.testing.assert_close(dielectric, one)
+    torch.testing.assert_close(metal, one)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_table_holds_its_exact_value(device):
+    f1, f2, chi = brdf_lut(device)[-1, -1].tolist()
+    assert f1 + f2 == pytest.approx(1 - math.log(2), abs=1e-4) and chi == pytest.approx(0, abs=1e-3)
+
+
+def test_table_made_in_inference_mode_serves_training():
+    from splitnerf.ops import shading
+
+    shading._brdf_lut.cache_clear()
+    with torch.inference_mode():
+        brdf_lut()
+    normals, views, roughness, *_ = query_inputs("cpu", torch.float32)
+    query_direction(normals.requires_grad_(), views, roughness).sum().backward()
+    assert normals.grad.abs().sum() > 0
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_errors_name_what_is_wrong(device):
+    normals, views, roughness, *_ = query_inputs(device, torch.float32)
+    check_error(lambda: query_direction(normals, views, roughness[:, 0]), "query_direction", "roughness", "[7, 1] float32", "[7]")
+    check_error(lambda: query_direction(normals, views.double(), roughness), "query_direction", "view_dirs", "float32", "float64")
+    check_error(lambda: query_direction(normals, views[:3], roughness), "view_dirs", "[7, 3]", "[3, 3]")
+    check_error(lambda: query_direction(normals, views, roughness, "median"), "query_direction", "query", "mean", "median")
+    check_error(lambda: lib.query_direction(normals, views, roughness, brdf_lut(device)[1:], True), "lut", "[32, 32, 3]", "[31, 32, 3]")
+    inputs = sample_inputs(device, torch.float32)
+    names = ("normals", "view_dirs", "albedo", "roughness", "metallic", "specular", "diffuse", "occlusion_s", "occlusion_d")
+    for i, name in enumerate(names):
+        bad = [*inputs]
+        bad[i] = inputs[i].repeat(1, 2)
+        check_error(lambda bad=bad: lib.split_sum_shade(*bad), "split_sum_shade", name, "float32", f"[7, {bad[i].shape[1]}]")
+    check_error(lambda: split_sum_shade(*inputs[:9], fresnel_mode="fast"), "split_sum_shade", "fresnel_mode", "exact", "fast")
+    check_error(lambda: lib.split_sum_shade(*inputs[:10], 3, False), "split_sum_shade", "fresnel_mode", "3")
