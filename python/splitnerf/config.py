@@ -54,6 +54,7 @@ class Config:
     occlusion_directional: bool = True  # o_s as a function of the reflection; false: of position alone (the paper)
     occlusion_width: int = 64
     occlusion_layers: int = 2
+    initial_roughness: float = 0.3
     light_width: int = 64
     light_layers: int = 3
     light_direction_frequencies: int = 6
@@ -83,7 +84,7 @@ class Config:
     colour_weight: float = 10.0
     light_weight: float = 1.0
     occlusion_weight: float = 0.1
-    eikonal_weight: float = 0.1
+    eikonal_weight: float = 3.0
     metal_weight: float = 0.001
     metal_regulariser: bool = True
     mask_weight: float = 1.0
@@ -162,12 +163,12 @@ class Config:
 # Section 4 and supplement of the paper; fractions stand for 20,000 steps.
 PAPER = dict(
     preset="paper", steps=20000, n_levels=16, base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4,
-    levels_open_by=0.6, sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0, material_width=256,
+    levels_open_by=0.6, sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0, material_width=256, initial_roughness=0.5,
     head_inputs="outputs", occlusion_directional=False, occlusion_width=256, light_width=256, light_layers=5,
     light_direction_frequencies=10, light_roughness_frequencies=5, light_activation="softplus", fresnel_mode="paper",
     query="reflection", compensate=False, compositing="srgb", initial_rays=256, target_samples=262144, step_scale=0.0,
     min_step=3**0.5 * 3 / 1024, min_transmittance=0.0, shade_above=0.0, grid_resolution=128, grid_every=16,
-    hull_until=0.0, foreground_share=0.0, light_weight=10.0, occlusion_weight=0.01, mask_weight=0.0,
+    hull_until=0.0, foreground_share=0.0, eikonal_weight=0.1, light_weight=10.0, occlusion_weight=0.01, mask_weight=0.0,
     light_samples=8129, light_queries=8129, light_lobe_below=0.0, eikonal_points=0, mesh_resolution=512,
     occlusion_rays=64, environment_height=128, warmup_steps=500, export_resolution=512,
 )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
@@ -28,10 +30,12 @@ class MaterialHead(nn.Module):
     Source: SplitNeRF, section 4.2.
     """
 
-    def __init__(self, n_inputs: int, width: int = 256, n_layers: int = 2):
+    def __init__(self, n_inputs: int, width: int = 256, n_layers: int = 2, initial_roughness: float = 0.5):
         super().__init__()
         self.net = relu_mlp(n_inputs, width, n_layers, 5)
+        share = min(max((initial_roughness - MIN_ROUGHNESS) / (1.0 - MIN_ROUGHNESS), 1e-3), 1.0 - 1e-3)
         with torch.no_grad():
+            self.net[-1].bias[3] = math.log(share / (1.0 - share))
             self.net[-1].bias[4] = -2.0  # most of the world is no metal
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -49,7 +49,9 @@ class SceneModel(nn.Module):
         )
         self.sdf_field = SdfField(spec, config.box, config.sdf_width, config.sdf_outputs, config.sphere_radius)
         n_inputs = config.sdf_outputs + (3 + spec.n_outputs if config.head_inputs == "grid" else 0)
-        self.material = MaterialHead(n_inputs, config.material_width, config.material_layers)
+        self.material = MaterialHead(
+            n_inputs, config.material_width, config.material_layers, config.initial_roughness
+        )
         self.occlusion = (
             OcclusionHead(
                 n_inputs, config.occlusion_width, config.occlusion_layers, config.occlusion_channels,
