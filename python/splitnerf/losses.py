@@ -8,7 +8,6 @@ from torch.nn import functional as F
 
 from splitnerf.config import Config
 from splitnerf.fields import LightMlp
-from splitnerf.fields.heads import smooth_l1_elements
 from splitnerf.ops import MeshScene, fibonacci_directions, occlusion_factors, prefilter_light, sample_ggx_lobe
 from splitnerf.render.renderer import RenderedRays
 
@@ -75,7 +74,7 @@ def light_loss(light: LightMlp, config: Config, generator: torch.Generator, seed
         lobes.view(n_narrow, c.light_lobe_samples, 3).mean(1),
         prefilter_light(queries[n_narrow:], roughness[n_narrow:], directions, shared),
     ])  # fmt: skip
-    return smooth_l1_elements(prefiltered, g_bar).sum(-1).mean()
+    return F.smooth_l1_loss(prefiltered, g_bar, reduction="none").sum(-1).mean()
 
 
 def occlusion_loss(

@@ -27,7 +27,7 @@ from splitnerf.render.occupancy import OccupancyGrid, visual_hull
 from splitnerf.render.rays import pixel_rays
 from splitnerf.render.renderer import render_rays, sample_step
 
-LOG_EVERY = 20  # steps between lines of metrics.jsonl
+LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first ones are logged one by one
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion rays
 
 
@@ -190,7 +190,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, max_minutes: float = 0
             psnr_mean = psnr if psnr_mean is None else 0.95 * psnr_mean + 0.05 * psnr
             samples_mean = n_samples / len(rays_o)
             bar.show(progress_now(), step, psnr_mean, samples_mean)
-            if step % LOG_EVERY == 0 or progress_now() >= 1.0:
+            if step % LOG_EVERY == 0 or step <= LOG_EVERY or progress_now() >= 1.0:
                 log.write(json.dumps({
                     "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss.item(),
                     **{f"loss_{name}": term.item() for name, term in terms.items()}, "psnr": psnr_mean,

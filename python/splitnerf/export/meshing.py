@@ -49,7 +49,7 @@ def extract_mesh(sdf: Callable[[Tensor], Tensor], box: float, resolution: int) -
     values = coarse.view(-1, 1).expand(-1, BLOCK**3).clone()
     offset = (torch.arange(BLOCK) - 0.5 * (BLOCK - 1)) * spacing
     offsets = torch.stack(torch.meshgrid(offset, offset, offset, indexing="ij"), -1).reshape(-1, 3)
-    for chunk in near.split(256):
+    for chunk in near.split(256) if len(near) else ():
         points = centres[chunk][:, None, :] + offsets
         values[chunk] = sdf(points.reshape(-1, 3)).view(len(chunk), -1)
     grid = values.view(n_blocks, n_blocks, n_blocks, BLOCK, BLOCK, BLOCK).permute(0, 3, 1, 4, 2, 5).reshape(n, n, n)
@@ -59,7 +59,7 @@ def extract_mesh(sdf: Callable[[Tensor], Tensor], box: float, resolution: int) -
         raise RuntimeError("the signed distance field is not finite: the training diverged")
     if volume.min() >= 0.0:
         raise EmptyMesh("the surface is empty: nothing inside the box has a negative distance")
-    vertices, faces, _, _ = marching_cubes(volume, 0.0, gradient_direction="ascent")
+    vertices, faces, _, _ = marching_cubes(volume, 0.0, gradient_direction="descent")
     vertices = (vertices - 1.0) * spacing - box
     return vertices.astype(np.float32), np.ascontiguousarray(faces, dtype=np.int32)
 

@@ -6,7 +6,6 @@ import math
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional as F
 
 MIN_ROUGHNESS = 0.05  # below it a mirror's lobe is narrower than what images of this size resolve
 
@@ -64,17 +63,7 @@ class OcclusionHead(nn.Module):
         """-> o_d, o_s, [n, n_channels] each."""
         if self.directional:
             x, y, z = lobe_dirs.unbind(-1)
-            second_order = torch.stack([x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1, z * z * z], dim=-1)
-            features = torch.cat([features, lobe_dirs, second_order, roughness], dim=-1)
+            products = torch.stack([x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1, z * z * z], dim=-1)
+            features = torch.cat([features, lobe_dirs, products, roughness], dim=-1)
         out = torch.sigmoid(self.net(features))
         return out[:, : self.n_channels], out[:, self.n_channels :]
-
-
-def sharpness(variance: Tensor) -> Tensor:
-    """s = exp(10 v) of the NeuS density, exponent clamped to [0, 9]."""
-    return torch.exp(torch.clamp(10.0 * variance, 0.0, 9.0))
-
-
-def smooth_l1_elements(a: Tensor, b: Tensor) -> Tensor:
-    """Smooth L1 element by element, as the released code takes for light and occlusion."""
-    return F.smooth_l1_loss(a, b, reduction="none")

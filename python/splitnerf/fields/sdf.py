@@ -58,7 +58,6 @@ class SdfField(nn.Module):
         out[0] = math.sqrt(math.pi / width) + torch.randn(width) * 1e-4
         bias = torch.zeros(n_outputs)
         bias[0] = -radius
-        # The columns of the hash features start at 0: a floor keeps the rows' directions trainable.
         self.hidden_direction = nn.Parameter(hidden)
         self.hidden_length = nn.Parameter(hidden.norm(dim=1, keepdim=True))
         self.hidden_bias = nn.Parameter(torch.zeros(width))
@@ -76,28 +75,31 @@ class SdfField(nn.Module):
     def _to_unit(self, positions: Tensor) -> Tensor:
         return positions * (0.5 / self.box) + 0.5
 
+    def _inputs(self, positions: Tensor, features: Tensor) -> Tensor:
+        return torch.cat([positions, features], dim=1)
+
+    def _outputs(self, inputs: Tensor, n_outputs: int | None = None) -> Tensor:
+        """The first n_outputs outputs (default: all)."""
+        hidden, out = self._weights()
+        h = F.softplus(F.linear(inputs, hidden, self.hidden_bias), SOFTPLUS_BETA)
+        return F.linear(h, out[:n_outputs], self.out_bias[:n_outputs])
+
     def forward(self, positions: Tensor) -> Tensor:
         """outputs [n, n_outputs] at positions [n, 3], scene units."""
-        hidden, out = self._weights()
-        x = torch.cat([positions, self.grid(self._to_unit(positions))], dim=1)
-        return F.linear(F.softplus(F.linear(x, hidden, self.hidden_bias), SOFTPLUS_BETA), out, self.out_bias)
+        return self._outputs(self._inputs(positions, self.grid(self._to_unit(positions))))
 
     def sdf(self, positions: Tensor) -> Tensor:
         """Signed distance [n] at positions [n, 3], scene units."""
-        hidden, out = self._weights()
-        x = torch.cat([positions, self.grid(self._to_unit(positions))], dim=1)
-        h = F.softplus(F.linear(x, hidden, self.hidden_bias), SOFTPLUS_BETA)
-        return (h @ out[0]) + self.out_bias[0]
+        return self._outputs(self._inputs(positions, self.grid(self._to_unit(positions))), 1)[:, 0]
 
-    def sample(self, positions: Tensor, with_features: bool = True) -> SdfSample:
+    def sample(self, positions: Tensor) -> SdfSample:
         """Outputs, grid features and the analytic gradient in one pass.
 
         Differentiable once in all parameters (not in positions).
         """
         hidden, out = self._weights()
         features, jacobian = self.grid.jacobian(self._to_unit(positions))
-        x = torch.cat([positions, features], dim=1)
-        pre = F.linear(x, hidden, self.hidden_bias)
+        pre = F.linear(self._inputs(positions, features), hidden, self.hidden_bias)
         outputs = F.linear(F.softplus(pre, SOFTPLUS_BETA), out, self.out_bias)
         slope = (torch.sigmoid(SOFTPLUS_BETA * pre) * out[0]) @ hidden  # d sdf / d input, [n, 3 + C]
         gradient = slope[:, :3] + (jacobian * slope[:, None, 3:]).sum(-1) * (0.5 / self.box)
@@ -108,15 +110,13 @@ class SdfField(nn.Module):
 
         Source: SplitNeRF, section 4.1 (Neuralangelo's numerical gradients).
         """
-        levels = self.grid.spec.levels()
-        resolution = levels[max(0, self.grid.n_active - 1)][0]
+        resolution = self.grid.spec.levels()[max(0, self.grid.n_active - 1)][0]
         eps = 2.0 * self.box / resolution
         steps = eps * torch.cat([torch.eye(3), -torch.eye(3)]).to(positions)
         taps = self.sdf((positions[:, None, :] + steps).reshape(-1, 3)).view(-1, 2, 3)
         features = self.grid(self._to_unit(positions))
-        hidden, out = self._weights()
-        h = F.softplus(F.linear(torch.cat([positions, features], 1), hidden, self.hidden_bias), SOFTPLUS_BETA)
-        return SdfSample(F.linear(h, out, self.out_bias), features, (taps[:, 0] - taps[:, 1]) / (2.0 * eps))
+        outputs = self._outputs(self._inputs(positions, features))
+        return SdfSample(outputs, features, (taps[:, 0] - taps[:, 1]) / (2.0 * eps))
 
 
 def unit_normals(gradient: Tensor) -> Tensor:
@@ -124,3 +124,8 @@ def unit_normals(gradient: Tensor) -> Tensor:
     squared = (gradient * gradient).sum(-1, keepdim=True)
     gradient = torch.where(squared < 1e-6, gradient.detach(), gradient)
     return gradient * torch.rsqrt((gradient * gradient).sum(-1, keepdim=True) + 1e-12)
+
+
+def sharpness(variance: Tensor) -> Tensor:
+    """s = exp(10 v) of the NeuS density Phi(f) = sigmoid(s f), exponent clamped to [0, 9]."""
+    return torch.exp(torch.clamp(10.0 * variance, 0.0, 9.0))

@@ -9,8 +9,7 @@ from torch import Tensor, nn
 
 from splitnerf.config import Config
 from splitnerf.fields import LightMlp, MaterialHead, OcclusionHead, SdfField
-from splitnerf.fields.heads import sharpness
-from splitnerf.fields.sdf import SdfSample
+from splitnerf.fields.sdf import SdfSample, sharpness
 from splitnerf.ops import HashGridSpec, query_direction, split_sum_shade
 
 

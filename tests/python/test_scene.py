@@ -1,0 +1,309 @@
+"""Fields, occupancy, rendering, meshing and losses: closed forms of a sphere and of constant light."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from splitnerf import losses
+from splitnerf.config import preset
+from splitnerf.export.meshing import EmptyMesh, drop_floaters, extract_mesh
+from splitnerf.fields import LightMlp, OcclusionHead, SdfField
+from splitnerf.fields.sdf import sharpness, unit_normals
+from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec
+from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import OccupancyGrid, visual_hull
+from splitnerf.render.rays import image_rays
+from splitnerf.render.renderer import annealed_cosine, linear_to_srgb, render_rays, render_view, sample_step
+
+RADIUS = 0.7
+
+
+def sphere(points: torch.Tensor) -> torch.Tensor:
+    return points.norm(dim=1) - RADIUS
+
+
+def perturbed_field() -> SdfField:
+    torch.manual_seed(0)
+    field = SdfField(HashGridSpec(n_levels=5, base_resolution=8, growth=1.5, log2_table_size=10), box=1.5)
+    with torch.no_grad():
+        field.grid.table.normal_(std=0.05)
+        field.hidden_direction.add_(0.1 * torch.randn_like(field.hidden_direction))
+    return field
+
+
+class TestSdf:
+    def test_the_closed_gradient_is_that_of_autograd(self):
+        field = perturbed_field()
+        points = (torch.rand(200, 3) * 2 - 1).requires_grad_()
+        (expected,) = torch.autograd.grad(field.sdf(points).sum(), points)
+        torch.testing.assert_close(field.sample(points.detach()).gradient, expected, rtol=1e-4, atol=1e-5)
+
+    def test_finite_differences_approach_it_where_the_field_is_smooth(self):
+        torch.manual_seed(1)
+        field = SdfField(HashGridSpec(n_levels=3, base_resolution=64, growth=1.5, log2_table_size=10), box=1.5)
+        points = torch.rand(300, 3) * 2 - 1
+        points = points[points.norm(dim=1) > 0.2]
+        exact = unit_normals(field.sample(points).gradient)
+        taps = unit_normals(field.sample_finite_difference(points).gradient)
+        assert (exact * taps).sum(-1).min() > 0.99
+
+    def test_it_starts_as_a_sphere(self):
+        torch.manual_seed(2)
+        field = SdfField(HashGridSpec(n_levels=4, log2_table_size=10), box=1.5, width=512, radius=0.6)
+        points = torch.nn.functional.normalize(torch.randn(200, 3), dim=1)
+        assert field.sdf(0.3 * points).max() < 0 < field.sdf(1.0 * points).min()
+
+    def test_closed_levels_do_not_count(self):
+        field = perturbed_field()
+        points = torch.rand(50, 3)
+        field.grid.n_active = 2
+        before = field.sdf(points)
+        with torch.no_grad():
+            first_closed = field.grid.spec.levels()[2][1]
+            field.grid.table[first_closed:] += 1.0
+        assert torch.equal(before, field.sdf(points))
+
+    def test_zero_gradients_give_finite_normals(self):
+        gradient = torch.zeros(3, 3, requires_grad=True)
+        normals = unit_normals(gradient)
+        normals.sum().backward()
+        assert torch.isfinite(normals).all() and torch.equal(gradient.grad, torch.zeros(3, 3))
+
+    def test_sharpness_is_bounded(self):
+        assert sharpness(torch.tensor(100.0)) == pytest.approx(math.exp(9.0), rel=1e-5)
+        assert sharpness(torch.tensor(0.3)) == pytest.approx(math.exp(3.0), rel=1e-5)
+
+
+class TestLight:
+    @pytest.mark.parametrize("activation", ["softplus", "exp"])
+    def test_it_is_never_negative_and_starts_at_half(self, activation):
+        torch.manual_seed(0)
+        light = LightMlp(width=16, n_layers=2, activation=activation)
+        panorama = light.panorama(16, 0.5)
+        assert panorama.shape == (16, 32, 3) and panorama.min() > 0
+        assert panorama.mean() == pytest.approx(0.5, abs=0.1)
+
+    def test_the_loss_vanishes_for_constant_light(self):
+        """g = L for every roughness is consistent: the integral of a constant is that constant."""
+        light = LightMlp(width=16, n_layers=2)
+        with torch.no_grad():
+            light.out.weight.zero_()
+        config = preset("cpu").replace({"light_samples": 512, "light_queries": 64})
+        assert losses.light_loss(light, config, torch.Generator().manual_seed(0), 0).item() < 1e-10
+
+    def test_the_loss_sees_light_that_forgets_the_roughness(self):
+        """A light that is the same bright spot for all roughness is inconsistent, and the gradient reaches it."""
+        torch.manual_seed(0)
+        light = LightMlp(width=16, n_layers=2)
+        with torch.no_grad():
+            light.out.weight.normal_(std=1.0)
+        config = preset("cpu").replace({"light_samples": 512, "light_queries": 64})
+        loss = losses.light_loss(light, config, torch.Generator().manual_seed(0), 0)
+        loss.backward()
+        assert loss.item() > 1e-2 and light.out.weight.grad.abs().max() > 0
+
+
+class TestOcclusionHead:
+    def test_the_papers_head_ignores_the_reflection(self):
+        torch.manual_seed(0)
+        features, directions, roughness = torch.randn(6, 13), torch.randn(6, 3), torch.rand(6, 1)
+        for directional in (False, True):
+            head = OcclusionHead(13, 16, 2, 1, directional)
+            with torch.no_grad():
+                head.net[-1].weight.normal_()
+            _, a = head(features, directions, roughness)
+            _, b = head(features, -directions, roughness)
+            assert torch.equal(a, b) != directional
+            assert ((a >= 0) & (a <= 1)).all()
+
+
+class TestOccupancy:
+    @pytest.mark.parametrize("s", [20.0, 200.0, 2000.0])
+    def test_no_cell_near_the_surface_is_skipped(self, s):
+        grid = OccupancyGrid(24, 1.5)
+        grid.update(sphere, s)
+        points = torch.nn.functional.normalize(torch.randn(4000, 3), dim=1) * (RADIUS + torch.randn(4000, 1) * 2.0 / s)
+        cell = ((points + 1.5) / (3.0 / 24)).long().clamp(0, 23)
+        assert (grid.cells[cell[:, 0], cell[:, 1], cell[:, 2]] == CELL_OCCUPIED).all()
+
+    def test_inside_is_opaque_and_outside_empty(self):
+        grid = OccupancyGrid(24, 1.5)
+        grid.update(sphere, 1000.0)
+        assert grid.cells[12, 12, 12] == CELL_OPAQUE and grid.cells[0, 0, 0] == CELL_EMPTY
+
+    def test_partial_updates_follow_a_moving_surface(self):
+        grid = OccupancyGrid(24, 1.5)
+        grid.update(sphere, 100.0)
+        for i in range(1, 21):
+            grid.update(lambda x, i=i: x.norm(dim=1) - RADIUS - 0.01 * i, 100.0, share=0.1)
+        whole = OccupancyGrid(24, 1.5)
+        whole.update(lambda x: x.norm(dim=1) - RADIUS - 0.2, 100.0)
+        needed = whole.cells == CELL_OCCUPIED
+        assert (grid.cells[needed] == CELL_OCCUPIED).all()
+
+    def test_a_thin_wire_survives(self):
+        """A wire of a twentieth of a cell: its cells stay, though their centres are outside it."""
+        wire = lambda x: x[:, :2].norm(dim=1) - 0.006  # noqa: E731
+        grid = OccupancyGrid(24, 1.5)
+        grid.update(wire, 1000.0)
+        z = torch.linspace(-1.4, 1.4, 200)
+        cell = ((torch.stack([torch.full_like(z, 0.003), torch.zeros_like(z), z], 1) + 1.5) / (3.0 / 24)).long()
+        assert (grid.cells[cell[:, 0], cell[:, 1], cell[:, 2]] == CELL_OCCUPIED).all()
+
+
+def orbit(n: int, distance: float = 4.0) -> torch.Tensor:
+    """Cameras around the z axis that look at the origin."""
+    poses = []
+    for k in range(n):
+        angle = 2 * math.pi * k / n
+        back = torch.tensor([math.cos(angle), math.sin(angle), 0.0])
+        right = torch.tensor([-math.sin(angle), math.cos(angle), 0.0])
+        pose = torch.eye(4)
+        pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, torch.tensor([0.0, 0.0, 1.0]), back, distance * back
+        poses.append(pose)
+    return torch.stack(poses)
+
+
+class TestHull:
+    def test_the_hull_of_discs_holds_the_sphere(self):
+        size, focal, distance = 160, 100.0, 4.0
+        y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
+        radius = focal * RADIUS / math.sqrt(distance**2 - RADIUS**2)
+        mask = (((x - 80) ** 2 + (y - 80) ** 2) < radius**2).float()
+        hull = visual_hull(32, 1.5, mask.expand(8, -1, -1), orbit(8), torch.tensor([[focal, focal, 80.0, 80.0]] * 8))
+        grid = OccupancyGrid(32, 1.5)
+        inside = (grid.centres().norm(dim=1) < RADIUS).view(32, 32, 32)
+        assert hull[inside].all()
+        far = (grid.centres()[:, :2].norm(dim=1) > RADIUS + 0.4).view(32, 32, 32)
+        assert not hull[far].any()
+
+
+@pytest.fixture
+def sphere_model() -> tuple[SceneModel, OccupancyGrid]:
+    """The untouched model with an exact sphere, sharp, under constant white light."""
+    torch.manual_seed(0)
+    model = SceneModel(preset("cpu").replace({"n_levels": 4, "start_levels": 4, "log2_table_size": 10, "sdf_width": 512}))
+    field = model.sdf_field
+    with torch.no_grad():
+        model.variance.fill_(0.55)
+        model.light.out.weight.zero_()
+        model.light.out.bias.zero_()  # exp(0) = 1
+        # |x| as the mean of |w.x| over many directions: exact up to the spread of the random rows.
+        lattice = torch.nn.functional.normalize(torch.randn(512, 3), dim=1)
+        field.hidden_direction.zero_()
+        field.hidden_direction[:, :3] = torch.cat([lattice[:256], -lattice[:256]])
+        field.hidden_length.fill_(1.0)
+        field.out_direction[0].fill_(1.0)
+        field.out_length[0] = 4.0 / math.sqrt(512)
+        field.out_bias[0] = -RADIUS
+    grid = OccupancyGrid(64, 1.5)
+    grid.update(field.sdf, model.s_value)
+    return model, grid
+
+
+class TestRendering:
+    def test_a_sphere_covers_its_disc(self, sphere_model):
+        model, grid = sphere_model
+        maps = render_view(model, grid.cells, orbit(1)[0], torch.tensor([100.0, 100.0, 32.0, 32.0]), 64, 64)
+        covered = (maps["alpha"] > 0.5).float().sum().item()
+        radius = 100.0 * RADIUS / math.sqrt(16.0 - RADIUS**2)
+        assert covered == pytest.approx(math.pi * radius**2, rel=0.06)
+        assert maps["alpha"][0, 0] == 0.0 and maps["alpha"][32, 32] > 0.99
+
+    def test_normals_face_the_camera_and_the_light_is_the_albedo(self, sphere_model):
+        model, grid = sphere_model
+        maps = render_view(model, grid.cells, orbit(1)[0], torch.tensor([100.0, 100.0, 32.0, 32.0]), 64, 64)
+        centre = maps["normal"][31:33, 31:33].mean((0, 1))
+        assert centre[0] > 0.98
+        # Under constant light L = 1 a dielectric of albedo a returns (1 - E) a + E with E small, m ~ .12.
+        rgb, albedo = maps["rgb"][32, 32], maps["albedo"][32, 32]
+        linear = torch.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        assert (linear > 0.8 * albedo).all() and (linear < albedo + 0.15).all()
+
+    def test_skipping_faint_samples_changes_little(self, sphere_model):
+        model, grid = sphere_model
+        rays_o, rays_d = image_rays(orbit(1)[0], torch.tensor([50.0, 50.0, 16.0, 16.0]), 32, 32)
+        jitter = torch.full((len(rays_o),), 0.5)
+        colours = []
+        for threshold in (0.0, 1e-3):
+            model.config.shade_above = threshold
+            ray = render_rays(model, grid.cells, rays_o, rays_d, jitter, 1.0, sample_step(model))
+            colours.append((ray.colour * ray.opacity[:, None]).detach())
+        assert (colours[0] - colours[1]).abs().max() < 0.02
+
+    def test_srgb_has_a_finite_slope_at_black(self):
+        x = torch.tensor([0.0, 1e-9, 0.0031308, 0.5, 4.0], requires_grad=True)
+        y = linear_to_srgb(x)
+        y.sum().backward()
+        assert torch.isfinite(x.grad).all() and x.grad[0] == pytest.approx(12.92)
+        assert y[3].item() == pytest.approx(0.735357, abs=1e-5) and y[4] > 1.0
+
+    def test_the_cosine_anneals_from_soft_to_sharp(self):
+        c = torch.tensor([-1.0, 0.0, 1.0])
+        assert annealed_cosine(c, 1.0).tolist() == [-1.0, 0.0, 0.0]
+        assert annealed_cosine(c, 0.0).tolist() == [-1.0, -0.5, 0.0]
+
+
+class TestMeshing:
+    def test_a_sphere_is_closed_outward_and_of_the_right_size(self):
+        import trimesh
+
+        vertices, faces = extract_mesh(sphere, 1.5, 64)
+        mesh = trimesh.Trimesh(vertices, faces)
+        assert mesh.is_watertight and mesh.volume == pytest.approx(4 / 3 * math.pi * RADIUS**3, rel=0.01)
+        assert np.abs(np.linalg.norm(vertices, axis=1) - RADIUS).max() < 2e-3
+
+    def test_skipped_blocks_change_nothing(self):
+        """The blocks that are left out hold no surface: the mesh is that of the dense grid."""
+        evaluated = 0
+
+        def counting(x):
+            nonlocal evaluated
+            evaluated += len(x)
+            return sphere(x)
+
+        vertices, _ = extract_mesh(counting, 1.5, 96)
+        axis = torch.linspace(-1.5, 1.5, 96)
+        dense = sphere(torch.stack(torch.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)).view(96, 96, 96)
+        from skimage.measure import marching_cubes
+
+        expected, _, _, _ = marching_cubes(dense.numpy(), 0.0)
+        assert len(vertices) == len(expected)
+        assert evaluated < 0.35 * 96**3
+
+    def test_what_reaches_the_border_is_closed(self):
+        import trimesh
+
+        mesh = trimesh.Trimesh(*extract_mesh(lambda x: x[:, 2], 1.5, 24))
+        assert mesh.is_watertight and mesh.volume > 0
+
+    def test_no_surface_raises(self):
+        with pytest.raises(EmptyMesh):
+            extract_mesh(lambda x: torch.ones(len(x)), 1.5, 16)
+        with pytest.raises(RuntimeError, match="not finite"):
+            extract_mesh(lambda x: torch.full((len(x),), float("nan")), 1.5, 16)
+
+    def test_small_components_go(self):
+        def two(x):
+            return torch.minimum(sphere(x), (x - torch.tensor([1.3, 1.3, 1.3])).norm(dim=1) - 0.05)
+
+        vertices, faces = drop_floaters(*extract_mesh(two, 1.5, 96))
+        assert np.abs(vertices).max() < RADIUS + 0.05 and faces.max() == len(vertices) - 1
+
+
+class TestColourLoss:
+    def test_a_clipped_photo_asks_only_for_enough(self, sphere_model):
+        model, grid = sphere_model
+        rays_o, rays_d = image_rays(orbit(1)[0], torch.tensor([50.0, 50.0, 4.0, 4.0]), 8, 8)
+        ray = render_rays(model, grid.cells, rays_o, rays_d, torch.full((64,), 0.5), 1.0, sample_step(model))
+        target = torch.cat([torch.ones(64, 3), ray.opacity.detach()[:, None]], 1)
+        ray.colour = torch.full_like(ray.colour, 3.0).requires_grad_()
+        loss = losses.colour_loss(ray, target, torch.zeros(64, 3))
+        loss.backward()
+        assert loss.item() == pytest.approx(0.0, abs=1e-9)
+        ray.colour = torch.full_like(ray.colour, 0.5)
+        assert losses.colour_loss(ray, target, torch.zeros(64, 3)).item() > 0.05
