@@ -14,6 +14,7 @@ import splitnerf
 from splitnerf.errors import InputError
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+UNLIMITED_STEPS = 10**9
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -61,7 +62,7 @@ def build_parser() -> argparse.ArgumentParser:
 def _add_training_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preset", choices=["cpu", "paper"], help="cpu: small, for a few cores (default); paper: the publication's settings")
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
-    parser.add_argument("--max-minutes", type=float, default=0.0, metavar="M", help="training time; the schedule fits itself to it")
+    parser.add_argument("--max-minutes", type=float, metavar="M", help="training time; the schedule fits itself to it")
     parser.add_argument("--device", choices=["cpu"], default="cpu", help="where to train (the operators run on the CPU)")
     parser.add_argument("--seed", type=int, help="of all random numbers (default: 0)")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change one setting; `splitnerf info --settings` lists them")
@@ -74,28 +75,34 @@ def run_train(args: argparse.Namespace) -> int:
 
     if args.resume and args.overwrite:
         raise InputError("--resume and --overwrite exclude each other")
-    if args.max_minutes < 0:
-        raise InputError(f"--max-minutes must not be negative, got {args.max_minutes}")
+    if args.max_minutes is not None and args.max_minutes <= 0:
+        raise InputError(f"--max-minutes must be positive, got {args.max_minutes}")
     run = args.out or Path("runs") / args.data.resolve().name
     settings = dict(parse_setting(text) for text in args.settings)
-    settings |= {key: value for key in ("steps", "seed") if (value := getattr(args, key)) is not None}
+    settings |= _budget(args.steps, args.max_minutes)
+    if args.seed is not None:
+        settings["seed"] = args.seed
     if args.resume:
         if args.preset:
             raise InputError("--preset cannot change in a run that is resumed")
         base = config_of(load_checkpoint(run / "checkpoint.pt"))
     else:
         base = preset(args.preset or "cpu")
-    if args.max_minutes > 0 and args.steps is None and "steps" not in settings:
-        settings["steps"] = 10**9  # the clock alone ends the run
     trained, evaluation = reconstruct(
-        args.data, run, base.replace(settings), downscale=args.downscale, max_minutes=args.max_minutes,
-        resume=args.resume, overwrite=args.overwrite,
-    )  # fmt: skip
+        args.data, run, base.replace(settings), downscale=args.downscale, resume=args.resume, overwrite=args.overwrite
+    )
     if evaluation is None:
         print(f"stopped at step {trained.step}; the state is in {run}. To go on, repeat the command with --resume.")
         return INTERRUPTED
     print_summary(run, evaluation, trained.step, trained.seconds)
     return DONE
+
+
+def _budget(steps: int | None, minutes: float | None) -> dict[str, object]:
+    """The settings that end a run: of steps and minutes what was asked for alone counts, both count together."""
+    if minutes is None:
+        return {} if steps is None else {"steps": steps, "max_minutes": 0.0}
+    return {"steps": UNLIMITED_STEPS if steps is None else steps, "max_minutes": minutes}
 
 
 def run_demo(args: argparse.Namespace) -> int:
@@ -107,8 +114,8 @@ def run_demo(args: argparse.Namespace) -> int:
     data = args.out / "data"
     print(f"rendering the demo scene into {data} ...", file=sys.stderr)
     write_demo_dataset(data, seed=args.seed)
-    config = preset("cpu").replace({"steps": 10**9, "seed": args.seed})
-    trained, evaluation = reconstruct(data, args.out, config, max_minutes=args.max_minutes, overwrite=True)
+    config = preset("cpu").replace({"seed": args.seed, **_budget(None, args.max_minutes)})
+    trained, evaluation = reconstruct(data, args.out, config, overwrite=True)
     if evaluation is None:
         print("stopped; run the demo again to start over.")
         return INTERRUPTED

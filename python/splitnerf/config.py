@@ -28,6 +28,7 @@ class Config:
     preset: str = "cpu"
     seed: int = 0
     steps: int = 6000
+    max_minutes: float = 0.0  # training time; 0: only the steps count
     box: float = 1.5
 
     # Surface: hash grid, progressive levels, one hidden layer.

@@ -75,7 +75,7 @@ class PixelSource:
         return rays_o, rays_d, self.pixels[index]
 
 
-def train(dataset: Dataset, config: Config, run: Path, *, max_minutes: float = 0.0, resume: bool = False) -> TrainedScene:
+def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) -> TrainedScene:
     """Trains a scene and keeps a checkpoint, a log and previews in the run's folder.
 
     The schedule (learning rate, levels, annealing, meshes) follows the progress: the share of steps
@@ -85,7 +85,6 @@ def train(dataset: Dataset, config: Config, run: Path, *, max_minutes: float = 0
         dataset: The train split.
         config: Settings; with ``resume`` those of the checkpoint are meant to be passed.
         run: The run's folder, which exists.
-        max_minutes: Budget of training time; 0 for none.
         resume: Continue from ``run/checkpoint.pt``.
 
     Raises:
@@ -138,7 +137,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, max_minutes: float = 0
         )  # fmt: skip
 
     def progress_now() -> float:
-        by_time = seconds / (60.0 * max_minutes) if max_minutes > 0 else 0.0
+        by_time = seconds / (60.0 * c.max_minutes) if c.max_minutes > 0 else 0.0
         return min(1.0, max(step / c.steps, by_time))
 
     started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True

@@ -59,9 +59,8 @@ def prepare_run(run: Path, *, resume: bool, overwrite: bool) -> None:
 
 
 def reconstruct(
-    data: Path, run: Path, config: Config, *, downscale: int = 1, max_minutes: float = 0.0, resume: bool = False,
-    overwrite: bool = False,
-) -> tuple[TrainedScene, dict | None]:  # fmt: skip
+    data: Path, run: Path, config: Config, *, downscale: int = 1, resume: bool = False, overwrite: bool = False
+) -> tuple[TrainedScene, dict | None]:
     """Trains on a dataset and fills the run's folder. Returns the scene and, when finished, its evaluation.
 
     Raises:
@@ -71,7 +70,7 @@ def reconstruct(
     dataset, test = load_splits(data, downscale)
     prepare_run(run, resume=resume, overwrite=overwrite)
     config.write(run / "config.toml")
-    trained = train(dataset, config, run, max_minutes=max_minutes, resume=resume)
+    trained = train(dataset, config, run, resume=resume)
     if not trained.finished:
         return trained, None
     return trained, finish(trained.model, trained.grid, dataset, test, run, {"training": trained.seconds})
