@@ -16,7 +16,7 @@ if(SPLITNERF_EMBREE)
   endif()
 endif()
 
-# Installs the shared libraries of Embree and its tbb beside ours.
+# Installs the shared libraries of Embree and its tbb beside ours, under the names by which they are asked for.
 function(splitnerf_bundle_embree destination)
   install(CODE "
     file(GET_RUNTIME_DEPENDENCIES
@@ -24,7 +24,13 @@ function(splitnerf_bundle_embree destination)
       RESOLVED_DEPENDENCIES_VAR resolved UNRESOLVED_DEPENDENCIES_VAR unresolved
       PRE_INCLUDE_REGEXES \"embree\" \"tbb\" PRE_EXCLUDE_REGEXES \".*\")
     foreach(library IN LISTS resolved)
-      file(INSTALL DESTINATION \"\${CMAKE_INSTALL_PREFIX}/${destination}\" TYPE SHARED_LIBRARY
-        FOLLOW_SYMLINK_CHAIN FILES \"\${library}\")
+      get_filename_component(name \"\${library}\" NAME)
+      file(REAL_PATH \"\${library}\" real)
+      get_filename_component(real_name \"\${real}\" NAME)
+      file(INSTALL DESTINATION \"\${CMAKE_INSTALL_PREFIX}/${destination}\" TYPE SHARED_LIBRARY FILES \"\${real}\")
+      if(NOT name STREQUAL real_name)
+        file(RENAME \"\${CMAKE_INSTALL_PREFIX}/${destination}/\${real_name}\"
+          \"\${CMAKE_INSTALL_PREFIX}/${destination}/\${name}\")
+      endif()
     endforeach()")
 endfunction()

@@ -117,17 +117,32 @@ def write_run_report(
         truth |= {"rgb": views.images[i, ..., :3], "alpha": views.images[i, ..., 3]}
         pages.append({"name": views.frame_names[i], "truth": truth, "prediction": prediction})
     lines = (run / "metrics.jsonl").read_text().splitlines()
-    headline = {key: value for key, value in evaluation.items() if value is not None}
     write_report(
         run / "report.html",
         title=views.name,
-        summary={"Result": headline, "Settings": asdict(model.config)},
+        summary={"Result": headline(evaluation), "All scores": evaluation, "Settings": asdict(model.config)},
         views=pages,
         lights=light_panels(model),
         light_truth=load_scene_truth(views.root).light,
         history=[json.loads(line) for line in lines],
         timings=timings,
     )
+
+
+def headline(evaluation: dict) -> dict[str, float]:
+    """The scores that a reader looks for first; what the data hold no truth for is left out."""
+    albedo = evaluation["albedo"] or {}
+    scores = {
+        "novel views, PSNR dB": evaluation["novel_view"]["psnr"],
+        "novel views, SSIM": evaluation["novel_view"]["ssim"],
+        "albedo, PSNR dB": albedo.get("psnr"),
+        "normals, degrees": evaluation["normal_mae_deg"],
+        "roughness, mean error": evaluation["roughness_mae"],
+        "metallic, accuracy": evaluation["metallic_balanced_accuracy"],
+        "light, PSNR dB": evaluation["light_psnr"],
+        "mesh, F-score": evaluation["f_score"],
+    }
+    return {name: value for name, value in scores.items() if value is not None}
 
 
 def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
