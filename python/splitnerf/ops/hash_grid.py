@@ -11,7 +11,7 @@ function                     to table to positions second order      note
 
 With the Jacobian as an output, an SDF normal is a product of two tensors, and a loss on it needs one
 backward pass instead of two.
-Measured on two cores, 12 levels x 2, 2^17 entries: 3.8 to 4.6 times as fast at 10k points, 2.1 to 2.6 at 100k.
+Measured on two cores, 12 levels x 2, 2^17 entries: 3.1 times as fast at 10k and at 100k points.
 
 Source: Mueller et al. 2022, section 3.
 """
