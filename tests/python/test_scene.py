@@ -147,7 +147,10 @@ class TestOccupancy:
 
     def test_a_thin_wire_survives(self):
         """A wire of a twentieth of a cell: its cells stay, though their centres are outside it."""
-        wire = lambda x: x[:, :2].norm(dim=1) - 0.006  # noqa: E731
+
+        def wire(x):
+            return x[:, :2].norm(dim=1) - 0.006
+
         grid = OccupancyGrid(24, 1.5)
         grid.update(wire, 1000.0)
         z = torch.linspace(-1.4, 1.4, 200)
@@ -223,6 +226,13 @@ class TestRendering:
         rgb, albedo = maps["rgb"][32, 32], maps["albedo"][32, 32]
         linear = torch.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
         assert (linear > 0.8 * albedo).all() and (linear < albedo + 0.15).all()
+
+    def test_the_lobe_of_a_head_on_ray_points_back_at_the_camera(self, sphere_model):
+        model, grid = sphere_model
+        rays_o, rays_d = torch.tensor([[4.0, 0.0, 0.0]]), torch.tensor([[-1.0, 0.0, 0.0]])
+        ray = render_rays(model, grid.cells, rays_o, rays_d, torch.tensor([0.5]), 1.0, sample_step(model))
+        heaviest = ray.weights[ray.shaded].argmax()
+        assert ray.points.lobe_dirs[heaviest, 0] > 0.95
 
     def test_skipping_faint_samples_changes_little(self, sphere_model):
         model, grid = sphere_model
