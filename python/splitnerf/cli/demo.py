@@ -1,0 +1,41 @@
+"""splitnerf demo."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.cli.summary import print_summary
+from splitnerf.cli.train import budget
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    parser = commands.add_parser(
+        "demo", help="render a small scene, reconstruct it and print the errors against its truth",
+        description="Makes a scene with known shape, materials and sky, renders it with the built-in path tracer, "
+        "trains on it and prints the errors. Nothing is downloaded.",
+    )  # fmt: skip
+    parser.add_argument("--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)")
+    parser.add_argument("--max-minutes", type=float, default=4.0, metavar="M", help="training time (default: 4)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    from splitnerf.config import preset
+    from splitnerf.demo.scene import write_demo_dataset
+    from splitnerf.workflow import prepare_run, reconstruct
+
+    prepare_run(args.out, resume=False, overwrite=True)
+    data = args.out / "data"
+    print(f"rendering the demo scene into {data} ...", file=sys.stderr)
+    write_demo_dataset(data, seed=args.seed)
+    config = preset("cpu").replace({"seed": args.seed, **budget(None, args.max_minutes)})
+    trained, evaluation = reconstruct(data, args.out, config, overwrite=True)
+    if evaluation is None:
+        print("stopped; run the demo again to start over.")
+        return INTERRUPTED
+    print_summary(args.out, evaluation, trained.step, trained.seconds)
+    return DONE

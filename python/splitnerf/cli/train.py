@@ -1,0 +1,73 @@
+"""splitnerf train."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.cli.summary import print_summary
+from splitnerf.errors import InputError
+
+UNLIMITED_STEPS = 10**9
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    parser = commands.add_parser(
+        "train", help="reconstruct an object from posed images",
+        description="Trains on DATA (NeRF-Blender layout, or a transforms.json with masks) and writes mesh.glb, mesh.ply, "
+        "environment.exr/.hdr, evaluation.json and report.html into the run's folder.",
+    )  # fmt: skip
+    parser.add_argument("data", type=Path, metavar="DATA", help="folder with transforms_train.json or transforms.json")
+    parser.add_argument("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
+    add_training_options(parser)
+    parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
+    parser.add_argument("--resume", action="store_true", help="continue the run in --out from its checkpoint")
+    parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
+    parser.set_defaults(run=run)
+
+
+def add_training_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--preset", choices=["cpu", "paper"], help="cpu: small, for a few cores (default); paper: the publication's settings")
+    parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
+    parser.add_argument("--max-minutes", type=float, metavar="M", help="training time; the schedule fits itself to it")
+    parser.add_argument("--device", choices=["cpu"], default="cpu", help="where to train (the operators run on the CPU)")
+    parser.add_argument("--seed", type=int, help="of all random numbers (default: 0)")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change one setting; `splitnerf info --settings` lists them")
+
+
+def run(args: argparse.Namespace) -> int:
+    from splitnerf.checkpoint import config_of, load_checkpoint
+    from splitnerf.config import parse_setting, preset
+    from splitnerf.workflow import reconstruct
+
+    if args.resume and args.overwrite:
+        raise InputError("--resume and --overwrite exclude each other")
+    if args.max_minutes is not None and args.max_minutes <= 0:
+        raise InputError(f"--max-minutes must be positive, got {args.max_minutes}")
+    run = args.out or Path("runs") / args.data.resolve().name
+    settings = dict(parse_setting(text) for text in args.settings)
+    settings |= budget(args.steps, args.max_minutes)
+    if args.seed is not None:
+        settings["seed"] = args.seed
+    if args.resume:
+        if args.preset:
+            raise InputError("--preset cannot change in a run that is resumed")
+        base = config_of(load_checkpoint(run / "checkpoint.pt"))
+    else:
+        base = preset(args.preset or "cpu")
+    trained, evaluation = reconstruct(
+        args.data, run, base.replace(settings), downscale=args.downscale, resume=args.resume, overwrite=args.overwrite
+    )
+    if evaluation is None:
+        print(f"stopped at step {trained.step}; the state is in {run}. To go on, repeat the command with --resume.")
+        return INTERRUPTED
+    print_summary(run, evaluation, trained.step, trained.seconds)
+    return DONE
+
+
+def budget(steps: int | None, minutes: float | None) -> dict[str, object]:
+    """The settings that end a run: of steps and minutes what was asked for alone counts, both count together."""
+    if minutes is None:
+        return {} if steps is None else {"steps": steps, "max_minutes": 0.0}
+    return {"steps": UNLIMITED_STEPS if steps is None else steps, "max_minutes": minutes}
