@@ -35,7 +35,7 @@ def main(argv: list[str] | None = None) -> int:
     os.environ.setdefault("GOMP_SPINCOUNT", "30000")
     args = build_parser().parse_args(argv)
     try:
-        return args.run(args)
+        return args.execute(args)
     except InputError as error:
         print(f"splitnerf: {error}", file=sys.stderr)
         return BAD_INPUT

@@ -11,7 +11,7 @@ from splitnerf.cli.exit_codes import DONE
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("info", help="show versions, the build, and the settings of a preset")
     parser.add_argument("--settings", metavar="PRESET", nargs="?", const="cpu", help="print every setting of a preset (default: cpu)")
-    parser.set_defaults(run=run)
+    parser.set_defaults(execute=run)
 
 
 def run(args: argparse.Namespace) -> int:

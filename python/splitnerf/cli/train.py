@@ -24,7 +24,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
     parser.add_argument("--resume", action="store_true", help="continue the run in --out from its checkpoint")
     parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
-    parser.set_defaults(run=run)
+    parser.set_defaults(execute=run)
 
 
 def add_training_options(parser: argparse.ArgumentParser) -> None:
