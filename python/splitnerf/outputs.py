@@ -15,7 +15,8 @@ from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.export.environment import write_environment
 from splitnerf.export.mesh import write_mesh_glb, write_mesh_ply
-from splitnerf.export.meshing import drop_floaters, extract_mesh
+from splitnerf.export.meshing import extract_mesh
+from splitnerf.export.simplify import drop_floaters
 from splitnerf.fields.sdf import unit_normals
 from splitnerf.ops import fibonacci_directions, prefilter_light
 from splitnerf.render.model import SceneModel

@@ -10,7 +10,8 @@ import torch
 
 from splitnerf import losses
 from splitnerf.config import preset
-from splitnerf.export.meshing import EmptyMesh, drop_floaters, extract_mesh
+from splitnerf.export.meshing import EmptyMesh, extract_mesh
+from splitnerf.export.simplify import drop_floaters
 from splitnerf.fields import LightMlp, OcclusionHead, SdfField
 from splitnerf.fields.sdf import sharpness, unit_normals
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec
