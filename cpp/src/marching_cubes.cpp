@@ -27,6 +27,19 @@ BlockPosition position(const BlockGrid& grid, int64_t i) {
   return {int(i / (n * n)), int(i / n % n), int(i % n)};
 }
 
+// Whether the 27 blocks about an inner one are the same, by their 9 runs along z.
+bool uniform(const BlockGrid& grid, BlockPosition p) {
+  if (std::min({p.x, p.y, p.z}) < 1 || std::max({p.x, p.y, p.z}) + 1 >= grid.n_blocks) return false;
+  const int32_t row = grid.index[flat(grid, p)];
+  bool same = true;
+  for (int dx = -1; dx <= 1; ++dx)
+    for (int dy = -1; dy <= 1; ++dy) {
+      const int32_t* run = grid.index + flat(grid, {p.x + dx, p.y + dy, p.z});
+      same = same & (run[-1] == row) & (run[0] == row) & (run[1] == row);
+    }
+  return same;
+}
+
 // Calls f(flat index, offset) for the neighbours inside the grid, offsets in {lowest, .., 1}^3 but not 0.
 template <class F> void for_neighbours(const BlockGrid& grid, BlockPosition p, int lowest, F&& f) {
   for (int dx = lowest; dx <= 1; ++dx)
@@ -188,11 +201,12 @@ std::vector<int64_t> blocks_to_open(const BlockGrid& grid) {
   for (int64_t i = 0; i < total; ++i) {
     const int32_t row = grid.index[i];
     const BlockPosition p = position(grid, i);
-    for_neighbours(grid, p, row < 0 ? 0 : -1, [&](int64_t other, int dx, int dy, int dz) {
+    if (row < 0 && uniform(grid, p)) continue;
+    for_neighbours(grid, p, -1, [&](int64_t other, int dx, int dy, int dz) {
       const int32_t there = grid.index[other];
       if (there >= 0) return;
       if (row < 0) {
-        if (row != there) found.insert(found.end(), {i, other});
+        if (row != there) found.push_back(other);
       } else if (touches_other_sign(grid.values + int64_t(row) * kMeshBlockNodes, there == kInsideBlock, dx, dy, dz)) {
         found.push_back(other);
       }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,15 +13,15 @@ import trimesh
 
 from splitnerf.checkpoint import config_of, load_checkpoint
 from splitnerf.config import Config
-from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.errors import InputError
 from splitnerf.export.meshing import EmptyMesh
-from splitnerf.outputs import evaluate_scene, light_panels, write_assets, write_json
+from splitnerf.outputs import Exported, evaluate_scene, light_panels, write_assets, write_json
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.report.html import write_report
-from splitnerf.train import TrainedScene, train
+from splitnerf.train import TrainedScene, check_same_scene, train
 
 RUN_FILES = (
     "config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
@@ -87,7 +88,7 @@ def finish(
     failure: EmptyMesh | None = None
     mesh: trimesh.Trimesh | None = None
     try:
-        mesh = write_assets(run, model, dataset)
+        mesh = write_assets(run, model, dataset.box_from_world).mesh
     except EmptyMesh as error:
         failure = error
     timings["export"] = time.monotonic() - clock
@@ -173,3 +174,42 @@ def evaluate_run(run: Path, data: Path, downscale: int) -> dict:
     model, grid, content = load_run(run)
     dataset, test = load_splits(data, downscale)
     return finish(model, grid, dataset, test, run, {"training": content["seconds"]})
+
+
+def export_run(
+    run: Path,
+    out: Path,
+    *,
+    formats: Sequence[str],
+    n_faces: int,
+    texture_size: int,
+    resolution: int | None = None,
+    data: Path | None = None,
+    downscale: int = 1,
+) -> Exported:
+    """Writes a run's meshes and light into a folder, see :func:`splitnerf.outputs.write_assets`.
+
+    Args:
+        data, downscale: What the run was trained on; needed where the checkpoint does not say how the data's world
+            lies about the scene.
+
+    Raises:
+        InputError: The run or the data cannot be used, or a format needs a package that is not installed.
+        EmptyMesh: The surface is empty.
+    """
+    model, _, content = load_run(run)
+    if data is not None:
+        dataset = load_dataset(data, "train", downscale)
+        check_same_scene(content, dataset_fingerprint(dataset), run)
+        box_from_world = dataset.box_from_world
+    elif "box_from_world" in content:
+        box_from_world = content["box_from_world"].numpy()
+    else:
+        raise InputError(
+            f"{run / 'checkpoint.pt'}: an older version wrote it, without the data's world frame; name the data that "
+            "the run was trained on with --data DATA"
+        )
+    out.mkdir(parents=True, exist_ok=True)
+    return write_assets(
+        out, model, box_from_world, formats=formats, resolution=resolution, n_faces=n_faces, texture_size=texture_size
+    )

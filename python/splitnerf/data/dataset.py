@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.images import LDR_SUFFIXES, area_average, downscale_rgba, read_image
-from splitnerf.data.normalisation import estimate_box
+from splitnerf.data.normalisation import estimate_box, transform_points
 from splitnerf.errors import InputError
 
 TEST_STRIDE = 8
@@ -75,9 +75,7 @@ class Dataset:
 
     def transform_to_world(self, points: np.ndarray) -> np.ndarray:
         """Carries points [..., 3] from the internal frame to the data's world frame; directions need no change."""
-        matrix = self.world_from_box
-        points = np.asarray(points)
-        return (points @ matrix[:3, :3].T + matrix[:3, 3]).astype(points.dtype)
+        return transform_points(self.world_from_box, points)
 
 
 @dataclass
