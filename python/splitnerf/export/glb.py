@@ -15,6 +15,8 @@ from splitnerf.data.asset import Asset
 from splitnerf.data.images import atomic_path
 from splitnerf.export.maps import encode_maps, y_up
 
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+
 
 def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | None = None) -> None:
     """Writes one mesh with one metallic-roughness material, y up, textures as PNG inside, atomically.
@@ -39,7 +41,6 @@ def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | Non
         metallicFactor=float(material.metallic),
         baseColorTexture=images[0],
         metallicRoughnessTexture=images[1],
-        occlusionTexture=images[1] if occlusion is not None else None,
         normalTexture=images[2],
     )
     mesh = trimesh.Trimesh(
@@ -54,10 +55,16 @@ def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | Non
         mesh.vertex_attributes["_TANGENT"] = tangents.astype(np.float32)
 
     def finish(tree: dict) -> None:
+        """What trimesh leaves out: TANGENT's name, one image for two uses, and what the buffers are for."""
         tree["asset"]["generator"] = "SplitNeRF"
-        attributes = tree["meshes"][0]["primitives"][0]["attributes"]
-        if "_TANGENT" in attributes:  # trimesh has no name of its own for it
+        primitive = tree["meshes"][0]["primitives"][0]
+        attributes, pbr = primitive["attributes"], tree["materials"][0]["pbrMetallicRoughness"]
+        if "_TANGENT" in attributes:
             attributes["TANGENT"] = attributes.pop("_TANGENT")
+        if occlusion is not None:
+            tree["materials"][0]["occlusionTexture"] = {"index": pbr["metallicRoughnessTexture"]["index"]}
+        for accessor, target in [(primitive["indices"], ELEMENT_ARRAY_BUFFER)] + [(i, ARRAY_BUFFER) for i in attributes.values()]:
+            tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = target
 
     scene = trimesh.Scene()
     scene.add_geometry(mesh, node_name=asset.name, geom_name=asset.name)
