@@ -36,7 +36,6 @@ def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | Non
     images = [None if pixels is None else Image.fromarray(pixels) for pixels in (maps.albedo, maps.orm, maps.normal)]
     pbr = PBRMaterial(
         name=material.name,
-        baseColorFactor=[*material.albedo, 1.0],
         roughnessFactor=float(material.roughness),
         metallicFactor=float(material.metallic),
         baseColorTexture=images[0],
@@ -55,10 +54,11 @@ def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | Non
         mesh.vertex_attributes["_TANGENT"] = tangents.astype(np.float32)
 
     def finish(tree: dict) -> None:
-        """What trimesh leaves out: TANGENT's name, one image for two uses, and what the buffers are for."""
+        """What trimesh leaves out: exact factors, TANGENT's name, one image for two uses, what the buffers are for."""
         tree["asset"]["generator"] = "SplitNeRF"
         primitive = tree["meshes"][0]["primitives"][0]
         attributes, pbr = primitive["attributes"], tree["materials"][0]["pbrMetallicRoughness"]
+        pbr["baseColorFactor"] = [*map(float, material.albedo), 1.0]  # trimesh would round it to 8 bit
         if "_TANGENT" in attributes:
             attributes["TANGENT"] = attributes.pop("_TANGENT")
         if occlusion is not None:
