@@ -19,7 +19,7 @@ namespace {
 using Vec = Vec3<float>;
 
 struct Image {
-  std::vector<float> radiance, alpha, albedo, roughness, metallic, normal, depth;
+  std::vector<float> radiance, alpha, albedo, roughness, metallic, normal, smooth_normal, depth, shadow;
   RenderTargets targets(size_t n) {
     for (auto* image : {&radiance, &albedo, &normal, &smooth_normal}) image->assign(n * 3, -1.f);
     for (auto* image : {&alpha, &roughness, &metallic, &depth, &shadow}) image->assign(n, -1.f);

@@ -11,14 +11,14 @@ namespace splitnerf {
 
 enum class PixelFilter : int {
   kBox = 0,             // 1 pixel wide
-  kBlackmanHarris = 1,  // 1.5 pixels wide, Blender's default
+  kBlackmanHarris = 1,  // 3 pixels from end to end, which Blender calls a width of 1.5, its default
 };
 
 // Maps a uniform u in [0, 1) to an offset from the pixel's centre, in pixels.
 class PixelFilterSampler {
  public:
   explicit PixelFilterSampler(PixelFilter filter) {
-    constexpr double kWidth = 1.5;
+    constexpr double kWidth = 3;  // pixels
     for (int i = 0; i <= kIntervals; ++i) {
       const double u = static_cast<double>(i) / kIntervals;
       offsets_[i] = static_cast<float>(filter == PixelFilter::kBox ? u - 0.5 : kWidth * (invert(u) - 0.5));
