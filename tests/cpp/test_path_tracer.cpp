@@ -21,10 +21,10 @@ using Vec = Vec3<float>;
 struct Image {
   std::vector<float> radiance, alpha, albedo, roughness, metallic, normal, depth;
   RenderTargets targets(size_t n) {
-    for (auto* image : {&radiance, &albedo, &normal}) image->assign(n * 3, -1.f);
-    for (auto* image : {&alpha, &roughness, &metallic, &depth}) image->assign(n, -1.f);
-    return {radiance.data(), alpha.data(),  albedo.data(), roughness.data(),
-            metallic.data(), normal.data(), depth.data()};
+    for (auto* image : {&radiance, &albedo, &normal, &smooth_normal}) image->assign(n * 3, -1.f);
+    for (auto* image : {&alpha, &roughness, &metallic, &depth, &shadow}) image->assign(n, -1.f);
+    return {radiance.data(), alpha.data(),         albedo.data(), roughness.data(), metallic.data(),
+            normal.data(),   smooth_normal.data(), depth.data(),  shadow.data()};
   }
 };
 
