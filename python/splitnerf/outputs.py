@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import torch
 import trimesh
 
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import atomic_path, linear_to_srgb, over_background, write_image
+from splitnerf.data.images import linear_to_srgb, over_background, write_image
 from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.export.environment import write_environment
@@ -109,8 +108,3 @@ def evaluate_scene(
         predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1)
     )
     return result, predictions
-
-
-def write_json(path: Path, content: dict) -> None:
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n")

@@ -13,10 +13,12 @@ import trimesh
 from splitnerf.checkpoint import config_of, load_checkpoint
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.data.frames import has_test_split
+from splitnerf.data.json_files import write_json
 from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.errors import InputError
 from splitnerf.export.meshing import EmptyMesh
-from splitnerf.outputs import evaluate_scene, light_panels, write_assets, write_json
+from splitnerf.outputs import evaluate_scene, light_panels, write_assets
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.report.html import write_report
@@ -35,8 +37,8 @@ def load_splits(data: Path, downscale: int) -> tuple[Dataset, Dataset | None]:
     Raises:
         InputError: Something about the data cannot be used.
     """
-    has_test = (data / "transforms_test.json").exists() or not (data / "transforms_train.json").exists()
-    return load_dataset(data, "train", downscale), load_dataset(data, "test", downscale) if has_test else None
+    test = load_dataset(data, "test", downscale) if has_test_split(data) else None
+    return load_dataset(data, "train", downscale), test
 
 
 def prepare_run(run: Path, *, resume: bool, overwrite: bool) -> None:
