@@ -60,7 +60,6 @@ class PathTracer {
         light_(environment.radiance, environment.height, environment.width),
         camera_(camera),
         params_(params),
-        lut_(brdf_lut()),
         filter_(params.filter),
         pattern_(params.samples_per_pixel, 1 + kPairsPerBounce * (params.max_bounces + 1), params.seed) {
     float extent = 0;
@@ -153,7 +152,7 @@ class PathTracer {
       if (bounce == 0) *first = {true, point};
       radiance += limited(throughput * point.emission, bounce > 0);
       const Frame<float> frame(point.shading_normal);
-      const PrincipledBsdf<float> bsdf(lut_, point.albedo, point.roughness, point.metallic,
+      const PrincipledBsdf<float> bsdf(tables_, point.albedo, point.roughness, point.metallic,
                                        frame.to_local(-direction));
       const Vec start = point.position + point.geometric_normal * ray_offset_;
       const int pair = 1 + kPairsPerBounce * bounce;
@@ -235,7 +234,7 @@ class PathTracer {
   EnvironmentSampler light_;
   const Camera& camera_;
   const PathTracerParams& params_;
-  const float* lut_;
+  PrincipledTables tables_;
   PixelFilterSampler filter_;
   SamplePattern pattern_;
   float ray_offset_;  // start of secondary rays above the surface, in scene units

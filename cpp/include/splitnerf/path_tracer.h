@@ -1,10 +1,11 @@
 // Forward path tracer for metallic-roughness meshes under an environment light: renders the demo
 // data and relights assets, and is the ground truth that split-sum shading approximates.
 //
-// BSDF, as Blender's Principled reads a glTF material (F0 = .04 (1 - m) + m albedo):
-//   f = D V F(v.h) gain + (1 - m)(1 - E) albedo / pi
-//   gain = 1 + F0 (1 / (F1 + F2) - 1),  E = (F0 F1 + F2) gain
-// with GGX D, height-correlated Smith V and the table of split_sum.h; gain restores the energy of
+// BSDF, as Blender's Principled reads a glTF material: a metal and a coated diffuse base, mixed,
+//   f = m F_m gain_m D V + (1 - m) [F_d gain_d D V + (1 - E_d) albedo / pi]
+//   F_m = albedo + (1 - albedo)(1 - v.h)^5, F_d the exact Fresnel term of refractive index 1.5,
+//   gain = 1 + F0 (1 / (F1 + F2) - 1),  E_d = gain_d int F_d D V ...
+// with GGX D, height-correlated Smith V and the tables of split_sum.h; gain restores the energy of
 // multiple scattering (Turquin 2019).
 #pragma once
 
