@@ -12,31 +12,36 @@ from splitnerf.errors import InputError
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "relight", help="render an asset under other lights",
-        description="Path-traces RUN's mesh.glb, or any metallic-roughness glTF file, under environment maps and writes "
-        "NNN.png (sRGB, straight alpha) and NNN.exr (linear, associated alpha) for each frame.",
+        description="Path-traces RUN's mesh.glb, or any metallic-roughness glTF file, under environment maps and "
+        "writes NNN.png (sRGB, straight alpha) and NNN.exr (linear, associated alpha) for each frame.",
     )  # fmt: skip
-    parser.add_argument("source", type=Path, metavar="RUN|FILE.glb", help="a run's folder, a .glb or a .gltf")
-    parser.add_argument("--env", type=Path, action="append", required=True, metavar="MAP", help="equirectangular .exr or .hdr; again for more maps, each into a sub-folder")
-    parser.add_argument("--rotate-env", type=float, default=0.0, metavar="DEG", help="turn the light about z, counter-clockwise from above")
+    # fmt: off
+    add = parser.add_argument
+    add("source", type=Path, metavar="RUN|FILE.glb", help="a run's folder, a .glb or a .gltf")
+    add("--env", type=Path, action="append", required=True, metavar="MAP",
+        help="equirectangular .exr or .hdr; repeated, each map has a sub-folder")
+    add("--rotate-env", type=float, default=0.0, metavar="DEG", help="turn the light, counter-clockwise from above")
     cameras = parser.add_mutually_exclusive_group()
     cameras.add_argument("--turntable", type=int, metavar="N", help="a full turn in N frames (default: 1, the front)")
     cameras.add_argument("--data", type=Path, metavar="DATA", help="the cameras of a data set")
     cameras.add_argument("--path", type=Path, metavar="CAMERAS.json", help="the cameras of a file like transforms.json")
-    parser.add_argument("--split", choices=["train", "test"], default="test", help="of --data (default: test)")
-    parser.add_argument("--elevation", type=float, default=20.0, metavar="DEG", help="of the turntable's camera (default: 20)")
-    parser.add_argument("--rotate", choices=["camera", "light"], default="camera", help="what the turntable turns (default: camera)")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="the folder to write to")
-    parser.add_argument("--size", metavar="W[xH]", help="pixels (default: the data's or the path's, else 512)")
-    parser.add_argument("--spp", type=int, default=128, metavar="N", help="paths a pixel (default: 128)")
-    parser.add_argument("--bounces", type=int, default=4, metavar="N", help="scattering events after the first (default: 4)")
-    parser.add_argument("--background", default="transparent", metavar="WHAT", help="transparent (default), white, environment, or an image")
-    parser.add_argument("--shadow-catcher", action="store_true", help="show the shadow on the ground below the object")
-    parser.add_argument("--exposure", type=float, default=0.0, metavar="EV", help="stops brighter (default: 0)")
-    parser.add_argument("--gif", action="store_true", help="write animation.gif too")
-    parser.add_argument("--mp4", action="store_true", help="write animation.mp4 too (needs splitnerf[video])")
-    parser.add_argument("--fps", type=float, default=12.0, help="of GIF and MP4 (default: 12)")
-    parser.add_argument("--seed", type=int, default=0, help="of the first frame's random numbers (default: 0)")
-    parser.add_argument("--overwrite", action="store_true", help="replace frames that stand in --out")
+    add("--split", choices=["train", "test"], default="test", help="of --data (default: test)")
+    add("--elevation", type=float, default=20.0, metavar="DEG", help="of the turntable's camera (default: 20)")
+    add("--rotate", choices=["camera", "light"], default="camera", help="what the turntable turns (default: camera)")
+    add("--out", type=Path, required=True, metavar="DIR", help="the folder to write to")
+    add("--size", metavar="W[xH]", help="pixels (default: the data's or the path's, else 512)")
+    add("--spp", type=int, default=128, metavar="N", help="paths a pixel (default: 128)")
+    add("--bounces", type=int, default=4, metavar="N", help="scattering events after the first (default: 4)")
+    add("--background", default="transparent", metavar="WHAT",
+        help="transparent (default), white, environment, or an image")
+    add("--shadow-catcher", action="store_true", help="show the shadow on the ground below the object")
+    add("--exposure", type=float, default=0.0, metavar="EV", help="stops brighter (default: 0)")
+    add("--gif", action="store_true", help="write animation.gif too")
+    add("--mp4", action="store_true", help="write animation.mp4 too (needs splitnerf[video])")
+    add("--fps", type=float, default=12.0, help="of GIF and MP4 (default: 12)")
+    add("--seed", type=int, default=0, help="of the first frame's random numbers (default: 0)")
+    add("--overwrite", action="store_true", help="replace frames that stand in --out")
+    # fmt: on
     parser.set_defaults(execute=run)
 
 

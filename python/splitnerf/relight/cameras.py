@@ -93,9 +93,8 @@ def turntable(
 
 def look_at(centre: np.ndarray, azimuth: float, elevation: float, distance: float) -> np.ndarray:
     """[4, 4] pose of an upright camera that looks at a point; azimuth from +x towards +y, radians."""
-    back = np.array(
-        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
-    )
+    level = np.cos(elevation)
+    back = np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     pose = np.eye(4)
     pose[:3] = np.stack([right, np.cross(back, right), back, centre + distance * back], axis=1)
@@ -140,5 +139,5 @@ def _lens_view(
     if height is None:
         height = max(1, round(width * own[1] / own[0])) if own else width
     if own and abs(height - width * own[1] / own[0]) > 1:
-        raise InputError(f"{name}: is {own[0]}x{own[1]}, --size {width}x{height} would stretch it; give the width alone")
+        raise InputError(f"{name}: is {own[0]}x{own[1]}, --size {width}x{height} would stretch it; give a width alone")
     return View(pose, tuple(lens_intrinsics(lens, (height, width)).tolist()), width, height)

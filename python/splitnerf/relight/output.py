@@ -85,7 +85,7 @@ def require_ffmpeg() -> None:
     try:
         import imageio_ffmpeg  # noqa: F401
     except ImportError:
-        raise InputError("--mp4 needs the package imageio-ffmpeg; install it with `pip install splitnerf[video]`") from None
+        raise InputError("--mp4 needs the package imageio-ffmpeg; `pip install splitnerf[video]`") from None
 
 
 def write_mp4(path: Path, frames: list[np.ndarray], fps: float) -> None:

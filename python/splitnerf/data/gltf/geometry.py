@@ -120,7 +120,7 @@ def _skin_matrices(
     weights = np.concatenate([document.array(attributes[f"WEIGHTS_{n}"]) for n in sets], axis=1)
     total = weights.sum(axis=1, keepdims=True)
     if not (total > 0).all() or which.max() >= len(joints):
-        raise InputError(f"{label} has vertices without weights or joints out of range; apply its skin and export again")
+        raise InputError(f"{label} has vertices without weights or joints out of range; apply its skin first")
     blended = np.zeros((len(which), 4, 4))
     for column in range(which.shape[1]):
         blended += (weights[:, column] / total[:, 0])[:, None, None] * placed[which[:, column]]

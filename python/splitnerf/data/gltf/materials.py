@@ -63,14 +63,15 @@ def read_material(document: Document, index: int | None) -> TexturedMaterial:
     if normal is not None:
         scale = _finite(document, name, source["normalTexture"].get("scale", 1.0), 1)[0]
         normal = ((2 * normal - 1) * np.array([scale, scale, 1.0])).astype(np.float32)
+    emissive = _unit(document, name, source.get("emissiveFactor", (0.0, 0.0, 0.0)), 3)
     strength = source.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
-    emissive = _finite(document, name, source.get("emissiveFactor", (0.0, 0.0, 0.0)), 3)
+    strength = max(0.0, _finite(document, name, strength, 1)[0])
     material = Material(
         name=name,
         albedo=tuple(_unit(document, name, pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))[:3], 3)),
         roughness=_unit(document, name, pbr.get("roughnessFactor", 1.0), 1)[0],
         metallic=_unit(document, name, pbr.get("metallicFactor", 1.0), 1)[0],
-        emission=tuple(max(0.0, e * float(strength)) for e in emissive),
+        emission=tuple(strength * channel for channel in emissive),
         albedo_texture=None if color is None else srgb_to_linear(color),
         roughness_metallic_texture=None if orm is None else np.ascontiguousarray(orm[..., 1:3]),
         normal_texture=normal,

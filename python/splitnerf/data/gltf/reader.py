@@ -33,8 +33,9 @@ def read_asset(path: str | os.PathLike) -> Asset:
     path = Path(path)
     document = Document(path)
     try:
-        return _read(document)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        with np.errstate(over="ignore", invalid="ignore"):  # what comes out is checked
+            return _read(document)
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, MemoryError) as error:
         raise InputError(f"{path}: is not valid glTF ({type(error).__name__}: {error}); export it again") from None
 
 
@@ -73,6 +74,9 @@ def _read(document: Document) -> Asset:
         tangents=_z_up(np.concatenate([_tangents(p, c) for p, c in zip(parts, uvs)])) if with_normal_map else None,
         colors=None if colors is None else colors.astype(np.float32),
     )
+    for values in (asset.vertices, asset.normals, asset.uv, asset.tangents):
+        if values is not None and not np.isfinite(values).all():
+            raise InputError(f"{path}: has NaN or infinite coordinates after its transforms; repair them")
     corners = asset.vertices[asset.triangles]
     if not np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
         raise InputError(f"{path}: no triangle has an area; export the mesh again")
