@@ -273,6 +273,12 @@ def broken_image(gltf):
     gltf.json["images"][0] = {"name": "bad", "bufferView": gltf.view(b"no image")}
 
 
+def endless_factor(gltf):
+    gltf.json["meshes"][0]["primitives"][0]["material"] = gltf.material(
+        name="m", pbrMetallicRoughness={"roughnessFactor": float("nan")}
+    )
+
+
 def set_position(value):
     def change(gltf):
         gltf.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = gltf.accessor(value)
@@ -320,6 +326,7 @@ def two_indices(gltf):
         (beyond_the_view, "an accessor reaches beyond its buffer view"),
         (without_uv, "material 'm' has textures, but a mesh with it has no TEXCOORD_0"),
         (two_coordinates, "textures of material 'm' have different coordinates"),
+        (endless_factor, "material 'm' has a factor that is no usable number"),
         (broken_image, "image 0 'bad': cannot be read as an image"),
     ],
 )

@@ -22,7 +22,7 @@ from splitnerf.relight.cameras import HALF_FIELD, MARGIN, View, bounding_sphere,
 from splitnerf.relight.output import display_frame, straight_srgb
 from splitnerf.render.path_traced import AssetRenderer
 
-CENTRE = np.array([1.0, -2.0, 0.5])  # of the ball, z up
+CENTRE = np.array([1.0, -2.0, 0.8])  # of the ball, z up
 
 
 def write_ball(path, *, base=(1, 1, 1, 1), roughness=1.0, metallic=0.0, radius=0.5):
@@ -277,16 +277,31 @@ def test_the_cameras_of_a_data_set_at_its_size(tmp_path, ball, grey):
 
 
 def test_an_interrupted_call_leaves_whole_frames_only(tmp_path, ball, grey, monkeypatch, capsys):
-    def interrupt(folder, index, linear, write=job.write_frame):
+    def interrupt(folder, index, linear, *, with_alpha, write=job.write_frame):
         if index == 1:
             raise KeyboardInterrupt
-        write(folder, index, linear)
+        write(folder, index, linear, with_alpha=with_alpha)
 
     monkeypatch.setattr(job, "write_frame", interrupt)
     words = ("--env", grey, "--size", "8", "--spp", "1", "--turntable", "3", "--gif", "--out", tmp_path / "out")
     assert run(ball, *words) == INTERRUPTED
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["000.exr", "000.png"]
     assert "interrupted" in capsys.readouterr().err
+
+
+def test_animations_need_frames_of_one_size(tmp_path, ball, grey, capsys):
+    pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg (extra video) is not installed")
+    frames = [{"transform_matrix": np.eye(4).tolist(), "w": size, "h": size} for size in (8, 9)]
+    (tmp_path / "path.json").write_text(json.dumps({"camera_angle_x": 1.0, "frames": frames}))
+    words = (ball, "--env", grey, "--spp", "1", "--path", tmp_path / "path.json", "--out", tmp_path / "out")
+    assert run(*words, "--gif") == BAD_INPUT
+    assert "the frames differ in size; give --size" in capsys.readouterr().err
+    assert run(*words, "--size", "1", "--mp4") == BAD_INPUT
+    assert "--mp4 needs frames of at least 2x2 pixels" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert run(*words) == DONE
+    # Seen from the origin the ball is out of sight: clear pictures, alpha included.
+    assert read_image(tmp_path / "out/001.png").shape == (9, 9, 4) and not read_image(tmp_path / "out/001.exr").any()
 
 
 @pytest.mark.parametrize(

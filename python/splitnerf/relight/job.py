@@ -92,6 +92,7 @@ def relight(
     lights = [rotate_environment(read_environment(path), settings.rotate_env) for path in maps]
     asset = asset_of(source)
     views = views_of(asset)
+    _check_animation(views, settings)
     for folder in folders:
         prepare_folder(folder, overwrite=overwrite)
     renderer = AssetRenderer(asset)
@@ -107,7 +108,7 @@ def relight(
                 )  # fmt: skip
                 exposure = 2.0**settings.exposure
                 linear = compose(images, background.behind(view, turned, exposure), exposure)
-                write_frame(folder, index, linear)
+                write_frame(folder, index, linear, with_alpha=background.transparent)
                 if settings.gif or settings.mp4:
                     frames.append(display_frame(linear))
                 bar.update()
@@ -116,6 +117,14 @@ def relight(
             if settings.mp4:
                 write_mp4(folder / MP4, frames, settings.fps)
     return folders
+
+
+def _check_animation(views: list[View], settings: Settings) -> None:
+    sizes = {(view.width, view.height) for view in views}
+    if (settings.gif or settings.mp4) and len(sizes) > 1:
+        raise InputError("--gif and --mp4: the frames differ in size; give --size")
+    if settings.mp4 and min(min(size) for size in sizes) < 2:
+        raise InputError("--mp4 needs frames of at least 2x2 pixels; give a larger --size")
 
 
 def _lowest(asset: Asset) -> float:

@@ -32,19 +32,19 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
         path.unlink()
 
 
-def write_frame(folder: Path, index: int, linear: np.ndarray) -> None:
+def write_frame(folder: Path, index: int, linear: np.ndarray, *, with_alpha: bool) -> None:
     """Writes NNN.exr (linear, half, alpha associated) and NNN.png (sRGB, alpha straight), each atomically.
 
     Args:
         folder: Made where it is missing.
         index: The frame's number.
-        linear: [h, w, 4] float32, premultiplied; written without alpha where that is 1 everywhere.
+        linear: [h, w, 4] float32, premultiplied.
+        with_alpha: Whether alpha is written.
     """
-    opaque = bool((linear[..., 3] >= 1).all())
-    stored = np.minimum(linear, np.finfo(np.float16).max)
-    write_image(folder / f"{index:03d}.exr", stored[..., :3] if opaque else stored, half=True)
-    srgb = straight_srgb(linear)
-    write_image(folder / f"{index:03d}.png", srgb[..., :3] if opaque else srgb)
+    channels = 4 if with_alpha else 3
+    stored = np.minimum(linear[..., :channels], np.finfo(np.float16).max)
+    write_image(folder / f"{index:03d}.exr", stored, half=True)
+    write_image(folder / f"{index:03d}.png", straight_srgb(linear)[..., :channels])
 
 
 def straight_srgb(linear: np.ndarray) -> np.ndarray:

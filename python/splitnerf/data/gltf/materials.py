@@ -17,6 +17,7 @@ SUPPORTED_EXTENSIONS = frozenset(
     {"KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_emissive_strength", "EXT_texture_webp"}
 )
 REPEAT = 10497
+LARGEST_FACTOR = 1e9
 
 
 @dataclass
@@ -111,7 +112,10 @@ class _Slots:
             raise InputError(
                 f"{document.path}: a texture of material '{self.name}' comes as {kinds}; export it with PNG or JPEG"
             )
-        pixels = decode_image(*document.image(texture.get("source", webp.get("source"))))
+        data, image = document.image(texture.get("source", webp.get("source")))
+        pixels = decode_image(data, image)
+        if not np.isfinite(pixels).all():
+            raise InputError(f"{image}: has NaN or infinite pixels; clean it and export again")
         return pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
 
 
@@ -126,8 +130,8 @@ def _uv_matrix(transform: dict) -> np.ndarray:
 
 def _finite(document: Document, name: str, values, count: int) -> list[float]:
     values = np.asarray(values, dtype=np.float64).reshape(-1)
-    if len(values) != count or not np.isfinite(values).all():
-        raise InputError(f"{document.path}: material '{name}' has a factor that is no number; export it again")
+    if len(values) != count or not (np.abs(values) <= LARGEST_FACTOR).all():
+        raise InputError(f"{document.path}: material '{name}' has a factor that is no usable number; repair it")
     return values.tolist()
 
 
