@@ -202,6 +202,22 @@ def test_tangents_from_coordinates_and_from_the_file(path):
             assert sign * np.cross(asset.normals, tangent) == pytest.approx(np.tile([0, 0, 1], (3, 1)), abs=1e-6)
 
 
+def test_tangents_part_where_the_texture_is_mirrored(path):
+    # Two triangles share the edge x = 0; u = |x| on both, so u grows away from it to either side.
+    position = np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0]], np.float32)
+    uv = np.stack([np.abs(position[:, 0]), 1 - position[:, 1]], axis=1)
+    gltf = Gltf()
+    material = gltf.material(normalTexture={"index": gltf.texture(np.full((2, 2, 3), 0.5))})
+    part = gltf.primitive(position, [0, 2, 1, 0, 1, 3], material=material, TEXCOORD_0=uv, NORMAL=[[0, 0, 1]] * 4)
+    gltf.node(mesh=gltf.mesh(part))
+    asset = read_asset(gltf.write(path))
+    corners = z_up(position)[[[0, 2, 1], [0, 1, 3]]]
+    assert asset.vertices[asset.triangles] == pytest.approx(corners) and len(asset.vertices) == 6
+    assert asset.uv[asset.triangles] == pytest.approx(uv[[[0, 2, 1], [0, 1, 3]]])
+    for triangle_tangents, side in zip(asset.tangents[asset.triangles], (1, -1)):
+        assert triangle_tangents == pytest.approx(np.tile([side, 0, 0, side], (3, 1)), abs=1e-6)
+
+
 def test_texture_transform_and_second_set(path):
     # The extension's order: scaled by (2, 3), turned a quarter counter-clockwise with v downward, moved.
     gltf = Gltf()

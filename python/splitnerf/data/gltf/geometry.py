@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
@@ -69,6 +68,27 @@ def scene_parts(document: Document) -> list[Part]:
     if not parts:
         raise InputError(f"{document.path}: has no triangles{', only points or lines' * others}; export a mesh")
     return parts
+
+
+def split_mirrored(part: Part, uv: np.ndarray) -> tuple[Part, np.ndarray]:
+    """Doubles the vertices where texture coordinates [n, 2] meet their mirror image: the two sides have no tangent
+    space in common (MikkTSpace parts them too)."""
+    texels = uv[part.triangles]
+    edges = texels[:, 1:] - texels[:, :1]
+    side = edges[:, 0, 0] * edges[:, 1, 1] < edges[:, 0, 1] * edges[:, 1, 0]
+    corners, triangles = np.unique(2 * part.triangles + side[:, None], return_inverse=True)
+    source = corners // 2
+    if len(np.unique(source)) == len(source):
+        return part, uv
+    split = replace(
+        part,
+        vertices=part.vertices[source],
+        triangles=triangles.reshape(-1, 3),
+        normals=part.normals[source],
+        colors=None if part.colors is None else part.colors[source],
+        uv={},
+    )
+    return split, uv[source]
 
 
 def _world_matrices(document: Document) -> dict[int, np.ndarray]:

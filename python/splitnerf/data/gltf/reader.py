@@ -9,7 +9,7 @@ import numpy as np
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.gltf.document import Document
-from splitnerf.data.gltf.geometry import Part, scene_parts
+from splitnerf.data.gltf.geometry import Part, scene_parts, split_mirrored
 from splitnerf.data.gltf.materials import SUPPORTED_EXTENSIONS, TexturedMaterial, read_material
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.errors import InputError
@@ -54,6 +54,9 @@ def _read(document: Document) -> Asset:
     materials = {index: read_material(document, index) for index in indices}
     uvs = [_uv(path, part, materials[part.material]) for part in parts]
     with_normal_map = any(entry.material.normal_texture is not None for entry in materials.values())
+    for i, (part, uv) in enumerate(zip(parts, uvs)):
+        if part.tangents is None and materials[part.material].material.normal_texture is not None:
+            parts[i], uvs[i] = split_mirrored(part, uv)
 
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     counts = [len(part.triangles) for part in parts]
