@@ -174,7 +174,7 @@ def test_white_furnace_through_the_command(tmp_path, grey, metallic):
     linear, srgb = read_image(tmp_path / "out/000.exr"), read_image(tmp_path / "out/000.png")
     alpha = linear[..., 3]
     inside = alpha > 0.999
-    assert inside.sum() > 200 and (alpha[0] == 0).all() and not linear[0, :, :3].any()
+    assert inside.sum() > 200 and not linear[:3, :3].any()
     # A white ball under light 0.5 from everywhere is as bright as the light, and vanishes against it.
     assert linear[inside, :3].mean() == pytest.approx(0.5, rel=0.01)
     assert linear[..., :3] == pytest.approx(0.5 * np.repeat(alpha[..., None], 3, axis=2), abs=0.06)
