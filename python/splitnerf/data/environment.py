@@ -50,6 +50,28 @@ def read_environment(path: str | os.PathLike) -> np.ndarray:
     return radiance
 
 
+def sample_environment(radiance: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Radiance from directions, interpolated bilinearly.
+
+    Args:
+        radiance: [h, w, 3] equirectangular.
+        directions: [..., 3] of any non-zero length.
+
+    Returns:
+        [..., 3] float32.
+    """
+    height, width = radiance.shape[:2]
+    x, y, z = np.moveaxis(directions, -1, 0)
+    column = (0.5 - np.arctan2(y, x) / (2 * np.pi)) * width - 0.5
+    row = np.clip(np.arctan2(np.hypot(x, y), z) / np.pi * height - 0.5, 0, height - 1)
+    left, top = np.floor(column).astype(int), np.minimum(np.floor(row).astype(int), height - 2)
+    across, down = (column - left)[..., None], (row - top)[..., None]
+    rows = [
+        (1 - across) * radiance[top + k, left % width] + across * radiance[top + k, (left + 1) % width] for k in (0, 1)
+    ]
+    return ((1 - down) * rows[0] + down * rows[1]).astype(np.float32)
+
+
 def rotate_environment(radiance: np.ndarray, degrees: float) -> np.ndarray:
     """Turns the light about the z axis, counter-clockwise seen from above.
 

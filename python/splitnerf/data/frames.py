@@ -65,15 +65,31 @@ def read_frames(root: Path, split: str) -> list[Frame]:
             f"{root}: has neither {own.name} nor {single.name}, nor view folders like train_000; "
             "give the folder that holds one"
         )
-    meta = read_json(path, "frames")
-    entries = _need(meta, "frames", path)
-    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise InputError(f"{path}: 'frames' must be a list of objects")
+    meta, entries = _read_entries(path)
     if path == single:
         entries = [e for i, e in enumerate(entries) if (i % TEST_STRIDE == 0) == (split == "test")]
     if not entries:
         raise InputError(f"{path}: has no frames for the {split} split; add posed images")
     return [_listed_frame(entry, meta, i, path) for i, entry in enumerate(entries)]
+
+
+def read_camera_path(path: Path) -> list[tuple[np.ndarray, dict]]:
+    """The cameras of a transforms file whose images need not exist, in its order.
+
+    Args:
+        path: JSON with `frames`, each with `transform_matrix`; `camera_angle_x` or `fl_x fl_y cx cy`, `w` and `h` in
+            each frame or for all.
+
+    Returns:
+        Of each frame the pose [4, 4] float64 and the lens, as in `Frame`.
+
+    Raises:
+        InputError: The file has no frame, or one of them no usable pose or no lens.
+    """
+    meta, entries = _read_entries(path)
+    if not entries:
+        raise InputError(f"{path}: has no frames; add some")
+    return [_read_camera(entry, meta, i, path, f"frame {i}") for i, entry in enumerate(entries)]
 
 
 def has_test_split(root: Path) -> bool:
@@ -107,14 +123,26 @@ def _need(table: dict, key: str, path: Path, where: str = ""):
 
 def _listed_frame(entry: dict, meta: dict, index: int, path: Path) -> Frame:
     """A frame of a transforms file."""
-    where = f" in frame {index}"
-    image_path = _find_image(path.parent, str(_need(entry, "file_path", path, where)), path)
+    image_path = _find_image(path.parent, str(_need(entry, "file_path", path, f" in frame {index}")), path)
     mask_path = path.parent / str(entry["mask_path"]) if "mask_path" in entry else None
-    matrix = _need(entry, "transform_matrix", path, where)
-    pose = _checked_pose(matrix, f"{path}: transform_matrix of frame {index} ({image_path.name})")
-    keys = ("camera_angle_x", "fl_x", "fl_y", "cx", "cy", "w", "h")
-    lens = _checked_lens({key: entry.get(key, meta.get(key)) for key in keys}, path)
+    pose, lens = _read_camera(entry, meta, index, path, f"frame {index} ({image_path.name})")
     return Frame(image_path.stem, image_path, mask_path, pose, lens)
+
+
+def _read_entries(path: Path) -> tuple[dict, list[dict]]:
+    """A transforms file and its frames."""
+    meta = read_json(path, "frames")
+    entries = _need(meta, "frames", path)
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise InputError(f"{path}: 'frames' must be a list of objects")
+    return meta, entries
+
+
+def _read_camera(entry: dict, meta: dict, index: int, path: Path, name: str) -> tuple[np.ndarray, dict]:
+    matrix = _need(entry, "transform_matrix", path, f" in frame {index}")
+    pose = _checked_pose(matrix, f"{path}: transform_matrix of {name}")
+    keys = ("camera_angle_x", "fl_x", "fl_y", "cx", "cy", "w", "h")
+    return pose, _checked_lens({key: entry.get(key, meta.get(key)) for key in keys}, path)
 
 
 def _folder_frame(folder: Path, content: dict, path: Path) -> Frame:

@@ -146,5 +146,5 @@ class Document:
                 raise InputError(f"{self.path}: holds a data URI that is not base64; export it again") from None
         path = self.path.parent / unquote(uri)
         if not path.is_file():
-            raise InputError(f"{path}: no such file, though {self.path.name} refers to it; put it there or export a GLB")
+            raise InputError(f"{path}: no such file, though {self.path.name} refers to it; add it or export a GLB")
         return path.read_bytes()

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
@@ -71,6 +70,27 @@ def scene_parts(document: Document) -> list[Part]:
     return parts
 
 
+def split_mirrored(part: Part, uv: np.ndarray) -> tuple[Part, np.ndarray]:
+    """Doubles the vertices where texture coordinates [n, 2] meet their mirror image: the two sides have no tangent
+    space in common (MikkTSpace parts them too)."""
+    texels = uv[part.triangles]
+    edges = texels[:, 1:] - texels[:, :1]
+    side = edges[:, 0, 0] * edges[:, 1, 1] < edges[:, 0, 1] * edges[:, 1, 0]
+    corners, triangles = np.unique(2 * part.triangles + side[:, None], return_inverse=True)
+    source = corners // 2
+    if len(np.unique(source)) == len(source):
+        return part, uv
+    split = replace(
+        part,
+        vertices=part.vertices[source],
+        triangles=triangles.reshape(-1, 3),
+        normals=part.normals[source],
+        colors=None if part.colors is None else part.colors[source],
+        uv={},
+    )
+    return split, uv[source]
+
+
 def _world_matrices(document: Document) -> dict[int, np.ndarray]:
     """[4, 4] of every node of the default scene, or of all nodes where the file has no scene."""
     nodes = document.get("nodes")
@@ -120,7 +140,7 @@ def _skin_matrices(
     weights = np.concatenate([document.array(attributes[f"WEIGHTS_{n}"]) for n in sets], axis=1)
     total = weights.sum(axis=1, keepdims=True)
     if not (total > 0).all() or which.max() >= len(joints):
-        raise InputError(f"{label} has vertices without weights or joints out of range; apply its skin and export again")
+        raise InputError(f"{label} has vertices without weights or joints out of range; apply its skin first")
     blended = np.zeros((len(which), 4, 4))
     for column in range(which.shape[1]):
         blended += (weights[:, column] / total[:, 0])[:, None, None] * placed[which[:, column]]

@@ -17,6 +17,7 @@ SUPPORTED_EXTENSIONS = frozenset(
     {"KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_emissive_strength", "EXT_texture_webp"}
 )
 REPEAT = 10497
+LARGEST_FACTOR = 1e9
 
 
 @dataclass
@@ -63,14 +64,15 @@ def read_material(document: Document, index: int | None) -> TexturedMaterial:
     if normal is not None:
         scale = _finite(document, name, source["normalTexture"].get("scale", 1.0), 1)[0]
         normal = ((2 * normal - 1) * np.array([scale, scale, 1.0])).astype(np.float32)
+    emissive = _unit(document, name, source.get("emissiveFactor", (0.0, 0.0, 0.0)), 3)
     strength = source.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
-    emissive = _finite(document, name, source.get("emissiveFactor", (0.0, 0.0, 0.0)), 3)
+    strength = max(0.0, _finite(document, name, strength, 1)[0])
     material = Material(
         name=name,
         albedo=tuple(_unit(document, name, pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))[:3], 3)),
         roughness=_unit(document, name, pbr.get("roughnessFactor", 1.0), 1)[0],
         metallic=_unit(document, name, pbr.get("metallicFactor", 1.0), 1)[0],
-        emission=tuple(max(0.0, e * float(strength)) for e in emissive),
+        emission=tuple(strength * channel for channel in emissive),
         albedo_texture=None if color is None else srgb_to_linear(color),
         roughness_metallic_texture=None if orm is None else np.ascontiguousarray(orm[..., 1:3]),
         normal_texture=normal,
@@ -110,7 +112,10 @@ class _Slots:
             raise InputError(
                 f"{document.path}: a texture of material '{self.name}' comes as {kinds}; export it with PNG or JPEG"
             )
-        pixels = decode_image(*document.image(texture.get("source", webp.get("source"))))
+        data, image = document.image(texture.get("source", webp.get("source")))
+        pixels = decode_image(data, image)
+        if not np.isfinite(pixels).all():
+            raise InputError(f"{image}: has NaN or infinite pixels; clean it and export again")
         return pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
 
 
@@ -125,8 +130,8 @@ def _uv_matrix(transform: dict) -> np.ndarray:
 
 def _finite(document: Document, name: str, values, count: int) -> list[float]:
     values = np.asarray(values, dtype=np.float64).reshape(-1)
-    if len(values) != count or not np.isfinite(values).all():
-        raise InputError(f"{document.path}: material '{name}' has a factor that is no number; export it again")
+    if len(values) != count or not (np.abs(values) <= LARGEST_FACTOR).all():
+        raise InputError(f"{document.path}: material '{name}' has a factor that is no usable number; repair it")
     return values.tolist()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.gltf.document import Document
-from splitnerf.data.gltf.geometry import Part, scene_parts
+from splitnerf.data.gltf.geometry import Part, scene_parts, split_mirrored
 from splitnerf.data.gltf.materials import SUPPORTED_EXTENSIONS, TexturedMaterial, read_material
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.errors import InputError
@@ -33,8 +33,9 @@ def read_asset(path: str | os.PathLike) -> Asset:
     path = Path(path)
     document = Document(path)
     try:
-        return _read(document)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        with np.errstate(over="ignore", invalid="ignore"):  # what comes out is checked
+            return _read(document)
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, MemoryError) as error:
         raise InputError(f"{path}: is not valid glTF ({type(error).__name__}: {error}); export it again") from None
 
 
@@ -53,6 +54,9 @@ def _read(document: Document) -> Asset:
     materials = {index: read_material(document, index) for index in indices}
     uvs = [_uv(path, part, materials[part.material]) for part in parts]
     with_normal_map = any(entry.material.normal_texture is not None for entry in materials.values())
+    for i, (part, uv) in enumerate(zip(parts, uvs)):
+        if part.tangents is None and materials[part.material].material.normal_texture is not None:
+            parts[i], uvs[i] = split_mirrored(part, uv)
 
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     counts = [len(part.triangles) for part in parts]
@@ -73,6 +77,9 @@ def _read(document: Document) -> Asset:
         tangents=_z_up(np.concatenate([_tangents(p, c) for p, c in zip(parts, uvs)])) if with_normal_map else None,
         colors=None if colors is None else colors.astype(np.float32),
     )
+    for values in (asset.vertices, asset.normals, asset.uv, asset.tangents):
+        if values is not None and not np.isfinite(values).all():
+            raise InputError(f"{path}: has NaN or infinite coordinates after its transforms; repair them")
     corners = asset.vertices[asset.triangles]
     if not np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
         raise InputError(f"{path}: no triangle has an area; export the mesh again")
