@@ -19,12 +19,12 @@ namespace {
 using Vec = Vec3<float>;
 
 struct Image {
-  std::vector<float> radiance, alpha, albedo, roughness, metallic, normal, depth;
+  std::vector<float> radiance, alpha, albedo, roughness, metallic, normal, smooth_normal, depth, shadow;
   RenderTargets targets(size_t n) {
-    for (auto* image : {&radiance, &albedo, &normal}) image->assign(n * 3, -1.f);
-    for (auto* image : {&alpha, &roughness, &metallic, &depth}) image->assign(n, -1.f);
-    return {radiance.data(), alpha.data(),  albedo.data(), roughness.data(),
-            metallic.data(), normal.data(), depth.data()};
+    for (auto* image : {&radiance, &albedo, &normal, &smooth_normal}) image->assign(n * 3, -1.f);
+    for (auto* image : {&alpha, &roughness, &metallic, &depth, &shadow}) image->assign(n, -1.f);
+    return {radiance.data(), alpha.data(),         albedo.data(), roughness.data(), metallic.data(),
+            normal.data(),   smooth_normal.data(), depth.data(),  shadow.data()};
   }
 };
 

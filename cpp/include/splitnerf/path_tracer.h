@@ -11,7 +11,9 @@
 #include <cstdint>
 
 #include "splitnerf/config.h"
+#include "splitnerf/pixel_filter.h"
 #include "splitnerf/scene.h"
+#include "splitnerf/texture.h"
 
 namespace splitnerf {
 
@@ -22,6 +24,18 @@ struct Camera {
   int width, height;          // pixels
 };
 
+// One glTF metallic-roughness material: each quantity is its factor times its texture.
+struct SurfaceMaterial {
+  Vec3<float> albedo{1, 1, 1};  // linear, in [0, 1]
+  float roughness = 1;          // perceptual, in [0, 1]
+  float metallic = 1;           // in [0, 1]
+  Vec3<float> emission{0, 0, 0};  // radiance, not negative
+  Texture albedo_texture;              // 3 channels, linear
+  Texture roughness_metallic_texture;  // 2 channels
+  Texture normal_texture;              // 3 channels in [-1, 1], tangent space, y along the bitangent
+  Texture emission_texture;            // 3 channels, linear
+};
+
 // Materials and normals of a mesh. All arrays are read during the call only.
 struct Surface {
   const float* albedo;     // [n, 3] linear, in [0, 1]
@@ -29,6 +43,14 @@ struct Surface {
   const float* metallic;   // [n] in [0, 1]
   bool per_triangle;       // n = number of triangles; else one entry a vertex, interpolated
   const float* normals;    // [n_vertices, 3] shading normals, or null for flat shading
+
+  // Optional, and multiplied with the above: the material of each triangle.
+  const SurfaceMaterial* materials = nullptr;
+  int n_materials = 0;
+  const int32_t* material_ids = nullptr;  // [n_triangles]
+  const float* uv = nullptr;              // [n_vertices, 2], needed where a material has a texture
+  const float* tangents = nullptr;        // [n_vertices, 4], needed for normal textures: along +u, and the sign of
+                                          // the bitangent, sign * cross(normal, tangent)
 };
 
 // Equirectangular map, see environment.h.
@@ -45,9 +67,13 @@ struct PathTracerParams {
   // Largest channel that one indirect contribution may add to a path (a brighter one is scaled
   // down); 0: no limit, unbiased. It trades caustics, which few samples show as specks, for noise.
   float clamp_indirect = 0;
+  PixelFilter filter = PixelFilter::kBox;
+  // An invisible ground plane z = catcher_height that shows the shadow of the direct light.
+  bool shadow_catcher = false;
+  float catcher_height = 0;
 };
 
-// Outputs, all required. The features are those of the first hit, averaged over the sub-samples
+// Outputs, all but shadow required. The features are those of the first hit, averaged over the sub-samples
 // that hit the mesh, and 0 where none does.
 struct RenderTargets {
   float* radiance;   // [height, width, 3] linear, premultiplied by alpha
@@ -55,13 +81,16 @@ struct RenderTargets {
   float* albedo;     // [height, width, 3]
   float* roughness;  // [height, width]
   float* metallic;   // [height, width]
-  float* normal;     // [height, width, 3] world space, shading normal turned to the camera
-  float* depth;      // [height, width] distance from the camera's centre along the ray
+  float* normal;         // [height, width, 3] world space, shading normal turned to the camera
+  float* smooth_normal;  // [height, width, 3] the same without normal texture
+  float* depth;          // [height, width] distance from the camera's centre along the ray
+  // [height, width] or null: opacity of the black shadow on the catcher; alpha + shadow <= 1.
+  float* shadow;
 };
 
-// Throws std::invalid_argument for unusable inputs and std::runtime_error for a path whose
-// radiance is not finite.
-SPLITNERF_API void render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment,
-                          const Camera& camera, const PathTracerParams& params, const RenderTargets& targets);
+// Returns the number of rays that were traced. Throws std::invalid_argument for unusable inputs and
+// std::runtime_error for a path whose radiance is not finite.
+SPLITNERF_API int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment,
+                             const Camera& camera, const PathTracerParams& params, const RenderTargets& targets);
 
 }  // namespace splitnerf
