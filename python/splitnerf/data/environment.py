@@ -1,0 +1,67 @@
+"""Environment maps that a user hands over."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.images import HDR_SUFFIXES, read_radiance
+from splitnerf.errors import InputError
+from splitnerf.notes import note
+
+ASPECT_TOLERANCE = 0.02
+NEGATIVE_SHARE = 1e-3  # of the map's sum: what resampling and compression leave behind
+
+
+def read_environment(path: str | os.PathLike) -> np.ndarray:
+    """Reads an equirectangular map of linear radiance, u = 0.5 - atan2(y, x)/(2 pi), v = acos(z)/pi from the top.
+
+    Negative pixels that sum to at most a thousandth of the map are set to 0 and said on stderr.
+
+    Args:
+        path: An EXR or HDR file, twice as wide as high.
+
+    Returns:
+        [h, w, 3] float32, finite and >= 0.
+
+    Raises:
+        InputError: Not an HDR file, not 2:1, black, or with NaN, infinite or many negative pixels.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such environment map; check the path")
+    if path.suffix.lower() not in HDR_SUFFIXES:
+        raise InputError(f"{path}: an environment map must hold linear radiance; use an .exr or .hdr file")
+    radiance = read_radiance(path)
+    height, width = radiance.shape[:2]
+    if abs(width - 2 * height) > ASPECT_TOLERANCE * width:
+        raise InputError(f"{path}: is {width}x{height}; an equirectangular map is twice as wide as high")
+    negative = radiance < 0
+    if negative.any():
+        total, dark = radiance.sum(where=~negative, dtype=np.float64), -radiance.sum(where=negative, dtype=np.float64)
+        if dark > NEGATIVE_SHARE * total:
+            raise InputError(f"{path}: has negative pixels, {dark / max(total, 1e-30):.1%} of its light; re-export it")
+        note(f"{path}: {negative.any(axis=2).sum()} pixels were slightly negative; set to 0")
+        radiance = np.maximum(radiance, 0)
+    if not radiance.any():
+        raise InputError(f"{path}: is black and lights nothing; use another map")
+    return radiance
+
+
+def rotate_environment(radiance: np.ndarray, degrees: float) -> np.ndarray:
+    """Turns the light about the z axis, counter-clockwise seen from above.
+
+    Args:
+        radiance: [h, w, 3] equirectangular.
+        degrees: The angle; columns are interpolated linearly, which keeps each row's mean.
+
+    Returns:
+        [h, w, 3], same dtype.
+    """
+    shift = degrees / 360 * radiance.shape[1]
+    whole = int(np.floor(shift))
+    share = shift - whole
+    near = np.roll(radiance, -whole, axis=1)
+    return ((1 - share) * near + share * np.roll(near, -1, axis=1)).astype(radiance.dtype)
