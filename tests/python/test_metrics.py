@@ -129,7 +129,7 @@ def make_inputs():
 
 KEYS = [
     "novel_view", "albedo", "relight", "normal_mae_deg", "roughness_mae", "metallic_balanced_accuracy",
-    "light_psnr", "chamfer", "f_score", "seconds",
+    "light_psnr", "chamfer", "f_score", "seconds", "views",
 ]  # fmt: skip
 
 
@@ -171,7 +171,7 @@ def test_protocol_composites_on_white_and_ignores_hidden_colour():
 def test_protocol_is_null_without_truth():
     predictions, data, _ = make_inputs()
     result = evaluate_maps(predictions, data, [ViewTruth("a"), ViewTruth("b")], light=np.ones((8, 16, 3)))
-    assert [key for key in KEYS if result[key] is not None] == ["novel_view"]
+    assert [key for key in KEYS if result[key] is not None] == ["novel_view", "views"]
 
 
 def test_protocol_rejects_numbers_and_sizes_that_differ():
@@ -179,5 +179,5 @@ def test_protocol_rejects_numbers_and_sizes_that_differ():
     with pytest.raises(ValueError, match="1 predictions for 2 images"):
         evaluate_maps(predictions[:1], data, truths)
     predictions[0]["rgb"] = predictions[0]["rgb"][:8]
-    with pytest.raises(ValueError, match="prediction is"):
+    with pytest.raises(ValueError, match="rgb of a prediction is"):
         evaluate_maps(predictions, data, truths)

@@ -64,10 +64,20 @@ def lsq_scale(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | N
     Returns:
         [C] float64; 1 for a channel that is 0 everywhere.
     """
+    return scale_of_sums(lsq_sums(prediction, truth, weights))
+
+
+def lsq_sums(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+    """What `lsq_scale` needs of some pixels, [2, C] float64 (sum w x y, sum w x^2); sums of parts add up."""
     x, y = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
     w = np.ones(len(x)) if weights is None else weights
-    square = (w[:, None] * x * x).sum(axis=0)
-    return np.where(square > 0, (w[:, None] * x * y).sum(axis=0) / np.where(square > 0, square, 1), 1.0)
+    return np.stack([(w[:, None] * x * y).sum(axis=0), (w[:, None] * x * x).sum(axis=0)])
+
+
+def scale_of_sums(sums: np.ndarray) -> np.ndarray:
+    """The scale [C] of `lsq_sums`."""
+    product, square = sums
+    return np.where(square > 0, product / np.where(square > 0, square, 1), 1.0)
 
 
 def median_scale(prediction: np.ndarray, truth: np.ndarray) -> np.ndarray:
