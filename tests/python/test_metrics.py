@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.environment import resize_environment
 from splitnerf.data.truth import ViewTruth
 from splitnerf.evaluate import metrics
 from splitnerf.evaluate.protocol import evaluate_maps
@@ -88,12 +89,12 @@ def test_light_psnr_weighs_rows_by_solid_angle():
 def test_resize_environment_wraps_around_and_keeps_constants():
     image = np.zeros((2, 4, 1), np.float32)
     image[:, 0] = 1
-    wide = metrics.resize_environment(image, 2, 8)[0, :, 0]
+    wide = resize_environment(image, 2, 8)[0, :, 0]
     assert wide == pytest.approx([0.75, 0.75, 0.25, 0, 0, 0, 0, 0.25])
     blocks = np.arange(18.0).reshape(3, 6, 1) ** 2
     # (0+1+4 + 36+49+64 + 144+169+196) / 9 and (9+16+25 + 81+100+121 + 225+256+289) / 9.
-    assert metrics.resize_environment(blocks, 1, 2)[0, :, 0] == pytest.approx([663 / 9, 1122 / 9])
-    assert metrics.resize_environment(np.ones((5, 7, 3)), 4, 9) == pytest.approx(np.ones((4, 9, 3)))
+    assert resize_environment(blocks, 1, 2)[0, :, 0] == pytest.approx([663 / 9, 1122 / 9])
+    assert resize_environment(np.ones((5, 7, 3)), 4, 9) == pytest.approx(np.ones((4, 9, 3)))
 
 
 def test_mesh_distances():

@@ -23,7 +23,7 @@ PROTOCOLS = {"low": (8, 20), "high": (7, 20)}
 
 def relit_path(image_path: Path, name: str) -> Path:
     """Where the view of `image_path` under map `name` lies."""
-    stem = "rgba" if view_folders.is_view(image_path) else f"{image_path.stem}_relit"
+    stem = image_path.stem if image_path.name == view_folders.PHOTO else f"{image_path.stem}_relit"
     return image_path.with_name(f"{stem}_{name}.png")
 
 

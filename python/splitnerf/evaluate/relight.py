@@ -17,6 +17,8 @@ from splitnerf.evaluate.lpips import Distance
 from splitnerf.evaluate.similarity import ScaledView, scaled_scores
 from splitnerf.render.path_traced import AssetRenderer
 
+FIRST_SEED = 1 << 31  # data are rendered with smaller ones, so that prediction and truth never share their noise
+
 
 @dataclass
 class RelitViews:
@@ -58,7 +60,9 @@ def render_view(
 ) -> dict[str, np.ndarray]:
     """The asset's maps of one view in the data's world frame, see `AssetRenderer.render`."""
     pose, lens = dataset.world_poses[index], dataset.intrinsics[index]
-    return renderer.render(environment, pose, tuple(lens), dataset.width, dataset.height, spp=spp, seed=index)
+    return renderer.render(
+        environment, pose, tuple(lens), dataset.width, dataset.height, spp=spp, seed=FIRST_SEED + index
+    )
 
 
 def relight(renderer: AssetRenderer, dataset: Dataset, maps: dict[str, Path], spp: int) -> RelitViews:
@@ -77,7 +81,7 @@ def relight(renderer: AssetRenderer, dataset: Dataset, maps: dict[str, Path], sp
         for index in range(len(dataset)):
             read_relit(dataset, index, name)
     images = {}
-    with tqdm(total=len(maps) * len(dataset), desc="relighting", unit="view", leave=False) as progress:
+    with tqdm(total=len(maps) * len(dataset), desc="relighting", unit="view", leave=False, disable=None) as progress:
         for name, path in maps.items():
             environment = read_environment(path)
             images[name] = []
