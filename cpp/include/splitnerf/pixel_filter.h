@@ -17,21 +17,28 @@ enum class PixelFilter : int {
 // Maps a uniform u in [0, 1) to an offset from the pixel's centre, in pixels.
 class PixelFilterSampler {
  public:
-  explicit PixelFilterSampler(PixelFilter filter) {
-    constexpr double kWidth = 3;  // pixels
-    for (int i = 0; i <= kIntervals; ++i) {
-      const double u = static_cast<double>(i) / kIntervals;
-      offsets_[i] = static_cast<float>(filter == PixelFilter::kBox ? u - 0.5 : kWidth * (invert(u) - 0.5));
-    }
-  }
+  explicit PixelFilterSampler(PixelFilter filter) : box_(filter == PixelFilter::kBox), window_(window()) {}
   float operator()(float u) const {
+    if (box_) return u - 0.5f;
     const float x = u * kIntervals;
     const int i = min_of(static_cast<int>(x), kIntervals - 1);
-    return lerp(offsets_[i], offsets_[i + 1], x - i);
+    return lerp(window_[i], window_[i + 1], x - i);
   }
 
  private:
-  static constexpr int kIntervals = 512;
+  static constexpr int kIntervals = 4096;
+  static constexpr double kWidth = 3;  // pixels
+
+  static const float* window() {
+    static const std::array<float, kIntervals + 1> offsets = [] {
+      std::array<float, kIntervals + 1> table;
+      for (int i = 0; i <= kIntervals; ++i) {
+        table[i] = static_cast<float>(kWidth * (invert(static_cast<double>(i) / kIntervals) - 0.5));
+      }
+      return table;
+    }();
+    return offsets.data();
+  }
 
   // The 4-term window w(t) = a0 - a1 cos 2 pi t + a2 cos 4 pi t - a3 cos 6 pi t, t in [0, 1],
   // integrated and divided by a0.   Source: Harris 1978, 92 dB window.
@@ -48,7 +55,8 @@ class PixelFilterSampler {
     return 0.5 * (lo + hi);
   }
 
-  std::array<float, kIntervals + 1> offsets_;
+  bool box_;
+  const float* window_;
 };
 
 }  // namespace splitnerf
