@@ -10,11 +10,11 @@ import os
 import sys
 
 import splitnerf
-from splitnerf.cli import demo, evaluate, info, train
+from splitnerf.cli import demo, evaluate, info, synth, train
 from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from splitnerf.errors import InputError
 
-COMMANDS = (train, demo, evaluate, info)
+COMMANDS = (train, demo, evaluate, synth, info)
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "build_parser", "main"]
 
 
