@@ -6,12 +6,13 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 
 from splitnerf.data.images import write_image
 from splitnerf.errors import InputError
 
 BOUNCES = 4
-PASSES = {"albedo": "RGB", "roughness": "X", "metallic": "X", "smooth_normal": "XYZ"}
+PASSES = {"albedo": "RGB", "roughness": "X", "metallic": "X", "smooth_normal": "RGB"}  # and their channels in the file
 
 
 class BlenderRenderer:
@@ -69,9 +70,9 @@ class BlenderRenderer:
             settings.media_type = "MULTI_LAYER_IMAGE"
         settings.file_format = "OPEN_EXR_MULTILAYER"
         settings.color_depth = "32"
-        for name, channels in PASSES.items():
+        for name, letters in PASSES.items():
             aov = bpy.context.view_layer.aovs.add()
-            aov.name, aov.type = name, "VALUE" if channels == "X" else "COLOR"
+            aov.name, aov.type = name, "VALUE" if letters == "X" else "COLOR"
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         scene.collection.objects.link(camera)
         scene.camera = camera
@@ -101,10 +102,9 @@ class BlenderRenderer:
         """
         scene, folder = self._bpy.context.scene, Path(self._folder.name)
         if self._environment is not environment:
-            write_image(folder / "light.exr", environment)
-            if self._light.image is not None:
-                self._bpy.data.images.remove(self._light.image)
-            self._light.image = self._bpy.data.images.load(str(folder / "light.exr"))
+            path = folder / f"light_{len(self._bpy.data.images)}.exr"  # a new name: Blender keeps what it loaded
+            write_image(path, environment)
+            self._light.image = self._bpy.data.images.load(str(path))
             self._environment = environment
         scene.camera.matrix_world = self._matrix(np.asarray(pose, np.float64).tolist())
         scene.camera.data.sensor_fit = "HORIZONTAL"
@@ -129,10 +129,10 @@ def _prepare_material(material) -> None:
     material.use_backface_culling = False
     normal = tree.nodes.new("ShaderNodeNewGeometry").outputs["Normal"]
     sources = {"albedo": "Base Color", "roughness": "Roughness", "metallic": "Metallic"}
-    for name, channels in PASSES.items():
+    for name, letters in PASSES.items():
         aov = tree.nodes.new("ShaderNodeOutputAOV")
         aov.aov_name = name
-        target = aov.inputs["Value" if channels == "X" else "Color"]
+        target = aov.inputs["Value" if letters == "X" else "Color"]
         source = shader.inputs[sources[name]] if name in sources else None
         if source is None:
             tree.links.new(normal, target)
@@ -144,25 +144,27 @@ def _prepare_material(material) -> None:
 
 def _read_passes(path: Path) -> dict[str, np.ndarray]:
     """The maps of a multi-layer EXR, passes divided by coverage."""
-    import OpenImageIO as oiio
-
     source = oiio.ImageInput.open(str(path))
     if source is None:
         raise RuntimeError(f"{path}: Blender wrote no image")
-    names = list(source.spec().channelnames)
-    pixels = np.asarray(source.read_image(0, 0, 0, len(names), "float"), np.float32)
+    channels: dict[str, np.ndarray] = {}
+    part = 0
+    while source.seek_subimage(part, 0):
+        names = source.spec().channelnames
+        pixels = np.asarray(source.read_image(part, 0, 0, len(names), "float"), np.float32)
+        channels |= {name.split(".", 1)[1]: pixels[..., i] for i, name in enumerate(names)}
+        part += 1
     source.close()
 
-    def layer(name: str, channels: str) -> np.ndarray:
-        found = [next(i for i, n in enumerate(names) if n.endswith(f".{name}.{c}")) for c in channels]
-        return pixels[..., found]
+    def layer(name: str, letters: str) -> np.ndarray:
+        return np.stack([channels[f"{name}.{letter}"] for letter in letters], axis=-1)
 
     alpha = layer("Combined", "A")[..., 0]
     maps = {"radiance": layer("Combined", "RGB"), "alpha": np.clip(alpha, 0, 1)}
     covered = np.maximum(alpha, 1e-8)[..., None]
-    for name, channels in PASSES.items():
-        values = layer(name, "X" if channels == "X" else "RGB") / covered
-        maps[name] = values[..., 0] if channels == "X" else values
+    for name, letters in PASSES.items():
+        values = layer(name, letters) / covered
+        maps[name] = values[..., 0] if letters == "X" else values
     lengths = np.linalg.norm(maps["smooth_normal"], axis=-1, keepdims=True)
     maps["smooth_normal"] = maps["smooth_normal"] / np.maximum(lengths, 1e-8)
     return maps
