@@ -11,6 +11,7 @@ import trimesh
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, load_dataset, spread
 from splitnerf.data.environment import read_environment
+from splitnerf.data.frames import has_test_split
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.json_files import read_json
 from splitnerf.data.relit import PROTOCOLS, relight_maps
@@ -73,7 +74,7 @@ def choose_views(dataset: Dataset, protocol: Protocol) -> tuple[Dataset, dict[st
     if count is None:
         count = PROTOCOLS[protocol.lights][1] if protocol.lights else len(dataset)
     if not 1 <= count <= len(dataset):
-        raise InputError(f"{dataset.root}: has {len(dataset)} test views, {count} were asked for; change --views")
+        raise InputError(f"{dataset.root}: has {len(dataset)} {dataset.split} views, {count} were asked for; change --views")
     maps = relight_maps(dataset, protocol.maps, protocol.lights)
     return dataset.select(spread(range(len(dataset)), count)), maps
 
@@ -107,7 +108,8 @@ def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None 
         InputError: The file, the data or the light cannot be used.
     """
     asset = read_asset(path)
-    views, maps = choose_views(load_dataset(data, "test", protocol.downscale), protocol)
+    split = "test" if has_test_split(data) else "train"
+    views, maps = choose_views(load_dataset(data, split, protocol.downscale), protocol)
     env = environment_beside(path) if env is None else env
     environment = None if env is None else read_environment(env)
     truths, truth = load_view_truths(views), load_scene_truth(data)

@@ -17,6 +17,7 @@ from splitnerf.evaluate.similarity import on_white
 SHEET_VIEWS = 3
 ERROR_GAIN = 4
 LABEL_HEIGHT, LABEL_WIDTH = 18, 130
+PANEL_WIDTH = 160  # smaller images are enlarged by a whole factor
 
 Row = tuple[str, list[tuple[np.ndarray, np.ndarray]]]
 
@@ -45,7 +46,8 @@ def write_sheet(
     shown = spread(range(len(dataset)), SHEET_VIEWS)
     rows = list(_rows(shown, dataset, predictions, truths, evaluation, relit))
     heads = [f"{dataset.frame_names[i]}: {kind}" for i in shown for kind in ("truth", "prediction", f"error x{ERROR_GAIN}")]
-    width, height = dataset.width, dataset.height
+    factor = -(-PANEL_WIDTH // dataset.width)
+    width, height = dataset.width * factor, dataset.height * factor
     sheet = Image.new("RGB", (LABEL_WIDTH + len(heads) * width, LABEL_HEIGHT + len(rows) * height), "white")
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(size=12)
     for column, head in enumerate(heads):
@@ -55,8 +57,9 @@ def write_sheet(
         draw.multiline_text((4, top + 4), label, "black", font)
         for i, (truth, prediction) in enumerate(pairs):
             error = np.clip(ERROR_GAIN * np.abs(prediction - truth), 0, 1)
-            panels = np.concatenate([truth, prediction, error], axis=1)
-            sheet.paste(Image.fromarray(to_uint8(panels)), (LABEL_WIDTH + 3 * i * width, top))
+            panels = Image.fromarray(to_uint8(np.concatenate([truth, prediction, error], axis=1)))
+            panels = panels.resize((3 * width, height), Image.Resampling.NEAREST)
+            sheet.paste(panels, (LABEL_WIDTH + 3 * i * width, top))
     write_image(path, np.asarray(sheet, np.float32) / 255)
 
 

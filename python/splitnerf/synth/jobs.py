@@ -18,6 +18,7 @@ from splitnerf.data.relit import PREFIX
 from splitnerf.errors import InputError
 from splitnerf.notes import note
 from splitnerf.synth.cameras import orbit, spiral
+from splitnerf.synth.placed import write_placed_glb
 from splitnerf.synth.writer import LAYOUTS, SceneWriter
 
 RENDERERS = ("project", "blender")
@@ -74,7 +75,8 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
     """Renders a dataset with truth.
 
     The asset is moved and scaled so that its bounding box is centred at the origin and its farthest vertex lies on the
-    unit sphere; its emission is left out, since the environment is taken to be the only light.
+    unit sphere; its emission is left out, since the environment is taken to be the only light. A GLB file is copied so
+    placed to `asset.glb`.
 
     Args:
         asset: A glTF file.
@@ -113,6 +115,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
 
     writer = SceneWriter(out, CAMERA_ANGLE_X, settings.layout)
     writer.mesh((original.vertices - centre) * scale, original.triangles)
+    write_placed_glb(asset, out / "asset.glb", centre, scale)
     stored = writer.light(maps[0])
     stored_relight = {name: writer.light(environment, name) for name, environment in zip(names, maps[1:])}
     render_views(renderer, writer, stored, stored_relight, settings)
