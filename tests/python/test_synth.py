@@ -143,7 +143,7 @@ def test_normals_face_the_camera_and_the_sun_stands_at_plus_x(data):
     normals, brightness = np.concatenate(normals), np.concatenate(brightness)
     # The gradient of brightness over the normal points to the sun.
     gradient = np.linalg.lstsq(np.column_stack([normals, np.ones(len(normals))]), brightness, rcond=None)[0][:3]
-    assert gradient[0] > 0.1 and gradient[0] / np.linalg.norm(gradient) > 0.9
+    assert gradient[0] > 0.1 and gradient[0] / np.linalg.norm(gradient) > 0.8
 
 
 def test_an_asset_scores_as_perfect_on_its_own_data(data, tmp_path):

@@ -70,12 +70,12 @@ def choose_views(dataset: Dataset, protocol: Protocol) -> tuple[Dataset, dict[st
     """
     if protocol.spp < 1:
         raise InputError(f"--spp must be at least 1, got {protocol.spp}")
+    maps = relight_maps(dataset, protocol.maps, protocol.lights)
     count = protocol.views
     if count is None:
         count = PROTOCOLS[protocol.lights][1] if protocol.lights else len(dataset)
     if not 1 <= count <= len(dataset):
         raise InputError(f"{dataset.root}: has {len(dataset)} {dataset.split} views, {count} were asked for; change --views")
-    maps = relight_maps(dataset, protocol.maps, protocol.lights)
     return dataset.select(spread(range(len(dataset)), count)), maps
 
 

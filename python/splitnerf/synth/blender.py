@@ -77,7 +77,8 @@ class BlenderRenderer:
         scene.collection.objects.link(camera)
         scene.camera = camera
         scene.world = bpy.data.worlds.new("world")
-        scene.world.use_nodes = True
+        if scene.world.node_tree is None:  # before Blender 5
+            scene.world.use_nodes = True
         tree = scene.world.node_tree
         self._light = tree.nodes.new("ShaderNodeTexEnvironment")
         tree.links.new(self._light.outputs[0], tree.nodes["Background"].inputs[0])
