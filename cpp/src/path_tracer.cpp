@@ -24,15 +24,18 @@ constexpr int kRouletteStart = 3;  // bounces before Russian roulette may end a 
 constexpr int64_t kPixelsPerTask = 64;
 constexpr int kPairsPerBounce = 3;  // light direction; BSDF direction; lobe choice and roulette
 
+constexpr int kCameraRays = 64;  // of a pixel, traced together
+
 struct FirstHit {
-  bool hit = false;
-  ShadingPoint point{};
-  float depth = 0;
+  bool hit;
+  ShadingPoint point;
 };
 
 // What one thread needs while it renders.
 struct Worker {
   std::vector<SamplePattern::Offset> offsets;
+  Vec origins[kCameraRays], directions[kCameraRays];
+  Hit hits[kCameraRays];
   int64_t n_rays = 0;
 };
 
@@ -73,8 +76,10 @@ class PathTracer {
     int n_hits = 0;
     CaughtLight caught;
     for (int sample = 0; sample < spp; ++sample) {
-      FirstHit first;
-      const Vec path = trace_path(x, y, sample, worker, &first, &caught);
+      const int k = sample % kCameraRays;
+      if (k == 0) trace_camera_rays(x, y, sample, min_of(kCameraRays, spp - sample), worker);
+      FirstHit first{};
+      const Vec path = trace_path(worker.directions[k], worker.hits[k], sample, worker, &first, &caught);
       if (!std::isfinite(sum(path))) {
         throw std::runtime_error("render: a path through pixel (" + std::to_string(x) + ", " + std::to_string(y) +
                                  ") has a radiance that is not finite");
@@ -89,7 +94,7 @@ class PathTracer {
       }
       roughness += first.point.roughness;
       metallic += first.point.metallic;
-      depth += first.depth;
+      depth += worker.hits[k].t;
     }
     const double per_hit = 1. / max_of(n_hits, 1);
     for (int c = 0; c < 3; ++c) {
@@ -109,14 +114,23 @@ class PathTracer {
   }
 
  private:
+  // The camera rays of the samples `first` ... `first + n - 1` of a pixel, and their nearest hits.
+  void trace_camera_rays(int x, int y, int first, int n, Worker& worker) const {
+    for (int k = 0; k < n; ++k) {
+      worker.origins[k] = camera_centre();
+      worker.directions[k] = camera_ray(x, y, pattern_.get(worker.offsets, first + k, 0));
+    }
+    scene_.trace_closest(&worker.origins[0].x, &worker.directions[0].x, n, kInfinity, worker.hits);
+  }
+
   // L = sum over vertices of throughput x (emission + light sampled there + light that the BSDF
   // sample finds).
-  Vec trace_path(int x, int y, int sample, Worker& worker, FirstHit* first, CaughtLight* caught) const {
+  Vec trace_path(Vec direction, Hit hit, int sample, Worker& worker, FirstHit* first, CaughtLight* caught) const {
     Vec radiance{0, 0, 0}, throughput{1, 1, 1};
-    Vec origin = camera_centre(), direction = camera_ray(x, y, pattern_.get(worker.offsets, sample, 0));
+    Vec origin = camera_centre();
     float bsdf_pdf = 0;
     for (int bounce = 0;; ++bounce) {
-      const Hit hit = scene_.trace_closest(origin, direction, kInfinity);
+      if (bounce > 0) hit = scene_.trace_closest(origin, direction, kInfinity);
       ++worker.n_rays;
       if (bounce == 0 && params_.shadow_catcher) {
         const float t = (params_.catcher_height - origin.z) / direction.z;
@@ -136,7 +150,7 @@ class PathTracer {
       if (bounce > params_.max_bounces) return radiance;
 
       const ShadingPoint point = surface_(hit, -direction);
-      if (bounce == 0) *first = {true, point, hit.t};
+      if (bounce == 0) *first = {true, point};
       radiance += limited(throughput * point.emission, bounce > 0);
       const Frame<float> frame(point.shading_normal);
       const PrincipledBsdf<float> bsdf(lut_, point.albedo, point.roughness, point.metallic,
@@ -245,44 +259,48 @@ void require_finite(const float* values, int64_t n, const char* what) {
 
 int64_t texels(const Texture& texture) { return int64_t(texture.height) * texture.width; }
 
-void check_materials(const Scene& scene, const Surface& surface) {
-  if (!surface.material_ids) return;
-  constexpr float kMax = std::numeric_limits<float>::max();
+void check_ids(const Scene& scene, const Surface& surface) {
+  bool any_texture = false, any_normal_texture = false;
+  for (int i = 0; i < surface.n_materials; ++i) {
+    const SurfaceMaterial& m = surface.materials[i];
+    any_normal_texture |= m.normal_texture.texels != nullptr;
+    any_texture |= m.albedo_texture.texels || m.roughness_metallic_texture.texels || m.emission_texture.texels;
+  }
+  require(!(any_texture || any_normal_texture) || surface.uv, "textures need uv");
+  require(!any_normal_texture || (surface.tangents && surface.normals), "a normal texture needs normals and tangents");
   for (int64_t i = 0; i < scene.n_triangles(); ++i) {
     require(surface.material_ids[i] >= 0 && surface.material_ids[i] < surface.n_materials,
             "material_ids must name materials");
-  }
-  for (int i = 0; i < surface.n_materials; ++i) {
-    const SurfaceMaterial& m = surface.materials[i];
-    const float factors[5] = {m.albedo.x, m.albedo.y, m.albedo.z, m.roughness, m.metallic};
-    require_range(factors, 5, 1.f, "material factors must lie in [0, 1]");
-    require_range(&m.emission.x, 3, kMax, "emission must be finite and not negative");
-    for (const Texture* t : {&m.albedo_texture, &m.roughness_metallic_texture, &m.normal_texture, &m.emission_texture}) {
-      if (!t->texels) continue;
-      require(t->height > 0 && t->width > 0, "textures must not be empty");
-      require(surface.uv, "textures need uv");
-    }
-    require(!m.normal_texture.texels || (surface.tangents && surface.normals), "a normal texture needs normals and tangents");
-    if (m.albedo_texture.texels) {
-      require_range(m.albedo_texture.texels, texels(m.albedo_texture) * 3, 1.f, "albedo textures must lie in [0, 1]");
-    }
-    if (m.roughness_metallic_texture.texels) {
-      require_range(m.roughness_metallic_texture.texels, texels(m.roughness_metallic_texture) * 2, 1.f,
-                    "roughness and metallic textures must lie in [0, 1]");
-    }
-    if (m.emission_texture.texels) {
-      require_range(m.emission_texture.texels, texels(m.emission_texture) * 3, kMax,
-                    "emission textures must be finite and not negative");
-    }
-    if (m.normal_texture.texels) {
-      require_finite(m.normal_texture.texels, texels(m.normal_texture) * 3, "normal textures must be finite");
-    }
   }
   if (surface.uv) require_finite(surface.uv, scene.n_vertices() * 2, "uv must be finite");
   if (surface.tangents) require_finite(surface.tangents, scene.n_vertices() * 4, "tangents must be finite");
 }
 
 }  // namespace
+
+void check_material(const SurfaceMaterial& m) {
+  constexpr float kMax = std::numeric_limits<float>::max();
+  const float factors[5] = {m.albedo.x, m.albedo.y, m.albedo.z, m.roughness, m.metallic};
+  require_range(factors, 5, 1.f, "material factors must lie in [0, 1]");
+  require_range(&m.emission.x, 3, kMax, "emission must be finite and not negative");
+  for (const Texture* t : {&m.albedo_texture, &m.roughness_metallic_texture, &m.normal_texture, &m.emission_texture}) {
+    require(!t->texels || (t->height > 0 && t->width > 0), "textures must not be empty");
+  }
+  if (m.albedo_texture.texels) {
+    require_range(m.albedo_texture.texels, texels(m.albedo_texture) * 3, 1.f, "albedo textures must lie in [0, 1]");
+  }
+  if (m.roughness_metallic_texture.texels) {
+    require_range(m.roughness_metallic_texture.texels, texels(m.roughness_metallic_texture) * 2, 1.f,
+                  "roughness and metallic textures must lie in [0, 1]");
+  }
+  if (m.emission_texture.texels) {
+    require_range(m.emission_texture.texels, texels(m.emission_texture) * 3, kMax,
+                  "emission textures must be finite and not negative");
+  }
+  if (m.normal_texture.texels) {
+    require_finite(m.normal_texture.texels, texels(m.normal_texture) * 3, "normal textures must be finite");
+  }
+}
 
 int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
                const PathTracerParams& params, const RenderTargets& targets) {
@@ -302,7 +320,7 @@ int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap&
   require_range(environment.radiance, int64_t(environment.height) * environment.width * 3,
                 std::numeric_limits<float>::max(), "environment radiance must be finite and not negative");
   if (surface.normals) require_finite(surface.normals, scene.n_vertices() * 3, "normals must be finite");
-  check_materials(scene, surface);
+  if (surface.material_ids) check_ids(scene, surface);
   require(std::isfinite(params.catcher_height), "catcher_height must be finite");
 
   const PathTracer tracer(scene, surface, environment, camera, params);

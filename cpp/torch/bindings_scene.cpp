@@ -103,7 +103,7 @@ py::tuple trace_closest(const PyScene& self, const py::object& origins, const py
   return py::make_tuple(t, triangle, u, v);
 }
 
-// The materials of a Surface, and what keeps their arrays alive.
+// The checked materials of a Surface, and what keeps their arrays alive.
 struct PyMaterials {
   // materials: objects with the attributes of splitnerf.data.asset.Material.
   explicit PyMaterials(const py::list& list) {
@@ -117,6 +117,7 @@ struct PyMaterials {
       m.roughness_metallic_texture = texture(item, "roughness_metallic_texture", 2);
       m.normal_texture = texture(item, "normal_texture", 3);
       m.emission_texture = texture(item, "emission_texture", 3);
+      splitnerf::check_material(m);
       materials.push_back(m);
     }
   }
@@ -143,7 +144,7 @@ splitnerf::PixelFilter pixel_filter(const std::string& name) {
 py::dict render(const PyScene& self, const py::object& albedo, const py::object& roughness,
                 const py::object& metallic, const py::object& environment, const py::object& camera_to_world,
                 float fx, float fy, float cx, float cy, int width, int height, const py::object& normals,
-                const std::string& materials_per, const py::list& materials, const py::object& material_ids,
+                const std::string& materials_per, const PyMaterials* materials, const py::object& material_ids,
                 const py::object& uv, const py::object& tangents, int spp, int max_bounces, uint32_t seed,
                 bool light_sampling, float clamp_indirect, const std::string& filter,
                 const std::optional<float>& catcher_height) {
@@ -168,14 +169,13 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
   std::copy_n(pose.data(), 12, camera.camera_to_world);
   splitnerf::Surface surface{albedos.data(), roughnesses.data(), metallics.data(), per_triangle,
                              normals.is_none() ? nullptr : shading.data()};
-  const PyMaterials table(materials);
   Array<int32_t> ids;
   Array<float> uvs, frames;
-  if (!material_ids.is_none()) {
+  if (materials) {
     ids = checked<int32_t>("render", "material_ids", material_ids, {self.scene->n_triangles()});
     surface.material_ids = ids.data();
-    surface.materials = table.materials.data();
-    surface.n_materials = int(table.materials.size());
+    surface.materials = materials->materials.data();
+    surface.n_materials = int(materials->materials.size());
   }
   if (!uv.is_none()) {
     uvs = checked<float>("render", "uv", uv, {self.scene->n_vertices(), 2});
@@ -263,11 +263,16 @@ void bind_scene(py::module_& m) {
            "miss.\n\n"
            "u and v are the barycentric coordinates of the triangle's second and third vertex.");
 
+  py::class_<PyMaterials>(m, "Materials",
+                          "Checked materials for render, from a list of splitnerf.data.asset.Material. ValueError where a\n"
+                          "factor or a texture lies outside its range.")
+      .def(py::init<const py::list&>(), py::arg("materials"));
+
   m.def(
       "render", &render, py::arg("scene"), py::arg("albedo"), py::arg("roughness"), py::arg("metallic"),
       py::arg("environment"), py::arg("camera_to_world"), py::arg("fx"), py::arg("fy"), py::arg("cx"),
       py::arg("cy"), py::arg("width"), py::arg("height"), py::kw_only(), py::arg("normals") = py::none(),
-      py::arg("materials_per") = "vertex", py::arg("materials") = py::list(), py::arg("material_ids") = py::none(),
+      py::arg("materials_per") = "vertex", py::arg("materials") = py::none(), py::arg("material_ids") = py::none(),
       py::arg("uv") = py::none(), py::arg("tangents") = py::none(), py::arg("spp") = 64, py::arg("max_bounces") = 4,
       py::arg("seed") = 0, py::arg("light_sampling") = true, py::arg("clamp_indirect") = 0.f,
       py::arg("pixel_filter") = "box", py::arg("catcher_height") = py::none(),
@@ -277,7 +282,7 @@ void bind_scene(py::module_& m) {
       "environment: [h, w, 3] linear radiance. camera_to_world: [3, 4], OpenGL axes; fx ... cy in pixels.\n"
       "normals: [n_vertices, 3] shading normals, or None for flat shading.\n"
       "clamp_indirect: largest channel of one indirect contribution, 0 for no limit (unbiased).\n"
-      "materials, material_ids [m] int32, uv [n_vertices, 2], tangents [n_vertices, 4]: see splitnerf.data.asset;\n"
+      "materials (Materials), material_ids [m] int32, uv [n_vertices, 2], tangents [n_vertices, 4]: see splitnerf.data.asset;\n"
       "multiplied with albedo, roughness and metallic.\n"
       "pixel_filter: 'box' (1 pixel) or 'blackman-harris' (1.5 pixels). catcher_height: z of an invisible ground\n"
       "plane that catches the shadow of the direct light, or None.\n"

@@ -181,7 +181,8 @@ TEST(TexturedPath, UnusableMaterialsAreRefused) {
   const auto refused = [&](auto change) {
     SquareJob job;
     change(job);
-    EXPECT_THROW(job.render(), std::invalid_argument);
+    const auto use = [&] { check_material(job.materials[0]), job.render(); };
+    EXPECT_THROW(use(), std::invalid_argument);
   };
   refused([](SquareJob& j) { j.ids = {0, 1}; });
   refused([](SquareJob& j) { j.materials[0].roughness = NAN; });

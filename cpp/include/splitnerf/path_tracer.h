@@ -36,6 +36,10 @@ struct SurfaceMaterial {
   Texture emission_texture;            // 3 channels, linear
 };
 
+// Throws std::invalid_argument for a factor or a texel outside its range. render() relies on it: big
+// textures are checked once, not for each view.
+SPLITNERF_API void check_material(const SurfaceMaterial& material);
+
 // Materials and normals of a mesh. All arrays are read during the call only.
 struct Surface {
   const float* albedo;     // [n, 3] linear, in [0, 1]

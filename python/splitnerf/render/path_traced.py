@@ -31,7 +31,7 @@ class AssetRenderer:
         }
         self._options = {
             "normals": _float32(asset.normals),
-            "materials": list(asset.materials),
+            "materials": _core.Materials(list(asset.materials)),
             "material_ids": np.ascontiguousarray(asset.material_ids, np.int32),
             "uv": None if asset.uv is None else _float32(asset.uv),
             "tangents": None if asset.tangents is None else _float32(asset.tangents),
