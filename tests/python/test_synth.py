@@ -221,7 +221,8 @@ def test_blender_sees_the_same_scene(files, tmp_path):
     pytest.importorskip("bpy", reason="bpy is not installed; pip install splitnerf[blender]")
     settings = SynthSettings(32, 2, 2, 128, renderer="blender")
     out = synthesise(files / "balls.glb", files / "blue.exr", [files / "sunny.exr"], tmp_path / "out", settings)
-    assert main(["evaluate", str(out / "asset.glb"), "--data", str(out), "--env", str(out / "light.hdr"), "--spp", "512"]) == DONE
+    options = ["--data", str(out), "--env", str(out / "light.hdr"), "--spp", "512"]
+    assert main(["evaluate", str(out / "asset.glb"), *options]) == DONE
     scores = json.loads((out / "asset_evaluation.json").read_text())
     assert scores["novel_view"]["psnr"] > 35 and scores["relight"]["psnr"] > 32 and scores["normal_mae_deg"] < 1
     assert scores["roughness_mae"] < 0.02 and scores["albedo"]["raw"]["psnr"] > 32

@@ -30,8 +30,8 @@ def asset_predictions(
         spp: Paths a pixel.
 
     Returns:
-        Per view what :func:`splitnerf.evaluate.protocol.evaluate_maps` reads: `alpha`, `albedo`, `roughness`, `metallic`,
-        `normal` (without the normal map, as the truth is) and, given the light, `rgb`.
+        Per view what :func:`splitnerf.evaluate.protocol.evaluate_maps` reads: `alpha`, `albedo`, `roughness`,
+        `metallic`, `normal` (without the normal map, as the truth is) and, given the light, `rgb`.
     """
     predictions = []
     for index in range(len(dataset)):

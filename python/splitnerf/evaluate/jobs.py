@@ -75,7 +75,8 @@ def choose_views(dataset: Dataset, protocol: Protocol) -> tuple[Dataset, dict[st
     if count is None:
         count = PROTOCOLS[protocol.lights][1] if protocol.lights else len(dataset)
     if not 1 <= count <= len(dataset):
-        raise InputError(f"{dataset.root}: has {len(dataset)} {dataset.split} views, {count} were asked for; change --views")
+        found = f"{dataset.root}: has {len(dataset)} {dataset.split} views"
+        raise InputError(f"{found}, {count} were asked for; change --views")
     return dataset.select(spread(range(len(dataset)), count)), maps
 
 

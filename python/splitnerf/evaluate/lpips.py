@@ -1,4 +1,4 @@
-"""LPIPS (Zhang et al., The Unreasonable Effectiveness of Deep Features as a Perceptual Metric, 2018), where installed."""
+"""LPIPS where installed: Zhang et al., The Unreasonable Effectiveness of Deep Features as a Perceptual Metric, 2018."""
 
 from __future__ import annotations
 

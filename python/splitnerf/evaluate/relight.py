@@ -99,8 +99,8 @@ def relight_scores(relit: RelitViews, distance: Distance | None = None) -> dict:
     Predictions are 8-bit clipped sRGB images before the factor, as if read from files.
 
     Returns:
-        The scores of :func:`splitnerf.evaluate.similarity.scaled_scores`, `maps` (the headline's scores per map), `views`
-        (their number) and `spp`.
+        The scores of :func:`splitnerf.evaluate.similarity.scaled_scores`, `maps` (the headline's scores per map),
+        `views` (their number) and `spp`.
     """
     scores, per_map = scaled_scores(relit.views, distance)
     return scores | {"maps": per_map, "views": len(relit.dataset), "spp": relit.spp}

@@ -45,7 +45,8 @@ def write_sheet(
     """
     shown = spread(range(len(dataset)), SHEET_VIEWS)
     rows = list(_rows(shown, dataset, predictions, truths, evaluation, relit))
-    heads = [f"{dataset.frame_names[i]}: {kind}" for i in shown for kind in ("truth", "prediction", f"error x{ERROR_GAIN}")]
+    kinds = ("truth", "prediction", f"error x{ERROR_GAIN}")
+    heads = [f"{dataset.frame_names[i]}: {kind}" for i in shown for kind in kinds]
     factor = -(-PANEL_WIDTH // dataset.width)
     width, height = dataset.width * factor, dataset.height * factor
     sheet = Image.new("RGB", (LABEL_WIDTH + len(heads) * width, LABEL_HEIGHT + len(rows) * height), "white")

@@ -69,8 +69,8 @@ def scaled_scores(
         distance: The LPIPS distance, or None.
 
     Returns:
-        The scores (`psnr`, `ssim`, `lpips` of the headline, then the variants with their `scale` [3]), and the headline's
-        scores per group.
+        The scores (`psnr`, `ssim`, `lpips` of the headline, then the variants with their `scale` [3]), and the
+        headline's scores per group.
     """
     scales = _scales(views())
     scores: dict[str, list[dict]] = {name: [] for name in scales}

@@ -33,7 +33,8 @@ def write_placed_glb(source: Path, target: Path, centre: np.ndarray, scale: floa
         return False
     length = struct.unpack_from("<I", data, 12)[0]
     document, rest = json.loads(data[HEADER : HEADER + length]), data[HEADER + length :]
-    if any(not item.get("uri", "data:").startswith("data:") for kind in ("buffers", "images") for item in document.get(kind, [])):
+    stored = [item for kind in ("buffers", "images") for item in document.get(kind, [])]
+    if any(not item.get("uri", "data:").startswith("data:") for item in stored):
         return False
     scene = document["scenes"][document.get("scene", 0)]
     x, y, z = (float(-value * scale) for value in centre)
