@@ -12,9 +12,10 @@ import trimesh
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.images import linear_to_srgb, srgb_to_linear, write_image
+from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
 from splitnerf.data.relit import read_relit, relight_maps
 from splitnerf.data.truth import load_scene_truth, load_view_truths
+from splitnerf.evaluate.relight import FIRST_SEED
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.synth.cameras import orbit, spiral
 from splitnerf.synth.jobs import SynthSettings, normalised, render_views, synthesise, unit_sphere
@@ -54,9 +55,10 @@ class Recorder:
     """A renderer that keeps what it gave."""
 
     def __init__(self, asset):
-        self.renderer, self.maps = AssetRenderer(asset), []
+        self.renderer, self.maps, self.seeds = AssetRenderer(asset), [], []
 
     def render(self, *args, **options):
+        self.seeds.append(options["seed"])
         self.maps.append(self.renderer.render(*args, **options))
         return self.maps[-1]
 
@@ -76,8 +78,8 @@ def test_files_hold_what_was_rendered(files, tmp_path, layout):
     writer = SceneWriter(tmp_path, 0.6911112070083618, layout)
     light = np.full((8, 16, 3), 0.5, np.float32)
     relight = {"a": writer.light(light * 2, "a"), "b_1": writer.light(light, "b_1")}
-    assert not list(tmp_path.rglob("*.json"))
     render_views(recorder, writer, writer.light(light), relight, settings)
+    assert len(set(recorder.seeds)) == len(recorder.seeds) == 3 + 2 * 3 and max(recorder.seeds) < FIRST_SEED
     with pytest.raises(Exception, match="has neither"):
         load_dataset(tmp_path)
     writer.close()
@@ -102,6 +104,8 @@ def test_files_hold_what_was_rendered(files, tmp_path, layout):
         if layout == "blender":
             assert np.abs(truth.roughness[solid] - maps["roughness"][solid]).max() <= HALF_STEP
             assert np.abs(truth.metallic[solid] - maps["metallic"][solid]).max() <= HALF_STEP
+            stored = read_image(tmp_path / f"test/{truth.name}_normal.exr")
+            assert stored[..., :3] == pytest.approx(maps["smooth_normal"] * maps["alpha"][..., None], abs=1e-3)
         else:
             assert truth.roughness is None and truth.metallic is None
     assert (load_view_truths(train)[0].albedo is None) == (layout != "tensoir")
