@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.images import HDR_SUFFIXES, read_radiance
+from splitnerf.data.images import HDR_SUFFIXES, area_average, read_radiance
 from splitnerf.errors import InputError
 from splitnerf.notes import note
 
@@ -87,3 +87,31 @@ def rotate_environment(radiance: np.ndarray, degrees: float) -> np.ndarray:
     share = shift - whole
     near = np.roll(radiance, -whole, axis=1)
     return ((1 - share) * near + share * np.roll(near, -1, axis=1)).astype(radiance.dtype)
+
+
+def resize_environment(image: np.ndarray, height: int, width: int) -> np.ndarray:
+    """Resizes an equirectangular map: whole blocks are averaged, the rest is bilinear, wrapping around in u.
+
+    Args:
+        image: [H, W, C].
+        height: Rows of the result.
+        width: Columns of the result.
+
+    Returns:
+        [height, width, C] float32.
+    """
+    image = np.asarray(image, np.float32)
+    factor = min(image.shape[0] // height, image.shape[1] // width)
+    if factor > 1 and image.shape[0] % factor == 0 and image.shape[1] % factor == 0:
+        image = area_average(image, factor)
+    rows, columns = image.shape[:2]
+    if (rows, columns) == (height, width):
+        return image
+    y = np.clip((np.arange(height) + 0.5) * rows / height - 0.5, 0, rows - 1)
+    x = (np.arange(width) + 0.5) * columns / width - 0.5
+    y0, x0 = np.floor(y).astype(int), np.floor(x).astype(int)
+    fy, fx = (y - y0)[:, None, None].astype(np.float32), (x - x0)[None, :, None].astype(np.float32)
+    y1, x1 = np.minimum(y0 + 1, rows - 1), (x0 + 1) % columns
+    upper = image[y0][:, x0] * (1 - fx) + image[y0][:, x1] * fx
+    lower = image[y1][:, x0] * (1 - fx) + image[y1][:, x1] * fx
+    return upper * (1 - fy) + lower * fy

@@ -1,7 +1,7 @@
 """Test views under other lights: which maps the data hold truth for, and the images, read one at a time.
 
-The truth of map M is `r_N_relit_M.png` beside `r_N.png`, or `rgba_M.png` in a view folder: sRGB, straight alpha. The map
-itself is `relight_M.hdr` (or .exr) in the data's folder, or M or relight_M with either suffix in a folder of maps.
+The truth of map M is `r_N_relit_M.png` beside `r_N.png`, or `rgba_M.png` in a view folder: sRGB, straight alpha. The
+map itself is `relight_M.hdr` (or .exr) in the data's folder, or M or relight_M with either suffix in a folder of maps.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PROTOCOLS = {"low": (8, 20), "high": (7, 20)}
 
 def relit_path(image_path: Path, name: str) -> Path:
     """Where the view of `image_path` under map `name` lies."""
-    stem = "rgba" if view_folders.is_view(image_path) else f"{image_path.stem}_relit"
+    stem = image_path.stem if image_path.name == view_folders.PHOTO else f"{image_path.stem}_relit"
     return image_path.with_name(f"{stem}_{name}.png")
 
 
@@ -86,12 +86,11 @@ def relight_maps(dataset: Dataset, folder: Path | None = None, protocol: str | N
     if protocol is not None:
         n_maps, n_views = PROTOCOLS[protocol]
         if len(files) != n_maps:
-            where = folder or dataset.root
-            raise InputError(f"{where}: holds {len(files)} maps, --lights {protocol} needs {n_maps}; give another --maps")
+            found = f"{folder or dataset.root}: holds {len(files)} maps"
+            raise InputError(f"{found}, --lights {protocol} needs {n_maps}; give another --maps")
         if len(dataset) < n_views:
-            raise InputError(
-                f"{dataset.root}: has {len(dataset)} test views, --lights {protocol} needs {n_views}; leave --lights out"
-            )
+            found = f"{dataset.root}: has {len(dataset)} test views"
+            raise InputError(f"{found}, --lights {protocol} needs {n_views}; leave --lights out")
         return files
     kept = {n: f for n, f in files.items() if any(relit_path(image, n).is_file() for image in dataset.image_paths)}
     if folder is not None and not kept:

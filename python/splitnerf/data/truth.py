@@ -157,7 +157,7 @@ def read_map(image_path: Path, path: Path, channels: int, dataset: Dataset) -> n
 
 
 def _load_view(image_path: Path, dataset: Dataset) -> ViewTruth:
-    factor, in_folder = dataset.downscale, view_folders.is_view(image_path)
+    factor, in_folder = dataset.downscale, image_path.name == view_folders.PHOTO
     truth = ViewTruth(image_path.parent.name if in_folder else image_path.stem)
 
     def read(ending: str, channels: int) -> np.ndarray | None:

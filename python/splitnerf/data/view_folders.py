@@ -37,11 +37,6 @@ def entries(root: Path, split: str) -> list[tuple[Path, dict, Path]]:
     return [(folder, read_json(folder / METADATA, "cam_transform_mat"), folder / METADATA) for folder in folders]
 
 
-def is_view(image_path: Path) -> bool:
-    """Whether an image is the photo of a view folder."""
-    return image_path.name == PHOTO and (image_path.parent / METADATA).is_file()
-
-
 def parse_matrix(text: object) -> object:
     """The 4 x 4 nested list of a comma-separated string; anything else as it came, for the caller to refuse."""
     if not isinstance(text, str):
