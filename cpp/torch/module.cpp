@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "bindings_mesh.h"
 #include "bindings_scene.h"
 #include "splitnerf/environment.h"
 #include "splitnerf/hash_grid.h"
@@ -14,7 +15,7 @@
 namespace py = pybind11;
 
 PYBIND11_MODULE(_core, m) {
-  m.doc() = "Embree scenes, the path tracer and build information of SplitNeRF.";
+  m.doc() = "Embree scenes, the path tracer, marching cubes and build information of SplitNeRF.";
 
   m.def(
       "hash_grid_levels",
@@ -73,5 +74,6 @@ PYBIND11_MODULE(_core, m) {
       "instruction_set", [] { return splitnerf::kernels<float>().name; },
       "The instruction set that the kernels run on: base, avx2 or avx512.");
 
+  bind_mesh(m);
   bind_scene(m);
 }

@@ -18,6 +18,9 @@ else:
     import tomli as tomllib
 
 
+MIN_EXPORT_SIZE = 8  # nodes or texels along an edge
+
+
 @dataclass
 class Config:
     """Settings of one run. Lengths are in scene units of the box [-1.5, 1.5]^3; fractions are of the whole run.
@@ -113,6 +116,8 @@ class Config:
 
     # Output.
     export_resolution: int = 192
+    export_faces: int = 20000  # of the textured mesh; 0: all
+    export_texture_size: int = 1024
     export_environment_height: int = 128
     preview_every: float = 0.1
     checkpoint_minutes: float = 2.0
@@ -135,6 +140,9 @@ class Config:
             value = getattr(self, field.name)
             if field.type in ("int", "float") and field.name != "seed" and value < 0:
                 raise InputError(f"{field.name} must not be negative, got {value}")
+        for key in ("mesh_resolution", "export_resolution", "export_texture_size"):
+            if getattr(self, key) < MIN_EXPORT_SIZE:
+                raise InputError(f"{key} must be at least {MIN_EXPORT_SIZE}, got {getattr(self, key)}")
         if self.steps < 1:
             raise InputError(f"steps must be at least 1, got {self.steps}")
 

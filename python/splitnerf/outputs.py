@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 import trimesh
+from torch import Tensor
 
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb, over_background, write_image
+from splitnerf.data.normalisation import transform_points
 from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.evaluate.lpips import Distance
 from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.export.environment import write_environment
-from splitnerf.export.mesh import write_mesh_glb, write_mesh_ply
-from splitnerf.export.meshing import drop_floaters, extract_mesh
+from splitnerf.export.glb import write_glb
+from splitnerf.export.mesh import write_mesh_ply
+from splitnerf.export.meshing import extract_mesh
+from splitnerf.export.obj import write_obj
+from splitnerf.export.simplify import drop_floaters, is_closed
+from splitnerf.export.surface import Surface, surface_materials
+from splitnerf.export.textured import textured_asset
+from splitnerf.export.usdz import require_usd, write_usdz
 from splitnerf.fields.sdf import unit_normals
 from splitnerf.ops import fibonacci_directions, prefilter_light
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import render_view
 
+FORMATS = ("glb", "ply", "obj", "usdz")
 REPORT_ROUGHNESS = (0.0, 0.25, 0.5, 1.0)
 
 
@@ -45,35 +57,91 @@ def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Da
     write_image(run / "previews" / f"step_{step:06d}.png", np.concatenate(panels, axis=1).astype(np.float32))
 
 
-def write_assets(run: Path, model: SceneModel, dataset: Dataset) -> trimesh.Trimesh:
-    """Writes mesh.ply, mesh.glb, environment.exr and environment.hdr, in the data's own world frame.
+@dataclass(frozen=True)
+class Exported:
+    """What an export made.
 
-    Returns:
-        The mesh.
+    Attributes:
+        mesh: The mesh before decimation, in the data's world.
+        n_faces: Of the textured mesh; of `mesh` where no format with textures was asked for.
+        watertight: Whether that mesh is closed.
+        n_dropped: Floating components that were left out.
+    """
+
+    mesh: trimesh.Trimesh
+    n_faces: int
+    watertight: bool
+    n_dropped: int
+
+
+def write_assets(
+    out: Path,
+    model: SceneModel,
+    box_from_world: np.ndarray,
+    *,
+    formats: Sequence[str] = ("glb", "ply"),
+    resolution: int | None = None,
+    n_faces: int | None = None,
+    texture_size: int | None = None,
+) -> Exported:
+    """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as asked, environment.exr and environment.hdr.
+
+    All stand in the data's own world frame; GLB, OBJ and USDZ are decimated, textured and y up. The PLY holds the mesh
+    as extracted, with vertex colours.
+
+    Args:
+        out: The folder.
+        model: The scene.
+        box_from_world: [4, 4], see :class:`splitnerf.data.dataset.Dataset`.
+        formats: Of :data:`FORMATS`.
+        resolution, n_faces, texture_size: None for the settings export_resolution, export_faces, export_texture_size.
 
     Raises:
         EmptyMesh: The surface is empty.
+        InputError: A format needs a package that is not installed.
+        RuntimeError: A field is not finite.
     """
     c = model.config
-    vertices, faces = drop_floaters(*extract_mesh(model.sdf_field.sdf, c.box, c.export_resolution))
-    albedo, roughness, metallic, normals = vertex_materials(model, vertices)
-    world = dataset.transform_to_world(vertices)
-    write_mesh_ply(run / "mesh.ply", world, faces, albedo)
-    write_mesh_glb(run / "mesh.glb", world, faces, normals, albedo, float(roughness.mean()), float(metallic.mean()))
-    write_environment(run, model.light.panorama(c.export_environment_height).numpy())
-    return trimesh.Trimesh(world, faces, process=False)
+    resolution, n_faces = c.export_resolution if resolution is None else resolution, c.export_faces if n_faces is None else n_faces
+    if "usdz" in formats:
+        require_usd()
+    surface = surface_of(model)
+    vertices, faces, n_dropped = drop_floaters(*extract_mesh(surface.sdf, c.box, resolution))
+    world_from_box = np.linalg.inv(box_from_world)
+    mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
+    exported = Exported(mesh, len(faces), is_closed(faces), n_dropped)
+    if "ply" in formats:
+        write_mesh_ply(out / "mesh.ply", mesh.vertices, faces, surface_materials(surface, vertices)[0])
+    if set(formats) - {"ply"}:
+        textured = textured_asset(
+            "object", vertices, faces, surface, n_faces=n_faces, texture_size=texture_size or c.export_texture_size,
+            spacing=2.0 * c.box / (resolution - 1), occlusion_offset=c.occlusion_offset,
+        )  # fmt: skip
+        asset = dataclasses.replace(textured.asset, vertices=transform_points(world_from_box, textured.asset.vertices))
+        if "glb" in formats:
+            write_glb(out / "mesh.glb", asset, textured.occlusion)
+        if "obj" in formats:
+            write_obj(out / "mesh.obj", asset)
+        if "usdz" in formats:
+            write_usdz(out / "mesh.usdz", asset, textured.occlusion)
+        exported = Exported(mesh, len(asset.triangles), textured.watertight, n_dropped)
+    write_environment(out, model.light.panorama(c.export_environment_height).numpy())
+    return exported
 
 
-@torch.no_grad()
-def vertex_materials(model: SceneModel, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """albedo [n, 3] linear, roughness [n], metallic [n] and normals [n, 3] at points of the internal frame."""
-    rows = []
-    for points in torch.from_numpy(vertices).split(1 << 15):
+def surface_of(model: SceneModel) -> Surface:
+    """The scene's fields as functions of points in the internal frame."""
+
+    def gradient(points: Tensor) -> tuple[Tensor, Tensor]:
         field = model.surface(points)
-        albedo, roughness, metallic = model.material(model.head_inputs(points, field.outputs, field.features))
-        rows.append(torch.cat([albedo, roughness, metallic, unit_normals(field.gradient)], dim=1))
-    table = torch.cat(rows).numpy()
-    return table[:, :3], table[:, 3], table[:, 4], table[:, 5:]
+        return field.sdf, field.gradient
+
+    def materials(points: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        field = model.surface(points)
+        material = model.material(model.head_inputs(points, field.outputs, field.features))
+        return (*material, unit_normals(field.gradient))
+
+    return Surface(model.sdf_field.sdf, gradient, materials)
 
 
 @torch.no_grad()

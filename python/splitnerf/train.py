@@ -132,6 +132,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 step=step, seconds=seconds, n_rays=n_rays, meshed_at=meshed_at, previewed_at=previewed_at,
                 model=model.state_dict(), optimiser=optimiser.state_dict(), generator=generator.get_state(),
                 torch_generator=torch.get_rng_state(), occupancy=grid.sdf,
+                box_from_world=torch.from_numpy(dataset.box_from_world),
                 mesh_vertices=mesh[0], mesh_faces=mesh[1],
             ),
         )  # fmt: skip

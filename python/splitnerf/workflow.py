@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import trimesh
 
 from splitnerf.checkpoint import config_of, load_checkpoint
 from splitnerf.config import Config
-from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.json_files import write_json
@@ -21,12 +22,12 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Evaluated, Protocol, asset_mesh, choose_views, evaluation_path, relit_scores
 from splitnerf.evaluate.lpips import load_distance
 from splitnerf.export.meshing import EmptyMesh
-from splitnerf.outputs import evaluate_scene, light_panels, write_assets
+from splitnerf.outputs import Exported, evaluate_scene, light_panels, write_assets
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.report.html import write_report
-from splitnerf.train import TrainedScene, train
+from splitnerf.train import TrainedScene, check_same_scene, train
 
 RUN_FILES = (
     "config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
@@ -93,7 +94,7 @@ def finish(
     failure: EmptyMesh | None = None
     mesh: trimesh.Trimesh | None = None
     try:
-        mesh = write_assets(run, model, dataset)
+        mesh = write_assets(run, model, dataset.box_from_world).mesh
     except EmptyMesh as error:
         failure = error
     timings["export"] = time.monotonic() - clock
@@ -200,3 +201,42 @@ def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = N
     if out is None:
         write_run_report(model, views, predictions, evaluation, run, timings)
     return Evaluated(evaluation, views, predictions, load_view_truths(views), relit)
+
+
+def export_run(
+    run: Path,
+    out: Path,
+    *,
+    formats: Sequence[str],
+    n_faces: int,
+    texture_size: int,
+    resolution: int | None = None,
+    data: Path | None = None,
+    downscale: int = 1,
+) -> Exported:
+    """Writes a run's meshes and light into a folder, see :func:`splitnerf.outputs.write_assets`.
+
+    Args:
+        data, downscale: What the run was trained on; needed where the checkpoint does not say how the data's world
+            lies about the scene.
+
+    Raises:
+        InputError: The run or the data cannot be used, or a format needs a package that is not installed.
+        EmptyMesh: The surface is empty.
+    """
+    model, _, content = load_run(run)
+    if data is not None:
+        dataset = load_dataset(data, "train", downscale)
+        check_same_scene(content, dataset_fingerprint(dataset), run)
+        box_from_world = dataset.box_from_world
+    elif "box_from_world" in content:
+        box_from_world = content["box_from_world"].numpy()
+    else:
+        raise InputError(
+            f"{run / 'checkpoint.pt'}: an older version wrote it, without the data's world frame; name the data that "
+            "the run was trained on with --data DATA"
+        )
+    out.mkdir(parents=True, exist_ok=True)
+    return write_assets(
+        out, model, box_from_world, formats=formats, resolution=resolution, n_faces=n_faces, texture_size=texture_size
+    )

@@ -1,17 +1,32 @@
-"""Exports: axes, winding, colours, and nothing written for a degenerate mesh."""
+"""Exports: axes, winding, textures, nothing written for a degenerate mesh, and the command."""
 
 from __future__ import annotations
 
+import dataclasses
+import io
 import json
+import re
 import struct
+import zipfile
 
 import numpy as np
 import pytest
+import torch
 import trimesh
+from PIL import Image
 
-from splitnerf.data.images import linear_to_srgb, read_hdr
+from splitnerf.checkpoint import save_checkpoint
+from splitnerf.cli import BAD_INPUT, DONE, main
+from splitnerf.config import Config
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.images import linear_to_srgb, read_hdr, read_image
+from splitnerf.data.tangents import vertex_tangents
 from splitnerf.export.environment import write_environment
-from splitnerf.export.mesh import write_mesh_glb, write_mesh_ply
+from splitnerf.export.glb import write_glb
+from splitnerf.export.mesh import write_mesh_ply
+from splitnerf.export.obj import write_obj
+from splitnerf.export.usdz import write_usdz
+from splitnerf.render.model import SceneModel
 
 
 @pytest.fixture
@@ -41,35 +56,114 @@ def parse_glb(path):
         dtype = {5126: "<f4", 5123: "<u2", 5125: "<u4"}[accessor["componentType"]]
         values = np.frombuffer(binary, dtype, view["byteLength"] // np.dtype(dtype).itemsize, view["byteOffset"])
         arrays[name] = values.reshape(accessor["count"], -1)
-    return document, arrays
+    return document, arrays, binary
 
 
-def test_glb_is_y_up_with_linear_colours_and_factors(tmp_path, ball):
-    vertices, faces, normals, albedo = ball
-    write_mesh_glb(tmp_path / "a.glb", vertices, faces, normals, albedo, 0.4, 0.1)
-    document, arrays = parse_glb(tmp_path / "a.glb")
-    top = vertices[:, 2].argmax()
-    assert arrays["POSITION"][top] == pytest.approx([0, 3, 0], abs=1e-6)  # +z in the world is +y in the file
-    assert arrays["POSITION"] == pytest.approx(vertices[:, [0, 2, 1]] * [1, 1, -1], abs=1e-6)
-    assert arrays["NORMAL"] == pytest.approx(normals[:, [0, 2, 1]] * [1, 1, -1], abs=1e-6)
-    assert arrays["COLOR_0"][:, :3] / 65535 == pytest.approx(albedo, abs=1e-5)
-    assert (arrays["COLOR_0"][:, 3] == 65535).all()
-    assert np.array_equal(arrays["indices"].reshape(-1, 3), faces)
-    material = document["materials"][0]["pbrMetallicRoughness"]
-    assert (material["roughnessFactor"], material["metallicFactor"]) == pytest.approx((0.4, 0.1))
-    accessor = document["accessors"][0]
-    assert accessor["min"] == arrays["POSITION"].min(axis=0).tolist()
-    assert accessor["max"] == arrays["POSITION"].max(axis=0).tolist()
+@pytest.fixture
+def asset(ball):
+    vertices, faces, normals, _ = ball
+    rng = np.random.default_rng(0)
+    uv = rng.random((len(vertices), 2)).astype(np.float32)
+    material = Material(
+        "paint", (0.5, 0.25, 1.0), 0.9, 0.8,
+        albedo_texture=rng.random((8, 8, 3)).astype(np.float32),
+        roughness_metallic_texture=rng.random((8, 8, 2)).astype(np.float32),
+        normal_texture=np.float32(np.dstack([np.full((8, 8), 0.6), np.zeros((8, 8)), np.full((8, 8), 0.8)])),
+    )  # fmt: skip
+    vertices, normals, faces = np.float32(vertices), np.float32(normals), np.int32(faces)
+    tangents = vertex_tangents(vertices, faces, normals, uv)
+    return Asset("ball", vertices, faces, normals, np.zeros(len(faces), np.int32), [material], uv, tangents)
+
+
+def image_of(document, binary, index):
+    view = document["bufferViews"][document["images"][document["textures"][index]["source"]]["bufferView"]]
+    start = view.get("byteOffset", 0)
+    return np.asarray(Image.open(io.BytesIO(binary[start : start + view["byteLength"]])))
+
+
+def test_glb_is_y_up_with_textures_in_their_colour_spaces(tmp_path, asset):
+    occlusion = np.random.default_rng(1).random((8, 8)).astype(np.float32)
+    write_glb(tmp_path / "a.glb", asset, occlusion)
+    document, arrays, binary = parse_glb(tmp_path / "a.glb")
+    to_file = lambda v: v[:, [0, 2, 1]] * [1, 1, -1]  # noqa: E731: +z in the world is +y in the file
+    assert arrays["POSITION"] == pytest.approx(to_file(asset.vertices), abs=1e-6)
+    assert arrays["NORMAL"] == pytest.approx(to_file(asset.normals), abs=1e-6)
+    assert arrays["TANGENT"][:, :3] == pytest.approx(to_file(asset.tangents[:, :3]), abs=1e-6)
+    assert np.array_equal(arrays["TANGENT"][:, 3], asset.tangents[:, 3])
+    assert arrays["TEXCOORD_0"] == pytest.approx(asset.uv, abs=1e-6)
+    assert np.array_equal(arrays["indices"].reshape(-1, 3), asset.triangles)
+    material = document["materials"][0]
+    pbr = material["pbrMetallicRoughness"]
+    assert pbr["baseColorFactor"] == pytest.approx([0.5, 0.25, 1.0, 1.0])
+    assert (pbr["roughnessFactor"], pbr["metallicFactor"]) == pytest.approx((0.9, 0.8))
+    assert material["occlusionTexture"]["index"] == pbr["metallicRoughnessTexture"]["index"]
+    assert len(document["images"]) == 3
+    stored = asset.materials[0]
+    albedo = image_of(document, binary, pbr["baseColorTexture"]["index"]) / 255
+    assert albedo == pytest.approx(linear_to_srgb(stored.albedo_texture), abs=0.51 / 255)
+    orm = image_of(document, binary, pbr["metallicRoughnessTexture"]["index"]) / 255
+    assert orm == pytest.approx(np.dstack([occlusion, stored.roughness_metallic_texture]), abs=0.51 / 255)
+    normal = image_of(document, binary, material["normalTexture"]["index"]) / 255 * 2 - 1
+    assert normal == pytest.approx(stored.normal_texture, abs=1.01 / 255)
+
+
+def test_glb_without_textures_has_factors_alone(tmp_path, asset):
+    plain = dataclasses.replace(asset, uv=None, tangents=None, materials=[Material("grey", (0.3, 0.3, 0.3), 0.5)])
+    write_glb(tmp_path / "a.glb", plain)
+    document, arrays, _ = parse_glb(tmp_path / "a.glb")
+    assert set(arrays) == {"POSITION", "NORMAL", "indices"} and "images" not in document
+    assert document["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] == 0.5
+
+
+def test_obj_reads_back(tmp_path, asset):
+    files = write_obj(tmp_path / "a.obj", asset)
+    assert sorted(tmp_path.iterdir()) == sorted(files) and len(files) == 6
+    mesh = trimesh.load(tmp_path / "a.obj", process=False)
+    assert mesh.vertices == pytest.approx(asset.vertices[:, [0, 2, 1]] * [1, 1, -1], abs=1e-6)
+    assert mesh.visual.uv == pytest.approx(asset.uv * [1, -1] + [0, 1], abs=1e-6)
+    text = (tmp_path / "a.mtl").read_text()
+    for line in ("map_Kd a_albedo.png", "map_Pr a_roughness.png", "map_Pm a_metallic.png", "norm a_normal.png"):
+        assert line in text.splitlines()
+    stored = asset.materials[0]
+    assert read_image(tmp_path / "a_albedo.png") == pytest.approx(linear_to_srgb(stored.albedo_texture), abs=0.51 / 255)
+    roughness = read_image(tmp_path / "a_roughness.png")[..., 0]
+    assert roughness == pytest.approx(stored.roughness_metallic_texture[..., 0], abs=0.51 / 255)
+
+
+def test_usdz_passes_usd_s_own_validators(tmp_path, asset):
+    usd = pytest.importorskip("pxr.Usd", reason="usd-core is not installed")
+    validation = pytest.importorskip("pxr.UsdValidation", reason="this usd-core has no validators")
+    write_usdz(tmp_path / "a.usdz", asset, np.ones((8, 8), np.float32))
+    stage = usd.Stage.Open(str(tmp_path / "a.usdz"))
+    context = validation.ValidationContext(validation.ValidationRegistry().GetOrLoadAllValidators())
+    assert [error.GetMessage() for error in context.Validate(stage)] == []
+    points = np.array(stage.GetPrimAtPath("/ball/mesh").GetAttribute("points").Get())
+    assert points == pytest.approx(asset.vertices[:, [0, 2, 1]] * [1, 1, -1], abs=1e-6)
+    with zipfile.ZipFile(tmp_path / "a.usdz") as package:
+        assert {"textures/albedo.png", "textures/orm.png", "textures/normal.png"} < set(package.namelist())
+        assert all(info.compress_type == zipfile.ZIP_STORED for info in package.infolist())
+
+
+@pytest.mark.parametrize("write", [write_glb, write_obj])
+def test_bad_assets_write_nothing(tmp_path, asset, write):
+    broken = {
+        "vertices must be finite": {"vertices": asset.vertices * np.nan},
+        "normals must be finite": {"normals": asset.normals[:5]},
+        "empty mesh": {"triangles": np.zeros((0, 3), np.int32)},
+        "2 materials": {"materials": asset.materials * 2},
+        "have texture coordinates": {"uv": None},
+    }
+    for message, change in broken.items():
+        with pytest.raises(RuntimeError, match=message):
+            write(tmp_path / "a.out", dataclasses.replace(asset, **change))
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("flip", [False, True])
-def test_faces_point_outward_whatever_came_in(tmp_path, ball, flip):
-    vertices, faces, normals, albedo = ball
-    faces = faces[:, ::-1] if flip else faces
-    write_mesh_glb(tmp_path / "a.glb", vertices, faces, normals, albedo, 0.4, 0.1)
-    write_mesh_ply(tmp_path / "a.ply", vertices, faces)
-    for name in ("a.glb", "a.ply"):
-        assert trimesh.load(tmp_path / name, force="mesh").volume > 20
+def test_faces_of_a_ply_point_outward_whatever_came_in(tmp_path, ball, flip):
+    vertices, faces, _, _ = ball
+    write_mesh_ply(tmp_path / "a.ply", vertices, faces[:, ::-1] if flip else faces)
+    assert trimesh.load(tmp_path / "a.ply", force="mesh").volume > 20
 
 
 @pytest.mark.parametrize("flip", [False, True])
@@ -107,19 +201,13 @@ def test_degenerate_mesh_writes_nothing(tmp_path, case):
     vertices, faces = BAD_MESHES[case]
     with pytest.raises(RuntimeError, match="a.ply: degenerate or empty mesh"):
         write_mesh_ply(tmp_path / "a.ply", vertices, faces)
-    with pytest.raises(RuntimeError, match="a.glb: degenerate or empty mesh"):
-        write_mesh_glb(tmp_path / "a.glb", vertices, faces, vertices, vertices, 0.5, 0.0)
     assert not list(tmp_path.iterdir())
 
 
-def test_bad_attributes_are_named(tmp_path, ball):
-    vertices, faces, normals, albedo = ball
-    with pytest.raises(RuntimeError, match="albedo must be finite"):
-        write_mesh_glb(tmp_path / "a.glb", vertices, faces, normals, albedo * np.nan, 0.5, 0.0)
-    with pytest.raises(RuntimeError, match="normals must be finite"):
-        write_mesh_glb(tmp_path / "a.glb", vertices, faces, normals[:5], albedo, 0.5, 0.0)
-    with pytest.raises(RuntimeError, match="roughness and metallic must be finite"):
-        write_mesh_glb(tmp_path / "a.glb", vertices, faces, normals, albedo, float("nan"), 0.0)
+def test_bad_colours_are_named(tmp_path, ball):
+    vertices, faces, _, albedo = ball
+    with pytest.raises(RuntimeError, match="colors must be finite"):
+        write_mesh_ply(tmp_path / "a.ply", vertices, faces, albedo * np.nan)
 
 
 def test_environment_keeps_rows_and_columns(tmp_path):
@@ -143,3 +231,71 @@ def test_bad_environment_writes_nothing(tmp_path, value):
     with pytest.raises(ValueError, match="finite and not negative"):
         write_environment(tmp_path, np.full((2, 4, 3), value))
     assert not list(tmp_path.iterdir())
+
+
+def save_run(run, **state):
+    """A run that was never trained: its surface is a sphere of radius 0.7 about the box's centre."""
+    torch.manual_seed(0)
+    config = Config(n_levels=4, log2_table_size=10, grid_resolution=16, export_resolution=48, export_environment_height=8)
+    run.mkdir()
+    content = dict(model=SceneModel(config).state_dict(), mesh_vertices=None, mesh_faces=None, **state)
+    save_checkpoint(run / "checkpoint.pt", config=config, fingerprint="", state=content)
+    return run
+
+
+@pytest.fixture
+def run(tmp_path):
+    box_from_world = torch.diag(torch.tensor([2.0, 2.0, 2.0, 1.0], dtype=torch.float64))
+    box_from_world[:3, 3] = torch.tensor([-2.0, 0.0, 4.0])
+    return save_run(tmp_path / "run", box_from_world=box_from_world)
+
+
+def test_export_writes_the_asset_in_the_data_s_world(tmp_path, run, capsys):
+    out = tmp_path / "out"
+    options = ["--out", str(out), "--faces", "1000", "--texture-size", "128", "--formats", "glb,ply,obj"]
+    assert main(["export", str(run), *options]) == DONE
+    line = capsys.readouterr().out.splitlines()[0]
+    assert line.startswith("mesh: watertight, 1000 faces of ") and line.endswith(", 0 floating components dropped")
+    assert {p.name for p in out.iterdir()} == {
+        "mesh.glb", "mesh.ply", "mesh.obj", "mesh.mtl", "mesh_albedo.png", "mesh_roughness.png", "mesh_metallic.png",
+        "mesh_normal.png", "environment.exr", "environment.hdr",
+    }  # fmt: skip
+    full = trimesh.load(out / "mesh.ply", process=False)
+    assert full.is_watertight and full.vertices.mean(axis=0) == pytest.approx([1, 0, -2], abs=0.05)
+    document, arrays, _ = parse_glb(out / "mesh.glb")
+    centre = (arrays["POSITION"].min(axis=0) + arrays["POSITION"].max(axis=0)) / 2
+    assert centre == pytest.approx([1, -2, 0], abs=0.05)
+    assert np.ptp(arrays["POSITION"], axis=0) == pytest.approx(0.7, rel=0.2)
+    outward = ((arrays["POSITION"] - centre) * arrays["NORMAL"]).sum(axis=1)
+    assert (outward > 0).all() and "TANGENT" in arrays and len(document["images"]) == 3
+
+
+def test_export_goes_into_the_run_and_ply_needs_no_textures(run):
+    assert main(["export", str(run), "--formats", "ply"]) == DONE
+    assert {p.name for p in run.iterdir()} == {"checkpoint.pt", "mesh.ply", "environment.exr", "environment.hdr"}
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--formats", "glb,fbx"], "--formats: unknown 'fbx'; there are glb, ply, obj, usdz"),
+        (["--faces", "-5"], "--faces must be 0 or at least 100, got -5"),
+        (["--texture-size", "4"], r"--texture-size must be in \[8, 8192\], got 4"),
+        (["--resolution", "2"], "--resolution must be at least 8, got 2"),
+    ],
+)
+def test_bad_options_are_one_line_and_write_nothing(tmp_path, run, options, message, capsys):
+    assert main(["export", str(run), "--out", str(tmp_path / "out"), *options]) == BAD_INPUT
+    error = capsys.readouterr().err
+    assert len(error.splitlines()) == 1 and re.search(message, error)
+    assert not (tmp_path / "out").exists()
+
+
+def test_runs_of_older_versions_ask_for_their_data(tmp_path, capsys):
+    old = save_run(tmp_path / "old")
+    assert main(["export", str(old)]) == BAD_INPUT
+    error = capsys.readouterr().err
+    assert "older version" in error and "--data DATA" in error and len(error.splitlines()) == 1
+    assert [p.name for p in old.iterdir()] == ["checkpoint.pt"]
+    assert main(["export", str(tmp_path / "none")]) == BAD_INPUT
+    assert "no such run" in capsys.readouterr().err

@@ -10,7 +10,6 @@ import torch
 
 from splitnerf import losses
 from splitnerf.config import preset
-from splitnerf.export.meshing import EmptyMesh, drop_floaters, extract_mesh
 from splitnerf.fields import LightMlp, OcclusionHead, SdfField
 from splitnerf.fields.sdf import sharpness, unit_normals
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec
@@ -256,53 +255,6 @@ class TestRendering:
         c = torch.tensor([-1.0, 0.0, 1.0])
         assert annealed_cosine(c, 1.0).tolist() == [-1.0, 0.0, 0.0]
         assert annealed_cosine(c, 0.0).tolist() == [-1.0, -0.5, 0.0]
-
-
-class TestMeshing:
-    def test_a_sphere_is_closed_outward_and_of_the_right_size(self):
-        import trimesh
-
-        vertices, faces = extract_mesh(sphere, 1.5, 64)
-        mesh = trimesh.Trimesh(vertices, faces)
-        assert mesh.is_watertight and mesh.volume == pytest.approx(4 / 3 * math.pi * RADIUS**3, rel=0.01)
-        assert np.abs(np.linalg.norm(vertices, axis=1) - RADIUS).max() < 2e-3
-
-    def test_skipped_blocks_change_nothing(self):
-        """The blocks that are left out hold no surface: the mesh is that of the dense grid."""
-        evaluated = 0
-
-        def counting(x):
-            nonlocal evaluated
-            evaluated += len(x)
-            return sphere(x)
-
-        vertices, _ = extract_mesh(counting, 1.5, 96)
-        axis = torch.linspace(-1.5, 1.5, 96)
-        dense = sphere(torch.stack(torch.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)).view(96, 96, 96)
-        from skimage.measure import marching_cubes
-
-        expected, _, _, _ = marching_cubes(dense.numpy(), 0.0)
-        assert len(vertices) == len(expected)
-        assert evaluated < 0.35 * 96**3
-
-    def test_what_reaches_the_border_is_closed(self):
-        import trimesh
-
-        mesh = trimesh.Trimesh(*extract_mesh(lambda x: x[:, 2], 1.5, 24))
-        assert mesh.is_watertight and mesh.volume > 0
-
-    def test_no_surface_raises(self):
-        with pytest.raises(EmptyMesh):
-            extract_mesh(lambda x: torch.ones(len(x)), 1.5, 16)
-        with pytest.raises(RuntimeError, match="not finite"):
-            extract_mesh(lambda x: torch.full((len(x),), float("nan")), 1.5, 16)
-
-    def test_small_components_go(self):
-        def two(x):
-            return torch.minimum(sphere(x), (x - torch.tensor([1.3, 1.3, 1.3])).norm(dim=1) - 0.05)
-
-        vertices, faces = drop_floaters(*extract_mesh(two, 1.5, 96))
-        assert np.abs(vertices).max() < RADIUS + 0.05 and faces.max() == len(vertices) - 1
 
 
 class TestColourLoss:

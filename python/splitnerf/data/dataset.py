@@ -14,7 +14,7 @@ import numpy as np
 
 from splitnerf.data.frames import Frame, lens_intrinsics, read_frames
 from splitnerf.data.images import LDR_SUFFIXES, area_average, downscale_rgba, read_image
-from splitnerf.data.normalisation import estimate_box
+from splitnerf.data.normalisation import estimate_box, transform_points
 from splitnerf.errors import InputError
 
 HULL_VIEWS = 40
@@ -67,9 +67,7 @@ class Dataset:
 
     def transform_to_world(self, points: np.ndarray) -> np.ndarray:
         """Carries points [..., 3] from the internal frame to the data's world frame; directions need no change."""
-        matrix = self.world_from_box
-        points = np.asarray(points)
-        return (points @ matrix[:3, :3].T + matrix[:3, 3]).astype(points.dtype)
+        return transform_points(self.world_from_box, points)
 
     @property
     def world_poses(self) -> np.ndarray:

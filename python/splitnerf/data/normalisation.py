@@ -49,6 +49,12 @@ def estimate_box(silhouettes: np.ndarray, poses: np.ndarray, intrinsics: np.ndar
     return box_from_world
 
 
+def transform_points(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Applies a [4, 4] similarity to points [..., 3]; the result has their dtype."""
+    points = np.asarray(points)
+    return (points @ matrix[:3, :3].T + matrix[:3, 3]).astype(points.dtype)
+
+
 def nearest_to_axes(poses: np.ndarray) -> np.ndarray:
     """The point with the least sum of squared distances to all optical axes.
 

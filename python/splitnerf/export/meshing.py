@@ -1,4 +1,4 @@
-"""Triangle meshes of the zero level set."""
+"""Triangle meshes of the zero level set: marching cubes on the blocks of nodes near it."""
 
 from __future__ import annotations
 
@@ -7,73 +7,119 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
-from skimage.measure import marching_cubes
 from torch import Tensor
 
-BLOCK = 8
+from splitnerf import _core
+
+BLOCK = _core.MESH_BLOCK
+COARSEST = 8  # blocks along the edge of the cubes that are looked at first
 LIPSCHITZ = 1.5
-MIN_COMPONENT = 0.01  # of the faces of the largest one
+CHUNK = 1 << 16  # points that the field is asked at a time
 
 
 class EmptyMesh(RuntimeError):
     """The field has no zero level set inside the box."""
 
 
-@torch.no_grad()
-def extract_mesh(sdf: Callable[[Tensor], Tensor], box: float, resolution: int) -> tuple[np.ndarray, np.ndarray]:
+def extract_mesh(
+    sdf: Callable[[Tensor], Tensor], box: float, resolution: int, *, dense: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
     """Marching cubes over [-box, box]^3, closed at the border, with outward faces.
 
-    The field is evaluated in blocks of 8^3 nodes; a block whose centre is farther from zero than
-    1.5 times its half diagonal holds no surface and takes its centre's value.
+    From coarse to fine: a cube of nodes whose centre is farther from zero than 1.5 times its half diagonal holds no
+    surface and takes its centre's sign, the others are halved down to blocks of 4^3 nodes, whose nodes are all
+    evaluated. Then blocks without values that the surface runs into are evaluated too until there are none, so that the
+    mesh is that of the dense grid wherever each of its components was met once.
 
     Args:
         sdf: [n, 3] -> [n], negative inside.
         box: Half size of the cube, scene units.
-        resolution: Nodes along an edge, rounded up to a multiple of 8.
+        resolution: Nodes along an edge.
+        dense: Evaluate all nodes.
 
     Returns:
         vertices [n, 3] float32 and faces [m, 3] int32.
 
     Raises:
         EmptyMesh: Nothing is inside.
+        RuntimeError: The field is not finite.
     """
-    n_blocks = math.ceil(resolution / BLOCK)
-    n = n_blocks * BLOCK
-    spacing = 2.0 * box / (n - 1)
-    axis = torch.arange(n) * spacing - box
-    centre = axis.view(n_blocks, BLOCK).mean(1)
-    centres = torch.stack(torch.meshgrid(centre, centre, centre, indexing="ij"), -1).reshape(-1, 3)
-    coarse = torch.cat([sdf(chunk) for chunk in centres.split(1 << 16)])
-    half_diagonal = math.sqrt(3.0) * 0.5 * BLOCK * spacing
-    near = (coarse.abs() < LIPSCHITZ * half_diagonal).nonzero().squeeze(1)
-    values = coarse.view(-1, 1).expand(-1, BLOCK**3).clone()
-    offset = (torch.arange(BLOCK) - 0.5 * (BLOCK - 1)) * spacing
-    offsets = torch.stack(torch.meshgrid(offset, offset, offset, indexing="ij"), -1).reshape(-1, 3)
-    for chunk in near.split(256) if len(near) else ():
-        points = centres[chunk][:, None, :] + offsets
-        values[chunk] = sdf(points.reshape(-1, 3)).view(len(chunk), -1)
-    grid = values.view(n_blocks, n_blocks, n_blocks, BLOCK, BLOCK, BLOCK).permute(0, 3, 1, 4, 2, 5).reshape(n, n, n)
-    # A shell of outside nodes closes whatever reaches the border.
-    volume = np.pad(grid.numpy(), 1, constant_values=spacing)
-    if not np.isfinite(volume).all():
-        raise RuntimeError("the signed distance field is not finite: the training diverged")
-    if volume.min() >= 0.0:
+    grid = _NodeGrid(sdf, box, resolution)
+    index = grid.all_blocks() if dense else grid.near_blocks()
+    active = np.flatnonzero(index.reshape(-1) == 0)
+    values = grid.block_values(active)
+    while True:
+        order = np.argsort(active)
+        active, values = active[order], values[order]
+        index.reshape(-1)[active] = np.arange(len(active), dtype=np.int32)
+        opened = _core.blocks_to_open(values, index)
+        if len(opened) == 0:
+            break
+        active, values = np.concatenate([active, opened]), np.concatenate([values, grid.block_values(opened)])
+    vertices, faces = _core.marching_cubes(values, index, -box - grid.spacing, grid.spacing)
+    if len(faces) == 0:
         raise EmptyMesh("the surface is empty: nothing inside the box has a negative distance")
-    vertices, faces, _, _ = marching_cubes(volume, 0.0, gradient_direction="descent")
-    vertices = (vertices - 1.0) * spacing - box
-    return vertices.astype(np.float32), np.ascontiguousarray(faces, dtype=np.int32)
+    return vertices, faces
 
 
-def drop_floaters(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Removes connected components with less than 1 % of the largest one's faces."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
+class _NodeGrid:
+    """resolution^3 nodes over the box in a shell of outside nodes, which closes whatever reaches the border.
 
-    n = len(vertices)
-    edges = np.concatenate([faces[:, :2], faces[:, 1:]])
-    graph = coo_matrix((np.ones(len(edges), bool), (edges[:, 0], edges[:, 1])), shape=(n, n))
-    _, label = connected_components(graph, directed=False)
-    count = np.bincount(label[faces[:, 0]], minlength=label.max() + 1)
-    keep = count[label[faces[:, 0]]] >= MIN_COMPONENT * count.max()
-    used, new_faces = np.unique(faces[keep], return_inverse=True)
-    return vertices[used], new_faces.reshape(-1, 3).astype(np.int32)
+    Nodes are counted from 0 in the shell; those of the box are 1 .. resolution, and all beyond are outside.
+    """
+
+    def __init__(self, sdf: Callable[[Tensor], Tensor], box: float, resolution: int):
+        self.sdf, self.box, self.resolution = sdf, box, resolution
+        self.spacing = 2.0 * box / (resolution - 1)
+        self.n_coarse = math.ceil((resolution + 2) / (BLOCK * COARSEST))
+        self.n_blocks = self.n_coarse * COARSEST
+
+    def evaluate(self, positions: np.ndarray) -> np.ndarray:
+        """The field at [n, 3] positions, float32 [n]."""
+        points = torch.from_numpy(positions.astype(np.float32))
+        with torch.no_grad():
+            values = torch.cat([self.sdf(chunk) for chunk in points.split(CHUNK)]).numpy()
+        if not np.isfinite(values).all():
+            raise RuntimeError("the signed distance field is not finite: the training diverged")
+        return values
+
+    def near_blocks(self) -> np.ndarray:
+        """[n_blocks]^3 int32: 0 where a block may hold surface, else the sign of its nodes."""
+        index = np.zeros((self.n_coarse,) * 3, np.int32)
+        size = BLOCK * COARSEST
+        while True:
+            cubes = np.argwhere(index == 0)
+            index[tuple(cubes.T)] = self.classify(cubes * size, size)
+            if size == BLOCK:
+                return index
+            size //= 2
+            index = index.repeat(2, 0).repeat(2, 1).repeat(2, 2)
+
+    def classify(self, first: np.ndarray, size: int) -> np.ndarray:
+        """0 for the cubes of size^3 nodes from node `first` [n, 3] on that may hold surface, else their sign."""
+        low, high = np.maximum(first, 1), np.minimum(first + size - 1, self.resolution)
+        signs = np.full(len(first), _core.OUTSIDE_BLOCK, np.int32)
+        met = (low <= high).all(axis=1)
+        low, high, first = low[met], high[met], first[met]
+        distance = self.evaluate(((low + high) / 2 - 1) * self.spacing - self.box)
+        reach = LIPSCHITZ * 0.5 * self.spacing * np.linalg.norm(high - low, axis=1)
+        whole = ((low == first) & (high == first + size - 1)).all(axis=1)  # no node of the shell
+        inside = (distance < -reach) & whole
+        signs[met] = np.where(distance > reach, _core.OUTSIDE_BLOCK, np.where(inside, _core.INSIDE_BLOCK, 0))
+        return signs
+
+    def all_blocks(self) -> np.ndarray:
+        """As :meth:`near_blocks`, every block."""
+        return np.zeros((self.n_blocks,) * 3, np.int32)
+
+    def block_values(self, blocks: np.ndarray) -> np.ndarray:
+        """[n, 4, 4, 4] float32 values of the nodes of blocks given by flat index."""
+        values = np.full((len(blocks), BLOCK, BLOCK, BLOCK), self.spacing, np.float32)
+        offsets = np.indices((BLOCK,) * 3).reshape(3, -1).T
+        for start in range(0, len(blocks), CHUNK // BLOCK**3):
+            rows = slice(start, start + CHUNK // BLOCK**3)
+            first = np.stack(np.unravel_index(blocks[rows], (self.n_blocks,) * 3), axis=1) * BLOCK
+            nodes = (first[:, None, :] + offsets).reshape(-1, 3)
+            met = ((nodes >= 1) & (nodes <= self.resolution)).all(axis=1)
+            values[rows].reshape(-1)[met] = self.evaluate((nodes[met] - 1) * self.spacing - self.box)
+        return values

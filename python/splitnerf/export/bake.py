@@ -1,0 +1,184 @@
+"""Textures of an unwrapped mesh from the fields that it approximates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from scipy.ndimage import distance_transform_edt, zoom
+
+from splitnerf import _core
+from splitnerf.ops import MeshScene, occlusion_factors
+from splitnerf.export.surface import Surface, surface_materials, to_level_set
+
+RAY_ROWS = 1 << 20  # texels traced at a time
+OCCLUSION_SHRINK = 4  # occlusion is baked at a quarter of the size
+OCCLUSION_RAYS = 64
+MIN_UP = 0.02  # least z of a tangent-space normal
+
+
+@dataclass(frozen=True)
+class UnwrappedMesh:
+    """A mesh with texture coordinates.
+
+    Attributes:
+        vertices: [n, 3] float32.
+        faces: [m, 3] int32.
+        normals: [n, 3] float32 unit.
+        tangents: [n, 4] float32, see :func:`splitnerf.data.tangents.vertex_tangents`.
+        uv: [n, 2] float32, (0, 0) the top left corner.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    normals: np.ndarray
+    tangents: np.ndarray
+    uv: np.ndarray
+
+
+@dataclass(frozen=True)
+class Textures:
+    """Square float32 maps, top row first.
+
+    Attributes:
+        albedo: [h, w, 3] linear.
+        roughness, metallic: [h, w] in [0, 1].
+        occlusion: [h, w] in [0, 1], 1 = open.
+        normal: [h, w, 3] unit, tangent space: x along the tangent, y along the bitangent (up in the texture).
+    """
+
+    albedo: np.ndarray
+    roughness: np.ndarray
+    metallic: np.ndarray
+    occlusion: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True)
+class Texels:
+    """The texels whose centres a triangle covers.
+
+    Attributes:
+        index: [k] int64, row * size + column.
+        triangle: [k] int64.
+        weights: [k, 3] float32 barycentric coordinates.
+    """
+
+    index: np.ndarray
+    triangle: np.ndarray
+    weights: np.ndarray
+
+    def interpolate(self, values: np.ndarray, faces: np.ndarray) -> np.ndarray:
+        """[k, c] float32 of per-vertex values [n, c], not normalised."""
+        corners = faces[self.triangle]
+        return sum(self.weights[:, i, None] * values[corners[:, i]] for i in range(3))
+
+
+def rasterise(uv: np.ndarray, faces: np.ndarray, size: int) -> Texels:
+    """Finds the triangle under each texel's centre by tracing straight down onto the mesh laid flat."""
+    flat = np.column_stack([uv * size, np.zeros(len(uv))]).astype(np.float32)
+    scene = _core.Scene(flat, np.ascontiguousarray(faces, dtype=np.int32))
+    rows = max(1, RAY_ROWS // size)
+    found = []
+    for start in range(0, size, rows):
+        y, x = np.mgrid[start : min(start + rows, size), 0:size].reshape(2, -1)
+        origins = np.column_stack([x + 0.5, y + 0.5, np.ones(len(x))]).astype(np.float32)
+        down = np.broadcast_to(np.float32([0, 0, -1]), origins.shape).copy()
+        _, triangle, u, v = scene.trace_closest(origins, down)
+        hit = triangle >= 0
+        found.append((start * size + np.flatnonzero(hit), triangle[hit], np.column_stack([1 - u - v, u, v])[hit]))
+    index, triangle, weights = (np.concatenate(parts) for parts in zip(*found))
+    return Texels(index, triangle, weights)
+
+
+def bake(mesh: UnwrappedMesh, surface: Surface, size: int, *, reach: float, offset: float) -> Textures:
+    """Asks the fields at each texel's point, brought onto the zero level set along the mesh's normal.
+
+    Args:
+        mesh: In the frame of the surface.
+        surface: The fields.
+        size: Texels along an edge.
+        reach: How far the level set may lie from the mesh.
+        offset: Occlusion rays start this far off the mesh along its normal.
+
+    Returns:
+        The maps; texels outside the charts have the value of the nearest inside.
+
+    Raises:
+        RuntimeError: The texture is too small for the mesh, or the materials are not finite.
+    """
+    texels = rasterise(mesh.uv, mesh.faces, size)
+    if len(texels.index) == 0:
+        raise RuntimeError(f"no texel of {size} x {size} lies in a chart; give a larger texture size")
+    normals = texels.interpolate(mesh.normals, mesh.faces)
+    points = to_level_set(surface, texels.interpolate(mesh.vertices, mesh.faces), reach, _unit(normals))
+    albedo, roughness, metallic, fine_normals = surface_materials(surface, points)
+    spread = Spread(texels.index, size)
+    return Textures(
+        albedo=spread(albedo),
+        roughness=spread(roughness),
+        metallic=spread(metallic),
+        occlusion=bake_occlusion(mesh, size, offset),
+        normal=spread(to_tangent_space(fine_normals, normals, texels.interpolate(mesh.tangents, mesh.faces))),
+    )
+
+
+def bake_occlusion(mesh: UnwrappedMesh, size: int, offset: float) -> np.ndarray:
+    """[size, size] share of the cosine-weighted hemisphere that the mesh leaves open, baked at a quarter of the size."""
+    small = max(1, size // OCCLUSION_SHRINK)
+    texels = rasterise(mesh.uv, mesh.faces, small)
+    if len(texels.index) == 0:
+        return np.ones((size, size), np.float32)
+    points, normals = (
+        torch.from_numpy(values)
+        for values in (texels.interpolate(mesh.vertices, mesh.faces), _unit(texels.interpolate(mesh.normals, mesh.faces)))
+    )
+    open_share, _ = occlusion_factors(
+        MeshScene(mesh.vertices, mesh.faces), points, normals, normals, torch.ones(len(points), 1), torch.zeros(2, 4, 3),
+        n_diffuse_rays=OCCLUSION_RAYS, n_specular_rays=1, offset=offset,
+    )  # fmt: skip
+    values = Spread(texels.index, small)(open_share[:, 0].numpy())
+    return np.clip(zoom(values, size / small, order=1, mode="nearest", grid_mode=True), 0, 1)
+
+
+def to_tangent_space(world: np.ndarray, normals: np.ndarray, tangents: np.ndarray) -> np.ndarray:
+    """World normals [n, 3] in the frames (T, sign * cross(N, T), N) of interpolated N [n, 3] and T [n, 4].
+
+    N and T are taken as interpolated, not normalised, as MikkTSpace's decoder does. Normals that face into the
+    interpolated surface are raised above it.
+    """
+    tangent = tangents[:, :3]
+    bitangent = np.sign(tangents[:, 3:]) * np.cross(normals, tangent)
+    # Cramer's rule for x T + y B + z N = world
+    columns = np.stack([np.cross(bitangent, normals), np.cross(normals, tangent), np.cross(tangent, bitangent)], axis=1)
+    volume = (tangent * columns[:, 0]).sum(axis=1, keepdims=True)
+    local = np.einsum("nij,nj->ni", columns, world) * np.where(volume < 0, -1, 1)
+    local = np.where(np.abs(volume) > 1e-9, local, [0, 0, 1])
+    local = _unit(local)
+    local[:, 2] = np.maximum(local[:, 2], MIN_UP)
+    return _unit(local).astype(np.float32)
+
+
+class Spread:
+    """Makes maps of values at some texels: the others take the value of the nearest, so that no seam shows in a mip map.
+
+    Args:
+        index: [k] row * size + column of the texels that have values.
+        size: Texels along an edge.
+    """
+
+    def __init__(self, index: np.ndarray, size: int):
+        row_of = np.full(size * size, -1, np.int32)
+        row_of[index] = np.arange(len(index), dtype=np.int32)
+        missing = (row_of < 0).reshape(size, size)
+        nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
+        self._rows = row_of.reshape(size, size)[tuple(nearest)]
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """[size, size] or [size, size, c] float32 of [k] or [k, c]."""
+        return values.astype(np.float32)[self._rows]
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-20)

@@ -1,0 +1,73 @@
+"""Writes a textured asset as binary glTF 2.0."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import trimesh
+from PIL import Image
+from trimesh.exchange.gltf import export_glb
+from trimesh.visual.material import PBRMaterial
+from trimesh.visual.texture import TextureVisuals
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.images import atomic_path
+from splitnerf.export.maps import encode_maps, y_up
+
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+
+
+def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | None = None) -> None:
+    """Writes one mesh with one metallic-roughness material, y up, textures as PNG inside, atomically.
+
+    Occlusion, roughness and metallic share one image, as glTF proposes. Without textures the file has the factors alone.
+
+    Args:
+        path: Ends in .glb.
+        asset: With one material.
+        occlusion: [h, w] in [0, 1], 1 = open, beside a roughness-metallic texture of the same size; or None.
+
+    Raises:
+        RuntimeError: See :func:`splitnerf.export.maps.encode_maps`.
+        OSError: The file cannot be written.
+    """
+    maps, material = encode_maps(path, asset, occlusion), asset.materials[0]
+    images = [None if pixels is None else Image.fromarray(pixels) for pixels in (maps.albedo, maps.orm, maps.normal)]
+    pbr = PBRMaterial(
+        name=material.name,
+        roughnessFactor=float(material.roughness),
+        metallicFactor=float(material.metallic),
+        baseColorTexture=images[0],
+        metallicRoughnessTexture=images[1],
+        normalTexture=images[2],
+    )
+    mesh = trimesh.Trimesh(
+        y_up(asset.vertices),
+        asset.triangles,
+        vertex_normals=y_up(asset.normals),
+        visual=TextureVisuals(uv=None if asset.uv is None else asset.uv * [1, -1] + [0, 1], material=pbr),
+        process=False,
+    )
+    if asset.tangents is not None:
+        tangents = np.column_stack([y_up(asset.tangents[:, :3]), asset.tangents[:, 3]])
+        mesh.vertex_attributes["_TANGENT"] = tangents.astype(np.float32)
+
+    def finish(tree: dict) -> None:
+        """What trimesh leaves out: exact factors, TANGENT's name, one image for two uses, what the buffers are for."""
+        tree["asset"]["generator"] = "SplitNeRF"
+        primitive = tree["meshes"][0]["primitives"][0]
+        attributes, pbr = primitive["attributes"], tree["materials"][0]["pbrMetallicRoughness"]
+        pbr["baseColorFactor"] = [*map(float, material.albedo), 1.0]  # trimesh would round it to 8 bit
+        if "_TANGENT" in attributes:
+            attributes["TANGENT"] = attributes.pop("_TANGENT")
+        if occlusion is not None:
+            tree["materials"][0]["occlusionTexture"] = {"index": pbr["metallicRoughnessTexture"]["index"]}
+        for accessor, target in [(primitive["indices"], ELEMENT_ARRAY_BUFFER)] + [(i, ARRAY_BUFFER) for i in attributes.values()]:
+            tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = target
+
+    scene = trimesh.Scene()
+    scene.add_geometry(mesh, node_name=asset.name, geom_name=asset.name)
+    content = export_glb(scene, include_normals=True, tree_postprocessor=finish)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content)

@@ -1,0 +1,65 @@
+"""What the writers of textured files share: axes, and an asset's textures in 8 bit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.images import linear_to_srgb, to_uint8
+
+
+@dataclass(frozen=True)
+class Maps:
+    """An asset's textures as files hold them, uint8, or None where it has only a factor.
+
+    Attributes:
+        albedo: [h, w, 3] sRGB.
+        orm: [h, w, 3] linear: occlusion (1 where there is none), roughness, metallic.
+        normal: [h, w, 3], (n + 1) / 2.
+    """
+
+    albedo: np.ndarray | None
+    orm: np.ndarray | None
+    normal: np.ndarray | None
+
+
+def encode_maps(path: object, asset: Asset, occlusion: np.ndarray | None) -> Maps:
+    """The textures of an asset's one material.
+
+    Args:
+        path: The file to be written, for messages.
+        asset: With uv where it has textures.
+        occlusion: [h, w] in [0, 1], 1 = open, of the size of the roughness texture; or None.
+
+    Raises:
+        RuntimeError: The asset has several materials, textures without uv, or something is not finite or of wrong size.
+    """
+    n, material = len(asset.vertices), asset.materials[0]
+    if len(asset.materials) != 1:
+        raise RuntimeError(f"{path}: has {len(asset.materials)} materials, one is supported")
+    for name, values, width in (("vertices", asset.vertices, 3), ("normals", asset.normals, 3), ("uv", asset.uv, 2), ("tangents", asset.tangents, 4)):
+        if values is not None and (values.shape != (n, width) or not np.isfinite(values).all()):
+            raise RuntimeError(f"{path}: {name} must be finite [{n}, {width}], got {list(values.shape)}")
+    if len(asset.triangles) == 0 or asset.triangles.min() < 0 or asset.triangles.max() >= n:
+        raise RuntimeError(f"{path}: degenerate or empty mesh, nothing written")
+    textures = (material.albedo_texture, material.roughness_metallic_texture, material.normal_texture, occlusion)
+    for texture in textures:
+        if texture is not None and (asset.uv is None or not np.isfinite(texture).all()):
+            raise RuntimeError(f"{path}: textures must be finite and the mesh have texture coordinates")
+    albedo, roughness_metallic, normal, _ = textures
+    orm = None
+    if roughness_metallic is not None:
+        open_share = np.ones(roughness_metallic.shape[:2]) if occlusion is None else occlusion
+        orm = to_uint8(np.dstack([open_share, roughness_metallic]))
+    return Maps(
+        albedo=None if albedo is None else to_uint8(linear_to_srgb(albedo)),
+        orm=orm,
+        normal=None if normal is None else to_uint8(0.5 * normal + 0.5),
+    )
+
+
+def y_up(vectors: np.ndarray) -> np.ndarray:
+    """(x, y, z) -> (x, z, -y) of [n, 3] vectors: from the program's axes to glTF's."""
+    return np.column_stack([vectors[:, 0], vectors[:, 2], -vectors[:, 1]])

@@ -1,0 +1,97 @@
+"""From a full-resolution mesh and the fields behind it to a light textured asset."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.tangents import vertex_tangents
+from splitnerf.export.bake import UnwrappedMesh, bake
+from splitnerf.export.simplify import decimate, is_closed
+from splitnerf.export.surface import Surface, surface_normals, to_level_set
+from splitnerf.export.unwrap import unwrap
+
+MIN_AGREEMENT = 0.2  # cosine between a vertex's two normals, below which that of the faces stands
+
+
+@dataclass(frozen=True)
+class TexturedAsset:
+    """A mesh with baked textures.
+
+    Attributes:
+        asset: In the surface's frame, with albedo, roughness-metallic and normal textures.
+        occlusion: [h, w] texture in [0, 1], 1 = open.
+        watertight: Whether the mesh was closed before the charts cut it.
+    """
+
+    asset: Asset
+    occlusion: np.ndarray
+    watertight: bool
+
+
+def textured_asset(
+    name: str,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    surface: Surface,
+    *,
+    n_faces: int,
+    texture_size: int,
+    spacing: float,
+    occlusion_offset: float,
+) -> TexturedAsset:
+    """Decimates a mesh, brings its vertices back onto the surface, unwraps it and bakes its textures.
+
+    Args:
+        name: Of the asset.
+        vertices, faces: The zero level set, [n, 3] and [m, 3], in the surface's frame.
+        surface: The fields.
+        n_faces: Faces to keep, 0 for all.
+        texture_size: Texels along an edge.
+        spacing: Of the grid that the mesh comes from: vertices and texels move by at most two.
+        occlusion_offset: Occlusion rays start this far off the mesh.
+
+    Raises:
+        RuntimeError: The texture is too small, or a field is not finite.
+    """
+    reach = 2.0 * spacing
+    vertices, faces = decimate(vertices, faces, n_faces)
+    vertices = to_level_set(surface, vertices, reach)
+    normals = vertex_normals(surface, vertices, faces)
+    watertight = is_closed(faces)
+    origins, faces, uv = unwrap(vertices, faces, texture_size)
+    vertices, normals = vertices[origins], normals[origins]
+    mesh = UnwrappedMesh(vertices, faces, normals, vertex_tangents(vertices, faces, normals, uv), uv)
+    maps = bake(mesh, surface, texture_size, reach=reach, offset=occlusion_offset)
+    material = Material(
+        name=name,
+        roughness=1.0,
+        metallic=1.0,
+        albedo_texture=maps.albedo,
+        roughness_metallic_texture=np.dstack([maps.roughness, maps.metallic]),
+        normal_texture=maps.normal,
+    )
+    asset = Asset(
+        name=name,
+        vertices=vertices,
+        triangles=faces,
+        normals=normals,
+        material_ids=np.zeros(len(faces), np.int32),
+        materials=[material],
+        uv=uv,
+        tangents=mesh.tangents,
+    )
+    return TexturedAsset(asset, maps.occlusion, watertight)
+
+
+def vertex_normals(surface: Surface, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """[n, 3] float32 unit gradients of the field; the faces' normals where the two do not agree."""
+    fine = surface_normals(surface, vertices)
+    coarse = np.asarray(trimesh.Trimesh(vertices, faces, process=False).vertex_normals, dtype=np.float32)
+    agree = (fine * coarse).sum(axis=1, keepdims=True) > MIN_AGREEMENT
+    known = np.linalg.norm(coarse, axis=1, keepdims=True) > 0.5
+    fallback = np.where(known, coarse, np.float32([0, 0, 1]))
+    return np.where(agree | (~known & (np.linalg.norm(fine, axis=1, keepdims=True) > 0.5)), fine, fallback)

@@ -1,0 +1,190 @@
+"""Unwrapping and baking: texels, padding, normal maps and occlusion against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+from scipy.ndimage import distance_transform_edt
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from splitnerf.data.tangents import vertex_tangents
+from splitnerf.export.bake import Spread, UnwrappedMesh, bake_occlusion, rasterise, to_tangent_space
+from splitnerf.export.meshing import extract_mesh
+from splitnerf.export.surface import Surface, to_level_set
+from splitnerf.export.textured import textured_asset
+from splitnerf.export.unwrap import PADDING, unwrap
+
+SIZE = 256
+SPACING = 3.0 / 79
+
+
+def bumpy(x):
+    """A sphere with waves, four times as long as the coarse mesh's edges are."""
+    return x.norm(dim=1) - 0.8 - 0.012 * (12 * x).sin().sum(dim=1)
+
+
+def with_gradient(field):
+    def gradient(points):
+        with torch.enable_grad():
+            points = points.clone().requires_grad_()
+            distance = field(points)
+            (slope,) = torch.autograd.grad(distance.sum(), points)
+        return distance.detach(), slope
+
+    return gradient
+
+
+def albedo_at(x):
+    return 0.5 + 0.4 * np.sin(7 * x)
+
+
+def surface_of(field):
+    gradient = with_gradient(field)
+
+    def materials(x):
+        rough, metal = 0.5 + 0.3 * x[:, :1], (x[:, 2:] > 0).float()
+        return torch.from_numpy(albedo_at(x.numpy())), rough, metal, torch.nn.functional.normalize(gradient(x)[1], dim=1)
+
+    return Surface(field, gradient, materials)
+
+
+@pytest.fixture(scope="module")
+def baked():
+    vertices, faces = extract_mesh(bumpy, 1.5, 80)
+    return textured_asset(
+        "bumpy", vertices, faces, surface_of(bumpy), n_faces=600, texture_size=SIZE, spacing=SPACING, occlusion_offset=0.01
+    )
+
+
+def angle(a, b):
+    a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b))
+    return np.degrees(np.arccos(np.clip((a * b).sum(axis=1), -1, 1)))
+
+
+def test_normal_map_restores_the_fine_normals(baked):
+    """The map in 8 bit, decoded as glTF says, gives the field's normals where the coarse mesh's are off."""
+    asset = baked.asset
+    texels = rasterise(asset.uv, asset.triangles, SIZE)
+    normal, tangent = (texels.interpolate(values, asset.triangles) for values in (asset.normals, asset.tangents))
+    bitangent = np.cross(normal, tangent[:, :3]) * tangent[:, 3:]
+    stored = np.rint(asset.materials[0].normal_texture * 127.5 + 127.5) / 127.5 - 1
+    local = stored.reshape(-1, 3)[texels.index]
+    world = local[:, :1] * tangent[:, :3] + local[:, 1:2] * bitangent + local[:, 2:] * normal
+    points = to_level_set(surface_of(bumpy), texels.interpolate(asset.vertices, asset.triangles), 2 * SPACING, normal)
+    truth = with_gradient(bumpy)(torch.from_numpy(points))[1].numpy()
+    assert angle(normal, truth).mean() > 2.0
+    assert angle(world, truth).mean() < 0.5
+    assert np.quantile(angle(world, truth), 0.99) < 2.0
+
+
+def test_albedo_and_materials_are_those_of_the_surface(baked):
+    asset = baked.asset
+    material = asset.materials[0]
+    texels = rasterise(asset.uv, asset.triangles, SIZE)
+    normal = texels.interpolate(asset.normals, asset.triangles)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    points = to_level_set(surface_of(bumpy), texels.interpolate(asset.vertices, asset.triangles), 2 * SPACING, normal)
+    assert bumpy(torch.from_numpy(points)).abs().max() < 1e-4
+    assert np.abs(material.albedo_texture.reshape(-1, 3)[texels.index] - albedo_at(points)).max() < 1e-5
+    roughness, metallic = material.roughness_metallic_texture.reshape(-1, 2)[texels.index].T
+    assert np.abs(roughness - 0.5 - 0.3 * points[:, 0]).max() < 1e-5
+    assert np.array_equal(metallic, points[:, 2] > 0)
+
+
+def test_mesh_is_light_closed_and_on_the_surface(baked):
+    asset = baked.asset
+    assert baked.watertight and len(asset.triangles) <= 600
+    assert bumpy(torch.from_numpy(asset.vertices)).abs().max() < 1e-4
+    welded = trimesh.Trimesh(asset.vertices, asset.triangles, process=False)
+    welded.merge_vertices(merge_tex=True, merge_norm=True)
+    assert welded.is_watertight and welded.volume > 0
+    assert (baked.occlusion > 0.8).all()  # next to convex
+
+
+def test_charts_do_not_overlap_and_keep_their_distance():
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    origins, faces, uv = unwrap(np.float32(ball.vertices), np.int32(ball.faces), SIZE)
+    assert np.array_equal(origins[faces], ball.faces) and uv.min() >= 0 and uv.max() <= 1
+    n = len(uv)
+    graph = coo_matrix((np.ones(2 * len(faces)), (faces[:, :2].reshape(-1), faces[:, 1:].reshape(-1))), shape=(n, n))
+    n_charts, chart = connected_components(graph, directed=False)
+    texels = rasterise(uv, faces, SIZE)
+    owner = np.full(SIZE * SIZE, -1)
+    owner[texels.index] = chart[faces[texels.triangle, 0]]
+    owner = owner.reshape(SIZE, SIZE)
+    for c in range(n_charts):
+        others = (owner >= 0) & (owner != c)
+        assert distance_transform_edt(~others)[owner == c].min() > PADDING
+    edges = uv[faces[:, 1:]] - uv[faces[:, :1]]
+    area = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]).sum()
+    assert len(texels.index) == pytest.approx(area * SIZE**2, rel=0.01)  # each texel counted once
+
+
+def test_texels_know_their_place():
+    uv = np.float32([[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]])
+    texels = rasterise(uv, np.int32([[0, 1, 2]]), 64)
+    centres = np.column_stack([texels.index % 64 + 0.5, texels.index // 64 + 0.5]) / 64
+    assert texels.interpolate(uv, np.int32([[0, 1, 2]])) == pytest.approx(centres, abs=1e-4)
+    assert len(texels.index) == pytest.approx(0.5 * (0.8 * 0.6 - 0.1 * 0.3) * 64**2, rel=0.02)
+
+
+def test_what_lies_outside_takes_the_nearest_value():
+    image = Spread(np.array([0, 15]), 4)(np.array([[1.0, 2.0], [3.0, 4.0]]))
+    assert image.dtype == np.float32 and image.shape == (4, 4, 2)
+    assert image[1, 1].tolist() == [1, 2] and image[2, 3].tolist() == [3, 4]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_tangent_space_is_undone_by_its_decoder(sign):
+    rng = np.random.default_rng(0)
+    normals = rng.normal(size=(500, 3))
+    normals *= rng.uniform(0.7, 1, (500, 1)) / np.linalg.norm(normals, axis=1, keepdims=True)  # as interpolated
+    tangents = np.cross(normals, rng.normal(size=(500, 3)))
+    tangents = np.column_stack([tangents / np.linalg.norm(tangents, axis=1, keepdims=True), np.full(500, sign)])
+    world = normals + 0.5 * rng.normal(size=(500, 3))
+    world = world[keep := (world * normals).sum(axis=1) > 0.3]
+    normals, tangents = normals[keep], tangents[keep]
+    local = to_tangent_space(world, normals, tangents)
+    bitangents = tangents[:, 3:] * np.cross(normals, tangents[:, :3])
+    decoded = local[:, :1] * tangents[:, :3] + local[:, 1:2] * bitangents + local[:, 2:] * normals
+    assert angle(decoded, world).max() < 1e-2
+    assert (to_tangent_space(-normals, normals, tangents)[:, 2] > 0).all()
+
+
+def test_points_move_onto_the_level_set_and_never_away():
+    """f = |x|^2 - 1 is no distance: Newton and the secant still land; what is out of reach stays inside it."""
+
+    def field(x):
+        return x.square().sum(dim=1) - 1
+
+    surface = surface_of(field)
+    rng = np.random.default_rng(1)
+    directions = rng.normal(size=(1000, 3))
+    directions = np.float32(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+    points = np.float32(directions * rng.uniform(0.9, 1.1, (1000, 1)))
+    for along in (None, directions):
+        moved = to_level_set(surface, points, 0.2, along)
+        assert np.abs(np.linalg.norm(moved, axis=1) - 1).max() < 1e-5
+    moved = to_level_set(surface, points, 0.02)
+    assert np.linalg.norm(moved - points, axis=1).max() < 0.0201
+    assert (np.abs(np.linalg.norm(moved, axis=1) - 1) <= np.abs(np.linalg.norm(points, axis=1) - 1) + 1e-6).all()
+    across = np.float32(np.cross(directions, [0.0, 0.0, 1.0]))
+    assert np.array_equal(to_level_set(surface, points, 0.2, across / np.linalg.norm(across, axis=1, keepdims=True)), points)
+
+
+def test_occlusion_beside_a_wall():
+    """A floor at distance d from a long wall of height 1 sees 1 - (1 - d / sqrt(d^2 + 1)) / 2 of its hemisphere."""
+    floor = np.float32([[0, -1, 0], [2, -1, 0], [2, 1, 0], [0, 1, 0]])
+    wall = np.float32([[0, -60, 0], [0, 60, 0], [0, 60, 1], [0, -60, 1]])
+    vertices = np.concatenate([floor, wall])
+    faces = np.int32([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    normals = np.float32([[0, 0, 1]] * 4 + [[1, 0, 0]] * 4)
+    uv = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]] + [[2, 2], [3, 2], [3, 3], [2, 3]])  # the wall off the texture
+    mesh = UnwrappedMesh(vertices, faces, normals, vertex_tangents(vertices, faces, normals, uv), uv)
+    occlusion = bake_occlusion(mesh, 128, 1e-3)
+    d = (np.arange(128) + 0.5) / 64
+    expected = 1 - 0.5 * (1 - d / np.sqrt(d**2 + 1))
+    assert occlusion.mean(axis=0)[8:-8] == pytest.approx(expected[8:-8], abs=0.02)

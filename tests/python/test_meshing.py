@@ -1,0 +1,153 @@
+"""Meshing by closed forms, and the narrow band against the dense grid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from splitnerf import _core
+from splitnerf.export.meshing import EmptyMesh, extract_mesh
+from splitnerf.export.simplify import decimate, drop_floaters, is_closed
+
+RADIUS = 0.7
+
+
+def sphere(x, radius=RADIUS):
+    return x.norm(dim=1) - radius
+
+
+def torus(x):
+    return torch.hypot(torch.hypot(x[:, 0], x[:, 1]) - 0.8, x[:, 2]) - 0.25
+
+
+def gyroid(x):
+    """Far from a distance: its slope varies, and it reaches the border everywhere."""
+    a, b = (5.0 * x).sin(), (5.0 * x).cos()
+    return 0.15 * (a[:, 0] * b[:, 1] + a[:, 1] * b[:, 2] + a[:, 2] * b[:, 0])
+
+
+def test_sphere_converges_in_area_and_volume():
+    """Second order: halving the cell quarters the errors."""
+    errors = []
+    for n in (17, 33, 65):
+        mesh = trimesh.Trimesh(*extract_mesh(sphere, 1.5, n), process=False)
+        assert mesh.is_watertight
+        errors.append([4 / 3 * math.pi * RADIUS**3 - mesh.volume, 4 * math.pi * RADIUS**2 - mesh.area])
+    errors = np.array(errors)
+    assert (errors > 0).all()  # chords lie inside
+    assert errors[:-1] / errors[1:] == pytest.approx(4, rel=0.25)
+
+
+def test_vertices_lie_on_the_sphere_and_normals_outward():
+    vertices, faces = extract_mesh(sphere, 1.5, 65)
+    assert vertices.dtype == np.float32 and faces.dtype == np.int32
+    assert np.abs(np.linalg.norm(vertices, axis=1) - RADIUS).max() < 1e-3
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    assert ((np.cross(b - a, c - a) * (a + b + c)).sum(axis=1) > 0).all()
+
+
+def test_torus_has_its_hole():
+    mesh = trimesh.Trimesh(*extract_mesh(torus, 1.5, 64), process=False)
+    assert mesh.is_watertight and mesh.euler_number == 0
+    assert mesh.volume == pytest.approx(2 * math.pi**2 * 0.8 * 0.25**2, rel=0.01)
+
+
+@pytest.mark.parametrize("field", [sphere, torus, gyroid])
+@pytest.mark.parametrize("resolution", [31, 48])
+def test_narrow_band_gives_the_dense_grid(field, resolution):
+    evaluated = 0
+
+    def counting(x):
+        nonlocal evaluated
+        evaluated += len(x)
+        return field(x)
+
+    vertices, faces = extract_mesh(counting, 1.5, resolution)
+    in_band, evaluated = evaluated, 0
+    dense_vertices, dense_faces = extract_mesh(counting, 1.5, resolution, dense=True)
+    assert np.array_equal(faces, dense_faces)
+    assert np.abs(vertices - dense_vertices).max() < 1e-5
+    assert is_closed(faces)
+    assert evaluated == resolution**3
+    if field is sphere and resolution == 48:
+        assert in_band < 0.3 * evaluated
+
+
+def test_the_front_follows_a_surface_that_the_first_look_missed():
+    """A field six times steeper than a distance hides much of its surface from the test by the centre."""
+
+    def steep(x):
+        return 6.0 * torus(x)
+
+
+    vertices, faces = extract_mesh(steep, 1.5, 64)
+    dense_vertices, dense_faces = extract_mesh(steep, 1.5, 64, dense=True)
+    assert np.array_equal(faces, dense_faces) and np.abs(vertices - dense_vertices).max() < 1e-5
+
+
+def test_what_reaches_the_border_is_closed():
+    half = trimesh.Trimesh(*extract_mesh(lambda x: x[:, 2], 1.5, 24), process=False)
+    assert half.is_watertight and 3**2 * 1.5 < half.volume < 3.3**2 * 1.65  # at most a cell beyond the box
+    full = trimesh.Trimesh(*extract_mesh(lambda x: torch.full((len(x),), -9.0), 1.5, 24), process=False)
+    assert full.is_watertight and full.euler_number == 2
+
+
+def test_zeros_at_the_nodes_leave_no_face_without_area():
+    vertices, faces = extract_mesh(lambda x: x.abs().amax(dim=1) - 0.75, 1.5, 25)  # nodes every 0.125
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    assert mesh.is_watertight and mesh.area_faces.min() > 0
+    assert mesh.volume == pytest.approx(1.5**3, rel=0.05)  # its edges are cut
+
+
+def test_no_surface_raises():
+    with pytest.raises(EmptyMesh):
+        extract_mesh(lambda x: torch.ones(len(x)), 1.5, 16)
+    with pytest.raises(RuntimeError, match="not finite"):
+        extract_mesh(lambda x: torch.full((len(x),), float("nan")), 1.5, 16)
+
+
+def test_core_refuses_what_does_not_fit():
+    values, index = np.ones((2, 4, 4, 4), np.float32), np.full((3, 3, 3), -1, np.int32)
+    with pytest.raises(ValueError, match="each block of values once"):
+        _core.marching_cubes(values, index, 0.0, 1.0)
+    index[1, 1, 1] = 5
+    with pytest.raises(ValueError, match="index holds 5, values have 2 blocks"):
+        _core.blocks_to_open(values, index)
+    with pytest.raises(ValueError, match="must be"):
+        _core.marching_cubes(np.ones((2, 4, 4, 3), np.float32), index, 0.0, 1.0)
+
+
+def test_small_components_go_and_are_counted():
+    def three(x):
+        far, near = torch.tensor([1.3, 1.3, 1.3]), torch.tensor([-1.2, 0.0, 0.0])
+        return torch.minimum(sphere(x), torch.minimum(sphere(x - far, 0.05), sphere(x - near, 0.2)))
+
+    vertices, faces, n_dropped = drop_floaters(*extract_mesh(three, 1.5, 96))
+    assert n_dropped == 1  # the middle one has more than a hundredth of the faces
+    assert np.abs(vertices).max() < 1.41 and vertices[:, 0].min() == pytest.approx(-1.4, abs=0.01)
+    assert faces.max() == len(vertices) - 1
+
+
+def test_decimation_keeps_a_thin_shape_closed():
+    def handle(x):
+        return torch.hypot(torch.hypot(x[:, 0], x[:, 1]) - 0.9, x[:, 2]) - 0.045
+
+    vertices, faces = extract_mesh(handle, 1.5, 128)
+    light_vertices, light_faces = decimate(vertices, faces, 1500)
+    assert is_closed(faces) and is_closed(light_faces)
+    assert 1400 <= len(light_faces) <= 1500
+    assert trimesh.Trimesh(light_vertices, light_faces, process=False).euler_number == 0
+    for n_faces in (0, len(faces), 10**7):
+        assert len(decimate(vertices, faces, n_faces)[1]) == len(faces)
+
+
+def test_closed_means_each_edge_once_in_each_direction():
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    assert is_closed(faces)
+    assert not is_closed(faces[:3])
+    assert not is_closed(np.concatenate([faces[:3], faces[3:, ::-1]]))
+    assert not is_closed(np.concatenate([faces, faces]))
