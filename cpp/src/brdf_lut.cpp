@@ -10,7 +10,10 @@ namespace {
 
 constexpr int kTablePoints = 4096;  // of each entry; error of F1 and F2 below 1e-3, see test_split_sum.cpp
 
-}  // namespace
+struct LobeIntegrals {
+  double f1, f2, chi;
+  double dielectric;  // E with fresnel_dielectric in place of Schlick's form
+};
 
 // The lobe integral  E = int f(l) (n.l) dl  by sampling the microfacet normal h ~ D(h)(n.h):
 //   pdf(l) = D (n.h) / (4 v.h),  f = D V F   =>   E = mean of  4 V F (n.l)(v.h) / (n.h).
@@ -20,12 +23,12 @@ constexpr int kTablePoints = 4096;  // of each entry; error of F1 and F2 below 1
 // The mean direction m = int l f (n.l) dl / E has a tangential part m_t along that of the
 // reflection r = (s, c) and a normal part m_n. (1 - chi) n + chi r is parallel to m for
 //   chi = m_t / (s m_n + m_t (1 - c)).
-Vec3<double> integrate_brdf(double n_dot_v, double roughness, int n_points) {
+LobeIntegrals integrate_lobe(double n_dot_v, double roughness, int n_points) {
   const double a = ggx_alpha_from_roughness(roughness), a2 = a * a;
   const double nv = std::clamp(n_dot_v, kMinNdotV, 1.0 - 1e-6);  // chi is 0/0 at n.v = 1; its limit is not
   const double sin_v = std::sqrt(1 - nv * nv);
   const Vec3<double> v{sin_v, 0, nv};
-  double f1 = 0, f2 = 0, m_t = 0, m_n = 0;
+  double f1 = 0, f2 = 0, dielectric = 0, m_t = 0, m_n = 0;
   for (int i = 0; i < n_points; ++i) {
     const Vec2<double> point = fibonacci_lattice<double>(i, n_points);
     const double x = point.x, u = x * x * (3 - 2 * x), weight_u = 6 * x * (1 - x);
@@ -40,29 +43,49 @@ Vec3<double> integrate_brdf(double n_dot_v, double roughness, int n_points) {
       const double w = weight_u * 4 * smith_v(a, nv, l.z) * l.z * vh / cos_h, fc = pow5(1 - vh);
       f1 += w * (1 - fc);
       f2 += w * fc;
+      dielectric += w * fresnel_dielectric(vh);
       m_t -= w * l.x;  // the reflection leans to -x
       m_n += w * l.z;
     }
   }
   const double scale = 0.5 / n_points;
   const double chi = roughness == 0 ? 1.0 : m_t / (sin_v * m_n + m_t * (1 - nv));
-  return {f1 * scale, f2 * scale, std::clamp(chi, 0.0, 1.0)};
+  return {f1 * scale, f2 * scale, std::clamp(chi, 0.0, 1.0), dielectric * scale};
 }
 
-const float* brdf_lut() {
-  static const std::array<float, kLutSize * kLutSize * 3> table = [] {
-    std::array<float, kLutSize * kLutSize * 3> values;
+struct Tables {
+  std::array<float, kLutSize * kLutSize * 3> brdf;
+  std::array<float, kLutSize * kLutSize> dielectric;
+};
+
+const Tables& tables() {
+  static const Tables computed = [] {
+    Tables t;
     parallel_for(kLutSize, 1, [&](int64_t begin, int64_t end) {
       for (int64_t row = begin; row < end; ++row)
         for (int col = 0; col < kLutSize; ++col) {
           const double root = double(col) / (kLutSize - 1), roughness = double(row) / (kLutSize - 1);
-          const Vec3<double> entry = integrate_brdf(root * root, roughness, kTablePoints);
-          for (int c = 0; c < 3; ++c) values[(row * kLutSize + col) * 3 + c] = static_cast<float>(entry[c]);
+          const LobeIntegrals entry = integrate_lobe(root * root, roughness, kTablePoints);
+          const int64_t texel = row * kLutSize + col;
+          t.brdf[texel * 3] = static_cast<float>(entry.f1);
+          t.brdf[texel * 3 + 1] = static_cast<float>(entry.f2);
+          t.brdf[texel * 3 + 2] = static_cast<float>(entry.chi);
+          t.dielectric[texel] = static_cast<float>(entry.dielectric);
         }
     });
-    return values;
+    return t;
   }();
-  return table.data();
+  return computed;
 }
+
+}  // namespace
+
+Vec3<double> integrate_brdf(double n_dot_v, double roughness, int n_points) {
+  const LobeIntegrals entry = integrate_lobe(n_dot_v, roughness, n_points);
+  return {entry.f1, entry.f2, entry.chi};
+}
+
+const float* brdf_lut() { return tables().brdf.data(); }
+const float* dielectric_lut() { return tables().dielectric.data(); }
 
 }  // namespace splitnerf

@@ -16,6 +16,7 @@ namespace splitnerf::embree {
 inline void occluded16(const int* valid, RTCScene scene, RTCRay16* rays) { rtcOccluded16(valid, scene, rays); }
 inline void occluded1(RTCScene scene, RTCRay* ray) { rtcOccluded1(scene, ray); }
 inline void intersect1(RTCScene scene, RTCRayHit* ray) { rtcIntersect1(scene, ray); }
+inline void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) { rtcIntersect16(valid, scene, rays); }
 
 #else
 
@@ -35,6 +36,11 @@ inline void occluded1(RTCScene scene, RTCRay* ray) {
 inline void intersect1(RTCScene scene, RTCRayHit* ray) {
   RTCIntersectContext context = default_context();
   rtcIntersect1(scene, &context, ray);
+}
+inline void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
+  RTCIntersectContext context = default_context();
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect16(valid, scene, &context, rays);
 }
 
 #endif

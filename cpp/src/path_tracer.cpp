@@ -1,12 +1,14 @@
 #include "splitnerf/path_tracer.h"
 
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "sample_pattern.h"
+#include "shading_point.h"
 #include "splitnerf/environment_sampler.h"
 #include "splitnerf/parallel.h"
 #include "splitnerf/principled.h"
@@ -22,88 +24,61 @@ constexpr int kRouletteStart = 3;  // bounces before Russian roulette may end a 
 constexpr int64_t kPixelsPerTask = 64;
 constexpr int kPairsPerBounce = 3;  // light direction; BSDF direction; lobe choice and roulette
 
-// Well-spread sample points: every pair of dimensions holds the spp-point Fibonacci lattice in a
-// random order of its own; each pixel starts at a random place of the order and shifts the points
-// modulo 1. Each sample is then uniform, so estimates stay unbiased.
-class SamplePattern {
- public:
-  SamplePattern(int spp, int n_pairs, uint32_t seed) : spp_(spp), n_pairs_(n_pairs), seed_(hash_u32(seed)) {
-    points_.resize(size_t(spp) * n_pairs);
-    for (int pair = 0; pair < n_pairs; ++pair) {
-      Vec2<float>* points = points_.data() + size_t(pair) * spp;
-      for (int i = 0; i < spp; ++i) points[i] = fibonacci_lattice<float>(i, spp);
-      for (int i = spp - 1; i > 0; --i) {  // Fisher-Yates
-        std::swap(points[i], points[hash_u32(i, pair, seed_) % uint32_t(i + 1)]);
-      }
-    }
-  }
-
-  struct Offset {
-    Vec2<float> shift;
-    uint32_t start;
-  };
-  void start_pixel(uint32_t pixel, std::vector<Offset>& offsets) const {
-    offsets.resize(n_pairs_);
-    for (int pair = 0; pair < n_pairs_; ++pair) {
-      const uint32_t bits = hash_u32(pixel, 3 * pair, seed_ + 1);
-      offsets[pair] = {{unit_from_bits<float>(hash_u32(bits + 1)), unit_from_bits<float>(hash_u32(bits + 2))},
-                       bits % uint32_t(spp_)};
-    }
-  }
-  Vec2<float> get(const std::vector<Offset>& offsets, int sample, int pair) const {
-    const Offset& o = offsets[pair];
-    const Vec2<float> p = points_[size_t(pair) * spp_ + (o.start + sample) % spp_];
-    return {wrap_unit(p.x, o.shift.x), wrap_unit(p.y, o.shift.y)};
-  }
-
- private:
-  int spp_, n_pairs_;
-  uint32_t seed_;
-  std::vector<Vec2<float>> points_;  // [n_pairs, spp]
-};
-
-struct ShadingPoint {
-  Vec position;
-  Vec geometric_normal, shading_normal;  // both on the viewer's side
-  Vec albedo;
-  float roughness, metallic;
-};
+constexpr int kCameraRays = 64;  // of a pixel, traced together
 
 struct FirstHit {
-  bool hit = false;
-  ShadingPoint point{};
-  float depth = 0;
+  bool hit;
+  ShadingPoint point;
+};
+
+// What one thread needs while it renders.
+struct Worker {
+  std::vector<SamplePattern::Offset> offsets;
+  Vec origins[kCameraRays], directions[kCameraRays];
+  Hit hits[kCameraRays];
+  int64_t n_rays = 0;
+};
+
+// Direct light (luminance) that the catcher receives with the object and without it.
+struct CaughtLight {
+  int n_samples = 0;
+  double shadowed = 0, open = 0;
 };
 
 // Power heuristic with exponent 2, pdf > 0; as a ratio neither square can overflow or vanish.
 // Source: Veach 1997, Eq. (9.15).
 float mis_weight(float pdf, float other_pdf) { return 1.f / (1.f + square(other_pdf / pdf)); }
 
+float luminance(Vec c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
+
 class PathTracer {
  public:
   PathTracer(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
              const PathTracerParams& params)
       : scene_(scene),
-        surface_(surface),
+        surface_(scene, surface),
         light_(environment.radiance, environment.height, environment.width),
         camera_(camera),
         params_(params),
-        lut_(brdf_lut()),
+        filter_(params.filter),
         pattern_(params.samples_per_pixel, 1 + kPairsPerBounce * (params.max_bounces + 1), params.seed) {
     float extent = 0;
     for (int64_t i = 0; i < scene.n_vertices() * 3; ++i) extent = max_of(extent, std::abs(scene.vertices()[i]));
     ray_offset_ = 1e-5f * extent;
   }
 
-  void render_pixel(int64_t pixel, std::vector<SamplePattern::Offset>& offsets, const RenderTargets& out) const {
-    pattern_.start_pixel(static_cast<uint32_t>(pixel), offsets);
+  void render_pixel(int64_t pixel, Worker& worker, const RenderTargets& out) const {
+    pattern_.start_pixel(static_cast<uint32_t>(pixel), worker.offsets);
     const int spp = params_.samples_per_pixel, x = int(pixel % camera_.width), y = int(pixel / camera_.width);
-    Vec3<double> radiance{}, albedo{}, normal{};
+    Vec3<double> radiance{}, albedo{}, normal{}, smooth_normal{};
     double roughness = 0, metallic = 0, depth = 0;
     int n_hits = 0;
+    CaughtLight caught;
     for (int sample = 0; sample < spp; ++sample) {
-      FirstHit first;
-      const Vec path = trace_path(x, y, sample, offsets, &first);
+      const int k = sample % kCameraRays;
+      if (k == 0) trace_camera_rays(x, y, sample, min_of(kCameraRays, spp - sample), worker);
+      FirstHit first{};
+      const Vec path = trace_path(worker.directions[k], worker.hits[k], sample, worker, &first, &caught);
       if (!std::isfinite(sum(path))) {
         throw std::runtime_error("render: a path through pixel (" + std::to_string(x) + ", " + std::to_string(y) +
                                  ") has a radiance that is not finite");
@@ -114,32 +89,55 @@ class PathTracer {
         radiance[c] += path[c];
         albedo[c] += first.point.albedo[c];
         normal[c] += first.point.shading_normal[c];
+        smooth_normal[c] += first.point.smooth_normal[c];
       }
       roughness += first.point.roughness;
       metallic += first.point.metallic;
-      depth += first.depth;
+      depth += worker.hits[k].t;
     }
     const double per_hit = 1. / max_of(n_hits, 1);
     for (int c = 0; c < 3; ++c) {
       out.radiance[pixel * 3 + c] = static_cast<float>(radiance[c] / spp);
       out.albedo[pixel * 3 + c] = static_cast<float>(albedo[c] * per_hit);
       out.normal[pixel * 3 + c] = static_cast<float>(normal[c] * per_hit);
+      out.smooth_normal[pixel * 3 + c] = static_cast<float>(smooth_normal[c] * per_hit);
     }
     out.alpha[pixel] = static_cast<float>(n_hits) / spp;
     out.roughness[pixel] = static_cast<float>(roughness * per_hit);
     out.metallic[pixel] = static_cast<float>(metallic * per_hit);
     out.depth[pixel] = static_cast<float>(depth * per_hit);
+    if (out.shadow) {
+      const double blocked = caught.open > 0 ? 1 - caught.shadowed / caught.open : 0;
+      out.shadow[pixel] = static_cast<float>(blocked * caught.n_samples / spp);
+    }
   }
 
  private:
-  // L = sum over vertices of throughput x (light sampled there + light that the BSDF sample finds).
-  Vec trace_path(int x, int y, int sample, const std::vector<SamplePattern::Offset>& offsets,
-                 FirstHit* first) const {
+  // The camera rays of the samples `first` ... `first + n - 1` of a pixel, and their nearest hits.
+  void trace_camera_rays(int x, int y, int first, int n, Worker& worker) const {
+    for (int k = 0; k < n; ++k) {
+      worker.origins[k] = camera_centre();
+      worker.directions[k] = camera_ray(x, y, pattern_.get(worker.offsets, first + k, 0));
+    }
+    scene_.trace_closest(&worker.origins[0].x, &worker.directions[0].x, n, kInfinity, worker.hits);
+  }
+
+  // L = sum over vertices of throughput x (emission + light sampled there + light that the BSDF
+  // sample finds).
+  Vec trace_path(Vec direction, Hit hit, int sample, Worker& worker, FirstHit* first, CaughtLight* caught) const {
     Vec radiance{0, 0, 0}, throughput{1, 1, 1};
-    Vec origin = camera_centre(), direction = camera_ray(x, y, pattern_.get(offsets, sample, 0));
+    Vec origin = camera_centre();
     float bsdf_pdf = 0;
     for (int bounce = 0;; ++bounce) {
-      const Hit hit = scene_.trace_closest(origin, direction, kInfinity);
+      if (bounce > 0) hit = scene_.trace_closest(origin, direction, kInfinity);
+      ++worker.n_rays;
+      if (bounce == 0 && params_.shadow_catcher) {
+        const float t = (params_.catcher_height - origin.z) / direction.z;
+        if (direction.z < 0 && t > 0 && (hit.t < 0 || t < hit.t)) {
+          catch_shadow(origin + direction * t, sample, worker, caught);
+          return radiance;
+        }
+      }
       if (hit.t < 0) {
         if (bounce > 0) {
           const bool both = params_.light_sampling && !light_.black();
@@ -150,29 +148,30 @@ class PathTracer {
       }
       if (bounce > params_.max_bounces) return radiance;
 
-      const ShadingPoint point = shading_point(hit, -direction);
-      if (bounce == 0) *first = {true, point, hit.t};
+      const ShadingPoint point = surface_(hit, -direction);
+      if (bounce == 0) *first = {true, point};
+      radiance += limited(throughput * point.emission, bounce > 0);
       const Frame<float> frame(point.shading_normal);
-      const PrincipledBsdf<float> bsdf(lut_, point.albedo, point.roughness, point.metallic,
+      const PrincipledBsdf<float> bsdf(tables_, point.albedo, point.roughness, point.metallic,
                                        frame.to_local(-direction));
       const Vec start = point.position + point.geometric_normal * ray_offset_;
       const int pair = 1 + kPairsPerBounce * bounce;
 
       if (params_.light_sampling && !light_.black()) {
         float light_pdf;
-        const Vec to_light = light_.sample(pattern_.get(offsets, sample, pair), &light_pdf);
+        const Vec to_light = light_.sample(pattern_.get(worker.offsets, sample, pair), &light_pdf);
         // Nothing arrives from below the true surface, whatever the shading normal says.
         if (dot(to_light, point.geometric_normal) > 0) {
           const BsdfValue<float> f = bsdf.evaluate(frame.to_local(to_light));
-          if (f.pdf > 0 && !scene_.occluded(start, to_light, kInfinity)) {
+          if (f.pdf > 0 && !occluded(start, to_light, worker)) {
             const float weight = mis_weight(light_pdf, f.pdf) / light_pdf;
             radiance += limited(throughput * f.f_cos * light_.radiance(to_light) * weight, bounce > 0);
           }
         }
       }
 
-      const Vec2<float> choice = pattern_.get(offsets, sample, pair + 2);
-      const Vec2<float> u = pattern_.get(offsets, sample, pair + 1);
+      const Vec2<float> choice = pattern_.get(worker.offsets, sample, pair + 2);
+      const Vec2<float> u = pattern_.get(worker.offsets, sample, pair + 1);
       const Vec next = bsdf.sample(choice.x, u.x, u.y);
       const BsdfValue<float> f = bsdf.evaluate(next);
       direction = normalize(frame.to_world(next));
@@ -188,6 +187,30 @@ class PathTracer {
     }
   }
 
+  // Irradiance of a point of the catcher by one light and one cosine sample. What is blocked is
+  // compared with the same two samples unblocked: where nothing blocks, the ratio is exactly 1.
+  void catch_shadow(Vec position, int sample, Worker& worker, CaughtLight* caught) const {
+    ++caught->n_samples;
+    if (light_.black()) return;
+    const auto add = [&](Vec to_light, float pdf, float other_pdf) {
+      if (!(to_light.z > 0) || !(pdf > 0)) return;
+      const double light = luminance(light_.radiance(to_light)) * to_light.z * mis_weight(pdf, other_pdf) / pdf;
+      caught->open += light;
+      if (!occluded(position, to_light, worker)) caught->shadowed += light;
+    };
+    float light_pdf;
+    const Vec to_light = light_.sample(pattern_.get(worker.offsets, sample, 1), &light_pdf);
+    if (to_light.z > 0) add(to_light, light_pdf, pdf_cosine_hemisphere(to_light.z));
+    const Vec2<float> u = pattern_.get(worker.offsets, sample, 2);
+    const Vec up = sample_cosine_hemisphere(u.x, u.y);
+    add(up, pdf_cosine_hemisphere(up.z), light_.pdf(up));
+  }
+
+  bool occluded(Vec origin, Vec direction, Worker& worker) const {
+    ++worker.n_rays;
+    return scene_.occluded(origin, direction, kInfinity);
+  }
+
   Vec limited(Vec contribution, bool indirect) const {
     const float largest = max_of(contribution.x, max_of(contribution.y, contribution.z));
     if (!indirect || params_.clamp_indirect <= 0 || !(largest > params_.clamp_indirect)) return contribution;
@@ -199,61 +222,20 @@ class PathTracer {
     return {m[3], m[7], m[11]};
   }
 
-  Vec camera_ray(int x, int y, Vec2<float> jitter) const {
-    const Vec local{(x + jitter.x - camera_.cx) / camera_.fx, -(y + jitter.y - camera_.cy) / camera_.fy, -1.f};
+  Vec camera_ray(int x, int y, Vec2<float> u) const {
+    const Vec local{(x + 0.5f + filter_(u.x) - camera_.cx) / camera_.fx,
+                    -(y + 0.5f + filter_(u.y) - camera_.cy) / camera_.fy, -1.f};
     const float* m = camera_.camera_to_world;
     return normalize(Vec{dot(load3(m), local), dot(load3(m + 4), local), dot(load3(m + 8), local)});
   }
 
-  ShadingPoint shading_point(const Hit& hit, Vec view) const {
-    const int32_t* corners = scene_.triangles() + int64_t(hit.triangle) * 3;
-    const float weights[3] = {1.f - hit.u - hit.v, hit.u, hit.v};
-    const auto corner = [&](const float* values, int k) { return load3(values + int64_t(corners[k]) * 3); };
-    const Vec a = corner(scene_.vertices(), 0), b = corner(scene_.vertices(), 1), c = corner(scene_.vertices(), 2);
-    ShadingPoint p{};
-    // From the corners rather than origin + t direction: the error does not grow with the distance.
-    p.position = a * weights[0] + b * weights[1] + c * weights[2];
-    p.geometric_normal = normalize(cross(b - a, c - a), 1e-36f);
-    if (dot(p.geometric_normal, view) < 0) p.geometric_normal = -p.geometric_normal;
-    if (surface_.per_triangle) {
-      p.albedo = load3(surface_.albedo + int64_t(hit.triangle) * 3);
-      p.roughness = surface_.roughness[hit.triangle];
-      p.metallic = surface_.metallic[hit.triangle];
-    } else {
-      for (int k = 0; k < 3; ++k) {
-        p.albedo += corner(surface_.albedo, k) * weights[k];
-        p.roughness += surface_.roughness[corners[k]] * weights[k];
-        p.metallic += surface_.metallic[corners[k]] * weights[k];
-      }
-    }
-    p.shading_normal = shading_normal(corners, weights, p.geometric_normal, view);
-    return p;
-  }
-
-  // The interpolated normal on the side of the geometric one; where it turns away from the viewer
-  // it is bent back until n.v = kMinCosine, so that the BSDF stays defined.
-  Vec shading_normal(const int32_t* corners, const float* weights, Vec geometric_normal, Vec view) const {
-    Vec n = geometric_normal;
-    if (surface_.normals) {
-      Vec mean{0, 0, 0};
-      for (int k = 0; k < 3; ++k) mean += load3(surface_.normals + int64_t(corners[k]) * 3) * weights[k];
-      if (dot(mean, mean) > 1e-12f) n = normalize(mean);
-      if (dot(n, geometric_normal) < 0) n = -n;
-    }
-    constexpr float kMinCosine = 1e-3f;
-    const float cosine = dot(n, view);
-    if (cosine >= kMinCosine) return n;
-    // |n - (n.v) v| stands square to v; adding kMinCosine v of its length gives the wanted angle.
-    const Vec across = normalize(n - view * cosine);
-    return normalize(across + view * kMinCosine);
-  }
-
   const Scene& scene_;
-  const Surface& surface_;
+  SurfaceLookup surface_;
   EnvironmentSampler light_;
   const Camera& camera_;
   const PathTracerParams& params_;
-  const float* lut_;
+  PrincipledTables tables_;
+  PixelFilterSampler filter_;
   SamplePattern pattern_;
   float ray_offset_;  // start of secondary rays above the surface, in scene units
 };
@@ -268,10 +250,59 @@ void require_range(const float* values, int64_t n, float hi, const char* what) {
   require(good, what);
 }
 
+void require_finite(const float* values, int64_t n, const char* what) {
+  bool good = true;
+  for (int64_t i = 0; i < n; ++i) good &= std::isfinite(values[i]);
+  require(good, what);
+}
+
+int64_t texels(const Texture& texture) { return int64_t(texture.height) * texture.width; }
+
+void check_ids(const Scene& scene, const Surface& surface) {
+  bool any_texture = false, any_normal_texture = false;
+  for (int i = 0; i < surface.n_materials; ++i) {
+    const SurfaceMaterial& m = surface.materials[i];
+    any_normal_texture |= m.normal_texture.texels != nullptr;
+    any_texture |= m.albedo_texture.texels || m.roughness_metallic_texture.texels || m.emission_texture.texels;
+  }
+  require(!(any_texture || any_normal_texture) || surface.uv, "textures need uv");
+  require(!any_normal_texture || (surface.tangents && surface.normals), "a normal texture needs normals and tangents");
+  for (int64_t i = 0; i < scene.n_triangles(); ++i) {
+    require(surface.material_ids[i] >= 0 && surface.material_ids[i] < surface.n_materials,
+            "material_ids must name materials");
+  }
+  if (surface.uv) require_finite(surface.uv, scene.n_vertices() * 2, "uv must be finite");
+  if (surface.tangents) require_finite(surface.tangents, scene.n_vertices() * 4, "tangents must be finite");
+}
+
 }  // namespace
 
-void render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
-            const PathTracerParams& params, const RenderTargets& targets) {
+void check_material(const SurfaceMaterial& m) {
+  constexpr float kMax = std::numeric_limits<float>::max();
+  const float factors[5] = {m.albedo.x, m.albedo.y, m.albedo.z, m.roughness, m.metallic};
+  require_range(factors, 5, 1.f, "material factors must lie in [0, 1]");
+  require_range(&m.emission.x, 3, kMax, "emission must be finite and not negative");
+  for (const Texture* t : {&m.albedo_texture, &m.roughness_metallic_texture, &m.normal_texture, &m.emission_texture}) {
+    require(!t->texels || (t->height > 0 && t->width > 0), "textures must not be empty");
+  }
+  if (m.albedo_texture.texels) {
+    require_range(m.albedo_texture.texels, texels(m.albedo_texture) * 3, 1.f, "albedo textures must lie in [0, 1]");
+  }
+  if (m.roughness_metallic_texture.texels) {
+    require_range(m.roughness_metallic_texture.texels, texels(m.roughness_metallic_texture) * 2, 1.f,
+                  "roughness and metallic textures must lie in [0, 1]");
+  }
+  if (m.emission_texture.texels) {
+    require_range(m.emission_texture.texels, texels(m.emission_texture) * 3, kMax,
+                  "emission textures must be finite and not negative");
+  }
+  if (m.normal_texture.texels) {
+    require_finite(m.normal_texture.texels, texels(m.normal_texture) * 3, "normal textures must be finite");
+  }
+}
+
+int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
+               const PathTracerParams& params, const RenderTargets& targets) {
   require(camera.width > 0 && camera.height > 0, "camera width and height must be positive");
   require(int64_t(camera.width) * camera.height < int64_t(1) << 31, "the image must have fewer than 2^31 pixels");
   require(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy),
@@ -287,17 +318,18 @@ void render(const Scene& scene, const Surface& surface, const EnvironmentMap& en
   require_range(surface.metallic, n, 1.f, "metallic must lie in [0, 1]");
   require_range(environment.radiance, int64_t(environment.height) * environment.width * 3,
                 std::numeric_limits<float>::max(), "environment radiance must be finite and not negative");
-  if (surface.normals) {
-    for (int64_t i = 0; i < scene.n_vertices() * 3; ++i) {
-      require(std::isfinite(surface.normals[i]), "normals must be finite");
-    }
-  }
+  if (surface.normals) require_finite(surface.normals, scene.n_vertices() * 3, "normals must be finite");
+  if (surface.material_ids) check_ids(scene, surface);
+  require(std::isfinite(params.catcher_height), "catcher_height must be finite");
 
   const PathTracer tracer(scene, surface, environment, camera, params);
+  std::atomic<int64_t> n_rays{0};
   parallel_for(int64_t(camera.width) * camera.height, kPixelsPerTask, [&](int64_t begin, int64_t end) {
-    std::vector<SamplePattern::Offset> offsets;
-    for (int64_t pixel = begin; pixel < end; ++pixel) tracer.render_pixel(pixel, offsets, targets);
+    Worker worker;
+    for (int64_t pixel = begin; pixel < end; ++pixel) tracer.render_pixel(pixel, worker, targets);
+    n_rays += worker.n_rays;
   });
+  return n_rays;
 }
 
 }  // namespace splitnerf

@@ -57,6 +57,28 @@ RTCRay make_ray(Vec3<float> origin, Vec3<float> direction, float t_far) {
   return ray;
 }
 
+// Fills a packet from the rays first, first + 1, ... and returns how many there were; lanes past the
+// end repeat the last ray, masked out.
+int load_packet(const float* origins, const float* directions, int64_t first, int64_t n_rays, float t_far,
+                RTCRay16& rays, int* valid) {
+  const int count = static_cast<int>(min_of(kPacket, n_rays - first));
+  for (int k = 0; k < kPacket; ++k) {
+    const int64_t i = first + min_of(k, count - 1);
+    rays.org_x[k] = origins[i * 3];
+    rays.org_y[k] = origins[i * 3 + 1];
+    rays.org_z[k] = origins[i * 3 + 2];
+    rays.dir_x[k] = directions[i * 3];
+    rays.dir_y[k] = directions[i * 3 + 1];
+    rays.dir_z[k] = directions[i * 3 + 2];
+    rays.tnear[k] = 0.f;
+    rays.tfar[k] = t_far;
+    rays.mask[k] = ~0u;
+    rays.flags[k] = 0;
+    valid[k] = k < count ? -1 : 0;
+  }
+  return count;
+}
+
 }  // namespace
 
 Scene::Scene(const float* vertices, int64_t n_vertices, const int32_t* triangles, int64_t n_triangles)
@@ -92,21 +114,8 @@ void Scene::trace_visibility(const float* origins, const float* directions, int6
     alignas(64) int valid[kPacket];
     for (int64_t packet = begin; packet < end; ++packet) {
       const int64_t first = packet * kPacket;
-      const int count = static_cast<int>(min_of(kPacket, n_rays - first));
-      for (int k = 0; k < kPacket; ++k) {
-        const int64_t i = first + min_of(k, count - 1);  // lanes past the end repeat the last ray, masked out
-        rays.org_x[k] = origins[i * 3];
-        rays.org_y[k] = origins[i * 3 + 1];
-        rays.org_z[k] = origins[i * 3 + 2];
-        rays.dir_x[k] = directions[i * 3];
-        rays.dir_y[k] = directions[i * 3 + 1];
-        rays.dir_z[k] = directions[i * 3 + 2];
-        rays.tnear[k] = 0.f;
-        rays.tfar[k] = t_far;
-        rays.mask[k] = ~0u;
-        rays.flags[k] = 0;
-        valid[k] = k < count && (!active || active[i]) ? -1 : 0;
-      }
+      const int count = load_packet(origins, directions, first, n_rays, t_far, rays, valid);
+      for (int k = 0; active && k < count; ++k) valid[k] = active[first + k] ? -1 : 0;
       embree::occluded16(valid, scene, &rays);
       // Embree marks an occluded ray by tfar = -infinity and leaves masked lanes alone.
       for (int k = 0; k < count; ++k) visible[first + k] = valid[k] == 0 || !(rays.tfar[k] < 0.f);
@@ -116,9 +125,20 @@ void Scene::trace_visibility(const float* origins, const float* directions, int6
 
 void Scene::trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far,
                           Hit* hits) const {
-  parallel_for(n_rays, kPacket * kPacketsPerTask, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      hits[i] = trace_closest(load3(origins + i * 3), load3(directions + i * 3), t_far);
+  const RTCScene scene = embree_scene(impl_->tracer);
+  parallel_for((n_rays + kPacket - 1) / kPacket, kPacketsPerTask, [&](int64_t begin, int64_t end) {
+    alignas(64) RTCRayHit16 query{};
+    alignas(64) int valid[kPacket];
+    for (int64_t packet = begin; packet < end; ++packet) {
+      const int64_t first = packet * kPacket;
+      const int count = load_packet(origins, directions, first, n_rays, t_far, query.ray, valid);
+      for (int k = 0; k < kPacket; ++k) query.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+      embree::intersect16(valid, scene, &query);
+      for (int k = 0; k < count; ++k) {
+        const bool hit = query.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
+        hits[first + k] = hit ? Hit{query.ray.tfar[k], query.hit.primID[k], query.hit.u[k], query.hit.v[k]}
+                              : Hit{-1.f, 0, 0.f, 0.f};
+      }
     }
   });
 }

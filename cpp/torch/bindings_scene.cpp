@@ -2,10 +2,13 @@
 #include "bindings_scene.h"
 
 #include <pybind11/numpy.h>
+#include <pybind11/stl.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -100,11 +103,51 @@ py::tuple trace_closest(const PyScene& self, const py::object& origins, const py
   return py::make_tuple(t, triangle, u, v);
 }
 
+// The checked materials of a Surface, and what keeps their arrays alive.
+struct PyMaterials {
+  // materials: objects with the attributes of splitnerf.data.asset.Material.
+  explicit PyMaterials(const py::list& list) {
+    for (const auto& item : list) {
+      splitnerf::SurfaceMaterial m;
+      m.albedo = vector(item, "albedo");
+      m.roughness = item.attr("roughness").cast<float>();
+      m.metallic = item.attr("metallic").cast<float>();
+      m.emission = vector(item, "emission");
+      m.albedo_texture = texture(item, "albedo_texture", 3);
+      m.roughness_metallic_texture = texture(item, "roughness_metallic_texture", 2);
+      m.normal_texture = texture(item, "normal_texture", 3);
+      m.emission_texture = texture(item, "emission_texture", 3);
+      splitnerf::check_material(m);
+      materials.push_back(m);
+    }
+  }
+  static splitnerf::Vec3<float> vector(py::handle item, const char* name) {
+    const auto v = item.attr(name).cast<std::array<float, 3>>();
+    return {v[0], v[1], v[2]};
+  }
+  splitnerf::Texture texture(py::handle item, const char* name, int channels) {
+    const py::object values = item.attr(name);
+    if (values.is_none()) return {};
+    arrays.push_back(checked<float>("render", name, values, {kAny, kAny, channels}));
+    return {arrays.back().data(), int(arrays.back().shape(0)), int(arrays.back().shape(1))};
+  }
+  std::vector<splitnerf::SurfaceMaterial> materials;
+  std::vector<Array<float>> arrays;
+};
+
+splitnerf::PixelFilter pixel_filter(const std::string& name) {
+  if (name == "box") return splitnerf::PixelFilter::kBox;
+  if (name == "blackman-harris") return splitnerf::PixelFilter::kBlackmanHarris;
+  throw py::value_error("render: pixel_filter must be 'box' or 'blackman-harris', got '" + name + "'");
+}
+
 py::dict render(const PyScene& self, const py::object& albedo, const py::object& roughness,
                 const py::object& metallic, const py::object& environment, const py::object& camera_to_world,
                 float fx, float fy, float cx, float cy, int width, int height, const py::object& normals,
-                const std::string& materials_per, int spp, int max_bounces, uint32_t seed, bool light_sampling,
-                float clamp_indirect) {
+                const std::string& materials_per, const PyMaterials* materials, const py::object& material_ids,
+                const py::object& uv, const py::object& tangents, int spp, int max_bounces, uint32_t seed,
+                bool light_sampling, float clamp_indirect, const std::string& filter,
+                const std::optional<float>& catcher_height) {
   if (materials_per != "vertex" && materials_per != "triangle") {
     throw py::value_error("render: materials_per must be 'vertex' or 'triangle', got '" + materials_per + "'");
   }
@@ -124,10 +167,27 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
 
   splitnerf::Camera camera{{}, fx, fy, cx, cy, width, height};
   std::copy_n(pose.data(), 12, camera.camera_to_world);
-  const splitnerf::Surface surface{albedos.data(), roughnesses.data(), metallics.data(), per_triangle,
-                                   normals.is_none() ? nullptr : shading.data()};
+  splitnerf::Surface surface{albedos.data(), roughnesses.data(), metallics.data(), per_triangle,
+                             normals.is_none() ? nullptr : shading.data()};
+  Array<int32_t> ids;
+  Array<float> uvs, frames;
+  if (materials) {
+    ids = checked<int32_t>("render", "material_ids", material_ids, {self.scene->n_triangles()});
+    surface.material_ids = ids.data();
+    surface.materials = materials->materials.data();
+    surface.n_materials = int(materials->materials.size());
+  }
+  if (!uv.is_none()) {
+    uvs = checked<float>("render", "uv", uv, {self.scene->n_vertices(), 2});
+    surface.uv = uvs.data();
+  }
+  if (!tangents.is_none()) {
+    frames = checked<float>("render", "tangents", tangents, {self.scene->n_vertices(), 4});
+    surface.tangents = frames.data();
+  }
   const splitnerf::EnvironmentMap light{map.data(), int(map.shape(0)), int(map.shape(1))};
-  const splitnerf::PathTracerParams params{spp, max_bounces, seed, light_sampling, clamp_indirect};
+  const splitnerf::PathTracerParams params{spp,           max_bounces, seed, light_sampling, clamp_indirect, pixel_filter(filter),
+                                           catcher_height.has_value(), catcher_height.value_or(0.f)};
 
   py::dict images;
   const auto allocate = [&](const char* name, int channels) {
@@ -137,13 +197,16 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
     images[name] = image;
     return image.mutable_data();
   };
-  const splitnerf::RenderTargets targets{allocate("radiance", 3),  allocate("alpha", 1),    allocate("albedo", 3),
-                                         allocate("roughness", 1), allocate("metallic", 1), allocate("normal", 3),
-                                         allocate("depth", 1)};
+  const splitnerf::RenderTargets targets{
+      allocate("radiance", 3), allocate("alpha", 1),         allocate("albedo", 3), allocate("roughness", 1),
+      allocate("metallic", 1), allocate("normal", 3),        allocate("smooth_normal", 3), allocate("depth", 1),
+      catcher_height ? allocate("shadow", 1) : nullptr};
+  int64_t n_rays;
   {
     py::gil_scoped_release release;
-    splitnerf::render(*self.scene, surface, light, camera, params, targets);
+    n_rays = splitnerf::render(*self.scene, surface, light, camera, params, targets);
   }
+  images["rays"] = n_rays;
   return images;
 }
 
@@ -200,20 +263,33 @@ void bind_scene(py::module_& m) {
            "miss.\n\n"
            "u and v are the barycentric coordinates of the triangle's second and third vertex.");
 
+  py::class_<PyMaterials>(m, "Materials",
+                          "Checked materials for render, from a list of splitnerf.data.asset.Material. ValueError where a\n"
+                          "factor or a texture lies outside its range.")
+      .def(py::init<const py::list&>(), py::arg("materials"));
+
   m.def(
       "render", &render, py::arg("scene"), py::arg("albedo"), py::arg("roughness"), py::arg("metallic"),
       py::arg("environment"), py::arg("camera_to_world"), py::arg("fx"), py::arg("fy"), py::arg("cx"),
       py::arg("cy"), py::arg("width"), py::arg("height"), py::kw_only(), py::arg("normals") = py::none(),
-      py::arg("materials_per") = "vertex", py::arg("spp") = 64, py::arg("max_bounces") = 4, py::arg("seed") = 0,
-      py::arg("light_sampling") = true, py::arg("clamp_indirect") = 0.f,
+      py::arg("materials_per") = "vertex", py::arg("materials") = py::none(), py::arg("material_ids") = py::none(),
+      py::arg("uv") = py::none(), py::arg("tangents") = py::none(), py::arg("spp") = 64, py::arg("max_bounces") = 4,
+      py::arg("seed") = 0, py::arg("light_sampling") = true, py::arg("clamp_indirect") = 0.f,
+      py::arg("pixel_filter") = "box", py::arg("catcher_height") = py::none(),
       "Path-traces the scene under an equirectangular light; float32 arrays in, a dict of float32 arrays out.\n\n"
       "albedo [n, 3], roughness [n], metallic [n]: in [0, 1], linear, per vertex or per triangle "
       "(materials_per).\n"
       "environment: [h, w, 3] linear radiance. camera_to_world: [3, 4], OpenGL axes; fx ... cy in pixels.\n"
       "normals: [n_vertices, 3] shading normals, or None for flat shading.\n"
       "clamp_indirect: largest channel of one indirect contribution, 0 for no limit (unbiased).\n"
+      "materials (Materials), material_ids [m] int32, uv [n_vertices, 2], tangents [n_vertices, 4]: see splitnerf.data.asset;\n"
+      "multiplied with albedo, roughness and metallic.\n"
+      "pixel_filter: 'box' (1 pixel) or 'blackman-harris' (1.5 pixels). catcher_height: z of an invisible ground\n"
+      "plane that catches the shadow of the direct light, or None.\n"
       "Returns radiance [h, w, 3] (linear, premultiplied), alpha [h, w], and of the first hit, averaged over the\n"
-      "sub-samples that hit: albedo, roughness, metallic, normal (world space), depth (along the ray).\n"
+      "sub-samples that hit: albedo, roughness, metallic, normal and smooth_normal (world space; with and without\n"
+      "normal texture), depth (along the ray); with a catcher shadow [h, w], the opacity of the black shadow\n"
+      "(alpha + shadow <= 1); and rays, the number of rays traced.\n"
       "Equal seeds give equal images.");
 
   m.def(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +13,10 @@ import trimesh
 from torch import Tensor
 
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import atomic_path, linear_to_srgb, over_background, write_image
+from splitnerf.data.images import linear_to_srgb, over_background, write_image
 from splitnerf.data.normalisation import transform_points
 from splitnerf.data.truth import load_scene_truth, load_view_truths
+from splitnerf.evaluate.lpips import Distance
 from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
@@ -163,7 +163,13 @@ def light_panels(model: SceneModel, height: int = 64, n_samples: int = 32768) ->
 
 
 def evaluate_scene(
-    model: SceneModel, grid: OccupancyGrid, test: Dataset, mesh: trimesh.Trimesh | None, seconds: float
+    model: SceneModel,
+    grid: OccupancyGrid,
+    test: Dataset,
+    mesh: trimesh.Trimesh | None,
+    seconds: float,
+    relight: dict | None = None,
+    distance: Distance | None = None,
 ) -> tuple[dict, list[dict[str, np.ndarray]]]:
     """Renders all test views and scores them; see :func:`splitnerf.evaluate.protocol.evaluate_maps`.
 
@@ -174,11 +180,7 @@ def evaluate_scene(
     truth = load_scene_truth(test.root)
     light = model.light.panorama(model.config.export_environment_height).numpy()
     result = evaluate_maps(
-        predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1)
-    )
+        predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1),
+        relight=relight, distance=distance,
+    )  # fmt: skip
     return result, predictions
-
-
-def write_json(path: Path, content: dict) -> None:
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n")

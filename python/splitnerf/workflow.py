@@ -14,12 +14,18 @@ import trimesh
 from splitnerf.checkpoint import config_of, load_checkpoint
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
-from splitnerf.data.truth import load_scene_truth, load_view_truths
+from splitnerf.data.frames import has_test_split
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.json_files import write_json
+from splitnerf.data.truth import load_scene_truth, load_view_truths, read_mesh
 from splitnerf.errors import InputError
+from splitnerf.evaluate.jobs import Evaluated, Protocol, asset_mesh, choose_views, evaluation_path, relit_scores
+from splitnerf.evaluate.lpips import load_distance
 from splitnerf.export.meshing import EmptyMesh
-from splitnerf.outputs import Exported, evaluate_scene, light_panels, write_assets, write_json
+from splitnerf.outputs import Exported, evaluate_scene, light_panels, write_assets
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
+from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.report.html import write_report
 from splitnerf.train import TrainedScene, check_same_scene, train
 
@@ -36,8 +42,8 @@ def load_splits(data: Path, downscale: int) -> tuple[Dataset, Dataset | None]:
     Raises:
         InputError: Something about the data cannot be used.
     """
-    has_test = (data / "transforms_test.json").exists() or not (data / "transforms_train.json").exists()
-    return load_dataset(data, "train", downscale), load_dataset(data, "test", downscale) if has_test else None
+    test = load_dataset(data, "test", downscale) if has_test_split(data) else None
+    return load_dataset(data, "train", downscale), test
 
 
 def prepare_run(run: Path, *, resume: bool, overwrite: bool) -> None:
@@ -132,10 +138,11 @@ def write_run_report(
 
 def headline(evaluation: dict) -> dict[str, float]:
     """The scores that a reader looks for first; what the data hold no truth for is left out."""
-    albedo = evaluation["albedo"] or {}
+    novel_view, relight, albedo = (evaluation[key] or {} for key in ("novel_view", "relight", "albedo"))
     scores = {
-        "novel views, PSNR dB": evaluation["novel_view"]["psnr"],
-        "novel views, SSIM": evaluation["novel_view"]["ssim"],
+        "novel views, PSNR dB": novel_view.get("psnr"),
+        "novel views, SSIM": novel_view.get("ssim"),
+        "relit views, PSNR dB": relight.get("psnr"),
         "albedo, PSNR dB": albedo.get("psnr"),
         "normals, degrees": evaluation["normal_mae_deg"],
         "roughness, mean error": evaluation["roughness_mae"],
@@ -165,15 +172,35 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     return model, grid, content
 
 
-def evaluate_run(run: Path, data: Path, downscale: int) -> dict:
-    """Renders a run's test views again, writes evaluation.json and report.html, and returns the evaluation.
+def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = None) -> Evaluated:
+    """Renders a run's test views again from its checkpoint, and relit views of its mesh.glb, and scores them.
+
+    Args:
+        run: The run's folder; its meshes and environment stay as they are.
+        data: The data that it was trained on.
+        protocol: Views and lights.
+        out: The json file for the scores; None for evaluation.json and report.html in the run's folder.
 
     Raises:
         InputError: The run or the data cannot be used.
     """
     model, grid, content = load_run(run)
-    dataset, test = load_splits(data, downscale)
-    return finish(model, grid, dataset, test, run, {"training": content["seconds"]})
+    dataset, test = load_splits(data, protocol.downscale)
+    views, maps = choose_views(dataset if test is None else test, protocol)
+    clock = time.monotonic()
+    relit, relight, mesh = None, None, None
+    if (run / "mesh.glb").is_file():
+        asset = read_asset(run / "mesh.glb")
+        mesh = asset_mesh(asset)
+        relit, relight = relit_scores(AssetRenderer(asset), views, maps, protocol.spp)
+    if (run / "mesh.ply").is_file():
+        mesh = read_mesh(run / "mesh.ply")
+    evaluation, predictions = evaluate_scene(model, grid, views, mesh, content["seconds"], relight, load_distance())
+    timings = {"training": content["seconds"], "evaluation": time.monotonic() - clock}
+    write_json(out or evaluation_path(run), evaluation)
+    if out is None:
+        write_run_report(model, views, predictions, evaluation, run, timings)
+    return Evaluated(evaluation, views, predictions, load_view_truths(views), relit)
 
 
 def export_run(

@@ -218,5 +218,19 @@ TEST(Shading, FloatFollowsDouble) {
   }
 }
 
+TEST(DielectricFresnel, MeetsItsClosedForms) {
+  EXPECT_NEAR(fresnel_dielectric(1.), 0.04, 1e-12);
+  EXPECT_NEAR(fresnel_dielectric(0.), 1, 1e-12);
+  // At Brewster's angle, tan = 1.5, only the s part is left: ((n^2 - 1) / (n^2 + 1))^2 / 2.
+  EXPECT_NEAR(fresnel_dielectric(1 / std::sqrt(1 + 2.25)), 0.5 * square(1.25 / 3.25), 1e-12);
+}
+
+TEST(DielectricTable, SmoothEndIsFresnelAndRoughEndStaysBelow) {
+  for (double nv : {0.2, 0.5, 0.8, 1.0}) {
+    EXPECT_NEAR(lookup_dielectric_lut(dielectric_lut(), nv, 0.), fresnel_dielectric(nv), 2e-3) << nv;
+    EXPECT_LT(lookup_dielectric_lut(dielectric_lut(), nv, 1.), fresnel_dielectric(nv) + 0.02) << nv;
+  }
+}
+
 }  // namespace
 }  // namespace splitnerf

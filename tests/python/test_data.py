@@ -11,6 +11,7 @@ import pytest
 import trimesh
 
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
+from splitnerf.data.frames import has_test_split
 from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths, read_mesh
 from splitnerf.errors import InputError
@@ -82,6 +83,20 @@ def scene(tmp_path):
     return make_blender(tmp_path / "ball")
 
 
+def make_folders(root):
+    """The same sphere in view folders."""
+    for i, pose in enumerate(poses_around(np.zeros(3), 1.0, 14)):
+        name = f"train_{i:03d}" if i < 12 else f"test_{2 * (i - 12) + 9:03d}"
+        image = np.full((SIZE, SIZE, 4), 0.5)
+        image[..., 3] = sphere_alpha(pose, np.zeros(3), 1.0)
+        write_image(root / name / "rgba.png", image)
+        matrix = ", ".join(str(value) for value in pose.ravel())
+        meta = {"cam_angle_x": ANGLE, "cam_transform_mat": matrix, "imw": SIZE, "imh": SIZE, "envmap": "sky"}
+        (root / name / "metadata.json").write_text(json.dumps(meta))
+    (root / "val_000").mkdir()
+    return root
+
+
 def edit(root, change, name="transforms_train.json"):
     meta = json.loads((root / name).read_text())
     change(meta)
@@ -107,6 +122,65 @@ def test_single_file_layout_takes_every_eighth_frame_for_testing(tmp_path):
     assert train.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2 + 1, SIZE / 2])
     assert test.intrinsics[0] == pytest.approx(train.intrinsics[0] / 2)
     assert set(np.unique(train.images[..., 3])) == {0, 1}
+
+
+def test_view_folders(tmp_path):
+    root = make_folders(tmp_path)
+    train, test = load_dataset(root, "train"), load_dataset(root, "test", downscale=2)
+    assert (len(train), test.frame_names) == (12, ["test_009", "test_011"])
+    focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
+    assert train.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
+    poses = poses_around(np.zeros(3), 1.0, 14)
+    assert test.world_poses == pytest.approx(np.array(poses[12:]), abs=1e-6)
+    assert has_test_split(root)
+    normals = np.full((SIZE, SIZE, 3), 0.5 * np.array([0, -0.6, 0.8]) + 0.5)
+    write_image(root / "test_009/normal.png", normals)
+    write_image(root / "test_009/albedo.png", np.full((SIZE, SIZE, 4), [0.5, 0.25, 1, 1]))
+    truth, empty = load_view_truths(test)
+    assert (truth.name, empty.normal) == ("test_009", None)
+    centre = SIZE // 4
+    assert truth.normal[centre, centre] == pytest.approx([0, -0.6, 0.8], abs=0.006)
+    assert truth.normal_mask[centre, centre] and not truth.normal_mask[0, 0] and not truth.normal[0, 0].any()
+    assert truth.albedo[centre, centre] == pytest.approx([0.2158605, 0.0512695, 1], abs=1e-4)
+
+
+BAD_FOLDERS = {
+    "no matrix": (lambda m: m.pop("cam_transform_mat"), "metadata.json: missing key 'cam_transform_mat'"),
+    "no angle": (lambda m: m.pop("cam_angle_x"), "metadata.json: missing key 'cam_angle_x'"),
+    "twelve numbers": (lambda m: m.update(cam_transform_mat=",".join("1" * 12)), "cam_transform_mat is not a 4x4"),
+    "words": (lambda m: m.update(cam_transform_mat=",".join(["one"] * 16)), "cam_transform_mat is not a 4x4"),
+    "all zero": (lambda m: m.update(cam_transform_mat=",".join("0" * 16)), "cam_transform_mat is not a rigid"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FOLDERS)
+def test_bad_view_folders(tmp_path, case):
+    root = make_folders(tmp_path)
+    change, message = BAD_FOLDERS[case]
+    edit(root, change, "train_003/metadata.json")
+    with pytest.raises(InputError, match=message) as caught:
+        load_dataset(root)
+    assert "train_003" in str(caught.value)
+
+
+def test_view_folders_that_lack_a_file(tmp_path):
+    root = make_folders(tmp_path)
+    (root / "train_003/rgba.png").unlink()
+    with pytest.raises(InputError, match="train_003/rgba.png: no such image"):
+        load_dataset(root)
+    (root / "train_003/metadata.json").unlink()
+    with pytest.raises(InputError, match="train_003/metadata.json: no such file"):
+        load_dataset(root)
+    for folder in root.glob("test_*"):
+        (folder / "metadata.json").unlink()
+    assert not has_test_split(root)
+
+
+def test_select_keeps_views_in_order(scene):
+    data = load_dataset(scene)
+    chosen = data.select([5, 2])
+    assert chosen.frame_names == ["r_5", "r_2"] and [path.stem for path in chosen.image_paths] == ["r_5", "r_2"]
+    assert np.array_equal(chosen.poses, data.poses[[5, 2]]) and len(chosen) == 2
 
 
 def test_downscale_divides_size_and_intrinsics(scene):

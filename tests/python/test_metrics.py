@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.environment import resize_environment
 from splitnerf.data.truth import ViewTruth
 from splitnerf.evaluate import metrics
 from splitnerf.evaluate.protocol import evaluate_maps
@@ -88,12 +89,12 @@ def test_light_psnr_weighs_rows_by_solid_angle():
 def test_resize_environment_wraps_around_and_keeps_constants():
     image = np.zeros((2, 4, 1), np.float32)
     image[:, 0] = 1
-    wide = metrics.resize_environment(image, 2, 8)[0, :, 0]
+    wide = resize_environment(image, 2, 8)[0, :, 0]
     assert wide == pytest.approx([0.75, 0.75, 0.25, 0, 0, 0, 0, 0.25])
     blocks = np.arange(18.0).reshape(3, 6, 1) ** 2
     # (0+1+4 + 36+49+64 + 144+169+196) / 9 and (9+16+25 + 81+100+121 + 225+256+289) / 9.
-    assert metrics.resize_environment(blocks, 1, 2)[0, :, 0] == pytest.approx([663 / 9, 1122 / 9])
-    assert metrics.resize_environment(np.ones((5, 7, 3)), 4, 9) == pytest.approx(np.ones((4, 9, 3)))
+    assert resize_environment(blocks, 1, 2)[0, :, 0] == pytest.approx([663 / 9, 1122 / 9])
+    assert resize_environment(np.ones((5, 7, 3)), 4, 9) == pytest.approx(np.ones((4, 9, 3)))
 
 
 def test_mesh_distances():
@@ -129,7 +130,7 @@ def make_inputs():
 
 KEYS = [
     "novel_view", "albedo", "relight", "normal_mae_deg", "roughness_mae", "metallic_balanced_accuracy",
-    "light_psnr", "chamfer", "f_score", "seconds",
+    "light_psnr", "chamfer", "f_score", "seconds", "views",
 ]  # fmt: skip
 
 
@@ -171,7 +172,7 @@ def test_protocol_composites_on_white_and_ignores_hidden_colour():
 def test_protocol_is_null_without_truth():
     predictions, data, _ = make_inputs()
     result = evaluate_maps(predictions, data, [ViewTruth("a"), ViewTruth("b")], light=np.ones((8, 16, 3)))
-    assert [key for key in KEYS if result[key] is not None] == ["novel_view"]
+    assert [key for key in KEYS if result[key] is not None] == ["novel_view", "views"]
 
 
 def test_protocol_rejects_numbers_and_sizes_that_differ():
@@ -179,5 +180,5 @@ def test_protocol_rejects_numbers_and_sizes_that_differ():
     with pytest.raises(ValueError, match="1 predictions for 2 images"):
         evaluate_maps(predictions[:1], data, truths)
     predictions[0]["rgb"] = predictions[0]["rgb"][:8]
-    with pytest.raises(ValueError, match="prediction is"):
+    with pytest.raises(ValueError, match="rgb of a prediction is"):
         evaluate_maps(predictions, data, truths)

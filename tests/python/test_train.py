@@ -221,9 +221,15 @@ def test_evaluate_repeats_the_result_of_training(data, tmp_path):
     run = tmp_path / "run"
     assert train(data, run, "--steps", "25") == DONE
     first = json.loads((run / "evaluation.json").read_text())
+    assets = {name: (run / name).stat().st_mtime_ns for name in ("mesh.ply", "mesh.glb", "environment.exr")}
     assert main(["evaluate", str(run), "--data", str(data)]) == DONE
     again = json.loads((run / "evaluation.json").read_text())
     assert again["novel_view"]["psnr"] == pytest.approx(first["novel_view"]["psnr"], abs=0.05)
+    assert again["f_score"] == pytest.approx(first["f_score"], abs=1e-3) and again["relight"] is None
+    assert assets == {name: (run / name).stat().st_mtime_ns for name in assets}
+    kept, other = (run / "evaluation.json").read_bytes(), tmp_path / "other.json"
+    assert main(["evaluate", str(run), "--data", str(data), "--views", "1", "--out", str(other)]) == DONE
+    assert json.loads(other.read_text())["views"] == 1 and (run / "evaluation.json").read_bytes() == kept
 
 
 def test_the_paper_preset_takes_steps(data, tmp_path):

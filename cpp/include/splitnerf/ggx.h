@@ -52,4 +52,11 @@ template <class T> SPLITNERF_HD T schlick(T f0, T v_dot_h) {
   return f0 + (T(1) - f0) * pow5(clamp(T(1) - v_dot_h, T(0), T(1)));
 }
 
+// Unpolarised reflectance of a smooth dielectric of refractive index 1.5 (F0 = .04), seen from outside.
+// Source: Walter et al. 2007, Eq. (22).
+template <class T> SPLITNERF_HD T fresnel_dielectric(T v_dot_h) {
+  const T c = clamp(v_dot_h, T(0), T(1)), g = std::sqrt(T(1.5 * 1.5 - 1) + c * c);
+  return T(0.5) * square((g - c) / (g + c)) * (T(1) + square((c * (g + c) - T(1)) / (c * (g - c) + T(1))));
+}
+
 }  // namespace splitnerf

@@ -13,39 +13,45 @@ struct BsdfValue {
   T pdf;          // density of sample() at l, sr^-1
 };
 
+// The tables that the BSDF reads.
+struct PrincipledTables {
+  const float* brdf = brdf_lut();
+  const float* dielectric = dielectric_lut();
+};
+
 template <class T>
 class PrincipledBsdf {
  public:
   // view: unit, local, view.z > 0, towards the viewer.
-  SPLITNERF_HD PrincipledBsdf(const float* lut, Vec3<T> albedo, T roughness, T metallic, Vec3<T> view)
-      : view_(view), ggx_alpha_(max_of(ggx_alpha_from_roughness(roughness), T(1e-3))) {
+  SPLITNERF_HD PrincipledBsdf(const PrincipledTables& tables, Vec3<T> albedo, T roughness, T metallic, Vec3<T> view)
+      : view_(view), f0_(albedo), ggx_alpha_(max_of(ggx_alpha_from_roughness(roughness), T(1e-3))) {
     // Below ggx_alpha = 1e-3 rounding of h in float dominates D.
-    const Vec3<T> table = lookup_brdf_lut(lut, view.z, roughness);
-    T single = T(0), total = T(0);
+    const Vec3<T> table = lookup_brdf_lut(tables.brdf, view.z, roughness);
+    const T missing = T(1) / (table.x + table.y) - T(1);
+    dielectric_ = (T(1) - metallic) * (T(1) + T(kDielectricF0) * missing);
+    const T e_dielectric = dielectric_ * lookup_dielectric_lut(tables.dielectric, view.z, roughness);
+    T specular = T(0), diffuse = T(0);
     for (int c = 0; c < 3; ++c) {
-      f0_[c] = T(kDielectricF0) * (T(1) - metallic) + metallic * albedo[c];
-      const T e = specular_albedo(f0_[c], table.x, table.y, true).value;
-      const T e_single = specular_albedo(f0_[c], table.x, table.y, false).value;
-      gain_[c] = e_single > T(0) ? e / e_single : T(1);
-      diffuse_[c] = (T(1) - metallic) * max_of(T(1) - e, T(0)) * albedo[c];
-      single += e_single;
-      total += e + diffuse_[c];
+      metal_[c] = metallic * (T(1) + f0_[c] * missing);
+      diffuse_[c] = max_of(T(1) - metallic - e_dielectric, T(0)) * albedo[c];
+      // Visible normals are sampled in proportion to single scattering, the cosine lobe for the
+      // rest: where gain is large most of their reflections end below the horizon, and the few
+      // above would carry weights of gain > 1 from bounce to bounce.
+      specular += metallic * (f0_[c] * table.x + table.y) + e_dielectric;
+      diffuse += diffuse_[c] + (metal_[c] - metallic) * (f0_[c] * table.x + table.y);
     }
-    // Visible normals are sampled in proportion to single scattering, the cosine lobe for the
-    // rest: where gain is large most of their reflections end below the horizon, and the few
-    // above would carry weights of gain > 1 from bounce to bounce.
-    specular_probability_ = single / max_of(total, T(1e-20));
+    specular_probability_ = specular / max_of(specular + diffuse, T(1e-20));
   }
 
   SPLITNERF_HD BsdfValue<T> evaluate(Vec3<T> light) const {
     if (!(light.z > T(0))) return {{T(0), T(0), T(0)}, T(0)};
     const Vec3<T> h = normalize(view_ + light);
     const T v_dot_h = dot(view_, h);
-    const T d_v = ggx_d(ggx_alpha_, h.x * h.x + h.y * h.y) * smith_v(ggx_alpha_, view_.z, light.z);
-    const T cosine_pdf = pdf_cosine_hemisphere(light.z);
+    const T d_v_cos = ggx_d(ggx_alpha_, h.x * h.x + h.y * h.y) * smith_v(ggx_alpha_, view_.z, light.z) * light.z;
+    const T cosine_pdf = pdf_cosine_hemisphere(light.z), dielectric = dielectric_ * fresnel_dielectric(v_dot_h);
     BsdfValue<T> out;
     for (int c = 0; c < 3; ++c) {
-      out.f_cos[c] = d_v * schlick(f0_[c], v_dot_h) * gain_[c] * light.z + diffuse_[c] * cosine_pdf;
+      out.f_cos[c] = d_v_cos * (metal_[c] * schlick(f0_[c], v_dot_h) + dielectric) + diffuse_[c] * cosine_pdf;
     }
     out.pdf = lerp(cosine_pdf, pdf_ggx_vndf(view_, h, ggx_alpha_), specular_probability_);
     return out;
@@ -59,8 +65,8 @@ class PrincipledBsdf {
   }
 
  private:
-  Vec3<T> view_, f0_, gain_, diffuse_;
-  T ggx_alpha_, specular_probability_;
+  Vec3<T> view_, f0_, metal_, diffuse_;  // metal_: share of the metal times its gain
+  T ggx_alpha_, dielectric_, specular_probability_;
 };
 
 }  // namespace splitnerf

@@ -31,7 +31,7 @@ class SPLITNERF_API Scene {
   void trace_visibility(const float* origins, const float* directions, int64_t n_rays, float t_far,
                         const uint8_t* active, uint8_t* visible) const;
 
-  // The nearest hit of each ray with t in (0, t_far).
+  // The nearest hit of each ray with t in (0, t_far); packets of 16 here too.
   void trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far, Hit* hits) const;
 
   Hit trace_closest(Vec3<float> origin, Vec3<float> direction, float t_far) const;

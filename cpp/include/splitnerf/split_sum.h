@@ -21,6 +21,10 @@ SPLITNERF_API const float* brdf_lut();
 // One entry of the table, F1, F2 and chi, by quadrature over 2 n_points microfacet normals.
 SPLITNERF_API Vec3<double> integrate_brdf(double n_dot_v, double roughness, int n_points);
 
+// [kLutSize roughness][kLutSize sqrt(n.v)] float32: E of a dielectric with its exact Fresnel term, for
+// the path tracer; the split sum itself uses Schlick's form.
+SPLITNERF_API const float* dielectric_lut();
+
 // Values and partial derivatives of the table at one point.
 template <class T> struct LutSample {
   Vec3<T> value;        // F1, F2, chi
@@ -48,6 +52,16 @@ template <class T> SPLITNERF_HD LutSample<T> sample_brdf_lut(const float* lut, T
     s.d_roughness[c] = (b - a) * dy;
   }
   return s;
+}
+
+// Bilinear in the table of one value, dielectric_lut().
+template <class T> SPLITNERF_HD T lookup_dielectric_lut(const float* lut, T n_dot_v, T roughness) {
+  const T x = std::sqrt(clamp(n_dot_v, T(kMinNdotV), T(1))) * T(kLutSize - 1);
+  const T y = clamp(roughness, T(0), T(1)) * T(kLutSize - 1);
+  const int x0 = clamp(static_cast<int>(x), 0, kLutSize - 2), y0 = clamp(static_cast<int>(y), 0, kLutSize - 2);
+  const float* row0 = lut + y0 * kLutSize + x0;
+  const float* row1 = row0 + kLutSize;
+  return lerp(lerp(T(row0[0]), T(row0[1]), x - T(x0)), lerp(T(row1[0]), T(row1[1]), x - T(x0)), y - T(y0));
 }
 
 template <class T> SPLITNERF_HD Vec3<T> lookup_brdf_lut(const float* lut, T n_dot_v, T roughness) {

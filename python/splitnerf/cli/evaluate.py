@@ -6,23 +6,100 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
-from splitnerf.cli.summary import print_summary
+from splitnerf.cli.summary import print_scores
+from splitnerf.errors import InputError
+
+NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "evaluate", help="score a run's test views again",
-        description="Renders the test views of DATA from RUN's checkpoint and rewrites its assets, evaluation.json and "
-        "report.html.",
+        "evaluate", help="score runs or GLB files against the truth, and put the scores into a table",
+        description="Renders the test views of DATA from RUN's checkpoint, or from a GLB file by the path tracer, relights "
+        "the asset under the data's maps, and writes evaluation.json and report.html into RUN (for a file "
+        "FILE_evaluation.json beside it). Without --data it reads the scores written before, for --table.",
     )  # fmt: skip
-    parser.add_argument("run", type=Path, metavar="RUN")
-    parser.add_argument("--data", type=Path, required=True, metavar="DATA", help="the data that RUN was trained on")
-    parser.add_argument("--downscale", type=int, default=1, metavar="N", help="as in training (default: 1)")
+    parser.add_argument("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
+    parser.add_argument("--data", type=Path, action="append", metavar="DATA", help="the data that RUN was trained on; once for all, or once for each RUN in order")
+    parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)")
+    parser.add_argument("--spp", type=int, default=64, metavar="N", help="paths a pixel of relit views and GLB files (default: 64)")
+    parser.add_argument("--views", type=int, metavar="N", help="test views, evenly spread (default: all; 20 with --lights)")
+    parser.add_argument("--lights", choices=["low", "high"], help="a published relighting protocol, 20 views: low, 8 low-frequency probes; high, 7 maps")
+    parser.add_argument("--maps", type=Path, metavar="FOLDER", help="folder of .hdr or .exr maps that DATA has relit images of (default: DATA's relight_*.hdr)")
+    parser.add_argument("--env", type=Path, metavar="MAP", help="the light of the photos, for a GLB file (default: the environment.exr or .hdr beside it)")
+    parser.add_argument("--out", type=Path, metavar="FILE.json", help="where to write the scores of one RUN; leaves RUN untouched")
+    parser.add_argument("--table", type=Path, metavar="OUT.md", help="write all scores as a markdown table, with their mean")
+    parser.add_argument("--sheet", type=Path, metavar="SHEET.png", help="write pictures of one RUN: truth, prediction, error")
     parser.set_defaults(execute=run)
 
 
 def run(args: argparse.Namespace) -> int:
+    check_usage(args)
+    from splitnerf.evaluate.jobs import read_evaluation
+
+    data = args.data or []
+    evaluations = []
+    for i, target in enumerate(args.targets):
+        if data:
+            scores = evaluate_target(target, data[min(i, len(data) - 1)], args)
+        else:
+            scores = read_evaluation(target)
+        evaluations.append((scene_name(target), scores))
+        if len(args.targets) > 1:
+            print(f"{target}:")
+        print_scores(scores)
+    if args.table:
+        from splitnerf.data.images import atomic_path
+        from splitnerf.evaluate.table import evaluation_table
+
+        with atomic_path(args.table) as temporary:
+            temporary.write_text(evaluation_table(evaluations), encoding="utf-8")
+        print(f"table: {args.table}")
+    return DONE
+
+
+def check_usage(args: argparse.Namespace) -> None:
+    """Refuses options that do not go together.
+
+    Raises:
+        InputError: Which, and what to do.
+    """
+    given = [name for name in NEEDS_DATA if getattr(args, name) is not None]
+    if not args.data and given:
+        raise InputError(f"--{given[0]} needs --data; without it the scores written before are read")
+    if args.data and len(args.data) not in (1, len(args.targets)):
+        raise InputError(f"--data was given {len(args.data)} times for {len(args.targets)} runs; give it once, or once each")
+    for name in ("out", "sheet"):
+        if getattr(args, name) is not None and len(args.targets) > 1:
+            raise InputError(f"--{name} takes one run, got {len(args.targets)}; evaluate them one by one")
+    if args.sheet is not None and args.sheet.suffix.lower() not in (".png", ".jpg"):
+        raise InputError(f"{args.sheet}: a sheet must end in .png or .jpg")
+
+
+def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
+    """Scores one run or file, writes what was asked for, and returns the scores."""
+    from splitnerf.data.json_files import write_json
+    from splitnerf.evaluate.jobs import Protocol, evaluate_asset, evaluation_path, is_asset
     from splitnerf.workflow import evaluate_run
 
-    print_summary(args.run, evaluate_run(args.run, args.data, args.downscale))
-    return DONE
+    protocol = Protocol(args.downscale, args.views, args.spp, args.lights, args.maps)
+    if is_asset(target):
+        evaluated = evaluate_asset(target, data, protocol, args.env)
+        write_json(args.out or evaluation_path(target), evaluated.scores)
+    elif args.env is not None:
+        raise InputError(f"{target}: is no GLB file, and a run has its own light; leave --env out")
+    else:
+        evaluated = evaluate_run(target, data, protocol, args.out)
+    if args.sheet:
+        from splitnerf.evaluate.sheet import write_sheet
+
+        e = evaluated
+        write_sheet(args.sheet, e.dataset, e.predictions, e.truths, e.scores, e.relit)
+        print(f"sheet: {args.sheet}")
+    return evaluated.scores
+
+
+def scene_name(target: Path) -> str:
+    """What a table calls a run or a file."""
+    target = target.resolve()
+    return f"{target.parent.name}/{target.name}" if target.is_file() else target.name

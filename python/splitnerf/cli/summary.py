@@ -9,11 +9,17 @@ def print_summary(run: Path, evaluation: dict, step: int | None = None, seconds:
     """The errors against whatever truth the data hold, and where the results lie."""
     if step is not None and seconds is not None:
         print(f"{step} steps in {seconds:.0f} s")
-    rows = [("novel views", evaluation["novel_view"], "dB"), ("albedo", evaluation["albedo"], "dB")]
-    for name, part, unit in rows:
-        if part:
-            scores = part.get("lsq", part)
-            print(f"{name:22s} PSNR {scores['psnr']:.2f} {unit}, SSIM {scores['ssim']:.4f}")
+    print_scores(evaluation)
+    print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")
+
+
+def print_scores(evaluation: dict) -> None:
+    """A line for each score that there is, after its free scale where it has one."""
+    for name, key in (("novel views", "novel_view"), ("relit views", "relight"), ("albedo", "albedo")):
+        scores = evaluation.get(key)
+        if scores:
+            lpips = "" if scores["lpips"] is None else f", LPIPS {scores['lpips']:.4f}"
+            print(f"{name:22s} PSNR {scores['psnr']:.2f} dB, SSIM {scores['ssim']:.4f}{lpips}")
     for name, key, unit in (
         ("normals, mean angle", "normal_mae_deg", "degrees"), ("roughness, mean error", "roughness_mae", ""),
         ("metallic, bal. accuracy", "metallic_balanced_accuracy", ""), ("light PSNR", "light_psnr", "dB"),
@@ -21,4 +27,3 @@ def print_summary(run: Path, evaluation: dict, step: int | None = None, seconds:
     ):  # fmt: skip
         if evaluation.get(key) is not None:
             print(f"{name:22s} {evaluation[key]:.4g} {unit}".rstrip())
-    print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")

@@ -1,11 +1,4 @@
-"""Posed images of one object: the two layouts, their checks, and the frame that training uses.
-
-Layouts:
-    NeRF-Blender   `transforms_train.json`, `transforms_test.json`; `file_path` without extension, `camera_angle_x`;
-                   RGBA images.
-    single file    `transforms.json`; `fl_x fl_y cx cy w h`, `mask_path` beside `file_path`; every 8th frame is the test
-                   split.
-"""
+"""Posed images of one object in the frame that training uses; the layouts are :mod:`splitnerf.data.frames`'s."""
 
 from __future__ import annotations
 
@@ -14,17 +7,16 @@ import json
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from splitnerf.data.frames import Frame, lens_intrinsics, read_frames
 from splitnerf.data.images import LDR_SUFFIXES, area_average, downscale_rgba, read_image
 from splitnerf.data.normalisation import estimate_box, transform_points
 from splitnerf.errors import InputError
 
-TEST_STRIDE = 8
-RIGID_TOLERANCE = 1e-3
 HULL_VIEWS = 40
 SILHOUETTE_SIZE = 100
 
@@ -41,7 +33,7 @@ class Dataset:
         images: [n, H, W, 4] float32, sRGB in [0, 1], straight alpha.
         poses: [n, 4, 4] float32 camera-to-world, OpenGL axes, internal frame.
         intrinsics: [n, 4] float32, (fx, fy, cx, cy) in pixels of the downscaled images; pixel centres at +0.5.
-        frame_names: File names without folder and extension.
+        frame_names: Names of the images' files without extension, or of the view folders.
         image_paths: The image files.
         box_from_world: [4, 4] float64, uniform scale and translation from the data's world to the internal frame.
     """
@@ -77,13 +69,24 @@ class Dataset:
         """Carries points [..., 3] from the internal frame to the data's world frame; directions need no change."""
         return transform_points(self.world_from_box, points)
 
+    @property
+    def world_poses(self) -> np.ndarray:
+        """[n, 4, 4] float64 camera-to-world, OpenGL axes, in the data's world frame."""
+        poses = self.poses.astype(np.float64)
+        poses[:, :3, 3] = self.transform_to_world(poses[:, :3, 3])
+        return poses
 
-@dataclass
-class _Frame:
-    image_path: Path
-    mask_path: Path | None
-    pose: np.ndarray
-    lens: dict
+    def select(self, views: Sequence[int]) -> Dataset:
+        """The same split with these views alone, in this order."""
+        views = list(views)
+        return replace(
+            self,
+            images=self.images[views],
+            poses=self.poses[views],
+            intrinsics=self.intrinsics[views],
+            frame_names=[self.frame_names[i] for i in views],
+            image_paths=[self.image_paths[i] for i in views],
+        )
 
 
 @dataclass
@@ -101,7 +104,7 @@ def load_dataset(root: str | os.PathLike, split: str = "train", downscale: int =
     The normalisation is always estimated from the train split, so that train and test share a frame.
 
     Args:
-        root: Folder of either layout.
+        root: Folder of any layout.
         split: "train" or "test".
         downscale: Integer factor >= 1, averaged in premultiplied linear light.
 
@@ -118,16 +121,16 @@ def load_dataset(root: str | os.PathLike, split: str = "train", downscale: int =
         raise InputError(f"{root}: downscale must be a whole number of at least 1, got {downscale}")
     if not root.is_dir():
         raise InputError(f"{root}: no such folder; give the folder that holds transforms_train.json or transforms.json")
-    frames = _read_frames(root, split)
+    frames = read_frames(root, split)
     loaded = _load_images(frames, int(downscale))
     if split == "train":
-        hull_frames, hull_images = _spread(frames, HULL_VIEWS), _spread(loaded, HULL_VIEWS)
+        hull_frames, hull_images = spread(frames, HULL_VIEWS), spread(loaded, HULL_VIEWS)
     else:
-        hull_frames = _spread(_read_frames(root, "train"), HULL_VIEWS)
+        hull_frames = spread(read_frames(root, "train"), HULL_VIEWS)
         hull_images = _load_images(hull_frames, int(downscale))
     box_from_world = _estimate_box(root, hull_frames, hull_images)
 
-    intrinsics = np.stack([_intrinsics(frame.lens, image.size) for frame, image in zip(frames, loaded)]) / downscale
+    intrinsics = np.stack([lens_intrinsics(frame.lens, image.size) for frame, image in zip(frames, loaded)]) / downscale
     poses = np.stack([frame.pose for frame in frames])
     poses[:, :3, 3] = poses[:, :3, 3] @ box_from_world[:3, :3].T + box_from_world[:3, 3]
     return Dataset(
@@ -138,7 +141,7 @@ def load_dataset(root: str | os.PathLike, split: str = "train", downscale: int =
         images=np.stack([image.rgba for image in loaded]),
         poses=poses.astype(np.float32),
         intrinsics=intrinsics.astype(np.float32),
-        frame_names=[frame.image_path.stem for frame in frames],
+        frame_names=[frame.name for frame in frames],
         image_paths=[frame.image_path for frame in frames],
         box_from_world=box_from_world,
     )
@@ -160,19 +163,19 @@ def dataset_fingerprint(dataset: Dataset) -> str:
     return digest.hexdigest()[:16]
 
 
-def _spread(items: Sequence, count: int) -> list:
+def spread(items: Sequence, count: int) -> list:
     """At most `count` of the items, evenly spread."""
     return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, count).round().astype(int))]
 
 
-def _estimate_box(root: Path, frames: list[_Frame], images: list[_Image]) -> np.ndarray:
+def _estimate_box(root: Path, frames: list[Frame], images: list[_Image]) -> np.ndarray:
     height, width = images[0].size
     factor = _silhouette_factor(height, width)
     try:
         return estimate_box(
             np.stack([image.silhouette for image in images]),
             np.stack([frame.pose for frame in frames]),
-            np.stack([_intrinsics(frame.lens, image.size) for frame, image in zip(frames, images)]) / factor,
+            np.stack([lens_intrinsics(frame.lens, image.size) for frame, image in zip(frames, images)]) / factor,
         )
     except ValueError as error:
         raise InputError(f"{root}: {error}") from None
@@ -182,81 +185,7 @@ def _silhouette_factor(height: int, width: int) -> int:
     return max(1, min(height, width) // SILHOUETTE_SIZE)
 
 
-def _read_frames(root: Path, split: str) -> list[_Frame]:
-    single, own = root / "transforms.json", root / f"transforms_{split}.json"
-    if own.is_file():
-        path = own
-    elif single.is_file():
-        path = single
-    else:
-        raise InputError(f"{root}: has neither {own.name} nor {single.name}; give the folder that holds one")
-    meta = _read_json(path)
-    entries = _need(meta, "frames", path)
-    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise InputError(f"{path}: 'frames' must be a list of objects")
-    if path == single:
-        entries = [e for i, e in enumerate(entries) if (i % TEST_STRIDE == 0) == (split == "test")]
-    if not entries:
-        raise InputError(f"{path}: has no frames for the {split} split; add posed images")
-    return [_read_frame(entry, meta, i, path) for i, entry in enumerate(entries)]
-
-
-def _read_json(path: Path) -> dict:
-    try:
-        meta = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError) as error:
-        raise InputError(f"{path}: is not valid json ({str(error).splitlines()[0]}); repair it") from None
-    if not isinstance(meta, dict):
-        raise InputError(f"{path}: must hold a json object with 'frames'")
-    return meta
-
-
-def _need(table: dict, key: str, path: Path, where: str = ""):
-    if key not in table:
-        raise InputError(f"{path}: missing key '{key}'{where}; add it")
-    return table[key]
-
-
-def _read_frame(entry: dict, meta: dict, index: int, path: Path) -> _Frame:
-    where = f" in frame {index}"
-    image_path = _find_image(path.parent, str(_need(entry, "file_path", path, where)), path)
-    mask_path = path.parent / str(entry["mask_path"]) if "mask_path" in entry else None
-    try:
-        pose = np.array(_need(entry, "transform_matrix", path, where), dtype=np.float64)
-    except (ValueError, TypeError):
-        pose = np.empty(0)
-    frame = f"{path}: transform_matrix of frame {index} ({image_path.name})"
-    if pose.shape != (4, 4):
-        raise InputError(f"{frame} is not a 4x4 matrix of numbers; repair it")
-    if not np.isfinite(pose).all():
-        raise InputError(f"{frame} has NaN or infinite entries; repair or remove the frame")
-    rotation = pose[:3, :3]
-    rigid = np.abs(rotation.T @ rotation - np.eye(3)).max() < RIGID_TOLERANCE and np.linalg.det(rotation) > 0
-    if not rigid or np.abs(pose[3] - [0, 0, 0, 1]).max() > RIGID_TOLERANCE:
-        raise InputError(f"{frame} is not a rigid camera-to-world pose (scaled, sheared or mirrored); repair it")
-    lens = {key: entry.get(key, meta.get(key)) for key in ("camera_angle_x", "fl_x", "fl_y", "cx", "cy", "w", "h")}
-    lens = {key: value for key, value in lens.items() if value is not None}
-    if "fl_x" not in lens and "camera_angle_x" not in lens:
-        raise InputError(f"{path}: missing key 'camera_angle_x' (or 'fl_x'); add it")
-    for key, value in lens.items():
-        valid = isinstance(value, (int, float)) and np.isfinite(value) and value > 0
-        if not valid or (key == "camera_angle_x" and value >= np.pi):
-            raise InputError(f"{path}: '{key}' must be a positive number, got {value}; repair it")
-    return _Frame(image_path, mask_path, pose, lens)
-
-
-def _find_image(folder: Path, file_path: str, path: Path) -> Path:
-    exact = folder / file_path
-    if exact.is_file():
-        return exact
-    for suffix in LDR_SUFFIXES:
-        candidate = exact.with_name(exact.name + suffix)
-        if candidate.is_file():
-            return candidate
-    raise InputError(f"{exact}: no such image, though {path.name} lists it; add the image or remove the frame")
-
-
-def _load_images(frames: list[_Frame], downscale: int) -> list[_Image]:
+def _load_images(frames: list[Frame], downscale: int) -> list[_Image]:
     with ThreadPoolExecutor(max_workers=min(8, os.cpu_count() or 1)) as pool:
         loaded = list(pool.map(lambda frame: _load_image(frame, downscale), frames))
     size = loaded[0].size
@@ -274,7 +203,7 @@ def _load_images(frames: list[_Frame], downscale: int) -> list[_Image]:
     return loaded
 
 
-def _load_image(frame: _Frame, downscale: int) -> _Image:
+def _load_image(frame: Frame, downscale: int) -> _Image:
     path = frame.image_path
     if path.suffix.lower() not in LDR_SUFFIXES:
         raise InputError(f"{path}: training images must be PNG or JPEG; convert it")
@@ -298,17 +227,3 @@ def _load_image(frame: _Frame, downscale: int) -> _Image:
     rgba = downscale_rgba(np.concatenate([colour, alpha], axis=-1), downscale)
     silhouette = area_average(alpha[..., 0], _silhouette_factor(height, width)) > 0.5
     return _Image(rgba, silhouette, (height, width))
-
-
-def _intrinsics(lens: dict, size: tuple[int, int]) -> np.ndarray:
-    """(fx, fy, cx, cy) in pixels of an image of this (height, width)."""
-    height, width = size
-    scale_x, scale_y = width / lens.get("w", width), height / lens.get("h", height)
-    if "fl_x" in lens:
-        fx = lens["fl_x"] * scale_x
-        fy = lens.get("fl_y", lens["fl_x"]) * scale_y
-    else:
-        fx = fy = 0.5 * width / np.tan(0.5 * lens["camera_angle_x"])
-    cx = lens["cx"] * scale_x if "cx" in lens else width / 2
-    cy = lens["cy"] * scale_y if "cy" in lens else height / 2
-    return np.array([fx, fy, cx, cy], dtype=np.float64)

@@ -61,19 +61,26 @@ def read_image(path: str | os.PathLike) -> np.ndarray:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such image; check the path")
-    config = oiio.ImageSpec()
-    config.attribute("oiio:UnassociatedAlpha", 1)
-    source = oiio.ImageInput.open(str(path), config)
-    if source is None:
-        raise InputError(f"{path}: cannot be read as an image ({_first_line(oiio.geterror())}); replace it")
-    try:
-        pixels = source.read_image(0, 0, 0, source.spec().nchannels, "float")
-        if pixels is None or source.has_error:
-            raise InputError(f"{path}: truncated or damaged image ({_first_line(source.geterror())}); replace it")
-    finally:
-        source.close()
-    height, width = source.spec().height, source.spec().width
-    return np.ascontiguousarray(pixels, dtype=np.float32).reshape(height, width, -1)
+    return _read(path, str(path))
+
+
+def decode_image(data: bytes, name: str) -> np.ndarray:
+    """Decodes an image file that lies in memory; any format that OpenImageIO tells by its content.
+
+    Args:
+        data: The file's bytes.
+        name: What to call it in a message.
+
+    Returns:
+        As `read_image`.
+
+    Raises:
+        InputError: Unreadable or truncated.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "image"
+        path.write_bytes(data)
+        return _read(path, name)
 
 
 def read_hdr(path: str | os.PathLike) -> np.ndarray:
@@ -88,12 +95,22 @@ def read_hdr(path: str | os.PathLike) -> np.ndarray:
     Raises:
         InputError: The file is unreadable, or holds NaN, infinite or negative pixels.
     """
-    pixels = read_image(path)
-    radiance = np.repeat(pixels, 3, axis=2) if pixels.shape[2] < 3 else pixels[..., :3]
-    if not np.isfinite(radiance).all():
-        raise InputError(f"{path}: has NaN or infinite pixels; clean or re-export it")
+    radiance = read_radiance(path)
     if radiance.min() < 0:
         raise InputError(f"{path}: has negative pixels, radiance cannot be negative; clean or re-export it")
+    return radiance
+
+
+def read_radiance(path: str | os.PathLike) -> np.ndarray:
+    """As `read_hdr`, but negative pixels are left as they are.
+
+    Raises:
+        InputError: The file is unreadable, or holds NaN or infinite pixels.
+    """
+    pixels = read_image(path)
+    radiance = np.repeat(pixels[..., :1], 3, axis=2) if pixels.shape[2] < 3 else pixels[..., :3]
+    if not np.isfinite(radiance).all():
+        raise InputError(f"{path}: has NaN or infinite pixels; clean or re-export it")
     return np.ascontiguousarray(radiance)
 
 
@@ -210,6 +227,22 @@ def over_background(srgb: np.ndarray, alpha: np.ndarray, background: float = 1.0
         [..., 3] colours.
     """
     return srgb * alpha[..., None] + background * (1 - alpha[..., None])
+
+
+def _read(path: Path, name: str) -> np.ndarray:
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    source = oiio.ImageInput.open(str(path), config)
+    if source is None:
+        raise InputError(f"{name}: cannot be read as an image ({_first_line(oiio.geterror())}); replace it")
+    try:
+        pixels = source.read_image(0, 0, 0, source.spec().nchannels, "float")
+        if pixels is None or source.has_error:
+            raise InputError(f"{name}: truncated or damaged image ({_first_line(source.geterror())}); replace it")
+    finally:
+        source.close()
+    height, width = source.spec().height, source.spec().width
+    return np.ascontiguousarray(pixels, dtype=np.float32).reshape(height, width, -1)
 
 
 def _first_line(message: str) -> str:

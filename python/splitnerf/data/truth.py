@@ -6,6 +6,7 @@ Files, `r_N` standing for the image's own name, each optional:
     r_N_normal.exr   world-space normals, multiplied by coverage; alpha is the coverage
     r_N_normal.png   world-space normals, negative components clipped to 0, sRGB-encoded (the NeRF Blender scenes)
     light.hdr, mesh.ply   in the dataset's folder
+In view folders (:mod:`splitnerf.data.view_folders`) `albedo.png` and `normal.png` lie beside `rgba.png`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from splitnerf.data import view_folders
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import area_average, downscale_rgba, read_hdr, read_image, srgb_to_linear
 from splitnerf.errors import InputError
@@ -126,48 +128,70 @@ def decode_clipped_normals(encoded: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return np.where(known[..., None], normals, 0).astype(np.float32), known
 
 
-def _load_view(image_path: Path, dataset: Dataset) -> ViewTruth:
-    factor, size = dataset.downscale, (dataset.height, dataset.width)
-    truth = ViewTruth(image_path.stem)
+def read_map(image_path: Path, path: Path, channels: int, dataset: Dataset) -> np.ndarray | None:
+    """Reads a map that belongs to a view, at the file's own size.
 
-    albedo = _read_map(image_path, "_albedo.png", 4, factor, size)
-    if albedo is not None:
-        truth.albedo = srgb_to_linear(downscale_rgba(albedo, factor)[..., :3])
+    Args:
+        image_path: The view's image.
+        path: The map's file.
+        channels: How many it needs at least.
+        dataset: The split, whose images the map must fit.
 
-    orm = _read_map(image_path, "_orm.png", 4, factor, size)
-    if orm is not None:
-        alpha = area_average(orm[..., 3], factor)
-        averaged = area_average(orm[..., 1:3] * orm[..., 3:], factor) / np.maximum(alpha, 1e-8)[..., None]
-        truth.roughness, truth.metallic = averaged[..., 0], averaged[..., 1]
+    Returns:
+        [H, W, C] float32, or None where there is no such file.
 
-    exact = _read_map(image_path, "_normal.exr", 4, factor, size)
-    if exact is not None:
-        averaged = area_average(exact, factor)
-        truth.normal, truth.normal_mask = _unit(averaged[..., :3], averaged[..., 3] > OPAQUE)
-        return truth
-    encoded = _read_map(image_path, "_normal.png", 3, factor, size)
-    if encoded is not None:
-        normals, known = decode_clipped_normals(encoded[..., :3])
-        alpha = read_image(image_path)[..., -1]
-        known &= alpha > OPAQUE
-        share = area_average(known.astype(np.float32), factor)
-        truth.normal, truth.normal_mask = _unit(area_average(normals * known[..., None], factor), share >= 0.5)
-    return truth
-
-
-def _read_map(image_path: Path, ending: str, channels: int, factor: int, size: tuple[int, int]) -> np.ndarray | None:
-    path = image_path.with_name(image_path.stem + ending)
+    Raises:
+        InputError: The file is unreadable, has too few channels, NaN, or another size than its image.
+    """
     if not path.is_file():
         return None
     pixels = read_image(path)
     if pixels.shape[2] < channels:
         raise InputError(f"{path}: needs {channels} channels, has {pixels.shape[2]}; re-export it")
-    if (pixels.shape[0] // factor, pixels.shape[1] // factor) != size:
+    if (pixels.shape[0] // dataset.downscale, pixels.shape[1] // dataset.downscale) != (dataset.height, dataset.width):
         found = f"{pixels.shape[1]}x{pixels.shape[0]}"
         raise InputError(f"{path}: is {found}, not the size of {image_path.name}; re-export it")
     if not np.isfinite(pixels).all():
         raise InputError(f"{path}: has NaN or infinite pixels; re-export it")
     return pixels
+
+
+def _load_view(image_path: Path, dataset: Dataset) -> ViewTruth:
+    factor, in_folder = dataset.downscale, image_path.name == view_folders.PHOTO
+    truth = ViewTruth(image_path.parent.name if in_folder else image_path.stem)
+
+    def read(ending: str, channels: int) -> np.ndarray | None:
+        path = image_path.with_name(ending if in_folder else f"{image_path.stem}_{ending}")
+        return read_map(image_path, path, channels, dataset)
+
+    albedo = read("albedo.png", 4)
+    if albedo is not None:
+        truth.albedo = srgb_to_linear(downscale_rgba(albedo, factor)[..., :3])
+
+    orm = read("orm.png", 4)
+    if orm is not None:
+        alpha = area_average(orm[..., 3], factor)
+        averaged = area_average(orm[..., 1:3] * orm[..., 3:], factor) / np.maximum(alpha, 1e-8)[..., None]
+        truth.roughness, truth.metallic = averaged[..., 0], averaged[..., 1]
+
+    exact = read("normal.exr", 4)
+    if exact is not None:
+        averaged = area_average(exact, factor)
+        truth.normal, truth.normal_mask = _unit(averaged[..., :3], averaged[..., 3] > OPAQUE)
+        return truth
+    encoded = read("normal.png", 3)
+    if encoded is None:
+        return truth
+    alpha = read_image(image_path)[..., -1]
+    if in_folder:
+        averaged = area_average((2 * encoded[..., :3] - 1) * alpha[..., None], factor)
+        truth.normal, truth.normal_mask = _unit(averaged, area_average(alpha, factor) > OPAQUE)
+    else:
+        normals, known = decode_clipped_normals(encoded[..., :3])
+        known &= alpha > OPAQUE
+        share = area_average(known.astype(np.float32), factor)
+        truth.normal, truth.normal_mask = _unit(area_average(normals * known[..., None], factor), share >= 0.5)
+    return truth
 
 
 def _unit(vectors: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

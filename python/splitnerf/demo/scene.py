@@ -6,15 +6,14 @@ download and has the full truth (materials, normals, light, mesh) to compare wit
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
-from splitnerf.data.images import linear_to_srgb, write_image
-from splitnerf.export.mesh import write_mesh_ply
+from splitnerf.synth.cameras import direction, orbit, spiral
+from splitnerf.synth.writer import SceneWriter
 
 CAMERA_DISTANCE = 3.0
 CAMERA_ANGLE_X = 0.69  # radians; frames the unit sphere from CAMERA_DISTANCE
@@ -96,10 +95,10 @@ def build_environment(height: int = 128, width: int = 256) -> np.ndarray:
     earth = ground * (1 - 0.5 * np.clip(-up, 0, 1))
     radiance = earth + (sky - earth) * _smoothstep(-0.04, 0.04, up)
 
-    sun = _direction(azimuth=35, elevation=48)
+    sun = direction(azimuth=35, elevation=48)
     radiance = radiance + np.array([80.0, 67.0, 50.0]) * np.exp((d @ sun - 1) / np.radians(4.0) ** 2)[..., None]
-    radiance = radiance + np.array([1.6, 1.0, 0.5]) * _soft_box(d, _direction(azimuth=-105, elevation=28), 0.36, 0.26)
-    radiance = radiance + np.array([0.5, 0.9, 1.4]) * _soft_box(d, _direction(azimuth=160, elevation=40), 0.24, 0.40)
+    radiance = radiance + np.array([1.6, 1.0, 0.5]) * _soft_box(d, direction(azimuth=-105, elevation=28), 0.36, 0.26)
+    radiance = radiance + np.array([0.5, 0.9, 1.4]) * _soft_box(d, direction(azimuth=160, elevation=40), 0.24, 0.40)
     return radiance.astype(np.float32)
 
 
@@ -114,21 +113,10 @@ def camera_poses(n: int, *, split: str) -> np.ndarray:
         [n, 4, 4] float64 camera-to-world, OpenGL axes.
     """
     if split == "train":
-        golden_turn = 2 * np.pi / ((1 + np.sqrt(5)) / 2)
-        azimuths = np.arange(n) * golden_turn
-        elevations = np.arcsin(np.linspace(np.sin(np.radians(4)), np.sin(np.radians(72)), n))
-    elif split == "test":
-        azimuths = 2 * np.pi * (np.arange(n) + 0.25) / n
-        elevations = np.full(n, np.radians(30))
-    else:
-        raise ValueError(f"camera_poses: split must be 'train' or 'test', got {split!r}")
-    poses = np.tile(np.eye(4), (n, 1, 1))
-    for pose, azimuth, elevation in zip(poses, azimuths, elevations):
-        back = _direction(np.degrees(azimuth), np.degrees(elevation))
-        right = np.cross([0, 0, 1], back)
-        right /= np.linalg.norm(right)
-        pose[:3] = np.stack([right, np.cross(back, right), back, CAMERA_DISTANCE * back], axis=1)
-    return poses
+        return spiral(n, CAMERA_DISTANCE, (4, 72))
+    if split == "test":
+        return orbit(n, CAMERA_DISTANCE, 30, start=0.25)
+    raise ValueError(f"camera_poses: split must be 'train' or 'test', got {split!r}")
 
 
 def write_demo_dataset(
@@ -136,9 +124,7 @@ def write_demo_dataset(
 ) -> Path:
     """Renders the demo scene and writes it as a dataset with truth.
 
-    The folder then holds `transforms_{train,test}.json`, `{train,test}/r_000.png` (sRGB, straight alpha), for test
-    views also `_albedo.png`, `_orm.png` (R = 1, G = roughness, B = metallic) and `_normal.exr` (world space), and
-    `light.hdr` and `mesh.ply`.
+    The folder is in the layout "blender" of :mod:`splitnerf.synth.writer`, without relit views.
 
     Args:
         out: The folder to write to; made where it is missing.
@@ -160,42 +146,21 @@ def write_demo_dataset(
     for name, value in (("size", size), ("n_train", n_train), ("n_test", n_test), ("spp", spp)):
         if value < 1:
             raise ValueError(f"write_demo_dataset: {name} must be at least 1, got {value}")
-    out = Path(out)
-    demo, environment = build_scene(), build_environment()
+    writer = SceneWriter(out, CAMERA_ANGLE_X)
+    demo, environment = build_scene(), writer.light(build_environment())
     scene = _core.Scene(demo.vertices, demo.triangles)
     focal = 0.5 * size / np.tan(0.5 * CAMERA_ANGLE_X)
     for split, n in (("train", n_train), ("test", n_test)):
-        frames = []
         for i, pose in enumerate(camera_poses(n, split=split)):
             images = _core.render(
                 scene, demo.albedo, demo.roughness, demo.metallic, environment, pose[:3].astype(np.float32),
                 focal, focal, size / 2, size / 2, size, size,
                 normals=demo.normals, spp=spp, clamp_indirect=1.0, seed=(seed * 2 + (split == "test")) * 65536 + i,
             )  # fmt: skip
-            _write_view(out / split / f"r_{i:03d}", images, with_truth=split == "test")
-            frames.append({"file_path": f"./{split}/r_{i:03d}", "transform_matrix": pose.tolist()})
-        transforms = {"camera_angle_x": CAMERA_ANGLE_X, "frames": frames}
-        (out / f"transforms_{split}.json").write_text(json.dumps(transforms, indent=1) + "\n")
-    write_image(out / "light.hdr", environment)
-    write_mesh_ply(out / "mesh.ply", demo.vertices, demo.triangles)
-    return out
-
-
-def _write_view(stem: Path, images: dict[str, np.ndarray], *, with_truth: bool) -> None:
-    """Writes one view: straight-alpha sRGB, and for test views albedo, roughness, metallic and normal."""
-    alpha = images["alpha"][..., None]
-    straight = images["radiance"] / np.maximum(alpha, 1e-8)
-
-    def path(suffix: str) -> Path:
-        return stem.with_name(stem.name + suffix)
-
-    write_image(path(".png"), np.concatenate([linear_to_srgb(straight), alpha], axis=-1))
-    if with_truth:
-        orm = np.stack([images["alpha"] > 0, images["roughness"], images["metallic"], images["alpha"]], axis=-1)
-        write_image(path("_albedo.png"), np.concatenate([linear_to_srgb(images["albedo"]), alpha], axis=-1))
-        write_image(path("_orm.png"), orm)
-        # EXR stores colours associated with alpha.
-        write_image(path("_normal.exr"), np.concatenate([images["normal"] * alpha, alpha], axis=-1), half=True)
+            writer.view(split, i, pose, images)
+    writer.mesh(demo.vertices, demo.triangles)
+    writer.close()
+    return Path(out)
 
 
 # ---- shapes: (vertices [n, 3], triangles [m, 3], normals [n, 3]), centred at the origin, outward ----
@@ -276,12 +241,6 @@ def _turned(shape: Shape, angle: float) -> Shape:
 
 
 # ---- light ----
-
-
-def _direction(azimuth: float, elevation: float) -> np.ndarray:
-    """Unit vector from degrees: azimuth from +x towards +y, elevation from the horizon."""
-    a, e = np.radians(azimuth), np.radians(elevation)
-    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
 def _smoothstep(lo: float, hi: float, x: np.ndarray) -> np.ndarray:

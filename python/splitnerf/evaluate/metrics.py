@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from splitnerf.data.images import area_average
+from splitnerf.data.environment import resize_environment
 
 MSE_FLOOR = 1e-10
 LIGHT_SIZE = (128, 256)
@@ -64,10 +64,20 @@ def lsq_scale(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | N
     Returns:
         [C] float64; 1 for a channel that is 0 everywhere.
     """
+    return scale_of_sums(lsq_sums(prediction, truth, weights))
+
+
+def lsq_sums(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+    """What `lsq_scale` needs of some pixels, [2, C] float64 (sum w x y, sum w x^2); sums of parts add up."""
     x, y = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
     w = np.ones(len(x)) if weights is None else weights
-    square = (w[:, None] * x * x).sum(axis=0)
-    return np.where(square > 0, (w[:, None] * x * y).sum(axis=0) / np.where(square > 0, square, 1), 1.0)
+    return np.stack([(w[:, None] * x * y).sum(axis=0), (w[:, None] * x * x).sum(axis=0)])
+
+
+def scale_of_sums(sums: np.ndarray) -> np.ndarray:
+    """The scale [C] of `lsq_sums`."""
+    product, square = sums
+    return np.where(square > 0, product / np.where(square > 0, square, 1), 1.0)
 
 
 def median_scale(prediction: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -121,34 +131,6 @@ def solid_angle_weights(height: int) -> np.ndarray:
     """The share of the sphere's solid angle of each row of an equirectangular map, [height] float64, sum 1."""
     edges = np.cos(np.linspace(0, np.pi, height + 1))
     return (edges[:-1] - edges[1:]) / 2
-
-
-def resize_environment(image: np.ndarray, height: int, width: int) -> np.ndarray:
-    """Resizes an equirectangular map: whole blocks are averaged, the rest is bilinear, wrapping around in u.
-
-    Args:
-        image: [H, W, C].
-        height: Rows of the result.
-        width: Columns of the result.
-
-    Returns:
-        [height, width, C] float32.
-    """
-    image = np.asarray(image, np.float32)
-    factor = min(image.shape[0] // height, image.shape[1] // width)
-    if factor > 1 and image.shape[0] % factor == 0 and image.shape[1] % factor == 0:
-        image = area_average(image, factor)
-    rows, columns = image.shape[:2]
-    if (rows, columns) == (height, width):
-        return image
-    y = np.clip((np.arange(height) + 0.5) * rows / height - 0.5, 0, rows - 1)
-    x = (np.arange(width) + 0.5) * columns / width - 0.5
-    y0, x0 = np.floor(y).astype(int), np.floor(x).astype(int)
-    fy, fx = (y - y0)[:, None, None].astype(np.float32), (x - x0)[None, :, None].astype(np.float32)
-    y1, x1 = np.minimum(y0 + 1, rows - 1), (x0 + 1) % columns
-    upper = image[y0][:, x0] * (1 - fx) + image[y0][:, x1] * fx
-    lower = image[y1][:, x0] * (1 - fx) + image[y1][:, x1] * fx
-    return upper * (1 - fy) + lower * fy
 
 
 def mesh_distances(

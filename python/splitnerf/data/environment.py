@@ -1,0 +1,117 @@
+"""Environment maps that a user hands over."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.images import HDR_SUFFIXES, area_average, read_radiance
+from splitnerf.errors import InputError
+from splitnerf.notes import note
+
+ASPECT_TOLERANCE = 0.02
+NEGATIVE_SHARE = 1e-3  # of the map's sum: what resampling and compression leave behind
+
+
+def read_environment(path: str | os.PathLike) -> np.ndarray:
+    """Reads an equirectangular map of linear radiance, u = 0.5 - atan2(y, x)/(2 pi), v = acos(z)/pi from the top.
+
+    Negative pixels that sum to at most a thousandth of the map are set to 0 and said on stderr.
+
+    Args:
+        path: An EXR or HDR file, twice as wide as high.
+
+    Returns:
+        [h, w, 3] float32, finite and >= 0.
+
+    Raises:
+        InputError: Not an HDR file, not 2:1, black, or with NaN, infinite or many negative pixels.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such environment map; check the path")
+    if path.suffix.lower() not in HDR_SUFFIXES:
+        raise InputError(f"{path}: an environment map must hold linear radiance; use an .exr or .hdr file")
+    radiance = read_radiance(path)
+    height, width = radiance.shape[:2]
+    if abs(width - 2 * height) > ASPECT_TOLERANCE * width:
+        raise InputError(f"{path}: is {width}x{height}; an equirectangular map is twice as wide as high")
+    negative = radiance < 0
+    if negative.any():
+        total, dark = radiance.sum(where=~negative, dtype=np.float64), -radiance.sum(where=negative, dtype=np.float64)
+        if dark > NEGATIVE_SHARE * total:
+            raise InputError(f"{path}: has negative pixels, {dark / max(total, 1e-30):.1%} of its light; re-export it")
+        note(f"{path}: {negative.any(axis=2).sum()} pixels were slightly negative; set to 0")
+        radiance = np.maximum(radiance, 0)
+    if not radiance.any():
+        raise InputError(f"{path}: is black and lights nothing; use another map")
+    return radiance
+
+
+def sample_environment(radiance: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Radiance from directions, interpolated bilinearly.
+
+    Args:
+        radiance: [h, w, 3] equirectangular.
+        directions: [..., 3] of any non-zero length.
+
+    Returns:
+        [..., 3] float32.
+    """
+    height, width = radiance.shape[:2]
+    x, y, z = np.moveaxis(directions, -1, 0)
+    column = (0.5 - np.arctan2(y, x) / (2 * np.pi)) * width - 0.5
+    row = np.clip(np.arctan2(np.hypot(x, y), z) / np.pi * height - 0.5, 0, height - 1)
+    left, top = np.floor(column).astype(int), np.minimum(np.floor(row).astype(int), height - 2)
+    across, down = (column - left)[..., None], (row - top)[..., None]
+    rows = [
+        (1 - across) * radiance[top + k, left % width] + across * radiance[top + k, (left + 1) % width] for k in (0, 1)
+    ]
+    return ((1 - down) * rows[0] + down * rows[1]).astype(np.float32)
+
+
+def rotate_environment(radiance: np.ndarray, degrees: float) -> np.ndarray:
+    """Turns the light about the z axis, counter-clockwise seen from above.
+
+    Args:
+        radiance: [h, w, 3] equirectangular.
+        degrees: The angle; columns are interpolated linearly, which keeps each row's mean.
+
+    Returns:
+        [h, w, 3], same dtype.
+    """
+    shift = degrees / 360 * radiance.shape[1]
+    whole = int(np.floor(shift))
+    share = shift - whole
+    near = np.roll(radiance, -whole, axis=1)
+    return ((1 - share) * near + share * np.roll(near, -1, axis=1)).astype(radiance.dtype)
+
+
+def resize_environment(image: np.ndarray, height: int, width: int) -> np.ndarray:
+    """Resizes an equirectangular map: whole blocks are averaged, the rest is bilinear, wrapping around in u.
+
+    Args:
+        image: [H, W, C].
+        height: Rows of the result.
+        width: Columns of the result.
+
+    Returns:
+        [height, width, C] float32.
+    """
+    image = np.asarray(image, np.float32)
+    factor = min(image.shape[0] // height, image.shape[1] // width)
+    if factor > 1 and image.shape[0] % factor == 0 and image.shape[1] % factor == 0:
+        image = area_average(image, factor)
+    rows, columns = image.shape[:2]
+    if (rows, columns) == (height, width):
+        return image
+    y = np.clip((np.arange(height) + 0.5) * rows / height - 0.5, 0, rows - 1)
+    x = (np.arange(width) + 0.5) * columns / width - 0.5
+    y0, x0 = np.floor(y).astype(int), np.floor(x).astype(int)
+    fy, fx = (y - y0)[:, None, None].astype(np.float32), (x - x0)[None, :, None].astype(np.float32)
+    y1, x1 = np.minimum(y0 + 1, rows - 1), (x0 + 1) % columns
+    upper = image[y0][:, x0] * (1 - fx) + image[y0][:, x1] * fx
+    lower = image[y1][:, x0] * (1 - fx) + image[y1][:, x1] * fx
+    return upper * (1 - fy) + lower * fy

@@ -1,0 +1,150 @@
+"""The container: a GLB's chunks or a .gltf with its files, and typed arrays out of them."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from pathlib import Path
+from urllib.parse import unquote
+
+import numpy as np
+
+from splitnerf.errors import InputError
+
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+GLB_HEADER, CHUNK_HEADER = 12, 8
+
+
+class Document:
+    """A parsed glTF file.
+
+    Attributes:
+        path: The file.
+        json: Its JSON, a dict with "asset".
+    """
+
+    def __init__(self, path: Path):
+        """Reads the JSON and, of a GLB, the binary chunk.
+
+        Raises:
+            InputError: No such file, not glTF 2.0, or truncated.
+        """
+        self.path = path
+        if not path.is_file():
+            raise InputError(f"{path}: no such file; give a .glb or .gltf file")
+        data = path.read_bytes()
+        text, self._binary = self._split_glb(data) if data[:4] == b"glTF" else (data, None)
+        try:
+            self.json = json.loads(text)
+        except ValueError:
+            raise InputError(f"{path}: is neither a GLB nor glTF's JSON; export the mesh as GLB") from None
+        if not isinstance(self.json, dict) or not isinstance(self.json.get("asset"), dict):
+            raise InputError(f"{path}: is JSON but not glTF, it has no 'asset'; export the mesh as GLB")
+        version = str(self.json["asset"].get("version"))
+        if version.split(".")[0] != "2":
+            raise InputError(f"{path}: is glTF {version}; only 2.0 is read, export it again")
+        self._buffers: dict[int, bytes] = {}
+
+    def get(self, name: str) -> list:
+        """A top-level array such as "nodes", empty where the file has none."""
+        return self.json.get(name, [])
+
+    def array(self, index: int) -> np.ndarray:
+        """Decodes one accessor.
+
+        Args:
+            index: The accessor's.
+
+        Returns:
+            [count, components], float64 where the file stores floats or normalised integers, else int64.
+
+        Raises:
+            InputError: It reaches beyond its buffer, or a file is missing.
+        """
+        accessor = self.json["accessors"][index]
+        dtype, width = np.dtype(COMPONENTS[accessor["componentType"]]), WIDTHS[accessor["type"]]
+        count = accessor["count"]
+        values = np.zeros((count, width), dtype)
+        if "bufferView" in accessor:
+            values = self._table(accessor["bufferView"], accessor.get("byteOffset", 0), dtype, width, count)
+        if "sparse" in accessor:
+            sparse = accessor["sparse"]
+            where, what = sparse["indices"], sparse["values"]
+            rows = self._table(
+                where["bufferView"], where.get("byteOffset", 0), np.dtype(COMPONENTS[where["componentType"]]), 1,
+                sparse["count"],
+            )  # fmt: skip
+            values = values.copy()
+            values[rows[:, 0]] = self._table(
+                what["bufferView"], what.get("byteOffset", 0), dtype, width, sparse["count"]
+            )
+        if dtype.kind == "f":
+            return values.astype(np.float64)
+        if accessor.get("normalized", False):
+            return np.maximum(values.astype(np.float64) / np.iinfo(dtype).max, -1.0)
+        return values.astype(np.int64)
+
+    def image(self, index: int) -> tuple[bytes, str]:
+        """The encoded bytes of an image, and how to call it in a message."""
+        image = self.json["images"][index]
+        name = f"{self.path}: image {index}" + (f" '{image['name']}'" if "name" in image else "")
+        return (self._view(image["bufferView"]) if "bufferView" in image else self._resource(image["uri"])), name
+
+    def _split_glb(self, data: bytes) -> tuple[bytes, bytes | None]:
+        """The JSON chunk and the binary one, or None."""
+        if len(data) < GLB_HEADER + CHUNK_HEADER:
+            raise InputError(f"{self.path}: truncated GLB, {len(data)} bytes; copy or export it again")
+        version, total = struct.unpack_from("<II", data, 4)
+        if version != 2:
+            raise InputError(f"{self.path}: is GLB version {version}; only 2 is read, export it again")
+        if total > len(data):
+            raise InputError(f"{self.path}: truncated GLB, {len(data)} of {total} bytes; copy or export it again")
+        chunks, offset = {}, GLB_HEADER
+        while offset + CHUNK_HEADER <= total:
+            length, kind = struct.unpack_from("<I4s", data, offset)
+            offset += CHUNK_HEADER
+            if offset + length > total:
+                raise InputError(f"{self.path}: damaged GLB, a chunk reaches beyond its end; export it again")
+            chunks.setdefault(kind, data[offset : offset + length])
+            offset += length
+        if b"JSON" not in chunks:
+            raise InputError(f"{self.path}: damaged GLB, it has no JSON chunk; export it again")
+        return chunks[b"JSON"], chunks.get(b"BIN\0")
+
+    def _table(self, view: int, offset: int, dtype: np.dtype, width: int, count: int) -> np.ndarray:
+        stride = self.json["bufferViews"][view].get("byteStride", dtype.itemsize * width)
+        data = self._view(view)
+        if count and offset + stride * (count - 1) + dtype.itemsize * width > len(data):
+            raise InputError(f"{self.path}: damaged, an accessor reaches beyond its buffer view; export it again")
+        return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
+
+    def _view(self, index: int) -> bytes:
+        view = self.json["bufferViews"][index]
+        data, start = self._buffer(view["buffer"]), view.get("byteOffset", 0)
+        if start + view["byteLength"] > len(data):
+            raise InputError(f"{self.path}: damaged, a buffer view reaches beyond its buffer; export it again")
+        return data[start : start + view["byteLength"]]
+
+    def _buffer(self, index: int) -> bytes:
+        if index not in self._buffers:
+            buffer = self.json["buffers"][index]
+            data = self._resource(buffer["uri"]) if "uri" in buffer else self._binary
+            if data is None:
+                raise InputError(f"{self.path}: buffer {index} has neither a file nor a binary chunk; export it again")
+            self._buffers[index] = data
+        return self._buffers[index]
+
+    def _resource(self, uri: str) -> bytes:
+        """The bytes of a data URI or of a file beside this one."""
+        if uri.startswith("data:"):
+            try:
+                return base64.b64decode(uri.partition(",")[2], validate=True)
+            except binascii.Error:
+                raise InputError(f"{self.path}: holds a data URI that is not base64; export it again") from None
+        path = self.path.parent / unquote(uri)
+        if not path.is_file():
+            raise InputError(f"{path}: no such file, though {self.path.name} refers to it; add it or export a GLB")
+        return path.read_bytes()

@@ -1,0 +1,41 @@
+"""JSON files that hold one object."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from splitnerf.data.images import atomic_path
+from splitnerf.errors import InputError
+
+
+def read_json(path: Path, key: str) -> dict:
+    """Reads a file.
+
+    Args:
+        path: The file.
+        key: What the object must hold, for the message; not checked here.
+
+    Raises:
+        InputError: It is missing, no valid json, or holds no object.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; check the path")
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, OSError) as error:
+        raise InputError(f"{path}: is not valid json ({str(error).splitlines()[0]}); repair it") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: must hold a json object with '{key}'")
+    return content
+
+
+def write_json(path: Path, content: dict) -> None:
+    """Writes a file atomically, indented, NaN refused.
+
+    Raises:
+        ValueError: A number is NaN or infinite.
+        OSError: The file cannot be written.
+    """
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,0 +1,55 @@
+"""The NeRFactor and TensoIR layouts: a folder per view.
+
+`train_000` ..., `test_000` ... (others, such as `val_000`, are not read), each with
+    metadata.json    `cam_angle_x` in radians, `cam_transform_mat` 16 numbers parted by commas, the rows of the
+                     camera-to-world matrix with OpenGL axes, `imw`, `imh`
+    rgba.png         the photo, sRGB, straight alpha
+    rgba_<map>.png   the view under another light, optional
+    albedo.png       sRGB, straight alpha, optional
+    normal.png       world-space normals n as n / 2 + 1 / 2, linear, 8 bit, optional
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from splitnerf.data.json_files import read_json
+from splitnerf.errors import InputError
+
+METADATA, PHOTO = "metadata.json", "rgba.png"
+
+
+def present(root: Path, split: str = "train") -> bool:
+    """Whether `root` has a view folder of the split."""
+    return any((folder / METADATA).is_file() for folder in _folders(root, split))
+
+
+def entries(root: Path, split: str) -> list[tuple[Path, dict, Path]]:
+    """Folder, metadata and metadata file of each view of a split, by number.
+
+    Raises:
+        InputError: The split has no folder, or a folder's metadata is missing or no json object.
+    """
+    folders = _folders(root, split)
+    if not folders:
+        raise InputError(f"{root}: has no view folder {split}_000 for the {split} split; add posed images")
+    return [(folder, read_json(folder / METADATA, "cam_transform_mat"), folder / METADATA) for folder in folders]
+
+
+def parse_matrix(text: object) -> object:
+    """The 4 x 4 nested list of a comma-separated string; anything else as it came, for the caller to refuse."""
+    if not isinstance(text, str):
+        return text
+    numbers = [number.strip() for number in text.split(",")]
+    return [numbers[4 * row : 4 * row + 4] for row in range(4)] if len(numbers) == 16 else numbers
+
+
+def format_matrix(pose) -> str:
+    """The inverse of `parse_matrix`, for a [4, 4] array."""
+    return ",".join(repr(float(value)) for row in pose for value in row)
+
+
+def _folders(root: Path, split: str) -> list[Path]:
+    named = [(re.fullmatch(rf"{split}_(\d+)", path.name), path) for path in root.glob(f"{split}_*") if path.is_dir()]
+    return [path for _, path in sorted((int(match[1]), path) for match, path in named if match)]

@@ -1,0 +1,46 @@
+"""The maps of an asset at the test views, so that any GLB is scored like a trained scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.dataset import Dataset
+from splitnerf.evaluate.relight import render_view, straight_srgb
+from splitnerf.render.path_traced import AssetRenderer
+
+ENVIRONMENTS = ("environment.exr", "environment.hdr")
+
+
+def environment_beside(path: Path) -> Path | None:
+    """The recovered light in the folder of a GLB file, if there is one."""
+    return next((path.with_name(name) for name in ENVIRONMENTS if path.with_name(name).is_file()), None)
+
+
+def asset_predictions(
+    renderer: AssetRenderer, dataset: Dataset, environment: np.ndarray | None, spp: int
+) -> list[dict[str, np.ndarray]]:
+    """Renders the asset's material and normal maps, and its look where the light is known.
+
+    Args:
+        renderer: The asset, in the data's world frame.
+        dataset: The views.
+        environment: [h, w, 3] linear radiance, or None.
+        spp: Paths a pixel.
+
+    Returns:
+        Per view what :func:`splitnerf.evaluate.protocol.evaluate_maps` reads: `alpha`, `albedo`, `roughness`,
+        `metallic`, `normal` (without the normal map, as the truth is) and, given the light, `rgb`.
+    """
+    predictions = []
+    for index in range(len(dataset)):
+        light = np.ones((2, 4, 3), np.float32) if environment is None else environment
+        maps = render_view(renderer, dataset, index, light, spp)
+        prediction = {key: maps[key] for key in ("alpha", "albedo", "roughness", "metallic")}
+        lengths = np.linalg.norm(maps["smooth_normal"], axis=-1, keepdims=True)
+        prediction["normal"] = maps["smooth_normal"] / np.maximum(lengths, 1e-8)
+        if environment is not None:
+            prediction["rgb"] = straight_srgb(maps)
+        predictions.append(prediction)
+    return predictions

@@ -1,0 +1,146 @@
+"""One evaluation from files to scores: what to compare, with which views and lights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.dataset import Dataset, load_dataset, spread
+from splitnerf.data.environment import read_environment
+from splitnerf.data.frames import has_test_split
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.json_files import read_json
+from splitnerf.data.relit import PROTOCOLS, relight_maps
+from splitnerf.data.truth import ViewTruth, load_scene_truth, load_view_truths
+from splitnerf.errors import InputError
+from splitnerf.evaluate.asset import asset_predictions, environment_beside
+from splitnerf.evaluate.lpips import load_distance
+from splitnerf.evaluate.protocol import evaluate_maps
+from splitnerf.evaluate.relight import RelitViews, relight, relight_scores
+from splitnerf.render.path_traced import AssetRenderer
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """Which views and lights an evaluation takes.
+
+    Attributes:
+        downscale: Integer factor by which images are averaged down.
+        views: Test views, evenly spread; None for all, or for the number that `lights` names.
+        spp: Paths a pixel of what is path traced.
+        lights: "low" or "high" for a published relighting protocol, else None.
+        maps: Folder of environment maps; None for those of the data.
+    """
+
+    downscale: int = 1
+    views: int | None = None
+    spp: int = 64
+    lights: str | None = None
+    maps: Path | None = None
+
+
+@dataclass
+class Evaluated:
+    """Scores, and what they were computed from.
+
+    Attributes:
+        scores: The contents of evaluation.json.
+        dataset: The views.
+        predictions: Maps per view.
+        truths: Truth maps per view.
+        relit: The relit views, or None.
+    """
+
+    scores: dict
+    dataset: Dataset
+    predictions: list[dict[str, np.ndarray]]
+    truths: list[ViewTruth]
+    relit: RelitViews | None
+
+
+def choose_views(dataset: Dataset, protocol: Protocol) -> tuple[Dataset, dict[str, Path]]:
+    """The views of a split that a protocol takes, and its maps.
+
+    Raises:
+        InputError: The data do not hold what the protocol asks for.
+    """
+    if protocol.spp < 1:
+        raise InputError(f"--spp must be at least 1, got {protocol.spp}")
+    maps = relight_maps(dataset, protocol.maps, protocol.lights)
+    count = protocol.views
+    if count is None:
+        count = PROTOCOLS[protocol.lights][1] if protocol.lights else len(dataset)
+    if not 1 <= count <= len(dataset):
+        found = f"{dataset.root}: has {len(dataset)} {dataset.split} views"
+        raise InputError(f"{found}, {count} were asked for; change --views")
+    return dataset.select(spread(range(len(dataset)), count)), maps
+
+
+def relit_scores(
+    renderer: AssetRenderer, views: Dataset, maps: dict[str, Path], spp: int
+) -> tuple[RelitViews | None, dict | None]:
+    """Renders and scores the relit views; None and None where there is no map."""
+    if not maps:
+        return None, None
+    relit = relight(renderer, views, maps, spp)
+    return relit, relight_scores(relit, load_distance())
+
+
+def asset_mesh(asset: Asset) -> trimesh.Trimesh:
+    """The asset's triangles, in its own frame."""
+    return trimesh.Trimesh(asset.vertices, asset.triangles, process=False)
+
+
+def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None = None) -> Evaluated:
+    """Scores a GLB file against the test views of a dataset.
+
+    Args:
+        path: The file, in the data's world frame as a run exports it.
+        data: The dataset.
+        protocol: Views and lights.
+        env: The light of the photos for the novel views; None for the environment.exr or .hdr beside the file. Without
+            either `novel_view` and `light_psnr` are None.
+
+    Raises:
+        InputError: The file, the data or the light cannot be used.
+    """
+    asset = read_asset(path)
+    split = "test" if has_test_split(data) else "train"
+    views, maps = choose_views(load_dataset(data, split, protocol.downscale), protocol)
+    env = environment_beside(path) if env is None else env
+    environment = None if env is None else read_environment(env)
+    truths, truth = load_view_truths(views), load_scene_truth(data)
+    renderer = AssetRenderer(asset)
+    predictions = asset_predictions(renderer, views, environment, protocol.spp)
+    relit, relight_part = relit_scores(renderer, views, maps, protocol.spp)
+    scores = evaluate_maps(
+        predictions, views, truths, environment, truth.light, asset_mesh(asset), truth.mesh,
+        relight=relight_part, distance=load_distance(),
+    )  # fmt: skip
+    return Evaluated(scores, views, predictions, truths, relit)
+
+
+def is_asset(path: Path) -> bool:
+    """Whether a path names an asset's file rather than a run's folder."""
+    return path.suffix.lower() in (".glb", ".gltf")
+
+
+def evaluation_path(target: Path) -> Path:
+    """Where the scores of a run, or of an asset's file, are kept."""
+    return target.with_name(f"{target.stem}_evaluation.json") if is_asset(target) else target / "evaluation.json"
+
+
+def read_evaluation(target: Path) -> dict:
+    """The scores that an earlier evaluation of a run or a file wrote.
+
+    Raises:
+        InputError: There are none.
+    """
+    path = evaluation_path(target)
+    if not path.is_file():
+        raise InputError(f"{path}: no such evaluation; make it with `splitnerf evaluate {target} --data DATA`")
+    return read_json(path, "novel_view")

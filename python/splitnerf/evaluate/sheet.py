@@ -1,0 +1,106 @@
+"""A sheet of pictures: truth, prediction and error of a few views, per map and per material quantity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from splitnerf.data.dataset import Dataset, spread
+from splitnerf.data.images import over_background, to_uint8, write_image
+from splitnerf.data.truth import ViewTruth
+from splitnerf.evaluate.relight import RelitViews
+from splitnerf.evaluate.similarity import on_white
+
+SHEET_VIEWS = 3
+ERROR_GAIN = 4
+LABEL_HEIGHT, LABEL_WIDTH = 18, 130
+PANEL_WIDTH = 160  # smaller images are enlarged by a whole factor
+
+Row = tuple[str, list[tuple[np.ndarray, np.ndarray]]]
+
+
+def write_sheet(
+    path: Path,
+    dataset: Dataset,
+    predictions: Sequence[dict[str, np.ndarray]],
+    truths: Sequence[ViewTruth],
+    evaluation: dict,
+    relit: RelitViews | None,
+) -> None:
+    """Writes the sheet, a row per quantity that has truth; relit views and albedo after the headline's scale.
+
+    Args:
+        path: Ends in .png or .jpg.
+        dataset: The views.
+        predictions: Per view, as for :func:`splitnerf.evaluate.protocol.evaluate_maps`.
+        truths: One per view.
+        evaluation: Their scores.
+        relit: The relit views, or None.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    shown = spread(range(len(dataset)), SHEET_VIEWS)
+    rows = list(_rows(shown, dataset, predictions, truths, evaluation, relit))
+    kinds = ("truth", "prediction", f"error x{ERROR_GAIN}")
+    heads = [f"{dataset.frame_names[i]}: {kind}" for i in shown for kind in kinds]
+    factor = -(-PANEL_WIDTH // dataset.width)
+    width, height = dataset.width * factor, dataset.height * factor
+    sheet = Image.new("RGB", (LABEL_WIDTH + len(heads) * width, LABEL_HEIGHT + len(rows) * height), "white")
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(size=12)
+    for column, head in enumerate(heads):
+        draw.text((LABEL_WIDTH + column * width + 4, 2), head, "black", font)
+    for line, (label, pairs) in enumerate(rows):
+        top = LABEL_HEIGHT + line * height
+        draw.multiline_text((4, top + 4), label, "black", font)
+        for i, (truth, prediction) in enumerate(pairs):
+            error = np.clip(ERROR_GAIN * np.abs(prediction - truth), 0, 1)
+            panels = Image.fromarray(to_uint8(np.concatenate([truth, prediction, error], axis=1)))
+            panels = panels.resize((3 * width, height), Image.Resampling.NEAREST)
+            sheet.paste(panels, (LABEL_WIDTH + 3 * i * width, top))
+    write_image(path, np.asarray(sheet, np.float32) / 255)
+
+
+def _rows(
+    shown: Sequence[int],
+    dataset: Dataset,
+    predictions: Sequence[dict[str, np.ndarray]],
+    truths: Sequence[ViewTruth],
+    evaluation: dict,
+    relit: RelitViews | None,
+) -> Iterator[Row]:
+    alphas = dataset.images[..., 3]
+    if all("rgb" in predictions[i] for i in shown):
+        yield "novel view", [
+            (over_background(dataset.images[i, ..., :3], alphas[i]), over_background(p["rgb"], p["alpha"]))
+            for i, p in ((i, predictions[i]) for i in shown)
+        ]
+    if relit is not None:
+        scale = np.array(evaluation["relight"]["lsq"]["scale"])
+        for name in relit.images:
+            views = [relit.view(name, i) for i in shown]
+            yield f"relit by\n{name}", [
+                (on_white(v.truth, v.truth_alpha), on_white(v.prediction, v.alpha, scale)) for v in views
+            ]
+    for key in ("albedo", "roughness", "metallic", "normal"):
+        if all(getattr(truths[i], key) is not None and key in predictions[i] for i in shown):
+            scale = np.array(evaluation["albedo"]["lsq"]["scale"]) if key == "albedo" else 1.0
+            yield key, [
+                (
+                    _shown(key, getattr(truths[i], key), alphas[i]),
+                    _shown(key, predictions[i][key], predictions[i]["alpha"], scale),
+                )
+                for i in shown
+            ]
+
+
+def _shown(key: str, values: np.ndarray, alpha: np.ndarray, scale: np.ndarray | float = 1.0) -> np.ndarray:
+    """A map as an [H, W, 3] picture on white: colours sRGB, scalars grey, normals as n / 2 + 1 / 2."""
+    if key == "albedo":
+        return on_white(values, alpha, scale)
+    if key == "normal":
+        return over_background(0.5 * values + 0.5, alpha)
+    return over_background(np.repeat(values[..., None], 3, axis=-1), alpha)

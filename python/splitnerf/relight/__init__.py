@@ -1,0 +1,1 @@
+"""Assets under other lights: cameras, backgrounds, output files and the loop over frames."""

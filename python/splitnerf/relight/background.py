@@ -1,0 +1,105 @@
+"""What stands behind the object, and putting it there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from skimage.transform import resize
+
+from splitnerf.data.environment import sample_environment
+from splitnerf.data.images import LDR_SUFFIXES, over_background, read_image, read_radiance, srgb_to_linear
+from splitnerf.errors import InputError
+from splitnerf.relight.cameras import View
+
+TRANSPARENT, WHITE, ENVIRONMENT = "transparent", "white", "environment"
+SUBPIXELS = 2
+
+
+class Background:
+    """One of "transparent", "white", "environment", or the path of an image that is scaled to fill and cropped.
+
+    Raises:
+        InputError: The image cannot be read.
+    """
+
+    def __init__(self, text: str):
+        self.transparent = text == TRANSPARENT
+        self.environment = text == ENVIRONMENT
+        self._plate: np.ndarray | None = None
+        if text not in (TRANSPARENT, WHITE, ENVIRONMENT):
+            self._plate = read_plate(Path(text))
+
+    def behind(self, view: View, environment: np.ndarray, exposure: float) -> np.ndarray | None:
+        """Linear radiance [height, width, 3] behind the object, None where it is transparent.
+
+        Args:
+            view: The camera.
+            environment: [h, w, 3], the light as it stands for this view.
+            exposure: Factor on the light; white and images stay as they are.
+        """
+        if self.transparent:
+            return None
+        if self.environment:
+            return exposure * environment_behind(view, environment)
+        if self._plate is not None:
+            return fill(self._plate, view.width, view.height)
+        return np.ones((view.height, view.width, 3), np.float32)
+
+
+def read_plate(path: Path) -> np.ndarray:
+    """Reads a background image as [h, w, 3] linear; PNG and JPEG are decoded from sRGB and laid over white.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    if path.suffix.lower() not in LDR_SUFFIXES:
+        return np.maximum(read_radiance(path), 0)
+    pixels = read_image(path)
+    channels = pixels.shape[2]
+    srgb = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
+    return srgb_to_linear(over_background(srgb, pixels[..., -1]) if channels in (2, 4) else srgb)
+
+
+def fill(plate: np.ndarray, width: int, height: int) -> np.ndarray:
+    """Scales an image [h, w, 3] so that it covers width x height, and crops it about its centre."""
+    rows, columns = plate.shape[:2]
+    scale = max(width / columns, height / rows)
+    shape = (max(height, round(rows * scale)), max(width, round(columns * scale)))
+    if shape != (rows, columns):
+        plate = resize(plate, shape, order=1, mode="edge", anti_aliasing=scale < 1)
+    top, left = (shape[0] - height) // 2, (shape[1] - width) // 2
+    return np.ascontiguousarray(plate[top : top + height, left : left + width], np.float32)
+
+
+def environment_behind(view: View, environment: np.ndarray) -> np.ndarray:
+    """The light as the camera sees it, [height, width, 3], the mean of four rays a pixel."""
+    fx, fy, cx, cy = view.intrinsics
+    total = np.zeros((view.height, view.width, 3), np.float32)
+    offsets = (np.arange(SUBPIXELS) + 0.5) / SUBPIXELS
+    for dx in offsets:
+        for dy in offsets:
+            x, y = np.meshgrid((np.arange(view.width) + dx - cx) / fx, (np.arange(view.height) + dy - cy) / fy)
+            rays = np.stack([x, -y, -np.ones_like(x)], axis=-1) @ view.pose[:3, :3].T
+            total += sample_environment(environment, rays)
+    return total / SUBPIXELS**2
+
+
+def compose(images: dict[str, np.ndarray], behind: np.ndarray | None, exposure: float) -> np.ndarray:
+    """Puts a rendering over its background, in linear light.
+
+    Args:
+        images: `radiance` [h, w, 3] premultiplied by `alpha` [h, w], and with a catcher `shadow` [h, w], the opacity
+            of its black shadow, alpha + shadow <= 1; see `AssetRenderer.render`.
+        behind: [h, w, 3] linear, or None for none.
+        exposure: Factor on the rendering.
+
+    Returns:
+        [h, w, 4] float32, linear, premultiplied: exposure * radiance + (1 - alpha - shadow) * behind, alpha 1; without
+        a background the sum of both opacities is the alpha.
+    """
+    opacity = np.clip(images["alpha"] + images.get("shadow", 0.0), 0, 1)[..., None]
+    color = exposure * images["radiance"]
+    if behind is None:
+        return np.concatenate([color, opacity], axis=2).astype(np.float32)
+    return np.concatenate([color + (1 - opacity) * behind, np.ones_like(opacity)], axis=2).astype(np.float32)

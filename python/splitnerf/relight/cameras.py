@@ -1,0 +1,143 @@
+"""Where the pictures are taken from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.frames import lens_intrinsics, read_camera_path, read_frames
+from splitnerf.data.images import read_image
+from splitnerf.errors import InputError
+
+DEFAULT_SIZE = 512
+HALF_FIELD = np.radians(19.8)  # of the shorter side; a 50 mm lens before a sensor 36 mm wide
+MARGIN = 1.1
+FRONT_AZIMUTH = -90.0  # glTF's front, +z of the file, is -y here
+
+
+@dataclass(frozen=True)
+class View:
+    """One picture to take.
+
+    Attributes:
+        pose: [4, 4] float64 camera-to-world, OpenGL axes.
+        intrinsics: (fx, fy, cx, cy) in pixels, pixel centres at +0.5.
+        width, height: Pixels.
+        light_degrees: How far the light is turned about z, counter-clockwise seen from above.
+    """
+
+    pose: np.ndarray
+    intrinsics: tuple[float, float, float, float]
+    width: int
+    height: int
+    light_degrees: float = 0.0
+
+
+def parse_size(text: str) -> tuple[int, int | None]:
+    """(width, height or None) of "W" or "WxH".
+
+    Raises:
+        InputError: Anything else, or a side below 1 or above 16384.
+    """
+    parts = text.lower().split("x")
+    if len(parts) > 2 or not all(part.isascii() and part.isdigit() and 1 <= int(part) <= 16384 for part in parts):
+        raise InputError(f"--size must be W or WxH in pixels, 1 to 16384, got '{text}'")
+    return int(parts[0]), int(parts[1]) if len(parts) == 2 else None
+
+
+def bounding_sphere(asset: Asset) -> tuple[np.ndarray, float]:
+    """Centre [3] of the bounding box and the greatest distance from it, of the vertices in use; float64."""
+    points = asset.vertices[np.unique(asset.triangles)].astype(np.float64)
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return centre, float(np.linalg.norm(points - centre, axis=1).max())
+
+
+def turntable(
+    asset: Asset, count: int, *, elevation: float = 20.0, rotate: str = "camera", size: tuple[int, int | None] | None
+) -> list[View]:
+    """Cameras on a circle about the object's bounding sphere, which fills the picture but for a margin of 10 %.
+
+    Args:
+        asset: The object.
+        count: Pictures in a full turn, at least 1; the first one is the front.
+        elevation: Of the camera above the horizon, degrees in (-90, 90).
+        rotate: "camera", or "light" where the camera stays and the light turns, counter-clockwise from above.
+        size: As from `parse_size`; None for 512x512, without a height square.
+
+    Returns:
+        `count` views.
+
+    Raises:
+        InputError: The count or the elevation is out of range.
+    """
+    if count < 1:
+        raise InputError(f"--turntable must be at least 1, got {count}")
+    if not -90 < elevation < 90:
+        raise InputError(f"--elevation must lie between -90 and 90 degrees, got {elevation:g}")
+    width, height = size or (DEFAULT_SIZE, None)
+    height = height or width
+    focal = 0.5 * min(width, height) / np.tan(HALF_FIELD)
+    centre, radius = bounding_sphere(asset)
+    distance = MARGIN * radius / np.sin(HALF_FIELD)
+    views = []
+    for turn in 360.0 * np.arange(count) / count:
+        azimuth = np.radians(FRONT_AZIMUTH + (turn if rotate == "camera" else 0.0))
+        pose = look_at(centre, azimuth, np.radians(elevation), distance)
+        light = float(turn) if rotate == "light" else 0.0
+        views.append(View(pose, (focal, focal, width / 2, height / 2), width, height, light))
+    return views
+
+
+def look_at(centre: np.ndarray, azimuth: float, elevation: float, distance: float) -> np.ndarray:
+    """[4, 4] pose of an upright camera that looks at a point; azimuth from +x towards +y, radians."""
+    level = np.cos(elevation)
+    back = np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    pose = np.eye(4)
+    pose[:3] = np.stack([right, np.cross(back, right), back, centre + distance * back], axis=1)
+    return pose
+
+
+def data_views(root: Path, split: str, size: tuple[int, int | None] | None) -> list[View]:
+    """The cameras of a data set's split, in the data's own world, the size the images' unless given.
+
+    Raises:
+        InputError: The data cannot be used, or the size has another shape than the images.
+    """
+    if not root.is_dir():
+        raise InputError(f"{root}: no such folder; give the folder of a data set")
+    frames = read_frames(root, split)
+    height, width = read_image(frames[0].image_path).shape[:2]
+    return [_lens_view(f.pose, f.lens | {"w": width, "h": height}, size, str(root), (width, height)) for f in frames]
+
+
+def path_views(path: Path, size: tuple[int, int | None] | None) -> list[View]:
+    """The cameras of a file in the form of transforms.json; its `w` and `h`, else 512x512, unless a size is given.
+
+    Raises:
+        InputError: The file cannot be used, or the size has another shape than its `w` and `h`.
+    """
+    views = []
+    for pose, lens in read_camera_path(path):
+        if ("w" in lens) != ("h" in lens):
+            raise InputError(f"{path}: has only one of 'w' and 'h'; give both or none")
+        if "fl_x" in lens and "w" not in lens:
+            raise InputError(f"{path}: 'fl_x' is in pixels and needs 'w' and 'h'; add them")
+        own = (int(lens["w"]), int(lens["h"])) if "w" in lens else None
+        views.append(_lens_view(pose, lens, size, str(path), own))
+    return views
+
+
+def _lens_view(
+    pose: np.ndarray, lens: dict, size: tuple[int, int | None] | None, name: str, own: tuple[int, int] | None
+) -> View:
+    """A view through a lens, scaled from its own (width, height) to the size asked for."""
+    width, height = size or own or (DEFAULT_SIZE, None)
+    if height is None:
+        height = max(1, round(width * own[1] / own[0])) if own else width
+    if own and abs(height - width * own[1] / own[0]) > 1:
+        raise InputError(f"{name}: is {own[0]}x{own[1]}, --size {width}x{height} would stretch it; give a width alone")
+    return View(pose, tuple(lens_intrinsics(lens, (height, width)).tolist()), width, height)

@@ -1,0 +1,132 @@
+"""The loop: every light, every frame, picture by picture to disk."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tqdm import tqdm
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.environment import read_environment, rotate_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.errors import InputError
+from splitnerf.relight.background import Background, compose
+from splitnerf.relight.cameras import View, bounding_sphere
+from splitnerf.relight.output import (
+    GIF, MP4, display_frame, prepare_folder, require_ffmpeg, write_frame, write_gif, write_mp4,
+)  # fmt: skip
+from splitnerf.render.path_traced import AssetRenderer
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How the pictures are rendered and written.
+
+    Attributes:
+        spp: Paths a pixel.
+        bounces: Scattering events after the first.
+        seed: Of the first frame; each frame has its own.
+        rotate_env: Degrees by which every map is turned about z, counter-clockwise seen from above.
+        exposure: Stops, in powers of two on the light.
+        background: See `Background`.
+        shadow_catcher: Whether an invisible ground at the object's lowest point shows its shadow.
+        gif, mp4: Whether to write them too.
+        fps: Of GIF and MP4.
+    """
+
+    spp: int = 128
+    bounces: int = 4
+    seed: int = 0
+    rotate_env: float = 0.0
+    exposure: float = 0.0
+    background: str = "transparent"
+    shadow_catcher: bool = False
+    gif: bool = False
+    mp4: bool = False
+    fps: float = 12.0
+
+
+def asset_of(path: Path) -> Asset:
+    """The asset of a run's folder or of a glTF file.
+
+    Raises:
+        InputError: There is none, or it cannot be read.
+    """
+    if path.is_dir():
+        if not (path / "mesh.glb").is_file():
+            raise InputError(f"{path}: has no mesh.glb; finish its training, or give a .glb file")
+        return read_asset(path / "mesh.glb")
+    return read_asset(path)
+
+
+def relight(
+    source: Path, maps: list[Path], views_of: Callable[[Asset], list[View]], out: Path, settings: Settings,
+    *, overwrite: bool = False,
+) -> list[Path]:  # fmt: skip
+    """Renders an asset under environment maps into NNN.png and NNN.exr, and GIF or MP4 where asked for.
+
+    Args:
+        source: A run's folder or a glTF file.
+        maps: Environment maps; with several each has a folder of its name below `out`.
+        views_of: The views of the asset, at least one.
+        out: The folder.
+        settings: See there.
+        overwrite: Whether frames that stand there are replaced.
+
+    Returns:
+        The folder of each map.
+
+    Raises:
+        InputError: Anything given cannot be used; nothing was written or removed then.
+        OSError: A file cannot be written.
+    """
+    folders = [out] if len(maps) == 1 else [out / path.stem for path in maps]
+    if len(set(folders)) < len(folders):
+        raise InputError(f"{out}: two maps have the same name and would share a folder; rename one")
+    if settings.mp4:
+        require_ffmpeg()
+    background = Background(settings.background)
+    lights = [rotate_environment(read_environment(path), settings.rotate_env) for path in maps]
+    asset = asset_of(source)
+    views = views_of(asset)
+    _check_animation(views, settings)
+    for folder in folders:
+        prepare_folder(folder, overwrite=overwrite)
+    renderer = AssetRenderer(asset)
+    ground = _lowest(asset) if settings.shadow_catcher else None
+    with tqdm(total=len(lights) * len(views), unit="frame", file=sys.stderr, disable=None) as bar:
+        for light, folder in zip(lights, folders):
+            frames = []
+            for index, view in enumerate(views):
+                turned = rotate_environment(light, view.light_degrees)
+                images = renderer.render(
+                    turned, view.pose, view.intrinsics, view.width, view.height, spp=settings.spp,
+                    bounces=settings.bounces, seed=settings.seed + index, catcher_height=ground,
+                )  # fmt: skip
+                exposure = 2.0**settings.exposure
+                linear = compose(images, background.behind(view, turned, exposure), exposure)
+                write_frame(folder, index, linear, with_alpha=background.transparent)
+                if settings.gif or settings.mp4:
+                    frames.append(display_frame(linear))
+                bar.update()
+            if settings.gif:
+                write_gif(folder / GIF, frames, settings.fps)
+            if settings.mp4:
+                write_mp4(folder / MP4, frames, settings.fps)
+    return folders
+
+
+def _check_animation(views: list[View], settings: Settings) -> None:
+    sizes = {(view.width, view.height) for view in views}
+    if (settings.gif or settings.mp4) and len(sizes) > 1:
+        raise InputError("--gif and --mp4: the frames differ in size; give --size")
+    if settings.mp4 and min(min(size) for size in sizes) < 2:
+        raise InputError("--mp4 needs frames of at least 2x2 pixels; give a larger --size")
+
+
+def _lowest(asset: Asset) -> float:
+    """z of the lowest point, lowered by a millionth of the size lest the ground cut into a flat bottom."""
+    return float(asset.vertices[asset.triangles][..., 2].min()) - 1e-6 * bounding_sphere(asset)[1]

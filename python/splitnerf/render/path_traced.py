@@ -1,0 +1,90 @@
+"""Renders a textured asset under an environment map by the path tracer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from splitnerf import _core
+from splitnerf.data.asset import Asset
+
+CLAMP_INDIRECT = 10.0
+
+
+class AssetRenderer:
+    """An asset with its acceleration structure, ready for any number of views and lights.
+
+    Args:
+        asset: What to render; its arrays are used as they are and must not change meanwhile.
+
+    Raises:
+        ValueError: The asset's arrays do not fit together.
+    """
+
+    def __init__(self, asset: Asset):
+        n = len(asset.vertices)
+        self.asset = asset
+        self._scene = _core.Scene(_float32(asset.vertices), np.ascontiguousarray(asset.triangles, np.int32))
+        self._surface = {
+            "albedo": np.ones((n, 3), np.float32) if asset.colors is None else _float32(asset.colors),
+            "roughness": np.ones(n, np.float32),
+            "metallic": np.ones(n, np.float32),
+        }
+        self._options = {
+            "normals": _float32(asset.normals),
+            "materials": _core.Materials(list(asset.materials)),
+            "material_ids": np.ascontiguousarray(asset.material_ids, np.int32),
+            "uv": None if asset.uv is None else _float32(asset.uv),
+            "tangents": None if asset.tangents is None else _float32(asset.tangents),
+        }
+
+    def render(
+        self,
+        environment: np.ndarray,
+        pose: np.ndarray,
+        intrinsics: tuple[float, float, float, float],
+        width: int,
+        height: int,
+        *,
+        spp: int = 64,
+        bounces: int = 4,
+        seed: int = 0,
+        clamp_indirect: float = CLAMP_INDIRECT,
+        pixel_filter: str = "blackman-harris",
+        catcher_height: float | None = None,
+    ) -> dict[str, np.ndarray]:
+        """Path-traces one view; equal seeds give equal images.
+
+        Args:
+            environment: [h, w, 3] linear radiance >= 0, equirectangular, in Blender's convention.
+            pose: [3 or 4, 4] camera-to-world, OpenGL axes.
+            intrinsics: (fx, fy, cx, cy) in pixels, pixel centres at +0.5.
+            width: Pixels.
+            height: Pixels.
+            spp: Paths a pixel.
+            bounces: Scattering events after the first one; 0 is direct light only.
+            seed: Of the random numbers.
+            clamp_indirect: Largest channel of one indirect contribution, against specks of caustics; 0 is unbiased.
+            pixel_filter: "blackman-harris" (1.5 pixels wide, Blender's default) or "box".
+            catcher_height: z of an invisible ground plane that shows the shadow of the direct light; None for none.
+
+        Returns:
+            float32 maps: `radiance` [height, width, 3] linear, premultiplied by `alpha` [height, width]; of the first
+            hit, straight, 0 where there is none, `albedo` [height, width, 3] linear, `roughness`, `metallic`, `normal`
+            (world space, normal texture included) and `smooth_normal` (without it), `depth` along the ray; with a
+            catcher `shadow`, the opacity of its black shadow (alpha + shadow <= 1).
+
+        Raises:
+            ValueError: A map, a pose or a size that cannot be used.
+        """
+        fx, fy, cx, cy = (float(value) for value in intrinsics)
+        images = _core.render(
+            self._scene, **self._surface, environment=_float32(environment), camera_to_world=_float32(pose[:3]),
+            fx=fx, fy=fy, cx=cx, cy=cy, width=width, height=height, **self._options, spp=spp, max_bounces=bounces,
+            seed=seed, clamp_indirect=clamp_indirect, pixel_filter=pixel_filter, catcher_height=catcher_height,
+        )  # fmt: skip
+        del images["rays"]
+        return images
+
+
+def _float32(values: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(values, np.float32)

@@ -1,0 +1,1 @@
+"""Renders data sets with full truth from an asset."""

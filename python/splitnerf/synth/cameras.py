@@ -1,0 +1,55 @@
+"""Where the cameras of a rendered data set stand: on a sphere about the origin, which they look at."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def spiral(n: int, distance: float, elevations: tuple[float, float], turn: float = 0.0) -> np.ndarray:
+    """Cameras spread evenly over a band of the sphere, on a golden spiral.
+
+    Args:
+        n: Number of cameras.
+        distance: From the origin.
+        elevations: Lowest and highest, in degrees from the horizon.
+        turn: Azimuth of the first, in degrees.
+
+    Returns:
+        [n, 4, 4] float64 camera-to-world, OpenGL axes.
+    """
+    golden_turn = 360 / ((1 + np.sqrt(5)) / 2)
+    heights = np.linspace(*np.sin(np.radians(elevations)), n)
+    return _poses(turn + np.arange(n) * golden_turn, np.degrees(np.arcsin(heights)), distance)
+
+
+def orbit(n: int, distance: float, elevation: float, swing: float = 0.0, start: float = 0.5) -> np.ndarray:
+    """Cameras on one turn about the vertical.
+
+    Args:
+        n: Number of cameras.
+        distance: From the origin.
+        elevation: Mean elevation in degrees.
+        swing: Amplitude in degrees with which the elevation goes up and down, twice a turn.
+        start: Azimuth of the first, in steps of 360 / n degrees.
+
+    Returns:
+        [n, 4, 4] float64 camera-to-world, OpenGL axes.
+    """
+    share = np.arange(n) / n
+    return _poses(360 * (share + start / n), elevation + swing * np.sin(4 * np.pi * share), distance)
+
+
+def direction(azimuth: float, elevation: float) -> np.ndarray:
+    """Unit vector from degrees: azimuth from +x towards +y, elevation from the horizon."""
+    a, e = np.radians(azimuth), np.radians(elevation)
+    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+
+
+def _poses(azimuths: np.ndarray, elevations: np.ndarray, distance: float) -> np.ndarray:
+    poses = np.tile(np.eye(4), (len(azimuths), 1, 1))
+    for pose, azimuth, elevation in zip(poses, azimuths, elevations):
+        back = direction(azimuth, elevation)
+        right = np.cross([0, 0, 1], back)
+        right /= np.linalg.norm(right)
+        pose[:3] = np.stack([right, np.cross(back, right), back, distance * back], axis=1)
+    return poses

@@ -1,0 +1,186 @@
+"""From an asset and environment maps to a dataset with truth."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from tqdm import tqdm
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.environment import read_environment, resize_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.relit import PREFIX
+from splitnerf.errors import InputError
+from splitnerf.notes import note
+from splitnerf.synth.cameras import orbit, spiral
+from splitnerf.synth.placed import write_placed_glb
+from splitnerf.synth.writer import LAYOUTS, SceneWriter
+
+RENDERERS = ("project", "blender")
+CAMERA_ANGLE_X = 0.6911112070083618  # of the NeRF Blender scenes
+CAMERA_DISTANCE = 3.0233467  # three quarters of theirs: it frames the unit sphere
+TRAIN_ELEVATIONS, TEST_ELEVATION, TEST_SWING = (-20.0, 78.0), 30.0, 20.0
+MAP_SIZE = (256, 512)
+
+
+class ViewRenderer(Protocol):
+    """What renders the views: :class:`splitnerf.render.path_traced.AssetRenderer`, or Blender."""
+
+    def render(
+        self, environment: np.ndarray, pose: np.ndarray, intrinsics: tuple[float, float, float, float],
+        width: int, height: int, *, spp: int, seed: int,
+    ) -> dict[str, np.ndarray]: ...  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SynthSettings:
+    """How much to render, and how to store it.
+
+    Attributes:
+        size: Width and height of the images in pixels.
+        train: Number of train views.
+        test: Number of test views.
+        spp: Paths a pixel.
+        layout: One of :data:`splitnerf.synth.writer.LAYOUTS`.
+        renderer: "project" for the path tracer, "blender" for Blender's Cycles.
+        seed: Of the renderings and of the first camera's azimuth.
+    """
+
+    size: int = 200
+    train: int = 100
+    test: int = 20
+    spp: int = 256
+    layout: str = "blender"
+    renderer: str = "project"
+    seed: int = 0
+
+    def check(self) -> None:
+        """Raises InputError where a setting has no meaning."""
+        for name in ("size", "train", "test", "spp"):
+            if getattr(self, name) < 1:
+                raise InputError(f"--{name} must be at least 1, got {getattr(self, name)}")
+        if self.seed < 0:
+            raise InputError(f"--seed must not be negative, got {self.seed}")
+        for name, known in (("layout", LAYOUTS), ("renderer", RENDERERS)):
+            if getattr(self, name) not in known:
+                raise InputError(f"--{name} must be one of {', '.join(known)}, got {getattr(self, name)}")
+
+
+def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, settings: SynthSettings) -> Path:
+    """Renders a dataset with truth.
+
+    The asset is moved and scaled so that its bounding box is centred at the origin and its farthest vertex lies on the
+    unit sphere; its emission is left out, since the environment is taken to be the only light. A GLB file is copied so
+    placed to `asset.glb`.
+
+    Args:
+        asset: A glTF file.
+        light: The environment map of the photos.
+        relight: The maps of the relit test views.
+        out: The dataset's folder, absent or empty.
+        settings: What to render.
+
+    Returns:
+        `out`.
+
+    Raises:
+        InputError: The asset, a map, the folder or a setting cannot be used, or Blender is missing.
+        OSError: A file cannot be written.
+    """
+    settings.check()
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"{out}: exists and is not an empty folder; give another --out")
+    names = [path.stem.removeprefix(PREFIX) for path in relight]
+    if len(set(names)) < len(names):
+        raise InputError(f"--relight: two maps are called {max(names, key=names.count)}; rename one")
+    maps = [resized(read_environment(path)) for path in (light, *relight)]
+    original = read_asset(asset)
+    if any(any(material.emission) for material in original.materials):
+        note(f"{asset}: emits light; left out, the environment is the only light")
+    centre, scale = unit_sphere(original)
+    renderer: ViewRenderer
+    if settings.renderer == "blender":
+        from splitnerf.synth.blender import BlenderRenderer
+
+        renderer = BlenderRenderer(asset, centre, scale)
+    else:
+        from splitnerf.render.path_traced import AssetRenderer
+
+        renderer = AssetRenderer(normalised(original, centre, scale))
+
+    writer = SceneWriter(out, CAMERA_ANGLE_X, settings.layout)
+    writer.mesh((original.vertices - centre) * scale, original.triangles)
+    write_placed_glb(asset, out / "asset.glb", centre, scale)
+    stored = writer.light(maps[0])
+    stored_relight = {name: writer.light(environment, name) for name, environment in zip(names, maps[1:])}
+    render_views(renderer, writer, stored, stored_relight, settings)
+    writer.close()
+    return out
+
+
+def render_views(
+    renderer: ViewRenderer,
+    writer: SceneWriter,
+    light: np.ndarray,
+    relight: dict[str, np.ndarray],
+    settings: SynthSettings,
+) -> None:
+    """Renders all views and hands them to the writer.
+
+    Args:
+        renderer: The asset, inside the unit sphere.
+        writer: Takes the views.
+        light: [h, w, 3] linear radiance of the photos.
+        relight: [h, w, 3] each, by name, for the test views.
+        settings: Numbers, size and seed.
+    """
+    size = settings.size
+    focal = 0.5 * size / np.tan(0.5 * CAMERA_ANGLE_X)
+    turn = np.random.default_rng(settings.seed).uniform(0, 360) if settings.seed else 0.0
+    cameras = {
+        "train": spiral(settings.train, CAMERA_DISTANCE, TRAIN_ELEVATIONS, turn),
+        "test": orbit(settings.test, CAMERA_DISTANCE, TEST_ELEVATION, TEST_SWING),
+    }
+    total = settings.train + settings.test * (1 + len(relight))
+    seeds = itertools.count(settings.seed * total)  # every image has its own
+    with tqdm(total=total, desc="rendering", unit="view", leave=False, disable=None) as progress:
+
+        def shot(environment: np.ndarray, pose: np.ndarray) -> dict[str, np.ndarray]:
+            seed = next(seeds) % (1 << 31)
+            lens = (focal, focal, size / 2, size / 2)
+            progress.update()
+            return renderer.render(environment, pose, lens, size, size, spp=settings.spp, seed=seed)
+
+        for split, poses in cameras.items():
+            for i, pose in enumerate(poses):
+                writer.view(split, i, pose, shot(light, pose))
+        for name, environment in relight.items():
+            for i, pose in enumerate(cameras["test"]):
+                writer.relit("test", i, name, shot(environment, pose))
+
+
+def unit_sphere(asset: Asset) -> tuple[np.ndarray, float]:
+    """Centre [3] of the asset's bounding box, and the scale that then brings its farthest vertex to distance 1."""
+    used = asset.vertices[np.unique(asset.triangles)].astype(np.float64)
+    centre = (used.min(axis=0) + used.max(axis=0)) / 2
+    return centre, float(1 / np.linalg.norm(used - centre, axis=1).max())
+
+
+def normalised(asset: Asset, centre: np.ndarray, scale: float) -> Asset:
+    """The asset in the dataset's world, (x - centre) scale, without emission."""
+    return replace(
+        asset,
+        vertices=((asset.vertices - centre) * scale).astype(np.float32),
+        materials=[replace(m, emission=(0.0, 0.0, 0.0), emission_texture=None) for m in asset.materials],
+    )
+
+
+def resized(environment: np.ndarray) -> np.ndarray:
+    """The map at no more than 512 x 256 pixels."""
+    height, width = (min(a, b) for a, b in zip(environment.shape, MAP_SIZE))
+    return resize_environment(environment, height, width)

@@ -1,0 +1,52 @@
+"""A copy of a GLB file, moved and scaled into a dataset's world."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.images import atomic_path
+
+HEADER = 20  # of the file and of its first chunk, which is the JSON
+
+
+def write_placed_glb(source: Path, target: Path, centre: np.ndarray, scale: float) -> bool:
+    """Writes the asset with a node above its scene that applies (x - centre) scale, and without emission.
+
+    Args:
+        source: A file that `read_asset` has read.
+        target: Ends in .glb.
+        centre: [3] of the source's world, z up.
+        scale: Then applied.
+
+    Returns:
+        Whether it was written: a .gltf, whose data lie in other files, is not copied.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    data = source.read_bytes()
+    if data[:4] != b"glTF":
+        return False
+    length = struct.unpack_from("<I", data, 12)[0]
+    document, rest = json.loads(data[HEADER : HEADER + length]), data[HEADER + length :]
+    stored = [item for kind in ("buffers", "images") for item in document.get(kind, [])]
+    if any(not item.get("uri", "data:").startswith("data:") for item in stored):
+        return False
+    scene = document["scenes"][document.get("scene", 0)]
+    x, y, z = (float(-value * scale) for value in centre)
+    root = {"name": "unit sphere", "children": scene["nodes"], "scale": [scale] * 3, "translation": [x, z, -y]}
+    scene["nodes"] = [len(document["nodes"])]
+    document["nodes"].append(root)
+    for material in document.get("materials", []):
+        material.pop("emissiveFactor", None)
+        material.pop("emissiveTexture", None)
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    with atomic_path(target) as temporary, open(temporary, "wb") as file:
+        file.write(struct.pack("<4sII", b"glTF", 2, HEADER + len(text) + len(rest)))
+        file.write(struct.pack("<I4s", len(text), b"JSON") + text + rest)
+    return True

@@ -1,0 +1,383 @@
+"""glTF files: axes, transforms, exact factors, textures in their colour spaces, and a clear line for what is wrong."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from gltf_builder import TRIANGLE, TRIANGLE_UV, Gltf, triangle
+
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import srgb_to_linear
+from splitnerf.errors import InputError
+from splitnerf.export.mesh import write_mesh_glb
+
+SCENES = Path(os.environ.get("SPLITNERF_DATA", Path(__file__).parents[2].parent / "shared" / "data")) / "scenes"
+
+
+def z_up(vectors):
+    return np.stack([vectors[:, 0], -vectors[:, 2], vectors[:, 1]], axis=1)
+
+
+def face_normals(asset):
+    a, b, c = (asset.vertices[asset.triangles[:, k]] for k in range(3))
+    crosses = np.cross(b - a, c - a)
+    return crosses / np.linalg.norm(crosses, axis=1, keepdims=True)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "a.glb"
+
+
+# ---- geometry ----
+
+
+def test_what_the_program_writes_is_read_back(path):
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    normals, albedo = np.array(ball.vertices), (np.array(ball.vertices) + 1) / 2
+    vertices = normals * [1, 2, 3]
+    write_mesh_glb(path, vertices, ball.faces, normals, albedo, 0.123456789, 0.1)
+    asset = read_asset(path)
+    assert asset.name == "a"
+    assert asset.vertices == pytest.approx(vertices, abs=1e-6)
+    assert asset.normals == pytest.approx(normals, abs=1e-6)
+    assert asset.colors == pytest.approx(albedo, abs=1e-5)  # 16 bit; 8 would leave 2e-3
+    assert np.array_equal(asset.triangles, ball.faces)
+    assert (asset.material_ids == 0).all() and len(asset.materials) == 1
+    material = asset.materials[0]
+    assert (material.roughness, material.metallic) == pytest.approx((0.123456789, 0.1), abs=1e-9)
+    assert asset.uv is None and asset.tangents is None
+    kinds = {name: getattr(asset, name).dtype.name for name in ("vertices", "normals", "triangles", "material_ids")}
+    assert kinds == {"vertices": "float32", "normals": "float32", "triangles": "int32", "material_ids": "int32"}
+
+
+def test_without_normals_shading_is_flat(path):
+    position = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]], np.float32)
+    asset = read_asset(triangle(position=position, indices=[0, 1, 2, 1, 3, 2]).write(path))
+    assert len(asset.vertices) == 6  # shared vertices part
+    for corner in range(3):
+        assert asset.normals[asset.triangles[:, corner]] == pytest.approx(face_normals(asset), abs=1e-6)
+
+
+def test_nodes_translate_turn_scale_in_that_order_down_the_tree(path):
+    gltf = Gltf()
+    mesh = gltf.mesh(gltf.primitive(NORMAL=[[0, 0, 1]] * 3))
+    child = gltf.node(root=False, mesh=mesh, scale=[2, 3, 4], rotation=[0, 0, np.sqrt(0.5), np.sqrt(0.5)])
+    matrix = np.eye(4)
+    matrix[:3, 3] = [10, 20, 30]
+    gltf.node(children=[child], matrix=matrix.T.ravel().tolist())
+    asset = read_asset(gltf.write(path))
+    # Scaled, then a quarter turn about z of the file takes (x, y) to (-y, x), then moved.
+    expected = TRIANGLE * [2, 3, 4]
+    expected = np.stack([-expected[:, 1], expected[:, 0], expected[:, 2]], axis=1) + [10, 20, 30]
+    assert asset.vertices == pytest.approx(z_up(expected), abs=1e-5)
+    assert asset.normals == pytest.approx(np.tile([0, -1, 0], (3, 1)), abs=1e-6)  # +z of the file
+
+
+def test_instances_repeat_and_a_mirrored_one_still_faces_outward(path):
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    gltf = Gltf()
+    mesh = gltf.mesh(gltf.primitive(ball.vertices, ball.faces, NORMAL=ball.vertices))
+    gltf.node(mesh=mesh)
+    gltf.node(mesh=mesh, translation=[5, 0, 0], scale=[-1, 2, 1])
+    asset = read_asset(gltf.write(path))
+    assert len(asset.triangles) == 2 * len(ball.faces)
+    centres = np.where(asset.vertices[asset.triangles].mean(axis=1)[:, :1] > 2.5, [[5, 0, 0]], [[0, 0, 0]])
+    outward = asset.vertices[asset.triangles].mean(axis=1) - centres
+    assert ((face_normals(asset) * outward).sum(axis=1) > 0).all()
+    # The ellipsoid's normals are the gradient of its equation, y of the file being z here.
+    second = asset.vertices[:, 0] > 2.5
+    gradient = (asset.vertices[second] - [5, 0, 0]) / [1, 1, 4]
+    gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
+    assert asset.normals[second] == pytest.approx(gradient, abs=1e-5)
+
+
+def test_strips_and_fans_become_triangles(path):
+    square = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], np.float32)
+    for mode, indices in ((5, [0, 1, 2, 3]), (6, [0, 1, 3, 2])):
+        asset = read_asset(triangle(position=square, indices=indices, mode=mode).write(path))
+        assert len(asset.triangles) == 2
+        assert face_normals(asset) == pytest.approx(np.tile([0, -1, 0], (2, 1)), abs=1e-6)
+
+
+def test_interleaved_sparse_and_quantised_accessors(path):
+    gltf = Gltf()
+    primitive = gltf.primitive()
+    rows = np.zeros((3, 5), np.float32)
+    rows[:, :3], rows[:, 3:] = TRIANGLE, TRIANGLE_UV
+    view = gltf.view(rows.tobytes(), byteStride=20)
+    base = {"bufferView": view, "componentType": 5126, "count": 3}
+    indices, values = gltf.view(np.array([1], "<u2").tobytes()), gltf.view(np.array([7, 8, 9], "<f4").tobytes())
+    sparse = {
+        "count": 1, "indices": {"bufferView": indices, "componentType": 5123}, "values": {"bufferView": values},
+    }  # fmt: skip
+    gltf.json["accessors"] += [base | {"type": "VEC3", "sparse": sparse}, base | {"type": "VEC2", "byteOffset": 12}]
+    count = len(gltf.json["accessors"])
+    primitive["attributes"] |= {"POSITION": count - 2, "TEXCOORD_0": count - 1}
+    primitive["attributes"]["NORMAL"] = gltf.accessor([[0, 0, 127]] * 3, "int8", normalized=True)
+    primitive["attributes"]["COLOR_0"] = gltf.accessor([[255, 51, 0, 255]] * 3, "uint8", normalized=True)
+    slot = {"index": gltf.texture(np.ones((2, 2, 3)))}
+    primitive["material"] = gltf.material(pbrMetallicRoughness={"baseColorTexture": slot})
+    gltf.node(mesh=gltf.mesh(primitive))
+    asset = read_asset(gltf.write(path))
+    assert asset.vertices == pytest.approx(z_up(np.array([[0, 0, 0], [7, 8, 9], [0, 1, 0]])), abs=1e-6)
+    assert asset.uv == pytest.approx(TRIANGLE_UV)
+    assert asset.normals == pytest.approx(np.tile([0, -1, 0], (3, 1)))
+    assert asset.colors == pytest.approx(np.tile([1, 0.2, 0], (3, 1)))
+
+
+def test_skin_stands_in_its_rest_pose(path, capsys):
+    gltf = Gltf()
+    primitive = gltf.primitive(NORMAL=[[0, 0, 1]] * 3)
+    primitive["attributes"]["JOINTS_0"] = gltf.accessor([[0, 1, 0, 0]] * 3, "uint8")
+    primitive["attributes"]["WEIGHTS_0"] = gltf.accessor([[1, 0, 0, 0], [0, 1, 0, 0], [0.5, 0.5, 0, 0]])
+    joints = [gltf.node(translation=[0, 0, 2]), gltf.node(translation=[0, 4, 0])]
+    gltf.json["skins"] = [{"joints": joints}]
+    gltf.node(mesh=gltf.mesh(primitive), skin=0, translation=[100, 0, 0])  # without effect, as glTF prescribes
+    asset = read_asset(gltf.write(path))
+    moved = TRIANGLE + [[0, 0, 2], [0, 4, 0], [0, 2, 1]]
+    assert asset.vertices == pytest.approx(z_up(moved), abs=1e-6)
+    assert "has a skin; drawn in its rest pose" in capsys.readouterr().err
+
+
+# ---- materials ----
+
+
+def test_materials_textures_and_colour_spaces(path):
+    gltf = Gltf()
+    levels = np.random.default_rng(0).integers(0, 256, (4, 2, 3)) / 255
+    slot = {"index": gltf.texture(levels)}
+    textured = gltf.material(
+        name="painted", emissiveFactor=[0.25, 0.5, 1.0], emissiveTexture=slot,
+        normalTexture=slot | {"scale": 0.5}, extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}},
+        pbrMetallicRoughness={
+            "baseColorFactor": [0.123456789, 0.5, 0.7, 0.3], "roughnessFactor": 0.345678901, "metallicFactor": 0.25,
+            "baseColorTexture": slot, "metallicRoughnessTexture": slot,
+        },
+    )  # fmt: skip
+    plain = gltf.material(name="plain", pbrMetallicRoughness={"roughnessFactor": 0.5})
+    normal = {"NORMAL": [[0, 0, 1]] * 3}
+    parts = [
+        gltf.primitive(material=plain, **normal),
+        gltf.primitive(
+            TRIANGLE + 1, material=textured, TEXCOORD_0=TRIANGLE_UV, COLOR_0=[[0.5, 0.25, 1e-4]] * 3, **normal
+        ),
+        gltf.primitive(TRIANGLE + 2, material=plain, **normal),
+    ]
+    gltf.node(mesh=gltf.mesh(*parts))
+    asset = read_asset(gltf.write(path))
+    assert [m.name for m in asset.materials] == ["plain", "painted"] and asset.material_ids.tolist() == [0, 1, 0]
+    first, second = asset.materials
+    assert (first.albedo, first.roughness, first.metallic) == ((1, 1, 1), 0.5, 1.0)  # glTF's defaults
+    assert first.albedo_texture is None and first.normal_texture is None
+    assert second.albedo == pytest.approx((0.123456789, 0.5, 0.7), abs=1e-9)
+    assert (second.roughness, second.metallic) == pytest.approx((0.345678901, 0.25), abs=1e-9)
+    assert second.emission == (1, 2, 4)
+    assert second.albedo_texture == pytest.approx(srgb_to_linear(levels), abs=1e-6)
+    assert second.emission_texture == pytest.approx(srgb_to_linear(levels), abs=1e-6)
+    assert second.roughness_metallic_texture == pytest.approx(levels[..., 1:], abs=1e-6)
+    assert second.normal_texture == pytest.approx((2 * levels - 1) * [0.5, 0.5, 1], abs=1e-6)
+    assert asset.uv[3:6] == pytest.approx(TRIANGLE_UV) and not asset.uv[:3].any()
+    assert asset.colors[3:6] == pytest.approx(np.tile([0.5, 0.25, 1e-4], (3, 1))) and (asset.colors[:3] == 1).all()
+
+
+def test_tangents_from_coordinates_and_from_the_file(path):
+    # u grows along +x of the file, v downward along -y: the tangent is +x, the bitangent +y, z here.
+    for given in (None, [[1, 0, 0, 1]] * 3):
+        for mirror in (1, -1):
+            gltf = Gltf()
+            material = gltf.material(normalTexture={"index": gltf.texture(np.full((2, 2, 3), 0.5))})
+            extra = {} if given is None else {"TANGENT": given}
+            part = gltf.primitive(material=material, TEXCOORD_0=TRIANGLE_UV, NORMAL=[[0, 0, 1]] * 3, **extra)
+            gltf.node(mesh=gltf.mesh(part), scale=[mirror, 1, 1])
+            asset = read_asset(gltf.write(path))
+            tangent, sign = asset.tangents[:, :3], asset.tangents[:, 3:]
+            assert tangent == pytest.approx(np.tile([mirror, 0, 0], (3, 1)), abs=1e-6)
+            assert sign * np.cross(asset.normals, tangent) == pytest.approx(np.tile([0, 0, 1], (3, 1)), abs=1e-6)
+
+
+def test_tangents_part_where_the_texture_is_mirrored(path):
+    # Two triangles share the edge x = 0; u = |x| on both, so u grows away from it to either side.
+    position = np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0]], np.float32)
+    uv = np.stack([np.abs(position[:, 0]), 1 - position[:, 1]], axis=1)
+    gltf = Gltf()
+    material = gltf.material(normalTexture={"index": gltf.texture(np.full((2, 2, 3), 0.5))})
+    part = gltf.primitive(position, [0, 2, 1, 0, 1, 3], material=material, TEXCOORD_0=uv, NORMAL=[[0, 0, 1]] * 4)
+    gltf.node(mesh=gltf.mesh(part))
+    asset = read_asset(gltf.write(path))
+    corners = z_up(position)[[[0, 2, 1], [0, 1, 3]]]
+    assert asset.vertices[asset.triangles] == pytest.approx(corners) and len(asset.vertices) == 6
+    assert asset.uv[asset.triangles] == pytest.approx(uv[[[0, 2, 1], [0, 1, 3]]])
+    for triangle_tangents, side in zip(asset.tangents[asset.triangles], (1, -1)):
+        assert triangle_tangents == pytest.approx(np.tile([side, 0, 0, side], (3, 1)), abs=1e-6)
+
+
+def test_texture_transform_and_second_set(path):
+    # The extension's order: scaled by (2, 3), turned a quarter counter-clockwise with v downward, moved.
+    gltf = Gltf()
+    transform = {"scale": [2, 3], "rotation": np.pi / 2, "offset": [0.1, 0.2], "texCoord": 1}
+    slot = {"index": gltf.texture(np.ones((2, 2, 3))), "extensions": {"KHR_texture_transform": transform}}
+    material = gltf.material(pbrMetallicRoughness={"baseColorTexture": slot})
+    part = gltf.primitive(material=material, NORMAL=[[0, 0, 1]] * 3, TEXCOORD_0=TRIANGLE_UV * 0, TEXCOORD_1=TRIANGLE_UV)
+    gltf.node(mesh=gltf.mesh(part))
+    gltf.json["extensionsRequired"] = ["KHR_texture_transform"]
+    asset = read_asset(gltf.write(path))
+    scaled = TRIANGLE_UV * [2, 3]
+    assert asset.uv == pytest.approx(np.stack([scaled[:, 1], -scaled[:, 0]], axis=1) + [0.1, 0.2], abs=1e-6)
+
+
+def test_gltf_with_files_and_data_uris(tmp_path):
+    gltf = triangle(NORMAL=[[0, 0, 1]] * 3)
+    content = {key: value for key, value in gltf.json.items() if value != []}
+    (tmp_path / "the data.bin").write_bytes(gltf.binary)
+    path = tmp_path / "a.gltf"
+    inline = "data:application/octet-stream;base64," + base64.b64encode(gltf.binary).decode()
+    for uri in ("the%20data.bin", inline):
+        path.write_text(json.dumps(content | {"buffers": [{"byteLength": len(gltf.binary), "uri": uri}]}))
+        assert read_asset(path).vertices == pytest.approx(z_up(TRIANGLE))
+    (tmp_path / "the data.bin").unlink()
+    path.write_text(json.dumps(content | {"buffers": [{"byteLength": len(gltf.binary), "uri": "the%20data.bin"}]}))
+    with pytest.raises(InputError, match=r"the data.bin: no such file, though a.gltf refers to it"):
+        read_asset(path)
+
+
+def test_repairs_are_said(path, capsys):
+    gltf = triangle(NORMAL=[[0, 0, 0]] * 3)
+    gltf.json["meshes"][0]["primitives"][0]["targets"] = [{}]
+    gltf.json["meshes"][0]["primitives"].append({"attributes": {"POSITION": 0}, "mode": 0})
+    gltf.json["animations"] = [{}]
+    gltf.json["extensionsUsed"] = ["KHR_lights_punctual"]
+    asset = read_asset(gltf.write(path))
+    assert asset.normals == pytest.approx(np.tile([0, -1, 0], (3, 1)))
+    material = asset.materials[0]
+    assert (material.albedo, material.roughness, material.metallic) == ((1, 1, 1), 1.0, 1.0)
+    said = capsys.readouterr().err
+    for text in (
+        "no material; drawn as glTF's default", "morph targets; drawn in its base shape", "points or lines; left out",
+        "animations; drawn as it stands", "uses KHR_lights_punctual; left out", "normals of length 0",
+    ):  # fmt: skip
+        assert text in said
+    gltf = Gltf()
+    gltf.node(mesh=gltf.mesh(gltf.primitive(material=gltf.material(name="glass", alphaMode="BLEND"))))
+    read_asset(gltf.write(path))
+    assert "material 'glass' is transparent (alphaMode BLEND); drawn opaque" in capsys.readouterr().err
+
+
+# ---- bad input ----
+
+
+def without_uv(gltf):
+    slot = {"index": gltf.texture(np.ones((2, 2, 3)))}
+    gltf.json["meshes"][0]["primitives"][0]["material"] = gltf.material(
+        name="m", pbrMetallicRoughness={"baseColorTexture": slot}
+    )
+
+
+def two_coordinates(gltf):
+    without_uv(gltf)
+    gltf.json["materials"][0]["emissiveTexture"] = {"index": 0, "texCoord": 1}
+
+
+def broken_image(gltf):
+    without_uv(gltf)
+    gltf.json["images"][0] = {"name": "bad", "bufferView": gltf.view(b"no image")}
+
+
+def endless_factor(gltf):
+    gltf.json["meshes"][0]["primitives"][0]["material"] = gltf.material(
+        name="m", pbrMetallicRoughness={"roughnessFactor": float("nan")}
+    )
+
+
+def set_position(value):
+    def change(gltf):
+        gltf.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = gltf.accessor(value)
+
+    return change
+
+
+def set_json(**content):
+    return lambda gltf: gltf.json.update(content)
+
+
+def set_primitive(**content):
+    return lambda gltf: gltf.json["meshes"][0]["primitives"][0].update(content)
+
+
+def out_of_range(gltf):
+    gltf.json["meshes"][0]["primitives"][0]["indices"] = gltf.accessor([0, 1, 3], "uint16")
+
+
+def beyond_the_view(gltf):
+    gltf.json["accessors"][0]["count"] = 1000
+
+
+def two_indices(gltf):
+    gltf.json["meshes"][0]["primitives"][0]["indices"] = gltf.accessor([0, 1], "uint16")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (set_json(extensionsRequired=["KHR_draco_mesh_compression"]), "requires KHR_draco_mesh_compression"),
+        (set_json(extensionsRequired=["KHR_texture_basisu", "EXT_a"]), "requires EXT_a, KHR_texture_basisu"),
+        (set_json(meshes=[], nodes=[], scenes=[{}]), "has no triangles; export a mesh"),
+        (set_primitive(mode=0), "has no triangles, only points or lines"),
+        (set_primitive(indices=99), "is not valid glTF"),
+        (set_json(nodes=[{"children": [0]}]), "node 0 stands in the scene twice"),
+        (set_json(nodes=[{"mesh": 0, "scale": [1, 0, 1]}]), "has no triangles"),
+        (set_json(asset={"version": "1.0"}), "is glTF 1.0; only 2.0 is read"),
+        (set_position(np.full((3, 3), np.nan)), "mesh 'part' has NaN or infinite values in POSITION"),
+        (set_json(nodes=[{"mesh": 0, "scale": [1e39, 1e39, 1e39]}]), "has NaN or infinite coordinates after its tr"),
+        (set_position(np.zeros((3, 3))), "no triangle has an area"),
+        (set_position(np.zeros((4, 3))), "has 3 values of NORMAL for 4 vertices"),
+        (out_of_range, "vertex indices out of range, 3 of 3"),
+        (two_indices, "has 2 indices, not three a triangle"),
+        (beyond_the_view, "an accessor reaches beyond its buffer view"),
+        (without_uv, "material 'm' has textures, but a mesh with it has no TEXCOORD_0"),
+        (two_coordinates, "textures of material 'm' have different coordinates"),
+        (endless_factor, "material 'm' has a factor that is no usable number"),
+        (broken_image, "image 0 'bad': cannot be read as an image"),
+    ],
+)
+def test_bad_files_give_one_clear_line(path, change, message):
+    gltf = triangle(NORMAL=[[0, 0, 1]] * 3)
+    change(gltf)
+    with pytest.raises(InputError, match=rf"^{path}: .*{message}") as caught:
+        read_asset(gltf.write(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_containers_that_are_none(path):
+    whole = triangle().write(path).read_bytes()
+    for content, message in (
+        (whole[: len(whole) // 2], "truncated GLB"),
+        (whole[:10], "truncated GLB"),
+        (whole[:4] + b"\1\0\0\0" + whole[8:], "GLB version 1"),
+        (b"glTX" + whole[4:], "is neither a GLB nor glTF's JSON"),
+        (b"", "is neither a GLB nor glTF's JSON"),
+        (b"[]", "is JSON but not glTF"),
+    ):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=f"^{path}: .*{message}"):
+            read_asset(path)
+    path.unlink()
+    with pytest.raises(InputError, match="no such file"):
+        read_asset(path)
+
+
+@pytest.mark.parametrize("scene", ["boombox", "avocado", "corset", "teapot"])
+def test_rendered_scenes_are_read_as_their_mesh_stands(scene):
+    if not SCENES.is_dir():
+        pytest.skip(f"{SCENES} is absent: the rendered scenes are not in the repository")
+    asset = read_asset(SCENES / scene / "asset.glb")
+    truth = trimesh.load_mesh(SCENES / scene / "mesh.ply", process=False)
+    assert np.stack([asset.vertices.min(0), asset.vertices.max(0)]) == pytest.approx(truth.bounds, abs=2e-3)
+    agree = (face_normals(asset) * asset.normals[asset.triangles[:, 0]]).sum(axis=1) > 0
+    assert agree.mean() > 0.99

@@ -1,0 +1,124 @@
+"""AssetRenderer: constants come out as they are, and real assets look as Blender renders them."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from splitnerf import _core
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.environment import read_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import linear_to_srgb, over_background, read_image
+from splitnerf.evaluate.metrics import psnr
+from splitnerf.render.path_traced import AssetRenderer
+
+SCENES = Path(os.environ.get("SPLITNERF_DATA", "../shared/data")) / "scenes"
+SIZE = 16
+FROM_ABOVE = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4.0]])
+
+
+def square(material: Material) -> Asset:
+    """[-1, 1]^2 at z = 0, its texture upright when seen from above."""
+    return Asset(
+        "square",
+        np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
+        np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        np.tile(np.array([0, 0, 1], np.float32), (4, 1)),
+        np.zeros(2, np.int32),
+        [material],
+        uv=np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32),
+        tangents=np.tile(np.array([1, 0, 0, 1], np.float32), (4, 1)),
+    )
+
+
+def render(asset: Asset, light: float = 1.0, **options) -> dict[str, np.ndarray]:
+    environment = np.full((4, 8, 3), light, np.float32)
+    focal = 4 * SIZE / 2  # the square fills the image
+    lens = (focal, focal, SIZE / 2, SIZE / 2)
+    return AssetRenderer(asset).render(environment, FROM_ABOVE, lens, SIZE, SIZE, **options)
+
+
+def test_texture_stands_upright():
+    texture = np.zeros((4, 4, 3), np.float32)
+    texture[0, 0] = (1, 0, 0)  # top left
+    texture[3, 3] = (0, 0, 1)  # bottom right
+    maps = render(square(Material(albedo_texture=texture)), pixel_filter="box")
+    # Bilinear, so pure only at the texel's centre.
+    assert maps["albedo"][1, 1] == pytest.approx([0.77, 0, 0.01], abs=0.02)
+    assert maps["albedo"][-2, -2] == pytest.approx([0.01, 0, 0.77], abs=0.02)
+    assert maps["albedo"][8, 8].max() == 0
+
+
+def test_a_white_metal_returns_the_light():
+    maps = render(square(Material(albedo=(1.0, 1.0, 1.0), roughness=0.6, metallic=1.0)), light=2.0, spp=256)
+    assert maps["radiance"][4:-4, 4:-4].mean() == pytest.approx(2, rel=0.005)
+    assert (maps["alpha"][4:-4, 4:-4] == 1).all()
+
+
+def test_colours_of_vertices_multiply_the_material():
+    asset = square(Material(albedo=(0.5, 1.0, 1.0)))
+    asset.colors = np.tile(np.array([0.5, 0.25, 1], np.float32), (4, 1))
+    assert render(asset, spp=4)["albedo"][8, 8] == pytest.approx([0.25, 0.25, 1])
+
+
+def test_wide_filter_blurs_the_outline_and_keeps_the_area():
+    camera = np.array(FROM_ABOVE)
+    camera[2, 3] = 8
+    maps = {}
+    for name in ("box", "blackman-harris"):
+        renderer = AssetRenderer(square(Material()))
+        lens = (4 * SIZE / 2 + 1.3, 4 * SIZE / 2, SIZE / 2, SIZE / 2)
+        maps[name] = renderer.render(np.ones((4, 8, 3), np.float32), camera, lens, SIZE, SIZE, spp=1024, pixel_filter=name)
+    partial = {name: ((m["alpha"] > 0.001) & (m["alpha"] < 0.999)).sum() for name, m in maps.items()}
+    assert partial["blackman-harris"] > partial["box"]
+    assert maps["blackman-harris"]["alpha"].sum() == pytest.approx(maps["box"]["alpha"].sum(), rel=2e-3)
+
+
+def test_equal_seeds_give_equal_images():
+    asset = square(Material(roughness=0.5))
+    first, again, other = (render(asset, spp=4, seed=seed, light=0.5)["radiance"] for seed in (3, 3, 4))
+    assert (first == again).all() and (first != other).any()
+
+
+@pytest.mark.parametrize(
+    "material, message",
+    [
+        (Material(roughness=1.5), "material factors must lie in"),
+        (Material(albedo_texture=np.full((2, 2, 3), 2, np.float32)), "albedo textures must lie in"),
+        (Material(normal_texture=np.full((2, 2, 3), np.nan, np.float32)), "normal textures must be finite"),
+        (Material(roughness_metallic_texture=np.zeros((2, 2, 3), np.float32)), "roughness_metallic_texture must be"),
+    ],
+)
+def test_unusable_materials_are_refused(material, message):
+    with pytest.raises(ValueError, match=message):
+        AssetRenderer(square(material))
+
+
+def test_textures_need_coordinates():
+    asset = square(Material(albedo_texture=np.ones((2, 2, 3), np.float32)))
+    asset.uv = None
+    with pytest.raises(ValueError, match="textures need uv"):
+        render(asset, spp=1)
+
+
+@pytest.mark.skipif(not _core.embree_version(), reason="needs the build with Embree: rays one by one are too slow")
+@pytest.mark.parametrize("scene, least", [("boombox", 34.0), ("avocado", 43.0), ("corset", 39.0), ("teapot", 39.0)])
+def test_looks_as_in_blender(scene, least):
+    """One relit view against Cycles at 64 samples, denoised: camera, axes, light, colour spaces and BSDF at once."""
+    folder = SCENES / scene
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is absent; set SPLITNERF_DATA")
+    meta = json.loads((folder / "transforms_test.json").read_text())
+    truth = read_image(folder / "test" / "r_000_relit_sunset.png")
+    height, width = truth.shape[:2]
+    focal = 0.5 * width / np.tan(0.5 * meta["camera_angle_x"])
+    maps = AssetRenderer(read_asset(folder / "asset.glb")).render(
+        read_environment(folder / "relight_sunset.hdr"), np.array(meta["frames"][0]["transform_matrix"]),
+        (focal, focal, width / 2, height / 2), width, height, spp=64,
+    )  # fmt: skip
+    straight = maps["radiance"] / np.maximum(maps["alpha"], 1e-8)[..., None]
+    image = over_background(np.clip(linear_to_srgb(straight), 0, 1), maps["alpha"])
+    assert psnr(image, over_background(truth[..., :3], truth[..., 3])) > least

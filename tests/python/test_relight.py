@@ -1,0 +1,336 @@
+"""The relighter: cameras and composition by closed forms, the furnace through the whole command, clear errors."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+from gltf_builder import Gltf
+from PIL import Image
+
+from splitnerf.cli import BAD_INPUT, DONE, INTERRUPTED, main
+from splitnerf.data.environment import rotate_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import linear_to_srgb, read_image, write_image
+from splitnerf.errors import InputError
+from splitnerf.relight import job
+from splitnerf.relight.background import Background, compose, environment_behind, fill
+from splitnerf.relight.cameras import (
+    HALF_FIELD, MARGIN, View, bounding_sphere, look_at, parse_size, path_views, turntable,
+)  # fmt: skip
+from splitnerf.relight.output import display_frame, straight_srgb
+from splitnerf.render.path_traced import AssetRenderer
+
+CENTRE = np.array([1.0, -2.0, 0.8])  # of the ball, z up
+
+
+def write_ball(path, *, base=(1, 1, 1, 1), roughness=1.0, metallic=0.0, radius=0.5):
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    gltf = Gltf()
+    factors = {"baseColorFactor": list(base), "roughnessFactor": roughness, "metallicFactor": metallic}
+    material = gltf.material(name="ball", pbrMetallicRoughness=factors)
+    part = gltf.primitive(radius * ball.vertices, ball.faces, material=material, NORMAL=ball.vertices)
+    gltf.node(mesh=gltf.mesh(part), translation=[CENTRE[0], CENTRE[2], -CENTRE[1]])  # y up in the file
+    return gltf.write(path)
+
+
+@pytest.fixture
+def ball(tmp_path):
+    return write_ball(tmp_path / "ball.glb")
+
+
+@pytest.fixture
+def grey(tmp_path):
+    write_image(tmp_path / "grey.exr", np.full((16, 32, 3), 0.5, np.float32))
+    return tmp_path / "grey.exr"
+
+
+def run(*words):
+    return main(["relight", *map(str, words)])
+
+
+# ---- cameras ----
+
+
+def test_turntable_starts_at_the_front_and_frames_the_sphere(ball):
+    asset = read_asset(ball)
+    centre, radius = bounding_sphere(asset)
+    assert centre == pytest.approx(CENTRE, abs=1e-5) and radius == pytest.approx(0.5, abs=1e-5)
+    views = turntable(asset, 4, elevation=30, size=(60, 40))
+    assert [view.light_degrees for view in views] == [0] * 4
+    for view, azimuth in zip(views, np.radians([-90, 0, 90, 180])):
+        offset = view.pose[:3, 3] - CENTRE
+        distance = MARGIN * 0.5 / np.sin(HALF_FIELD)
+        expected = [np.cos(azimuth) * np.sqrt(0.75), np.sin(azimuth) * np.sqrt(0.75), 0.5]
+        assert offset / distance == pytest.approx(expected, abs=1e-4)
+        rotation = view.pose[:3, :3]
+        assert rotation.T @ rotation == pytest.approx(np.eye(3), abs=1e-12) and np.linalg.det(rotation) > 0
+        assert rotation[2, 0] == pytest.approx(0, abs=1e-12) and rotation[2, 1] > 0  # upright
+        # The silhouette's half angle is asin(r / d): it keeps inside the shorter side by the margin.
+        points = (asset.vertices - view.pose[:3, 3]) @ rotation
+        pixels = np.array(view.intrinsics[2:]) + view.intrinsics[0] * points[:, :2] * [1, -1] / -points[:, 2:]
+        assert pixels.min(axis=0)[1] == pytest.approx(20 - 20 * silhouette(), abs=0.05)
+        assert pixels.max(axis=0)[0] == pytest.approx(30 + 20 * silhouette(), abs=0.05)
+
+
+def silhouette():
+    return np.tan(np.arcsin(np.sin(HALF_FIELD) / MARGIN)) / np.tan(HALF_FIELD)
+
+
+def test_turning_the_light_keeps_the_camera(ball):
+    views = turntable(read_asset(ball), 4, rotate="light", size=None)
+    assert [view.light_degrees for view in views] == [0, 90, 180, 270]
+    assert all(np.array_equal(view.pose, views[0].pose) for view in views)
+    assert (views[0].width, views[0].height) == (512, 512)
+
+
+def test_a_path_keeps_its_lens_at_any_size(tmp_path):
+    pose = np.eye(4)
+    pose[:3, 3] = [1, 2, 3]
+    path = tmp_path / "path.json"
+    lens = {"fl_x": 100, "fl_y": 110, "cx": 30, "cy": 25, "w": 80, "h": 40}
+    path.write_text(json.dumps(lens | {"frames": [{"transform_matrix": pose.tolist()}]}))
+    (view,) = path_views(path, None)
+    assert np.array_equal(view.pose, pose)
+    assert (view.intrinsics, view.width, view.height) == ((100, 110, 30, 25), 80, 40)
+    (view,) = path_views(path, (160, None))
+    assert (view.intrinsics, view.width, view.height) == ((200, 220, 60, 50), 160, 80)
+    with pytest.raises(InputError, match="path.json: is 80x40, --size 50x50 would stretch it"):
+        path_views(path, (50, 50))
+    path.write_text(json.dumps({"camera_angle_x": np.pi / 2, "frames": [{"transform_matrix": pose.tolist()}]}))
+    (view,) = path_views(path, (40, 20))
+    assert view.intrinsics == pytest.approx((20, 20, 20, 10))
+
+
+def test_sizes():
+    assert parse_size("64") == (64, None) and parse_size("64x48") == (64, 48)
+    for text in ("", "0", "64x", "a", "64x48x3", "-5", "99999"):
+        with pytest.raises(InputError, match="--size must be W or WxH"):
+            parse_size(text)
+
+
+# ---- composition ----
+
+
+def test_composition_is_linear_and_the_shadow_darkens_what_is_behind():
+    images = {
+        "radiance": np.array([[[0.2, 0.4, 0.6]]], np.float32), "alpha": np.array([[0.5]], np.float32),
+        "shadow": np.array([[0.25]], np.float32),
+    }  # fmt: skip
+    clear = compose(images, None, 2.0)
+    assert clear[0, 0] == pytest.approx([0.4, 0.8, 1.2, 0.75])
+    behind = np.array([[[1.0, 0.5, 0.0]]], np.float32)
+    assert compose(images, behind, 2.0)[0, 0] == pytest.approx([0.65, 0.925, 1.2, 1.0])
+    # Laying the transparent picture over the same background later gives the same.
+    assert clear[0, 0, :3] + (1 - clear[0, 0, 3]) * behind[0, 0] == pytest.approx([0.65, 0.925, 1.2])
+    assert straight_srgb(clear)[0, 0] == pytest.approx([*linear_to_srgb(np.array([0.4 / 0.75, 1, 1])), 0.75], abs=1e-6)
+    assert display_frame(clear)[0, 0].tolist() == np.rint(255 * linear_to_srgb(np.array([0.65, 1.0, 1.0]))).tolist()
+    del images["shadow"]
+    assert compose(images, None, 1.0)[0, 0, 3] == 0.5
+
+
+def test_plates_cover_the_picture_and_are_cropped_about_the_centre(tmp_path):
+    columns = np.broadcast_to(np.arange(40.0)[None, :, None], (10, 40, 3))
+    assert fill(columns, 20, 10) == pytest.approx(columns[:, 10:30])
+    assert fill(columns, 20, 5)[2, :, 0] == pytest.approx(np.arange(0.5, 40, 2)[0:20], abs=0.5)
+    assert fill(columns, 5, 30).shape == (30, 5, 3)
+    pixels = np.zeros((4, 4, 4))
+    pixels[..., 0], pixels[:2, :, 3] = 0.5, 1
+    write_image(tmp_path / "plate.png", pixels)
+    view = View(np.eye(4), (4, 4, 2, 2), 4, 4)
+    behind = Background(str(tmp_path / "plate.png")).behind(view, np.zeros((2, 4, 3)), 8.0)
+    assert behind[0, 0] == pytest.approx([0.2159, 0, 0], abs=1e-3)  # 128 / 255 decoded, no exposure
+    assert behind[3, 0] == pytest.approx([1, 1, 1])  # clear: white
+    assert (Background("white").behind(view, np.zeros((2, 4, 3)), 8.0) == 1).all()
+    assert Background("transparent").behind(view, np.zeros((2, 4, 3)), 8.0) is None
+
+
+def test_the_environment_stands_behind_in_its_directions():
+    # Radiance 2 + d on a fine map; a camera at the origin that looks along -z of a turned frame.
+    height, width = 180, 360
+    azimuth = 2 * np.pi * (0.5 - (np.arange(width) + 0.5) / width)[None]
+    polar = np.pi * ((np.arange(height) + 0.5) / height)[:, None]
+    parts = np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)
+    d = np.stack(np.broadcast_arrays(*parts), axis=-1)
+    rotation = trimesh.transformations.random_rotation_matrix(np.array([0.2, 0.7, 0.4]))
+    seen = environment_behind(View(rotation, (30, 30, 8, 6), 16, 12), (2 + d).astype(np.float32))
+    x, y = np.meshgrid((np.arange(16) + 0.5 - 8) / 30, (np.arange(12) + 0.5 - 6) / 30)
+    rays = np.stack([x, -y, -np.ones_like(x)], axis=-1)
+    rays = rays @ rotation[:3, :3].T / np.linalg.norm(rays, axis=-1, keepdims=True)
+    assert seen == pytest.approx(2 + rays, abs=2e-3)
+
+
+# ---- light ----
+
+
+@pytest.mark.parametrize("metallic", [0.0, 1.0])
+def test_white_furnace_through_the_command(tmp_path, grey, metallic):
+    path = write_ball(tmp_path / "white.glb", metallic=metallic)
+    assert run(path, "--env", grey, "--size", "24", "--spp", "256", "--out", tmp_path / "out") == DONE
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["000.exr", "000.png"]
+    linear, srgb = read_image(tmp_path / "out/000.exr"), read_image(tmp_path / "out/000.png")
+    alpha = linear[..., 3]
+    inside = alpha > 0.999
+    assert inside.sum() > 200 and not linear[:3, :3].any()
+    # A white ball under light 0.5 from everywhere is as bright as the light, and vanishes against it.
+    assert linear[inside, :3].mean() == pytest.approx(0.5, rel=0.01)
+    assert linear[..., :3] == pytest.approx(0.5 * np.repeat(alpha[..., None], 3, axis=2), abs=0.06)
+    assert srgb[inside, :3].mean() == pytest.approx(0.7353570, abs=0.01)
+    assert srgb[..., 3] == pytest.approx(alpha, abs=3e-3)
+
+
+def test_exposure_and_an_environment_behind_make_the_white_ball_vanish(tmp_path, ball, grey):
+    words = ("--env", grey, "--size", "24x16", "--spp", "256", "--exposure", "1", "--background", "environment")
+    assert run(ball, *words, "--out", tmp_path / "out") == DONE
+    pixels = read_image(tmp_path / "out/000.exr")
+    assert pixels.shape == (16, 24, 3)
+    assert pixels.mean() == pytest.approx(1.0, rel=0.01) and pixels == pytest.approx(np.ones_like(pixels), abs=0.12)
+
+
+def test_turning_the_light_is_turning_the_camera_the_other_way(ball):
+    # The ball looks the same from every side, so only the angle between light and camera counts.
+    asset = read_asset(ball)
+    light = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32) ** 4
+    renderer = AssetRenderer(asset)
+
+    def render(view, environment):
+        options = {"spp": 2048, "clamp_indirect": 0, "pixel_filter": "box"}
+        return renderer.render(environment, view.pose, view.intrinsics, view.width, view.height, **options)["radiance"]
+
+    by_light, by_camera = (turntable(asset, 4, rotate=rotate, size=(12, 12)) for rotate in ("light", "camera"))
+    expected = render(by_camera[3], light)
+    turned = render(by_light[1], rotate_environment(light, by_light[1].light_degrees))
+    assert by_light[1].light_degrees == 90
+    assert turned == pytest.approx(expected, abs=0.02)
+    assert np.abs(render(by_light[0], light) - expected).max() > 0.06
+
+
+def test_shadow_lies_beside_the_object_and_nowhere_else(tmp_path, ball):
+    # A small light straight above: the shadow is the ball's disc on the ground, seen from 40 degrees.
+    light = np.full((128, 256, 3), 1e-5, np.float32)
+    light[0] = 1000.0
+    write_image(tmp_path / "top.exr", light)
+    pose = look_at(CENTRE, np.radians(-60), np.radians(40), 4.0)
+    camera = {"camera_angle_x": 0.5, "frames": [{"transform_matrix": pose.tolist()}]}
+    (tmp_path / "path.json").write_text(json.dumps(camera))
+    words = ("--env", tmp_path / "top.exr", "--size", "48", "--spp", "64", "--path", tmp_path / "path.json")
+    assert run(ball, *words, "--shadow-catcher", "--out", tmp_path / "out") == DONE
+    pixels = read_image(tmp_path / "out/000.exr")
+    (view,) = path_views(tmp_path / "path.json", (48, 48))
+    images = AssetRenderer(read_asset(ball)).render(light, view.pose, view.intrinsics, 48, 48, spp=64)
+    # Where each pixel's ray meets the ground, measured from the point below the ball.
+    x, y = np.meshgrid((np.arange(48) + 0.5 - 24) / view.intrinsics[0], (np.arange(48) + 0.5 - 24) / view.intrinsics[1])
+    rays = np.stack([x, -y, -np.ones_like(x)], axis=-1) @ view.pose[:3, :3].T
+    reach = (CENTRE[2] - 0.5 - view.pose[2, 3]) / rays[..., 2]
+    radius = np.linalg.norm((view.pose[:3, 3] + reach[..., None] * rays - CENTRE)[..., :2], axis=-1)
+    beside = (images["alpha"] == 0) & (reach > 0)
+    shadow = pixels[..., 3]
+    assert (beside & (radius < 0.44)).sum() > 20 and (shadow[beside & (radius < 0.44)] > 0.95).all()
+    assert (shadow[beside & (radius > 0.56)] < 0.05).all()
+    assert not pixels[beside][:, :3].any()  # black
+    assert shadow[images["alpha"] > 0.999] == pytest.approx(1.0, abs=1e-3)
+
+
+# ---- files ----
+
+
+def test_several_maps_animations_and_overwriting(tmp_path, ball, grey, capsys):
+    write_image(tmp_path / "red.hdr", np.full((8, 16, 3), [1.0, 0.1, 0.1], np.float32))
+    out = tmp_path / "out"
+    words = (ball, "--env", grey, "--env", tmp_path / "red.hdr", "--size", "17", "--spp", "2", "--out", out)
+    assert run(*words, "--turntable", "3", "--gif", "--fps", "10") == DONE
+    assert capsys.readouterr().out.split() == [str(out / "grey"), str(out / "red")]
+    for name in ("grey", "red"):
+        frames = sorted(p.name for p in (out / name).iterdir())
+        assert frames == ["000.exr", "000.png", "001.exr", "001.png", "002.exr", "002.png", "animation.gif"]
+        with Image.open(out / name / "animation.gif") as gif:
+            assert (gif.n_frames, gif.size, gif.info["duration"], gif.info["loop"]) == (3, (17, 17), 100, 0)
+    assert read_image(out / "red/000.exr")[8, 8, 0] > 5 * read_image(out / "red/000.exr")[8, 8, 1]
+    assert run(*words) == BAD_INPUT
+    assert "grey: holds frames already; replace them with --overwrite" in capsys.readouterr().err
+    (out / "grey/notes.txt").write_text("mine")
+    assert run(*words, "--overwrite") == DONE
+    assert sorted(p.name for p in (out / "grey").iterdir()) == ["000.exr", "000.png", "notes.txt"]
+
+
+def test_mp4_or_the_package_that_is_missing(tmp_path, ball, grey, monkeypatch, capsys):
+    words = (ball, "--env", grey, "--size", "33x18", "--spp", "1", "--turntable", "2", "--mp4")
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    assert run(*words, "--out", tmp_path / "none") == BAD_INPUT
+    assert "--mp4 needs the package imageio-ffmpeg" in capsys.readouterr().err and not (tmp_path / "none").exists()
+    monkeypatch.undo()
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg (extra video) is not installed")
+    assert run(*words, "--out", tmp_path / "out") == DONE
+    reader = imageio_ffmpeg.read_frames(str(tmp_path / "out/animation.mp4"))
+    assert next(reader)["size"] == (32, 18) and len(list(reader)) == 2
+
+
+def test_the_cameras_of_a_data_set_at_its_size(tmp_path, ball, grey):
+    data = tmp_path / "data"
+    (view,) = turntable(read_asset(ball), 1, size=(20, 20))
+    frames = [{"file_path": "./test/r_0", "transform_matrix": view.pose.tolist()}] * 2
+    data.mkdir()
+    (data / "transforms_test.json").write_text(json.dumps({"camera_angle_x": 2 * HALF_FIELD, "frames": frames}))
+    write_image(data / "test/r_0.png", np.ones((20, 20, 4)))
+    assert run(ball, "--env", grey, "--spp", "4", "--data", data, "--out", tmp_path / "a") == DONE
+    assert run(ball, "--env", grey, "--spp", "4", "--size", "20", "--out", tmp_path / "b") == DONE
+    assert sorted(p.name for p in (tmp_path / "a").glob("*.exr")) == ["000.exr", "001.exr"]
+    assert np.array_equal(read_image(tmp_path / "a/000.exr"), read_image(tmp_path / "b/000.exr"))
+
+
+def test_an_interrupted_call_leaves_whole_frames_only(tmp_path, ball, grey, monkeypatch, capsys):
+    def interrupt(folder, index, linear, *, with_alpha, write=job.write_frame):
+        if index == 1:
+            raise KeyboardInterrupt
+        write(folder, index, linear, with_alpha=with_alpha)
+
+    monkeypatch.setattr(job, "write_frame", interrupt)
+    words = ("--env", grey, "--size", "8", "--spp", "1", "--turntable", "3", "--gif", "--out", tmp_path / "out")
+    assert run(ball, *words) == INTERRUPTED
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["000.exr", "000.png"]
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_animations_need_frames_of_one_size(tmp_path, ball, grey, capsys):
+    pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg (extra video) is not installed")
+    frames = [{"transform_matrix": np.eye(4).tolist(), "w": size, "h": size} for size in (8, 9)]
+    (tmp_path / "path.json").write_text(json.dumps({"camera_angle_x": 1.0, "frames": frames}))
+    words = (ball, "--env", grey, "--spp", "1", "--path", tmp_path / "path.json", "--out", tmp_path / "out")
+    assert run(*words, "--gif") == BAD_INPUT
+    assert "the frames differ in size; give --size" in capsys.readouterr().err
+    assert run(*words, "--size", "1", "--mp4") == BAD_INPUT
+    assert "--mp4 needs frames of at least 2x2 pixels" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert run(*words) == DONE
+    # Seen from the origin, looking down, the ball is out of sight: clear pictures, alpha included.
+    assert read_image(tmp_path / "out/001.png").shape == (9, 9, 4) and not read_image(tmp_path / "out/001.exr").any()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["{ball}", "--env", "{tmp}/none.exr"], "none.exr: no such environment map"),
+        (["{tmp}/none.glb", "--env", "{grey}"], "none.glb: no such file"),
+        (["{tmp}", "--env", "{grey}"], "has no mesh.glb; finish its training"),
+        (["{ball}", "--env", "{grey}", "--env", "{grey}"], "two maps have the same name"),
+        (["{ball}", "--env", "{grey}", "--turntable", "0"], "--turntable must be at least 1"),
+        (["{ball}", "--env", "{grey}", "--elevation", "90"], "--elevation must lie between -90 and 90"),
+        (["{ball}", "--env", "{grey}", "--elevation", "nan"], "--elevation must lie between -90 and 90"),
+        (["{ball}", "--env", "{grey}", "--spp", "0"], "--spp must lie between 1 and"),
+        (["{ball}", "--env", "{grey}", "--exposure", "nan"], "--exposure must lie between -20 and 20"),
+        (["{ball}", "--env", "{grey}", "--size", "big"], "--size must be W or WxH"),
+        (["{ball}", "--env", "{grey}", "--background", "sky"], "sky: no such image"),
+        (["{ball}", "--env", "{grey}", "--data", "{tmp}/none"], "none: no such folder"),
+        (["{ball}", "--env", "{grey}", "--path", "{tmp}/none.json"], "none.json: no such file"),
+        (["{ball}", "--env", "{grey}", "--out", "{ball}"], "ball.glb: is a file; give --out a folder"),
+    ],
+)
+def test_bad_input_ends_with_2_one_line_and_no_folder(tmp_path, ball, grey, capsys, words, message):
+    words = [word.format(tmp=tmp_path, ball=ball, grey=grey) for word in words]
+    assert run("--out", tmp_path / "out", *words) == BAD_INPUT
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,232 @@
+"""Rendered datasets: what each layout's files hold against the renderer's arrays, axes, and the asset's own scores."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+
+from splitnerf.cli import BAD_INPUT, DONE, main
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
+from splitnerf.data.relit import read_relit, relight_maps
+from splitnerf.data.truth import load_scene_truth, load_view_truths
+from splitnerf.evaluate.relight import FIRST_SEED
+from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.synth.cameras import orbit, spiral
+from splitnerf.synth.jobs import SynthSettings, normalised, render_views, synthesise, unit_sphere
+from splitnerf.synth.writer import LAYOUTS, SceneWriter
+
+SIZE = 24
+HALF_STEP = 0.5 / 255 + 1e-6
+
+
+def part(mesh, colour, metallic, roughness, offset):
+    """A mesh with its material, moved, z up turned to glTF's y up."""
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorFactor=[*colour, 1.0], metallicFactor=metallic, roughnessFactor=roughness
+    )
+    vertices = (mesh.vertices + offset)[:, [0, 2, 1]] * [1, 1, -1]
+    normals = np.array(mesh.vertex_normals)[:, [0, 2, 1]] * [1, 1, -1]
+    visual = trimesh.visual.TextureVisuals(material=material)
+    return trimesh.Trimesh(vertices, mesh.faces, vertex_normals=normals, visual=visual, process=False)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """An asset with no symmetry, off the origin, and two maps: one side bright, and a blue one."""
+    folder = tmp_path_factory.mktemp("files")
+    ball = part(trimesh.creation.icosphere(subdivisions=4), (0.8, 0.3, 0.1), 0.0, 0.6, (5.0, 2.0, 1.0))
+    small = part(trimesh.creation.icosphere(subdivisions=3, radius=0.5), (0.9, 0.9, 0.9), 1.0, 0.4, (6.5, 2.2, 1.6))
+    scene = trimesh.Scene({"ball": ball, "small": small})
+    (folder / "balls.glb").write_bytes(scene.export(file_type="glb", include_normals=True))
+    sunny = np.full((16, 32, 3), 0.05, np.float32)
+    sunny[6:10, 14:18] = 6  # the centre column looks along +x
+    write_image(folder / "sunny.exr", sunny)
+    write_image(folder / "blue.exr", np.full((16, 32, 3), (0.2, 0.4, 0.9), np.float32))
+    return folder
+
+
+class Recorder:
+    """A renderer that keeps what it gave."""
+
+    def __init__(self, asset):
+        self.renderer, self.maps, self.seeds = AssetRenderer(asset), [], []
+
+    def render(self, *args, **options):
+        self.seeds.append(options["seed"])
+        self.maps.append(self.renderer.render(*args, **options))
+        return self.maps[-1]
+
+
+def close_images(image, maps):
+    alpha = maps["alpha"]
+    seen = alpha > 0
+    straight = maps["radiance"][seen] / alpha[seen][:, None]
+    assert np.abs(image[..., 3] - alpha).max() <= HALF_STEP
+    assert np.abs(image[seen][:, :3] - np.clip(linear_to_srgb(straight), 0, 1)).max() <= HALF_STEP
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_files_hold_what_was_rendered(files, tmp_path, layout):
+    asset = read_asset(files / "balls.glb")
+    recorder, settings = Recorder(normalised(asset, *unit_sphere(asset))), SynthSettings(SIZE, 3, 2, 4, layout)
+    writer = SceneWriter(tmp_path, 0.6911112070083618, layout)
+    light = np.full((8, 16, 3), 0.5, np.float32)
+    relight = {"a": writer.light(light * 2, "a"), "b_1": writer.light(light, "b_1")}
+    render_views(recorder, writer, writer.light(light), relight, settings)
+    assert len(set(recorder.seeds)) == len(recorder.seeds) == 3 + 2 * 3 and max(recorder.seeds) < FIRST_SEED
+    with pytest.raises(Exception, match="has neither"):
+        load_dataset(tmp_path)
+    writer.close()
+    (tmp_path / "val_000").mkdir()
+
+    train, test = load_dataset(tmp_path), load_dataset(tmp_path, "test")
+    assert (len(train), len(test)) == (3, 2)
+    assert test.frame_names == (["r_000", "r_001"] if layout == "blender" else ["test_000", "test_001"])
+    for image, maps in zip(np.concatenate([train.images, test.images]), recorder.maps):
+        close_images(image, maps)
+    focal = 0.5 * SIZE / np.tan(0.5 * 0.6911112070083618)
+    assert train.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
+    assert test.world_poses == pytest.approx(orbit(2, 3.0233467, 30, 20), abs=1e-4)
+
+    truths = load_view_truths(test) + (load_view_truths(train) if layout == "tensoir" else [])
+    for truth, maps in zip(truths, recorder.maps[3:5] + recorder.maps[:3]):
+        solid = maps["alpha"] > 0.92
+        assert np.array_equal(truth.normal_mask | ~solid, np.ones_like(solid))
+        assert np.abs(linear_to_srgb(truth.albedo[solid]) - linear_to_srgb(maps["albedo"][solid])).max() <= HALF_STEP
+        unit = maps["smooth_normal"] / np.maximum(np.linalg.norm(maps["smooth_normal"], axis=-1, keepdims=True), 1e-8)
+        assert np.linalg.norm(truth.normal[solid] - unit[solid], axis=-1).max() < np.radians(0.6)
+        if layout == "blender":
+            assert np.abs(truth.roughness[solid] - maps["roughness"][solid]).max() <= HALF_STEP
+            assert np.abs(truth.metallic[solid] - maps["metallic"][solid]).max() <= HALF_STEP
+            stored = read_image(tmp_path / f"test/{truth.name}_normal.exr")
+            assert stored[..., :3] == pytest.approx(maps["smooth_normal"] * maps["alpha"][..., None], abs=1e-3)
+        else:
+            assert truth.roughness is None and truth.metallic is None
+    assert (load_view_truths(train)[0].albedo is None) == (layout != "tensoir")
+
+    assert list(relight_maps(test)) == ["a", "b_1"]
+    for k, name in enumerate(relight_maps(test)):
+        for i in range(2):
+            close_images(read_relit(test, i, name), recorder.maps[5 + 2 * k + i])
+
+
+@pytest.fixture(scope="module")
+def data(files):
+    out = files / "data"
+    arguments = ["synth", files / "balls.glb", "--light", files / "sunny.exr", "--relight", files / "blue.exr",
+                 files / "sunny.exr", "--out", out, "--size", 40, "--train", 6, "--test", 3, "--spp", 384]  # fmt: skip
+    assert main([str(a) for a in arguments]) == DONE
+    return out
+
+
+def test_mesh_poses_and_images_share_one_world(data):
+    test, mesh = load_dataset(data, "test"), load_scene_truth(data).mesh
+    assert np.linalg.norm(mesh.vertices, axis=1).max() == pytest.approx(1, abs=1e-5)
+    for pose, (fx, fy, cx, cy), image in zip(test.world_poses, test.intrinsics, test.images):
+        local = (mesh.vertices - pose[:3, 3]) @ pose[:3, :3]
+        x, y = cx - fx * local[:, 0] / local[:, 2], cy + fy * local[:, 1] / local[:, 2]
+        rows, columns = np.nonzero(image[..., 3] > 0.5)
+        seen = [columns.min(), columns.max() + 1, rows.min(), rows.max() + 1]
+        assert seen == pytest.approx([x.min(), x.max(), y.min(), y.max()], abs=0.8)
+
+
+def test_normals_face_the_camera_and_the_sun_stands_at_plus_x(data):
+    test = load_dataset(data, "test")
+    normals, brightness = [], []
+    for truth, image, pose in zip(load_view_truths(test), test.images, test.world_poses):
+        mask = truth.normal_mask & (truth.metallic < 0.5)
+        assert (truth.normal[mask] @ pose[:3, 2]).min() > -0.2
+        normals.append(truth.normal[mask])
+        brightness.append(srgb_to_linear(image[mask][:, :3]).mean(axis=1))
+    normals, brightness = np.concatenate(normals), np.concatenate(brightness)
+    # The gradient of brightness over the normal points to the sun.
+    gradient = np.linalg.lstsq(np.column_stack([normals, np.ones(len(normals))]), brightness, rcond=None)[0][:3]
+    assert gradient[0] > 0.1 and gradient[0] / np.linalg.norm(gradient) > 0.8
+
+
+def test_an_asset_scores_as_perfect_on_its_own_data(data, tmp_path):
+    out = tmp_path / "scores.json"
+    arguments = ["evaluate", data / "asset.glb", "--data", data, "--env", data / "light.hdr", "--spp", 384,
+                 "--out", out, "--sheet", tmp_path / "sheet.png"]  # fmt: skip
+    assert main([str(a) for a in arguments]) == DONE
+    scores = json.loads(out.read_text())
+    assert scores["relight"]["psnr"] > 40 and scores["novel_view"]["psnr"] > 40 and scores["albedo"]["psnr"] > 38
+    assert scores["relight"]["lsq"]["scale"] == pytest.approx([1, 1, 1], abs=0.005)
+    assert set(scores["relight"]["maps"]) == {"blue", "sunny"}
+    assert scores["normal_mae_deg"] < 1
+    assert scores["roughness_mae"] < 0.01 and scores["metallic_balanced_accuracy"] > 0.97
+    assert scores["light_psnr"] == 100 and scores["f_score"] == 1 and scores["chamfer"] < 0.01
+    assert (tmp_path / "sheet.png").stat().st_size > 1000
+
+
+def test_cameras_look_at_the_origin():
+    for poses in (spiral(20, 3.0, (-20, 70), turn=15), orbit(7, 3.0, 30, swing=20)):
+        assert np.linalg.norm(poses[:, :3, 3], axis=1) == pytest.approx(3)
+        assert poses[:, :3, 2] * 3 == pytest.approx(poses[:, :3, 3])
+        assert np.linalg.det(poses[:, :3, :3]) == pytest.approx(1)
+        assert np.abs(poses[:, 2, 0]).max() < 1e-12 and (poses[:, 2, 1] > 0).all()
+    heights = np.degrees(np.arcsin(spiral(20, 3.0, (-20, 70))[:, 2, 2]))
+    assert (heights.min(), heights.max()) == pytest.approx((-20, 70))
+
+
+def test_equal_seeds_write_equal_files_and_others_differ(files, tmp_path):
+    images = []
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        settings = SynthSettings(SIZE, 1, 1, 2, seed=seed)
+        out = synthesise(files / "balls.glb", files / "blue.exr", [], tmp_path / name, settings)
+        images.append((out / "train/r_000.png").read_bytes())
+    assert images[0] == images[1] != images[2]
+
+
+def bad(files, tmp_path, **change):
+    known = {"light": files / "blue.exr", "relight": [], "out": tmp_path / "out", "settings": SynthSettings(8, 1, 1, 1)}
+    return synthesise(files / "balls.glb", **(known | change))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"settings": SynthSettings(0, 1, 1, 1)}, "--size must be at least 1"),
+        ({"settings": SynthSettings(8, 1, 1, 0)}, "--spp must be at least 1"),
+        ({"settings": SynthSettings(8, 1, 1, 1, layout="nerf")}, "--layout must be one of"),
+    ],
+)
+def test_bad_settings_are_named(files, tmp_path, change, message):
+    with pytest.raises(Exception, match=message):
+        bad(files, tmp_path, **change)
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_input_writes_nothing(files, tmp_path, monkeypatch):
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full/notes.txt").write_text("mine")
+    with pytest.raises(Exception, match="full: exists and is not an empty folder"):
+        bad(files, tmp_path, out=tmp_path / "full")
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more/relight_blue.exr").write_bytes((files / "blue.exr").read_bytes())
+    with pytest.raises(Exception, match="two maps are called blue"):
+        bad(files, tmp_path, relight=[files / "blue.exr", tmp_path / "more/relight_blue.exr"])
+    monkeypatch.setitem(sys.modules, "bpy", None)
+    with pytest.raises(Exception, match="needs the module bpy"):
+        bad(files, tmp_path, settings=SynthSettings(8, 1, 1, 1, renderer="blender"))
+    assert not (tmp_path / "out").exists()
+    missing = ["synth", str(files / "gone.glb"), "--light", str(files / "blue.exr"), "--out", str(tmp_path / "out")]
+    assert main(missing) == BAD_INPUT
+    assert not (tmp_path / "out").exists()
+
+
+def test_blender_sees_the_same_scene(files, tmp_path):
+    pytest.importorskip("bpy", reason="bpy is not installed; pip install splitnerf[blender]")
+    settings = SynthSettings(32, 2, 2, 128, renderer="blender")
+    out = synthesise(files / "balls.glb", files / "blue.exr", [files / "sunny.exr"], tmp_path / "out", settings)
+    options = ["--data", str(out), "--env", str(out / "light.hdr"), "--spp", "512"]
+    assert main(["evaluate", str(out / "asset.glb"), *options]) == DONE
+    scores = json.loads((out / "asset_evaluation.json").read_text())
+    assert scores["novel_view"]["psnr"] > 35 and scores["relight"]["psnr"] > 32 and scores["normal_mae_deg"] < 1
+    assert scores["roughness_mae"] < 0.02 and scores["albedo"]["raw"]["psnr"] > 32
