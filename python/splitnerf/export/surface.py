@@ -10,8 +10,9 @@ import torch
 from torch import Tensor
 
 CHUNK = 1 << 15  # points that the fields are asked at a time
-STEPS = 2  # secant steps after the first Newton step
-MIN_SLOPE = 0.2  # of the field along a line, below which a point stays where it is
+STEPS = 4  # along a line, each by one value of the field
+TOLERANCE = 1e-4  # of the reach, below which a value counts as zero
+MIN_SLOPE = 0.2  # of the field along a line, below which a point moves no further
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,9 @@ def to_level_set(
 ) -> np.ndarray:
     """Moves points along lines onto the zero level set, as far as it lies within reach.
 
-    A Newton step, then secant steps, each cut off at the reach; of all places tried the one nearest to zero stands,
-    so that no point ends farther from the surface than it began.
+    The first step takes the field for a distance, the others are secant steps, each cut off at the reach; they end
+    where the field hardly rises along the line. Of all places tried the one nearest to zero stands, so that no point
+    ends farther from the surface than it began.
 
     Args:
         surface: The field.
@@ -70,28 +72,29 @@ def to_level_set(
     Returns:
         [n, 3] float32.
     """
-    moved = [
-        _along_lines(surface, chunk, reach, None if directions is None else torch.from_numpy(directions[rows]))
-        for rows, chunk in ((slice(i, i + CHUNK), torch.from_numpy(points[i : i + CHUNK])) for i in range(0, len(points), CHUNK))
-    ]
+    moved = []
+    for rows in (slice(start, start + CHUNK) for start in range(0, len(points), CHUNK)):
+        chunk = torch.from_numpy(points[rows])
+        along = _unit(surface.gradient(chunk)[1]) if directions is None else torch.from_numpy(directions[rows])
+        moved.append(_along_lines(surface.sdf, chunk, along, reach))
     return torch.cat(moved).numpy()
 
 
-def _along_lines(surface: Surface, points: Tensor, reach: float, directions: Tensor | None) -> Tensor:
-    distance, gradient = surface.gradient(points)
-    directions = _unit(gradient) if directions is None else directions
-    slope = (gradient * directions).sum(dim=1)
-    t_last, f_last = torch.zeros_like(distance), distance
-    best_t, best_f = t_last, f_last
-    t = torch.where(slope > MIN_SLOPE, -distance / slope.clamp(min=MIN_SLOPE), 0.0).clamp(-reach, reach)
-    for step in range(STEPS + 1):
-        f = surface.sdf(points + t[:, None] * directions)
-        closer = f.abs() < best_f.abs()
+def _along_lines(sdf: Callable[[Tensor], Tensor], points: Tensor, directions: Tensor, reach: float) -> Tensor:
+    f_last = best_f = sdf(points)
+    t_last = best_t = torch.zeros_like(f_last)
+    t = (-f_last).clamp(-reach, reach)
+    for _ in range(STEPS):
+        moving = ((t != t_last) & (best_f.abs() > TOLERANCE * reach)).nonzero().squeeze(1)
+        if len(moving) == 0:
+            break
+        f = f_last.clone()
+        f[moving] = sdf(points[moving] + t[moving, None] * directions[moving])
+        slope = (f - f_last) / torch.where(t == t_last, 1.0, t - t_last)
+        closer = (f.abs() < best_f.abs()) & (slope > MIN_SLOPE)
         best_t, best_f = torch.where(closer, t, best_t), torch.where(closer, f, best_f)
-        if step < STEPS:
-            rise = f - f_last
-            secant = t - f * (t - t_last) / torch.where(rise == 0, 1.0, rise)
-            t_last, f_last, t = t, f, torch.where(rise == 0, t, secant).clamp(-reach, reach)
+        t_next = (t - f / slope.clamp(min=MIN_SLOPE)).clamp(-reach, reach)
+        t_last, f_last, t = t, f, torch.where(slope > MIN_SLOPE, t_next, t)
     return points + best_t[:, None] * directions
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import trimesh
 import xatlas
 
 PADDING = 4  # texels between charts
+CHARTS = 64  # no chart has a larger share of the surface: the time to grow one rises with the square of its faces
 
 
 def unwrap(vertices: np.ndarray, faces: np.ndarray, texture_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -26,7 +28,9 @@ def unwrap(vertices: np.ndarray, faces: np.ndarray, texture_size: int) -> tuple[
     options.resolution = texture_size
     options.padding = 2 * PADDING  # the packed area comes out up to twice as large as asked for
     options.bilinear = True
-    atlas.generate(xatlas.ChartOptions(), options)
+    charts = xatlas.ChartOptions()
+    charts.max_chart_area = float(trimesh.Trimesh(vertices, faces, process=False).area) / CHARTS
+    atlas.generate(charts, options)
     origins, new_faces, uv = atlas[0]
     texels = uv * [atlas.width, atlas.height]
     uv = texels / max(atlas.width, atlas.height)
