@@ -78,10 +78,10 @@ def test_narrow_band_gives_the_dense_grid(field, resolution):
 
 
 def test_the_front_follows_a_surface_that_the_first_look_missed():
-    """A field six times steeper than a distance hides much of its surface from the test by the centre."""
+    """A field three times steeper than a distance hides much of its surface from the test by the centre."""
 
     def steep(x):
-        return 6.0 * torus(x)
+        return 3.0 * torus(x)
 
 
     vertices, faces = extract_mesh(steep, 1.5, 64)
