@@ -12,10 +12,11 @@ import pytest
 import trimesh
 from gltf_builder import TRIANGLE, TRIANGLE_UV, Gltf, triangle
 
+from splitnerf.data.asset import Asset, Material
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import srgb_to_linear
 from splitnerf.errors import InputError
-from splitnerf.export.mesh import write_mesh_glb
+from splitnerf.export.glb import write_glb
 
 SCENES = Path(os.environ.get("SPLITNERF_DATA", Path(__file__).parents[2].parent / "shared" / "data")) / "scenes"
 
@@ -40,21 +41,35 @@ def path(tmp_path):
 
 def test_what_the_program_writes_is_read_back(path):
     ball = trimesh.creation.icosphere(subdivisions=2)
-    normals, albedo = np.array(ball.vertices), (np.array(ball.vertices) + 1) / 2
-    vertices = normals * [1, 2, 3]
-    write_mesh_glb(path, vertices, ball.faces, normals, albedo, 0.123456789, 0.1)
+    n, rng = len(ball.vertices), np.random.default_rng(0)
+    normals, levels = np.array(ball.vertices, np.float32), rng.integers(0, 256, (3, 4, 4, 3)) / 255
+    tangents = np.cross(normals, [0.3, 0.5, 0.8])
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    textures = {
+        "albedo_texture": srgb_to_linear(levels[0]), "roughness_metallic_texture": levels[1, ..., 1:],
+        "normal_texture": 2 * levels[2] - 1,
+    }  # fmt: skip
+    material = Material("painted", (0.123456789, 0.5, 0.7), 0.345678901, 0.25, **textures)
+    written = Asset(
+        "ball", normals * np.float32([1, 2, 3]), np.array(ball.faces, np.int32), normals,
+        np.zeros(len(ball.faces), np.int32), [material], uv=rng.random((n, 2), np.float32),
+        tangents=np.column_stack([tangents, np.sign(normals[:, 0] + 1e-3)]).astype(np.float32),
+    )  # fmt: skip
+    write_glb(path, written)
     asset = read_asset(path)
     assert asset.name == "a"
-    assert asset.vertices == pytest.approx(vertices, abs=1e-6)
-    assert asset.normals == pytest.approx(normals, abs=1e-6)
-    assert asset.colors == pytest.approx(albedo, abs=1e-5)  # 16 bit; 8 would leave 2e-3
-    assert np.array_equal(asset.triangles, ball.faces)
-    assert (asset.material_ids == 0).all() and len(asset.materials) == 1
-    material = asset.materials[0]
-    assert (material.roughness, material.metallic) == pytest.approx((0.123456789, 0.1), abs=1e-9)
-    assert asset.uv is None and asset.tangents is None
-    kinds = {name: getattr(asset, name).dtype.name for name in ("vertices", "normals", "triangles", "material_ids")}
-    assert kinds == {"vertices": "float32", "normals": "float32", "triangles": "int32", "material_ids": "int32"}
+    for name in ("vertices", "triangles", "normals", "material_ids", "uv", "tangents"):
+        values, expected = getattr(asset, name), getattr(written, name)
+        assert values.dtype == expected.dtype and values == pytest.approx(expected, abs=1e-6), name
+    read = asset.materials[0]
+    assert read.albedo == pytest.approx(material.albedo, abs=1e-9)
+    assert (read.roughness, read.metallic) == pytest.approx((0.345678901, 0.25), abs=1e-9)
+    assert read.albedo_texture == pytest.approx(textures["albedo_texture"], abs=1e-6)
+    assert read.roughness_metallic_texture == pytest.approx(textures["roughness_metallic_texture"], abs=1e-6)
+    # Normals are stored in 8 bit after normalising.
+    unit = textures["normal_texture"] / np.linalg.norm(textures["normal_texture"], axis=-1, keepdims=True)
+    read_unit = read.normal_texture / np.linalg.norm(read.normal_texture, axis=-1, keepdims=True)
+    assert read_unit == pytest.approx(unit, abs=0.02)
 
 
 def test_without_normals_shading_is_flat(path):

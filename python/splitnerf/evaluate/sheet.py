@@ -88,13 +88,14 @@ def _rows(
     for key in ("albedo", "roughness", "metallic", "normal"):
         if all(getattr(truths[i], key) is not None and key in predictions[i] for i in shown):
             scale = np.array(evaluation["albedo"]["lsq"]["scale"]) if key == "albedo" else 1.0
-            yield key, [
-                (
-                    _shown(key, getattr(truths[i], key), alphas[i]),
-                    _shown(key, predictions[i][key], predictions[i]["alpha"], scale),
-                )
-                for i in shown
-            ]
+            pairs = []
+            for i in shown:
+                alpha, truth_alpha = predictions[i]["alpha"], alphas[i]
+                if key == "normal":  # where the truth is known, so that the rim shows no error that is not scored
+                    alpha = truth_alpha = np.float32(truths[i].normal_mask)
+                truth, prediction = getattr(truths[i], key), predictions[i][key]
+                pairs.append((_shown(key, truth, truth_alpha), _shown(key, prediction, alpha, scale)))
+            yield key, pairs
 
 
 def _shown(key: str, values: np.ndarray, alpha: np.ndarray, scale: np.ndarray | float = 1.0) -> np.ndarray:
