@@ -66,11 +66,11 @@ bool touches_other_sign(const float* values, bool inside, int dx, int dy, int dz
 struct BlockVertices {
   int32_t first = 0;
   uint64_t crossed[3] = {};  // bit per node
-  int count() const { return __builtin_popcountll(crossed[0]) + __builtin_popcountll(crossed[1]) + __builtin_popcountll(crossed[2]); }
+  int count() const { return number(3, 0) - first; }
   int32_t number(int axis, int node) const {
     int32_t n = first;
     for (int a = 0; a < axis; ++a) n += __builtin_popcountll(crossed[a]);
-    return n + __builtin_popcountll(crossed[axis] & ((uint64_t(1) << node) - 1));
+    return axis < 3 ? n + __builtin_popcountll(crossed[axis] & ((uint64_t(1) << node) - 1)) : n;
   }
 };
 
@@ -94,7 +94,8 @@ class Mesher {
     for (int64_t row = 0; row < n; ++row) {
       vertices_[row].first = int32_t(n_vertices);
       n_vertices += vertices_[row].count();
-      if (n_vertices > std::numeric_limits<int32_t>::max()) throw std::length_error("marching_cubes: too many vertices");
+      if (n_vertices > std::numeric_limits<int32_t>::max())
+        throw std::length_error("marching_cubes: too many vertices");
       n_triangles_[row + 1] += n_triangles_[row];
     }
     TriangleMesh mesh;
@@ -119,7 +120,8 @@ class Mesher {
     const BlockPosition p = position(grid_, rows_[row]);
     std::fill_n(out.rows, 8, kOutsideBlock);
     out.rows[0] = int32_t(row);
-    for_neighbours(grid_, p, 0, [&](int64_t i, int dx, int dy, int dz) { out.rows[dx + 2 * dy + 4 * dz] = grid_.index[i]; });
+    for_neighbours(grid_, p, 0,
+                   [&](int64_t i, int dx, int dy, int dz) { out.rows[dx + 2 * dy + 4 * dz] = grid_.index[i]; });
     for (int x = 0; x < W; ++x)
       for (int y = 0; y < W; ++y)
         for (int z = 0; z < W; ++z) {

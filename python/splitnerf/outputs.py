@@ -102,7 +102,8 @@ def write_assets(
         RuntimeError: A field is not finite.
     """
     c = model.config
-    resolution, n_faces = c.export_resolution if resolution is None else resolution, c.export_faces if n_faces is None else n_faces
+    resolution = c.export_resolution if resolution is None else resolution
+    n_faces = c.export_faces if n_faces is None else n_faces
     if "usdz" in formats:
         require_usd()
     surface = surface_of(model)

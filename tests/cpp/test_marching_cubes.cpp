@@ -151,7 +151,7 @@ TEST(MarchingCubes, RandomFieldsAreClosedAndOriented) {
 
 TEST(MarchingCubes, OpensWhatTheSurfaceEntersAndNoMore) {
   // A ball of radius 7.3 about node (12, 12, 12), met in one block only.
-  const auto ball = [](int i, int j, int k) { return std::sqrt(double((i - 12) * (i - 12) + (j - 12) * (j - 12) + (k - 12) * (k - 12))) - 7.3; };
+  const auto ball = [](int i, int j, int k) { return length(Vec3<double>{i - 12., j - 12., k - 12.}) - 7.3; };
   Field sparse(4), dense(4);
   for (int x = 0; x < 6; ++x)
     for (int y = 0; y < 6; ++y)

@@ -24,6 +24,7 @@ SMALL = [
     "--set", "n_levels=4", "--set", "log2_table_size=10", "--set", "target_samples=512", "--set", "initial_rays=64",
     "--set", "grid_resolution=16", "--set", "light_samples=64", "--set", "light_queries=16", "--set", "eikonal_points=32",
     "--set", "mesh_resolution=24", "--set", "export_resolution=32", "--set", "export_environment_height=16",
+    "--set", "export_faces=500", "--set", "export_texture_size=64",
 ]  # fmt: skip
 
 

@@ -16,17 +16,20 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "export", help="write a run's textured mesh and light",
         description="Writes mesh.glb (watertight where the object is, decimated, UV-unwrapped, with albedo, "
-        "occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex colours), environment.exr "
-        "and environment.hdr. Components with less than 1 % of the largest one's faces are dropped.",
+        "occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex colours), "
+        "environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces are dropped.",
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN)")
-    parser.add_argument("--faces", type=int, default=50000, metavar="N", help="faces of the textured mesh, 0 keeps all (default: 50000)")
-    parser.add_argument("--texture-size", type=int, default=2048, metavar="N", help="texels along an edge (default: 2048)")
-    parser.add_argument("--resolution", type=int, metavar="N", help="nodes along an edge of the grid that is meshed (default: the run's export_resolution)")
-    parser.add_argument("--formats", default="glb,ply", metavar="LIST", help="of glb, ply, obj and usdz, by commas (default: glb,ply); usdz needs the extra 'usd'")
-    parser.add_argument("--data", type=Path, metavar="DATA", help="the data that RUN was trained on, for runs of older versions")
-    parser.add_argument("--downscale", type=int, default=1, metavar="N", help="as in training, with --data (default: 1)")
+    for option, kind, default, name, text in (
+        ("--faces", int, 50000, "N", "faces of the textured mesh, 0 keeps all (default: 50000)"),
+        ("--texture-size", int, 2048, "N", "texels along an edge (default: 2048)"),
+        ("--resolution", int, None, "N", "nodes along an edge of the grid that is meshed (default: as in training)"),
+        ("--formats", str, "glb,ply", "LIST", "of glb, ply, obj, usdz (default: glb,ply); usdz needs the extra 'usd'"),
+        ("--data", Path, None, "DATA", "the data that RUN was trained on, for runs of older versions"),
+        ("--downscale", int, 1, "N", "as in training, with --data (default: 1)"),
+    ):
+        parser.add_argument(option, type=kind, default=default, metavar=name, help=text)
     parser.set_defaults(execute=run)
 
 
@@ -53,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         data=args.data, downscale=args.downscale,
     )  # fmt: skip
     closed = "watertight" if exported.watertight else "not watertight"
-    plural = "" if exported.n_dropped == 1 else "s"
-    print(f"mesh: {closed}, {exported.n_faces} faces of {len(exported.mesh.faces)}, {exported.n_dropped} floating component{plural} dropped")
+    floaters = f"{exported.n_dropped} floating component{'' if exported.n_dropped == 1 else 's'} dropped"
+    print(f"mesh: {closed}, {exported.n_faces} faces of {len(exported.mesh.faces)}, {floaters}")
     print(f"results: {', '.join(str(out / f'mesh.{name}') for name in formats)}, {out / 'environment.exr'}")
     return DONE

@@ -21,7 +21,7 @@ ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | None = None) -> None:
     """Writes one mesh with one metallic-roughness material, y up, textures as PNG inside, atomically.
 
-    Occlusion, roughness and metallic share one image, as glTF proposes. Without textures the file has the factors alone.
+    Occlusion, roughness and metallic share one image, as glTF proposes. Without textures there are the factors alone.
 
     Args:
         path: Ends in .glb.
@@ -63,7 +63,8 @@ def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | Non
             attributes["TANGENT"] = attributes.pop("_TANGENT")
         if occlusion is not None:
             tree["materials"][0]["occlusionTexture"] = {"index": pbr["metallicRoughnessTexture"]["index"]}
-        for accessor, target in [(primitive["indices"], ELEMENT_ARRAY_BUFFER)] + [(i, ARRAY_BUFFER) for i in attributes.values()]:
+        for accessor in (primitive["indices"], *attributes.values()):
+            target = ELEMENT_ARRAY_BUFFER if accessor == primitive["indices"] else ARRAY_BUFFER
             tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = target
 
     scene = trimesh.Scene()

@@ -39,7 +39,9 @@ def encode_maps(path: object, asset: Asset, occlusion: np.ndarray | None) -> Map
     n, material = len(asset.vertices), asset.materials[0]
     if len(asset.materials) != 1:
         raise RuntimeError(f"{path}: has {len(asset.materials)} materials, one is supported")
-    for name, values, width in (("vertices", asset.vertices, 3), ("normals", asset.normals, 3), ("uv", asset.uv, 2), ("tangents", asset.tangents, 4)):
+    per_vertex = {"vertices": 3, "normals": 3, "uv": 2, "tangents": 4}
+    for name, width in per_vertex.items():
+        values = getattr(asset, name)
         if values is not None and (values.shape != (n, width) or not np.isfinite(values).all()):
             raise RuntimeError(f"{path}: {name} must be finite [{n}, {width}], got {list(values.shape)}")
     if len(asset.triangles) == 0 or asset.triangles.min() < 0 or asset.triangles.max() >= n:

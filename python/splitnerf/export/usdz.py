@@ -77,7 +77,8 @@ def _fill(stage: object, asset: Asset, maps: Maps, folder: Path) -> None:
     surface = _shader(stage, material, "surface", "UsdPreviewSurface")
     material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
     types, factors = Sdf.ValueTypeNames, asset.materials[0]
-    inputs = {"diffuseColor": types.Color3f, "roughness": types.Float, "metallic": types.Float, "normal": types.Normal3f, "occlusion": types.Float}
+    inputs = {"diffuseColor": types.Color3f, "normal": types.Normal3f}
+    inputs |= dict.fromkeys(("occlusion", "roughness", "metallic"), types.Float)
     surface.CreateInput("diffuseColor", types.Color3f).Set(Gf.Vec3f(*factors.albedo))
     surface.CreateInput("roughness", types.Float).Set(float(factors.roughness))
     surface.CreateInput("metallic", types.Float).Set(float(factors.metallic))
