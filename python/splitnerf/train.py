@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import signal
 import sys
 import time
 from dataclasses import dataclass
@@ -12,7 +11,6 @@ from pathlib import Path
 
 import torch
 from torch import Tensor
-from tqdm import tqdm
 
 from splitnerf import losses
 from splitnerf.checkpoint import load_checkpoint, save_checkpoint
@@ -22,9 +20,10 @@ from splitnerf.errors import InputError
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.ops import MeshScene
 from splitnerf.outputs import write_preview
+from splitnerf.progress import Interrupt, Progress
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
-from splitnerf.render.rays import pixel_rays
+from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import render_rays, sample_step
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first ones are logged one by one
@@ -44,35 +43,6 @@ class TrainedScene:
     step: int
     seconds: float
     finished: bool
-
-
-class PixelSource:
-    """Draws training rays: most of them near the objects' masks, the rest anywhere.
-
-    Args:
-        dataset: The train split.
-        foreground_share: Share of the rays drawn within a few pixels of a mask.
-    """
-
-    def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator):
-        self.pixels = torch.from_numpy(dataset.images).reshape(-1, 4)
-        self.poses, self.intrinsics = torch.from_numpy(dataset.poses), torch.from_numpy(dataset.intrinsics)
-        self.height, self.width = dataset.height, dataset.width
-        self.share, self.generator = foreground_share, generator
-        margin = max(2, self.width // 50)
-        masks = torch.from_numpy(dataset.images[..., 3])[:, None]
-        near = torch.nn.functional.max_pool2d(masks, 2 * margin + 1, stride=1, padding=margin) > 0
-        self.foreground = near.reshape(-1).nonzero().squeeze(1)
-
-    def draw(self, n: int) -> tuple[Tensor, Tensor, Tensor]:
-        """rays_o [n, 3], rays_d [n, 3] and the pixels [n, 4] (sRGB, straight alpha)."""
-        n_near = int(n * self.share) if len(self.foreground) else 0
-        near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), generator=self.generator)]
-        anywhere = torch.randint(len(self.pixels), (n - n_near,), generator=self.generator)
-        index = torch.cat([near, anywhere])
-        view, row, column = index // (self.height * self.width), index // self.width % self.height, index % self.width
-        rays_o, rays_d = pixel_rays(self.poses[view], self.intrinsics[view], column + 0.5, row + 0.5)
-        return rays_o, rays_d, self.pixels[index]
 
 
 def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) -> TrainedScene:
@@ -254,43 +224,6 @@ def check_same_scene(content: dict, fingerprint: str, run: Path) -> None:
         raise InputError(
             f"{run / 'checkpoint.pt'}: was trained on other images or another --downscale; give those, or another --out"
         )
-
-
-class Interrupt:
-    """Turns the first Ctrl-C (or SIGTERM) into a request; a second one ends the program at once."""
-
-    def __enter__(self) -> Interrupt:
-        self.asked = False
-        self._previous = {s: signal.signal(s, self._ask) for s in (signal.SIGINT, signal.SIGTERM)}
-        return self
-
-    def _ask(self, number, frame) -> None:
-        self.asked = True
-        signal.signal(number, self._previous[number])
-
-    def __exit__(self, *exception) -> None:
-        for number, handler in self._previous.items():
-            signal.signal(number, handler)
-
-
-class Progress:
-    """The progress bar: share done, time left, PSNR of the batch and samples a ray."""
-
-    def __init__(self, start: float):
-        self._bar = tqdm(
-            total=100.0, initial=100.0 * start, file=sys.stderr,
-            bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining} {postfix}",
-        )  # fmt: skip
-
-    def __enter__(self) -> Progress:
-        return self
-
-    def show(self, progress: float, step: int, psnr: float, samples_per_ray: float) -> None:
-        self._bar.set_postfix_str(f"step {step} PSNR {psnr:.2f} dB, {samples_per_ray:.1f} samples/ray", refresh=False)
-        self._bar.update(100.0 * progress - self._bar.n)
-
-    def __exit__(self, *exception) -> None:
-        self._bar.close()
 
 
 if __name__ == "__main__":

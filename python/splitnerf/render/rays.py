@@ -1,10 +1,12 @@
-"""Pinhole rays."""
+"""Pinhole rays: through image points, of whole images, and drawn for training."""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor
 from torch.nn import functional as F
+
+from splitnerf.data.dataset import Dataset
 
 
 def pixel_rays(pose: Tensor, intrinsics: Tensor, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
@@ -28,3 +30,32 @@ def image_rays(pose: Tensor, intrinsics: Tensor, height: int, width: int) -> tup
     """Rays through all pixel centres of an image, row by row, [H * W, 3] each."""
     y, x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
     return pixel_rays(pose, intrinsics, x.reshape(-1), y.reshape(-1))
+
+
+class PixelSource:
+    """Draws training rays: most of them near the objects' masks, the rest anywhere.
+
+    Args:
+        dataset: The train split.
+        foreground_share: Share of the rays drawn within a few pixels of a mask.
+    """
+
+    def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator):
+        self.pixels = torch.from_numpy(dataset.images).reshape(-1, 4)
+        self.poses, self.intrinsics = torch.from_numpy(dataset.poses), torch.from_numpy(dataset.intrinsics)
+        self.height, self.width = dataset.height, dataset.width
+        self.share, self.generator = foreground_share, generator
+        margin = max(2, self.width // 50)
+        masks = torch.from_numpy(dataset.images[..., 3])[:, None]
+        near = F.max_pool2d(masks, 2 * margin + 1, stride=1, padding=margin) > 0
+        self.foreground = near.reshape(-1).nonzero().squeeze(1)
+
+    def draw(self, n: int) -> tuple[Tensor, Tensor, Tensor]:
+        """rays_o [n, 3], rays_d [n, 3] and the pixels [n, 4] (sRGB, straight alpha)."""
+        n_near = int(n * self.share) if len(self.foreground) else 0
+        near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), generator=self.generator)]
+        anywhere = torch.randint(len(self.pixels), (n - n_near,), generator=self.generator)
+        index = torch.cat([near, anywhere])
+        view, row, column = index // (self.height * self.width), index // self.width % self.height, index % self.width
+        rays_o, rays_d = pixel_rays(self.poses[view], self.intrinsics[view], column + 0.5, row + 0.5)
+        return rays_o, rays_d, self.pixels[index]
