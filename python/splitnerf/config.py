@@ -84,6 +84,10 @@ class Config:
     hull_until: float = 0.1  # the masks' visual hull is sampled until then
     foreground_share: float = 0.85  # of the rays, drawn near the masks
 
+    # Monte Carlo shading in the last part.
+    finetune_from: float = 1.0  # the fraction at which it begins; 1: never
+    finetune_samples: int = 16  # directions of each of a ray's two estimates
+
     # Losses.
     colour_weight: float = 10.0
     light_weight: float = 1.0
@@ -92,6 +96,12 @@ class Config:
     metal_weight: float = 0.001
     metal_regulariser: bool = True
     mask_weight: float = 1.0
+    neutral_weight: float = 0.0  # of the diffuse light's log chroma
+    neutral_queries: int = 256
+    albedo_smoothness: float = 0.0  # of the albedo between neighbouring surface points
+    gloss_smoothness: float = 0.0  # the same of roughness and metallic
+    smoothness_points: int = 1024
+    smoothness_radius: float = 0.02  # scene units, one standard deviation
     light_samples: int = 2048
     light_queries: int = 512
     light_every: int = 1
@@ -143,6 +153,10 @@ class Config:
         for key in ("mesh_resolution", "export_resolution", "export_texture_size"):
             if getattr(self, key) < MIN_EXPORT_SIZE:
                 raise InputError(f"{key} must be at least {MIN_EXPORT_SIZE}, got {getattr(self, key)}")
+        if self.finetune_from < 1 and self.compositing != "linear":
+            raise InputError("finetune_from below 1 needs compositing = linear")
+        if self.finetune_samples < 1:
+            raise InputError(f"finetune_samples must be at least 1, got {self.finetune_samples}")
         if self.steps < 1:
             raise InputError(f"steps must be at least 1, got {self.steps}")
 

@@ -22,6 +22,7 @@ from splitnerf.ops import MeshScene
 from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.render.model import SceneModel
+from splitnerf.render.monte_carlo import monte_carlo_colours
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import render_rays, sample_step
@@ -131,7 +132,12 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             anneal = min(1.0, progress / c.cos_anneal_by) if c.cos_anneal_by > 0 else 1.0
             ray = render_rays(model, grid.cells, rays_o, rays_d, jitter, anneal, sample_step(model))
 
-            terms = {"colour": c.colour_weight * losses.colour_loss(ray, target, background)}
+            if progress >= c.finetune_from and scene is not None:
+                colours = monte_carlo_colours(model, scene, ray, -rays_d, generator)
+                colour = losses.monte_carlo_colour_loss(colours, ray, target, background)
+            else:
+                colour = losses.colour_loss(ray, target, background)
+            terms = {"colour": c.colour_weight * colour}
             gradients = ray.gradients
             if c.eikonal_points:
                 points = (torch.rand(c.eikonal_points, 3, generator=generator) * 2 - 1) * c.box
@@ -141,6 +147,10 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 terms["mask"] = c.mask_weight * losses.mask_loss(ray, target[:, 3])
             if c.light_weight and step % c.light_every == 0:
                 terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
+            if c.neutral_weight:
+                terms["neutral"] = c.neutral_weight * losses.neutral_light_loss(model.light, c, generator)
+            if c.albedo_smoothness or c.gloss_smoothness:
+                terms["smoothness"] = losses.smoothness_loss(model, ray, c, generator)
             if c.metal_regulariser:
                 terms["metal"] = c.metal_weight * losses.metal_loss(ray)
             if scene is not None and model.occlusion_ready:

@@ -68,6 +68,21 @@ template <class T>
 SPLITNERF_API void sample_ggx_lobe(int64_t n, const T* axes, const T* roughness, int n_samples, uint32_t seed,
                                    T* directions);
 
+// ---- Monte Carlo shading, k = n_samples directions a point ----
+
+// normals, view_dirs [n, 3], roughness [n] -> directions [n, k, 3], pdf [n, k], 0 below the horizon.
+template <class T>
+SPLITNERF_API void sample_bsdf(int64_t n, const T* normals, const T* view_dirs, const T* roughness, int n_samples,
+                               uint32_t seed, T* directions, T* pdf);
+// light_dirs [n, k, 3], pdf [n, k], radiance [n, k, 3] -> sums [n, 3 (all, grazing, diffuse), 3].
+template <class T>
+SPLITNERF_API void monte_carlo_light(int64_t n, int n_samples, const T* normals, const T* view_dirs, const T* roughness,
+                                     const T* light_dirs, const T* pdf, const T* radiance, T* sums);
+template <class T>
+SPLITNERF_API void monte_carlo_light_backward(int64_t n, int n_samples, const T* normals, const T* view_dirs,
+                                              const T* roughness, const T* light_dirs, const T* pdf, const T* radiance,
+                                              const T* grad_sums, T* grad_normals, T* grad_roughness, T* grad_radiance);
+
 // ---- rays ----
 
 // jitter [n_rays] in [0, 1). offsets [n_rays + 1] is filled with the exclusive sum of the counts.

@@ -2,6 +2,7 @@
 
 from splitnerf.ops.hash_grid import HashGrid, HashGridSpec, growth_for, hash_encode, hash_encode_jacobian
 from splitnerf.ops.light import fibonacci_directions, prefilter_light, sample_ggx_lobe
+from splitnerf.ops.monte_carlo import LightSums, monte_carlo_light, sample_bsdf
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
 from splitnerf.ops.rays import (
     CELL_EMPTY,
@@ -15,8 +16,8 @@ from splitnerf.ops.rays import (
 from splitnerf.ops.shading import FRESNEL_MODES, QUERIES, brdf_lut, query_direction, split_sum_shade
 
 __all__ = [
-    "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "QUERIES", "HashGrid", "HashGridSpec", "MeshScene",
-    "PackedSamples", "brdf_lut", "composite", "fibonacci_directions", "growth_for", "hash_encode",
-    "hash_encode_jacobian", "march_rays", "neus_weights", "occlusion_factors", "prefilter_light", "query_direction",
-    "sample_ggx_lobe",     "split_sum_shade", "trace_visibility",
+    "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "QUERIES", "HashGrid", "HashGridSpec", "LightSums",
+    "MeshScene", "PackedSamples", "brdf_lut", "composite", "fibonacci_directions", "growth_for", "hash_encode",
+    "hash_encode_jacobian", "march_rays", "monte_carlo_light", "neus_weights", "occlusion_factors", "prefilter_light",
+    "query_direction", "sample_bsdf", "sample_ggx_lobe", "split_sum_shade", "trace_visibility",
 ]  # fmt: skip
