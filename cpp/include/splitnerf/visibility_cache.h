@@ -10,7 +10,7 @@ namespace splitnerf {
 
 inline constexpr int kBitsPerWord = 32;
 inline constexpr int kMaxNeighbours = 16;
-inline constexpr double kLobeDirections = 3;
+inline constexpr double kLobeDirections = 2;
 
 // The lobe's width, never so narrow that fewer than about kLobeDirections of the n directions count: the lattice's
 // effective number of directions in a lobe is 3 n a^2 for small a. The floor depends on n alone, so the factor stays

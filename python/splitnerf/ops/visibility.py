@@ -87,7 +87,7 @@ def cached_occlusion(
 
     With V_i the mean bit of the vertices around the point, weighted by distance and by agreement of normals,
     ``o_d = sum V_i L_i (w_i.n)+ / sum L_i (w_i.n)+``; o_s the same with D(w_i, d)(w_i.d)+ [w_i.n > 0] for the cosine, D no
-    narrower than about three directions. With ``radiance``, ``i_d = sum (1 - V_i) C_i (w_i.n)+ / sum (w_i.n)+`` and i_s over
+    narrower than about two directions. With ``radiance``, ``i_d = sum (1 - V_i) C_i (w_i.n)+ / sum (w_i.n)+`` and i_s over
     the lobe: what they send adds to o_d g(n, 1) and o_s g(d, rho). Where no vertex is near, or all that are near see
     all of the sky above the horizon, the factors are exactly 1 and the added light 0. Black light falls back to the
     geometric share. A number that is not finite gives NaN.
