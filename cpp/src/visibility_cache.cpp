@@ -1,5 +1,6 @@
 #include "splitnerf/visibility_cache.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -32,25 +33,35 @@ void visibility_bits(const Scene& scene, int64_t n, const float* positions, cons
                      const float* directions, float offset, uint32_t* bits, int32_t* hits) {
   const int64_t n_words = n_directions / kBitsPerWord;
   parallel_for(n, kVertexGrain, [&](int64_t begin, int64_t end) {
-    std::vector<float> origins(3 * n_directions);
+    std::vector<float> origins(3 * n_directions), rays(3 * n_directions);
+    std::vector<int64_t> above(n_directions);  // the directions above the horizon
     std::vector<uint8_t> open(n_directions);
     std::vector<Hit> found(hits ? n_directions : 0);
     for (int64_t v = begin; v < end; ++v) {
-      const Vec3<float> origin = load3(positions + 3 * v) + load3(normals + 3 * v) * offset;
-      for (int64_t i = 0; i < n_directions; ++i) store3(&origins[3 * i], origin);
+      const Vec3<float> normal = load3(normals + 3 * v), origin = load3(positions + 3 * v) + normal * offset;
+      int64_t n_rays = 0;
+      for (int64_t i = 0; i < n_directions; ++i) {
+        const Vec3<float> w = load3(directions + 3 * i);
+        if (!(dot(w, normal) > 0.f)) continue;
+        store3(&origins[3 * n_rays], origin);
+        store3(&rays[3 * n_rays], w);
+        above[n_rays++] = i;
+      }
+      uint32_t *open_words = bits + 2 * v * n_words, *blocked_words = open_words + n_words;
+      std::fill(open_words, open_words + 2 * n_words, 0u);
       if (hits) {
-        scene.trace_closest(origins.data(), directions, n_directions, INFINITY, found.data());
-        for (int64_t i = 0; i < n_directions; ++i) {
-          open[i] = found[i].t < 0.f;
-          hits[v * n_directions + i] = open[i] ? -1 : heaviest_vertex(scene.triangles() + 3 * int64_t(found[i].triangle), found[i]);
+        std::fill(hits + v * n_directions, hits + (v + 1) * n_directions, -1);
+        scene.trace_closest(origins.data(), rays.data(), n_rays, INFINITY, found.data());
+        for (int64_t k = 0; k < n_rays; ++k) {
+          open[k] = found[k].t < 0.f;
+          if (open[k]) continue;
+          hits[v * n_directions + above[k]] = heaviest_vertex(scene.triangles() + 3 * int64_t(found[k].triangle), found[k]);
         }
       } else {
-        scene.trace_visibility(origins.data(), directions, n_directions, INFINITY, nullptr, open.data());
+        scene.trace_visibility(origins.data(), rays.data(), n_rays, INFINITY, nullptr, open.data());
       }
-      for (int64_t word = 0; word < n_words; ++word) {
-        uint32_t packed = 0;
-        for (int j = 0; j < kBitsPerWord; ++j) packed |= uint32_t(open[word * kBitsPerWord + j] != 0) << j;
-        bits[v * n_words + word] = packed;
+      for (int64_t k = 0; k < n_rays; ++k) {
+        (open[k] ? open_words : blocked_words)[above[k] / kBitsPerWord] |= 1u << above[k] % kBitsPerWord;
       }
     }
   });
@@ -81,7 +92,7 @@ template <class T> class CacheReader {
  public:
   CacheReader(const VisibilityCache<T>& cache, const LobeSide<T>& directions)
       : cache_(cache), directions_(directions), n_words_(cache.n_directions / kBitsPerWord), above_(n_words_),
-        cosine_(cache.n_directions), visible_(cache.n_directions), lobe_(cache.n_directions) {}
+        cosine_(cache.n_directions), known_(cache.n_directions), visible_(cache.n_directions), lobe_(cache.n_directions) {}
 
   struct Result {
     Vec3<T> occlusion_d{T(1), T(1), T(1)}, occlusion_s{T(1), T(1), T(1)};
@@ -105,7 +116,7 @@ template <class T> class CacheReader {
     const T alpha = cached_lobe_alpha(roughness, static_cast<int>(cache_.n_directions));
     const VisibilityPoint<T> point{bits, near.weight, near.n, cosine_.data(), &lobe_dir.x, alpha * alpha};
     T sums[14];
-    kernels<T>().visibility_sums(directions_, point, visible_.data(), lobe_.data(), sums);
+    kernels<T>().visibility_sums(directions_, point, known_.data(), visible_.data(), lobe_.data(), sums);
     result.occlusion_d = ratio(sums, sums + 3);
     result.occlusion_s = ratio(sums + 7, sums + 10);
     if (cache_.hits) add_indirect(near, sums[6], sums[13], result);
@@ -113,13 +124,14 @@ template <class T> class CacheReader {
   }
 
  private:
-  const uint32_t* words(int32_t vertex) const { return cache_.bits + int64_t(vertex) * n_words_; }
+  const uint32_t* words(int32_t vertex) const { return cache_.bits + 2 * int64_t(vertex) * n_words_; }
+  const uint32_t* blocked_words(int32_t vertex) const { return words(vertex) + n_words_; }
 
   // Whether no neighbour has a blocked direction above the point's horizon; so without neighbours.
   bool all_open(const Neighbours<T>& near) const {
     uint32_t blocked = 0;
     for (int k = 0; k < near.n; ++k) {
-      for (int64_t word = 0; word < n_words_; ++word) blocked |= ~words(near.vertex[k])[word] & above_[word];
+      for (int64_t word = 0; word < n_words_; ++word) blocked |= blocked_words(near.vertex[k])[word] & above_[word];
     }
     return blocked == 0;
   }
@@ -130,12 +142,12 @@ template <class T> class CacheReader {
       const int32_t* hits = cache_.hits + int64_t(near.vertex[k]) * cache_.n_directions;
       Vec3<T> d{T(0), T(0), T(0)}, s{T(0), T(0), T(0)};
       for (int64_t word = 0; word < n_words_; ++word) {
-        const uint32_t blocked = ~words(near.vertex[k])[word] & above_[word];
+        const uint32_t blocked = blocked_words(near.vertex[k])[word] & above_[word];
         for (int j = 0; j < kBitsPerWord; ++j) {
           if (!(blocked >> j & 1u)) continue;
           const int64_t i = word * kBitsPerWord + j;
           if (hits[i] < 0 || hits[i] >= cache_.grids.n_vertices) continue;
-          const Vec3<T> arriving = load3(cache_.radiance + 3 * int64_t(hits[i]));
+          const Vec3<T> arriving = load3(cache_.radiance + 3 * int64_t(hits[i])) / known_[i];
           d += arriving * cosine_[i];
           s += arriving * lobe_[i];
         }
@@ -149,7 +161,7 @@ template <class T> class CacheReader {
   const LobeSide<T>& directions_;
   const int64_t n_words_;
   std::vector<uint32_t> above_;
-  std::vector<T> cosine_, visible_, lobe_;
+  std::vector<T> cosine_, known_, visible_, lobe_;
 };
 
 }  // namespace

@@ -20,7 +20,7 @@ std::tuple<Tensor, Tensor> visibility_bits(int64_t scene, Tensor positions, Tens
   const Tensor n = checked(op, "normals", normals, {x.size(0), 3}, ScalarType::Float);
   const Tensor d = checked(op, "directions", directions, {kAny, 3}, ScalarType::Float);
   check_directions(op, d.size(0));
-  Tensor bits = empty_like_type(x, {x.size(0), d.size(0) / kBitsPerWord}, ScalarType::Int);
+  Tensor bits = empty_like_type(x, {x.size(0), 2, d.size(0) / kBitsPerWord}, ScalarType::Int);
   Tensor hits = empty_like_type(x, {x.size(0), with_hits ? d.size(0) : 0}, ScalarType::Int);
   cpu::visibility_bits(*get_scene(scene), x.size(0), in<float>(x), in<float>(n), d.size(0), in<float>(d),
                        static_cast<float>(offset), out<uint32_t>(bits), with_hits ? out<int32_t>(hits) : nullptr);
@@ -72,7 +72,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> cached_occlusion(Tensor positions, Te
   const Tensor w = checked(op, "directions", directions, {kAny, 3}, type);
   check_directions(op, w.size(0));
   const Tensor l = checked(op, "light", light, {w.size(0), 3}, type);
-  const Tensor b = checked(op, "bits", bits, {n_vertices, w.size(0) / kBitsPerWord}, ScalarType::Int);
+  const Tensor b = checked(op, "bits", bits, {n_vertices, 2, w.size(0) / kBitsPerWord}, ScalarType::Int);
   const bool indirect = hits.dim() == 2 && hits.size(1) > 0;
   const Tensor h = checked(op, "hits", hits, {n_vertices, indirect ? w.size(0) : 0}, ScalarType::Int);
   const Tensor c = checked(op, "radiance", radiance, {indirect ? n_vertices : 0, 3}, type);

@@ -29,7 +29,7 @@ template <class T> struct LobeSide {
 
 // A point that reads visibility bits from nearby vertices.
 template <class T> struct VisibilityPoint {
-  const uint32_t* const* bits;  // [n_neighbours] words of each neighbour, a bit a direction
+  const uint32_t* const* bits;  // [n_neighbours] each neighbour's words, open then blocked, see visibility_bits
   const T* weights;             // [n_neighbours], sum 1
   int n_neighbours;
   const T* cosine;              // [n directions], from visibility_horizon
@@ -54,9 +54,10 @@ template <class T> struct Kernels {
   void (*lobe_scatter)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
   // cosine[i] = (w_i.n)+ and, bit by bit, whether it is positive. The number of directions is a multiple of 32.
   void (*visibility_horizon)(const LobeSide<T>& directions, const T* normal, T* cosine, uint32_t* above);
-  // visible[i] = mean bit of the neighbours, lobe[i] = D(w_i, d)(w_i.d)+ [w_i.n > 0] up to a factor; light in the
-  // directions' r, g, b. sums = {sum V L c, sum L c (three channels each), sum c; the same with lobe for c}: 14 numbers.
-  void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityPoint<T>& point, T* visible, T* lobe, T* sums);
+  // known[i] = weight of the neighbours that know direction i, visible[i] = the open share of it, 1 where none knows.
+  // lobe[i] = D(w_i, d)(w_i.d)+ [w_i.n > 0] up to a factor; light in the directions' r, g, b. sums = {sum V L c, sum L c (three channels each), sum c; the same with lobe for c}: 14 numbers.
+  void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityPoint<T>& point, T* known, T* visible, T* lobe,
+                          T* sums);
 };
 
 // Those for this processor. SPLITNERF_ISA = base | avx2 | avx512 in the environment picks a lower

@@ -111,8 +111,9 @@ SPLITNERF_API void occlusion_factors(const Scene& scene, const OcclusionOptions&
 // ---- visibility bits cached on a mesh ----
 
 // positions (vertices of the scene's mesh), normals [n, 3], directions [n_directions, 3], n_directions a multiple of 32
-// -> bits [n, n_directions / 32], 1 = open, of rays that start `offset` along the normal; hits [n, n_directions] (may be
-// null): the vertex with the largest barycentric weight of the triangle hit, -1 = open.
+// -> bits [n, 2, n_directions / 32] of the rays above each vertex's horizon that start `offset` along its normal: a bit in
+// the first row for an open direction, in the second for a blocked one, in neither below the horizon; hits
+// [n, n_directions] (may be null): the vertex with the largest barycentric weight of the triangle hit, -1 where not blocked.
 SPLITNERF_API void visibility_bits(const Scene& scene, int64_t n, const float* positions, const float* normals,
                                    int64_t n_directions, const float* directions, float offset, uint32_t* bits,
                                    int32_t* hits);
@@ -124,7 +125,7 @@ SPLITNERF_API void build_vertex_grids(int64_t n_vertices, const T* vertices, T r
 
 template <class T> struct VisibilityCache {
   VertexGrids<T> grids;
-  const uint32_t* bits;   // [n_vertices, n_directions / 32]
+  const uint32_t* bits;   // [n_vertices, 2, n_directions / 32], see visibility_bits
   const int32_t* hits;    // [n_vertices, n_directions], or null: no indirect light
   const T* radiance;      // [n_vertices, 3] that the vertices send out, with hits
   int64_t n_directions;

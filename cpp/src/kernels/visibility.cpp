@@ -20,16 +20,23 @@ template <class T> void visibility_horizon(const LobeSide<T>& directions, const 
 }
 
 template <class T>
-void visibility_sums(const LobeSide<T>& directions, const VisibilityPoint<T>& point, T* visible, T* lobe, T* sums) {
-  for (int64_t word = 0; word < directions.n / kBitsPerWord; ++word) {
-    T* share = visible + word * kBitsPerWord;
-    for (int j = 0; j < kBitsPerWord; ++j) share[j] = T(0);
+void visibility_sums(const LobeSide<T>& directions, const VisibilityPoint<T>& point, T* known, T* visible, T* lobe,
+                     T* sums) {
+  const int64_t n_words = directions.n / kBitsPerWord;
+  for (int64_t word = 0; word < n_words; ++word) {
+    T *all = known + word * kBitsPerWord, *share = visible + word * kBitsPerWord;
+    for (int j = 0; j < kBitsPerWord; ++j) all[j] = share[j] = T(0);
     for (int k = 0; k < point.n_neighbours; ++k) {
-      const uint32_t bits = point.bits[k][word];
+      const uint32_t open = point.bits[k][word], either = open | point.bits[k][n_words + word];
       const T weight = point.weights[k];
 #pragma omp simd
-      for (int j = 0; j < kBitsPerWord; ++j) share[j] += weight * T(int32_t(bits >> j & 1u));
+      for (int j = 0; j < kBitsPerWord; ++j) {
+        all[j] += weight * T(int32_t(either >> j & 1u));
+        share[j] += weight * T(int32_t(open >> j & 1u));
+      }
     }
+#pragma omp simd
+    for (int j = 0; j < kBitsPerWord; ++j) share[j] = all[j] > T(0) ? share[j] / all[j] : T(1);
   }
   const T x = point.lobe_dir[0], y = point.lobe_dir[1], z = point.lobe_dir[2], a2 = point.alpha_squared;
   T open_dr = 0, open_dg = 0, open_db = 0, all_dr = 0, all_dg = 0, all_db = 0, total_d = 0;
@@ -53,7 +60,7 @@ void visibility_sums(const LobeSide<T>& directions, const VisibilityPoint<T>& po
 
 #define SPLITNERF_INSTANTIATE(T)                                                        \
   template void visibility_horizon<T>(const LobeSide<T>&, const T*, T*, uint32_t*);     \
-  template void visibility_sums<T>(const LobeSide<T>&, const VisibilityPoint<T>&, T*, T*, T*);
+  template void visibility_sums<T>(const LobeSide<T>&, const VisibilityPoint<T>&, T*, T*, T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE
