@@ -142,10 +142,8 @@ template <class T> class CacheReader {
       const int32_t* hits = cache_.hits + int64_t(near.vertex[k]) * cache_.n_directions;
       Vec3<T> d{T(0), T(0), T(0)}, s{T(0), T(0), T(0)};
       for (int64_t word = 0; word < n_words_; ++word) {
-        const uint32_t blocked = blocked_words(near.vertex[k])[word] & above_[word];
-        for (int j = 0; j < kBitsPerWord; ++j) {
-          if (!(blocked >> j & 1u)) continue;
-          const int64_t i = word * kBitsPerWord + j;
+        for (uint32_t blocked = blocked_words(near.vertex[k])[word] & above_[word]; blocked; blocked &= blocked - 1) {
+          const int64_t i = word * kBitsPerWord + lowest_bit(blocked);
           if (hits[i] < 0 || hits[i] >= cache_.grids.n_vertices) continue;
           const Vec3<T> arriving = load3(cache_.radiance + 3 * int64_t(hits[i])) / known_[i];
           d += arriving * cosine_[i];

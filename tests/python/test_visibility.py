@@ -12,9 +12,20 @@ from op_checks import check_error, check_no_gradient, check_op, generator, lib, 
 from torch.nn import functional as F
 
 from splitnerf import _core
+from splitnerf.config import Config
 from splitnerf.fields import OcclusionQuery, VisibilityBits
 from splitnerf.fields.light import panorama_directions
-from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, occlusion_factors, query_direction, trace_visibility, visibility_bits
+from splitnerf.ops import (
+    MeshScene,
+    VisibilityCache,
+    cached_occlusion,
+    occlusion_factors,
+    query_direction,
+    split_sum_shade,
+    trace_visibility,
+    visibility_bits,
+)
+from splitnerf.render.model import SceneModel
 
 OFFSET = 0.0125
 UP = torch.tensor([[0.0, 0.0, 1.0]])
@@ -75,7 +86,7 @@ def test_bits_and_hits_are_those_of_single_rays():
     expected = trace_visibility(scene, origins.reshape(-1, 3), w.repeat(len(x), 1)).view(len(x), 96)
     above = n @ w.T > 0
     assert torch.equal(open_, expected & above) and torch.equal(blocked, ~expected & above)
-    assert torch.equal(hits >= 0, blocked) and 0.05 < blocked[above].float().mean() < 0.9
+    assert torch.equal(hits >= 0, blocked) and 0.02 < blocked[above].float().mean() < 0.9
     assert torch.equal(visibility_bits(scene, x, n, w, OFFSET)[0], bits)
 
     triangle, u, v = trimesh_hits(mesh, origins.reshape(-1, 3), w.repeat(len(x), 1))
@@ -210,12 +221,16 @@ def test_light_of_the_cells():
 # ---- indirect light ----
 
 
+def half_shell(subdivisions: int) -> trimesh.Trimesh:
+    """The lower half of the unit sphere, faces inwards."""
+    ball = trimesh.creation.icosphere(subdivisions)
+    return trimesh.Trimesh(ball.vertices, ball.faces[ball.triangles_center[:, 2] < 0][:, ::-1])
+
+
 @pytest.mark.parametrize("albedo", [0.3, 0.8, 1.0])
 def test_the_furnace_of_a_bowl(albedo):
     """Each point of half a spherical shell sees as much shell as sky: B = a (1/2 + B/2), so B = a / (2 - a)."""
-    ball = trimesh.creation.icosphere(4)
-    bowl = trimesh.Trimesh(ball.vertices, ball.faces[ball.triangles_center[:, 2] < 0][:, ::-1])  # faces inwards
-    cache = cache_of(bowl, 256, offset=1e-3, with_hits=True)
+    cache = cache_of(half_shell(4), 256, offset=1e-3, with_hits=True)
     inner = cache.vertices[:, 2] < -0.15
     radiance = torch.zeros_like(cache.vertices)
     for bounce in range(1, 41):
@@ -246,11 +261,43 @@ def test_a_mirror_sees_what_blocks_its_lobe():
     assert (o_s[0] < 0.05).all() and (o_s[1] > 0.95).all() and (i_s[1] < 0.05).all()
 
 
+def test_the_model_shades_with_the_light_of_its_mesh():
+    """In a bowl: o g + i takes the place of the light, each refresh adds a bounce, and the sums converge."""
+    settings = {"n_levels": 2, "log2_table_size": 8, "occlusion": "bits", "indirect": True, "occlusion_directions": 64}
+    torch.manual_seed(0)
+    model = SceneModel(Config().replace(settings | {"initial_roughness": 0.9}))
+    mesh = half_shell(3)
+    vertices, faces = torch.tensor(np.asarray(mesh.vertices)).float(), torch.tensor(np.asarray(mesh.faces))
+    model.use_mesh(scene_of(mesh), vertices, faces)
+    bits = model.occlusion
+    assert not any(key.startswith("occlusion") for key in model.state_dict())
+
+    x, n = bits.cache.vertices[::9], bits.cache.normals[::9]
+    field = model.surface(x)
+    field = field._replace(outputs=field.outputs * torch.tensor([0.0] + [1.0] * 12))  # as if the level set passed there
+    shaded = model.shade(x, field.outputs, field.features, n, n)
+    occlusion = bits(OcclusionQuery(torch.empty(0), x, n, shaded.lobe_dirs, shaded.roughness))
+    light_s, light_d = model.light(shaded.lobe_dirs, shaded.roughness), model.light(n, torch.ones(len(x), 1))
+    expected = split_sum_shade(
+        n, n, shaded.albedo, shaded.roughness, shaded.metallic, occlusion.specular * light_s + occlusion.indirect_specular,
+        occlusion.diffuse * light_d + occlusion.indirect_diffuse, torch.ones(len(x), 1), torch.ones(len(x), 1), "exact", True,
+    )  # fmt: skip
+    torch.testing.assert_close(shaded.radiance, expected, rtol=1e-3, atol=1e-4)
+    assert torch.equal(shaded.occlusion_d, occlusion.diffuse) and shaded.radiance.requires_grad
+
+    bits.radiance, levels = None, []
+    for _ in range(6):
+        model.refresh_indirect()
+        levels.append(bits.radiance.mean().item())
+    steps = np.diff(levels)
+    assert (steps > 0).all() and (steps[1:] < 0.6 * steps[:-1]).all() and steps[0] > 0.05 * levels[0]
+
+
 # ---- the operators ----
 
 
 def op_inputs(dtype, n: int = 9, with_hits: bool = True) -> tuple:
-    mesh = nine_spheres()
+    mesh = trimesh.util.concatenate([grid_mesh(2.0, 5), trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))])
     cache = cache_of(mesh, 64, with_hits=with_hits)
     x, normals = (t[:n].to(dtype) for t in between(mesh, 9))
     lobes = unit(normals + 0.3 * unit(torch.randn(9, 3, generator=generator(1)))[:n].to(dtype))

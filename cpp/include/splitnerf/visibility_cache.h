@@ -19,6 +19,19 @@ template <class T> SPLITNERF_HD T cached_lobe_alpha(T roughness, int n_direction
   return max_of(ggx_alpha_from_roughness(roughness), std::sqrt(T(kLobeDirections / 3) / T(n_directions)));
 }
 
+// Index of the lowest bit of a word that is not 0.
+SPLITNERF_HD int lowest_bit(uint32_t word) {
+#if defined(__CUDA_ARCH__)
+  return __ffs(int(word)) - 1;
+#elif defined(__GNUC__)
+  return __builtin_ctz(word);
+#else
+  int i = 0;
+  while (!(word >> i & 1u)) ++i;
+  return i;
+#endif
+}
+
 // ---- which vertices answer for a point -------------------------------------------------------
 
 // Hash grids over the vertices of a mesh. Level l reaches radius * 2^l far and has cells twice as large, so that the ball
