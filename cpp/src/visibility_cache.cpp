@@ -55,7 +55,8 @@ void visibility_bits(const Scene& scene, int64_t n, const float* positions, cons
         for (int64_t k = 0; k < n_rays; ++k) {
           open[k] = found[k].t < 0.f;
           if (open[k]) continue;
-          hits[v * n_directions + above[k]] = heaviest_vertex(scene.triangles() + 3 * int64_t(found[k].triangle), found[k]);
+          const int32_t* triangle = scene.triangles() + 3 * int64_t(found[k].triangle);
+          hits[v * n_directions + above[k]] = heaviest_vertex(triangle, found[k]);
         }
       } else {
         scene.trace_visibility(origins.data(), rays.data(), n_rays, INFINITY, nullptr, open.data());
@@ -68,8 +69,8 @@ void visibility_bits(const Scene& scene, int64_t n, const float* positions, cons
 }
 
 template <class T>
-void build_vertex_grids(int64_t n_vertices, const T* vertices, T radius, int n_levels, int64_t n_buckets, int32_t* starts,
-                        int32_t* order) {
+void build_vertex_grids(int64_t n_vertices, const T* vertices, T radius, int n_levels, int64_t n_buckets,
+                        int32_t* starts, int32_t* order) {
   std::vector<int32_t> bucket(n_vertices);
   T inverse_size = T(0.5) / radius;
   for (int level = 0; level < n_levels; ++level, inverse_size *= T(0.5)) {
@@ -92,7 +93,8 @@ template <class T> class CacheReader {
  public:
   CacheReader(const VisibilityCache<T>& cache, const LobeSide<T>& directions)
       : cache_(cache), directions_(directions), n_words_(cache.n_directions / kBitsPerWord), above_(n_words_),
-        cosine_(cache.n_directions), known_(cache.n_directions), visible_(cache.n_directions), lobe_(cache.n_directions) {}
+        cosine_(cache.n_directions), known_(cache.n_directions), visible_(cache.n_directions),
+        lobe_(cache.n_directions) {}
 
   struct Result {
     Vec3<T> occlusion_d{T(1), T(1), T(1)}, occlusion_s{T(1), T(1), T(1)};
@@ -136,7 +138,8 @@ template <class T> class CacheReader {
     return blocked == 0;
   }
 
-  // sum (1 - V_i) C_i c_i / sum c_i over both kernels. Few directions above the horizon are blocked: they are taken one by one.
+  // sum (1 - V_i) C_i c_i / sum c_i over both kernels. Few directions above the horizon are blocked: they are taken
+  // one by one.
   void add_indirect(const Neighbours<T>& near, T total_d, T total_s, Result& result) const {
     for (int k = 0; k < near.n; ++k) {
       const int32_t* hits = cache_.hits + int64_t(near.vertex[k]) * cache_.n_directions;
@@ -178,7 +181,8 @@ void cached_occlusion(const VisibilityCache<T>& cache, int64_t n, const T* posit
   parallel_for(n, kPointGrain, [&](int64_t begin, int64_t end) {
     CacheReader<T> reader(cache, directions);
     for (int64_t i = begin; i < end; ++i) {
-      const auto result = reader.read(load3(positions + 3 * i), load3(normals + 3 * i), load3(lobe_dirs + 3 * i), roughness[i]);
+      const auto result =
+          reader.read(load3(positions + 3 * i), load3(normals + 3 * i), load3(lobe_dirs + 3 * i), roughness[i]);
       store3(occlusion_d + 3 * i, result.occlusion_d);
       store3(occlusion_s + 3 * i, result.occlusion_s);
       if (!cache.hits) continue;

@@ -10,7 +10,8 @@ namespace {
 constexpr int64_t kMaxDirections = 1 << 16;
 
 void check_directions(const char* op, int64_t n) {
-  require(n > 0 && n % kBitsPerWord == 0 && n <= kMaxDirections, op, "directions must hold a multiple of 32 in [32, 65536]");
+  require(n > 0 && n % kBitsPerWord == 0 && n <= kMaxDirections, op,
+          "directions must hold a multiple of 32 in [32, 65536]");
 }
 
 std::tuple<Tensor, Tensor> visibility_bits(int64_t scene, Tensor positions, Tensor normals, Tensor directions,
@@ -87,7 +88,8 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> cached_occlusion(Tensor positions, Te
   dispatch_real(type, [&](auto zero) {
     using T = decltype(zero);
     const cpu::VisibilityCache<T> cache{
-        {in<T>(v), in<T>(vn), in<int32_t>(s), in<int32_t>(o), n_vertices, n_buckets, static_cast<int>(s.size(0)), T(radius)},
+        {in<T>(v), in<T>(vn), in<int32_t>(s), in<int32_t>(o), n_vertices, n_buckets, static_cast<int>(s.size(0)),
+         T(radius)},
         in<uint32_t>(b), indirect ? in<int32_t>(h) : nullptr, in<T>(c), w.size(0), in<T>(w), in<T>(l)};
     cpu::cached_occlusion(cache, x.size(0), in<T>(x), in<T>(n), in<T>(d), in<T>(rho), out<T>(o_d), out<T>(o_s),
                           out<T>(i_d), out<T>(i_s));

@@ -147,7 +147,9 @@ class Config:
             if getattr(self, key) < MIN_EXPORT_SIZE:
                 raise InputError(f"{key} must be at least {MIN_EXPORT_SIZE}, got {getattr(self, key)}")
         if not 64 <= self.occlusion_directions <= 1024 or self.occlusion_directions % 32:
-            raise InputError(f"occlusion_directions must be a multiple of 32 in 64 to 1024, got {self.occlusion_directions}")
+            raise InputError(
+                f"occlusion_directions must be a multiple of 32 in 64 to 1024, got {self.occlusion_directions}"
+            )
         if self.indirect and self.occlusion != "bits":
             raise InputError(f'indirect needs occlusion = "bits", got {self.occlusion!r}')
         if self.indirect_every < 1:

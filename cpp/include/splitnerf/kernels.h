@@ -55,7 +55,8 @@ template <class T> struct Kernels {
   // cosine[i] = (w_i.n)+ and, bit by bit, whether it is positive. The number of directions is a multiple of 32.
   void (*visibility_horizon)(const LobeSide<T>& directions, const T* normal, T* cosine, uint32_t* above);
   // known[i] = weight of the neighbours that know direction i, visible[i] = the open share of it, 1 where none knows.
-  // lobe[i] = D(w_i, d)(w_i.d)+ [w_i.n > 0] up to a factor; light in the directions' r, g, b. sums = {sum V L c, sum L c (three channels each), sum c; the same with lobe for c}: 14 numbers.
+  // lobe[i] = D(w_i, d)(w_i.d)+ [w_i.n > 0] up to a factor; light in the directions' r, g, b. With c = cosine,
+  // sums = {sum V L c, sum L c (three channels each), sum c; the same with lobe for c}: 14 numbers.
   void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityPoint<T>& point, T* known, T* visible, T* lobe,
                           T* sums);
 };

@@ -111,9 +111,10 @@ SPLITNERF_API void occlusion_factors(const Scene& scene, const OcclusionOptions&
 // ---- visibility bits cached on a mesh ----
 
 // positions (vertices of the scene's mesh), normals [n, 3], directions [n_directions, 3], n_directions a multiple of 32
-// -> bits [n, 2, n_directions / 32] of the rays above each vertex's horizon that start `offset` along its normal: a bit in
-// the first row for an open direction, in the second for a blocked one, in neither below the horizon; hits
-// [n, n_directions] (may be null): the vertex with the largest barycentric weight of the triangle hit, -1 where not blocked.
+// -> bits [n, 2, n_directions / 32] of the rays above each vertex's horizon that start `offset` along its normal: a
+// bit in the first row for an open direction, in the second for a blocked one, in neither below the horizon; hits
+// [n, n_directions] (may be null): the vertex with the largest barycentric weight of the triangle hit, -1 where the
+// direction is not blocked.
 SPLITNERF_API void visibility_bits(const Scene& scene, int64_t n, const float* positions, const float* normals,
                                    int64_t n_directions, const float* directions, float offset, uint32_t* bits,
                                    int32_t* hits);
@@ -132,8 +133,8 @@ template <class T> struct VisibilityCache {
   const T *directions, *light;  // [n_directions, 3]; the light's mean over each direction's cell
 };
 
-// positions, normals, lobe_dirs [n, 3], roughness [n] -> occlusion_d, occlusion_s, and with hits indirect_d, indirect_s,
-// [n, 3] each. Numbers that are not finite make NaN.
+// positions, normals, lobe_dirs [n, 3], roughness [n] -> occlusion_d, occlusion_s, and with hits indirect_d and
+// indirect_s, [n, 3] each. Numbers that are not finite make NaN.
 template <class T>
 SPLITNERF_API void cached_occlusion(const VisibilityCache<T>& cache, int64_t n, const T* positions, const T* normals,
                                     const T* lobe_dirs, const T* roughness, T* occlusion_d, T* occlusion_s,

@@ -34,8 +34,8 @@ SPLITNERF_HD int lowest_bit(uint32_t word) {
 
 // ---- which vertices answer for a point -------------------------------------------------------
 
-// Hash grids over the vertices of a mesh. Level l reaches radius * 2^l far and has cells twice as large, so that the ball
-// around a point touches 2 x 2 x 2 of them. The vertices of bucket b are order[starts[b] ... starts[b + 1] - 1].
+// Hash grids over the vertices of a mesh. Level l reaches radius * 2^l far and has cells twice as large, so that the
+// ball around a point touches 2 x 2 x 2 of them. The vertices of bucket b are order[starts[b] ... starts[b + 1] - 1].
 template <class T> struct VertexGrids {
   const T *vertices, *normals;  // [n_vertices, 3]
   const int32_t* starts;        // [n_levels, n_buckets + 1]
@@ -56,7 +56,9 @@ struct GridCell {
 
 // Coordinates are kept within what 32 bits hold; so far out all share the last cell.
 template <class T> SPLITNERF_HD GridCell grid_cell(Vec3<T> x, T inverse_size, T shift = T(0)) {
-  const auto index = [&](T t) { return static_cast<int32_t>(std::floor(clamp(t * inverse_size + shift, T(-1e9), T(1e9)))); };
+  const auto index = [&](T t) {
+    return static_cast<int32_t>(std::floor(clamp(t * inverse_size + shift, T(-1e9), T(1e9))));
+  };
   return {index(x.x), index(x.y), index(x.z)};
 }
 
@@ -82,8 +84,8 @@ template <class T> struct Neighbours {
 };
 
 // Share of a vertex at distance r < reach whose normal makes the cosine c with the point's: distance by the weight of
-// Franke and Little (1980), ((reach - r) / (reach r))^2 up to a factor, which interpolates and has compact support, with a
-// small constant in place of its pole; normals by c^4, so that the other side of a thin plate never answers.
+// Franke and Little (1980), ((reach - r) / (reach r))^2 up to a factor, which interpolates and has compact support, with
+// a small constant in place of its pole; normals by c^4, so that the other side of a thin plate never answers.
 template <class T> SPLITNERF_HD T neighbour_weight(T relative_distance, T cosine) {
   if (relative_distance >= T(1) || !(cosine > T(0))) return T(0);
   return square((T(1) - relative_distance) / (relative_distance + T(0.05))) * square(square(cosine));

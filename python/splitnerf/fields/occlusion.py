@@ -33,7 +33,7 @@ class Occlusion(NamedTuple):
 
     Attributes:
         diffuse, specular: o_d and o_s, [n, 1] or [n, 3], 1 = open.
-        indirect_diffuse, indirect_specular: [n, 3] linear, in the normalisation of g(n, 1) and g(d, rho); None: unknown.
+        indirect_diffuse, indirect_specular: [n, 3] linear, in the normalisation of g(n, 1) and g(d, rho), or None.
     """
 
     diffuse: Tensor

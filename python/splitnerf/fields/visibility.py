@@ -21,8 +21,9 @@ SHADED_CHUNK = 1 << 15  # vertices shaded at a time
 class VisibilityBits(nn.Module):
     """o_d and o_s from what each mesh vertex sees in a fixed set of directions, and the light of what it does not see.
 
-    Nothing is learned here and nothing is part of the state: :meth:`trace` fills the cache from a mesh, :meth:`set_light`
-    takes the current light, :meth:`refresh` the light that the vertices send out. No gradient flows through the factors.
+    Nothing is learned here and nothing is part of the state: :meth:`trace` fills the cache from a mesh,
+    :meth:`set_light` takes the current light, :meth:`refresh` the light that the vertices send out. No gradient flows
+    through the factors.
 
     Args:
         n_directions: Fibonacci directions over the sphere, a multiple of 32.
@@ -54,8 +55,9 @@ class VisibilityBits(nn.Module):
         mesh = trimesh.Trimesh(vertices.numpy(), faces.numpy(), process=False)
         normals = torch.from_numpy(np.array(mesh.vertex_normals, dtype=np.float32))
         self.cache = VisibilityCache.trace(
-            scene, vertices.float(), normals, float(mesh.area), self.directions, offset=self.offset, with_hits=self.indirect
-        )
+            scene, vertices.float(), normals, float(mesh.area), self.directions, offset=self.offset,
+            with_hits=self.indirect,
+        )  # fmt: skip
         self.radiance = None
 
     def set_light(self, panorama: Tensor) -> None:

@@ -18,8 +18,9 @@ RADIUS_IN_SPACINGS = 1.5
 
 
 def visibility_bits(
-    scene: MeshScene, positions: Tensor, normals: Tensor, directions: Tensor, offset: float = 0.0125, *, with_hits: bool = False
-) -> tuple[Tensor, Tensor]:
+    scene: MeshScene, positions: Tensor, normals: Tensor, directions: Tensor, offset: float = 0.0125, *,
+    with_hits: bool = False,
+) -> tuple[Tensor, Tensor]:  # fmt: skip
     """Traces the same directions from every vertex of a mesh and keeps what became of each ray.
 
     Args:
@@ -30,8 +31,8 @@ def visibility_bits(
         with_hits: Also say what was hit.
 
     Returns:
-        bits: [n, 2, k / 32] int32; bit j of word i stands for direction 32 i + j. Row 0 marks the open directions, row 1
-            the blocked ones; those below the vertex's own horizon, which are not traced, stand in neither.
+        bits: [n, 2, k / 32] int32; bit j of word i stands for direction 32 i + j. Row 0 marks the open directions,
+            row 1 the blocked ones; those below the vertex's own horizon, which are not traced, stand in neither.
         hits: [n, k] int32, the vertex with the largest barycentric weight of the triangle that was hit, -1 where the
             direction is not blocked; [n, 0] without ``with_hits``.
 
@@ -86,11 +87,12 @@ def cached_occlusion(
 ) -> tuple[Tensor, Tensor, Tensor | None, Tensor | None]:  # fmt: skip
     """Occlusion factors, and the light that the mesh itself sends, from the cached bits.
 
-    With V_i the open share among the vertices around the point, weighted by distance and by agreement of normals (a vertex
-    says nothing of directions below its own horizon; where none says anything, V_i = 1),
-    ``o_d = sum V_i L_i (w_i.n)+ / sum L_i (w_i.n)+``; o_s the same with D(w_i, d)(w_i.d)+ [w_i.n > 0] for the cosine, D no
-    narrower than about two directions. With ``radiance``, ``i_d = sum (1 - V_i) C_i (w_i.n)+ / sum (w_i.n)+`` and i_s over
-    the lobe: what they send adds to o_d g(n, 1) and o_s g(d, rho). Where no vertex is near, or all that are near see
+    With V_i the open share among the vertices around the point, weighted by distance and by agreement of normals (a
+    vertex says nothing of directions below its own horizon; where none says anything, V_i = 1),
+    ``o_d = sum V_i L_i (w_i.n)+ / sum L_i (w_i.n)+``; o_s the same with D(w_i, d)(w_i.d)+ [w_i.n > 0] for the cosine,
+    D no narrower than about two directions. With ``radiance``, C_i the radiance of the vertex that direction i meets,
+    ``i_d = sum (1 - V_i) C_i (w_i.n)+ / sum (w_i.n)+`` and i_s the same over the lobe: they add to o_d g(n, 1) and
+    o_s g(d, rho). Where no vertex is near, or all that are near see
     all of the sky above the horizon, the factors are exactly 1 and the added light 0. Black light falls back to the
     geometric share. A number that is not finite gives NaN.
 
@@ -120,7 +122,8 @@ def cached_occlusion(
 
 def _fake_bits(scene, positions, normals, directions, offset, with_hits):
     n, k = positions.shape[0], directions.shape[0]
-    return tuple(positions.new_empty(shape, dtype=torch.int32) for shape in ((n, 2, k // 32), (n, k if with_hits else 0)))
+    shapes = ((n, 2, k // 32), (n, k if with_hits else 0))
+    return tuple(positions.new_empty(shape, dtype=torch.int32) for shape in shapes)
 
 
 def _fake_grids(vertices, radius, n_levels):

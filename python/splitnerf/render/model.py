@@ -12,7 +12,6 @@ from splitnerf.fields import LightMlp, MaterialHead, Occlusion, OcclusionHead, O
 from splitnerf.fields.sdf import SdfSample, sharpness
 from splitnerf.ops import HashGridSpec, MeshScene, query_direction, split_sum_shade
 
-
 START_BOUNCES = 3  # of indirect light on a new mesh
 
 
@@ -128,8 +127,9 @@ class SceneModel(nn.Module):
             light_d = factor_d * light_d + occlusion.indirect_diffuse
             factor_s = factor_d = torch.ones_like(roughness)
         radiance = split_sum_shade(
-            normals, view_dirs, albedo, roughness, metallic, light_s, light_d, factor_s, factor_d, c.fresnel_mode, c.compensate
-        )
+            normals, view_dirs, albedo, roughness, metallic, light_s, light_d, factor_s, factor_d,
+            c.fresnel_mode, c.compensate,
+        )  # fmt: skip
         return ShadedPoints(radiance, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, lobe_dirs)
 
     def occlusion_factors(
