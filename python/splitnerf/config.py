@@ -53,7 +53,7 @@ class Config:
     material_width: int = 64
     material_layers: int = 2
     head_inputs: str = "grid"  # outputs: the SDF's outputs (the paper) | grid: the hash features as well
-    occlusion: str = "mlp"  # mlp | off
+    occlusion: str = "mlp"  # mlp | bits (cached on the mesh) | off
     occlusion_channels: int = 1
     occlusion_directional: bool = True  # o_s as a function of the reflection; false: of position alone (the paper)
     occlusion_width: int = 64
@@ -116,6 +116,9 @@ class Config:
     occlusion_rays: int = 32
     occlusion_offset: float = 0.0125
     environment_height: int = 32
+    occlusion_directions: int = 256  # of the bits; a multiple of 32
+    indirect: bool = False  # light from the object itself, by the bits
+    indirect_every: int = 200  # steps between refreshes of what the mesh sends out
 
     # Optimiser.
     learning_rate: float = 0.01
@@ -136,7 +139,7 @@ class Config:
         choices = {
             "normals": ("analytic", "finite_difference"),
             "head_inputs": ("outputs", "grid"),
-            "occlusion": ("mlp", "off"),
+            "occlusion": ("mlp", "bits", "off"),
             "occlusion_channels": (1, 3),
             "light_activation": ("softplus", "exp"),
             "fresnel_mode": ("exact", "paper", "code"),
@@ -157,6 +160,14 @@ class Config:
             raise InputError("finetune_from below 1 needs compositing = linear")
         if self.finetune_samples < 1:
             raise InputError(f"finetune_samples must be at least 1, got {self.finetune_samples}")
+        if not 64 <= self.occlusion_directions <= 1024 or self.occlusion_directions % 32:
+            raise InputError(
+                f"occlusion_directions must be a multiple of 32 in 64 to 1024, got {self.occlusion_directions}"
+            )
+        if self.indirect and self.occlusion != "bits":
+            raise InputError(f'indirect needs occlusion = "bits", got {self.occlusion!r}')
+        if self.indirect_every < 1:
+            raise InputError(f"indirect_every must be at least 1, got {self.indirect_every}")
         if self.steps < 1:
             raise InputError(f"steps must be at least 1, got {self.steps}")
 

@@ -1,7 +1,11 @@
 """The learned functions of space and direction: SDF, materials, occlusion factors and light."""
 
-from splitnerf.fields.heads import MaterialHead, OcclusionHead
+from splitnerf.fields.heads import MaterialHead
 from splitnerf.fields.light import LightMlp
+from splitnerf.fields.occlusion import Occlusion, OcclusionHead, OcclusionQuery
 from splitnerf.fields.sdf import SdfField
+from splitnerf.fields.visibility import VisibilityBits
 
-__all__ = ["LightMlp", "MaterialHead", "OcclusionHead", "SdfField"]
+__all__ = [
+    "LightMlp", "MaterialHead", "Occlusion", "OcclusionHead", "OcclusionQuery", "SdfField", "VisibilityBits",
+]  # fmt: skip

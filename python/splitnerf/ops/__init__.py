@@ -14,10 +14,12 @@ from splitnerf.ops.rays import (
     neus_weights,
 )
 from splitnerf.ops.shading import FRESNEL_MODES, QUERIES, brdf_lut, query_direction, split_sum_shade
+from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, visibility_bits
 
 __all__ = [
     "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "QUERIES", "HashGrid", "HashGridSpec", "LightSums",
-    "MeshScene", "PackedSamples", "brdf_lut", "composite", "fibonacci_directions", "growth_for", "hash_encode",
-    "hash_encode_jacobian", "march_rays", "monte_carlo_light", "neus_weights", "occlusion_factors", "prefilter_light",
-    "query_direction", "sample_bsdf", "sample_ggx_lobe", "split_sum_shade", "trace_visibility",
+    "MeshScene", "PackedSamples", "VisibilityCache", "brdf_lut", "cached_occlusion", "composite", "fibonacci_directions",
+    "growth_for", "hash_encode", "hash_encode_jacobian", "march_rays", "monte_carlo_light", "neus_weights",
+    "occlusion_factors", "prefilter_light", "query_direction", "sample_bsdf", "sample_ggx_lobe", "split_sum_shade",
+    "trace_visibility", "visibility_bits",
 ]  # fmt: skip
