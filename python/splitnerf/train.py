@@ -119,7 +119,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             set_learning_rate(optimiser, c, step, progress)
             if first or step % c.grid_every == 0:
                 grid.update(model.sdf_field.sdf, model.s_value, 1.0 if first else 0.1, progress < c.hull_until)
-            if model.occlusion is not None and progress - meshed_at >= c.mesh_every:
+            if (model.occlusion is not None or c.finetune_from < 1) and progress - meshed_at >= c.mesh_every:
                 meshed_at = progress
                 scene, mesh = remesh(model, c, scene, mesh)
             if scene is not None and (environment is None or step % ENVIRONMENT_EVERY == 0):
