@@ -6,6 +6,7 @@
 
 #include "splitnerf/config.h"
 #include "splitnerf/hash_grid.h"
+#include "splitnerf/light_pyramid.h"
 
 namespace splitnerf {
 
@@ -27,6 +28,13 @@ template <class T> struct LobeSide {
   int64_t n;
 };
 
+// Rows of a sparse matrix: those of row r are [offsets[r], offsets[r + 1]).
+template <class T> struct SparseRows {
+  const int64_t* offsets;
+  const int32_t* columns;
+  const T* weights;
+};
+
 template <class T> struct Kernels {
   const char* name;
 
@@ -42,6 +50,16 @@ template <class T> struct Kernels {
   void (*lobe_gather)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
   // sums[i - begin] = {sum K r, sum K g, sum K b} over the queries, for lights [begin, end).
   void (*lobe_scatter)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
+
+  // products [rows, 3] = matrix . values, rows [begin, end); values are [columns, 4], the fourth unused.
+  void (*sparse_product)(const SparseRows<T>&, int64_t begin, int64_t end, const T* values, T* products);
+  // radiance [n, 3] of directions [n, 3] and roughness [n]. Points [begin, end).
+  void (*light_lookup)(const LightPyramid<T>&, int64_t begin, int64_t end, const T* directions, const T* roughness,
+                       T* radiance);
+  // Adds to grad_levels and grad_sh, overwrites the others. Points [begin, end).
+  void (*light_lookup_backward)(const LightPyramid<T>&, int64_t begin, int64_t end, const T* directions,
+                                const T* roughness, const T* grad_radiance, T* grad_directions, T* grad_roughness,
+                                T* grad_levels, T* grad_sh);
 };
 
 // Those for this processor. SPLITNERF_ISA = base | avx2 | avx512 in the environment picks a lower

@@ -2,6 +2,16 @@
 
 from splitnerf.ops.hash_grid import HashGrid, HashGridSpec, growth_for, hash_encode, hash_encode_jacobian
 from splitnerf.ops.light import fibonacci_directions, prefilter_light, sample_ggx_lobe
+from splitnerf.ops.light_pyramid import (
+    SparseMap,
+    light_averages,
+    light_filters,
+    light_lookup,
+    light_sum_of_levels,
+    sh_projection,
+    sparse_product,
+    zonal_factors,
+)
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
 from splitnerf.ops.rays import (
     CELL_EMPTY,
@@ -15,8 +25,9 @@ from splitnerf.ops.rays import (
 from splitnerf.ops.shading import FRESNEL_MODES, QUERIES, brdf_lut, query_direction, split_sum_shade
 
 __all__ = [
-    "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "QUERIES", "HashGrid", "HashGridSpec", "MeshScene",
-    "PackedSamples", "brdf_lut", "composite", "fibonacci_directions", "growth_for", "hash_encode",
-    "hash_encode_jacobian", "march_rays", "neus_weights", "occlusion_factors", "prefilter_light", "query_direction",
-    "sample_ggx_lobe",     "split_sum_shade", "trace_visibility",
+    "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "MeshScene",
+    "PackedSamples", "QUERIES", "SparseMap", "brdf_lut", "composite", "fibonacci_directions", "growth_for",
+    "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters", "light_lookup", "light_sum_of_levels",
+    "march_rays", "neus_weights", "occlusion_factors", "prefilter_light", "query_direction", "sample_ggx_lobe",
+    "sh_projection", "sparse_product", "split_sum_shade", "trace_visibility", "zonal_factors",
 ]  # fmt: skip
