@@ -12,9 +12,9 @@
 namespace splitnerf {
 namespace {
 
-// Where a cell of the light is taken as one: its edge is at most kCellSize of the lobe's scale there, which grows
-// with the squared distance from the centre, as the lobe's share falls with it.
-constexpr double kCellSize = 0.7, kLargestCell = 0.3;
+// Where a cell of the light is taken as one: its edge is at most kCellSize ggx_alpha near the lobe's centre, and
+// grows with the squared distance further out, as the lobe's share falls with it.
+constexpr double kCellSize = 0.8, kLargestCell = 0.6;
 
 struct Entry {
   int32_t column;
@@ -98,7 +98,7 @@ class LobeRow {
     const Vec3<double> p = octahedral_point(octahedral_texel_centre<double>(side, i, j));
     const double r2 = dot(p, p), edge = 2 / (side * std::sqrt(r2 * std::sqrt(r2)));
     const double cosine = dot(p, axis) / std::sqrt(r2), angle = std::acos(clamp(cosine, -1.0, 1.0));
-    const double nearest = max_of(angle - edge, 0.0);
+    const double nearest = max_of(angle - 0.5 * edge, 0.0);
     if (nearest > 0.5 * kPi) return;
     const double s = std::sin(0.5 * nearest), ratio = max_of(s / alpha_, 1.0);
     if (edge > min_of(kCellSize * alpha_ * ratio * ratio, kLargestCell)) {

@@ -7,7 +7,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.config import Config
-from splitnerf.fields import LightMlp
+from splitnerf.fields import Light
 from splitnerf.ops import MeshScene, fibonacci_directions, occlusion_factors, prefilter_light, sample_ggx_lobe
 from splitnerf.render.renderer import RenderedRays
 
@@ -49,7 +49,7 @@ def metal_loss(ray: RenderedRays) -> Tensor:
     return (weights[:, None] * ray.points.metallic.square()).mean()
 
 
-def light_loss(light: LightMlp, config: Config, generator: torch.Generator, seed: int) -> Tensor:
+def light_loss(light: Light, config: Config, generator: torch.Generator, seed: int) -> Tensor:
     """Distance of g(w, rho) from the Monte Carlo integral of g(w, 0), for random directions and roughness.
 
     Half of the queries ask at rho = 1, the rest uniformly in [0, 1]. Broad lobes share one rotated

@@ -21,10 +21,11 @@ from splitnerf.ops import (
     zonal_factors,
 )
 
-CHAIN = (0.1, 0.15, 0.2, 0.3, 0.4)  # roughness of the filtered maps
+CHAIN = (0.1, 0.15, 0.2, 0.3, 0.4)  # roughness of the filtered maps, but for lobes narrower than a texel
 BASE_NODE = 0.05  # up to this roughness the texels stand unfiltered
+LOBE_WIDTH = 2.57  # of ggx_alpha
 SH_NODE = 0.5  # from it on spherical harmonics
-TEXELS_PER_ALPHA = 5.5  # a map of resolution m = TEXELS_PER_ALPHA / ggx_alpha resolves its own lobe
+TEXELS_PER_ALPHA = 5.0  # a map of resolution m = TEXELS_PER_ALPHA / ggx_alpha resolves its own lobe
 SH_RESOLUTION = 64  # of the averages that the harmonics are taken from, at most
 ZONAL_ROWS = 129
 LOG_LIMIT = 12.0
@@ -56,7 +57,7 @@ class PyramidMaps(NamedTuple):
 def pyramid_maps(resolution: int) -> PyramidMaps:
     """The maps for ``resolution`` texels along the edge, a power of 2 >= 8. Computed once, in double precision."""
     with torch.inference_mode(False):  # whoever asks first, autograd may keep them later
-        chain = [(chain_resolution(resolution, rho), rho) for rho in CHAIN]
+        chain = [(chain_resolution(resolution, rho), rho) for rho in CHAIN if is_resolved(resolution, rho)]
         side, skipped = resolution, 0
         while side > SH_RESOLUTION:
             skipped, side = skipped + side * side, side // 2
@@ -64,7 +65,7 @@ def pyramid_maps(resolution: int) -> PyramidMaps:
             light_sum_of_levels(resolution), light_averages(resolution), light_filters(resolution, chain),
             sh_projection(side, cells=side < resolution), slice(skipped, skipped + side * side),
             torch.tensor([resolution] + [m for m, _ in chain]),
-            torch.tensor([BASE_NODE, *CHAIN, SH_NODE], dtype=torch.float64), zonal_factors(SH_NODE, ZONAL_ROWS),
+            torch.tensor([BASE_NODE, *(rho for _, rho in chain), SH_NODE], dtype=torch.float64), zonal_factors(SH_NODE, ZONAL_ROWS),
         )  # fmt: skip
 
 
@@ -72,6 +73,11 @@ def chain_resolution(resolution: int, roughness: float) -> int:
     """The power of 2 that resolves the lobe, at most the texels' own resolution."""
     wanted = TEXELS_PER_ALPHA / roughness**2
     return min(resolution, 1 << math.ceil(math.log2(wanted)))
+
+
+def is_resolved(resolution: int, roughness: float) -> bool:
+    """Whether the lobe, 2.57 ggx_alpha wide at half its height, spans a texel of sqrt(4 pi) / n on average."""
+    return LOBE_WIDTH * roughness**2 * resolution >= math.sqrt(4.0 * math.pi)
 
 
 class LightPyramid(Light):

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from splitnerf.config import Config
-from splitnerf.fields import LightMlp, MaterialHead, OcclusionHead, SdfField
+from splitnerf.fields import LightMlp, LightPyramid, MaterialHead, OcclusionHead, SdfField
 from splitnerf.fields.sdf import SdfSample, sharpness
 from splitnerf.ops import HashGridSpec, query_direction, split_sum_shade
 
@@ -59,10 +59,14 @@ class SceneModel(nn.Module):
             if config.occlusion == "mlp"
             else None
         )
-        self.light = LightMlp(
-            config.light_width, config.light_layers, config.light_direction_frequencies,
-            config.light_roughness_frequencies, config.light_activation,
-        )  # fmt: skip
+        self.light = (
+            LightPyramid(config.light_resolution)
+            if config.light == "pyramid"
+            else LightMlp(
+                config.light_width, config.light_layers, config.light_direction_frequencies,
+                config.light_roughness_frequencies, config.light_activation,
+            )  # fmt: skip
+        )
         self.variance = nn.Parameter(torch.tensor(config.initial_variance))
         self.occlusion_ready = False  # until the first mesh was traced the occlusion factors are 1
 
