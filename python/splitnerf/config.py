@@ -147,8 +147,8 @@ class Config:
         for key in ("mesh_resolution", "export_resolution", "export_texture_size"):
             if getattr(self, key) < MIN_EXPORT_SIZE:
                 raise InputError(f"{key} must be at least {MIN_EXPORT_SIZE}, got {getattr(self, key)}")
-        if not 8 <= self.light_resolution <= 1024 or self.light_resolution & (self.light_resolution - 1):
-            raise InputError(f"light_resolution must be a power of 2 in [8, 1024], got {self.light_resolution}")
+        if not 16 <= self.light_resolution <= 1024 or self.light_resolution & (self.light_resolution - 1):
+            raise InputError(f"light_resolution must be a power of 2 in [16, 1024], got {self.light_resolution}")
         if self.steps < 1:
             raise InputError(f"steps must be at least 1, got {self.steps}")
 

@@ -185,16 +185,13 @@ def make_optimiser(model: SceneModel, config: Config) -> torch.optim.AdamW:
     texels = [model.light.texels] if config.light == "pyramid" else []
     apart = {id(p) for p in [model.variance, *texels]}
     others = [p for p in model.parameters() if id(p) not in apart]
-    return torch.optim.AdamW(
-        [
-            {"params": others, "lr": config.learning_rate, "weight_decay": config.weight_decay},
-            {"params": [model.variance], "lr": config.variance_learning_rate, "weight_decay": 0.0},
-            {"params": texels, "lr": config.light_learning_rate, "weight_decay": 0.0},
-        ],
-        betas=(0.9, 0.99),
-        eps=1e-15,
-        fused=True,
-    )
+    groups = [
+        {"params": others, "lr": config.learning_rate, "weight_decay": config.weight_decay},
+        {"params": [model.variance], "lr": config.variance_learning_rate, "weight_decay": 0.0},
+    ]
+    if texels:
+        groups.append({"params": texels, "lr": config.light_learning_rate, "weight_decay": 0.0})
+    return torch.optim.AdamW(groups, betas=(0.9, 0.99), eps=1e-15, fused=True)
 
 
 def set_learning_rate(optimiser: torch.optim.Optimizer, config: Config, step: int, progress: float) -> None:
