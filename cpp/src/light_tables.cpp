@@ -137,7 +137,8 @@ template <class T> const ShRecurrence<T>& sh_recurrence() {
       if (m > 0) diagonal *= std::sqrt((2 * m + 1) / (2.0 * m)) * (m == 1 ? std::sqrt(2.0) : 1.0);
       r.diagonal[m] = T(diagonal);
       for (int l = m; l <= kShDegree; ++l) {
-        const double above = l + 1, m2 = double(m) * m, raise = std::sqrt((4 * above * above - 1) / (above * above - m2));
+        const double above = l + 1, m2 = double(m) * m;
+        const double raise = std::sqrt((4 * above * above - 1) / (above * above - m2));
         r.raise[l][m] = T(raise);
         r.lower[l][m] = l > m ? T(raise * std::sqrt((double(l) * l - m2) / (4.0 * l * l - 1))) : T(0);
       }
@@ -156,12 +157,9 @@ std::vector<double> octahedral_solid_angles(int n) {
       Vec3<double> corner[4];
       for (int k = 0; k < 4; ++k)
         corner[k] = direction_of({2.0 * (i + (k & 1)) / n - 1, 2.0 * (j + (k >> 1)) / n - 1});
-      // Two triangles, divided along the border of the octahedron's faces where it crosses the texel.
-      const bool falling = (2 * i < n) == (2 * j < n);
-      out[int64_t(j) * n + i] = falling ? triangle_solid_angle(corner[0], corner[1], corner[2]) +
-                                              triangle_solid_angle(corner[3], corner[2], corner[1])
-                                        : triangle_solid_angle(corner[0], corner[1], corner[3]) +
-                                              triangle_solid_angle(corner[0], corner[3], corner[2]);
+      // Great-circle sides: either diagonal divides the texel into two triangles.
+      out[int64_t(j) * n + i] = triangle_solid_angle(corner[0], corner[1], corner[2]) +
+                                triangle_solid_angle(corner[3], corner[2], corner[1]);
     }
   return out;
 }

@@ -2,7 +2,7 @@
 
 #include <pybind11/numpy.h>
 
-#include <cstring>
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -13,7 +13,8 @@ namespace py = pybind11;
 
 namespace {
 
-template <class To, class From> py::array_t<To> to_array(const std::vector<From>& values, py::array::ShapeContainer shape) {
+template <class To, class From>
+py::array_t<To> to_array(const std::vector<From>& values, py::array::ShapeContainer shape) {
   py::array_t<To> out(std::move(shape));
   std::copy(values.begin(), values.end(), out.mutable_data());
   return out;
@@ -21,8 +22,9 @@ template <class To, class From> py::array_t<To> to_array(const std::vector<From>
 
 py::tuple to_tuple(const splitnerf::SparseMatrix& matrix) {
   const auto n = static_cast<py::ssize_t>(matrix.columns.size());
-  return py::make_tuple(to_array<int64_t>(matrix.offsets, {static_cast<py::ssize_t>(matrix.offsets.size())}),
-                        to_array<int32_t>(matrix.columns, {n}), to_array<double>(matrix.weights, {n}), matrix.n_columns);
+  const auto n_offsets = static_cast<py::ssize_t>(matrix.offsets.size());
+  return py::make_tuple(to_array<int64_t>(matrix.offsets, {n_offsets}), to_array<int32_t>(matrix.columns, {n}),
+                        to_array<double>(matrix.weights, {n}), matrix.n_columns);
 }
 
 void check_side(const char* function, int n) {
@@ -80,5 +82,5 @@ void bind_light(py::module_& m) {
           throw py::value_error("zonal_factors: start must be in [0.1, 1) and n_rows at least 2");
         return to_array<double>(splitnerf::zonal_factors(start, n_rows), {n_rows, splitnerf::kShBands});
       },
-      py::arg("start"), py::arg("n_rows"), "Factors of the lobe by degree, roughness start ... 1: [n_rows, 13] float64.");
+      py::arg("start"), py::arg("n_rows"), "Factors of the lobe by degree, roughness start to 1: [n_rows, 13].");
 }

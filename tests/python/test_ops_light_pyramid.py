@@ -92,6 +92,19 @@ def test_gradcheck_where_the_harmonics_are_bent_above_zero():
     torch.autograd.gradcheck(lambda *x: light_lookup(*x, *rest), inputs, eps=1e-8, atol=1e-4, rtol=1e-3)
 
 
+def test_the_bend_above_zero_has_its_own_derivative():
+    _, _, levels, sh, resolutions, nodes, zonal = lookup_inputs()
+    constant, floor = 0.28209479177387814, 1e-3 * 4.0 * 0.28209479177387814  # Y_00 and e
+    sh[0], sh[1:] = 4.0, 0.0
+    sh[2] = -(4.0 * constant + floor) / (zonal[-1, 1] * math.sqrt(3) * constant)  # x = -e towards z
+    leaf, up, one = sh.clone().requires_grad_(), torch.tensor([[0.0, 0, 1]]).double(), torch.ones(1, 1).double()
+    value = light_lookup(up, one, levels, leaf, resolutions, nodes, zonal)
+    value.sum().backward()
+    torch.testing.assert_close(value, torch.full_like(value, floor * math.exp(-2)), rtol=1e-9, atol=0)
+    expected = torch.full((3,), math.exp(-2) * constant * (1 + 2e-3)).double()
+    torch.testing.assert_close(leaf.grad[0], expected, rtol=1e-6, atol=0)
+
+
 def test_float32_agrees_with_float64():
     got = light_lookup(*lookup_inputs(torch.float32))
     torch.testing.assert_close(got.double(), light_lookup(*lookup_inputs()), rtol=1e-4, atol=1e-5)
@@ -127,7 +140,8 @@ def test_the_lookup_is_continuous_across_every_seam_and_node():
     along = torch.linspace(-0.999, 0.999, 201, dtype=torch.float64)
     zero, step = torch.zeros_like(along), 1e-7
     poles = torch.tensor([[0.0, 0, 1], [0, 0, -1], [1, 0, 0], [0, -1, 0]], dtype=torch.float64)
-    circles = [torch.stack(order, -1) for order in ((along, zero, 1 - along**2), (zero, along, -1 + along**2), (along, 1 - along**2, zero))]
+    bow = 1 - along**2
+    circles = [torch.stack(axes, -1) for axes in ((along, zero, bow), (zero, along, -bow), (along, bow, zero))]
     points = unit(torch.cat([*circles, poles]))  # where octants meet; the lower ones are the square's own edges
     for rho in (0.0, 0.1, 0.3):
         roughness = torch.full((len(points), 1), rho, dtype=torch.float64)
@@ -139,7 +153,7 @@ def test_the_lookup_is_continuous_across_every_seam_and_node():
                 assert (near - at).abs().max() < 20 * step * 16
     for node in NODES:
         sides = [
-            light_lookup(points, torch.full((len(points), 1), node + s, dtype=torch.float64), levels, sh, resolutions, nodes, zonal)
+            light_lookup(points, torch.full_like(roughness, node + s), levels, sh, resolutions, nodes, zonal)
             for s in (-1e-9, 1e-9)
         ]
         torch.testing.assert_close(*sides, rtol=1e-6, atol=1e-6)
@@ -152,8 +166,13 @@ def test_solid_angles_are_those_of_the_sphere():
         directions = octahedral_directions(n)
         density = directions.abs().sum(1) ** 3 * 4 / n**2  # du dv / |p|^3 at the centre; folded texels differ most
         torch.testing.assert_close(angles, density, rtol=2.5 / n, atol=0)
-        second = (angles[:, None, None] * directions[:, :, None] * directions[:, None, :]).sum(0)
+        second = torch.einsum("n,ni,nj->ij", angles, directions, directions)
         torch.testing.assert_close(second, torch.eye(3, dtype=torch.float64) * (4 * math.pi / 3), rtol=0, atol=20 / n**2)
+
+
+def test_four_texels_cover_the_one_that_they_halve():
+    coarse, fine = (torch.from_numpy(_core.octahedral_solid_angles(n)) for n in (8, 16))
+    torch.testing.assert_close(fine.view(8, 2, 8, 2).sum((1, 3)).flatten(), coarse, rtol=1e-10, atol=0)
 
 
 def test_averages_and_filters_keep_a_constant_and_the_total():
@@ -178,7 +197,7 @@ def test_levels_are_interpolated_and_added():
 
 def test_zonal_factors_of_the_cosine_lobe_and_of_all_lobes():
     factors = zonal_factors(0.5, 65).double()
-    expected = torch.tensor([1, 2 / 3, 1 / 4, 0, -1 / 24, 0, 1 / 64], dtype=torch.float64)  # Ramamoorthi and Hanrahan 2001
+    expected = torch.tensor([1, 2 / 3, 1 / 4, 0, -1 / 24, 0, 1 / 64], dtype=torch.float64)  # Lambert's
     torch.testing.assert_close(factors[-1, :7], expected, rtol=0, atol=1e-6)
     assert (factors[:, 0] == 1).all() and (factors[:-1, 1:3] > factors[1:, 1:3]).all()
 
@@ -187,9 +206,14 @@ def test_the_projection_is_orthonormal_on_the_first_degrees():
     projection = sh_projection(32, cells=False).double()
     w = octahedral_directions(32)
     x, y, z = w.unbind(1)
-    basis = [torch.ones_like(x) * math.sqrt(1 / (4 * math.pi)), *(v * math.sqrt(3 / (4 * math.pi)) for v in (y, z, x))]
+    basis = [v * math.sqrt(k / (4 * math.pi)) for v, k in ((torch.ones_like(x), 1), (y, 3), (z, 3), (x, 3))]
     got = torch.stack([projection[:4] @ b for b in basis], 1)
     torch.testing.assert_close(got, torch.eye(4, dtype=torch.float64), rtol=0, atol=5e-3)
+    for n in (8, 16, 32):
+        for cells in (False, True):
+            totals = sh_projection(n, cells).double().sum(1)
+            assert totals[0].item() == pytest.approx(math.sqrt(4 * math.pi), rel=1e-6)
+            assert totals[1:].abs().max() < 2e-6
 
 
 def test_missing_gradients_raise():
@@ -219,7 +243,8 @@ def test_empty_batch_and_nan():
 def test_errors_name_what_is_wrong():
     directions, roughness, levels, sh, resolutions, nodes, zonal = lookup_inputs(torch.float32)
     call = lambda **k: light_lookup(**{**dict(  # noqa: E731
-        directions=directions, roughness=roughness, levels=levels, sh=sh, resolutions=resolutions, nodes=nodes, zonal=zonal,
+        directions=directions, roughness=roughness, levels=levels, sh=sh, resolutions=resolutions, nodes=nodes,
+        zonal=zonal,
     ), **k})  # fmt: skip
     check_error(lambda: call(roughness=roughness[:, 0]), "light_lookup", "roughness", "[18, 1] float32", "[18]")
     check_error(lambda: call(levels=levels[1:]), "light_lookup", "levels", "336", "335")
@@ -228,5 +253,5 @@ def test_errors_name_what_is_wrong():
     check_error(lambda: call(nodes=nodes[1:]), "light_lookup", "nodes", "[4] float64", "[3]")
     check_error(lambda: call(resolutions=resolutions[:0], nodes=nodes[:1]), "light_lookup", "levels")
     matrix = light_averages(8)
-    check_error(lambda: sparse_product(matrix, torch.rand(63, 3)), "sparse_product", "transposed_offsets", "[64]", "[65]")
+    check_error(lambda: sparse_product(matrix, torch.rand(63, 3)), "sparse_product", "transposed_offsets", "[64]")
     check_error(lambda: light_averages(12), "light_averages", "power of 2", "12")

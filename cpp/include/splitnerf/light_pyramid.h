@@ -41,9 +41,10 @@ template <class T> SPLITNERF_HD Vec3<T> read_level(const T* map, const Octahedra
   return sum;
 }
 
-// Adds grad times the texels' weights to grad_map (unless null); returns the gradient to the square's point.
+// Adds grad times the texels' weights to grad_map; returns the gradient to the square's point.
 template <class T>
-SPLITNERF_HD Vec2<T> read_level_backward(const T* map, int n, const OctahedralFootprint<T>& f, Vec3<T> grad, T* grad_map) {
+SPLITNERF_HD Vec2<T> read_level_backward(const T* map, int n, const OctahedralFootprint<T>& f, Vec3<T> grad,
+                                         T* grad_map) {
   T along[4];
   for (int k = 0; k < 4; ++k) {
     along[k] = dot(load3(map + 3 * f.texel[k]), grad);

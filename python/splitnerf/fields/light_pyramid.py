@@ -71,7 +71,8 @@ def pyramid_maps(resolution: int) -> PyramidMaps:
             light_sum_of_levels(resolution), light_averages(resolution), light_filters(resolution, chain),
             sh_projection(side, cells=side < resolution), slice(skipped, skipped + side * side),
             torch.tensor([resolution] + [m for m, _ in chain]),
-            torch.tensor([BASE_NODE, *(rho for _, rho in chain), SH_NODE], dtype=torch.float64), zonal_factors(SH_NODE, ZONAL_ROWS),
+            torch.tensor([BASE_NODE, *(rho for _, rho in chain), SH_NODE], dtype=torch.float64),
+            zonal_factors(SH_NODE, ZONAL_ROWS),
         )  # fmt: skip
 
 
@@ -149,4 +150,5 @@ class LightPyramid(Light):
 
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
-        return light_lookup(directions, roughness, *self.chain(), *self.maps[5:])
+        maps = self.maps
+        return light_lookup(directions, roughness, *self.chain(), maps.resolutions, maps.nodes, maps.zonal)

@@ -81,7 +81,7 @@ def light_filters(resolution: int, targets: list[tuple[int, float]]) -> SparseMa
 
 
 def sh_projection(resolution: int, cells: bool) -> Tensor:
-    """[169, n^2] float32: spherical harmonics of a light that is bilinear between texels, or (``cells``) constant in each."""
+    """[169, n^2] float32: spherical harmonics of a light bilinear between texels or (``cells``) constant in each."""
     return torch.from_numpy(_core.sh_projection(resolution, cells)).to(torch.float32)
 
 
