@@ -1,5 +1,6 @@
 #include <vector>
 
+#include "planes.h"
 #include "splitnerf/ggx.h"
 #include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
@@ -10,15 +11,6 @@ namespace splitnerf::cpu {
 namespace {
 
 constexpr int64_t kGrain = 16;
-
-// Interleaved three-vectors split into three arrays, so that the kernels read whole vectors.
-template <class T> struct Planes {
-  std::vector<T> x, y, z;
-
-  Planes(const T* interleaved, int64_t n) : x(n), y(n), z(n) {
-    for (int64_t i = 0; i < n; ++i) x[i] = interleaved[3 * i], y[i] = interleaved[3 * i + 1], z[i] = interleaved[3 * i + 2];
-  }
-};
 
 // A query above whose horizon no light stands is black.
 template <class T> T inverse(T total) { return total == T(0) ? T(0) : T(1) / total; }

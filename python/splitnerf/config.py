@@ -53,7 +53,7 @@ class Config:
     material_width: int = 64
     material_layers: int = 2
     head_inputs: str = "grid"  # outputs: the SDF's outputs (the paper) | grid: the hash features as well
-    occlusion: str = "mlp"  # mlp | off
+    occlusion: str = "mlp"  # mlp | bits (cached on the mesh) | off
     occlusion_channels: int = 1
     occlusion_directional: bool = True  # o_s as a function of the reflection; false: of position alone (the paper)
     occlusion_width: int = 64
@@ -86,6 +86,10 @@ class Config:
     hull_until: float = 0.1  # the masks' visual hull is sampled until then
     foreground_share: float = 0.85  # of the rays, drawn near the masks
 
+    # Monte Carlo shading in the last part.
+    finetune_from: float = 1.0  # the fraction at which it begins; 1: never
+    finetune_samples: int = 16  # directions of each of a ray's two estimates
+
     # Losses.
     colour_weight: float = 10.0
     light_weight: float = 1.0
@@ -94,6 +98,12 @@ class Config:
     metal_weight: float = 0.001
     metal_regulariser: bool = True
     mask_weight: float = 1.0
+    neutral_weight: float = 0.0  # of the diffuse light's log chroma
+    neutral_queries: int = 256
+    albedo_smoothness: float = 0.0  # of the albedo between neighbouring surface points
+    gloss_smoothness: float = 0.0  # the same of roughness and metallic
+    smoothness_points: int = 1024
+    smoothness_radius: float = 0.02  # scene units, one standard deviation
     light_samples: int = 2048
     light_queries: int = 512
     light_every: int = 1
@@ -108,6 +118,9 @@ class Config:
     occlusion_rays: int = 32
     occlusion_offset: float = 0.0125
     environment_height: int = 32
+    occlusion_directions: int = 256  # of the bits; a multiple of 32
+    indirect: bool = False  # light from the object itself, by the bits
+    indirect_every: int = 200  # steps between refreshes of what the mesh sends out
 
     # Optimiser.
     learning_rate: float = 0.01
@@ -129,7 +142,7 @@ class Config:
         choices = {
             "normals": ("analytic", "finite_difference"),
             "head_inputs": ("outputs", "grid"),
-            "occlusion": ("mlp", "off"),
+            "occlusion": ("mlp", "bits", "off"),
             "occlusion_channels": (1, 3),
             "light": ("mlp", "pyramid"),
             "light_activation": ("softplus", "exp"),
@@ -149,6 +162,18 @@ class Config:
                 raise InputError(f"{key} must be at least {MIN_EXPORT_SIZE}, got {getattr(self, key)}")
         if not 16 <= self.light_resolution <= 1024 or self.light_resolution & (self.light_resolution - 1):
             raise InputError(f"light_resolution must be a power of 2 in [16, 1024], got {self.light_resolution}")
+        if self.finetune_from < 1 and self.compositing != "linear":
+            raise InputError("finetune_from below 1 needs compositing = linear")
+        if self.finetune_samples < 1:
+            raise InputError(f"finetune_samples must be at least 1, got {self.finetune_samples}")
+        if not 64 <= self.occlusion_directions <= 1024 or self.occlusion_directions % 32:
+            raise InputError(
+                f"occlusion_directions must be a multiple of 32 in 64 to 1024, got {self.occlusion_directions}"
+            )
+        if self.indirect and self.occlusion != "bits":
+            raise InputError(f'indirect needs occlusion = "bits", got {self.occlusion!r}')
+        if self.indirect_every < 1:
+            raise InputError(f"indirect_every must be at least 1, got {self.indirect_every}")
         if self.steps < 1:
             raise InputError(f"steps must be at least 1, got {self.steps}")
 

@@ -9,6 +9,7 @@ from torch.nn import functional as F
 from splitnerf.config import Config
 from splitnerf.fields import Light
 from splitnerf.ops import MeshScene, fibonacci_directions, occlusion_factors, prefilter_light, sample_ggx_lobe
+from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
 
 SATURATED = 254.0 / 255.0
@@ -27,10 +28,31 @@ def colour_loss(ray: RenderedRays, target: Tensor, background: Tensor) -> Tensor
 
     Source: SplitNeRF Eq. (3).
     """
-    colour = torch.where(target[:, :3] >= SATURATED, ray.colour.clamp(max=1.0), ray.colour)
-    opacity, alpha = ray.opacity[:, None], target[:, 3:]
-    predicted = colour * opacity + background * (1.0 - opacity)
-    return F.mse_loss(predicted, target[:, :3] * alpha + background * (1.0 - alpha))
+    return F.mse_loss(over_background(ray.colour, ray.opacity, target, background), blended(target, background))
+
+
+def monte_carlo_colour_loss(
+    colours: tuple[Tensor, Tensor], ray: RenderedRays, target: Tensor, background: Tensor
+) -> Tensor:
+    """As :func:`colour_loss` for two independent noisy estimates: the mean product of their errors.
+
+    Its expectation is the squared error of the mean; that of one estimate would add the noise's variance, and the
+    materials would turn to whatever is less noisy. It can be negative.
+    """
+    truth = blended(target, background)
+    first, second = (over_background(colour, ray.opacity, target, background) - truth for colour in colours)
+    return (first * second).mean()
+
+
+def over_background(colour: Tensor, opacity: Tensor, target: Tensor, background: Tensor) -> Tensor:
+    """[n_rays, 3] predicted pixels; where the photo is saturated the colour is clipped like it."""
+    colour = torch.where(target[:, :3] >= SATURATED, colour.clamp(max=1.0), colour)
+    return colour * opacity[:, None] + background * (1.0 - opacity[:, None])
+
+
+def blended(target: Tensor, background: Tensor) -> Tensor:
+    """[n_rays, 3] pixels of the photo over the background."""
+    return target[:, :3] * target[:, 3:] + background * (1.0 - target[:, 3:])
 
 
 def mask_loss(ray: RenderedRays, alpha: Tensor) -> Tensor:
@@ -75,6 +97,42 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
         prefilter_light(queries[n_narrow:], roughness[n_narrow:], directions, shared),
     ])  # fmt: skip
     return F.smooth_l1_loss(prefiltered, g_bar, reduction="none").sum(-1).mean()
+
+
+def neutral_light_loss(light: Light, config: Config, generator: torch.Generator) -> Tensor:
+    """Mean squared log chroma of the diffuse light g(n, 1): how far its channels are from their geometric mean.
+
+    Images of a diffuse object leave it open whether a colour is the object's or the light's. This prefers a
+    light without colour where nothing speaks against it.
+    """
+    normals = F.normalize(torch.randn(config.neutral_queries, 3, generator=generator), dim=1)
+    log_light = torch.log(light(normals, torch.ones(len(normals), 1)) + 1e-6)
+    return (log_light - log_light.mean(1, keepdim=True)).square().mean()
+
+
+def smoothness_loss(model: SceneModel, ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:
+    """Mean absolute difference of the materials between surface points and neighbours on their tangent planes.
+
+    Shading changes with the normal, and materials in steps or not at all: of the ways to split an image into light and
+    materials this prefers the one whose materials change least. Albedo is compared by its square root.
+    """
+    c = config
+    m = len(ray.shaded)
+    if m == 0:
+        return torch.zeros(())
+    chosen = torch.randint(m, (min(m, c.smoothness_points),), generator=generator)
+    normals = ray.normals[chosen].detach()
+    shift = c.smoothness_radius * torch.randn(len(chosen), 3, generator=generator)
+    shift = shift - normals * (shift * normals).sum(-1, keepdim=True)
+    positions = ray.positions[chosen] + shift
+    features = model.sdf_field.encode(positions)
+    inputs = model.head_inputs(positions, model.sdf_field.outputs_at(positions, features), features)
+    albedo, roughness, metallic = model.material(inputs)
+    points, weights = ray.points, ray.weights[ray.shaded[chosen], None].detach()
+    weights = weights / weights.mean().clamp(min=1e-8)
+    albedo_change = (torch.sqrt(albedo + 1e-3) - torch.sqrt(points.albedo[chosen] + 1e-3)).abs().mean(1, keepdim=True)
+    other_change = (roughness - points.roughness[chosen]).abs() + (metallic - points.metallic[chosen]).abs()
+    return (weights * (c.albedo_smoothness * albedo_change + c.gloss_smoothness * other_change)).mean()
 
 
 def occlusion_loss(

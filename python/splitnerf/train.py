@@ -22,6 +22,7 @@ from splitnerf.ops import MeshScene
 from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.render.model import SceneModel
+from splitnerf.render.monte_carlo import monte_carlo_colours
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import render_rays, sample_step
@@ -87,10 +88,6 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         grid.sdf = content["occupancy"]
         step, seconds, n_rays = content["step"], content["seconds"], content["n_rays"]
         meshed_at, previewed_at = content["meshed_at"], content["previewed_at"]
-        if content["mesh_vertices"] is not None:
-            scene = MeshScene(content["mesh_vertices"].numpy(), content["mesh_faces"].numpy())
-            model.occlusion_ready = model.occlusion is not None
-            environment = model.light.panorama(c.environment_height)
     mesh: tuple[Tensor, Tensor] | tuple[None, None] = (content["mesh_vertices"], content["mesh_faces"]) if resume else (None, None)
 
     def save() -> None:
@@ -111,6 +108,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         by_time = seconds / (60.0 * c.max_minutes) if c.max_minutes > 0 else 0.0
         return min(1.0, max(step / c.steps, by_time))
 
+    if resume:
+        model.open_levels(progress_now())
+        scene = restore_mesh(model, content)
     started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True
     psnr_mean = samples_mean = None
     with Interrupt() as interrupt, Progress(progress_now()) as bar, open(run / "metrics.jsonl", "a") as log:
@@ -124,6 +124,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 scene, mesh = remesh(model, c, scene, mesh)
             if scene is not None and (environment is None or step % ENVIRONMENT_EVERY == 0):
                 environment = model.light.panorama(c.environment_height)
+                model.refresh_light()
+            if c.indirect and scene is not None and step % c.indirect_every == 0:
+                model.refresh_indirect()
 
             rays_o, rays_d, target = source.draw(n_rays)
             background = torch.rand(n_rays, 3, generator=generator)
@@ -131,7 +134,12 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             anneal = min(1.0, progress / c.cos_anneal_by) if c.cos_anneal_by > 0 else 1.0
             ray = render_rays(model, grid.cells, rays_o, rays_d, jitter, anneal, sample_step(model))
 
-            terms = {"colour": c.colour_weight * losses.colour_loss(ray, target, background)}
+            if progress >= c.finetune_from and scene is not None:
+                colours = monte_carlo_colours(model, scene, ray, -rays_d, generator)
+                colour = losses.monte_carlo_colour_loss(colours, ray, target, background)
+            else:
+                colour = losses.colour_loss(ray, target, background)
+            terms = {"colour": c.colour_weight * colour}
             gradients = ray.gradients
             if c.eikonal_points:
                 points = (torch.rand(c.eikonal_points, 3, generator=generator) * 2 - 1) * c.box
@@ -141,9 +149,13 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 terms["mask"] = c.mask_weight * losses.mask_loss(ray, target[:, 3])
             if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
                 terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
+            if c.neutral_weight:
+                terms["neutral"] = c.neutral_weight * losses.neutral_light_loss(model.light, c, generator)
+            if c.albedo_smoothness or c.gloss_smoothness:
+                terms["smoothness"] = losses.smoothness_loss(model, ray, c, generator)
             if c.metal_regulariser:
                 terms["metal"] = c.metal_weight * losses.metal_loss(ray)
-            if scene is not None and model.occlusion_ready:
+            if scene is not None and c.occlusion == "mlp":
                 terms["occlusion"] = c.occlusion_weight * losses.occlusion_loss(ray, scene, environment, c, generator, step)
             loss = sum(terms.values())
             if not math.isfinite(loss.item()):
@@ -175,6 +187,8 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 save()
                 saved_at = time.monotonic()
         finished = progress_now() >= 1.0
+        if finished and c.occlusion == "bits":  # what is rendered from here on sees the final surface
+            scene, mesh = remesh(model, c, scene, mesh)
         grid.update(model.sdf_field.sdf, model.s_value)
         save()
     return TrainedScene(model, grid, step, seconds, finished)
@@ -214,8 +228,19 @@ def remesh(model: SceneModel, config: Config, scene: MeshScene | None, mesh: tup
         vertices, faces = extract_mesh(model.sdf_field.sdf, config.box, config.mesh_resolution)
     except EmptyMesh:
         return scene, mesh
-    model.occlusion_ready = True
-    return MeshScene(vertices, faces), (torch.from_numpy(vertices), torch.from_numpy(faces))
+    scene, mesh = MeshScene(vertices, faces), (torch.from_numpy(vertices), torch.from_numpy(faces))
+    model.use_mesh(scene, *mesh)
+    return scene, mesh
+
+
+def restore_mesh(model: SceneModel, content: dict) -> MeshScene | None:
+    """The mesh of a checkpoint, in use by the model; None where the run had none yet."""
+    if content["mesh_vertices"] is None:
+        return None
+    mesh = content["mesh_vertices"], content["mesh_faces"]
+    scene = MeshScene(*(part.numpy() for part in mesh))
+    model.use_mesh(scene, *mesh)
+    return scene
 
 
 def check_same_scene(content: dict, fingerprint: str, run: Path) -> None:

@@ -27,7 +27,7 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.report.html import write_report
-from splitnerf.train import TrainedScene, check_same_scene, train
+from splitnerf.train import TrainedScene, check_same_scene, restore_mesh, train
 
 RUN_FILES = (
     "config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
@@ -166,7 +166,7 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     model = SceneModel(config)
     model.load_state_dict(content["model"])
     model.open_levels(1.0)
-    model.occlusion_ready = model.occlusion is not None and content["mesh_vertices"] is not None
+    restore_mesh(model, content)
     grid = OccupancyGrid(config.grid_resolution, config.box)
     grid.update(model.sdf_field.sdf, model.s_value)
     return model, grid, content

@@ -11,7 +11,7 @@ import trimesh
 
 from splitnerf import _core
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
-from splitnerf.export.simplify import decimate, drop_floaters, is_closed
+from splitnerf.export.simplify import decimate, drop_floaters, is_closed, split_pinches
 
 RADIUS = 0.7
 
@@ -151,3 +151,17 @@ def test_closed_means_each_edge_once_in_each_direction():
     assert not is_closed(faces[:3])
     assert not is_closed(np.concatenate([faces[:3], faces[3:, ::-1]]))
     assert not is_closed(np.concatenate([faces, faces]))
+
+
+@pytest.mark.parametrize("n_shared", [1, 2])
+def test_parts_that_touch_are_split(n_shared):
+    """Two tetrahedra that share a vertex or an edge become two closed ones; what is sound stays as it is."""
+    tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    vertices = np.random.default_rng(0).normal(size=(8 - n_shared, 3)).astype(np.float32)
+    other = np.where(tetrahedron < n_shared, tetrahedron, tetrahedron + 4 - n_shared)
+    faces = np.concatenate([tetrahedron, other])
+    assert is_closed(faces) == (n_shared == 1)
+    split_vertices, split_faces = split_pinches(vertices, faces)
+    assert len(split_vertices) == 8 and is_closed(split_faces)
+    np.testing.assert_array_equal(split_vertices[split_faces], vertices[faces])
+    assert len(split_pinches(split_vertices, split_faces)[0]) == 8

@@ -65,6 +65,53 @@ def test_the_error_falls(data, tmp_path):
     assert psnr[-1] > psnr[0] + 2.0
 
 
+def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
+    """Trained, resumed and loaded, a run with occlusion=bits renders with the factors of the mesh that it stored."""
+    from splitnerf.data.dataset import load_dataset
+    from splitnerf.outputs import render_maps
+    from splitnerf.train import train as train_scene
+    from splitnerf.workflow import load_run
+
+    config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {
+        "steps": 24, "occlusion": "bits", "indirect": True, "indirect_every": 5, "occlusion_directions": 64,
+    })  # fmt: skip
+    dataset = load_dataset(data)
+    trained = train_scene(dataset, config, tmp_path)
+    assert trained.finished and trained.model.occlusion_ready and trained.model.occlusion.radiance.isfinite().all()
+    before = render_maps(trained.model, trained.grid, dataset, 0)
+    model, grid, content = load_run(tmp_path)
+    after = render_maps(model, grid, dataset, 0)
+    assert len(content["mesh_vertices"]) == len(model.occlusion.radiance)
+    for name in ("occlusion_d", "occlusion_s", "rgb"):
+        np.testing.assert_allclose(before[name], after[name], atol=0.02, err_msg=name)
+    assert 0.0 < before["occlusion_d"][before["alpha"] > 0.5].mean() <= 1.0
+
+    again = train_scene(dataset, config.replace({"steps": 30}), tmp_path, resume=True)
+    assert again.step == 30 and len(again.model.occlusion.cache.vertices) > 0
+
+
+def test_without_a_mesh_nothing_is_occluded():
+    from splitnerf.render.model import SceneModel
+
+    small = dict(parse_setting(s) for s in SMALL[1::2])
+    for kind in ("mlp", "bits", "off"):
+        model = SceneModel(preset("cpu").replace(small | {"occlusion": kind}))
+        points = torch.rand(5, 3)
+        field = model.surface(points)
+        up = torch.tensor([[0.0, 0.0, 1.0]]).expand(5, 3)
+        shaded = model.shade(points, field.outputs, field.features, up, up)
+        assert (shaded.occlusion_d == 1).all() and (shaded.occlusion_s == 1).all() and shaded.radiance.isfinite().all()
+
+
+@pytest.mark.parametrize("settings", [
+    {"occlusion": "bits", "occlusion_directions": 250}, {"occlusion": "bits", "occlusion_directions": 2048},
+    {"indirect": True}, {"occlusion": "bits", "indirect": True, "indirect_every": 0},
+])  # fmt: skip
+def test_settings_of_the_bits_are_checked(settings):
+    with pytest.raises(InputError, match="occlusion_directions|indirect"):
+        preset("cpu").replace(settings)
+
+
 def test_one_seed_gives_one_result(data, tmp_path):
     states = []
     for name in "ab":

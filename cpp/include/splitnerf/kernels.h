@@ -35,6 +35,16 @@ template <class T> struct SparseRows {
   const T* weights;
 };
 
+// A point that reads visibility bits from nearby vertices.
+template <class T> struct VisibilityPoint {
+  const uint32_t* const* bits;  // [n_neighbours] each neighbour's words, open then blocked, see visibility_bits
+  const T* weights;             // [n_neighbours], sum 1
+  int n_neighbours;
+  const T* cosine;              // [n directions], from visibility_horizon
+  const T* lobe_dir;            // [3]
+  T alpha_squared;              // of the lobe, ggx_alpha^2
+};
+
 template <class T> struct Kernels {
   const char* name;
 
@@ -50,6 +60,13 @@ template <class T> struct Kernels {
   void (*lobe_gather)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
   // sums[i - begin] = {sum K r, sum K g, sum K b} over the queries, for lights [begin, end).
   void (*lobe_scatter)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
+  // cosine[i] = (w_i.n)+ and, bit by bit, whether it is positive. The number of directions is a multiple of 32.
+  void (*visibility_horizon)(const LobeSide<T>& directions, const T* normal, T* cosine, uint32_t* above);
+  // known[i] = weight of the neighbours that know direction i, visible[i] = the open share of it, 1 where none knows.
+  // lobe[i] = D(w_i, d)(w_i.d)+ [w_i.n > 0] up to a factor; light in the directions' r, g, b. With c = cosine,
+  // sums = {sum V L c, sum L c (three channels each), sum c; the same with lobe for c}: 14 numbers.
+  void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityPoint<T>& point, T* known, T* visible, T* lobe,
+                          T* sums);
 
   // products [rows, 3] = matrix . values, rows [begin, end); values are [columns, 4], the fourth unused.
   void (*sparse_product)(const SparseRows<T>&, int64_t begin, int64_t end, const T* values, T* products);

@@ -12,6 +12,7 @@
 #include "splitnerf/occlusion.h"
 #include "splitnerf/scene.h"
 #include "splitnerf/split_sum.h"
+#include "splitnerf/visibility_cache.h"
 
 namespace splitnerf::cpu {
 
@@ -87,6 +88,21 @@ SPLITNERF_API void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t
                                          const T* roughness, const T* grad_radiance, T* grad_directions,
                                          T* grad_roughness, T* grad_levels, T* grad_sh);
 
+// ---- Monte Carlo shading, k = n_samples directions a point ----
+
+// normals, view_dirs [n, 3], roughness [n] -> directions [n, k, 3], pdf [n, k], 0 below the horizon.
+template <class T>
+SPLITNERF_API void sample_bsdf(int64_t n, const T* normals, const T* view_dirs, const T* roughness, int n_samples,
+                               uint32_t seed, T* directions, T* pdf);
+// light_dirs [n, k, 3], pdf [n, k], radiance [n, k, 3] -> sums [n, 3 (all, grazing, diffuse), 3].
+template <class T>
+SPLITNERF_API void monte_carlo_light(int64_t n, int n_samples, const T* normals, const T* view_dirs, const T* roughness,
+                                     const T* light_dirs, const T* pdf, const T* radiance, T* sums);
+template <class T>
+SPLITNERF_API void monte_carlo_light_backward(int64_t n, int n_samples, const T* normals, const T* view_dirs,
+                                              const T* roughness, const T* light_dirs, const T* pdf, const T* radiance,
+                                              const T* grad_sums, T* grad_normals, T* grad_roughness, T* grad_radiance);
+
 // ---- rays ----
 
 // jitter [n_rays] in [0, 1). offsets [n_rays + 1] is filled with the exclusive sum of the counts.
@@ -125,5 +141,37 @@ template <class T>
 SPLITNERF_API void occlusion_factors(const Scene& scene, const OcclusionOptions& options, int64_t n, const T* positions,
                                      const T* normals, const T* lobe_dirs, const T* roughness, int height, int width,
                                      const T* environment, T* occlusion_d, T* occlusion_s);
+
+// ---- visibility bits cached on a mesh ----
+
+// positions (vertices of the scene's mesh), normals [n, 3], directions [n_directions, 3], n_directions a multiple of 32
+// -> bits [n, 2, n_directions / 32] of the rays above each vertex's horizon that start `offset` along its normal: a
+// bit in the first row for an open direction, in the second for a blocked one, in neither below the horizon; hits
+// [n, n_directions] (may be null): the vertex with the largest barycentric weight of the triangle hit, -1 where the
+// direction is not blocked.
+SPLITNERF_API void visibility_bits(const Scene& scene, int64_t n, const float* positions, const float* normals,
+                                   int64_t n_directions, const float* directions, float offset, uint32_t* bits,
+                                   int32_t* hits);
+
+// Fills starts and order of the grids, see VertexGrids.
+template <class T>
+SPLITNERF_API void build_vertex_grids(int64_t n_vertices, const T* vertices, T radius, int n_levels, int64_t n_buckets,
+                                      int32_t* starts, int32_t* order);
+
+template <class T> struct VisibilityCache {
+  VertexGrids<T> grids;
+  const uint32_t* bits;   // [n_vertices, 2, n_directions / 32], see visibility_bits
+  const int32_t* hits;    // [n_vertices, n_directions], or null: no indirect light
+  const T* radiance;      // [n_vertices, 3] that the vertices send out, with hits
+  int64_t n_directions;
+  const T *directions, *light;  // [n_directions, 3]; the light's mean over each direction's cell
+};
+
+// positions, normals, lobe_dirs [n, 3], roughness [n] -> occlusion_d, occlusion_s, and with hits indirect_d and
+// indirect_s, [n, 3] each. Numbers that are not finite make NaN.
+template <class T>
+SPLITNERF_API void cached_occlusion(const VisibilityCache<T>& cache, int64_t n, const T* positions, const T* normals,
+                                    const T* lobe_dirs, const T* roughness, T* occlusion_d, T* occlusion_s,
+                                    T* indirect_d, T* indirect_s);
 
 }  // namespace splitnerf::cpu

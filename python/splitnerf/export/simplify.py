@@ -57,10 +57,35 @@ def decimate(vertices: np.ndarray, faces: np.ndarray, n_faces: int) -> tuple[np.
     closed = is_closed(faces)
     for share, aggressiveness in product(SHARES, AGGRESSIVENESS):
         light = fast_simplification.simplify(vertices, faces, target_count=int(share * n_faces), agg=aggressiveness)
-        result = _compact(light[0].astype(np.float32), _without_fins(light[1]))
+        result = split_pinches(*_compact(light[0].astype(np.float32), _without_fins(light[1])))
         if not closed or is_closed(result[1]):
             break
     return result
+
+
+def split_pinches(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gives each fan of faces its own copy of a vertex, where parts of the surface touch in a vertex or an edge.
+
+    Two faces belong to one fan of a vertex if they share an edge there that no third face shares.
+    """
+    corners = np.arange(3 * len(faces)).reshape(-1, 3)
+    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()  # of each directed edge, as corners
+    vertex = faces.ravel()
+    keys = np.sort(np.stack([vertex[start], vertex[end]], axis=1), axis=1)
+    _, edge, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(edge.reshape(-1), kind="stable")
+    order = order[count[edge.reshape(-1)[order]] == 2]
+    one, other = order[0::2], order[1::2]
+    same_way = vertex[start[one]] == vertex[start[other]]
+    joined = [
+        (start[one], np.where(same_way, start[other], end[other])),
+        (end[one], np.where(same_way, end[other], start[other])),
+    ]
+    links = np.concatenate([np.stack(pair) for pair in joined], axis=1)
+    graph = coo_matrix((np.ones(links.shape[1], bool), tuple(links)), shape=(vertex.size, vertex.size))
+    _, fan = connected_components(graph, directed=False)
+    _, first, renumbered = np.unique(fan, return_index=True, return_inverse=True)
+    return vertices[vertex[first]], renumbered.reshape(-1, 3).astype(np.int32)
 
 
 def _without_fins(faces: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Small networks on top of the SDF's outputs: materials and occlusion factors."""
+"""Small networks on top of the SDF's outputs: the materials, and the layers that such heads share."""
 
 from __future__ import annotations
 
@@ -41,29 +41,3 @@ class MaterialHead(nn.Module):
         """features [n, n_inputs] -> albedo [n, 3], roughness [n, 1], metallic [n, 1]."""
         out = torch.sigmoid(self.net(features))
         return out[:, :3], MIN_ROUGHNESS + (1.0 - MIN_ROUGHNESS) * out[:, 3:4], out[:, 4:5]
-
-
-class OcclusionHead(nn.Module):
-    """Occlusion factors o_d and o_s of a point, 1 = open.
-
-    With ``directional`` the specular factor also reads the lobe's axis and width, so that it is a
-    function of the reflection; without it the head is the paper's, which depends on position alone.
-
-    Source: SplitNeRF Eq. (12)-(15).
-    """
-
-    def __init__(self, n_inputs: int, width: int, n_layers: int, n_channels: int, directional: bool):
-        super().__init__()
-        self.n_channels, self.directional = n_channels, directional
-        self.net = relu_mlp(n_inputs + (10 if directional else 0), width, n_layers, 2 * n_channels)
-        with torch.no_grad():
-            self.net[-1].bias.fill_(2.0)  # mostly open
-
-    def forward(self, features: Tensor, lobe_dirs: Tensor, roughness: Tensor) -> tuple[Tensor, Tensor]:
-        """-> o_d, o_s, [n, n_channels] each."""
-        if self.directional:
-            x, y, z = lobe_dirs.unbind(-1)
-            products = torch.stack([x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1, z * z * z], dim=-1)
-            features = torch.cat([features, lobe_dirs, products, roughness], dim=-1)
-        out = torch.sigmoid(self.net(features))
-        return out[:, : self.n_channels], out[:, self.n_channels :]

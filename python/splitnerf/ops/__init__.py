@@ -12,6 +12,7 @@ from splitnerf.ops.light_pyramid import (
     sparse_product,
     zonal_factors,
 )
+from splitnerf.ops.monte_carlo import LightSums, monte_carlo_light, sample_bsdf
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
 from splitnerf.ops.rays import (
     CELL_EMPTY,
@@ -23,11 +24,13 @@ from splitnerf.ops.rays import (
     neus_weights,
 )
 from splitnerf.ops.shading import FRESNEL_MODES, QUERIES, brdf_lut, query_direction, split_sum_shade
+from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, visibility_bits
 
 __all__ = [
-    "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "MeshScene",
-    "PackedSamples", "QUERIES", "SparseMap", "brdf_lut", "composite", "fibonacci_directions", "growth_for",
-    "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters", "light_lookup", "light_sum_of_levels",
-    "march_rays", "neus_weights", "occlusion_factors", "prefilter_light", "query_direction", "sample_ggx_lobe",
-    "sh_projection", "sparse_product", "split_sum_shade", "trace_visibility", "zonal_factors",
+    "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "QUERIES", "HashGrid", "HashGridSpec", "LightSums",
+    "MeshScene", "PackedSamples", "SparseMap", "VisibilityCache", "brdf_lut", "cached_occlusion", "composite",
+    "fibonacci_directions", "growth_for", "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters",
+    "light_lookup", "light_sum_of_levels", "march_rays", "monte_carlo_light", "neus_weights", "occlusion_factors",
+    "prefilter_light", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sh_projection", "sparse_product",
+    "split_sum_shade", "trace_visibility", "visibility_bits", "zonal_factors",
 ]  # fmt: skip

@@ -8,9 +8,21 @@ import torch
 from torch import Tensor, nn
 
 from splitnerf.config import Config
-from splitnerf.fields import LightMlp, LightPyramid, MaterialHead, OcclusionHead, SdfField
+from splitnerf.fields import (
+    Light,
+    LightMlp,
+    LightPyramid,
+    MaterialHead,
+    Occlusion,
+    OcclusionHead,
+    OcclusionQuery,
+    SdfField,
+    VisibilityBits,
+)
 from splitnerf.fields.sdf import SdfSample, sharpness
-from splitnerf.ops import HashGridSpec, query_direction, split_sum_shade
+from splitnerf.ops import HashGridSpec, MeshScene, query_direction, split_sum_shade
+
+START_BOUNCES = 3  # of indirect light on a new mesh
 
 
 class ShadedPoints(NamedTuple):
@@ -33,6 +45,28 @@ class ShadedPoints(NamedTuple):
     lobe_dirs: Tensor
 
 
+def make_light(config: Config) -> Light:
+    """The light that the configuration names."""
+    if config.light == "pyramid":
+        return LightPyramid(config.light_resolution)
+    return LightMlp(
+        config.light_width, config.light_layers, config.light_direction_frequencies,
+        config.light_roughness_frequencies, config.light_activation,
+    )  # fmt: skip
+
+
+def make_occlusion(config: Config, n_inputs: int) -> OcclusionHead | VisibilityBits | None:
+    """What the setting ``occlusion`` names; None for ``off``."""
+    c = config
+    if c.occlusion == "mlp":
+        return OcclusionHead(
+            n_inputs, c.occlusion_width, c.occlusion_layers, c.occlusion_channels, c.occlusion_directional
+        )
+    if c.occlusion == "bits":
+        return VisibilityBits(c.occlusion_directions, c.occlusion_offset, c.occlusion_channels, c.indirect)
+    return None
+
+
 class SceneModel(nn.Module):
     """All learned parts of a scene.
 
@@ -51,22 +85,8 @@ class SceneModel(nn.Module):
         self.material = MaterialHead(
             n_inputs, config.material_width, config.material_layers, config.initial_roughness
         )
-        self.occlusion = (
-            OcclusionHead(
-                n_inputs, config.occlusion_width, config.occlusion_layers, config.occlusion_channels,
-                config.occlusion_directional,
-            )  # fmt: skip
-            if config.occlusion == "mlp"
-            else None
-        )
-        self.light = (
-            LightPyramid(config.light_resolution)
-            if config.light == "pyramid"
-            else LightMlp(
-                config.light_width, config.light_layers, config.light_direction_frequencies,
-                config.light_roughness_frequencies, config.light_activation,
-            )  # fmt: skip
-        )
+        self.occlusion = make_occlusion(config, n_inputs)
+        self.light = make_light(config)
         self.variance = nn.Parameter(torch.tensor(config.initial_variance))
         self.occlusion_ready = False  # until the first mesh was traced the occlusion factors are 1
 
@@ -116,12 +136,53 @@ class SceneModel(nn.Module):
         n = len(normals)
         facing = torch.where((normals * view_dirs).sum(-1, keepdim=True) < 0, -normals, normals)
         light = self.light(torch.cat([lobe_dirs, facing]), torch.cat([roughness, torch.ones_like(roughness)]))
-        if self.occlusion is not None and self.occlusion_ready:
-            occlusion_d, occlusion_s = self.occlusion(inputs, lobe_dirs.detach(), roughness.detach())
-        else:
-            occlusion_d = occlusion_s = torch.ones_like(roughness).expand(-1, c.occlusion_channels)
+        occlusion = self.occlusion_factors(inputs, positions - normals * outputs[:, :1], normals, lobe_dirs, roughness)
+        light_s, light_d = light[:n], light[n:]
+        factor_s, factor_d = occlusion.specular, occlusion.diffuse
+        if occlusion.indirect_specular is not None:
+            light_s = factor_s * light_s + occlusion.indirect_specular
+            light_d = factor_d * light_d + occlusion.indirect_diffuse
+            factor_s = factor_d = torch.ones_like(roughness)
         radiance = split_sum_shade(
-            normals, view_dirs, albedo, roughness, metallic, light[:n], light[n:], occlusion_s, occlusion_d,
+            normals, view_dirs, albedo, roughness, metallic, light_s, light_d, factor_s, factor_d,
             c.fresnel_mode, c.compensate,
         )  # fmt: skip
-        return ShadedPoints(radiance, albedo, roughness, metallic, occlusion_d, occlusion_s, lobe_dirs)
+        return ShadedPoints(radiance, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, lobe_dirs)
+
+    def occlusion_factors(
+        self, inputs: Tensor, positions: Tensor, normals: Tensor, lobe_dirs: Tensor, roughness: Tensor
+    ) -> Occlusion:
+        """The factors at surface points; 1 before the first mesh."""
+        if self.occlusion is None or not self.occlusion_ready:
+            ones = torch.ones_like(roughness).expand(-1, self.config.occlusion_channels)
+            return Occlusion(ones, ones)
+        geometry = (t.detach() for t in (positions, normals, lobe_dirs, roughness))
+        return self.occlusion(OcclusionQuery(inputs, *geometry))
+
+    def use_mesh(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> None:
+        """From now on occlusion factors count; bits are traced anew on this mesh, and its light bounces a few times.
+
+        Args:
+            scene: The mesh below.
+            vertices, faces: [n, 3], [m, 3].
+        """
+        self.occlusion_ready = self.occlusion is not None
+        if isinstance(self.occlusion, VisibilityBits):
+            self.occlusion.trace(scene, vertices, faces)
+            self.refresh_light()
+            for _ in range(START_BOUNCES):
+                self.refresh_indirect()
+
+    def refresh_light(self) -> None:
+        """Hands the current light to the occlusion's weights, where these do not come from traced rays."""
+        if isinstance(self.occlusion, VisibilityBits):
+            self.occlusion.set_light(self.light.panorama(self.occlusion.light_height))
+
+    def refresh_indirect(self) -> None:
+        """Shades the cached mesh anew, with the light that it sent so far. The view is the normal's."""
+        if isinstance(self.occlusion, VisibilityBits):
+            self.occlusion.refresh(self._radiance_along_normal)
+
+    def _radiance_along_normal(self, positions: Tensor, normals: Tensor) -> Tensor:
+        field = self.surface(positions)
+        return self.shade(positions, field.outputs, field.features, normals, normals).radiance

@@ -24,6 +24,7 @@ class RenderedRays:
         opacity: [n_rays].
         samples: The packed samples.
         weights: [n].
+        values: [n, 3] what is composited: radiance, linear or sRGB as `compositing` says.
         gradients: [n, 3] d sdf / d position of all samples.
         shaded: [m] indices of the samples that were shaded.
         positions: [m, 3] of the shaded samples, on the level set through the sample.
@@ -36,6 +37,7 @@ class RenderedRays:
     opacity: Tensor
     samples: PackedSamples
     weights: Tensor
+    values: Tensor
     gradients: Tensor
     shaded: Tensor
     positions: Tensor
@@ -89,7 +91,7 @@ def render_rays(
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
     colour = linear_to_srgb(mean) if c.compositing == "linear" else mean
     return RenderedRays(
-        colour, opacity, samples, weights, field.gradient, shaded, positions[shaded], normals[shaded],
+        colour, opacity, samples, weights, values, field.gradient, shaded, positions[shaded], normals[shaded],
         field.sdf[shaded], points,
     )  # fmt: skip
 

@@ -1,0 +1,133 @@
+// Monte Carlo shading of one point: directions from the BSDF's two lobes, and the sums over incoming
+// light that stand where the split sum has L_s and L_d, each with its adjoint.
+#pragma once
+
+#include "splitnerf/sampling.h"
+#include "splitnerf/split_sum.h"
+
+namespace splitnerf {
+
+// The lobe that is sampled and weighed is not narrower than this, so that D stays clear of rounding.
+inline constexpr double kMinSampledAlpha = 2e-3;
+
+template <class T> SPLITNERF_HD T sampled_alpha(T roughness) {
+  return max_of(ggx_alpha_from_roughness(roughness), T(kMinSampledAlpha));
+}
+
+// Half of the directions follow the cosine, half the visible normals: the density of both together
+// (balance heuristic; Veach 1997). normal: turned to the viewer.
+template <class T> SPLITNERF_HD T bsdf_pdf(Vec3<T> normal, Vec3<T> view, Vec3<T> light, T ggx_alpha) {
+  const Frame<T> frame(normal);
+  const Vec3<T> v = frame.to_local(view), l = frame.to_local(light), h = normalize(v + l);
+  if (!(l.z > T(0))) return T(0);
+  return T(0.5) * (pdf_cosine_hemisphere(l.z) + pdf_ggx_vndf(v, h, ggx_alpha));
+}
+
+// Direction i of n; u in [0, 1)^2 from a lattice over all n, so that each half is stratified too. It
+// may lie below the horizon.
+template <class T>
+SPLITNERF_HD Vec3<T> sample_bsdf(Vec3<T> normal, Vec3<T> view, T ggx_alpha, int i, Vec2<T> u) {
+  const Frame<T> frame(normal);
+  if (i % 2 == 0) return frame.to_world(sample_cosine_hemisphere(u.x, u.y));
+  const Vec3<T> v = frame.to_local(view);
+  return frame.to_world(reflect(sample_ggx_vndf(v, u.x, u.y, ggx_alpha), v));
+}
+
+// f without Fresnel times n.l, w = D V (n.l)+, Schlick's weight (1 - v.h)^5, and the cosine over pi.
+template <class T> struct LobeWeight {
+  T specular, schlick, cosine;
+};
+
+// w and its derivatives; the half vector does not depend on the normal.
+template <class T> struct LobeWeightGrad {
+  LobeWeight<T> value;
+  T d_ggx_alpha;
+  Vec3<T> d_normal;
+};
+
+template <class T>
+SPLITNERF_HD LobeWeightGrad<T> lobe_weight(Vec3<T> normal, Vec3<T> view, Vec3<T> light, T ggx_alpha) {
+  const T nl = dot(normal, light), nv = max_of(dot(normal, view), T(kMinNdotV));
+  LobeWeightGrad<T> out{{T(0), T(0), T(0)}, T(0), {T(0), T(0), T(0)}};
+  if (!(nl > T(0))) return out;
+  const Vec3<T> h = normalize(view + light);
+  const T a2 = ggx_alpha * ggx_alpha;
+  const Vec3<T> delta = normal - h;
+  const T d2 = dot(delta, delta), sin2 = d2 * (T(1) - T(0.25) * d2), q = a2 + (T(1) - a2) * sin2;
+  const T root_v = std::sqrt(nv * nv * (T(1) - a2) + a2), root_l = std::sqrt(nl * nl * (T(1) - a2) + a2);
+  const T x = nl * root_v + nv * root_l;
+  const T w = ggx_d(ggx_alpha, sin2) * smith_v(ggx_alpha, nv, nl) * nl;
+  out.value = {w, pow5(clamp(T(1) - dot(view, h), T(0), T(1))), nl * T(1 / kPi)};
+  // ln w = 2 ln a - 2 ln q + ln nl - ln x + const
+  const T d_x_alpha = ggx_alpha * (nl * (T(1) - nv * nv) / root_v + nv * (T(1) - nl * nl) / root_l);
+  out.d_ggx_alpha = w * (T(2) / ggx_alpha - T(4) * ggx_alpha * (T(1) - sin2) / q - d_x_alpha / x);
+  const T d_nl = T(1) / nl - (root_v + nv * nl * (T(1) - a2) / root_l) / x;
+  const T d_nv = nv > T(kMinNdotV) ? -(root_l + nl * nv * (T(1) - a2) / root_v) / x : T(0);
+  const T d_sin2 = -T(2) * (T(1) - a2) / q;
+  out.d_normal = (light * d_nl + view * d_nv + delta * (d_sin2 * (T(2) - d2))) * w;
+  return out;
+}
+
+// Sums over the n directions of a point, per channel, radiance L_i past the object itself:
+//   all     = 1/n sum w_i L_i / p_i           grazing = 1/n sum w_i (1 - v.h_i)^5 L_i / p_i
+//   diffuse = 1/n sum (n.l_i)+ / pi L_i / p_i
+// so that the specular light with Schlick's Fresnel term is F0 (all - grazing) + grazing.
+template <class T> struct LightSums {
+  Vec3<T> all, grazing, diffuse;
+};
+
+template <class T>
+SPLITNERF_HD LightSums<T> monte_carlo_light(Vec3<T> normal, Vec3<T> view, T roughness, int n, const T* light_dirs,
+                                            const T* pdf, const T* radiance) {
+  const Vec3<T> facing_normal = normal * facing(normal, view);
+  const T ggx_alpha = sampled_alpha(roughness);
+  LightSums<T> sums{{T(0), T(0), T(0)}, {T(0), T(0), T(0)}, {T(0), T(0), T(0)}};
+  for (int i = 0; i < n; ++i) {
+    if (!(pdf[i] > T(0))) continue;
+    const LobeWeight<T> w = lobe_weight(facing_normal, view, load3(light_dirs + 3 * i), ggx_alpha).value;
+    const Vec3<T> share = load3(radiance + 3 * i) * (T(1) / (T(n) * pdf[i]));
+    sums.all += share * w.specular;
+    sums.grazing += share * (w.specular * w.schlick);
+    sums.diffuse += share * w.cosine;
+  }
+  return sums;
+}
+
+template <class T> struct LightSumsGrad {
+  Vec3<T> normal;
+  T roughness;
+};
+
+// Gradients to normal and roughness, and to the radiance [n, 3]. Directions and densities are taken as given:
+// the integral does not depend on them.
+template <class T>
+SPLITNERF_HD LightSumsGrad<T> monte_carlo_light_backward(Vec3<T> normal, Vec3<T> view, T roughness, int n,
+                                                         const T* light_dirs, const T* pdf, const T* radiance,
+                                                         const LightSums<T>& grad, T* grad_radiance) {
+  const T sign = facing(normal, view), ggx_alpha = sampled_alpha(roughness);
+  const Vec3<T> facing_normal = normal * sign;
+  LightSumsGrad<T> out{{T(0), T(0), T(0)}, T(0)};
+  T grad_alpha = T(0);
+  for (int i = 0; i < n; ++i) {
+    Vec3<T> grad_share{T(0), T(0), T(0)};
+    if (pdf[i] > T(0)) {
+      const Vec3<T> light = load3(light_dirs + 3 * i);
+      const LobeWeightGrad<T> w = lobe_weight(facing_normal, view, light, ggx_alpha);
+      const T scale = T(1) / (T(n) * pdf[i]);
+      const Vec3<T> share = load3(radiance + 3 * i) * scale;
+      const Vec3<T> grad_specular = grad.all + grad.grazing * w.value.schlick;
+      grad_share = (grad_specular * w.value.specular + grad.diffuse * w.value.cosine) * scale;
+      const T grad_w = dot(grad_specular, share);
+      grad_alpha += grad_w * w.d_ggx_alpha;
+      out.normal += w.d_normal * grad_w;
+      if (w.value.cosine > T(0)) out.normal += light * (dot(grad.diffuse, share) * T(1 / kPi));
+    }
+    store3(grad_radiance + 3 * i, grad_share);
+  }
+  out.normal = out.normal * sign;
+  // ggx_alpha = roughness^2 above its floor
+  out.roughness = roughness * roughness > T(kMinSampledAlpha) ? grad_alpha * T(2) * roughness : T(0);
+  return out;
+}
+
+}  // namespace splitnerf

@@ -1,0 +1,73 @@
+#include "splitnerf/monte_carlo.h"
+
+#include "splitnerf/ops_cpu.h"
+#include "splitnerf/parallel.h"
+
+namespace splitnerf::cpu {
+namespace {
+
+constexpr int64_t kGrain = 32;  // points
+
+}  // namespace
+
+template <class T>
+void sample_bsdf(int64_t n, const T* normals, const T* view_dirs, const T* roughness, int n_samples, uint32_t seed,
+                 T* directions, T* pdf) {
+  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const Vec3<T> view = load3(view_dirs + 3 * i);
+      const Vec3<T> given = load3(normals + 3 * i), normal = given * facing(given, view);
+      const T ggx_alpha = sampled_alpha(roughness[i]);
+      const auto counter = static_cast<uint32_t>(i);
+      const Vec2<T> shift{random_unit<T>(seed, counter, 0), random_unit<T>(seed, counter, 1)};
+      for (int k = 0; k < n_samples; ++k) {
+        const int64_t at = i * n_samples + k;
+        const Vec3<T> l = splitnerf::sample_bsdf(normal, view, ggx_alpha, k, fibonacci_lattice<T>(k, n_samples, shift));
+        store3(directions + 3 * at, l);
+        pdf[at] = bsdf_pdf(normal, view, l, ggx_alpha);
+      }
+    }
+  });
+}
+
+template <class T>
+void monte_carlo_light(int64_t n, int n_samples, const T* normals, const T* view_dirs, const T* roughness,
+                       const T* light_dirs, const T* pdf, const T* radiance, T* sums) {
+  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const int64_t at = i * n_samples;
+      const LightSums<T> s =
+          splitnerf::monte_carlo_light(load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i], n_samples,
+                                       light_dirs + 3 * at, pdf + at, radiance + 3 * at);
+      store3(sums + 9 * i, s.all), store3(sums + 9 * i + 3, s.grazing), store3(sums + 9 * i + 6, s.diffuse);
+    }
+  });
+}
+
+template <class T>
+void monte_carlo_light_backward(int64_t n, int n_samples, const T* normals, const T* view_dirs, const T* roughness,
+                                const T* light_dirs, const T* pdf, const T* radiance, const T* grad_sums,
+                                T* grad_normals, T* grad_roughness, T* grad_radiance) {
+  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const int64_t at = i * n_samples;
+      const T* g = grad_sums + 9 * i;
+      const LightSumsGrad<T> out = splitnerf::monte_carlo_light_backward(
+          load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i], n_samples, light_dirs + 3 * at, pdf + at,
+          radiance + 3 * at, LightSums<T>{load3(g), load3(g + 3), load3(g + 6)}, grad_radiance + 3 * at);
+      store3(grad_normals + 3 * i, out.normal);
+      grad_roughness[i] = out.roughness;
+    }
+  });
+}
+
+#define SPLITNERF_INSTANTIATE(T)                                                                                     \
+  template void sample_bsdf<T>(int64_t, const T*, const T*, const T*, int, uint32_t, T*, T*);                        \
+  template void monte_carlo_light<T>(int64_t, int, const T*, const T*, const T*, const T*, const T*, const T*, T*);  \
+  template void monte_carlo_light_backward<T>(int64_t, int, const T*, const T*, const T*, const T*, const T*, const T*, \
+                                              const T*, T*, T*, T*);
+SPLITNERF_INSTANTIATE(float)
+SPLITNERF_INSTANTIATE(double)
+#undef SPLITNERF_INSTANTIATE
+
+}  // namespace splitnerf::cpu

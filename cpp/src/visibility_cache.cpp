@@ -1,0 +1,203 @@
+#include "splitnerf/visibility_cache.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "planes.h"
+#include "splitnerf/kernels.h"
+#include "splitnerf/occlusion.h"
+#include "splitnerf/ops_cpu.h"
+#include "splitnerf/parallel.h"
+
+namespace splitnerf::cpu {
+namespace {
+
+constexpr int64_t kVertexGrain = 32, kPointGrain = 64;
+
+int32_t heaviest_vertex(const int32_t* triangle, const Hit& hit) {
+  const float w = 1.f - hit.u - hit.v;
+  return triangle[w >= hit.u && w >= hit.v ? 0 : hit.u >= hit.v ? 1 : 2];
+}
+
+template <class T> Vec3<T> ratio(const T* above, const T* below) {
+  Vec3<T> o;
+  for (int c = 0; c < 3; ++c) o[c] = below[c] > T(0) ? min_of(above[c] / below[c], T(1)) : T(1);
+  return o;
+}
+
+}  // namespace
+
+void visibility_bits(const Scene& scene, int64_t n, const float* positions, const float* normals, int64_t n_directions,
+                     const float* directions, float offset, uint32_t* bits, int32_t* hits) {
+  const int64_t n_words = n_directions / kBitsPerWord;
+  parallel_for(n, kVertexGrain, [&](int64_t begin, int64_t end) {
+    std::vector<float> origins(3 * n_directions), rays(3 * n_directions);
+    std::vector<int64_t> above(n_directions);  // the directions above the horizon
+    std::vector<uint8_t> open(n_directions);
+    std::vector<Hit> found(hits ? n_directions : 0);
+    for (int64_t v = begin; v < end; ++v) {
+      const Vec3<float> normal = load3(normals + 3 * v), origin = load3(positions + 3 * v) + normal * offset;
+      int64_t n_rays = 0;
+      for (int64_t i = 0; i < n_directions; ++i) {
+        const Vec3<float> w = load3(directions + 3 * i);
+        if (!(dot(w, normal) > 0.f)) continue;
+        store3(&origins[3 * n_rays], origin);
+        store3(&rays[3 * n_rays], w);
+        above[n_rays++] = i;
+      }
+      uint32_t *open_words = bits + 2 * v * n_words, *blocked_words = open_words + n_words;
+      std::fill(open_words, open_words + 2 * n_words, 0u);
+      if (hits) {
+        std::fill(hits + v * n_directions, hits + (v + 1) * n_directions, -1);
+        scene.trace_closest(origins.data(), rays.data(), n_rays, INFINITY, found.data());
+        for (int64_t k = 0; k < n_rays; ++k) {
+          open[k] = found[k].t < 0.f;
+          if (open[k]) continue;
+          const int32_t* triangle = scene.triangles() + 3 * int64_t(found[k].triangle);
+          hits[v * n_directions + above[k]] = heaviest_vertex(triangle, found[k]);
+        }
+      } else {
+        scene.trace_visibility(origins.data(), rays.data(), n_rays, INFINITY, nullptr, open.data());
+      }
+      for (int64_t k = 0; k < n_rays; ++k) {
+        (open[k] ? open_words : blocked_words)[above[k] / kBitsPerWord] |= 1u << above[k] % kBitsPerWord;
+      }
+    }
+  });
+}
+
+template <class T>
+void build_vertex_grids(int64_t n_vertices, const T* vertices, T radius, int n_levels, int64_t n_buckets,
+                        int32_t* starts, int32_t* order) {
+  std::vector<int32_t> bucket(n_vertices);
+  T inverse_size = T(0.5) / radius;
+  for (int level = 0; level < n_levels; ++level, inverse_size *= T(0.5)) {
+    int32_t* first = starts + level * (n_buckets + 1);
+    std::fill(first, first + n_buckets + 1, 0);
+    for (int64_t v = 0; v < n_vertices; ++v) {
+      bucket[v] = static_cast<int32_t>(grid_cell(load3(vertices + 3 * v), inverse_size).bucket(n_buckets));
+      ++first[bucket[v] + 1];
+    }
+    for (int64_t b = 0; b < n_buckets; ++b) first[b + 1] += first[b];
+    std::vector<int32_t> next(first, first + n_buckets);
+    for (int64_t v = 0; v < n_vertices; ++v) order[level * n_vertices + next[bucket[v]]++] = static_cast<int32_t>(v);
+  }
+}
+
+namespace {
+
+// Reads the cache for one point after the other; holds what a point needs while it is worked on.
+template <class T> class CacheReader {
+ public:
+  CacheReader(const VisibilityCache<T>& cache, const LobeSide<T>& directions)
+      : cache_(cache), directions_(directions), n_words_(cache.n_directions / kBitsPerWord), above_(n_words_),
+        cosine_(cache.n_directions), known_(cache.n_directions), visible_(cache.n_directions),
+        lobe_(cache.n_directions) {}
+
+  struct Result {
+    Vec3<T> occlusion_d{T(1), T(1), T(1)}, occlusion_s{T(1), T(1), T(1)};
+    Vec3<T> indirect_d{T(0), T(0), T(0)}, indirect_s{T(0), T(0), T(0)};
+  };
+
+  Result read(Vec3<T> position, Vec3<T> normal, Vec3<T> lobe_dir, T roughness) {
+    Result result;
+    const T check = sum(position) + sum(normal) + sum(lobe_dir) + roughness;
+    if (!std::isfinite(check)) {
+      const T nan = std::numeric_limits<T>::quiet_NaN();
+      result.occlusion_d = result.occlusion_s = result.indirect_d = result.indirect_s = {nan, nan, nan};
+      return result;
+    }
+    const Neighbours<T> near = find_neighbours(cache_.grids, position, normal);
+    kernels<T>().visibility_horizon(directions_, &normal.x, cosine_.data(), above_.data());
+    if (all_open(near)) return result;
+
+    const uint32_t* bits[kMaxNeighbours];
+    for (int k = 0; k < near.n; ++k) bits[k] = words(near.vertex[k]);
+    const T alpha = cached_lobe_alpha(roughness, static_cast<int>(cache_.n_directions));
+    const VisibilityPoint<T> point{bits, near.weight, near.n, cosine_.data(), &lobe_dir.x, alpha * alpha};
+    T sums[14];
+    kernels<T>().visibility_sums(directions_, point, known_.data(), visible_.data(), lobe_.data(), sums);
+    result.occlusion_d = ratio(sums, sums + 3);
+    result.occlusion_s = ratio(sums + 7, sums + 10);
+    if (cache_.hits) add_indirect(near, sums[6], sums[13], result);
+    return result;
+  }
+
+ private:
+  const uint32_t* words(int32_t vertex) const { return cache_.bits + 2 * int64_t(vertex) * n_words_; }
+  const uint32_t* blocked_words(int32_t vertex) const { return words(vertex) + n_words_; }
+
+  // Whether no neighbour has a blocked direction above the point's horizon; so without neighbours.
+  bool all_open(const Neighbours<T>& near) const {
+    uint32_t blocked = 0;
+    for (int k = 0; k < near.n; ++k) {
+      for (int64_t word = 0; word < n_words_; ++word) blocked |= blocked_words(near.vertex[k])[word] & above_[word];
+    }
+    return blocked == 0;
+  }
+
+  // sum (1 - V_i) C_i c_i / sum c_i over both kernels. Few directions above the horizon are blocked: they are taken
+  // one by one.
+  void add_indirect(const Neighbours<T>& near, T total_d, T total_s, Result& result) const {
+    for (int k = 0; k < near.n; ++k) {
+      const int32_t* hits = cache_.hits + int64_t(near.vertex[k]) * cache_.n_directions;
+      Vec3<T> d{T(0), T(0), T(0)}, s{T(0), T(0), T(0)};
+      for (int64_t word = 0; word < n_words_; ++word) {
+        for (uint32_t blocked = blocked_words(near.vertex[k])[word] & above_[word]; blocked; blocked &= blocked - 1) {
+          const int64_t i = word * kBitsPerWord + lowest_bit(blocked);
+          if (hits[i] < 0 || hits[i] >= cache_.grids.n_vertices) continue;
+          const Vec3<T> arriving = load3(cache_.radiance + 3 * int64_t(hits[i])) / known_[i];
+          d += arriving * cosine_[i];
+          s += arriving * lobe_[i];
+        }
+      }
+      if (total_d > T(0)) result.indirect_d += d * (near.weight[k] / total_d);
+      if (total_s > T(0)) result.indirect_s += s * (near.weight[k] / total_s);
+    }
+  }
+
+  const VisibilityCache<T>& cache_;
+  const LobeSide<T>& directions_;
+  const int64_t n_words_;
+  std::vector<uint32_t> above_;
+  std::vector<T> cosine_, known_, visible_, lobe_;
+};
+
+}  // namespace
+
+template <class T>
+void cached_occlusion(const VisibilityCache<T>& cache, int64_t n, const T* positions, const T* normals,
+                      const T* lobe_dirs, const T* roughness, T* occlusion_d, T* occlusion_s, T* indirect_d,
+                      T* indirect_s) {
+  const Planes<T> direction(cache.directions, cache.n_directions);
+  Planes<T> light(cache.light, cache.n_directions);
+  for (auto* plane : {&light.x, &light.y, &light.z}) {
+    for (T& value : *plane) value += T(kBlackLight);
+  }
+  const LobeSide<T> directions{direction.x.data(), direction.y.data(), direction.z.data(), nullptr,
+                               light.x.data(),     light.y.data(),     light.z.data(),     cache.n_directions};
+  parallel_for(n, kPointGrain, [&](int64_t begin, int64_t end) {
+    CacheReader<T> reader(cache, directions);
+    for (int64_t i = begin; i < end; ++i) {
+      const auto result =
+          reader.read(load3(positions + 3 * i), load3(normals + 3 * i), load3(lobe_dirs + 3 * i), roughness[i]);
+      store3(occlusion_d + 3 * i, result.occlusion_d);
+      store3(occlusion_s + 3 * i, result.occlusion_s);
+      if (!cache.hits) continue;
+      store3(indirect_d + 3 * i, result.indirect_d);
+      store3(indirect_s + 3 * i, result.indirect_s);
+    }
+  });
+}
+
+#define SPLITNERF_INSTANTIATE(T)                                                                                      \
+  template void build_vertex_grids<T>(int64_t, const T*, T, int, int64_t, int32_t*, int32_t*);                        \
+  template void cached_occlusion<T>(const VisibilityCache<T>&, int64_t, const T*, const T*, const T*, const T*, T*,   \
+                                    T*, T*, T*);
+SPLITNERF_INSTANTIATE(float)
+SPLITNERF_INSTANTIATE(double)
+#undef SPLITNERF_INSTANTIATE
+
+}  // namespace splitnerf::cpu

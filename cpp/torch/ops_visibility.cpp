@@ -1,0 +1,117 @@
+// visibility_bits, vertex_grids and cached_occlusion as torch operators.
+#include <tuple>
+
+#include "check.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf::glue {
+namespace {
+
+constexpr int64_t kMaxDirections = 1 << 16;
+
+void check_directions(const char* op, int64_t n) {
+  require(n > 0 && n % kBitsPerWord == 0 && n <= kMaxDirections, op,
+          "directions must hold a multiple of 32 in [32, 65536]");
+}
+
+std::tuple<Tensor, Tensor> visibility_bits(int64_t scene, Tensor positions, Tensor normals, Tensor directions,
+                                           double offset, bool with_hits) {
+  const char* op = "visibility_bits";
+  const Tensor x = checked(op, "positions", positions, {kAny, 3}, ScalarType::Float);
+  const Tensor n = checked(op, "normals", normals, {x.size(0), 3}, ScalarType::Float);
+  const Tensor d = checked(op, "directions", directions, {kAny, 3}, ScalarType::Float);
+  check_directions(op, d.size(0));
+  Tensor bits = empty_like_type(x, {x.size(0), 2, d.size(0) / kBitsPerWord}, ScalarType::Int);
+  Tensor hits = empty_like_type(x, {x.size(0), with_hits ? d.size(0) : 0}, ScalarType::Int);
+  cpu::visibility_bits(*get_scene(scene), x.size(0), in<float>(x), in<float>(n), d.size(0), in<float>(d),
+                       static_cast<float>(offset), out<uint32_t>(bits), with_hits ? out<int32_t>(hits) : nullptr);
+  return {bits, hits};
+}
+
+std::tuple<Tensor, Tensor> vertex_grids(Tensor vertices, double radius, int64_t n_levels) {
+  const char* op = "vertex_grids";
+  const ScalarType type = real_type(op, "vertices", vertices);
+  const Tensor v = checked(op, "vertices", vertices, {kAny, 3}, type);
+  require(radius > 0 && n_levels > 0 && n_levels <= 16, op, "radius must be positive and n_levels in [1, 16]");
+  require(v.size(0) < int64_t(1) << 30, op, "at most 2^30 vertices");
+  int64_t n_buckets = 1;
+  while (n_buckets < v.size(0)) n_buckets *= 2;
+  Tensor starts = empty_like_type(v, {n_levels, n_buckets + 1}, ScalarType::Int);
+  Tensor order = empty_like_type(v, {n_levels, v.size(0)}, ScalarType::Int);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::build_vertex_grids(v.size(0), in<T>(v), T(radius), static_cast<int>(n_levels), n_buckets, out<int32_t>(starts),
+                            out<int32_t>(order));
+  });
+  return {starts, order};
+}
+
+// Numbers in [0, high): the grids are walked without further checks.
+void check_indices(const char* op, const char* name, const Tensor& t, int64_t high) {
+  const int32_t* values = in<int32_t>(t);
+  bool fits = true;
+  for (int64_t i = 0; i < t.size(0) * t.size(1); ++i) fits = fits && values[i] >= 0 && values[i] < high;
+  require(fits, op, std::string(name) + " must hold numbers in [0, " + std::to_string(high) + ")");
+}
+
+std::tuple<Tensor, Tensor, Tensor, Tensor> cached_occlusion(Tensor positions, Tensor normals, Tensor lobe_dirs,
+                                                            Tensor roughness, Tensor vertices, Tensor vertex_normals,
+                                                            Tensor starts, Tensor order, double radius, Tensor bits,
+                                                            Tensor hits, Tensor radiance, Tensor directions,
+                                                            Tensor light) {
+  const char* op = "cached_occlusion";
+  const ScalarType type = real_type(op, "positions", positions);
+  const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
+  const Tensor n = checked(op, "normals", normals, {x.size(0), 3}, type);
+  const Tensor d = checked(op, "lobe_dirs", lobe_dirs, {x.size(0), 3}, type);
+  const Tensor rho = checked(op, "roughness", roughness, {x.size(0), 1}, type);
+  const Tensor v = checked(op, "vertices", vertices, {kAny, 3}, type);
+  const int64_t n_vertices = v.size(0);
+  const Tensor vn = checked(op, "vertex_normals", vertex_normals, {n_vertices, 3}, type);
+  const Tensor s = checked(op, "starts", starts, {kAny, kAny}, ScalarType::Int);
+  const Tensor o = checked(op, "order", order, {s.size(0), n_vertices}, ScalarType::Int);
+  const Tensor w = checked(op, "directions", directions, {kAny, 3}, type);
+  check_directions(op, w.size(0));
+  const Tensor l = checked(op, "light", light, {w.size(0), 3}, type);
+  const Tensor b = checked(op, "bits", bits, {n_vertices, 2, w.size(0) / kBitsPerWord}, ScalarType::Int);
+  const bool indirect = hits.dim() == 2 && hits.size(1) > 0;
+  const Tensor h = checked(op, "hits", hits, {n_vertices, indirect ? w.size(0) : 0}, ScalarType::Int);
+  const Tensor c = checked(op, "radiance", radiance, {indirect ? n_vertices : 0, 3}, type);
+  const int64_t n_buckets = s.size(1) - 1;
+  require(n_buckets > 0 && (n_buckets & (n_buckets - 1)) == 0 && radius > 0, op,
+          "starts must be [levels, 2^k + 1] and radius positive");
+  check_indices(op, "starts", s, n_vertices + 1);
+  check_indices(op, "order", o, n_vertices);
+  Tensor o_d = empty_like_type(x, {x.size(0), 3}, type), o_s = empty_like_type(x, {x.size(0), 3}, type);
+  Tensor i_d = empty_like_type(x, {indirect ? x.size(0) : 0, 3}, type);
+  Tensor i_s = empty_like_type(x, {indirect ? x.size(0) : 0, 3}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    const cpu::VisibilityCache<T> cache{
+        {in<T>(v), in<T>(vn), in<int32_t>(s), in<int32_t>(o), n_vertices, n_buckets, static_cast<int>(s.size(0)),
+         T(radius)},
+        in<uint32_t>(b), indirect ? in<int32_t>(h) : nullptr, in<T>(c), w.size(0), in<T>(w), in<T>(l)};
+    cpu::cached_occlusion(cache, x.size(0), in<T>(x), in<T>(n), in<T>(d), in<T>(rho), out<T>(o_d), out<T>(o_s),
+                          out<T>(i_d), out<T>(i_s));
+  });
+  return {o_d, o_s, i_d, i_s};
+}
+
+}  // namespace
+
+STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
+  m.def("visibility_bits(int scene, Tensor positions, Tensor normals, Tensor directions, float offset, bool with_hits) "
+        "-> (Tensor, Tensor)");
+  m.def("vertex_grids(Tensor vertices, float radius, int n_levels) -> (Tensor, Tensor)");
+  m.def("cached_occlusion(Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, Tensor vertices, "
+        "Tensor vertex_normals, Tensor starts, Tensor order, float radius, Tensor bits, Tensor hits, Tensor radiance, "
+        "Tensor directions, Tensor light) -> (Tensor, Tensor, Tensor, Tensor)");
+}
+
+STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+  m.impl("visibility_bits", TORCH_BOX(&visibility_bits));
+  m.impl("vertex_grids", TORCH_BOX(&vertex_grids));
+  m.impl("cached_occlusion", TORCH_BOX(&cached_occlusion));
+}
+
+}  // namespace splitnerf::glue

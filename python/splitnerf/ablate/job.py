@@ -1,0 +1,89 @@
+"""Runs an ablation: trains and scores each row on each scene, and goes on where it was interrupted."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from splitnerf.ablate.rows import FULL, Row
+from splitnerf.ablate.table import Score, differences, score_of
+from splitnerf.config import Config
+from splitnerf.data.json_files import read_json
+from splitnerf.errors import InputError
+from splitnerf.evaluate.jobs import Protocol
+from splitnerf.workflow import evaluate_run, reconstruct
+
+CLOSE = 0.3  # dB: rows that differ by less from the full method are run with more seeds
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to run.
+
+    Attributes:
+        scenes: Datasets.
+        rows: The first is the full method.
+        seeds: Seeds of rows that come close to the full method; others get one.
+        protocol: How runs are scored.
+        out: Folder of the runs, a folder per scene.
+    """
+
+    scenes: list[Path]
+    rows: list[Row]
+    seeds: int
+    protocol: Protocol
+    out: Path
+
+
+class Interrupted(Exception):
+    """Ctrl-C ended a training; its state is saved."""
+
+
+def ablate(plan: Plan, show: Callable[[list[Score]], None]) -> list[Score]:
+    """Trains and scores what is not done yet.
+
+    Args:
+        plan: What to run.
+        show: Called with all scores so far after each run.
+
+    Raises:
+        InputError: The data or a run's folder cannot be used.
+        Interrupted: To be continued by the same call.
+    """
+    scores: list[Score] = []
+
+    def run(scene: Path, row: Row, seed: int) -> None:
+        scores.append(score_of(scene.resolve().name, row.name, seed, run_row(plan, scene, row, seed)))
+        show(scores)
+
+    for scene in plan.scenes:
+        for row in plan.rows:
+            run(scene, row, 0)
+    for scene in plan.scenes:
+        close = [d.row for d in differences(scores, scene.resolve().name) if abs(d.mean) < CLOSE]
+        for row in plan.rows:
+            if row.name in close or (close and row.name == FULL):
+                for seed in range(1, plan.seeds):
+                    run(scene, row, seed)
+    return scores
+
+
+def run_row(plan: Plan, scene: Path, row: Row, seed: int) -> dict:
+    """The evaluation of one run, made now unless it stands already."""
+    config = dataclasses.replace(row.config, seed=seed)
+    run = plan.out / scene.resolve().name / (row.slug if seed == 0 else f"{row.slug}_seed{seed}")
+    scores = run / "scores.json"
+    stored = run / "config.toml"
+    if stored.is_file() and Config.read(stored) != config:
+        raise InputError(f"{run}: holds a run with other settings; give another --out")
+    if not scores.is_file():
+        resume = (run / "checkpoint.pt").is_file()
+        _, evaluation = reconstruct(
+            scene, run, config, downscale=plan.protocol.downscale, resume=resume, overwrite=not resume
+        )
+        if evaluation is None:
+            raise Interrupted
+        evaluate_run(run, scene, plan.protocol, scores)
+    return read_json(scores, "novel_view")

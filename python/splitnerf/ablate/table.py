@@ -1,0 +1,119 @@
+"""An ablation's scores as CSV and as Markdown."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from splitnerf.ablate.rows import FULL
+
+NOISE = 0.3  # dB: a smaller difference of single runs says nothing
+COLUMNS = (
+    ("relight", "relight, dB", "{:.2f}"),
+    ("albedo", "albedo, dB", "{:.2f}"),
+    ("novel_view", "novel view, dB", "{:.2f}"),
+    ("normals", "normals, degrees", "{:.2f}"),
+    ("roughness", "roughness, error", "{:.3f}"),
+    ("metallic", "metallic, accuracy", "{:.3f}"),
+    ("light", "light, dB", "{:.2f}"),
+    ("minutes", "time, min", "{:.1f}"),
+)
+
+
+@dataclass(frozen=True)
+class Score:
+    """One run's scores; None where the data hold no truth. Units as in the column titles."""
+
+    scene: str
+    row: str
+    seed: int
+    relight: float | None
+    albedo: float | None
+    novel_view: float | None
+    normals: float | None
+    roughness: float | None
+    metallic: float | None
+    light: float | None
+    minutes: float | None
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A row against the full method in its scene: relit views, or novel views where none are known.
+
+    Attributes:
+        row: Its name.
+        mean: dB, over the seeds that both have; positive is better than the full method.
+        error: Standard error of the mean, None with one seed.
+    """
+
+    row: str
+    mean: float
+    error: float | None
+
+    def verdict(self) -> str:
+        """In words: a number, or that there is no difference."""
+        if self.error is None:
+            return "no difference" if abs(self.mean) < NOISE else f"{self.mean:+.2f} dB"
+        text = f"{self.mean:+.2f} ± {self.error:.2f} dB"
+        return f"no difference ({text})" if abs(self.mean) < 2 * self.error else text
+
+
+def score_of(scene: str, row: str, seed: int, evaluation: dict) -> Score:
+    """The columns of an evaluation.json."""
+    psnr = {key: (evaluation.get(key) or {}).get("psnr") for key in ("relight", "albedo", "novel_view")}
+    seconds = evaluation.get("seconds")
+    return Score(
+        scene, row, seed, **psnr, normals=evaluation["normal_mae_deg"], roughness=evaluation["roughness_mae"],
+        metallic=evaluation["metallic_balanced_accuracy"], light=evaluation["light_psnr"],
+        minutes=None if seconds is None else seconds / 60,
+    )  # fmt: skip
+
+
+def differences(scores: Sequence[Score], scene: str) -> list[Difference]:
+    """Each row of a scene against the full method there, seed by seed."""
+    here = [s for s in scores if s.scene == scene]
+    full = {s.seed: s for s in here if s.row == FULL}
+    found = []
+    for name in dict.fromkeys(s.row for s in here if s.row != FULL):
+        gaps = [_judged(s) - _judged(full[s.seed]) for s in here if s.row == name and s.seed in full]
+        if gaps:
+            error = float(np.std(gaps, ddof=1) / np.sqrt(len(gaps))) if len(gaps) > 1 else None
+            found.append(Difference(name, float(np.mean(gaps)), error))
+    return found
+
+
+def _judged(score: Score) -> float:
+    return score.novel_view if score.relight is None else score.relight
+
+
+def csv_table(scores: Sequence[Score]) -> str:
+    """A line per run."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, fieldnames=list(Score.__dataclass_fields__), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({k: "" if v is None else v for k, v in asdict(s).items()} for s in scores)
+    return text.getvalue()
+
+
+def markdown_table(scores: Sequence[Score]) -> str:
+    """A table per scene, means over the seeds of a row, and the difference to the full method."""
+    parts = []
+    for scene in dict.fromkeys(s.scene for s in scores):
+        verdicts = {d.row: d.verdict() for d in differences(scores, scene)}
+        lines = [["", *(title for _, title, _ in COLUMNS), "seeds", "against full"], ["---"] + ["---:"] * (len(COLUMNS) + 2)]
+        for name in dict.fromkeys(s.row for s in scores if s.scene == scene):
+            runs = [s for s in scores if s.scene == scene and s.row == name]
+            cells = [_mean([getattr(s, key) for s in runs], text) for key, _, text in COLUMNS]
+            lines.append([name, *cells, str(len(runs)), verdicts.get(name, "")])
+        parts.append(f"## {scene}\n\n" + "".join("| " + " | ".join(line) + " |\n" for line in lines))
+    return "\n".join(parts)
+
+
+def _mean(values: Sequence[float | None], text: str) -> str:
+    known = [value for value in values if value is not None]
+    return text.format(sum(known) / len(known)) if known else "-"

@@ -1,0 +1,87 @@
+"""Occlusion factors and indirect light from visibility bits cached on the current mesh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import torch
+import trimesh
+from torch import Tensor, nn
+
+from splitnerf import _core
+from splitnerf.fields.occlusion import Occlusion, OcclusionQuery
+from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion
+
+TEXELS_PER_CELL = 8  # of the light, for its mean over a direction's cell
+SHADED_CHUNK = 1 << 15  # vertices shaded at a time
+
+
+class VisibilityBits(nn.Module):
+    """o_d and o_s from what each mesh vertex sees in a fixed set of directions, and the light of what it does not see.
+
+    Nothing is learned here and nothing is part of the state: :meth:`trace` fills the cache from a mesh,
+    :meth:`set_light` takes the current light, :meth:`refresh` the light that the vertices send out. No gradient flows
+    through the factors.
+
+    Args:
+        n_directions: Fibonacci directions over the sphere, a multiple of 32.
+        offset: Rays start this far off a vertex along its normal, scene units.
+        n_channels: 1 averages the factors over the colour channels, 3 keeps them.
+        indirect: Keep which vertex each blocked ray meets.
+    """
+
+    def __init__(self, n_directions: int, offset: float, n_channels: int, indirect: bool):
+        super().__init__()
+        self.offset, self.n_channels, self.indirect = offset, n_channels, indirect
+        self.directions = torch.from_numpy(_core.fibonacci_sphere(n_directions)).float()
+        self.light_height = height = math.ceil(math.sqrt(TEXELS_PER_CELL * n_directions / 2))
+        texels = torch.from_numpy(_core.equirect_directions(height, 2 * height)).float().reshape(-1, 3)
+        self._cell = torch.cat([(part @ self.directions.T).argmax(1) for part in texels.split(4096)])
+        self._solid_angle = (1.0 - texels[:, 2:] ** 2).clamp(min=0.0).sqrt()  # up to a factor
+        self.light = torch.ones_like(self.directions)
+        self.cache: VisibilityCache | None = None
+        self.radiance: Tensor | None = None
+
+    def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> None:
+        """Traces every vertex of the mesh. What the vertices send out is unknown until :meth:`refresh`.
+
+        Args:
+            scene: The mesh below.
+            vertices: [n, 3], scene units.
+            faces: [m, 3].
+        """
+        mesh = trimesh.Trimesh(vertices.numpy(), faces.numpy(), process=False)
+        normals = torch.from_numpy(np.array(mesh.vertex_normals, dtype=np.float32))
+        self.cache = VisibilityCache.trace(
+            scene, vertices.float(), normals, float(mesh.area), self.directions, offset=self.offset,
+            with_hits=self.indirect,
+        )  # fmt: skip
+        self.radiance = None
+
+    def set_light(self, panorama: Tensor) -> None:
+        """Takes the light's mean over each direction's cell from an equirectangular map of ``light_height`` rows."""
+        weighted = torch.cat([panorama.reshape(-1, 3) * self._solid_angle, self._solid_angle], dim=1)
+        sums = torch.zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
+        self.light = sums[:, :3] / sums[:, 3:]
+
+    @torch.no_grad()
+    def refresh(self, shade: Callable[[Tensor, Tensor], Tensor]) -> None:
+        """Shades the vertices anew: ``shade(positions, normals)`` is their radiance [n, 3] along the normal.
+
+        The shading itself reads the radiance of the former refresh: a bounce is added each time.
+        """
+        if self.indirect and self.cache is not None:
+            parts = zip(self.cache.vertices.split(SHADED_CHUNK), self.cache.normals.split(SHADED_CHUNK))
+            self.radiance = torch.cat([shade(x, n) for x, n in parts])
+
+    @torch.no_grad()
+    def forward(self, query: OcclusionQuery) -> Occlusion:
+        """The factors at points; before :meth:`trace` there is nothing to answer from."""
+        o_d, o_s, i_d, i_s = cached_occlusion(
+            self.cache, query.positions, query.normals, query.lobe_dirs, query.roughness, self.light, self.radiance
+        )
+        if self.n_channels == 1:
+            o_d, o_s = o_d.mean(-1, keepdim=True), o_s.mean(-1, keepdim=True)
+        return Occlusion(o_d, o_s, i_d, i_s)

@@ -1,0 +1,101 @@
+"""Monte Carlo shading: directions from the BSDF, and the sums over the light that comes from them.
+
+``monte_carlo_light`` is differentiable once in normals, roughness and radiance; a gradient to the rest raises.
+
+Source: the rendering equation, SplitNeRF Eq. (4)-(6), without the split.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from torch import Tensor
+
+from splitnerf.ops._library import lib, refuse_gradients, register
+
+
+class LightSums(NamedTuple):
+    """Incoming light weighed by the lobes of a point, [n, 3] each.
+
+    Attributes:
+        specular: Over the GGX lobe without Fresnel: integral of D V L (n.l) dl.
+        grazing: The same times Schlick's (1 - v.h)^5, so that F0 (specular - grazing) + grazing is the reflected light.
+        diffuse: Irradiance over pi.
+    """
+
+    specular: Tensor
+    grazing: Tensor
+    diffuse: Tensor
+
+
+def sample_bsdf(
+    normals: Tensor, view_dirs: Tensor, roughness: Tensor, n_samples: int, seed: int = 0
+) -> tuple[Tensor, Tensor]:
+    """Directions for the light of points: half follow the cosine, half the visible normals. No gradient.
+
+    Args:
+        normals, view_dirs: [n, 3] unit; a normal that faces away is turned.
+        roughness: [n, 1], in [0, 1]; a narrower lobe than ggx_alpha = .002 is sampled as that.
+        n_samples: Directions a point, from one lattice, shifted at random by point and seed.
+        seed: Of the shifts.
+
+    Returns:
+        directions [n, n_samples, 3] unit and the density of both halves together [n, n_samples], sr^-1, 0 where a
+        direction lies below the horizon.
+
+    Raises:
+        ValueError: A shape, dtype or count does not fit.
+
+    Source: Heitz 2018 (visible normals); Veach 1997 (balance heuristic).
+    """
+    return lib.sample_bsdf(normals, view_dirs, roughness, n_samples, seed)
+
+
+def monte_carlo_light(
+    normals: Tensor, view_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, pdf: Tensor, radiance: Tensor
+) -> LightSums:
+    """Estimates the integrals of incoming light over the specular and the diffuse lobe.
+
+    Args:
+        normals, view_dirs: [n, 3] unit; a normal that faces away is turned.
+        roughness: [n, 1].
+        light_dirs, pdf: [n, k, 3] and [n, k] of :func:`sample_bsdf`; they count as given.
+        radiance: [n, k, 3] from there, 0 where the way is blocked.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+    """
+    return LightSums(*lib.monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance).unbind(1))
+
+
+def _keep(ctx, inputs, output):
+    ctx.save_for_backward(*inputs)
+
+
+def _backward(ctx, grad_sums):
+    refuse_gradients(ctx, "monte_carlo_light", view_dirs=1, light_dirs=3, pdf=4)
+    normals, roughness, radiance = lib.monte_carlo_light_backward(*ctx.saved_tensors, grad_sums)
+    return normals, None, roughness, None, None, radiance
+
+
+register(
+    "sample_bsdf",
+    fake=lambda normals, view_dirs, roughness, n_samples, seed: (
+        normals.new_empty(normals.shape[0], n_samples, 3),
+        normals.new_empty(normals.shape[0], n_samples),
+    ),
+)
+register(
+    "monte_carlo_light",
+    fake=lambda normals, *rest: normals.new_empty(normals.shape[0], 3, 3),
+    setup_context=_keep,
+    backward=_backward,
+)
+register(
+    "monte_carlo_light_backward",
+    fake=lambda normals, view_dirs, roughness, light_dirs, pdf, radiance, grad_sums: (
+        normals.new_empty(normals.shape),
+        roughness.new_empty(roughness.shape),
+        radiance.new_empty(radiance.shape),
+    ),
+)

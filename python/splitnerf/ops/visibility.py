@@ -1,0 +1,143 @@
+"""Visibility bits cached on a mesh: occlusion factors and one bounce of light without a ray in the step.
+
+No operator here has a gradient: asking for one raises.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from splitnerf.ops._library import lib, register
+from splitnerf.ops.occlusion import MeshScene
+
+GRID_LEVELS = 4  # the search widens to 8 times its first radius
+RADIUS_IN_SPACINGS = 1.5
+
+
+def visibility_bits(
+    scene: MeshScene, positions: Tensor, normals: Tensor, directions: Tensor, offset: float = 0.0125, *,
+    with_hits: bool = False,
+) -> tuple[Tensor, Tensor]:  # fmt: skip
+    """Traces the same directions from every vertex of a mesh and keeps what became of each ray.
+
+    Args:
+        scene: The mesh.
+        positions, normals: [n, 3] float32, vertices of the mesh and their unit normals.
+        directions: [k, 3] float32 unit; k a multiple of 32.
+        offset: Rays start this far off the vertex along its normal, scene units.
+        with_hits: Also say what was hit.
+
+    Returns:
+        bits: [n, 2, k / 32] int32; bit j of word i stands for direction 32 i + j. Row 0 marks the open directions,
+            row 1 the blocked ones; those below the vertex's own horizon, which are not traced, stand in neither.
+        hits: [n, k] int32, the vertex with the largest barycentric weight of the triangle that was hit, -1 where the
+            direction is not blocked; [n, 0] without ``with_hits``.
+
+    Raises:
+        ValueError: A shape, dtype or count does not fit.
+        IndexError: The scene no longer exists.
+    """
+    return lib.visibility_bits(scene.handle, positions, normals, directions, offset, with_hits)
+
+
+@dataclass(frozen=True)
+class VisibilityCache:
+    """What :func:`cached_occlusion` reads: the vertices, how to find them, and what each sees.
+
+    Attributes:
+        vertices, normals: [n, 3] float32.
+        directions: [k, 3] float32 unit.
+        bits, hits: See :func:`visibility_bits`.
+        radius: Of the first search for vertices around a point: 1.5 times sqrt(area / vertices).
+        starts, order: Hash grids over the vertices; level l reaches radius * 2^l.
+    """
+
+    vertices: Tensor
+    normals: Tensor
+    directions: Tensor
+    bits: Tensor
+    hits: Tensor
+    radius: float
+    starts: Tensor
+    order: Tensor
+
+    @staticmethod
+    def trace(
+        scene: MeshScene, vertices: Tensor, normals: Tensor, area: float, directions: Tensor, *, offset: float = 0.0125,
+        with_hits: bool = False,
+    ) -> VisibilityCache:  # fmt: skip
+        """Fills the cache of a mesh of the given area (scene units squared)."""
+        bits, hits = visibility_bits(scene, vertices, normals, directions, offset, with_hits=with_hits)
+        radius = RADIUS_IN_SPACINGS * (area / len(vertices)) ** 0.5
+        return VisibilityCache(
+            vertices, normals, directions, bits, hits, radius, *lib.vertex_grids(vertices, radius, GRID_LEVELS)
+        )
+
+    def n_bytes(self) -> int:
+        tensors = (self.vertices, self.normals, self.directions, self.bits, self.hits, self.starts, self.order)
+        return sum(t.numel() * t.element_size() for t in tensors)
+
+
+def cached_occlusion(
+    cache: VisibilityCache, positions: Tensor, normals: Tensor, lobe_dirs: Tensor, roughness: Tensor, light: Tensor,
+    radiance: Tensor | None = None,
+) -> tuple[Tensor, Tensor, Tensor | None, Tensor | None]:  # fmt: skip
+    """Occlusion factors, and the light that the mesh itself sends, from the cached bits.
+
+    With V_i the open share among the vertices around the point, weighted by distance and by agreement of normals (a
+    vertex says nothing of directions below its own horizon; where none says anything, V_i = 1),
+    ``o_d = sum V_i L_i (w_i.n)+ / sum L_i (w_i.n)+``; o_s the same with D(w_i, d)(w_i.d)+ [w_i.n > 0] for the cosine,
+    D no narrower than about two directions. With ``radiance``, C_i the radiance of the vertex that direction i meets,
+    ``i_d = sum (1 - V_i) C_i (w_i.n)+ / sum (w_i.n)+`` and i_s the same over the lobe: they add to o_d g(n, 1) and
+    o_s g(d, rho). Where no vertex is near, or all that are near see
+    all of the sky above the horizon, the factors are exactly 1 and the added light 0. Black light falls back to the
+    geometric share. A number that is not finite gives NaN.
+
+    Args:
+        cache: The mesh's bits; with hits where ``radiance`` is given.
+        positions, normals: [n, 3] float32; normals unit.
+        lobe_dirs: [n, 3] float32 unit, the axis of the specular lobe (:func:`splitnerf.ops.query_direction`).
+        roughness: [n, 1] float32.
+        light: [k, 3] float32, the light's mean over the cell of each of the cache's directions.
+        radiance: [vertices, 3] float32 that each vertex sends out, or None.
+
+    Returns:
+        o_d, o_s [n, 3] in [0, 1], 1 = open; i_d, i_s [n, 3] or None, in the normalisation of g (irradiance / pi).
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+
+    Source: SplitNeRF Eq. (12)-(15) as sums over fixed directions.
+    """
+    hits = cache.hits if radiance is not None else cache.hits[:, :0]
+    o_d, o_s, i_d, i_s = lib.cached_occlusion(
+        positions, normals, lobe_dirs, roughness, cache.vertices, cache.normals, cache.starts, cache.order,
+        cache.radius, cache.bits, hits, cache.vertices[:0] if radiance is None else radiance, cache.directions, light,
+    )  # fmt: skip
+    return (o_d, o_s, None, None) if radiance is None else (o_d, o_s, i_d, i_s)
+
+
+def _fake_bits(scene, positions, normals, directions, offset, with_hits):
+    n, k = positions.shape[0], directions.shape[0]
+    shapes = ((n, 2, k // 32), (n, k if with_hits else 0))
+    return tuple(positions.new_empty(shape, dtype=torch.int32) for shape in shapes)
+
+
+def _fake_grids(vertices, radius, n_levels):
+    n = vertices.shape[0]
+    shapes = ((n_levels, (1 << max(0, int(n) - 1).bit_length()) + 1), (n_levels, n))
+    return tuple(vertices.new_empty(shape, dtype=torch.int32) for shape in shapes)
+
+
+def _fake_occlusion(positions, *rest):
+    n = positions.shape[0]
+    sizes = (n, n) + (n if rest[9].shape[1] else 0,) * 2  # rest[9]: hits
+    return tuple(positions.new_empty(size, 3) for size in sizes)
+
+
+register("visibility_bits", fake=_fake_bits)
+register("vertex_grids", fake=_fake_grids)
+register("cached_occlusion", fake=_fake_occlusion)

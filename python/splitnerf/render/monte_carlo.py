@@ -1,0 +1,102 @@
+"""Shading without the split: light from directions drawn by the BSDF, past the mesh, for the last part of a training."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from splitnerf.ops import MeshScene, composite, monte_carlo_light, sample_bsdf, split_sum_shade, trace_visibility
+from splitnerf.render.model import SceneModel
+from splitnerf.render.renderer import MIN_OPACITY, RenderedRays, linear_to_srgb
+
+DIELECTRIC_F0 = 0.04
+
+
+def monte_carlo_radiance(
+    model: SceneModel,
+    scene: MeshScene,
+    positions: Tensor,
+    normals: Tensor,
+    view_dirs: Tensor,
+    albedo: Tensor,
+    roughness: Tensor,
+    metallic: Tensor,
+    seed: int,
+) -> Tensor:
+    """Outgoing radiance of surface points towards the camera, an unbiased estimate up to the light's filter.
+
+    The materials are those of the split sum: Schlick's Fresnel term, energy compensation, and the diffuse share that the
+    specular lobe leaves. The light is asked at the roughness whose lobe covers a sample's solid angle, which trades
+    noise for blur. Directions, visibility and that roughness count as given; the rest is differentiable.
+
+    Args:
+        model: The scene; its light and settings are used.
+        scene: The mesh that blocks.
+        positions, normals, view_dirs: [n, 3].
+        albedo: [n, 3]. roughness, metallic: [n, 1].
+        seed: Of the directions.
+
+    Returns:
+        [n, 3] linear.
+
+    Source: SplitNeRF Eq. (4)-(6); filtered importance sampling: Krivanek and Colbert 2008.
+    """
+    c, k = model.config, model.config.finetune_samples
+    with torch.no_grad():
+        directions, pdf = sample_bsdf(normals, view_dirs, roughness, k, seed)
+        facing = torch.where((normals * view_dirs).sum(-1, keepdim=True) < 0, -normals, normals)
+        origins = (positions + c.occlusion_offset * facing)[:, None].expand_as(directions)
+        above = pdf.flatten() > 0
+        lit = torch.zeros(above.shape, dtype=torch.bool)
+        lit[above] = trace_visibility(scene, origins.reshape(-1, 3)[above], directions.reshape(-1, 3)[above])
+        lit = lit.nonzero().squeeze(1)
+        filter_roughness = lobe_roughness(1.0 / (k * pdf.flatten()[lit]))[:, None]
+    light = model.light(directions.reshape(-1, 3)[lit], filter_roughness)
+    radiance = torch.zeros_like(directions).view(-1, 3).index_copy(0, lit, light).view_as(directions)
+    sums = monte_carlo_light(normals, view_dirs, roughness, directions, pdf, radiance)
+
+    def shade(specular: float, diffuse: float, compensate: bool) -> Tensor:
+        one = torch.ones_like(albedo)
+        return split_sum_shade(
+            normals, view_dirs, albedo, roughness, metallic, specular * one, diffuse * one, one, one, "exact", compensate
+        )
+
+    f0 = DIELECTRIC_F0 * (1.0 - metallic) + metallic * albedo
+    gain = shade(1.0, 0.0, c.compensate) / shade(1.0, 0.0, False)
+    return gain * (f0 * (sums.specular - sums.grazing) + sums.grazing) + shade(0.0, 1.0, c.compensate) * sums.diffuse
+
+
+def lobe_roughness(solid_angle: Tensor) -> Tensor:
+    """Roughness whose pre-integration lobe has this effective solid angle, 4 pi a^2 for narrow ones; at most 1."""
+    return torch.sqrt(torch.sqrt(solid_angle / (4.0 * math.pi))).clamp(max=1.0)
+
+
+def monte_carlo_colours(
+    model: SceneModel, scene: MeshScene, ray: RenderedRays, view_dirs: Tensor, generator: torch.Generator
+) -> tuple[Tensor, Tensor]:
+    """Two independent estimates of the rays' colours, [n_rays, 3] sRGB as :attr:`RenderedRays.colour`.
+
+    Each ray shades one of its samples, drawn by weight; the split sum, held fixed, stands in for the others (a control
+    variate). The gradient to the weights is that of the split sum's colours, the one to materials, normals and light
+    that of the Monte Carlo radiance.
+    """
+    weights = ray.weights[ray.shaded].detach()
+    rays = ray.samples.ray_indices[ray.shaded]
+    key = torch.log(weights) - torch.log(-torch.log(torch.rand(len(weights), generator=generator).clamp(1e-7, 1 - 1e-7)))
+    best = torch.full((len(ray.opacity),), -math.inf).scatter_reduce(0, rays, key, "amax")
+    drawn = (key == best[rays]).nonzero().squeeze(1)
+    rays, points = rays[drawn], ray.points
+    on_surface = (ray.positions[drawn] - ray.normals[drawn] * ray.sdf[drawn, None]).detach()
+    fixed = points.radiance[drawn].detach()
+    mean = composite(ray.weights, ray.values.detach(), ray.samples.offsets) / ray.opacity.clamp(min=MIN_OPACITY)[:, None]
+    colours = []
+    for _ in range(2):
+        seed = int(torch.randint(1 << 31, (), generator=generator))
+        radiance = monte_carlo_radiance(
+            model, scene, on_surface, ray.normals[drawn], view_dirs[rays], points.albedo[drawn], points.roughness[drawn],
+            points.metallic[drawn], seed,
+        )  # fmt: skip
+        colours.append(linear_to_srgb(mean.index_add(0, rays, radiance - fixed)))
+    return colours[0], colours[1]

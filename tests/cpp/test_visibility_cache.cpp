@@ -1,0 +1,146 @@
+// Visibility bits: the search for vertices against brute force, and the sums against plain loops.
+#include "splitnerf/visibility_cache.h"
+
+#include <algorithm>
+#include <map>
+
+#include "check.h"
+#include "meshes.h"
+#include "splitnerf/kernels.h"
+#include "splitnerf/ops_cpu.h"
+#include "splitnerf/prefilter.h"
+
+namespace splitnerf {
+namespace {
+
+constexpr int kVertices = 600, kLevels = 3, kBuckets = 256;
+constexpr double kRadius = 0.2;
+
+// Vertices spread over [-1, 1]^3 with random normals, in grids with many collisions.
+struct Cloud {
+  std::vector<double> vertices, normals;
+  std::vector<int32_t> starts, order;
+  VertexGrids<double> grids;
+
+  explicit Cloud(uint32_t seed) : starts(kLevels * (kBuckets + 1)), order(kLevels * kVertices) {
+    Random random(seed);
+    vertices = random.uniforms(3 * kVertices, -1, 1);
+    normals = random.directions(kVertices);
+    cpu::build_vertex_grids(kVertices, vertices.data(), kRadius, kLevels, kBuckets, starts.data(), order.data());
+    grids = {vertices.data(), normals.data(), starts.data(), order.data(), kVertices, kBuckets, kLevels, kRadius};
+  }
+};
+
+TEST(VertexGrids, EachLevelHoldsEveryVertexOnce) {
+  const Cloud cloud(1);
+  for (int level = 0; level < kLevels; ++level) {
+    std::vector<int32_t> found(cloud.order.begin() + level * kVertices, cloud.order.begin() + (level + 1) * kVertices);
+    std::sort(found.begin(), found.end());
+    for (int v = 0; v < kVertices; ++v) ASSERT_EQ(found[v], v);
+    EXPECT_EQ(cloud.starts[level * (kBuckets + 1)], 0);
+    EXPECT_EQ(cloud.starts[(level + 1) * (kBuckets + 1) - 1], kVertices);
+  }
+}
+
+TEST(VertexGrids, NeighboursAreThoseOfBruteForce) {
+  const Cloud cloud(2);
+  Random random(3);
+  int widened = 0, none = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const Vec3<double> x{random.uniform(-1.6, 1.6), random.uniform(-1.6, 1.6), random.uniform(-1.6, 1.6)};
+    const Vec3<double> n = random.direction();
+    std::vector<std::pair<double, int>> expected;
+    double reach = kRadius;
+    for (int level = 0; level < kLevels && expected.empty(); ++level, reach *= 2) {
+      for (int v = 0; v < kVertices; ++v) {
+        const double distance = length(load3(&cloud.vertices[3 * v]) - x);
+        const double weight = neighbour_weight(distance / reach, dot(n, load3(&cloud.normals[3 * v])));
+        if (weight > 1e-6) expected.push_back({weight, v});
+      }
+      widened += expected.empty();
+    }
+    std::sort(expected.rbegin(), expected.rend());
+    if (expected.size() > kMaxNeighbours) expected.resize(kMaxNeighbours);
+    double total = 0;
+    for (const auto& e : expected) total += e.first;
+    const Neighbours<double> found = find_neighbours(cloud.grids, x, n);
+    ASSERT_EQ(found.n, static_cast<int>(expected.size()));
+    none += found.n == 0;
+    std::map<int, double> shares;
+    for (int k = 0; k < found.n; ++k) shares[found.vertex[k]] = found.weight[k];
+    for (const auto& [weight, v] : expected) ASSERT_NEAR(shares[v], weight / total, 1e-12);
+  }
+  EXPECT_GT(widened, 20);
+  EXPECT_GT(none, 5);
+}
+
+TEST(VertexGrids, AFarPointHasNoNeighbours) {
+  const Cloud cloud(4);
+  for (const double far : {1e3, 1e12, 1e30}) EXPECT_EQ(find_neighbours(cloud.grids, {far, -far, 0.0}, {0.0, 0.0, 1.0}).n, 0);
+}
+
+TEST(NeighbourWeight, FallsWithDistanceAndNeverTakesTheOtherSide) {
+  EXPECT_GT(neighbour_weight(0.0, 1.0), 100 * neighbour_weight(0.6, 1.0));
+  EXPECT_GT(neighbour_weight(0.5, 1.0), neighbour_weight(0.6, 1.0));
+  EXPECT_GT(neighbour_weight(0.5, 1.0), neighbour_weight(0.5, 0.9));
+  for (const double cosine : {0.0, -1e-9, -1.0}) EXPECT_EQ(neighbour_weight(0.1, cosine), 0);
+  EXPECT_EQ(neighbour_weight(1.0, 1.0), 0);
+}
+
+TEST(CachedLobe, NoLobeIsNarrowerThanTheDirectionsAllow) {
+  for (const int n : {64, 256, 1024}) {
+    const double floor = cached_lobe_alpha(0.0, n);
+    EXPECT_NEAR(3 * n * floor * floor, kLobeDirections, 1e-12);
+    EXPECT_EQ(cached_lobe_alpha(0.9, n), 0.9 * 0.9);
+  }
+}
+
+// Every instruction set against plain loops over the same formulas.
+template <class T> void check_sums(double tolerance) {
+  constexpr int n = 96, words = n / kBitsPerWord, neighbours = 5;
+  Random random(7);
+  const std::vector<T> x = random.uniforms<T>(n, -1, 1), y = random.uniforms<T>(n, -1, 1), z = random.uniforms<T>(n, -1, 1);
+  const std::vector<T> light = random.uniforms<T>(3 * n, 0, 2);
+  const std::vector<T> lobe_dir{T(0.6), T(0), T(0.8)}, normal{T(0), T(0), T(1)};
+  std::vector<uint32_t> bits(neighbours * 2 * words);
+  for (size_t i = 0; i < bits.size(); ++i) bits[i] = hash_u32(uint32_t(i));
+  for (int k = 0; k < neighbours; ++k) {  // open or blocked or neither; nobody knows the first direction
+    for (int w = 0; w < words; ++w) bits[(2 * k + 1) * words + w] &= ~bits[2 * k * words + w];
+    bits[2 * k * words] &= ~1u, bits[(2 * k + 1) * words] &= ~1u;
+  }
+  const std::vector<T> weights{T(0.4), T(0.3), T(0.15), T(0.1), T(0.05)};
+  const uint32_t* rows[neighbours];
+  for (int k = 0; k < neighbours; ++k) rows[k] = &bits[2 * k * words];
+  const LobeSide<T> directions{x.data(), y.data(), z.data(), nullptr, &light[0], &light[n], &light[2 * n], n};
+
+  double expected[14] = {};
+  for (int i = 0; i < n; ++i) {
+    double all = 0, open = 0;
+    for (int k = 0; k < neighbours; ++k) {
+      const bool is_open = rows[k][i / 32] >> i % 32 & 1, is_blocked = rows[k][words + i / 32] >> i % 32 & 1;
+      all += (is_open || is_blocked) * double(weights[k]), open += is_open * double(weights[k]);
+    }
+    const double v = all > 0 ? open / all : 1, c = std::max(double(z[i]), 0.0);
+    const double s = c > 0 ? double(prefilter_weight(lobe_dir[0] - x[i], lobe_dir[1] - y[i], lobe_dir[2] - z[i], T(0.04))) : 0;
+    for (int ch = 0; ch < 3; ++ch) {
+      const double l = light[ch * n + i];
+      expected[ch] += v * c * l, expected[3 + ch] += c * l, expected[7 + ch] += v * s * l, expected[10 + ch] += s * l;
+    }
+    expected[6] += c, expected[13] += s;
+  }
+  for (const Kernels<T>& set : usable_kernels<T>()) {
+    std::vector<T> cosine(n), known(n), visible(n), lobe(n), sums(14);
+    std::vector<uint32_t> above(words);
+    set.visibility_horizon(directions, normal.data(), cosine.data(), above.data());
+    for (int i = 0; i < n; ++i) ASSERT_EQ(above[i / 32] >> i % 32 & 1, z[i] > 0) << set.name;
+    const VisibilityPoint<T> point{rows, weights.data(), neighbours, cosine.data(), lobe_dir.data(), T(0.04)};
+    set.visibility_sums(directions, point, known.data(), visible.data(), lobe.data(), sums.data());
+    EXPECT_EQ(visible[0], 1) << set.name;
+    for (int i = 0; i < 14; ++i) EXPECT_NEAR(sums[i], expected[i], tolerance * (1 + expected[i])) << set.name << " " << i;
+  }
+}
+TEST(CachedLobe, SumsFloat) { check_sums<float>(1e-5); }
+TEST(CachedLobe, SumsDouble) { check_sums<double>(1e-12); }
+
+}  // namespace
+}  // namespace splitnerf

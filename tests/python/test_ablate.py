@@ -1,0 +1,90 @@
+"""The ablation: its rows, its runs on a tiny scene, and its tables."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+
+import numpy as np
+import pytest
+
+from splitnerf.ablate.rows import FULL, PAPER, SWITCHES, make_rows
+from splitnerf.ablate.table import Score, csv_table, differences, markdown_table
+from splitnerf.cli import BAD_INPUT, DONE, main
+from splitnerf.config import Config
+from splitnerf.demo.scene import write_demo_dataset
+from splitnerf.errors import InputError
+
+SMALL = [
+    "n_levels=2", "log2_table_size=8", "target_samples=256", "initial_rays=32", "grid_resolution=16", "light_samples=32",
+    "light_queries=8", "eikonal_points=16", "mesh_resolution=16", "export_resolution=16", "export_environment_height=16",
+    "export_faces=200", "export_texture_size=32",
+]  # fmt: skip
+
+
+def score(row: str, seed: int, relight: float | None, novel_view: float = 30.0) -> Score:
+    return Score("scene", row, seed, relight, 20.0, novel_view, 5.0, 0.1, None, 15.0, 6.0)
+
+
+def test_every_row_is_a_setting_that_exists():
+    base = Config()
+    for settings in (PAPER | SWITCHES).values():
+        base.replace(settings)
+
+
+def test_rows_that_change_nothing_are_left_out():
+    base = Config()
+    rows = make_rows(base)
+    assert rows[0].name == FULL and rows[0].config == base
+    assert all(a.config != b.config for i, a in enumerate(rows) for b in rows[:i])
+    assert len({row.slug for row in rows}) == len(rows)
+    assert [r.name for r in make_rows(base.replace({"mask_weight": 0.0}), ["no mask loss"])] == [FULL]
+
+
+def test_an_unknown_row_is_named():
+    with pytest.raises(InputError, match="'no such row'"):
+        make_rows(Config(), ["no such row"])
+
+
+def test_differences_are_by_seed():
+    scores = [score(FULL, 0, 30.0), score(FULL, 1, 31.0), score("b", 0, 30.5), score("b", 1, 31.1), score("c", 0, 30.2)]
+    b, c = differences(scores, "scene")
+    assert b.mean == pytest.approx(0.3) and b.error == pytest.approx(0.2)
+    assert c.mean == pytest.approx(0.2) and c.error is None and c.verdict() == "no difference"
+    assert dataclasses.replace(c, mean=-0.4).verdict() == "-0.40 dB"
+    assert b.verdict().startswith("no difference (+0.30")
+    assert dataclasses.replace(b, error=0.1).verdict() == "+0.30 ± 0.10 dB"
+
+
+def test_without_relit_views_novel_views_judge():
+    (b,) = differences([score(FULL, 0, None, 30.0), score("b", 0, None, 31.0)], "scene")
+    assert b.mean == pytest.approx(1.0)
+
+
+def test_tables_hold_what_is_known():
+    scores = [score(FULL, 0, 30.0), score("b", 0, None)]
+    rows = list(csv.DictReader(csv_table(scores).splitlines()))
+    assert rows[0]["relight"] == "30.0" and rows[1]["relight"] == "" and rows[0]["metallic"] == ""
+    text = markdown_table([score(FULL, 0, 30.0), score(FULL, 1, 31.0), score("b", 0, 29.0)])
+    assert "| full | 30.50 | 20.00 | 30.00 |" in text and "| b | 29.00 |" in text and "| -1.00 dB |" in text
+
+
+def test_it_runs_and_goes_on(tmp_path, capsys):
+    data = write_demo_dataset(tmp_path / "tiny", size=16, n_train=4, n_test=1, spp=2)
+    command = ["ablate", str(data), "--out", str(tmp_path / "out"), "--steps", "6", "--spp", "1"]
+    command += [word for setting in SMALL for word in ("--set", setting)]
+    assert main([*command, "--rows", "no mask loss"]) == DONE
+    runs = tmp_path / "out" / "tiny"
+    assert {p.name for p in runs.iterdir()} == {"full", "no_mask_loss"}
+    first = (runs / "full" / "checkpoint.pt").stat().st_mtime_ns
+    assert main([*command, "--rows", "no mask loss; no metal regulariser", "--seeds", "2"]) == DONE
+    assert (runs / "full" / "checkpoint.pt").stat().st_mtime_ns == first
+    assert (runs / "no_metal_regulariser").is_dir()
+    rows = list(csv.DictReader((tmp_path / "out" / "ablation.csv").read_text().splitlines()))
+    assert {r["row"] for r in rows} == {FULL, "no mask loss", "no metal regulariser"}
+    assert all(np.isfinite(float(r["novel_view"])) for r in rows)
+    capsys.readouterr()
+    assert main([*command, "--set", "mask_weight=0.5"]) == BAD_INPUT
+    assert "other settings" in capsys.readouterr().err
+    assert main(["ablate", "--list"]) == DONE
+    assert "no metal regulariser: metal_regulariser = False" in capsys.readouterr().out

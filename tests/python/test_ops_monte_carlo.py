@@ -1,0 +1,120 @@
+"""sample_bsdf and monte_carlo_light: densities, closed forms, gradients, errors."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from op_checks import check_op, generator, grad_leaves, lib, unit
+
+from splitnerf.ops import brdf_lut, monte_carlo_light, sample_bsdf
+
+GRADIENTS = (0, 2, 5)  # normals, roughness, radiance
+
+
+def inputs(n: int = 5, k: int = 6, dtype=torch.float64, seed: int = 0) -> tuple:
+    g = generator(seed)
+    normals = unit(torch.randn(n, 3, generator=g, dtype=dtype))
+    view_dirs = unit(normals + 0.7 * unit(torch.randn(n, 3, generator=g, dtype=dtype)))
+    roughness = 0.2 + 0.7 * torch.rand(n, 1, generator=g, dtype=dtype)
+    directions, pdf = sample_bsdf(normals, view_dirs, roughness, k, seed)
+    return normals, view_dirs, roughness, directions, pdf, torch.rand(n, k, 3, generator=g, dtype=dtype)
+
+
+def at(n_dot_v: float, roughness: float, dtype=torch.float64) -> tuple:
+    normals = torch.tensor([[0.0, 0.0, 1.0]], dtype=dtype)
+    view_dirs = torch.tensor([[math.sqrt(1 - n_dot_v**2), 0.0, n_dot_v]], dtype=dtype)
+    return normals, view_dirs, torch.tensor([[roughness]], dtype=dtype)
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.3, 0.5, 0.8, 1.0])
+@pytest.mark.parametrize("n_dot_v", [0.2, 0.6, 1.0])
+def test_a_white_sky_gives_the_brdf_table(n_dot_v, roughness):
+    """Under radiance 1 the sums are F1 + F2, F2 and 1."""
+    point = at(n_dot_v, roughness)
+    directions, pdf = sample_bsdf(*point, 1 << 16)
+    sums = monte_carlo_light(*point, directions, pdf, torch.ones_like(directions))
+    table = brdf_lut().double()
+    x, y = math.sqrt(n_dot_v) * 31, roughness * 31
+    x0, y0 = min(int(x), 30), min(int(y), 30)
+    rows = [torch.lerp(table[j, x0], table[j, x0 + 1], x - x0) for j in (y0, y0 + 1)]
+    f1, f2, _ = torch.lerp(*rows, y - y0).tolist()
+    assert sums.specular[0].tolist() == pytest.approx([f1 + f2] * 3, abs=4e-3)
+    assert sums.grazing[0].tolist() == pytest.approx([f2] * 3, abs=3e-3)
+    assert sums.diffuse[0].tolist() == pytest.approx([1.0] * 3, abs=1e-3)
+
+
+@pytest.mark.parametrize("roughness", [0.05, 0.4, 1.0])
+def test_density_integrates_to_one_and_matches_the_samples(roughness):
+    """What 1 / pdf of the samples estimates is the solid angle that they can reach: the hemisphere, 2 pi."""
+    point = at(0.5, roughness)
+    directions, pdf = sample_bsdf(*point, 1 << 17)
+    up = directions[0, :, 2] > 0
+    assert torch.equal(pdf[0] > 0, up)
+    torch.testing.assert_close(directions.norm(dim=-1), torch.ones_like(pdf))
+    solid_angle = torch.where(up, 1 / pdf[0].clamp(min=1e-300), torch.zeros_like(pdf[0])).mean().item()
+    assert solid_angle == pytest.approx(2 * math.pi, rel=0.01)
+
+
+def test_a_normal_that_faces_away_is_turned():
+    normals, view_dirs, roughness, directions, pdf, radiance = inputs()
+    flipped = monte_carlo_light(-normals, view_dirs, roughness, directions, pdf, radiance)
+    for a, b in zip(flipped, monte_carlo_light(normals, view_dirs, roughness, directions, pdf, radiance)):
+        torch.testing.assert_close(a, b)
+
+
+def test_opcheck():
+    check_op(lib.sample_bsdf, (*inputs()[:3], 4, 1))
+    check_op(lib.monte_carlo_light, inputs(), GRADIENTS)
+    torch.library.opcheck(lib.monte_carlo_light_backward, (*inputs(), torch.rand(5, 3, 3, dtype=torch.float64)))
+
+
+def test_gradcheck():
+    x = inputs()
+    assert torch.autograd.gradcheck(
+        lambda n, r, l: torch.stack(monte_carlo_light(n, x[1], r, x[3], x[4], l)), grad_leaves((x[0], x[2], x[5]), (0, 1, 2)),
+        atol=1e-7, rtol=1e-6,
+    )  # fmt: skip
+
+
+def test_float32_is_close_to_float64():
+    exact = monte_carlo_light(*inputs(200, 32))
+    single = monte_carlo_light(*(x.float() for x in inputs(200, 32)))
+    for a, b in zip(single, exact):
+        torch.testing.assert_close(a.double(), b, rtol=2e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("roughness", [0.0, 1e-4, 1.0])
+@pytest.mark.parametrize("n_dot_v", [0.0, 1e-7, 1.0])
+def test_edges_stay_finite(n_dot_v, roughness):
+    point = tuple(x.requires_grad_() for x in at(n_dot_v, roughness, torch.float32))
+    directions, pdf = sample_bsdf(*(x.detach() for x in point), 64)
+    assert torch.isfinite(directions).all() and torch.isfinite(pdf).all() and (pdf >= 0).all()
+    sums = torch.stack(monte_carlo_light(point[0], point[1].detach(), point[2], directions, pdf, torch.ones_like(directions)))
+    sums.sum().backward()
+    assert torch.isfinite(sums).all()
+    assert torch.isfinite(point[0].grad).all() and torch.isfinite(point[2].grad).all()
+
+
+def test_missing_gradients_raise():
+    for position in (1, 3, 4):
+        with pytest.raises(RuntimeError, match="no gradient to"):
+            torch.stack(monte_carlo_light(*grad_leaves(inputs(), (position,)))).sum().backward()
+    with pytest.raises(RuntimeError, match="no gradient"):
+        sample_bsdf(*grad_leaves(inputs()[:3], (0,)), 4)[0].sum().backward()
+
+
+def test_empty_batch():
+    directions, pdf = sample_bsdf(torch.empty(0, 3), torch.empty(0, 3), torch.empty(0, 1), 4)
+    assert directions.shape == (0, 4, 3) and pdf.shape == (0, 4)
+    sums = monte_carlo_light(torch.empty(0, 3), torch.empty(0, 3), torch.empty(0, 1), directions, pdf, directions)
+    assert sums.specular.shape == (0, 3)
+
+
+def test_errors_name_what_is_wrong():
+    n, v, r, d, p, l = inputs()
+    with pytest.raises(Exception, match=r"pdf must be \[5, 6\] float64"):
+        monte_carlo_light(n, v, r, d, p[:, :3], l)
+    with pytest.raises(Exception, match="n_samples must be in"):
+        sample_bsdf(n, v, r, 0)

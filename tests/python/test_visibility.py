@@ -1,0 +1,336 @@
+"""Visibility bits cached on a mesh: against rays, closed forms of occlusion, and the furnace of a bowl."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+from op_checks import check_error, check_no_gradient, check_op, generator, lib, unit
+from torch.nn import functional as F
+
+from splitnerf import _core
+from splitnerf.config import Config
+from splitnerf.fields import OcclusionQuery, VisibilityBits
+from splitnerf.fields.light import panorama_directions
+from splitnerf.ops import (
+    MeshScene,
+    VisibilityCache,
+    cached_occlusion,
+    occlusion_factors,
+    query_direction,
+    split_sum_shade,
+    trace_visibility,
+    visibility_bits,
+)
+from splitnerf.render.model import SceneModel
+
+OFFSET = 0.0125
+UP = torch.tensor([[0.0, 0.0, 1.0]])
+
+
+def lattice(n: int) -> torch.Tensor:
+    return torch.from_numpy(_core.fibonacci_sphere(n)).float()
+
+
+def scene_of(mesh: trimesh.Trimesh) -> MeshScene:
+    return MeshScene(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def corners(mesh: trimesh.Trimesh) -> tuple[torch.Tensor, torch.Tensor]:
+    """The vertices of a mesh and their normals."""
+    return tuple(torch.tensor(np.asarray(x), dtype=torch.float32) for x in (mesh.vertices, mesh.vertex_normals))
+
+
+def cache_of(mesh: trimesh.Trimesh, n: int = 256, offset: float = OFFSET, with_hits: bool = False) -> VisibilityCache:
+    return VisibilityCache.trace(scene_of(mesh), *corners(mesh), mesh.area, lattice(n), offset=offset, with_hits=with_hits)
+
+
+def grid_mesh(size: float, cells: int, z: float = 0.0) -> trimesh.Trimesh:
+    """A square in the plane z, facing up."""
+    x, y = np.meshgrid(*[np.linspace(-size / 2, size / 2, cells + 1)] * 2, indexing="ij")
+    first = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    quads = np.stack([first, first + cells + 1, first + cells + 2, first + 1], axis=1)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return trimesh.Trimesh(np.stack([x.ravel(), y.ravel(), np.full(x.size, z)], axis=1), faces, process=False)
+
+
+def read(cache: VisibilityCache, x: torch.Tensor, n: torch.Tensor, *, rho: float = 1.0, light=None, radiance=None):
+    """cached_occlusion with the lobe about the normal."""
+    light = torch.ones_like(cache.directions) if light is None else light
+    return cached_occlusion(cache, x, n, n, torch.full((len(x), 1), rho), light, radiance)
+
+
+def between(mesh: trimesh.Trimesh, n: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """Random points on the faces and their interpolated normals."""
+    vertices, normals = corners(mesh)
+    faces = torch.tensor(np.asarray(mesh.faces))[torch.randint(len(mesh.faces), (n,), generator=generator(1))]
+    share = torch.rand(n, 3, 1, generator=generator(2))
+    share = share / share.sum(1, keepdim=True)
+    return (vertices[faces] * share).sum(1), F.normalize((normals[faces] * share).sum(1), dim=1)
+
+
+# ---- the bits ----
+
+
+def test_bits_and_hits_are_those_of_single_rays():
+    sphere, box = trimesh.creation.icosphere(2), trimesh.creation.box((0.8, 1.2, 0.5))
+    mesh = trimesh.util.concatenate([sphere.apply_translation((-0.9, 0, 0)), box.apply_translation((0.6, 0.2, -0.1))])
+    scene, (x, n), w = scene_of(mesh), corners(mesh), lattice(96)
+    bits, hits = visibility_bits(scene, x, n, w, OFFSET, with_hits=True)
+    assert bits.shape == (len(x), 2, 3) and hits.shape == (len(x), 96)
+    open_, blocked = ((bits[..., None] >> torch.arange(32, dtype=torch.int32)) & 1).bool().reshape(len(x), 2, 96).unbind(1)
+    origins = (x + OFFSET * n)[:, None].expand(-1, 96, 3)
+    expected = trace_visibility(scene, origins.reshape(-1, 3), w.repeat(len(x), 1)).view(len(x), 96)
+    above = n @ w.T > 0
+    assert torch.equal(open_, expected & above) and torch.equal(blocked, ~expected & above)
+    assert torch.equal(hits >= 0, blocked) and 0.02 < blocked[above].float().mean() < 0.9
+    assert torch.equal(visibility_bits(scene, x, n, w, OFFSET)[0], bits)
+
+    triangle, u, v = trimesh_hits(mesh, origins.reshape(-1, 3), w.repeat(len(x), 1))
+    blocked = blocked.reshape(-1)
+    weights = np.stack([1 - u - v, u, v], axis=1)[blocked]
+    heaviest = np.asarray(mesh.faces)[triangle[blocked], weights.argmax(1)]
+    assert np.array_equal(hits.reshape(-1)[blocked].numpy(), heaviest)
+
+
+def trimesh_hits(mesh: trimesh.Trimesh, origins: torch.Tensor, directions: torch.Tensor) -> tuple:
+    scene = _core.Scene(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32))
+    _, triangle, u, v = scene.trace_closest(origins.contiguous().numpy(), directions.contiguous().numpy())
+    return triangle, u, v
+
+
+# ---- closed forms ----
+
+
+@pytest.mark.parametrize("height", [1.3, 2.0, 3.0])
+def test_under_a_sphere(height):
+    """A unit sphere straight above hides sin^2 of its half angle of the cosine-weighted hemisphere."""
+    ball = trimesh.creation.icosphere(4).apply_translation((0, 0, height))
+    cache = cache_of(trimesh.util.concatenate([grid_mesh(0.4, 4), ball]), 1024)
+    for light in (None, torch.zeros(1024, 3)):  # black light falls back to geometry
+        o_d, o_s, _, _ = read(cache, 0 * UP, UP, light=light)
+        assert o_d.shape == (1, 3)
+        expected = 1 - 1 / (height - OFFSET) ** 2
+        assert abs(o_d[0, 0].item() - expected) < 0.01
+        torch.testing.assert_close(o_s, o_d, rtol=0, atol=1e-5)  # the lobe of roughness 1 about n is the cosine's
+
+
+def test_in_a_right_angled_corner():
+    """Long wall of height h at distance a: (1 - a / sqrt(a^2 + h^2)) / 2 is hidden, 1/2 in the limit at the edge."""
+    wall = trimesh.Trimesh([(0, -99, 0), (0, 99, 0), (0, 99, 1), (0, -99, 1)], [(0, 1, 2), (0, 2, 3)], process=False)
+    a = torch.tensor([0.01, 0.2, 0.5, 1.0, 2.0])
+    x = torch.stack([a, 0 * a, 0 * a], dim=1)
+    cache = VisibilityCache.trace(scene_of(wall), x, UP.expand(5, 3).contiguous(), 1e-4, lattice(1024), offset=OFFSET)
+    o_d = read(cache, x, UP.expand(5, 3))[0][:, 0]
+    h = 1 - OFFSET
+    expected = 0.5 + 0.5 * a / (a * a + h * h).sqrt()
+    torch.testing.assert_close(o_d, expected, rtol=0, atol=0.01)
+    assert abs(o_d[0].item() - 0.5) < 0.012
+
+
+def test_a_lone_sphere_is_open_at_and_between_its_vertices():
+    mesh = trimesh.creation.icosphere(3)
+    cache = cache_of(mesh)
+    light = torch.rand(256, 3, generator=generator())
+    for x, n in (corners(mesh), between(mesh, 500)):
+        for rho in (0.1, 0.5, 1.0):
+            o_d, o_s, i_d, _ = read(cache, x, n, rho=rho, light=light)
+            assert (o_d == 1).all() and (o_s == 1).all() and i_d is None
+
+
+def test_the_sides_of_a_thin_plate_do_not_mix():
+    """A lid over one side of a plate thinner than its mesh's spacing darkens that side alone."""
+    top, bottom = grid_mesh(1.0, 20, 0.002), grid_mesh(1.0, 20, -0.002)
+    bottom.invert()
+    lid = grid_mesh(3.0, 1, 0.3)
+    cache = cache_of(trimesh.util.concatenate([top, bottom, lid]))
+    x, _ = between(grid_mesh(0.8, 10), 200)
+    upper, lower = (read(cache, x, UP.expand(200, 3) * side)[0] for side in (1.0, -1.0))
+    assert (lower == 1).all() and (upper < 0.2).all()
+
+
+def test_where_nothing_is_near_the_search_widens_and_then_gives_up():
+    mesh = trimesh.util.concatenate([grid_mesh(1.0, 20), grid_mesh(3.0, 1, 1.2)])
+    vertices, normals = corners(mesh)
+    on_floor = slice(0, 21 * 21)
+    cache = VisibilityCache.trace(scene_of(mesh), vertices[on_floor], normals[on_floor], 1.0, lattice(256))
+    heights = torch.tensor([0.0, 4.0, 9.0]) * cache.radius
+    x = torch.stack([0.01 + 0 * heights, 0.02 + 0 * heights, heights], dim=1)
+    at, above, far = read(cache, x, UP.expand(3, 3))[0].mean(1).tolist()
+    assert at < 0.8 and abs(above - at) < 0.05 and far == 1.0
+    o_d = read(cache, torch.tensor([[math.nan, 0, 0], [0, 0, math.inf]]), UP.expand(2, 3))[0]
+    assert o_d.isnan().all()
+
+
+# ---- against many rays ----
+
+
+def sky(directions: torch.Tensor) -> torch.Tensor:
+    """Blue above, dim below, two soft lamps."""
+    z = directions[..., 2:]
+    base = torch.cat([0.3 + 0.2 * z, 0.35 + 0.25 * z, 0.5 + 0.4 * z], dim=-1)
+    for axis, colour, width in (((1, 0.4, 0.9), (4, 3.6, 2.8), 0.05), ((-0.8, 0.6, 0.3), (1.8, 2.4, 3), 0.1)):
+        c = directions @ unit(torch.tensor(axis, dtype=torch.float32))
+        base = base + torch.exp((c[..., None] - 1) / width) * torch.tensor(colour)
+    return base
+
+
+def nine_spheres() -> trimesh.Trimesh:
+    rng = np.random.default_rng(0)
+    parts = [grid_mesh(2.6, 64)]
+    for k in range(9):
+        r = 0.18 + 0.1 * rng.random()
+        ball = trimesh.creation.icosphere(3 if r < 0.23 else 4, radius=r)
+        parts.append(ball.apply_translation(((k % 3 - 1) * 0.7, (k // 3 - 1) * 0.7, r + 0.02)))
+    return trimesh.util.concatenate(parts)
+
+
+def test_spheres_on_a_plane_against_4096_rays():
+    """256 directions know o_d to about .01, between the vertices as at them."""
+    mesh = nine_spheres()
+    bits = VisibilityBits(256, OFFSET, 1, indirect=False)
+    vertices, normals = corners(mesh)
+    bits.trace(scene_of(mesh), vertices, torch.tensor(np.asarray(mesh.faces)))
+    bits.set_light(sky(panorama_directions(bits.light_height)))
+    some = torch.randperm(len(vertices), generator=generator())[:300]
+    for x, n in ((vertices[some], normals[some]), between(mesh, 300)):
+        for rho, bound in ((0.1, 0.13), (0.2, 0.084), (0.3, 0.051), (0.5, 0.025)):
+            view = unit(n + 0.9 * unit(torch.randn(len(n), 3, generator=generator(4))))
+            roughness = torch.full((len(n), 1), rho)
+            lobes = query_direction(n, view, roughness)
+            got = bits(OcclusionQuery(torch.empty(0), x, n, lobes, roughness))
+            o_d, o_s = occlusion_factors(
+                scene_of(mesh), x, n, lobes, roughness, sky(panorama_directions(64)), n_diffuse_rays=4096, n_specular_rays=1024
+            )
+            assert (o_d < 0.95).float().mean() > 0.3
+            assert (got.diffuse - o_d).square().mean().sqrt() < 0.015
+            assert (got.specular - o_s).square().mean().sqrt() < bound
+
+
+def test_light_of_the_cells():
+    bits = VisibilityBits(256, OFFSET, 1, indirect=False)
+    bits.set_light(torch.full((bits.light_height, 2 * bits.light_height, 3), 3.0))
+    torch.testing.assert_close(bits.light, torch.full((256, 3), 3.0))
+    directions = panorama_directions(bits.light_height)
+    bits.set_light(directions)  # the mean direction of a cell is that of its centre
+    assert (F.normalize(bits.light, dim=1) - bits.directions).norm(dim=1).max() < 0.12
+    assert bits.light.mean(0).norm() < 0.01
+
+
+# ---- indirect light ----
+
+
+def half_shell(subdivisions: int) -> trimesh.Trimesh:
+    """The lower half of the unit sphere, faces inwards."""
+    ball = trimesh.creation.icosphere(subdivisions)
+    return trimesh.Trimesh(ball.vertices, ball.faces[ball.triangles_center[:, 2] < 0][:, ::-1])
+
+
+@pytest.mark.parametrize("albedo", [0.3, 0.8, 1.0])
+def test_the_furnace_of_a_bowl(albedo):
+    """Each point of half a spherical shell sees as much shell as sky: B = a (1/2 + B/2), so B = a / (2 - a)."""
+    cache = cache_of(half_shell(4), 256, offset=1e-3, with_hits=True)
+    inner = cache.vertices[:, 2] < -0.15
+    radiance = torch.zeros_like(cache.vertices)
+    for bounce in range(1, 41):
+        o_d, o_s, i_d, i_s = read(cache, cache.vertices, cache.normals, radiance=radiance)
+        radiance = albedo * (o_d + i_d)
+        if bounce in (1, 3):
+            expected = 0.5 * albedo * sum((0.5 * albedo) ** k for k in range(bounce))
+            assert abs(radiance[inner].mean().item() - expected) < 0.01
+    assert abs(o_d[inner].mean().item() - 0.5) < 0.01
+    assert (radiance[inner] - albedo / (2 - albedo)).abs().max() < 0.04
+    assert abs(radiance[inner].mean().item() - albedo / (2 - albedo)) < 0.01
+    torch.testing.assert_close(i_s, i_d, rtol=1e-4, atol=1e-5)  # roughness 1 about the normal
+    if albedo == 1.0:  # all that arrives, from sky or bowl, is 1
+        torch.testing.assert_close((o_d + i_d)[inner], torch.ones(int(inner.sum()), 3), rtol=0, atol=0.04)
+
+
+def test_a_mirror_sees_what_blocks_its_lobe():
+    """Floor under a wall: a narrow lobe towards the wall brings the wall's light and nothing of the sky."""
+    floor, wall = grid_mesh(0.4, 8), grid_mesh(4.0, 2)
+    wall.apply_transform(trimesh.transformations.rotation_matrix(math.pi / 2, (0, 1, 0)))
+    mesh = trimesh.util.concatenate([floor, wall.apply_translation((0.5, 0, 0))])
+    cache = cache_of(mesh, with_hits=True)
+    colour = torch.tensor([0.2, 0.5, 0.9]).expand(len(cache.vertices), 3).clone()
+    colour[: 9 * 9] = 7.0  # the floor itself is not seen
+    lobes = unit(torch.tensor([[1.0, 0, 0.6], [-1.0, 0, 0.6]]))
+    narrow, light = torch.full((2, 1), 0.1), torch.ones(256, 3)
+    _, o_s, _, i_s = cached_occlusion(cache, torch.zeros(2, 3), UP.expand(2, 3), lobes, narrow, light, colour)
+    torch.testing.assert_close(i_s[0] / (1 - o_s[0]), torch.tensor([0.2, 0.5, 0.9]), rtol=1e-3, atol=1e-3)
+    assert (o_s[0] < 0.05).all() and (o_s[1] > 0.95).all() and (i_s[1] < 0.05).all()
+
+
+def test_the_model_shades_with_the_light_of_its_mesh():
+    """In a bowl: o g + i takes the place of the light, each refresh adds a bounce, and the sums converge."""
+    settings = {"n_levels": 2, "log2_table_size": 8, "occlusion": "bits", "indirect": True, "occlusion_directions": 64}
+    torch.manual_seed(0)
+    model = SceneModel(Config().replace(settings | {"initial_roughness": 0.9}))
+    mesh = half_shell(3)
+    vertices, faces = torch.tensor(np.asarray(mesh.vertices)).float(), torch.tensor(np.asarray(mesh.faces))
+    model.use_mesh(scene_of(mesh), vertices, faces)
+    bits = model.occlusion
+    assert not any(key.startswith("occlusion") for key in model.state_dict())
+
+    x, n = bits.cache.vertices[::9], bits.cache.normals[::9]
+    field = model.surface(x)
+    field = field._replace(outputs=field.outputs * torch.tensor([0.0] + [1.0] * 12))  # as if the level set passed there
+    shaded = model.shade(x, field.outputs, field.features, n, n)
+    occlusion = bits(OcclusionQuery(torch.empty(0), x, n, shaded.lobe_dirs, shaded.roughness))
+    light_s, light_d = model.light(shaded.lobe_dirs, shaded.roughness), model.light(n, torch.ones(len(x), 1))
+    expected = split_sum_shade(
+        n, n, shaded.albedo, shaded.roughness, shaded.metallic, occlusion.specular * light_s + occlusion.indirect_specular,
+        occlusion.diffuse * light_d + occlusion.indirect_diffuse, torch.ones(len(x), 1), torch.ones(len(x), 1), "exact", True,
+    )  # fmt: skip
+    torch.testing.assert_close(shaded.radiance, expected, rtol=1e-3, atol=1e-4)
+    assert torch.equal(shaded.occlusion_d, occlusion.diffuse) and shaded.radiance.requires_grad
+
+    bits.radiance, levels = None, []
+    for _ in range(6):
+        model.refresh_indirect()
+        levels.append(bits.radiance.mean().item())
+    steps = np.diff(levels)
+    assert (steps > 0).all() and (steps[1:] < 0.6 * steps[:-1]).all() and steps[0] > 0.05 * levels[0]
+
+
+# ---- the operators ----
+
+
+def op_inputs(dtype, n: int = 9, with_hits: bool = True) -> tuple:
+    mesh = trimesh.util.concatenate([grid_mesh(2.0, 5), trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))])
+    cache = cache_of(mesh, 64, with_hits=with_hits)
+    x, normals = (t[:n].to(dtype) for t in between(mesh, 9))
+    lobes = unit(normals + 0.3 * unit(torch.randn(9, 3, generator=generator(1)))[:n].to(dtype))
+    roughness = torch.rand(9, 1, generator=generator(2))[:n].to(dtype)
+    radiance = torch.rand(len(cache.vertices) if with_hits else 0, 3, generator=generator(3)).to(dtype)
+    light = torch.rand(64, 3, generator=generator(4)).to(dtype)
+    return (x, normals, lobes, roughness, cache.vertices.to(dtype), cache.normals.to(dtype), cache.starts, cache.order,
+            cache.radius, cache.bits, cache.hits, radiance, cache.directions.to(dtype), light)  # fmt: skip
+
+
+def test_opcheck_precision_and_gradients():
+    scene, mesh = scene_of(trimesh.creation.icosphere(1)), trimesh.creation.icosphere(1)
+    check_op(lib.visibility_bits, (scene.handle, *corners(mesh), lattice(64), OFFSET, True))
+    check_op(lib.vertex_grids, (corners(mesh)[0], 0.2, 3))
+    for with_hits in (False, True):
+        check_op(lib.cached_occlusion, op_inputs(torch.float32, with_hits=with_hits))
+    for a, b in zip(*(lib.cached_occlusion(*op_inputs(t)) for t in (torch.float32, torch.float64))):
+        torch.testing.assert_close(a.double(), b, rtol=0, atol=2e-5)
+    for index in (0, 1, 2, 3, 4, 11, 13):
+        check_no_gradient(lib.cached_occlusion, op_inputs(torch.float32), index)
+    assert all(t.shape == (0, 3) for t in lib.cached_occlusion(*op_inputs(torch.float32, 0)))
+
+
+def test_errors():
+    scene, (x, n), w = scene_of(trimesh.creation.icosphere(1)), corners(trimesh.creation.icosphere(1)), lattice(64)
+    check_error(lambda: visibility_bits(scene, x, n[1:], w), "visibility_bits", "normals", "[42, 3]", "[41, 3]")
+    check_error(lambda: visibility_bits(scene, x, n, w[:40]), "visibility_bits", "multiple of 32")
+    check_error(lambda: lib.vertex_grids(x, 0.0, 2), "vertex_grids", "radius")
+    good = op_inputs(torch.float32)
+    for index, part in ((3, "roughness"), (5, "vertex_normals"), (9, "bits"), (10, "hits"), (11, "radiance"), (13, "light")):
+        bad = (*good[:index], good[index][1:], *good[index + 1 :])
+        check_error(lambda: lib.cached_occlusion(*bad), "cached_occlusion", part)
+    check_error(lambda: lib.cached_occlusion(*good[:7], good[7] + 1, *good[8:]), "cached_occlusion", "order")
