@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "bindings_light.h"
 #include "bindings_mesh.h"
 #include "bindings_scene.h"
 #include "splitnerf/environment.h"
@@ -74,6 +75,7 @@ PYBIND11_MODULE(_core, m) {
       "instruction_set", [] { return splitnerf::kernels<float>().name; },
       "The instruction set that the kernels run on: base, avx2 or avx512.");
 
+  bind_light(m);
   bind_mesh(m);
   bind_scene(m);
 }

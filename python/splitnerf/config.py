@@ -59,6 +59,8 @@ class Config:
     occlusion_width: int = 64
     occlusion_layers: int = 2
     initial_roughness: float = 0.3
+    light: str = "mlp"  # mlp (the paper) | pyramid
+    light_resolution: int = 64  # texels along the edge of the pyramid's map, a power of 2
     light_width: int = 64
     light_layers: int = 3
     light_direction_frequencies: int = 6
@@ -123,6 +125,7 @@ class Config:
     # Optimiser.
     learning_rate: float = 0.01
     variance_learning_rate: float = 0.001
+    light_learning_rate: float = 0.02  # of the pyramid's texels; the MLP has learning_rate
     warmup_steps: int = 100
     final_learning_rate: float = 0.1  # factor at the end
     weight_decay: float = 0.01
@@ -141,6 +144,7 @@ class Config:
             "head_inputs": ("outputs", "grid"),
             "occlusion": ("mlp", "bits", "off"),
             "occlusion_channels": (1, 3),
+            "light": ("mlp", "pyramid"),
             "light_activation": ("softplus", "exp"),
             "fresnel_mode": ("exact", "paper", "code"),
             "query": ("mean", "reflection"),
@@ -156,6 +160,8 @@ class Config:
         for key in ("mesh_resolution", "export_resolution", "export_texture_size"):
             if getattr(self, key) < MIN_EXPORT_SIZE:
                 raise InputError(f"{key} must be at least {MIN_EXPORT_SIZE}, got {getattr(self, key)}")
+        if not 16 <= self.light_resolution <= 1024 or self.light_resolution & (self.light_resolution - 1):
+            raise InputError(f"light_resolution must be a power of 2 in [16, 1024], got {self.light_resolution}")
         if self.finetune_from < 1 and self.compositing != "linear":
             raise InputError("finetune_from below 1 needs compositing = linear")
         if self.finetune_samples < 1:

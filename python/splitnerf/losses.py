@@ -7,7 +7,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.config import Config
-from splitnerf.fields import LightMlp
+from splitnerf.fields import Light
 from splitnerf.ops import MeshScene, fibonacci_directions, occlusion_factors, prefilter_light, sample_ggx_lobe
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
@@ -71,7 +71,7 @@ def metal_loss(ray: RenderedRays) -> Tensor:
     return (weights[:, None] * ray.points.metallic.square()).mean()
 
 
-def light_loss(light: LightMlp, config: Config, generator: torch.Generator, seed: int) -> Tensor:
+def light_loss(light: Light, config: Config, generator: torch.Generator, seed: int) -> Tensor:
     """Distance of g(w, rho) from the Monte Carlo integral of g(w, 0), for random directions and roughness.
 
     Half of the queries ask at rho = 1, the rest uniformly in [0, 1]. Broad lobes share one rotated
@@ -99,7 +99,7 @@ def light_loss(light: LightMlp, config: Config, generator: torch.Generator, seed
     return F.smooth_l1_loss(prefiltered, g_bar, reduction="none").sum(-1).mean()
 
 
-def neutral_light_loss(light: LightMlp, config: Config, generator: torch.Generator) -> Tensor:
+def neutral_light_loss(light: Light, config: Config, generator: torch.Generator) -> Tensor:
     """Mean squared log chroma of the diffuse light g(n, 1): how far its channels are from their geometric mean.
 
     Images of a diffuse object leave it open whether a colour is the object's or the light's. This prefers a

@@ -147,7 +147,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             terms["eikonal"] = c.eikonal_weight * losses.eikonal_loss(gradients)
             if c.mask_weight:
                 terms["mask"] = c.mask_weight * losses.mask_loss(ray, target[:, 3])
-            if c.light_weight and step % c.light_every == 0:
+            if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
                 terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
             if c.neutral_weight:
                 terms["neutral"] = c.neutral_weight * losses.neutral_light_loss(model.light, c, generator)
@@ -195,23 +195,23 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
 
 
 def make_optimiser(model: SceneModel, config: Config) -> torch.optim.AdamW:
-    """AdamW with the paper's settings; the sharpness has a rate of its own and no decay."""
-    others = [p for name, p in model.named_parameters() if name != "variance"]
-    return torch.optim.AdamW(
-        [
-            {"params": others, "lr": config.learning_rate, "weight_decay": config.weight_decay},
-            {"params": [model.variance], "lr": config.variance_learning_rate, "weight_decay": 0.0},
-        ],
-        betas=(0.9, 0.99),
-        eps=1e-15,
-        fused=True,
-    )
+    """AdamW with the paper's settings; the sharpness and the texels of a light have rates of their own and no decay."""
+    texels = [model.light.texels] if config.light == "pyramid" else []
+    apart = {id(p) for p in [model.variance, *texels]}
+    others = [p for p in model.parameters() if id(p) not in apart]
+    groups = [
+        {"params": others, "lr": config.learning_rate, "weight_decay": config.weight_decay},
+        {"params": [model.variance], "lr": config.variance_learning_rate, "weight_decay": 0.0},
+    ]
+    if texels:
+        groups.append({"params": texels, "lr": config.light_learning_rate, "weight_decay": 0.0})
+    return torch.optim.AdamW(groups, betas=(0.9, 0.99), eps=1e-15, fused=True)
 
 
 def set_learning_rate(optimiser: torch.optim.Optimizer, config: Config, step: int, progress: float) -> None:
     """Linear warm-up over ``warmup_steps``, then exponential decay to ``final_learning_rate``."""
     factor = min(1.0, (step + 1) / max(1, config.warmup_steps)) * config.final_learning_rate**progress
-    rates = (config.learning_rate, config.variance_learning_rate)
+    rates = (config.learning_rate, config.variance_learning_rate, config.light_learning_rate)
     for group, rate in zip(optimiser.param_groups, rates):
         group["lr"] = rate * factor
 

@@ -6,6 +6,7 @@
 
 #include "splitnerf/config.h"
 #include "splitnerf/hash_grid.h"
+#include "splitnerf/light_pyramid.h"
 
 namespace splitnerf {
 
@@ -25,6 +26,13 @@ template <class T> struct LobeSide {
   const T* alpha_squared; // ggx_alpha^2 on the query side, null on the light side
   const T *r, *g, *b;     // what is summed over this side
   int64_t n;
+};
+
+// Rows of a sparse matrix: those of row r are [offsets[r], offsets[r + 1]).
+template <class T> struct SparseRows {
+  const int64_t* offsets;
+  const int32_t* columns;
+  const T* weights;
 };
 
 // A point that reads visibility bits from nearby vertices.
@@ -59,6 +67,16 @@ template <class T> struct Kernels {
   // sums = {sum V L c, sum L c (three channels each), sum c; the same with lobe for c}: 14 numbers.
   void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityPoint<T>& point, T* known, T* visible, T* lobe,
                           T* sums);
+
+  // products [rows, 3] = matrix . values, rows [begin, end); values are [columns, 4], the fourth unused.
+  void (*sparse_product)(const SparseRows<T>&, int64_t begin, int64_t end, const T* values, T* products);
+  // radiance [n, 3] of directions [n, 3] and roughness [n]. Points [begin, end).
+  void (*light_lookup)(const LightPyramid<T>&, int64_t begin, int64_t end, const T* directions, const T* roughness,
+                       T* radiance);
+  // Adds to grad_levels and grad_sh, overwrites the others. Points [begin, end).
+  void (*light_lookup_backward)(const LightPyramid<T>&, int64_t begin, int64_t end, const T* directions,
+                                const T* roughness, const T* grad_radiance, T* grad_directions, T* grad_roughness,
+                                T* grad_levels, T* grad_sh);
 };
 
 // Those for this processor. SPLITNERF_ISA = base | avx2 | avx512 in the environment picks a lower

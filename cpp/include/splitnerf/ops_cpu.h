@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "splitnerf/hash_grid.h"
+#include "splitnerf/kernels.h"
+#include "splitnerf/light_pyramid.h"
 #include "splitnerf/march.h"
 #include "splitnerf/occlusion.h"
 #include "splitnerf/scene.h"
@@ -68,6 +70,23 @@ SPLITNERF_API void prefilter_light_backward(int64_t n_queries, const T* query_di
 template <class T>
 SPLITNERF_API void sample_ggx_lobe(int64_t n, const T* axes, const T* roughness, int n_samples, uint32_t seed,
                                    T* directions);
+
+// products [n_rows, 3] = matrix . values [n_columns, 3].
+template <class T>
+SPLITNERF_API void sparse_product(const SparseRows<T>& matrix, int64_t n_rows, int64_t n_columns, const T* values,
+                                  T* products);
+
+// directions [n, 3], roughness [n] -> radiance [n, 3].
+template <class T>
+SPLITNERF_API void light_lookup(const LightPyramid<T>& pyramid, int64_t n, const T* directions, const T* roughness,
+                                T* radiance);
+// grad_levels and grad_sh are overwritten. Points are summed in chunks that depend on n alone, each
+// into a copy of the two: at most kLightChunks copies, and the same bits on any number of threads.
+inline constexpr int kLightChunks = 8;
+template <class T>
+SPLITNERF_API void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t n, const T* directions,
+                                         const T* roughness, const T* grad_radiance, T* grad_directions,
+                                         T* grad_roughness, T* grad_levels, T* grad_sh);
 
 // ---- Monte Carlo shading, k = n_samples directions a point ----
 

@@ -16,6 +16,10 @@ template <class T> void lobe_gather(const LobeSide<T>&, const LobeSide<T>&, int6
 template <class T> void lobe_scatter(const LobeSide<T>&, const LobeSide<T>&, int64_t, int64_t, T*);
 template <class T> void visibility_horizon(const LobeSide<T>&, const T*, T*, uint32_t*);
 template <class T> void visibility_sums(const LobeSide<T>&, const VisibilityPoint<T>&, T*, T*, T*, T*);
+template <class T> void sparse_product(const SparseRows<T>&, int64_t, int64_t, const T*, T*);
+template <class T> void light_lookup(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, T*);
+template <class T>
+void light_lookup_backward(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, const T*, T*, T*, T*, T*);
 
 Kernels<float> kernels_float32();
 Kernels<double> kernels_float64();

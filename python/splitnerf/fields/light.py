@@ -1,68 +1,37 @@
-"""The pre-integrated light g(w, rho) as one network."""
+"""What every model of the light offers."""
 
 from __future__ import annotations
 
-import math
-
 import torch
 from torch import Tensor, nn
-from torch.nn import functional as F
 
 from splitnerf import _core
 
 
-class LightMlp(nn.Module):
-    """g(w, rho): radiance of the environment filtered by the lobe of roughness rho, never negative.
+class Light(nn.Module):
+    """The pre-integrated light g(w, rho): the environment filtered by the lobe of roughness rho.
 
-    g(w, 0) is the environment itself and g(n, 1) the irradiance over pi. The direction enters by sines
-    and cosines of 2^k w, the roughness by those of 2^k rho, and both again before the output layer.
+    g(w, 0) is the environment itself and g(n, 1) the irradiance over pi. A subclass defines
+    :meth:`forward`, differentiable in its parameters, in directions and in roughness.
 
-    Args:
-        width, n_layers: Hidden ReLU layers.
-        direction_frequencies, roughness_frequencies: Octaves of the encodings.
-        activation: ``softplus`` (the paper) or ``exp`` (clamped to [-12, 12]; bright lamps need few units).
+    Attributes:
+        needs_consistency_loss: Whether only ``losses.light_loss`` ties g(w, rho) to g(w, 0). False where
+            that holds by construction.
 
-    Source: SplitNeRF Eq. (8)-(9) and its supplement.
+    Source: SplitNeRF Eq. (8)-(11).
     """
 
-    def __init__(
-        self,
-        width: int = 256,
-        n_layers: int = 5,
-        direction_frequencies: int = 10,
-        roughness_frequencies: int = 5,
-        activation: str = "softplus",
-    ):
-        super().__init__()
-        self.activation = activation
-        self.register_buffer("direction_scales", 2.0 ** torch.arange(direction_frequencies), persistent=False)
-        self.register_buffer("roughness_scales", 2.0 ** torch.arange(roughness_frequencies), persistent=False)
-        n_inputs = 6 * direction_frequencies + 2 * roughness_frequencies
-        self.hidden = nn.ModuleList(nn.Linear(n_inputs if i == 0 else width, width) for i in range(n_layers))
-        self.out = nn.Linear(width + n_inputs, 3)
-        nn.init.normal_(self.out.weight, std=0.01)
-        start = 0.5
-        nn.init.constant_(self.out.bias, math.log(math.expm1(start)) if activation == "softplus" else math.log(start))
-
-    def encode(self, directions: Tensor, roughness: Tensor) -> Tensor:
-        w = (directions[:, :, None] * self.direction_scales).flatten(1)
-        r = roughness * self.roughness_scales
-        return torch.cat([w.sin(), w.cos(), r.sin(), r.cos()], dim=1)
+    needs_consistency_loss = True
 
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
-        encoded = self.encode(directions, roughness)
-        h = encoded
-        for layer in self.hidden:
-            h = F.relu(layer(h))
-        raw = self.out(torch.cat([h, encoded], dim=1))
-        return F.softplus(raw) if self.activation == "softplus" else torch.exp(raw.clamp(-12.0, 12.0))
+        raise NotImplementedError
 
     @torch.no_grad()
     def panorama(self, height: int, roughness: float = 0.0) -> Tensor:
         """[height, 2 height, 3] equirectangular radiance at one roughness (z up, centre column along +x)."""
-        directions = panorama_directions(height, self.out.weight.device)
-        flat = directions.reshape(-1, 3)
+        parameter = next(self.parameters())
+        flat = panorama_directions(height, parameter.device).reshape(-1, 3).to(parameter.dtype)
         rho = torch.full_like(flat[:, :1], roughness)
         return torch.cat([self(d, r) for d, r in zip(flat.split(1 << 16), rho.split(1 << 16))]).view(height, -1, 3)
 

@@ -2,6 +2,16 @@
 
 from splitnerf.ops.hash_grid import HashGrid, HashGridSpec, growth_for, hash_encode, hash_encode_jacobian
 from splitnerf.ops.light import fibonacci_directions, prefilter_light, sample_ggx_lobe
+from splitnerf.ops.light_pyramid import (
+    SparseMap,
+    light_averages,
+    light_filters,
+    light_lookup,
+    light_sum_of_levels,
+    sh_projection,
+    sparse_product,
+    zonal_factors,
+)
 from splitnerf.ops.monte_carlo import LightSums, monte_carlo_light, sample_bsdf
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
 from splitnerf.ops.rays import (
@@ -18,8 +28,9 @@ from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, visibili
 
 __all__ = [
     "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "QUERIES", "HashGrid", "HashGridSpec", "LightSums",
-    "MeshScene", "PackedSamples", "VisibilityCache", "brdf_lut", "cached_occlusion", "composite", "fibonacci_directions",
-    "growth_for", "hash_encode", "hash_encode_jacobian", "march_rays", "monte_carlo_light", "neus_weights",
-    "occlusion_factors", "prefilter_light", "query_direction", "sample_bsdf", "sample_ggx_lobe", "split_sum_shade",
-    "trace_visibility", "visibility_bits",
+    "MeshScene", "PackedSamples", "SparseMap", "VisibilityCache", "brdf_lut", "cached_occlusion", "composite",
+    "fibonacci_directions", "growth_for", "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters",
+    "light_lookup", "light_sum_of_levels", "march_rays", "monte_carlo_light", "neus_weights", "occlusion_factors",
+    "prefilter_light", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sh_projection", "sparse_product",
+    "split_sum_shade", "trace_visibility", "visibility_bits", "zonal_factors",
 ]  # fmt: skip

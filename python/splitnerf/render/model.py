@@ -8,7 +8,17 @@ import torch
 from torch import Tensor, nn
 
 from splitnerf.config import Config
-from splitnerf.fields import LightMlp, MaterialHead, Occlusion, OcclusionHead, OcclusionQuery, SdfField, VisibilityBits
+from splitnerf.fields import (
+    Light,
+    LightMlp,
+    LightPyramid,
+    MaterialHead,
+    Occlusion,
+    OcclusionHead,
+    OcclusionQuery,
+    SdfField,
+    VisibilityBits,
+)
 from splitnerf.fields.sdf import SdfSample, sharpness
 from splitnerf.ops import HashGridSpec, MeshScene, query_direction, split_sum_shade
 
@@ -33,6 +43,16 @@ class ShadedPoints(NamedTuple):
     occlusion_d: Tensor
     occlusion_s: Tensor
     lobe_dirs: Tensor
+
+
+def make_light(config: Config) -> Light:
+    """The light that the configuration names."""
+    if config.light == "pyramid":
+        return LightPyramid(config.light_resolution)
+    return LightMlp(
+        config.light_width, config.light_layers, config.light_direction_frequencies,
+        config.light_roughness_frequencies, config.light_activation,
+    )  # fmt: skip
 
 
 def make_occlusion(config: Config, n_inputs: int) -> OcclusionHead | VisibilityBits | None:
@@ -66,10 +86,7 @@ class SceneModel(nn.Module):
             n_inputs, config.material_width, config.material_layers, config.initial_roughness
         )
         self.occlusion = make_occlusion(config, n_inputs)
-        self.light = LightMlp(
-            config.light_width, config.light_layers, config.light_direction_frequencies,
-            config.light_roughness_frequencies, config.light_activation,
-        )  # fmt: skip
+        self.light = make_light(config)
         self.variance = nn.Parameter(torch.tensor(config.initial_variance))
         self.occlusion_ready = False  # until the first mesh was traced the occlusion factors are 1
 

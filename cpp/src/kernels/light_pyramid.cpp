@@ -1,0 +1,183 @@
+#include "kernel_set.h"
+
+namespace splitnerf::SPLITNERF_ISA {
+namespace {
+
+// One register of the widest set; narrower sets split it.
+template <class T> struct Lanes;
+template <> struct Lanes<float> {
+  typedef float V __attribute__((vector_size(64)));
+  typedef float Row __attribute__((vector_size(16), aligned(4)));
+  static constexpr int n = 16;
+};
+template <> struct Lanes<double> {
+  typedef double V __attribute__((vector_size(64)));
+  typedef double Row __attribute__((vector_size(32), aligned(8)));
+  static constexpr int n = 8;
+};
+
+// Points that wait for the harmonics, evaluated one lane each. `share` is how much of the harmonics'
+// value the point takes, `slope` the derivative of that by its roughness.
+template <class T> struct Waiting {
+  using V = typename Lanes<T>::V;
+  V x, y, z, zonal[kShBands], zonal_slope[kShBands];
+  T share[Lanes<T>::n], slope[Lanes<T>::n];
+  int64_t point[Lanes<T>::n];
+  int n = 0;
+
+  SPLITNERF_HD void add(const LightPyramid<T>& p, const LightMix<T>& mix, int64_t i, Vec3<T> w, T roughness) {
+    const ZonalPlace<T> place = zonal_place(p, roughness);
+    const T *row = place.row, *next = row + kShBands;
+    x[n] = w.x, y[n] = w.y, z[n] = w.z;
+    for (int l = 0; l < kShBands; ++l) {
+      zonal[l][n] = lerp(row[l], next[l], place.share);
+      zonal_slope[l][n] = place.slope * (next[l] - row[l]);
+    }
+    share[n] = mix.share, slope[n] = mix.slope, point[n] = i;
+    ++n;
+  }
+  SPLITNERF_HD bool full() const { return n == Lanes<T>::n; }
+
+  // Lanes without a point: the pole, with no weight.
+  SPLITNERF_HD void pad() {
+    for (int k = n; k < Lanes<T>::n; ++k) {
+      x[k] = y[k] = T(0), z[k] = T(1);
+      for (int l = 0; l < kShBands; ++l) zonal[l][k] = zonal_slope[l][k] = T(0);
+    }
+  }
+};
+
+template <class T> void flush(const LightPyramid<T>& p, Waiting<T>& waiting, T* radiance) {
+  typename Lanes<T>::V sums[3];
+  waiting.pad();
+  sh_evaluate(*p.recurrence, p.sh, waiting.zonal, waiting.x, waiting.y, waiting.z, sums);
+  for (int k = 0; k < waiting.n; ++k) {
+    T* out = radiance + 3 * waiting.point[k];
+    for (int c = 0; c < 3; ++c) out[c] += waiting.share[k] * floored_light(sums[c][k], p.sh[c]).value;
+  }
+  waiting.n = 0;
+}
+
+template <class T>
+void flush_backward(const LightPyramid<T>& p, Waiting<T>& waiting, const T* grad_radiance, T* grad_directions,
+                    T* grad_roughness, typename Lanes<T>::V* grad_sh) {
+  using V = typename Lanes<T>::V;
+  V sums[3], grad[3] = {}, grad_zonal[kShBands], grad_xyz[3], to_roughness = V{};
+  waiting.pad();
+  sh_evaluate(*p.recurrence, p.sh, waiting.zonal, waiting.x, waiting.y, waiting.z, sums);
+  for (int k = 0; k < waiting.n; ++k) {
+    const int64_t i = waiting.point[k];
+    for (int c = 0; c < 3; ++c) {
+      const FlooredLight<T> floored = floored_light(sums[c][k], p.sh[c]);
+      const T g = grad_radiance[3 * i + c];
+      grad_roughness[i] += waiting.slope[k] * g * floored.value;
+      grad[c][k] = waiting.share[k] * g * floored.d_x;
+      grad_sh[c][k] += waiting.share[k] * g * floored.d_e * T(kShFloor * kShConstant);
+    }
+  }
+  sh_evaluate_backward(*p.recurrence, p.sh, waiting.zonal, waiting.x, waiting.y, waiting.z, grad, grad_sh, grad_zonal,
+                       grad_xyz);
+  for (int l = 0; l < kShBands; ++l) to_roughness += grad_zonal[l] * waiting.zonal_slope[l];
+  for (int k = 0; k < waiting.n; ++k) {
+    const int64_t i = waiting.point[k];
+    grad_roughness[i] += to_roughness[k];
+    for (int c = 0; c < 3; ++c) grad_directions[3 * i + c] += grad_xyz[c][k];
+  }
+  waiting.n = 0;
+}
+
+}  // namespace
+
+template <class T>
+void sparse_product(const SparseRows<T>& matrix, int64_t begin, int64_t end, const T* values, T* products) {
+  using Row = typename Lanes<T>::Row;
+  for (int64_t r = begin; r < end; ++r) {
+    Row even = {}, odd = {};
+    int64_t k = matrix.offsets[r];
+    const int64_t last = matrix.offsets[r + 1];
+    for (; k + 1 < last; k += 2) {
+      even += *reinterpret_cast<const Row*>(values + 4 * int64_t(matrix.columns[k])) * matrix.weights[k];
+      odd += *reinterpret_cast<const Row*>(values + 4 * int64_t(matrix.columns[k + 1])) * matrix.weights[k + 1];
+    }
+    if (k < last) even += *reinterpret_cast<const Row*>(values + 4 * int64_t(matrix.columns[k])) * matrix.weights[k];
+    even += odd;
+    for (int c = 0; c < 3; ++c) products[3 * r + c] = even[c];
+  }
+}
+
+template <class T>
+void light_lookup(const LightPyramid<T>& p, int64_t begin, int64_t end, const T* directions, const T* roughness,
+                  T* radiance) {
+  Waiting<T> waiting;
+  for (int64_t i = begin; i < end; ++i) {
+    const Vec3<T> w = load3(directions + 3 * i);
+    const LightMix<T> mix = light_mix(p, roughness[i]);
+    Vec3<T> value{T(0), T(0), T(0)};
+    if (mix.share != T(1)) {
+      const Vec2<T> uv = octahedral_encode(w);
+      const int k = mix.level, n = p.resolution[k];
+      value = read_level(p.levels + 3 * p.offset[k], octahedral_footprint(n, uv)) * (T(1) - mix.share);
+      if (k + 1 < p.n_levels && mix.share > T(0)) {
+        const int m = p.resolution[k + 1];
+        value += read_level(p.levels + 3 * p.offset[k + 1], octahedral_footprint(m, uv)) * mix.share;
+      }
+    }
+    store3(radiance + 3 * i, value);
+    if (mix.level + 1 < p.n_levels || mix.share == T(0)) continue;
+    waiting.add(p, mix, i, w, roughness[i]);
+    if (waiting.full()) flush(p, waiting, radiance);
+  }
+  if (waiting.n) flush(p, waiting, radiance);
+}
+
+template <class T>
+void light_lookup_backward(const LightPyramid<T>& p, int64_t begin, int64_t end, const T* directions,
+                           const T* roughness, const T* grad_radiance, T* grad_directions, T* grad_roughness,
+                           T* grad_levels, T* grad_sh) {
+  using V = typename Lanes<T>::V;
+  V lanes_sh[3 * kShCoefficients] = {};
+  Waiting<T> waiting;
+  for (int64_t i = begin; i < end; ++i) {
+    const Vec3<T> w = load3(directions + 3 * i), grad = load3(grad_radiance + 3 * i);
+    const LightMix<T> mix = light_mix(p, roughness[i]);
+    Vec3<T> grad_w{T(0), T(0), T(0)};
+    T along_rho = T(0);
+    if (mix.share != T(1)) {
+      const Vec2<T> uv = octahedral_encode(w);
+      Vec2<T> grad_uv{T(0), T(0)};
+      for (int above = 0; above < 2 && mix.level + above < p.n_levels; ++above) {
+        const T share = above ? mix.share : T(1) - mix.share, slope = above ? mix.slope : -mix.slope;
+        if (share == T(0) && slope == T(0)) continue;
+        const int k = mix.level + above, n = p.resolution[k];
+        const T* map = p.levels + 3 * p.offset[k];
+        const OctahedralFootprint<T> f = octahedral_footprint(n, uv);
+        const Vec2<T> g = read_level_backward(map, n, f, grad * share, grad_levels + 3 * p.offset[k]);
+        grad_uv.x += g.x, grad_uv.y += g.y;
+        if (slope != T(0)) along_rho += slope * dot(read_level(map, f), grad);
+      }
+      grad_w = octahedral_encode_backward(w, grad_uv);
+    }
+    store3(grad_directions + 3 * i, grad_w);
+    grad_roughness[i] = along_rho;
+    if (mix.level + 1 < p.n_levels || (mix.share == T(0) && mix.slope == T(0))) continue;
+    waiting.add(p, mix, i, w, roughness[i]);
+    if (waiting.full()) flush_backward(p, waiting, grad_radiance, grad_directions, grad_roughness, lanes_sh);
+  }
+  if (waiting.n) flush_backward(p, waiting, grad_radiance, grad_directions, grad_roughness, lanes_sh);
+  for (int i = 0; i < 3 * kShCoefficients; ++i) {
+    T sum = T(0);
+    for (int k = 0; k < Lanes<T>::n; ++k) sum += lanes_sh[i][k];
+    grad_sh[i] += sum;
+  }
+}
+
+#define SPLITNERF_INSTANTIATE(T)                                                                                 \
+  template void sparse_product<T>(const SparseRows<T>&, int64_t, int64_t, const T*, T*);                         \
+  template void light_lookup<T>(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, T*);               \
+  template void light_lookup_backward<T>(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, const T*, \
+                                         T*, T*, T*, T*);
+SPLITNERF_INSTANTIATE(float)
+SPLITNERF_INSTANTIATE(double)
+#undef SPLITNERF_INSTANTIATE
+
+}  // namespace splitnerf::SPLITNERF_ISA

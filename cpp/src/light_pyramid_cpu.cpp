@@ -1,0 +1,63 @@
+#include <algorithm>
+#include <vector>
+
+#include "splitnerf/kernels.h"
+#include "splitnerf/ops_cpu.h"
+#include "splitnerf/parallel.h"
+
+namespace splitnerf::cpu {
+namespace {
+
+constexpr int64_t kRowGrain = 512, kPointGrain = 1024, kChunkPoints = 2048;
+
+}  // namespace
+
+template <class T>
+void sparse_product(const SparseRows<T>& matrix, int64_t n_rows, int64_t n_columns, const T* values, T* products) {
+  std::vector<T> padded(4 * n_columns);
+  for (int64_t i = 0; i < n_columns; ++i) std::copy_n(values + 3 * i, 3, &padded[4 * i]);
+  parallel_for(n_rows, kRowGrain, [&](int64_t begin, int64_t end) {
+    kernels<T>().sparse_product(matrix, begin, end, padded.data(), products);
+  });
+}
+
+template <class T>
+void light_lookup(const LightPyramid<T>& pyramid, int64_t n, const T* directions, const T* roughness, T* radiance) {
+  parallel_for(n, kPointGrain, [&](int64_t begin, int64_t end) {
+    kernels<T>().light_lookup(pyramid, begin, end, directions, roughness, radiance);
+  });
+}
+
+template <class T>
+void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t n, const T* directions, const T* roughness,
+                           const T* grad_radiance, T* grad_directions, T* grad_roughness, T* grad_levels, T* grad_sh) {
+  const int last = pyramid.n_levels - 1, side = pyramid.resolution[last];
+  const int64_t n_levels = 3 * (pyramid.offset[last] + int64_t(side) * side), n_sh = 3 * kShCoefficients;
+  const int64_t n_chunks = std::clamp<int64_t>((n + kChunkPoints - 1) / kChunkPoints, 1, kLightChunks);
+  const int64_t stride = n_levels + n_sh;
+  std::vector<T> copies(n_chunks * stride);
+  parallel_for(n_chunks, 1, [&](int64_t first, int64_t end) {
+    for (int64_t c = first; c < end; ++c) {
+      T* copy = &copies[c * stride];
+      kernels<T>().light_lookup_backward(pyramid, c * n / n_chunks, (c + 1) * n / n_chunks, directions, roughness,
+                                         grad_radiance, grad_directions, grad_roughness, copy, copy + n_levels);
+    }
+  });
+  parallel_for(stride, 1 << 14, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      T sum = T(0);
+      for (int64_t c = 0; c < n_chunks; ++c) sum += copies[c * stride + i];
+      (i < n_levels ? grad_levels[i] : grad_sh[i - n_levels]) = sum;
+    }
+  });
+}
+
+#define SPLITNERF_INSTANTIATE(T)                                                                                     \
+  template void sparse_product<T>(const SparseRows<T>&, int64_t, int64_t, const T*, T*);                             \
+  template void light_lookup<T>(const LightPyramid<T>&, int64_t, const T*, const T*, T*);                            \
+  template void light_lookup_backward<T>(const LightPyramid<T>&, int64_t, const T*, const T*, const T*, T*, T*, T*, T*);
+SPLITNERF_INSTANTIATE(float)
+SPLITNERF_INSTANTIATE(double)
+#undef SPLITNERF_INSTANTIATE
+
+}  // namespace splitnerf::cpu

@@ -1,0 +1,125 @@
+// sparse_product and light_lookup as torch operators.
+#include <tuple>
+
+#include "check.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf::glue {
+namespace {
+
+Tensor sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor transposed_offsets,
+                      Tensor transposed_columns, Tensor transposed_weights, Tensor values) {
+  const char* op = "sparse_product";
+  const ScalarType type = real_type(op, "values", values);
+  const Tensor o = checked(op, "offsets", offsets, {kAny}, ScalarType::Long);
+  const Tensor c = checked(op, "columns", columns, {kAny}, ScalarType::Int);
+  const Tensor w = checked(op, "weights", weights, {c.size(0)}, type);
+  const Tensor x = checked(op, "values", values, {kAny, 3}, type);
+  checked(op, "transposed_offsets", transposed_offsets, {x.size(0) + 1}, ScalarType::Long);
+  checked(op, "transposed_columns", transposed_columns, {c.size(0)}, ScalarType::Int);
+  checked(op, "transposed_weights", transposed_weights, {c.size(0)}, type);
+  require(o.size(0) > 0, op, "offsets must hold at least one number");
+  Tensor products = empty_like_type(x, {o.size(0) - 1, 3}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    const SparseRows<T> matrix{in<int64_t>(o), in<int32_t>(c), in<T>(w)};
+    cpu::sparse_product(matrix, o.size(0) - 1, x.size(0), in<T>(x), out<T>(products));
+  });
+  return products;
+}
+
+// The arguments that describe the pyramid, checked and contiguous.
+struct Parts {
+  Tensor levels, sh, resolutions, nodes, zonal;
+
+  Parts(const char* op, ScalarType type, const Tensor& levels_in, const Tensor& sh_in, const Tensor& resolutions_in,
+        const Tensor& nodes_in, const Tensor& zonal_in)
+      : levels(checked(op, "levels", levels_in, {kAny, 3}, type)),
+        sh(checked(op, "sh", sh_in, {kShCoefficients, 3}, type)),
+        resolutions(checked(op, "resolutions", resolutions_in, {kAny}, ScalarType::Long)),
+        nodes(checked(op, "nodes", nodes_in, {resolutions.size(0) + 1}, ScalarType::Double)),
+        zonal(checked(op, "zonal", zonal_in, {kAny, kShBands}, type)) {
+    const int64_t n = resolutions.size(0);
+    require(n >= 1 && n <= kMaxLightLevels, op, "there must be 1 to " + std::to_string(kMaxLightLevels) + " levels");
+    require(zonal.size(0) >= 2, op, "zonal must have at least two rows");
+    int64_t texels = 0;
+    for (int64_t k = 0; k < n; ++k) {
+      const int64_t side = in<int64_t>(resolutions)[k];
+      require(side >= 1 && side <= 1 << 14, op, "resolutions must be in [1, 2^14]");
+      require(in<double>(nodes)[k] < in<double>(nodes)[k + 1], op, "nodes must ascend");
+      texels += side * side;
+    }
+    require(in<double>(nodes)[n] < 1, op, "the last node must be below 1");
+    require(texels == levels.size(0), op,
+            "levels must hold " + std::to_string(texels) + " texels, got " + std::to_string(levels.size(0)));
+  }
+
+  template <class T> LightPyramid<T> view() const {
+    LightPyramid<T> p{};
+    p.levels = in<T>(levels), p.sh = in<T>(sh), p.zonal = in<T>(zonal);
+    p.n_levels = static_cast<int>(resolutions.size(0)), p.n_zonal = static_cast<int>(zonal.size(0));
+    p.recurrence = &sh_recurrence<T>();
+    int64_t offset = 0;
+    for (int k = 0; k < p.n_levels; ++k) {
+      p.resolution[k] = static_cast<int>(in<int64_t>(resolutions)[k]);
+      p.offset[k] = offset;
+      offset += int64_t(p.resolution[k]) * p.resolution[k];
+    }
+    for (int k = 0; k <= p.n_levels; ++k) p.node[k] = T(in<double>(nodes)[k]);
+    return p;
+  }
+};
+
+Tensor light_lookup(Tensor directions, Tensor roughness, Tensor levels, Tensor sh, Tensor resolutions, Tensor nodes,
+                    Tensor zonal) {
+  const char* op = "light_lookup";
+  const ScalarType type = real_type(op, "levels", levels);
+  const Tensor d = checked(op, "directions", directions, {kAny, 3}, type);
+  const Tensor rho = checked(op, "roughness", roughness, {d.size(0), 1}, type);
+  const Parts parts(op, type, levels, sh, resolutions, nodes, zonal);
+  Tensor radiance = empty_like_type(d, {d.size(0), 3}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::light_lookup(parts.view<T>(), d.size(0), in<T>(d), in<T>(rho), out<T>(radiance));
+  });
+  return radiance;
+}
+
+std::tuple<Tensor, Tensor, Tensor, Tensor> light_lookup_backward(Tensor directions, Tensor roughness, Tensor levels,
+                                                                 Tensor sh, Tensor resolutions, Tensor nodes,
+                                                                 Tensor zonal, Tensor grad_radiance) {
+  const char* op = "light_lookup_backward";
+  const ScalarType type = real_type(op, "levels", levels);
+  const Tensor d = checked(op, "directions", directions, {kAny, 3}, type);
+  const Tensor rho = checked(op, "roughness", roughness, {d.size(0), 1}, type);
+  const Tensor g = checked(op, "grad_radiance", grad_radiance, {d.size(0), 3}, type);
+  const Parts parts(op, type, levels, sh, resolutions, nodes, zonal);
+  Tensor grad_d = empty_like_type(d, {d.size(0), 3}, type), grad_rho = empty_like_type(d, {d.size(0), 1}, type);
+  Tensor grad_levels = empty_like_type(d, {parts.levels.size(0), 3}, type);
+  Tensor grad_sh = empty_like_type(d, {kShCoefficients, 3}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::light_lookup_backward(parts.view<T>(), d.size(0), in<T>(d), in<T>(rho), in<T>(g), out<T>(grad_d),
+                               out<T>(grad_rho), out<T>(grad_levels), out<T>(grad_sh));
+  });
+  return {grad_d, grad_rho, grad_levels, grad_sh};
+}
+
+}  // namespace
+
+STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
+  m.def("sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor transposed_offsets, "
+        "Tensor transposed_columns, Tensor transposed_weights, Tensor values) -> Tensor");
+  m.def("light_lookup(Tensor directions, Tensor roughness, Tensor levels, Tensor sh, Tensor resolutions, "
+        "Tensor nodes, Tensor zonal) -> Tensor");
+  m.def("light_lookup_backward(Tensor directions, Tensor roughness, Tensor levels, Tensor sh, Tensor resolutions, "
+        "Tensor nodes, Tensor zonal, Tensor grad_radiance) -> (Tensor, Tensor, Tensor, Tensor)");
+}
+
+STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+  m.impl("sparse_product", TORCH_BOX(&sparse_product));
+  m.impl("light_lookup", TORCH_BOX(&light_lookup));
+  m.impl("light_lookup_backward", TORCH_BOX(&light_lookup_backward));
+}
+
+}  // namespace splitnerf::glue

@@ -1,0 +1,165 @@
+"""The explicit light: fixed linear maps of its texels, and the lookup in the filtered levels.
+
+Maps of the sphere are octahedral, +z in the centre of the square, texel (i, j) at row j n + i of an
+[n^2, 3] tensor; see ``cpp/include/splitnerf/octahedral.h``.
+
+Source: Praun and Hoppe 2003 (the map); Ramamoorthi and Hanrahan 2001 (harmonics of the rough end).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from splitnerf import _core
+from splitnerf.ops._library import lib, refuse_gradients, register
+
+SH_COEFFICIENTS = 169  # degrees 0 to 12
+
+
+class SparseMap(NamedTuple):
+    """A sparse matrix by rows, and its transpose by rows for the backward pass.
+
+    Attributes:
+        offsets: [rows + 1] int64, where each row's entries begin.
+        columns: [entries] int32.
+        weights: [entries].
+        transposed_offsets, transposed_columns, transposed_weights: The same of the transpose.
+    """
+
+    offsets: Tensor
+    columns: Tensor
+    weights: Tensor
+    transposed_offsets: Tensor
+    transposed_columns: Tensor
+    transposed_weights: Tensor
+
+
+def sparse_map(parts: list[tuple], dtype: torch.dtype = torch.float32) -> SparseMap:
+    """Stacks matrices (offsets, columns, weights, n_columns) of one width, as ``_core`` hands them over."""
+    n_columns = parts[0][3]
+    starts = np.cumsum([0] + [len(columns) for _, columns, _, _ in parts])
+    offsets = np.concatenate([[0]] + [part[0][1:] + start for part, start in zip(parts, starts)])
+    columns = np.concatenate([part[1] for part in parts])
+    weights = np.concatenate([part[2] for part in parts])
+    rows = np.repeat(np.arange(len(offsets) - 1, dtype=np.int32), np.diff(offsets))
+    order = np.argsort(columns, kind="stable")
+    transposed_offsets = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=n_columns))])
+    return SparseMap(
+        torch.from_numpy(offsets.astype(np.int64)), torch.from_numpy(columns), torch.from_numpy(weights).to(dtype),
+        torch.from_numpy(transposed_offsets.astype(np.int64)), torch.from_numpy(rows[order]),
+        torch.from_numpy(weights[order]).to(dtype),
+    )  # fmt: skip
+
+
+def light_sum_of_levels(resolution: int) -> SparseMap:
+    """[n^2, 4^2 + 8^2 + ... + n^2]: levels of log-radiance, coarse to fine, interpolated bilinearly and added."""
+    return sparse_map([_core.light_sum_of_levels(resolution)])
+
+
+def light_averages(resolution: int) -> SparseMap:
+    """[n^2 + (n/2)^2 + ... + 8^2, n^2]: the texels and their averages by solid angle."""
+    return sparse_map([_core.light_averages(resolution)])
+
+
+def light_filters(resolution: int, targets: list[tuple[int, float]]) -> SparseMap:
+    """gbar(w, rho) at the texel centres of octahedral maps, from the averages of :func:`light_averages`.
+
+    Each row is the integral of ``D (w.w_s)+`` over cells that grow where the lobe varies slowly, divided by
+    its sum: a constant light stays itself. Nothing of the lobe is cut.
+
+    Args:
+        resolution: n of the texels, a power of 2 >= 8.
+        targets: (m, rho) of each map: m^2 rows.
+
+    Source: SplitNeRF Eq. (11).
+    """
+    return sparse_map([_core.light_filter(resolution, m, rho) for m, rho in targets])
+
+
+def sh_projection(resolution: int, cells: bool) -> Tensor:
+    """[169, n^2] float32: spherical harmonics of a light bilinear between texels or (``cells``) constant in each."""
+    return torch.from_numpy(_core.sh_projection(resolution, cells)).to(torch.float32)
+
+
+def zonal_factors(start: float, n_rows: int) -> Tensor:
+    """[n_rows, 13] float32: what the lobe D cos leaves of each degree, for roughness ``start`` to 1."""
+    return torch.from_numpy(_core.zonal_factors(start, n_rows)).to(torch.float32)
+
+
+def sparse_product(matrix: SparseMap, values: Tensor) -> Tensor:
+    """matrix times values [columns, 3] -> [rows, 3]. Differentiable in ``values``, any number of times.
+
+    Column indices are trusted: they come from the maps above.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+    """
+    return lib.sparse_product(*matrix, values)
+
+
+def light_lookup(
+    directions: Tensor, roughness: Tensor, levels: Tensor, sh: Tensor, resolutions: Tensor, nodes: Tensor, zonal: Tensor
+) -> Tensor:
+    """g(w, rho) from filtered maps and spherical harmonics.
+
+    Below ``nodes[0]`` the first map, between nodes their maps linearly in rho, from the last node on
+    ``g = sum_lm zonal_l(rho) sh_lm Y_lm(w)``. Maps are read bilinearly, across the seams of the
+    octahedron as within. Where the harmonics' sum x falls below a thousandth e of the mean light (they
+    ring around strong lamps) it is e exp(x/e - 1), with that form's gradient.
+
+    Differentiable once in directions (tangentially in the maps), roughness, levels and sh.
+
+    Args:
+        directions: [n, 3] unit.
+        roughness: [n, 1] perceptual; above 1 as 1.
+        levels: [sum of r_k^2, 3] radiance, the maps one after the other.
+        sh: [169, 3], coefficient l^2 + l + m of radiance.
+        resolutions: [K] int64, r_k.
+        nodes: [K + 1] float64 ascending: the maps' roughness, then the harmonics'.
+        zonal: [rows, 13] factors at roughness nodes[K] to 1.
+
+    Returns:
+        [n, 3] radiance. A NaN direction or roughness gives NaN.
+
+    Raises:
+        ValueError: A shape, dtype or number does not fit.
+    """
+    return lib.light_lookup(directions, roughness, levels, sh, resolutions, nodes, zonal)
+
+
+def _keep_map(ctx, inputs, output):
+    ctx.save_for_backward(*inputs[:6])
+
+
+def _map_backward(ctx, grad):
+    refuse_gradients(ctx, "sparse_product", weights=2, transposed_weights=5)
+    forward, transposed = ctx.saved_tensors[:3], ctx.saved_tensors[3:]
+    return *[None] * 6, lib.sparse_product(*transposed, *forward, grad)
+
+
+def _keep_lookup(ctx, inputs, output):
+    ctx.save_for_backward(*inputs)
+
+
+def _lookup_backward(ctx, grad):
+    refuse_gradients(ctx, "light_lookup", nodes=5, zonal=6)
+    return *lib.light_lookup_backward(*ctx.saved_tensors, grad), None, None, None
+
+
+register(
+    "sparse_product",
+    fake=lambda *inputs: inputs[6].new_empty(inputs[0].shape[0] - 1, 3),
+    setup_context=_keep_map,
+    backward=_map_backward,
+)
+register(
+    "light_lookup",
+    fake=lambda directions, *rest: directions.new_empty(directions.shape),
+    setup_context=_keep_lookup,
+    backward=_lookup_backward,
+)
+register("light_lookup_backward", fake=lambda *inputs: tuple(x.new_empty(x.shape) for x in inputs[:4]))

@@ -1,0 +1,112 @@
+// The octahedral map and the light's lookup: inverses, derivatives, and the instruction sets against each other.
+#include "splitnerf/light_pyramid.h"
+
+#include <vector>
+
+#include "check.h"
+#include "splitnerf/kernels.h"
+#include "splitnerf/light_tables.h"
+#include "splitnerf/sampling.h"
+
+namespace splitnerf {
+namespace {
+
+constexpr int kPoints = 203;  // no multiple of a register's lanes
+
+TEST(Octahedral, PointsAndTexelsComeBack) {
+  for (uint32_t i = 0; i < 1000; ++i) {
+    const Vec3<double> w = fibonacci_sphere<double>(i, 1000);
+    const Vec3<double> back = normalize(octahedral_point(octahedral_encode(w)));
+    EXPECT_LT(length(back - w), 1e-14);
+  }
+  for (int n : {4, 7, 64})
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) {
+        const auto f = octahedral_footprint(n, octahedral_texel_centre<double>(n, i, j));
+        double share = 0;
+        for (int k = 0; k < 4; ++k) share += f.texel[k] == j * n + i ? f.weight(k) : 0;
+        EXPECT_NEAR(share, 1, 1e-12);
+      }
+}
+
+TEST(Octahedral, BackwardIsTheDerivative) {
+  const Vec2<double> grad{0.7, -1.3};
+  Random random(1);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3<double> w = random.direction() * 1.7;
+    const Vec3<double> got = octahedral_encode_backward(w, grad);
+    for (int axis = 0; axis < 3; ++axis) {
+      double value[2];
+      for (int side = 0; side < 2; ++side) {
+        Vec3<double> moved = w;
+        moved[axis] += side ? 1e-6 : -1e-6;
+        const Vec2<double> uv = octahedral_encode(moved);
+        value[side] = grad.x * uv.x + grad.y * uv.y;
+      }
+      EXPECT_NEAR(got[axis], (value[1] - value[0]) / 2e-6, 1e-7);
+    }
+    EXPECT_NEAR(dot(got, w), 0, 1e-12);
+  }
+}
+
+// A pyramid of two maps, with everything that a kernel call needs.
+template <class T> struct Scene {
+  std::vector<T> levels, sh, zonal, directions, roughness, grad;
+  LightPyramid<T> pyramid{};
+
+  Scene() : levels(3 * (16 * 16 + 8 * 8)), sh(3 * kShCoefficients) {
+    uint32_t seed = 0;
+    for (T& x : levels) x = T(random_unit<double>(++seed)) + T(0.1);
+    for (T& x : sh) x = T(0.1 * random_unit<double>(++seed) - 0.05);
+    sh[0] = sh[1] = sh[2] = T(3);
+    for (double x : zonal_factors(0.5, 9)) zonal.push_back(T(x));
+    for (int i = 0; i < kPoints; ++i) {
+      const Vec3<double> w = fibonacci_sphere<double>(i, kPoints);
+      for (int c = 0; c < 3; ++c) directions.push_back(T(w[c])), grad.push_back(T(random_unit<double>(++seed) - 0.5));
+      roughness.push_back(T(random_unit<double>(++seed)));
+    }
+    pyramid.levels = levels.data(), pyramid.sh = sh.data(), pyramid.zonal = zonal.data();
+    pyramid.n_levels = 2, pyramid.n_zonal = 9;
+    pyramid.resolution[0] = 16, pyramid.resolution[1] = 8, pyramid.offset[1] = 16 * 16;
+    pyramid.node[0] = T(0.05), pyramid.node[1] = T(0.3), pyramid.node[2] = T(0.5);
+    pyramid.recurrence = &sh_recurrence<T>();
+  }
+
+  // Radiance, then the gradients to directions, roughness, levels and sh, one after the other.
+  std::vector<T> run(const Kernels<T>& kernels) const {
+    std::vector<T> out(7 * kPoints + levels.size() + sh.size());
+    T *grad_directions = &out[3 * kPoints], *grad_roughness = &out[6 * kPoints], *grad_levels = &out[7 * kPoints];
+    kernels.light_lookup(pyramid, 0, kPoints, directions.data(), roughness.data(), out.data());
+    kernels.light_lookup_backward(pyramid, 0, kPoints, directions.data(), roughness.data(), grad.data(), grad_directions,
+                                  grad_roughness, grad_levels, grad_levels + levels.size());
+    return out;
+  }
+};
+
+template <class T> void expect_equal_sets(T tolerance) {
+  const Scene<T> scene;
+  const std::vector<Kernels<T>> sets = usable_kernels<T>();
+  const std::vector<T> expected = scene.run(sets[0]);
+  for (const Kernels<T>& set : sets) {
+    const std::vector<T> got = scene.run(set);
+    for (size_t i = 0; i < got.size(); ++i)
+      ASSERT_NEAR(got[i], expected[i], tolerance * (1 + std::fabs(expected[i]))) << set.name << " at " << i;
+  }
+}
+
+TEST(LightLookup, InstructionSetsAgree) {
+  expect_equal_sets<double>(1e-12);
+  expect_equal_sets<float>(3e-5f);
+}
+
+TEST(LightTables, FiltersAndAveragesSumToOne) {
+  for (const SparseMatrix& matrix : {light_averages(16), light_filter(16, 8, 0.3), light_filter(32, 32, 0.1)})
+    for (size_t r = 0; r + 1 < matrix.offsets.size(); ++r) {
+      double sum = 0;
+      for (int64_t k = matrix.offsets[r]; k < matrix.offsets[r + 1]; ++k) sum += matrix.weights[k];
+      ASSERT_NEAR(sum, 1, 1e-12);
+    }
+}
+
+}  // namespace
+}  // namespace splitnerf

@@ -1,0 +1,257 @@
+"""sparse_product, light_lookup and the maps between the texels of an explicit light."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
+
+from splitnerf import _core
+from splitnerf.ops import (
+    SparseMap,
+    light_averages,
+    light_filters,
+    light_lookup,
+    light_sum_of_levels,
+    sh_projection,
+    sparse_product,
+    zonal_factors,
+)
+
+NODES = (0.05, 0.2, 0.4, 0.5)
+RESOLUTIONS = (16, 8, 4)
+ROUGHNESS = (0.0, 0.03, 0.1, 0.31, 0.43, 0.49, 0.55, 0.8, 0.97)
+
+
+def octahedral_directions(n: int) -> torch.Tensor:
+    """[n^2, 3] unit float64 directions of the texel centres."""
+    centres = (torch.arange(n, dtype=torch.float64) + 0.5) * 2 / n - 1
+    y, x = torch.meshgrid(centres, centres, indexing="ij")
+    z = 1 - x.abs() - y.abs()
+    sign = lambda v: torch.where(v < 0, -1.0, 1.0).double()  # noqa: E731
+    below = z < 0
+    x, y = torch.where(below, (1 - y.abs()) * sign(x), x), torch.where(below, (1 - x.abs()) * sign(y), y)
+    return unit(torch.stack([x, y, z], -1).reshape(-1, 3))
+
+
+def lookup_inputs(dtype=torch.float64, n: int = 18) -> tuple:
+    directions = unit(torch.randn(n, 3, generator=generator(1), dtype=torch.float64))
+    roughness = torch.tensor(ROUGHNESS, dtype=torch.float64).repeat(n)[:n, None]
+    levels = torch.rand(sum(r * r for r in RESOLUTIONS), 3, generator=generator(2), dtype=torch.float64) + 0.1
+    sh = torch.randn(169, 3, generator=generator(3), dtype=torch.float64) * 0.1
+    sh[0] = 4.0
+    zonal = zonal_factors(NODES[-1], 33)
+    floats = (x.to(dtype) for x in (directions, roughness, levels, sh))
+    return (*floats, torch.tensor(RESOLUTIONS), torch.tensor(NODES, dtype=torch.float64), zonal.to(dtype))
+
+
+def as_double(matrix: SparseMap) -> SparseMap:
+    return SparseMap(*(x.double() if x.is_floating_point() else x for x in matrix))
+
+
+def dense(matrix: SparseMap) -> torch.Tensor:
+    n_columns = len(matrix.transposed_offsets) - 1
+    rows = torch.repeat_interleave(torch.arange(len(matrix.offsets) - 1), matrix.offsets.diff())
+    out = torch.zeros(len(matrix.offsets) - 1, n_columns, dtype=matrix.weights.dtype)
+    return out.index_put_((rows, matrix.columns.long()), matrix.weights, accumulate=True)
+
+
+def test_sparse_product_matches_the_dense_one_forward_and_backward():
+    matrix = as_double(light_filters(8, [(8, 0.3), (4, 0.4)]))
+    values = torch.randn(64, 3, generator=generator(), dtype=torch.float64, requires_grad=True)
+    torch.testing.assert_close(sparse_product(matrix, values), dense(matrix) @ values, rtol=1e-12, atol=1e-12)
+    torch.autograd.gradcheck(lambda x: sparse_product(matrix, x), values)
+    torch.testing.assert_close(dense(SparseMap(*matrix[3:], *matrix[:3])), dense(matrix).T, rtol=0, atol=0)
+
+
+def test_opcheck():
+    for dtype in (torch.float32, torch.float64):
+        inputs = lookup_inputs(dtype)
+        check_op(lib.light_lookup, inputs, (0, 1, 2, 3))
+        grad = torch.randn(18, 3, generator=generator(4)).to(dtype)
+        check_op(lib.light_lookup_backward, (*inputs, grad))
+        matrix = light_averages(8)
+        matrix = as_double(matrix) if dtype == torch.float64 else matrix
+        check_op(lib.sparse_product, (*matrix, torch.rand(64, 3, generator=generator()).to(dtype)), (6,))
+
+
+def test_gradcheck_in_directions_roughness_levels_and_harmonics():
+    inputs = grad_leaves(lookup_inputs(), (0, 1, 2, 3))
+    torch.autograd.gradcheck(lambda *x: light_lookup(*x, *inputs[4:]), inputs[:4], eps=1e-7, atol=1e-5)
+
+
+def test_gradcheck_where_the_harmonics_are_bent_above_zero():
+    directions, _, levels, sh, *rest = lookup_inputs()
+    roughness = torch.full((18, 1), 0.6, dtype=torch.float64)
+    sh[1:] *= 20
+    inputs = grad_leaves((directions, roughness, levels, sh), (0, 1, 2, 3))
+    value = light_lookup(*inputs, *rest)
+    assert (value > 0).all() and (value < 4.0 * 0.2820948 * 1e-3).any()
+    torch.autograd.gradcheck(lambda *x: light_lookup(*x, *rest), inputs, eps=1e-8, atol=1e-4, rtol=1e-3)
+
+
+def test_the_bend_above_zero_has_its_own_derivative():
+    _, _, levels, sh, resolutions, nodes, zonal = lookup_inputs()
+    constant, floor = 0.28209479177387814, 1e-3 * 4.0 * 0.28209479177387814  # Y_00 and e
+    sh[0], sh[1:] = 4.0, 0.0
+    sh[2] = -(4.0 * constant + floor) / (zonal[-1, 1] * math.sqrt(3) * constant)  # x = -e towards z
+    leaf, up, one = sh.clone().requires_grad_(), torch.tensor([[0.0, 0, 1]]).double(), torch.ones(1, 1).double()
+    value = light_lookup(up, one, levels, leaf, resolutions, nodes, zonal)
+    value.sum().backward()
+    torch.testing.assert_close(value, torch.full_like(value, floor * math.exp(-2)), rtol=1e-9, atol=0)
+    expected = torch.full((3,), math.exp(-2) * constant * (1 + 2e-3)).double()
+    torch.testing.assert_close(leaf.grad[0], expected, rtol=1e-6, atol=0)
+
+
+def test_float32_agrees_with_float64():
+    got = light_lookup(*lookup_inputs(torch.float32))
+    torch.testing.assert_close(got.double(), light_lookup(*lookup_inputs()), rtol=1e-4, atol=1e-5)
+
+
+def test_many_points_agree_with_one_at_a_time_and_do_not_depend_on_threads():
+    inputs = lookup_inputs(torch.float32, 5000)
+    together = light_lookup(*inputs)
+    single = torch.cat([light_lookup(inputs[0][i : i + 1], inputs[1][i : i + 1], *inputs[2:]) for i in range(40)])
+    torch.testing.assert_close(together[:40], single, rtol=1e-6, atol=1e-6)
+    grad = torch.randn(5000, 3, generator=generator(4))
+    threads = torch.get_num_threads()
+    try:
+        results = []
+        for n in (1, 3):
+            torch.set_num_threads(n)
+            results.append(lib.light_lookup_backward(*inputs, grad))
+    finally:
+        torch.set_num_threads(threads)
+    for one, three in zip(*results):
+        assert torch.equal(one, three)
+
+
+def test_a_level_of_a_linear_function_is_read_at_its_texels():
+    directions, _, levels, *rest = lookup_inputs()
+    levels[:256] = octahedral_directions(16) + 2
+    got = light_lookup(octahedral_directions(16), torch.zeros(256, 1, dtype=torch.float64), levels, *rest)
+    torch.testing.assert_close(got, levels[:256], rtol=0, atol=1e-12)
+
+
+def test_the_lookup_is_continuous_across_every_seam_and_node():
+    *_, levels, sh, resolutions, nodes, zonal = lookup_inputs()
+    along = torch.linspace(-0.999, 0.999, 201, dtype=torch.float64)
+    zero, step = torch.zeros_like(along), 1e-7
+    poles = torch.tensor([[0.0, 0, 1], [0, 0, -1], [1, 0, 0], [0, -1, 0]], dtype=torch.float64)
+    bow = 1 - along**2
+    circles = [torch.stack(axes, -1) for axes in ((along, zero, bow), (zero, along, -bow), (along, bow, zero))]
+    points = unit(torch.cat([*circles, poles]))  # where octants meet; the lower ones are the square's own edges
+    for rho in (0.0, 0.1, 0.3):
+        roughness = torch.full((len(points), 1), rho, dtype=torch.float64)
+        rest = (levels, sh, resolutions, nodes, zonal)
+        at = light_lookup(points, roughness, *rest)
+        for offset in torch.eye(3, dtype=torch.float64):
+            for side in (-step, step):
+                near = light_lookup(unit(points + side * offset), roughness, *rest)
+                assert (near - at).abs().max() < 20 * step * 16
+    for node in NODES:
+        sides = [
+            light_lookup(points, torch.full_like(roughness, node + s), levels, sh, resolutions, nodes, zonal)
+            for s in (-1e-9, 1e-9)
+        ]
+        torch.testing.assert_close(*sides, rtol=1e-6, atol=1e-6)
+
+
+def test_solid_angles_are_those_of_the_sphere():
+    for n in (8, 64):
+        angles = torch.from_numpy(_core.octahedral_solid_angles(n))
+        assert angles.sum().item() == pytest.approx(4 * math.pi, rel=1e-12)
+        directions = octahedral_directions(n)
+        density = directions.abs().sum(1) ** 3 * 4 / n**2  # du dv / |p|^3 at the centre; folded texels differ most
+        torch.testing.assert_close(angles, density, rtol=2.5 / n, atol=0)
+        second = torch.einsum("n,ni,nj->ij", angles, directions, directions)
+        torch.testing.assert_close(second, torch.eye(3, dtype=torch.float64) * (4 * math.pi / 3), rtol=0, atol=20 / n**2)
+
+
+def test_four_texels_cover_the_one_that_they_halve():
+    coarse, fine = (torch.from_numpy(_core.octahedral_solid_angles(n)) for n in (8, 16))
+    torch.testing.assert_close(fine.view(8, 2, 8, 2).sum((1, 3)).flatten(), coarse, rtol=1e-10, atol=0)
+
+
+def test_averages_and_filters_keep_a_constant_and_the_total():
+    averages, angles = light_averages(16), torch.from_numpy(_core.octahedral_solid_angles(16))
+    ones = torch.ones(256, 3)
+    torch.testing.assert_close(sparse_product(averages, ones), torch.ones(320, 3), rtol=0, atol=1e-6)
+    light = torch.rand(256, 3, generator=generator(), dtype=torch.float64)
+    coarse = sparse_product(as_double(averages), light)[256:]
+    total = (coarse * torch.from_numpy(_core.octahedral_solid_angles(8))[:, None]).sum(0)
+    torch.testing.assert_close(total, (light * angles[:, None]).sum(0), rtol=1e-6, atol=0)
+    filters = light_filters(16, [(16, 0.2), (8, 0.4)])
+    torch.testing.assert_close(sparse_product(filters, torch.ones(320, 3)), torch.ones(320, 3), rtol=0, atol=1e-6)
+    assert (filters.weights > 0).all()
+
+
+def test_levels_are_interpolated_and_added():
+    matrix = as_double(light_sum_of_levels(16))
+    parameters = torch.zeros(16 + 64 + 256, 3, dtype=torch.float64)
+    parameters[:16], parameters[16:80], parameters[80:] = 1.0, 2.0, torch.rand(256, 3, generator=generator())
+    torch.testing.assert_close(sparse_product(matrix, parameters), parameters[80:] + 3.0, rtol=1e-6, atol=1e-6)
+
+
+def test_zonal_factors_of_the_cosine_lobe_and_of_all_lobes():
+    factors = zonal_factors(0.5, 65).double()
+    expected = torch.tensor([1, 2 / 3, 1 / 4, 0, -1 / 24, 0, 1 / 64], dtype=torch.float64)  # Lambert's
+    torch.testing.assert_close(factors[-1, :7], expected, rtol=0, atol=1e-6)
+    assert (factors[:, 0] == 1).all() and (factors[:-1, 1:3] > factors[1:, 1:3]).all()
+
+
+def test_the_projection_is_orthonormal_on_the_first_degrees():
+    projection = sh_projection(32, cells=False).double()
+    w = octahedral_directions(32)
+    x, y, z = w.unbind(1)
+    basis = [v * math.sqrt(k / (4 * math.pi)) for v, k in ((torch.ones_like(x), 1), (y, 3), (z, 3), (x, 3))]
+    got = torch.stack([projection[:4] @ b for b in basis], 1)
+    torch.testing.assert_close(got, torch.eye(4, dtype=torch.float64), rtol=0, atol=5e-3)
+    for n in (8, 16, 32):
+        for cells in (False, True):
+            totals = sh_projection(n, cells).double().sum(1)
+            assert totals[0].item() == pytest.approx(math.sqrt(4 * math.pi), rel=1e-6)
+            assert totals[1:].abs().max() < 2e-6
+
+
+def test_missing_gradients_raise():
+    inputs = lookup_inputs()
+    for index in (5, 6):
+        check_no_gradient(lib.light_lookup, inputs, index)
+    grad = torch.randn(18, 3, generator=generator(4), dtype=torch.float64)
+    for index in (0, 1, 2, 3, 7):
+        check_no_gradient(lib.light_lookup_backward, (*inputs, grad), index)
+    matrix = as_double(light_averages(8))
+    for index in (2, 5):
+        check_no_gradient(lib.sparse_product, (*matrix, torch.rand(64, 3, dtype=torch.float64)), index)
+
+
+def test_empty_batch_and_nan():
+    directions, roughness, *rest = lookup_inputs(torch.float32)
+    leaves = grad_leaves((directions[:0], roughness[:0], rest[0]), (0, 1, 2))
+    out = light_lookup(*leaves, *rest[1:])
+    out.sum().backward()
+    assert out.shape == (0, 3) and not leaves[2].grad.any()
+    bad = torch.full((1, 3), math.nan)
+    for rho in (0.0, 0.3, 0.45, 0.7):
+        assert light_lookup(bad, torch.full((1, 1), rho), *rest).isnan().all()
+    assert light_lookup(directions[:1], torch.full((1, 1), math.nan), *rest).isnan().all()
+
+
+def test_errors_name_what_is_wrong():
+    directions, roughness, levels, sh, resolutions, nodes, zonal = lookup_inputs(torch.float32)
+    call = lambda **k: light_lookup(**{**dict(  # noqa: E731
+        directions=directions, roughness=roughness, levels=levels, sh=sh, resolutions=resolutions, nodes=nodes,
+        zonal=zonal,
+    ), **k})  # fmt: skip
+    check_error(lambda: call(roughness=roughness[:, 0]), "light_lookup", "roughness", "[18, 1] float32", "[18]")
+    check_error(lambda: call(levels=levels[1:]), "light_lookup", "levels", "336", "335")
+    check_error(lambda: call(sh=sh[:100]), "light_lookup", "sh", "[169, 3]", "[100, 3]")
+    check_error(lambda: call(nodes=nodes.flip(0)), "light_lookup", "nodes must ascend")
+    check_error(lambda: call(nodes=nodes[1:]), "light_lookup", "nodes", "[4] float64", "[3]")
+    check_error(lambda: call(resolutions=resolutions[:0], nodes=nodes[:1]), "light_lookup", "levels")
+    matrix = light_averages(8)
+    check_error(lambda: sparse_product(matrix, torch.rand(63, 3)), "sparse_product", "transposed_offsets", "[64]")
+    check_error(lambda: light_averages(12), "light_averages", "power of 2", "12")
