@@ -11,6 +11,7 @@ import torch
 from splitnerf import losses
 from splitnerf.config import preset
 from splitnerf.fields import LightMlp, OcclusionHead, SdfField
+from splitnerf.fields.occlusion import OcclusionQuery
 from splitnerf.fields.sdf import sharpness, unit_normals
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec
 from splitnerf.render.model import SceneModel
@@ -114,8 +115,8 @@ class TestOcclusionHead:
             head = OcclusionHead(13, 16, 2, 1, directional)
             with torch.no_grad():
                 head.net[-1].weight.normal_()
-            _, a = head(features, directions, roughness)
-            _, b = head(features, -directions, roughness)
+            query = OcclusionQuery(features, None, None, directions, roughness)
+            a, b = head(query).specular, head(query._replace(lobe_dirs=-directions)).specular
             assert torch.equal(a, b) != directional
             assert ((a >= 0) & (a <= 1)).all()
 

@@ -79,8 +79,8 @@ def monte_carlo_colours(
     """Two independent estimates of the rays' colours, [n_rays, 3] sRGB as :attr:`RenderedRays.colour`.
 
     Each ray shades one of its samples, drawn by weight; the split sum, held fixed, stands in for the others (a control
-    variate). The gradient to the weights is that of the split sum's colours, the one to materials, normals and light
-    that of the Monte Carlo radiance.
+    variate). The gradient to the weights is that of the split sum's colours, the one to materials and light
+    that of the Monte Carlo radiance; to the normals none flows: its noise would roughen the surface.
     """
     weights = ray.weights[ray.shaded].detach()
     rays = ray.samples.ray_indices[ray.shaded]
@@ -95,7 +95,7 @@ def monte_carlo_colours(
     for _ in range(2):
         seed = int(torch.randint(1 << 31, (), generator=generator))
         radiance = monte_carlo_radiance(
-            model, scene, on_surface, ray.normals[drawn], view_dirs[rays], points.albedo[drawn], points.roughness[drawn],
+            model, scene, on_surface, ray.normals[drawn].detach(), view_dirs[rays], points.albedo[drawn], points.roughness[drawn],
             points.metallic[drawn], seed,
         )  # fmt: skip
         colours.append(linear_to_srgb(mean.index_add(0, rays, radiance - fixed)))
