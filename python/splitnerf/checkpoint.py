@@ -48,6 +48,10 @@ def load_checkpoint(path: Path) -> dict:
     return content
 
 
+# How runs were trained that were written before these settings existed.
+FIRST_SETTINGS = {"light": "mlp", "neutral_weight": 0.0}
+
+
 def config_of(content: dict) -> Config:
     """The settings of the run that wrote the checkpoint."""
-    return Config().replace(content["config"])
+    return Config().replace(FIRST_SETTINGS | content["config"])

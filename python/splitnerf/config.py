@@ -59,7 +59,7 @@ class Config:
     occlusion_width: int = 64
     occlusion_layers: int = 2
     initial_roughness: float = 0.3
-    light: str = "mlp"  # mlp (the paper) | pyramid
+    light: str = "pyramid"  # mlp (the paper) | pyramid
     light_resolution: int = 64  # texels along the edge of the pyramid's map, a power of 2
     light_width: int = 64
     light_layers: int = 3
@@ -98,7 +98,7 @@ class Config:
     metal_weight: float = 0.001
     metal_regulariser: bool = True
     mask_weight: float = 1.0
-    neutral_weight: float = 0.0  # of the diffuse light's log chroma
+    neutral_weight: float = 0.1  # of the diffuse light's log chroma
     neutral_queries: int = 256
     albedo_smoothness: float = 0.0  # of the albedo between neighbouring surface points
     gloss_smoothness: float = 0.0  # the same of roughness and metallic
@@ -202,7 +202,7 @@ class Config:
 
 # Section 4 and supplement of the paper; fractions stand for 20,000 steps.
 PAPER = dict(
-    preset="paper", steps=20000, n_levels=16, base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4,
+    preset="paper", light="mlp", neutral_weight=0.0, steps=20000, n_levels=16, base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4,
     levels_open_by=0.6, sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0, material_width=256, initial_roughness=0.5,
     head_inputs="outputs", occlusion_directional=False, occlusion_width=256, light_width=256, light_layers=5,
     light_direction_frequencies=10, light_roughness_frequencies=5, light_activation="softplus", fresnel_mode="paper",

@@ -40,7 +40,8 @@ def monte_carlo_colour_loss(
     materials would turn to whatever is less noisy. It can be negative.
     """
     truth = blended(target, background)
-    first, second = (over_background(colour, ray.opacity, target, background) - truth for colour in colours)
+    opacity = ray.opacity.detach()
+    first, second = (over_background(colour, opacity, target, background) - truth for colour in colours)
     return (first * second).mean()
 
 

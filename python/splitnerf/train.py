@@ -132,14 +132,15 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             background = torch.rand(n_rays, 3, generator=generator)
             jitter = torch.rand(n_rays, generator=generator)
             anneal = min(1.0, progress / c.cos_anneal_by) if c.cos_anneal_by > 0 else 1.0
-            ray = render_rays(model, grid.cells, rays_o, rays_d, jitter, anneal, sample_step(model))
+            finetune = progress >= c.finetune_from and scene is not None
+            ray = render_rays(
+                model, grid.cells, rays_o, rays_d, jitter, anneal, sample_step(model), fixed_materials=finetune
+            )
 
-            if progress >= c.finetune_from and scene is not None:
+            terms = {"colour": c.colour_weight * losses.colour_loss(ray, target, background)}
+            if finetune:
                 colours = monte_carlo_colours(model, scene, ray, -rays_d, generator)
-                colour = losses.monte_carlo_colour_loss(colours, ray, target, background)
-            else:
-                colour = losses.colour_loss(ray, target, background)
-            terms = {"colour": c.colour_weight * colour}
+                terms["finetune"] = c.colour_weight * losses.monte_carlo_colour_loss(colours, ray, target, background)
             gradients = ray.gradients
             if c.eikonal_points:
                 points = (torch.rand(c.eikonal_points, 3, generator=generator) * 2 - 1) * c.box

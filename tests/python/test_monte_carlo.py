@@ -95,3 +95,17 @@ def test_settings_that_do_not_fit_are_refused():
         Config().replace({"finetune_from": 0.8, "compositing": "srgb"})
     with pytest.raises(InputError, match="finetune_samples"):
         Config().replace({"finetune_samples": 0})
+
+
+def test_with_fixed_materials_the_colours_move_the_surface_alone():
+    scene = SceneModel(Config().replace({"n_levels": 2, "log2_table_size": 8}))
+    p = points(16)
+    field = scene.surface(p["positions"])
+    normals = field.gradient / field.gradient.norm(dim=1, keepdim=True)
+    shaded = scene.shade(
+        p["positions"], field.outputs, field.features, normals, p["view_dirs"], fixed_materials=True
+    )
+    parameters = list(scene.material.parameters())
+    found = torch.autograd.grad(shaded.radiance.sum(), [*parameters, scene.sdf_field.hidden_direction], retain_graph=True, allow_unused=True)
+    assert all(g is None for g in found[:-1]) and (found[-1] != 0).any()
+    assert all((g != 0).any() for g in torch.autograd.grad(shaded.albedo.sum(), parameters[-1:]))

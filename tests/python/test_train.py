@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 import torch
 
-from splitnerf.checkpoint import load_checkpoint
+from splitnerf.checkpoint import config_of, load_checkpoint
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
 from splitnerf.config import Config, parse_setting, preset
 from splitnerf.demo.scene import write_demo_dataset
@@ -297,3 +298,11 @@ def test_a_config_survives_its_file(tmp_path):
     (tmp_path / "config.toml").write_text("steps = [")
     with pytest.raises(InputError, match="config.toml"):
         Config.read(tmp_path / "config.toml")
+
+
+def test_runs_from_before_a_setting_keep_what_they_were_trained_with():
+    stored = dataclasses.asdict(Config())
+    assert config_of({"config": stored}) == Config()
+    for name in ("light", "neutral_weight"):
+        del stored[name]
+    assert config_of({"config": stored}) == Config().replace({"light": "mlp", "neutral_weight": 0.0})

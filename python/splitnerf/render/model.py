@@ -118,7 +118,14 @@ class SceneModel(nn.Module):
         return torch.cat([outputs, positions, features], dim=1)
 
     def shade(
-        self, positions: Tensor, outputs: Tensor, features: Tensor, normals: Tensor, view_dirs: Tensor
+        self,
+        positions: Tensor,
+        outputs: Tensor,
+        features: Tensor,
+        normals: Tensor,
+        view_dirs: Tensor,
+        *,
+        fixed_materials: bool = False,
     ) -> ShadedPoints:
         """Outgoing radiance of points towards the camera.
 
@@ -126,12 +133,14 @@ class SceneModel(nn.Module):
             positions: [n, 3].
             outputs, features: [n, 13] and [n, C] of the SDF there.
             normals, view_dirs: [n, 3] unit; view_dirs point to the camera.
+            fixed_materials: No gradient flows from the radiance to the materials, which are returned with theirs.
 
         Source: SplitNeRF Eq. (6)-(10), (17).
         """
         c = self.config
         inputs = self.head_inputs(positions, outputs, features)
-        albedo, roughness, metallic = self.material(inputs)
+        materials = self.material(inputs)
+        albedo, roughness, metallic = (m.detach() for m in materials) if fixed_materials else materials
         lobe_dirs = query_direction(normals, view_dirs, roughness, c.query)
         n = len(normals)
         facing = torch.where((normals * view_dirs).sum(-1, keepdim=True) < 0, -normals, normals)
@@ -147,7 +156,7 @@ class SceneModel(nn.Module):
             normals, view_dirs, albedo, roughness, metallic, light_s, light_d, factor_s, factor_d,
             c.fresnel_mode, c.compensate,
         )  # fmt: skip
-        return ShadedPoints(radiance, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, lobe_dirs)
+        return ShadedPoints(radiance, *materials, occlusion.diffuse, occlusion.specular, lobe_dirs)
 
     def occlusion_factors(
         self, inputs: Tensor, positions: Tensor, normals: Tensor, lobe_dirs: Tensor, roughness: Tensor

@@ -79,8 +79,8 @@ def monte_carlo_colours(
     """Two independent estimates of the rays' colours, [n_rays, 3] sRGB as :attr:`RenderedRays.colour`.
 
     Each ray shades one of its samples, drawn by weight; the split sum, held fixed, stands in for the others (a control
-    variate). The gradient to the weights is that of the split sum's colours, the one to materials and light
-    that of the Monte Carlo radiance; to the normals none flows: its noise would roughen the surface.
+    variate). The gradient flows to materials and light alone: the surface would be roughened by its noise, and follows
+    the split sum's colours instead.
     """
     weights = ray.weights[ray.shaded].detach()
     rays = ray.samples.ray_indices[ray.shaded]
@@ -90,7 +90,8 @@ def monte_carlo_colours(
     rays, points = rays[drawn], ray.points
     on_surface = (ray.positions[drawn] - ray.normals[drawn] * ray.sdf[drawn, None]).detach()
     fixed = points.radiance[drawn].detach()
-    mean = composite(ray.weights, ray.values.detach(), ray.samples.offsets) / ray.opacity.clamp(min=MIN_OPACITY)[:, None]
+    opacity = ray.opacity.detach().clamp(min=MIN_OPACITY)[:, None]
+    mean = composite(ray.weights.detach(), ray.values.detach(), ray.samples.offsets) / opacity
     colours = []
     for _ in range(2):
         seed = int(torch.randint(1 << 31, (), generator=generator))

@@ -58,7 +58,15 @@ def annealed_cosine(cosine: Tensor, anneal: float) -> Tensor:
 
 
 def render_rays(
-    model: SceneModel, cells: Tensor, rays_o: Tensor, rays_d: Tensor, jitter: Tensor, anneal: float, step: float
+    model: SceneModel,
+    cells: Tensor,
+    rays_o: Tensor,
+    rays_d: Tensor,
+    jitter: Tensor,
+    anneal: float,
+    step: float,
+    *,
+    fixed_materials: bool = False,
 ) -> RenderedRays:
     """Renders rays through the occupied cells.
 
@@ -69,6 +77,7 @@ def render_rays(
         jitter: [n_rays] in [0, 1).
         anneal: Of the cosine, 0 at the start, 1 when done.
         step: Length of a sample.
+        fixed_materials: The colours have a gradient to surface and light alone.
 
     Source: SplitNeRF Eq. (1)-(2), (17).
     """
@@ -84,7 +93,8 @@ def render_rays(
 
     shaded = (weights.detach() > c.shade_above).nonzero().squeeze(1) if c.shade_above > 0 else torch.arange(len(weights))
     points = model.shade(
-        positions[shaded], field.outputs[shaded], field.features[shaded], normals[shaded], -directions[shaded]
+        positions[shaded], field.outputs[shaded], field.features[shaded], normals[shaded], -directions[shaded],
+        fixed_materials=fixed_materials,
     )
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values = _fill_skipped(radiance, shaded, weights, samples)
