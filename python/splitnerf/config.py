@@ -53,7 +53,7 @@ class Config:
     material_width: int = 64
     material_layers: int = 2
     head_inputs: str = "grid"  # outputs: the SDF's outputs (the paper) | grid: the hash features as well
-    occlusion: str = "mlp"  # mlp | bits (cached on the mesh) | off
+    occlusion: str = "bits"  # mlp | bits (cached on the mesh) | off
     occlusion_channels: int = 1
     occlusion_directional: bool = True  # o_s as a function of the reflection; false: of position alone (the paper)
     occlusion_width: int = 64
@@ -98,7 +98,7 @@ class Config:
     metal_weight: float = 0.001
     metal_regulariser: bool = True
     mask_weight: float = 1.0
-    neutral_weight: float = 0.1  # of the diffuse light's log chroma
+    neutral_weight: float = 0.03  # of the diffuse light's log chroma
     neutral_queries: int = 256
     albedo_smoothness: float = 0.0  # of the albedo between neighbouring surface points
     gloss_smoothness: float = 0.0  # the same of roughness and metallic
@@ -119,7 +119,7 @@ class Config:
     occlusion_offset: float = 0.0125
     environment_height: int = 32
     occlusion_directions: int = 256  # of the bits; a multiple of 32
-    indirect: bool = False  # light from the object itself, by the bits
+    indirect: bool = True  # with bits: light from the object itself
     indirect_every: int = 200  # steps between refreshes of what the mesh sends out
 
     # Optimiser.
@@ -170,8 +170,6 @@ class Config:
             raise InputError(
                 f"occlusion_directions must be a multiple of 32 in 64 to 1024, got {self.occlusion_directions}"
             )
-        if self.indirect and self.occlusion != "bits":
-            raise InputError(f'indirect needs occlusion = "bits", got {self.occlusion!r}')
         if self.indirect_every < 1:
             raise InputError(f"indirect_every must be at least 1, got {self.indirect_every}")
         if self.steps < 1:
@@ -202,7 +200,8 @@ class Config:
 
 # Section 4 and supplement of the paper; fractions stand for 20,000 steps.
 PAPER = dict(
-    preset="paper", light="mlp", neutral_weight=0.0, steps=20000, n_levels=16, base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4,
+    preset="paper", light="mlp", occlusion="mlp", indirect=False, neutral_weight=0.0, steps=20000, n_levels=16,
+    base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4,
     levels_open_by=0.6, sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0, material_width=256, initial_roughness=0.5,
     head_inputs="outputs", occlusion_directional=False, occlusion_width=256, light_width=256, light_layers=5,
     light_direction_frequencies=10, light_roughness_frequencies=5, light_activation="softplus", fresnel_mode="paper",

@@ -193,8 +193,7 @@ def sphere_model() -> tuple[SceneModel, OccupancyGrid]:
     field = model.sdf_field
     with torch.no_grad():
         model.variance.fill_(0.55)
-        model.light.out.weight.zero_()
-        model.light.out.bias.zero_()  # exp(0) = 1
+        model.light.texels.zero_()  # exp(0) = 1
         # |x| as the mean of |w.x| over many directions: exact up to the spread of the random rows.
         lattice = torch.nn.functional.normalize(torch.randn(512, 3), dim=1)
         field.hidden_direction.zero_()

@@ -106,7 +106,7 @@ def test_without_a_mesh_nothing_is_occluded():
 
 @pytest.mark.parametrize("settings", [
     {"occlusion": "bits", "occlusion_directions": 250}, {"occlusion": "bits", "occlusion_directions": 2048},
-    {"indirect": True}, {"occlusion": "bits", "indirect": True, "indirect_every": 0},
+    {"indirect_every": 0},
 ])  # fmt: skip
 def test_settings_of_the_bits_are_checked(settings):
     with pytest.raises(InputError, match="occlusion_directions|indirect"):

@@ -18,9 +18,9 @@ PAPER: dict[str, dict[str, object]] = {
 }
 SWITCHES: dict[str, dict[str, object]] = {
     "MLP light": {"light": "mlp"},
-    "no occlusion": {"occlusion": "off", "indirect": False},
-    "occlusion by MLP": {"occlusion": "mlp", "indirect": False},
-    "occlusion by MLP, of position alone": {"occlusion": "mlp", "indirect": False, "occlusion_directional": False},
+    "no occlusion": {"occlusion": "off"},
+    "occlusion by MLP": {"occlusion": "mlp"},
+    "occlusion by MLP, of position alone": {"occlusion": "mlp", "occlusion_directional": False},
     "occlusion by bits": {"occlusion": "bits", "indirect": False},
     "occlusion by bits, indirect light": {"occlusion": "bits", "indirect": True},
     "Fresnel as in the paper": {"fresnel_mode": "paper"},
