@@ -18,6 +18,7 @@ namespace py = pybind11;
 PYBIND11_MODULE(_core, m) {
   m.doc() = "Embree scenes, the path tracer, marching cubes and build information of SplitNeRF.";
 
+  m.attr("DIELECTRIC_F0") = splitnerf::kDielectricF0;
   m.def(
       "hash_grid_levels",
       [](int64_t n_levels, int64_t n_features, int64_t base_resolution, double growth, int64_t log2_table_size) {

@@ -7,11 +7,10 @@ import math
 import torch
 from torch import Tensor
 
+from splitnerf import _core
 from splitnerf.ops import MeshScene, composite, monte_carlo_light, sample_bsdf, split_sum_shade, trace_visibility
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import MIN_OPACITY, RenderedRays, linear_to_srgb
-
-DIELECTRIC_F0 = 0.04
 
 
 def monte_carlo_radiance(
@@ -63,7 +62,7 @@ def monte_carlo_radiance(
             normals, view_dirs, albedo, roughness, metallic, specular * one, diffuse * one, one, one, "exact", compensate
         )
 
-    f0 = DIELECTRIC_F0 * (1.0 - metallic) + metallic * albedo
+    f0 = _core.DIELECTRIC_F0 * (1.0 - metallic) + metallic * albedo
     gain = shade(1.0, 0.0, c.compensate) / shade(1.0, 0.0, False)
     return gain * (f0 * (sums.specular - sums.grazing) + sums.grazing) + shade(0.0, 1.0, c.compensate) * sums.diffuse
 
