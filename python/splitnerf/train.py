@@ -122,8 +122,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             if (model.occlusion is not None or c.finetune_from < 1) and progress - meshed_at >= c.mesh_every:
                 meshed_at = progress
                 scene, mesh = remesh(model, c, scene, mesh)
-            if scene is not None and (environment is None or step % ENVIRONMENT_EVERY == 0):
+            if scene is not None and c.occlusion == "mlp" and (environment is None or step % ENVIRONMENT_EVERY == 0):
                 environment = model.light.panorama(c.environment_height)
+            if scene is not None and step % ENVIRONMENT_EVERY == 0:
                 model.refresh_light()
             if c.indirect and scene is not None and step % c.indirect_every == 0:
                 model.refresh_indirect()

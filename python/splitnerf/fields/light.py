@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import abc
+
 import torch
 from torch import Tensor, nn
 
 from splitnerf import _core
 
 
-class Light(nn.Module):
+class Light(nn.Module, abc.ABC):
     """The pre-integrated light g(w, rho): the environment filtered by the lobe of roughness rho.
 
     g(w, 0) is the environment itself and g(n, 1) the irradiance over pi. A subclass defines
@@ -23,9 +25,9 @@ class Light(nn.Module):
 
     needs_consistency_loss = True
 
+    @abc.abstractmethod
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
-        raise NotImplementedError
 
     @torch.no_grad()
     def panorama(self, height: int, roughness: float = 0.0) -> Tensor:
