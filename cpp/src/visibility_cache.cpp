@@ -110,19 +110,32 @@ template <class T> class CacheReader {
       return result;
     }
     const Neighbours<T> near = find_neighbours(cache_.grids, position, normal);
-    kernels<T>().visibility_horizon(directions_, &normal.x, cosine_.data(), above_.data());
-    if (all_open(near)) return result;
+    if (!look(near, normal)) return result;
 
-    const uint32_t* bits[kMaxNeighbours];
-    for (int k = 0; k < near.n; ++k) bits[k] = words(near.vertex[k]);
     const T alpha = cached_lobe_alpha(roughness, static_cast<int>(cache_.n_directions));
-    const VisibilityPoint<T> point{bits, near.weight, near.n, cosine_.data(), &lobe_dir.x, alpha * alpha};
     T sums[14];
-    kernels<T>().visibility_sums(directions_, point, known_.data(), visible_.data(), lobe_.data(), sums);
+    kernels<T>().visibility_sums(directions_, {cosine_.data(), &lobe_dir.x, alpha * alpha}, visible_.data(),
+                                 lobe_.data(), sums);
     result.occlusion_d = ratio(sums, sums + 3);
     result.occlusion_s = ratio(sums + 7, sums + 10);
     if (cache_.hits) add_indirect(near, sums[6], sums[13], result);
     return result;
+  }
+
+  // V_i [n_directions] and, with hits, (1 - V_i) C_i [n_directions, 3].
+  void read_directions(Vec3<T> position, Vec3<T> normal, T* visible, T* arriving) {
+    const bool finite = std::isfinite(sum(position) + sum(normal));
+    const T nan = std::numeric_limits<T>::quiet_NaN();
+    std::fill(visible, visible + cache_.n_directions, finite ? T(1) : nan);
+    if (cache_.hits) std::fill(arriving, arriving + 3 * cache_.n_directions, finite ? T(0) : nan);
+    if (!finite) return;
+    const Neighbours<T> near = find_neighbours(cache_.grids, position, normal);
+    if (!look(near, normal)) return;
+    std::copy(visible_.begin(), visible_.end(), visible);
+    if (!cache_.hits) return;
+    for_each_blocked(near, [&](int k, int64_t i, Vec3<T> sent) {
+      store3(arriving + 3 * i, load3(arriving + 3 * i) + sent * near.weight[k]);
+    });
   }
 
  private:
@@ -138,24 +151,37 @@ template <class T> class CacheReader {
     return blocked == 0;
   }
 
-  // sum (1 - V_i) C_i c_i / sum c_i over both kernels. Few directions above the horizon are blocked: they are taken
-  // one by one.
-  void add_indirect(const Neighbours<T>& near, T total_d, T total_s, Result& result) const {
+  // Takes the shares of the neighbours together; false where they block nothing.
+  bool look(const Neighbours<T>& near, Vec3<T> normal) {
+    kernels<T>().visibility_horizon(directions_, &normal.x, cosine_.data(), above_.data());
+    if (all_open(near)) return false;
+    const uint32_t* bits[kMaxNeighbours];
+    for (int k = 0; k < near.n; ++k) bits[k] = words(near.vertex[k]);
+    kernels<T>().visibility_shares(cache_.n_directions, {bits, near.weight, near.n}, known_.data(), visible_.data());
+    return true;
+  }
+
+  // visit(neighbour, direction, what the hit vertex sends over the weight of those that know the direction). Few
+  // directions above the horizon are blocked: they are taken one by one.
+  template <class Visit> void for_each_blocked(const Neighbours<T>& near, Visit&& visit) const {
     for (int k = 0; k < near.n; ++k) {
       const int32_t* hits = cache_.hits + int64_t(near.vertex[k]) * cache_.n_directions;
-      Vec3<T> d{T(0), T(0), T(0)}, s{T(0), T(0), T(0)};
       for (int64_t word = 0; word < n_words_; ++word) {
         for (uint32_t blocked = blocked_words(near.vertex[k])[word] & above_[word]; blocked; blocked &= blocked - 1) {
           const int64_t i = word * kBitsPerWord + lowest_bit(blocked);
           if (hits[i] < 0 || hits[i] >= cache_.grids.n_vertices) continue;
-          const Vec3<T> arriving = load3(cache_.radiance + 3 * int64_t(hits[i])) / known_[i];
-          d += arriving * cosine_[i];
-          s += arriving * lobe_[i];
+          visit(k, i, load3(cache_.radiance + 3 * int64_t(hits[i])) / known_[i]);
         }
       }
-      if (total_d > T(0)) result.indirect_d += d * (near.weight[k] / total_d);
-      if (total_s > T(0)) result.indirect_s += s * (near.weight[k] / total_s);
     }
+  }
+
+  // sum (1 - V_i) C_i c_i / sum c_i over both kernels.
+  void add_indirect(const Neighbours<T>& near, T total_d, T total_s, Result& result) const {
+    for_each_blocked(near, [&](int k, int64_t i, Vec3<T> sent) {
+      if (total_d > T(0)) result.indirect_d += sent * (cosine_[i] * near.weight[k] / total_d);
+      if (total_s > T(0)) result.indirect_s += sent * (lobe_[i] * near.weight[k] / total_s);
+    });
   }
 
   const VisibilityCache<T>& cache_;
@@ -192,10 +218,27 @@ void cached_occlusion(const VisibilityCache<T>& cache, int64_t n, const T* posit
   });
 }
 
+template <class T>
+void cached_visibility(const VisibilityCache<T>& cache, int64_t n, const T* positions, const T* normals, T* visible,
+                       T* arriving) {
+  const Planes<T> direction(cache.directions, cache.n_directions);
+  const LobeSide<T> directions{direction.x.data(), direction.y.data(), direction.z.data(), nullptr,
+                               nullptr,            nullptr,            nullptr,            cache.n_directions};
+  const int64_t k = cache.n_directions;
+  parallel_for(n, kPointGrain, [&](int64_t begin, int64_t end) {
+    CacheReader<T> reader(cache, directions);
+    for (int64_t i = begin; i < end; ++i) {
+      reader.read_directions(load3(positions + 3 * i), load3(normals + 3 * i), visible + k * i,
+                             cache.hits ? arriving + 3 * k * i : nullptr);
+    }
+  });
+}
+
 #define SPLITNERF_INSTANTIATE(T)                                                                                      \
   template void build_vertex_grids<T>(int64_t, const T*, T, int, int64_t, int32_t*, int32_t*);                        \
   template void cached_occlusion<T>(const VisibilityCache<T>&, int64_t, const T*, const T*, const T*, const T*, T*,   \
-                                    T*, T*, T*);
+                                    T*, T*, T*);                                                                      \
+  template void cached_visibility<T>(const VisibilityCache<T>&, int64_t, const T*, const T*, T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

@@ -54,6 +54,45 @@ void check_indices(const char* op, const char* name, const Tensor& t, int64_t hi
   require(fits, op, std::string(name) + " must hold numbers in [0, " + std::to_string(high) + ")");
 }
 
+// The cache as both readers take it.
+struct Cache {
+  ScalarType type;
+  Tensor vertices, normals, starts, order, bits, hits, radiance, directions;
+  double radius;
+
+  Cache(const char* op, ScalarType type, const Tensor& v, const Tensor& vn, const Tensor& s, const Tensor& o, double r,
+        const Tensor& b, const Tensor& h, const Tensor& c, const Tensor& w)
+      : type(type),
+        vertices(checked(op, "vertices", v, {kAny, 3}, type)),
+        normals(checked(op, "vertex_normals", vn, {vertices.size(0), 3}, type)),
+        starts(checked(op, "starts", s, {kAny, kAny}, ScalarType::Int)),
+        order(checked(op, "order", o, {starts.size(0), vertices.size(0)}, ScalarType::Int)),
+        bits(checked(op, "bits", b, {vertices.size(0), 2, kAny}, ScalarType::Int)),
+        hits(checked(op, "hits", h, {vertices.size(0), kAny}, ScalarType::Int)),
+        radiance(checked(op, "radiance", c, {indirect() ? vertices.size(0) : 0, 3}, type)),
+        directions(checked(op, "directions", w, {kAny, 3}, type)),
+        radius(r) {
+    check_directions(op, n_directions());
+    checked(op, "bits", bits, {vertices.size(0), 2, n_directions() / kBitsPerWord}, ScalarType::Int);
+    if (indirect()) checked(op, "hits", hits, {vertices.size(0), n_directions()}, ScalarType::Int);
+    require(n_buckets() > 0 && (n_buckets() & (n_buckets() - 1)) == 0 && radius > 0, op,
+            "starts must be [levels, 2^k + 1] and radius positive");
+    check_indices(op, "starts", starts, vertices.size(0) + 1);
+    check_indices(op, "order", order, vertices.size(0));
+  }
+
+  bool indirect() const { return hits.size(1) > 0; }
+  int64_t n_directions() const { return directions.size(0); }
+  int64_t n_buckets() const { return starts.size(1) - 1; }
+
+  template <class T> cpu::VisibilityCache<T> get(const T* light) const {
+    return {{in<T>(vertices), in<T>(normals), in<int32_t>(starts), in<int32_t>(order), vertices.size(0), n_buckets(),
+             static_cast<int>(starts.size(0)), T(radius)},
+            in<uint32_t>(bits), indirect() ? in<int32_t>(hits) : nullptr, in<T>(radiance), n_directions(),
+            in<T>(directions), light};
+  }
+};
+
 std::tuple<Tensor, Tensor, Tensor, Tensor> cached_occlusion(Tensor positions, Tensor normals, Tensor lobe_dirs,
                                                             Tensor roughness, Tensor vertices, Tensor vertex_normals,
                                                             Tensor starts, Tensor order, double radius, Tensor bits,
@@ -65,36 +104,34 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> cached_occlusion(Tensor positions, Te
   const Tensor n = checked(op, "normals", normals, {x.size(0), 3}, type);
   const Tensor d = checked(op, "lobe_dirs", lobe_dirs, {x.size(0), 3}, type);
   const Tensor rho = checked(op, "roughness", roughness, {x.size(0), 1}, type);
-  const Tensor v = checked(op, "vertices", vertices, {kAny, 3}, type);
-  const int64_t n_vertices = v.size(0);
-  const Tensor vn = checked(op, "vertex_normals", vertex_normals, {n_vertices, 3}, type);
-  const Tensor s = checked(op, "starts", starts, {kAny, kAny}, ScalarType::Int);
-  const Tensor o = checked(op, "order", order, {s.size(0), n_vertices}, ScalarType::Int);
-  const Tensor w = checked(op, "directions", directions, {kAny, 3}, type);
-  check_directions(op, w.size(0));
-  const Tensor l = checked(op, "light", light, {w.size(0), 3}, type);
-  const Tensor b = checked(op, "bits", bits, {n_vertices, 2, w.size(0) / kBitsPerWord}, ScalarType::Int);
-  const bool indirect = hits.dim() == 2 && hits.size(1) > 0;
-  const Tensor h = checked(op, "hits", hits, {n_vertices, indirect ? w.size(0) : 0}, ScalarType::Int);
-  const Tensor c = checked(op, "radiance", radiance, {indirect ? n_vertices : 0, 3}, type);
-  const int64_t n_buckets = s.size(1) - 1;
-  require(n_buckets > 0 && (n_buckets & (n_buckets - 1)) == 0 && radius > 0, op,
-          "starts must be [levels, 2^k + 1] and radius positive");
-  check_indices(op, "starts", s, n_vertices + 1);
-  check_indices(op, "order", o, n_vertices);
+  const Cache cache(op, type, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions);
+  const Tensor l = checked(op, "light", light, {cache.n_directions(), 3}, type);
   Tensor o_d = empty_like_type(x, {x.size(0), 3}, type), o_s = empty_like_type(x, {x.size(0), 3}, type);
-  Tensor i_d = empty_like_type(x, {indirect ? x.size(0) : 0, 3}, type);
-  Tensor i_s = empty_like_type(x, {indirect ? x.size(0) : 0, 3}, type);
+  Tensor i_d = empty_like_type(x, {cache.indirect() ? x.size(0) : 0, 3}, type);
+  Tensor i_s = empty_like_type(x, {cache.indirect() ? x.size(0) : 0, 3}, type);
   dispatch_real(type, [&](auto zero) {
     using T = decltype(zero);
-    const cpu::VisibilityCache<T> cache{
-        {in<T>(v), in<T>(vn), in<int32_t>(s), in<int32_t>(o), n_vertices, n_buckets, static_cast<int>(s.size(0)),
-         T(radius)},
-        in<uint32_t>(b), indirect ? in<int32_t>(h) : nullptr, in<T>(c), w.size(0), in<T>(w), in<T>(l)};
-    cpu::cached_occlusion(cache, x.size(0), in<T>(x), in<T>(n), in<T>(d), in<T>(rho), out<T>(o_d), out<T>(o_s),
-                          out<T>(i_d), out<T>(i_s));
+    cpu::cached_occlusion(cache.get(in<T>(l)), x.size(0), in<T>(x), in<T>(n), in<T>(d), in<T>(rho), out<T>(o_d),
+                          out<T>(o_s), out<T>(i_d), out<T>(i_s));
   });
   return {o_d, o_s, i_d, i_s};
+}
+
+std::tuple<Tensor, Tensor> cached_visibility(Tensor positions, Tensor normals, Tensor vertices, Tensor vertex_normals,
+                                             Tensor starts, Tensor order, double radius, Tensor bits, Tensor hits,
+                                             Tensor radiance, Tensor directions) {
+  const char* op = "cached_visibility";
+  const ScalarType type = real_type(op, "positions", positions);
+  const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
+  const Tensor n = checked(op, "normals", normals, {x.size(0), 3}, type);
+  const Cache cache(op, type, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions);
+  Tensor visible = empty_like_type(x, {x.size(0), cache.n_directions()}, type);
+  Tensor arriving = empty_like_type(x, {cache.indirect() ? x.size(0) : 0, cache.n_directions(), 3}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::cached_visibility(cache.get<T>(nullptr), x.size(0), in<T>(x), in<T>(n), out<T>(visible), out<T>(arriving));
+  });
+  return {visible, arriving};
 }
 
 }  // namespace
@@ -106,12 +143,16 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("cached_occlusion(Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, Tensor vertices, "
         "Tensor vertex_normals, Tensor starts, Tensor order, float radius, Tensor bits, Tensor hits, Tensor radiance, "
         "Tensor directions, Tensor light) -> (Tensor, Tensor, Tensor, Tensor)");
+  m.def("cached_visibility(Tensor positions, Tensor normals, Tensor vertices, Tensor vertex_normals, Tensor starts, "
+        "Tensor order, float radius, Tensor bits, Tensor hits, Tensor radiance, Tensor directions) -> "
+        "(Tensor, Tensor)");
 }
 
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
   m.impl("visibility_bits", TORCH_BOX(&visibility_bits));
   m.impl("vertex_grids", TORCH_BOX(&vertex_grids));
   m.impl("cached_occlusion", TORCH_BOX(&cached_occlusion));
+  m.impl("cached_visibility", TORCH_BOX(&cached_visibility));
 }
 
 }  // namespace splitnerf::glue

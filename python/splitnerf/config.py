@@ -35,10 +35,10 @@ class Config:
     box: float = 1.5
 
     # Surface: hash grid, progressive levels, one hidden layer.
-    n_levels: int = 10
+    n_levels: int = 9
     n_features: int = 2
     base_resolution: int = 16
-    growth: float = 1.4697344922755988  # 16 to 512 cells along an edge
+    growth: float = 1.4697344922755988  # 16 to 348 cells along an edge
     log2_table_size: int = 16
     start_levels: int = 4
     levels_open_by: float = 0.4  # the finest level opens at this fraction
@@ -54,18 +54,19 @@ class Config:
     material_layers: int = 2
     head_inputs: str = "grid"  # outputs: the SDF's outputs (the paper) | grid: the hash features as well
     occlusion: str = "bits"  # mlp | bits (cached on the mesh) | off
-    occlusion_channels: int = 1
+    occlusion_channels: int = 3
     occlusion_directional: bool = True  # o_s as a function of the reflection; false: of position alone (the paper)
     occlusion_width: int = 64
     occlusion_layers: int = 2
     initial_roughness: float = 0.3
     light: str = "pyramid"  # mlp (the paper) | pyramid
-    light_resolution: int = 64  # texels along the edge of the pyramid's map, a power of 2
+    light_resolution: int = 128  # texels along the edge of the pyramid's map, a power of 2
     light_width: int = 64
     light_layers: int = 3
     light_direction_frequencies: int = 6
     light_roughness_frequencies: int = 3
     light_activation: str = "exp"  # softplus (the paper) | exp
+    shading: str = "summed"  # split (the paper) | summed (over the bits' directions, where lobes are wide)
     fresnel_mode: str = "exact"  # exact | paper | code
     query: str = "mean"  # mean | reflection (the paper)
     compensate: bool = True  # multiple-scattering compensation, as Blender has it
@@ -97,11 +98,16 @@ class Config:
     eikonal_weight: float = 3.0
     metal_weight: float = 0.001
     metal_regulariser: bool = True
+    dark_metal_weight: float = 0.03  # of metals that reflect less than any does
     mask_weight: float = 1.0
     neutral_weight: float = 0.03  # of the diffuse light's log chroma
+    entropy_weight: float = 0.003  # of the materials' quadratic entropy
+    entropy_from: float = 0.5  # the fraction at which it begins
+    entropy_points: int = 384
+    albedo_width: float = 0.3  # log albedos this close count as one
+    gloss_width: float = 0.2
     neutral_queries: int = 256
-    albedo_smoothness: float = 0.0  # of the albedo between neighbouring surface points
-    gloss_smoothness: float = 0.0  # the same of roughness and metallic
+    normal_smoothness: float = 0.01  # of the normals between neighbouring surface points
     smoothness_points: int = 1024
     smoothness_radius: float = 0.02  # scene units, one standard deviation
     light_samples: int = 2048
@@ -127,7 +133,7 @@ class Config:
     variance_learning_rate: float = 0.001
     light_learning_rate: float = 0.02  # of the pyramid's texels; the MLP has learning_rate
     warmup_steps: int = 100
-    final_learning_rate: float = 0.1  # factor at the end
+    final_learning_rate: float = 0.02  # factor at the end
     weight_decay: float = 0.01
 
     # Output.
@@ -146,6 +152,7 @@ class Config:
             "occlusion_channels": (1, 3),
             "light": ("mlp", "pyramid"),
             "light_activation": ("softplus", "exp"),
+            "shading": ("split", "summed"),
             "fresnel_mode": ("exact", "paper", "code"),
             "query": ("mean", "reflection"),
             "compositing": ("linear", "srgb"),
@@ -162,6 +169,8 @@ class Config:
                 raise InputError(f"{key} must be at least {MIN_EXPORT_SIZE}, got {getattr(self, key)}")
         if not 16 <= self.light_resolution <= 1024 or self.light_resolution & (self.light_resolution - 1):
             raise InputError(f"light_resolution must be a power of 2 in [16, 1024], got {self.light_resolution}")
+        if self.shading == "summed" and (self.occlusion != "bits" or self.compositing != "linear"):
+            raise InputError("shading = summed needs occlusion = bits and compositing = linear; set shading=split")
         if self.finetune_from < 1 and self.compositing != "linear":
             raise InputError("finetune_from below 1 needs compositing = linear")
         if self.finetune_samples < 1:
@@ -200,7 +209,7 @@ class Config:
 
 # Section 4 and supplement of the paper; fractions stand for 20,000 steps.
 PAPER = dict(
-    preset="paper", light="mlp", occlusion="mlp", indirect=False, neutral_weight=0.0, steps=20000, n_levels=16,
+    preset="paper", shading="split", dark_metal_weight=0.0, entropy_weight=0.0, normal_smoothness=0.0, final_learning_rate=0.1, light="mlp", occlusion="mlp", occlusion_channels=1, indirect=False, neutral_weight=0.0, steps=20000, n_levels=16,
     base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4,
     levels_open_by=0.6, sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0, material_width=256, initial_roughness=0.5,
     head_inputs="outputs", occlusion_directional=False, occlusion_width=256, light_width=256, light_layers=5,

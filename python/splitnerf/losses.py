@@ -8,11 +8,14 @@ from torch.nn import functional as F
 
 from splitnerf.config import Config
 from splitnerf.fields import Light
+from splitnerf.fields.sdf import unit_normals
 from splitnerf.ops import MeshScene, fibonacci_directions, occlusion_factors, prefilter_light, sample_ggx_lobe
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
 
 SATURATED = 254.0 / 255.0
+DARKEST_METAL = 0.4  # normal reflectance
+ALBEDO_FLOOR = 0.01  # below it albedos count as one black
 
 
 def colour_loss(ray: RenderedRays, target: Tensor, background: Tensor) -> Tensor:
@@ -72,6 +75,17 @@ def metal_loss(ray: RenderedRays) -> Tensor:
     return (weights[:, None] * ray.points.metallic.square()).mean()
 
 
+def dark_metal_loss(ray: RenderedRays) -> Tensor:
+    """Mean w m (1 - F0 / .4)+ of the shaded samples, F0 the brightest channel of the albedo, taken as given.
+
+    A dark metal and a black dielectric of F0 = .04 look nearly alike, and there are no dark metals: the common ones
+    reflect half of the light and more (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
+    """
+    weights, points = ray.weights[ray.shaded].detach(), ray.points
+    brightest = points.albedo.detach().amax(dim=1, keepdim=True)
+    return (weights[:, None] * points.metallic * (1.0 - brightest / DARKEST_METAL).clamp(min=0.0)).mean()
+
+
 def light_loss(light: Light, config: Config, generator: torch.Generator, seed: int) -> Tensor:
     """Distance of g(w, rho) from the Monte Carlo integral of g(w, 0), for random directions and roughness.
 
@@ -111,29 +125,45 @@ def neutral_light_loss(light: Light, config: Config, generator: torch.Generator)
     return (log_light - log_light.mean(1, keepdim=True)).square().mean()
 
 
-def smoothness_loss(model: SceneModel, ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:
-    """Mean absolute difference of the materials between surface points and neighbours on their tangent planes.
+def normal_smoothness_loss(model: SceneModel, ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:
+    """Mean distance of the unit normals of surface points from those of neighbours on their tangent planes.
 
-    Shading changes with the normal, and materials in steps or not at all: of the ways to split an image into light and
-    materials this prefers the one whose materials change least. Albedo is compared by its square root.
+    Of the surfaces that explain the images this prefers the one that wavers least: the distance adds up to the same
+    along a smooth bend and along a sharp edge, so that edges stay.
     """
     c = config
     m = len(ray.shaded)
     if m == 0:
         return torch.zeros(())
     chosen = torch.randint(m, (min(m, c.smoothness_points),), generator=generator)
-    normals = ray.normals[chosen].detach()
+    normals = ray.normals[chosen]
+    across = normals.detach()
     shift = c.smoothness_radius * torch.randn(len(chosen), 3, generator=generator)
-    shift = shift - normals * (shift * normals).sum(-1, keepdim=True)
-    positions = ray.positions[chosen] + shift
-    features = model.sdf_field.encode(positions)
-    inputs = model.head_inputs(positions, model.sdf_field.outputs_at(positions, features), features)
-    albedo, roughness, metallic = model.material(inputs)
-    points, weights = ray.points, ray.weights[ray.shaded[chosen], None].detach()
-    weights = weights / weights.mean().clamp(min=1e-8)
-    albedo_change = (torch.sqrt(albedo + 1e-3) - torch.sqrt(points.albedo[chosen] + 1e-3)).abs().mean(1, keepdim=True)
-    other_change = (roughness - points.roughness[chosen]).abs() + (metallic - points.metallic[chosen]).abs()
-    return (weights * (c.albedo_smoothness * albedo_change + c.gloss_smoothness * other_change)).mean()
+    shift = shift - across * (shift * across).sum(-1, keepdim=True)
+    there = unit_normals(model.surface(ray.positions[chosen].detach() + shift).gradient)
+    distance = torch.sqrt((there - normals).square().sum(-1) + 1e-8)
+    weights = ray.weights[ray.shaded[chosen]].detach()
+    return (weights * distance).mean() / weights.mean().clamp(min=1e-8)
+
+
+def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:
+    """Quadratic entropy of the materials of surface points, -ln mean exp(-|x_i - x_j|^2 / 4) over all pairs.
+
+    Images leave open how bright a side of the object is and how bright its light. This prefers the split in which few
+    materials make up the object: points alike in colour and gloss draw together, and those far apart do not. x holds log
+    albedo, roughness and metallic, each over the width within which points count as alike.
+
+    Source: Barron and Malik 2015 (SIRFS), section 4.2, for reflectance; the gloss is our addition.
+    """
+    c, points = config, ray.points
+    weights = ray.weights[ray.shaded].detach()
+    if len(weights) == 0:
+        return torch.zeros(())
+    chosen = torch.multinomial(weights + 1e-12, c.entropy_points, replacement=True, generator=generator)
+    gloss = torch.cat([points.roughness[chosen], points.metallic[chosen]], dim=1)
+    x = torch.cat([torch.log(points.albedo[chosen] + ALBEDO_FLOOR) / c.albedo_width, gloss / c.gloss_width], dim=1)
+    squared = (x[:, None] - x).square().sum(-1)
+    return -torch.log(torch.exp(-0.25 * squared).mean())
 
 
 def occlusion_loss(

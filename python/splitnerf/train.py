@@ -153,10 +153,14 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
             if c.neutral_weight:
                 terms["neutral"] = c.neutral_weight * losses.neutral_light_loss(model.light, c, generator)
-            if c.albedo_smoothness or c.gloss_smoothness:
-                terms["smoothness"] = losses.smoothness_loss(model, ray, c, generator)
+            if c.normal_smoothness:
+                terms["smoothness"] = c.normal_smoothness * losses.normal_smoothness_loss(model, ray, c, generator)
+            if c.entropy_weight and progress >= c.entropy_from:
+                terms["entropy"] = c.entropy_weight * losses.material_entropy_loss(ray, c, generator)
             if c.metal_regulariser:
                 terms["metal"] = c.metal_weight * losses.metal_loss(ray)
+            if c.dark_metal_weight:
+                terms["dark_metal"] = c.dark_metal_weight * losses.dark_metal_loss(ray)
             if scene is not None and c.occlusion == "mlp":
                 terms["occlusion"] = c.occlusion_weight * losses.occlusion_loss(ray, scene, environment, c, generator, step)
             loss = sum(terms.values())

@@ -133,8 +133,8 @@ template <class T> void check_sums(double tolerance) {
     std::vector<uint32_t> above(words);
     set.visibility_horizon(directions, normal.data(), cosine.data(), above.data());
     for (int i = 0; i < n; ++i) ASSERT_EQ(above[i / 32] >> i % 32 & 1, z[i] > 0) << set.name;
-    const VisibilityPoint<T> point{rows, weights.data(), neighbours, cosine.data(), lobe_dir.data(), T(0.04)};
-    set.visibility_sums(directions, point, known.data(), visible.data(), lobe.data(), sums.data());
+    set.visibility_shares(directions.n, {rows, weights.data(), neighbours}, known.data(), visible.data());
+    set.visibility_sums(directions, {cosine.data(), lobe_dir.data(), T(0.04)}, visible.data(), lobe.data(), sums.data());
     EXPECT_EQ(visible[0], 1) << set.name;
     for (int i = 0; i < 14; ++i) EXPECT_NEAR(sums[i], expected[i], tolerance * (1 + expected[i])) << set.name << " " << i;
   }

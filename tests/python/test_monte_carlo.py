@@ -10,9 +10,10 @@ from op_checks import generator, unit
 from splitnerf import losses
 from splitnerf.config import Config
 from splitnerf.errors import InputError
+from splitnerf.fields.light import lobe_roughness
 from splitnerf.ops import MeshScene, split_sum_shade
 from splitnerf.render.model import SceneModel
-from splitnerf.render.monte_carlo import lobe_roughness, monte_carlo_radiance
+from splitnerf.render.monte_carlo import monte_carlo_radiance
 
 RADIUS = 0.5
 
@@ -92,7 +93,10 @@ def test_the_loss_of_two_estimates_has_no_noise_in_it():
 
 def test_settings_that_do_not_fit_are_refused():
     with pytest.raises(InputError, match="finetune_from below 1 needs compositing"):
-        Config().replace({"finetune_from": 0.8, "compositing": "srgb"})
+        Config().replace({"finetune_from": 0.8, "compositing": "srgb", "shading": "split"})
+    for setting in ({"occlusion": "mlp"}, {"occlusion": "off"}, {"compositing": "srgb"}):
+        with pytest.raises(InputError, match="shading = summed needs"):
+            Config().replace(setting)
     with pytest.raises(InputError, match="finetune_samples"):
         Config().replace({"finetune_samples": 0})
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import pytest
 import torch
-from torch.nn import functional as F
 
 from splitnerf import losses
 from splitnerf.config import Config
@@ -42,34 +42,68 @@ def test_neutral_light_loss_measures_chroma_alone():
     assert tinted == pytest.approx(2.0 / 3.0 * 0.36 / 3.0, rel=0.03)
 
 
-class Stripes(torch.nn.Module):
-    """Materials that change at x = 0 only."""
+def surface_rays(n: int, x: float) -> SimpleNamespace:
+    """Points at (x, 0, 0) whose normal is that of `crease`."""
+    positions = torch.tensor([x, 0.0, 0.0]).expand(n, 3)
+    return SimpleNamespace(
+        shaded=torch.arange(n), weights=torch.ones(n), positions=positions, normals=crease(positions).gradient
+    )
 
-    def forward(self, inputs):
-        right = (inputs[:, :1] > 0).float()
-        return (0.25 * right).expand(-1, 3), right, torch.zeros_like(right)
+
+def crease(positions: torch.Tensor) -> SimpleNamespace:
+    """Normals up on the left of x = 0, and on its right, by 60 degrees to the side."""
+    right = (positions[:, :1] > 0).float()
+    tilted = torch.tensor([math.sin(math.pi / 3), 0.0, math.cos(math.pi / 3)])
+    return SimpleNamespace(gradient=right * tilted + (1 - right) * torch.tensor([0.0, 0.0, 1.0]))
 
 
-def test_smoothness_loss_counts_steps_and_nothing_else():
-    """Points on the plane z = 0: away from the step nothing differs; astride it, the share that the shift carries across."""
-    config = Config().replace({
-        "smoothness_points": 20000, "albedo_smoothness": 1.0, "gloss_smoothness": 0.0, "smoothness_radius": 0.02,
-    })  # fmt: skip
-    field = SimpleNamespace(encode=lambda x: x, outputs_at=lambda x, f: x)
-    model = SimpleNamespace(sdf_field=field, head_inputs=lambda x, outputs, features: x, material=Stripes())
+def test_normal_smoothness_counts_bends():
+    """Flat ground costs nothing; beside an edge of 60 degrees, whose normals are 1 apart, the share that the shift
+    carries across it."""
+    config = Config().replace({"smoothness_points": 20000, "smoothness_radius": 0.02})
+    model = SimpleNamespace(surface=crease)
 
     def loss(x: float) -> float:
-        n = 20000
-        positions = torch.tensor([x, 0.0, 0.0]).expand(n, 3)
-        albedo, roughness, metallic = Stripes()(positions)
-        ray = SimpleNamespace(
-            shaded=torch.arange(n), weights=torch.ones(n), positions=positions,
-            normals=F.one_hot(torch.full((n,), 2), 3).float(),
-            points=SimpleNamespace(albedo=albedo, roughness=roughness, metallic=metallic),
-        )  # fmt: skip
-        return losses.smoothness_loss(model, ray, config, torch.Generator().manual_seed(0)).item()
+        return losses.normal_smoothness_loss(model, surface_rays(20000, x), config, torch.Generator().manual_seed(0)).item()
 
-    step = (0.25 + 1e-3) ** 0.5 - 1e-3**0.5
-    assert loss(0.5) == 0.0 and loss(-0.5) == 0.0
     crossed = 0.5 * torch.erfc(torch.tensor(0.5) / 2**0.5).item()  # a normal variable beyond half its deviation
-    assert loss(0.01) == pytest.approx(step * crossed, rel=0.05)
+    assert loss(-0.5) == pytest.approx(1e-4, abs=1e-6) and loss(0.5) == pytest.approx(1e-4, abs=1e-6)
+    assert loss(-0.01) == pytest.approx(crossed, rel=0.05)
+
+
+def test_dark_metal_loss_spares_bright_metals_and_dielectrics():
+    ray = rays([0.5, 0.5, 0.5], [1.0, 1.0, 0.0])
+    ray.points.albedo = torch.tensor([[0.1, 0.2, 0.0], [0.5, 0.1, 0.1], [0.01, 0.01, 0.01]]).requires_grad_()
+    ray.points.metallic.requires_grad_()
+    loss = losses.dark_metal_loss(ray)
+    assert loss.item() == pytest.approx(0.5 * (1 - 0.2 / 0.4) / 3)
+    loss.backward()
+    assert ray.points.albedo.grad is None
+    torch.testing.assert_close(ray.points.metallic.grad[:, 0] * 6, torch.tensor([0.5, 0.0, 1 - 0.01 / 0.4]))
+
+
+def entropy(albedo: list[float], weights: list[float] | None = None, roughness: list[float] | None = None) -> float:
+    """Of grey points, from many draws."""
+    n = len(albedo)
+    config = Config().replace({"entropy_points": 4000, "albedo_width": 0.3, "gloss_width": 0.2})
+    ray = SimpleNamespace(
+        weights=torch.tensor(weights or [1.0] * n).repeat(2000), shaded=torch.arange(2000 * n),
+        points=SimpleNamespace(
+            albedo=torch.tensor(albedo)[:, None].expand(-1, 3).repeat(2000, 1),
+            roughness=torch.tensor(roughness or [0.5] * n)[:, None].repeat(2000, 1),
+            metallic=torch.zeros(2000 * n, 1),
+        ),
+    )  # fmt: skip
+    return losses.material_entropy_loss(ray, config, torch.Generator().manual_seed(0)).item()
+
+
+def test_material_entropy_counts_materials():
+    """One material: 0. k equal shares of materials far apart: ln k. Two that differ by d in ln albedo:
+    -ln(1/2 + e^(-3 (d/width)^2 / 4) / 2). A share that no ray sees does not count."""
+    assert entropy([0.4]) == pytest.approx(0.0, abs=1e-6)
+    assert entropy([0.02, 0.2, 0.9]) == pytest.approx(math.log(3), abs=0.01)
+    close = -math.log(0.5 + 0.5 * math.exp(-0.75 * (math.log(0.31 / 0.26) / 0.3) ** 2))
+    assert entropy([0.25, 0.30]) == pytest.approx(close, rel=0.02)
+    apart = -math.log(0.5 + 0.5 * math.exp(-0.25 * (0.8 / 0.2) ** 2))
+    assert entropy([0.2, 0.2], roughness=[0.1, 0.9]) == pytest.approx(apart, abs=0.01)
+    assert entropy([0.02, 0.9], weights=[1.0, 0.0]) == pytest.approx(0.0, abs=1e-6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -13,19 +14,23 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.config import Config
-from splitnerf.fields import OcclusionQuery, VisibilityBits
+from splitnerf.fields import Light, OcclusionQuery, VisibilityBits
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import (
     MeshScene,
     VisibilityCache,
     cached_occlusion,
+    cached_visibility,
+    monte_carlo_light,
     occlusion_factors,
+    prefilter_light,
     query_direction,
     split_sum_shade,
     trace_visibility,
     visibility_bits,
 )
-from splitnerf.render.model import SceneModel
+from splitnerf.render.model import SceneModel, ShadedPoints
+from splitnerf.render.sums import radiance_of_sums
 
 OFFSET = 0.0125
 UP = torch.tensor([[0.0, 0.0, 1.0]])
@@ -296,6 +301,114 @@ def test_the_model_shades_with_the_light_of_its_mesh():
     assert (steps > 0).all() and (steps[1:] < 0.6 * steps[:-1]).all() and steps[0] > 0.05 * levels[0]
 
 
+# ---- the directions one by one ----
+
+
+def test_visibility_of_a_vertex_is_its_bits():
+    """At a vertex that has no neighbour in reach: open, blocked with the light of what is hit, or below the horizon."""
+    floor, ball = grid_mesh(2.0, 2), trimesh.creation.icosphere(2, 0.5).apply_translation((0, 0, 0.9))
+    cache = cache_of(trimesh.util.concatenate([floor, ball]), 64, with_hits=True)
+    cache = dataclasses.replace(cache, radius=0.1, **grids(cache.vertices, 0.1))
+    sent = torch.rand(len(cache.vertices), 3, generator=generator(1))
+    visible, arriving = cached_visibility(cache, 0 * UP, UP, sent)
+    centre = 4  # of the floor's 3 x 3 vertices
+    open_, blocked = unpacked(cache.bits[centre])
+    above = cache.directions[:, 2] > 0
+    assert torch.equal(visible[0].bool() & above, open_) and 3 < blocked.sum() < 30
+    expected = torch.where(blocked[:, None], sent[cache.hits[centre].clamp(min=0).long()], torch.zeros(3))
+    torch.testing.assert_close(arriving[0], expected)
+    assert (visible[0][~above] == 1).all()
+    assert torch.equal(cached_visibility(cache, 0 * UP, UP)[0], visible) and cached_visibility(cache, 0 * UP, UP)[1] is None
+    assert cached_visibility(cache, UP * math.nan, UP, sent)[0].isnan().all()
+
+
+def grids(vertices: torch.Tensor, radius: float) -> dict:
+    return dict(zip(("starts", "order"), lib.vertex_grids(vertices, radius, 4)))
+
+
+def unpacked(words: torch.Tensor) -> torch.Tensor:
+    """[2, words] int32 -> [2, directions] bool."""
+    return ((words[..., None] >> torch.arange(32, dtype=torch.int32)) & 1).bool().reshape(2, -1)
+
+
+def test_sums_of_directions_agree_with_the_factors():
+    """Summing V L cos and (1 - V) C cos over the directions is what cached_occlusion does."""
+    mesh = trimesh.util.concatenate([grid_mesh(2.0, 8), trimesh.creation.icosphere(2, 0.4).apply_translation((0, 0, 0.7))])
+    cache = cache_of(mesh, 256, with_hits=True)
+    x, n = between(mesh, 50)
+    light, sent = torch.rand(256, 3, generator=generator(3)), torch.rand(len(cache.vertices), 3, generator=generator(4))
+    visible, arriving = cached_visibility(cache, x, n, sent)
+    o_d, _, i_d, _ = read(cache, x, n, light=light, radiance=sent)
+    cosine = (n @ cache.directions.T).clamp(min=0)
+    torch.testing.assert_close((visible * cosine) @ light / (cosine @ light), o_d, rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close((arriving * cosine[..., None]).sum(1) / cosine.sum(1, keepdim=True), i_d, rtol=1e-4, atol=1e-5)
+
+
+class Lamp(Light):
+    """A dim sky with a lamp of a few degrees."""
+
+    def __init__(self, axis: tuple[float, float, float], power: float = 50.0):
+        super().__init__()
+        self.axis, self.power = unit(torch.tensor([axis]))[0], torch.nn.Parameter(torch.tensor(power))
+
+    def forward(self, directions, roughness):
+        lobe = torch.exp(200.0 * (directions @ self.axis - 1.0))[:, None]
+        return (0.2 + self.power * lobe).expand(-1, 3)
+
+
+def test_the_cells_light_keeps_power_and_place():
+    bits, lamp = VisibilityBits(256, OFFSET, 3, True), Lamp((0.3, -0.5, 0.7))
+    light, directions = bits.cell_light(lamp)
+    exact = 4 * math.pi * 0.2 + 50.0 * 2 * math.pi / 200.0
+    assert light[:, 0].mean().item() * 4 * math.pi == pytest.approx(exact, rel=0.04)
+    strength = light[:, :1] - 0.2
+    assert (unit((strength * directions).sum(0, keepdim=True)) @ lamp.axis).item() > math.cos(math.radians(0.7))
+    assert (unit((strength * bits.directions).sum(0, keepdim=True)) @ lamp.axis).item() < 1.0
+    light.sum().backward()
+    assert lamp.power.grad.item() > 0
+
+
+def brute_force(lamp, normals, views, albedo, roughness, metallic) -> torch.Tensor:
+    """The rendering equation over 200 x 400 directions, without what blocks them."""
+    w = panorama_directions(200).reshape(-1, 3)
+    area = (1 - w[:, 2] ** 2).sqrt()
+    area = area * (4 * math.pi / area.sum())
+    pdf = (1.0 / (len(w) * area)).expand(len(normals), -1)
+    light = lamp(w, torch.zeros(len(w), 1)).expand(len(normals), -1, -1)
+    sums = monte_carlo_light(normals, views, roughness, w.expand(len(normals), -1, 3), pdf, light)
+    return radiance_of_sums(normals, views, albedo, roughness, metallic, sums, compensate=True)
+
+
+def test_summed_light_is_nearer_to_the_integral_than_the_split(monkeypatch):
+    """A dark convex object under a lamp: the sum is 2.7 % off where the lamp shines, the split sum 7.4 %."""
+    torch.manual_seed(0)
+    model = SceneModel(Config().replace({"n_levels": 2, "log2_table_size": 8}))
+    model.light = Lamp((0.3, -0.5, 0.7))
+    mesh = trimesh.creation.icosphere(3, 0.5)
+    model.use_mesh(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces))
+    g = generator(5)
+    n = unit(torch.randn(200, 3, generator=g))
+    views = unit(n + 0.9 * unit(torch.randn(200, 3, generator=g)))
+    rough, metal, albedo = torch.full((200, 1), 0.6), torch.zeros(200, 1), torch.full((200, 3), 0.05)
+    exact = brute_force(model.light, n, views, albedo, rough, metal).detach()
+    light = prefiltered(model.light, torch.cat([query_direction(n, views, rough), n]), torch.cat([rough, torch.ones_like(rough)]))
+    one = torch.ones(200, 3)
+    split = split_sum_shade(n, views, albedo, rough, metal, light[:200], light[200:], one, one, "exact", True)
+    points = ShadedPoints(split, albedo, rough, metal, one, one, n)
+    summed = model.summed_radiance(0.5 * n, n, views, points)
+    lit = n @ model.light.axis > 0
+    error = lambda radiance: ((radiance - exact) / exact)[lit].abs().mean().item()  # noqa: E731
+    assert error(summed) < 0.035 and 0.06 < error(split) < 0.09
+    narrow = points._replace(roughness=torch.full((200, 1), 0.3))
+    assert torch.equal(model.summed_radiance(0.5 * n, n, views, narrow), split)  # too narrow for so few directions
+
+
+def prefiltered(lamp, directions, roughness) -> torch.Tensor:
+    """gbar of the lamp from many directions."""
+    w = torch.from_numpy(_core.fibonacci_sphere(1 << 14)).float()
+    return prefilter_light(directions, roughness, w, lamp(w, torch.zeros(len(w), 1)).detach())
+
+
 # ---- the operators ----
 
 
@@ -311,6 +424,11 @@ def op_inputs(dtype, n: int = 9, with_hits: bool = True) -> tuple:
             cache.radius, cache.bits, cache.hits, radiance, cache.directions.to(dtype), light)  # fmt: skip
 
 
+def visibility_inputs(dtype, with_hits: bool = True) -> tuple:
+    inputs = op_inputs(dtype, with_hits=with_hits)
+    return (*inputs[:2], *inputs[4:13])
+
+
 def test_opcheck_precision_and_gradients():
     scene, mesh = scene_of(trimesh.creation.icosphere(1)), trimesh.creation.icosphere(1)
     check_op(lib.visibility_bits, (scene.handle, *corners(mesh), lattice(64), OFFSET, True))
@@ -321,6 +439,12 @@ def test_opcheck_precision_and_gradients():
         torch.testing.assert_close(a.double(), b, rtol=0, atol=2e-5)
     for index in (0, 1, 2, 3, 4, 11, 13):
         check_no_gradient(lib.cached_occlusion, op_inputs(torch.float32), index)
+    for with_hits in (False, True):
+        check_op(lib.cached_visibility, visibility_inputs(torch.float32, with_hits=with_hits))
+    for a, b in zip(*(lib.cached_visibility(*visibility_inputs(t)) for t in (torch.float32, torch.float64))):
+        torch.testing.assert_close(a.double(), b, rtol=0, atol=2e-5)
+    for index in (0, 1, 2, 3, 9, 10):
+        check_no_gradient(lib.cached_visibility, visibility_inputs(torch.float32), index)
     assert all(t.shape == (0, 3) for t in lib.cached_occlusion(*op_inputs(torch.float32, 0)))
 
 
@@ -333,4 +457,6 @@ def test_errors():
     for index, part in ((3, "roughness"), (5, "vertex_normals"), (9, "bits"), (10, "hits"), (11, "radiance"), (13, "light")):
         bad = (*good[:index], good[index][1:], *good[index + 1 :])
         check_error(lambda: lib.cached_occlusion(*bad), "cached_occlusion", part)
+    short = visibility_inputs(torch.float32)
+    check_error(lambda: lib.cached_visibility(short[0], short[1][1:], *short[2:]), "cached_visibility", "normals")
     check_error(lambda: lib.cached_occlusion(*good[:7], good[7] + 1, *good[8:]), "cached_occlusion", "order")

@@ -40,9 +40,13 @@ template <class T> struct VisibilityPoint {
   const uint32_t* const* bits;  // [n_neighbours] each neighbour's words, open then blocked, see visibility_bits
   const T* weights;             // [n_neighbours], sum 1
   int n_neighbours;
-  const T* cosine;              // [n directions], from visibility_horizon
-  const T* lobe_dir;            // [3]
-  T alpha_squared;              // of the lobe, ggx_alpha^2
+};
+
+// The two kernels that visibility_sums weighs the light with at a point.
+template <class T> struct VisibilityLobe {
+  const T* cosine;    // [n directions], from visibility_horizon
+  const T* lobe_dir;  // [3]
+  T alpha_squared;    // of the lobe, ggx_alpha^2
 };
 
 template <class T> struct Kernels {
@@ -63,9 +67,10 @@ template <class T> struct Kernels {
   // cosine[i] = (w_i.n)+ and, bit by bit, whether it is positive. The number of directions is a multiple of 32.
   void (*visibility_horizon)(const LobeSide<T>& directions, const T* normal, T* cosine, uint32_t* above);
   // known[i] = weight of the neighbours that know direction i, visible[i] = the open share of it, 1 where none knows.
+  void (*visibility_shares)(int64_t n_directions, const VisibilityPoint<T>& point, T* known, T* visible);
   // lobe[i] = D(w_i, d)(w_i.d)+ [w_i.n > 0] up to a factor; light in the directions' r, g, b. With c = cosine,
   // sums = {sum V L c, sum L c (three channels each), sum c; the same with lobe for c}: 14 numbers.
-  void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityPoint<T>& point, T* known, T* visible, T* lobe,
+  void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityLobe<T>& point, const T* visible, T* lobe,
                           T* sums);
 
   // products [rows, 3] = matrix . values, rows [begin, end); values are [columns, 4], the fourth unused.

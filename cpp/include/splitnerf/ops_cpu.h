@@ -174,4 +174,10 @@ SPLITNERF_API void cached_occlusion(const VisibilityCache<T>& cache, int64_t n, 
                                     const T* lobe_dirs, const T* roughness, T* occlusion_d, T* occlusion_s,
                                     T* indirect_d, T* indirect_s);
 
+// positions, normals [n, 3] -> visible [n, n_directions], and with hits arriving [n, n_directions, 3], what comes from
+// the mesh itself. The cache's light is not read. Numbers that are not finite make NaN.
+template <class T>
+SPLITNERF_API void cached_visibility(const VisibilityCache<T>& cache, int64_t n, const T* positions, const T* normals,
+                                     T* visible, T* arriving);
+
 }  // namespace splitnerf::cpu

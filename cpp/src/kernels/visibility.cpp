@@ -20,9 +20,8 @@ template <class T> void visibility_horizon(const LobeSide<T>& directions, const 
 }
 
 template <class T>
-void visibility_sums(const LobeSide<T>& directions, const VisibilityPoint<T>& point, T* known, T* visible, T* lobe,
-                     T* sums) {
-  const int64_t n_words = directions.n / kBitsPerWord;
+void visibility_shares(int64_t n_directions, const VisibilityPoint<T>& point, T* known, T* visible) {
+  const int64_t n_words = n_directions / kBitsPerWord;
   for (int64_t word = 0; word < n_words; ++word) {
     T *all = known + word * kBitsPerWord, *share = visible + word * kBitsPerWord;
     for (int j = 0; j < kBitsPerWord; ++j) all[j] = share[j] = T(0);
@@ -38,6 +37,10 @@ void visibility_sums(const LobeSide<T>& directions, const VisibilityPoint<T>& po
 #pragma omp simd
     for (int j = 0; j < kBitsPerWord; ++j) share[j] = all[j] > T(0) ? share[j] / all[j] : T(1);
   }
+}
+
+template <class T>
+void visibility_sums(const LobeSide<T>& directions, const VisibilityLobe<T>& point, const T* visible, T* lobe, T* sums) {
   const T x = point.lobe_dir[0], y = point.lobe_dir[1], z = point.lobe_dir[2], a2 = point.alpha_squared;
   T open_dr = 0, open_dg = 0, open_db = 0, all_dr = 0, all_dg = 0, all_db = 0, total_d = 0;
   T open_sr = 0, open_sg = 0, open_sb = 0, all_sr = 0, all_sg = 0, all_sb = 0, total_s = 0;
@@ -59,8 +62,9 @@ void visibility_sums(const LobeSide<T>& directions, const VisibilityPoint<T>& po
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                        \
-  template void visibility_horizon<T>(const LobeSide<T>&, const T*, T*, uint32_t*);     \
-  template void visibility_sums<T>(const LobeSide<T>&, const VisibilityPoint<T>&, T*, T*, T*, T*);
+  template void visibility_horizon<T>(const LobeSide<T>&, const T*, T*, uint32_t*);                       \
+  template void visibility_shares<T>(int64_t, const VisibilityPoint<T>&, T*, T*);                         \
+  template void visibility_sums<T>(const LobeSide<T>&, const VisibilityLobe<T>&, const T*, T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

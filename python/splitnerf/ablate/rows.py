@@ -9,32 +9,39 @@ from splitnerf.errors import InputError
 
 FULL = "full"
 
+SPLIT: dict[str, object] = {"shading": "split"}  # what has no bits, or composites in sRGB, cannot sum the light
+
 # The paper's own ablations (its table of relighting and albedo).
 PAPER: dict[str, dict[str, object]] = {
     "no occlusion averaging": {"occlusion_channels": 3},
-    "no occlusion loss": {"occlusion": "mlp", "occlusion_weight": 0.0},
+    "no occlusion loss": SPLIT | {"occlusion": "mlp", "occlusion_weight": 0.0},
     "no metal regulariser": {"metal_regulariser": False},
     "mip-map light": {"light": "pyramid"},
 }
 SWITCHES: dict[str, dict[str, object]] = {
     "MLP light": {"light": "mlp"},
-    "no occlusion": {"occlusion": "off"},
-    "occlusion by MLP": {"occlusion": "mlp"},
-    "occlusion by MLP, of position alone": {"occlusion": "mlp", "occlusion_directional": False},
+    "light by the split sum": SPLIT,
+    "summed light": {"shading": "summed", "occlusion": "bits"},
+    "split sum, no occlusion": SPLIT | {"occlusion": "off"},
+    "split sum, occlusion by MLP": SPLIT | {"occlusion": "mlp"},
+    "split sum, occlusion by MLP, of position alone": SPLIT | {"occlusion": "mlp", "occlusion_directional": False},
+    "occlusion averaged over channels": {"occlusion_channels": 1},
     "occlusion by bits": {"occlusion": "bits", "indirect": False},
     "occlusion by bits, indirect light": {"occlusion": "bits", "indirect": True},
     "Fresnel as in the paper": {"fresnel_mode": "paper"},
     "Fresnel as in the released code": {"fresnel_mode": "code"},
     "no energy compensation": {"compensate": False},
     "light asked at the reflection": {"query": "reflection"},
-    "composited in sRGB": {"compositing": "srgb"},
+    "split sum, composited in sRGB": SPLIT | {"compositing": "srgb"},
     "normals by finite differences": {"normals": "finite_difference"},
     "materials from the SDF's outputs": {"head_inputs": "outputs"},
     "no mask loss": {"mask_weight": 0.0},
     "no neutral light": {"neutral_weight": 0.0},
     "no Monte Carlo fine-tune": {"finetune_from": 1.0},
     "Monte Carlo fine-tune": {"finetune_from": 0.85},
-    "no smoothness": {"albedo_smoothness": 0.0, "gloss_smoothness": 0.0},
+    "no smoothness of normals": {"normal_smoothness": 0.0},
+    "no material entropy": {"entropy_weight": 0.0},
+    "dark metals allowed": {"dark_metal_weight": 0.0},
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import math
 
 import torch
 from torch import Tensor, nn
@@ -41,3 +42,9 @@ class Light(nn.Module, abc.ABC):
 def panorama_directions(height: int, device: torch.device | str = "cpu") -> Tensor:
     """[height, 2 height, 3] unit directions of an equirectangular map's texel centres."""
     return torch.from_numpy(_core.equirect_directions(height, 2 * height)).to(device, torch.float32)
+
+
+def lobe_roughness(solid_angle: Tensor | float) -> Tensor | float:
+    """Roughness whose pre-integration lobe has this effective solid angle, 4 pi a^2 for narrow ones; at most 1."""
+    roughness = (solid_angle / (4.0 * math.pi)) ** 0.25
+    return roughness.clamp(max=1.0) if isinstance(roughness, Tensor) else min(roughness, 1.0)

@@ -9,10 +9,12 @@ import numpy as np
 import torch
 import trimesh
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 from splitnerf import _core
+from splitnerf.fields.light import Light, lobe_roughness
 from splitnerf.fields.occlusion import Occlusion, OcclusionQuery
-from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion
+from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility
 
 TEXELS_PER_CELL = 8  # of the light, for its mean over a direction's cell
 SHADED_CHUNK = 1 << 15  # vertices shaded at a time
@@ -38,6 +40,7 @@ class VisibilityBits(nn.Module):
         self.directions = torch.from_numpy(_core.fibonacci_sphere(n_directions)).float()
         self.light_height = height = math.ceil(math.sqrt(TEXELS_PER_CELL * n_directions / 2))
         texels = torch.from_numpy(_core.equirect_directions(height, 2 * height)).float().reshape(-1, 3)
+        self._texels, self._texel_roughness = texels, lobe_roughness(4.0 * math.pi / len(texels))
         self._cell = torch.cat([(part @ self.directions.T).argmax(1) for part in texels.split(4096)])
         self._solid_angle = (1.0 - texels[:, 2:] ** 2).clamp(min=0.0).sqrt()  # up to a factor
         self.light = torch.ones_like(self.directions)
@@ -65,6 +68,25 @@ class VisibilityBits(nn.Module):
         weighted = torch.cat([panorama.reshape(-1, 3) * self._solid_angle, self._solid_angle], dim=1)
         sums = torch.zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
         self.light = sums[:, :3] / sums[:, 3:]
+
+    def cell_light(self, light: Light) -> tuple[Tensor, Tensor]:
+        """The light's mean over each direction's cell [k, 3], and where in the cell it comes from [k, 3] unit.
+
+        The first is differentiable in the light. The second is the cell's mean direction by luminance: a small lamp
+        shines from where it is.
+        """
+        radiance = light(self._texels, torch.full_like(self._solid_angle, self._texel_roughness))
+        weighted = torch.cat([radiance * self._solid_angle, self._solid_angle], dim=1)
+        sums = torch.zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
+        power = weighted[:, :3].detach().sum(1, keepdim=True)
+        centres = torch.zeros_like(self.directions).index_add(0, self._cell, self._texels * power)
+        return sums[:, :3] / sums[:, 3:], F.normalize(centres, dim=1)
+
+    def incoming(self, positions: Tensor, normals: Tensor, cell_light: Tensor) -> Tensor:
+        """Radiance [n, k, 3] that arrives at points from each direction, the mesh's own light included."""
+        visible, arriving = cached_visibility(self.cache, positions, normals, self.radiance)
+        incoming = visible[..., None] * cell_light
+        return incoming if arriving is None else incoming + arriving
 
     @torch.no_grad()
     def refresh(self, shade: Callable[[Tensor, Tensor], Tensor]) -> None:

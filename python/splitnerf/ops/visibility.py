@@ -120,6 +120,30 @@ def cached_occlusion(
     return (o_d, o_s, None, None) if radiance is None else (o_d, o_s, i_d, i_s)
 
 
+def cached_visibility(
+    cache: VisibilityCache, positions: Tensor, normals: Tensor, radiance: Tensor | None = None
+) -> tuple[Tensor, Tensor | None]:
+    """What arrives at points from each of the cache's directions: which share of the environment, and what the mesh
+    itself sends. Incoming light is then ``visible[..., None] * light + arriving``.
+
+    Args:
+        cache, positions, normals, radiance: See :func:`cached_occlusion`.
+
+    Returns:
+        visible: [n, k] V_i in [0, 1], 1 where nothing is known.
+        arriving: [n, k, 3] (1 - V_i) C_i, 0 below the horizon; None without ``radiance``.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+    """
+    hits = cache.hits if radiance is not None else cache.hits[:, :0]
+    visible, arriving = lib.cached_visibility(
+        positions, normals, cache.vertices, cache.normals, cache.starts, cache.order, cache.radius, cache.bits, hits,
+        cache.vertices[:0] if radiance is None else radiance, cache.directions,
+    )  # fmt: skip
+    return visible, (None if radiance is None else arriving)
+
+
 def _fake_bits(scene, positions, normals, directions, offset, with_hits):
     n, k = positions.shape[0], directions.shape[0]
     shapes = ((n, 2, k // 32), (n, k if with_hits else 0))
@@ -138,6 +162,12 @@ def _fake_occlusion(positions, *rest):
     return tuple(positions.new_empty(size, 3) for size in sizes)
 
 
+def _fake_visibility(positions, *rest):
+    n, k = positions.shape[0], rest[9].shape[0]
+    return positions.new_empty(n, k), positions.new_empty(n if rest[7].shape[1] else 0, k, 3)  # rest[7]: hits
+
+
 register("visibility_bits", fake=_fake_bits)
 register("vertex_grids", fake=_fake_grids)
 register("cached_occlusion", fake=_fake_occlusion)
+register("cached_visibility", fake=_fake_visibility)

@@ -7,9 +7,10 @@ import math
 import torch
 from torch import Tensor
 
-from splitnerf import _core
-from splitnerf.ops import MeshScene, composite, monte_carlo_light, sample_bsdf, split_sum_shade, trace_visibility
+from splitnerf.fields.light import lobe_roughness
+from splitnerf.ops import MeshScene, composite, monte_carlo_light, sample_bsdf, trace_visibility
 from splitnerf.render.model import SceneModel
+from splitnerf.render.sums import radiance_of_sums
 from splitnerf.render.renderer import MIN_OPACITY, RenderedRays, linear_to_srgb
 
 
@@ -55,21 +56,7 @@ def monte_carlo_radiance(
     light = model.light(directions.reshape(-1, 3)[lit], filter_roughness)
     radiance = torch.zeros_like(directions).view(-1, 3).index_copy(0, lit, light).view_as(directions)
     sums = monte_carlo_light(normals, view_dirs, roughness, directions, pdf, radiance)
-
-    def shade(specular: float, diffuse: float, compensate: bool) -> Tensor:
-        one = torch.ones_like(albedo)
-        return split_sum_shade(
-            normals, view_dirs, albedo, roughness, metallic, specular * one, diffuse * one, one, one, "exact", compensate
-        )
-
-    f0 = _core.DIELECTRIC_F0 * (1.0 - metallic) + metallic * albedo
-    gain = shade(1.0, 0.0, c.compensate) / shade(1.0, 0.0, False)
-    return gain * (f0 * (sums.specular - sums.grazing) + sums.grazing) + shade(0.0, 1.0, c.compensate) * sums.diffuse
-
-
-def lobe_roughness(solid_angle: Tensor) -> Tensor:
-    """Roughness whose pre-integration lobe has this effective solid angle, 4 pi a^2 for narrow ones; at most 1."""
-    return torch.sqrt(torch.sqrt(solid_angle / (4.0 * math.pi))).clamp(max=1.0)
+    return radiance_of_sums(normals, view_dirs, albedo, roughness, metallic, sums, compensate=c.compensate)
 
 
 def monte_carlo_colours(

@@ -99,11 +99,32 @@ def render_rays(
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values = _fill_skipped(radiance, shaded, weights, samples)
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
+    if model.sums_light:
+        mean = mean + _summed_less_split(model, positions, directions, field.sdf, normals, weights, shaded, samples, points)
     colour = linear_to_srgb(mean) if c.compositing == "linear" else mean
     return RenderedRays(
         colour, opacity, samples, weights, values, field.gradient, shaded, positions[shaded], normals[shaded],
         field.sdf[shaded], points,
     )  # fmt: skip
+
+
+def _summed_less_split(
+    model: SceneModel, positions: Tensor, directions: Tensor, sdf: Tensor, normals: Tensor, weights: Tensor, shaded: Tensor,
+    samples: PackedSamples, points: ShadedPoints,
+) -> Tensor:  # fmt: skip
+    """[n_rays, 3] what summing the light adds to the split sum, at each ray's heaviest sample: 0 without one."""
+    rays, weight = samples.ray_indices[shaded], weights.detach()[shaded]
+    n_rays = len(samples.offsets) - 1
+    heaviest = torch.zeros(n_rays).scatter_reduce(0, rays, weight, "amax")
+    first = torch.full((n_rays,), -1)
+    at = (weight == heaviest[rays]).nonzero().squeeze(1)
+    first[rays[at]] = at
+    at = first[first >= 0]
+    here = ShadedPoints(*(part[at] for part in points))
+    i = shaded[at]
+    on_surface = (positions[i] - normals[i] * sdf[i, None]).detach()
+    summed = model.summed_radiance(on_surface, normals[i], -directions[i], here)
+    return torch.zeros(n_rays, 3).index_add(0, rays[at], summed - here.radiance)
 
 
 def _fill_skipped(radiance: Tensor, shaded: Tensor, weights: Tensor, samples: PackedSamples) -> Tensor:
