@@ -18,17 +18,18 @@ template <class T> class RayFan {
   RayFan(const Scene& scene, int height, int width, const T* environment)
       : scene_(scene), height_(height), width_(width), environment_(environment) {}
 
-  // Factor over n_rays directions frame.to_world(sample(u1, u2)) that leave `origin` above the
-  // horizon of `normal`.
+  // Factor over n_rays directions w = frame.to_world(sample(u1, u2)) above the horizon of `normal`; the rays start at
+  // origin + ahead w.
   template <class Sampler>
-  Vec3<T> factor(Vec3<T> origin, Vec3<T> normal, const Frame<T>& frame, int n_rays, Vec2<T> shift, Sampler sample) {
+  Vec3<T> factor(Vec3<T> origin, T ahead, Vec3<T> normal, const Frame<T>& frame, int n_rays, Vec2<T> shift,
+                 Sampler sample) {
     origins_.resize(3 * n_rays), directions_.resize(3 * n_rays), active_.resize(n_rays), visible_.resize(n_rays);
     for (int i = 0; i < n_rays; ++i) {
       const Vec2<T> u = fibonacci_lattice<T>(i, n_rays, shift);
       const Vec3<T> w = frame.to_world(sample(u.x, u.y));
       active_[i] = dot(w, normal) > T(0);
       for (int c = 0; c < 3; ++c) {
-        origins_[3 * i + c] = static_cast<float>(origin[c]);
+        origins_[3 * i + c] = static_cast<float>(origin[c] + ahead * w[c]);
         directions_[3 * i + c] = static_cast<float>(w[c]);
       }
     }
@@ -64,11 +65,12 @@ void occlusion_factors(const Scene& scene, const OcclusionOptions& options, int6
         return Vec2<T>{random_unit<T>(options.seed, counter, dimension), random_unit<T>(options.seed, counter, dimension + 1)};
       };
       const Vec3<T> normal = load3(normals + 3 * i), axis = load3(lobe_dirs + 3 * i);
-      const Vec3<T> origin = load3(positions + 3 * i) + normal * T(options.offset);
+      const T ahead = options.along_ray ? T(options.offset) : T(0), up = T(options.offset) - ahead;
+      const Vec3<T> origin = load3(positions + 3 * i) + normal * up;
       const T ggx_alpha = ggx_alpha_from_roughness(roughness[i]);
-      store3(occlusion_d + 3 * i, fan.factor(origin, normal, Frame<T>(normal), options.n_diffuse_rays, shift(0),
+      store3(occlusion_d + 3 * i, fan.factor(origin, ahead, normal, Frame<T>(normal), options.n_diffuse_rays, shift(0),
                                              [](T u1, T u2) { return sample_cosine_hemisphere(u1, u2); }));
-      store3(occlusion_s + 3 * i, fan.factor(origin, normal, Frame<T>(axis), options.n_specular_rays, shift(2),
+      store3(occlusion_s + 3 * i, fan.factor(origin, ahead, normal, Frame<T>(axis), options.n_specular_rays, shift(2),
                                              [&](T u1, T u2) { return splitnerf::sample_ggx_lobe(u1, u2, ggx_alpha); }));
     }
   });

@@ -178,9 +178,10 @@ template <class T> class CacheReader {
 
   // sum (1 - V_i) C_i c_i / sum c_i over both kernels.
   void add_indirect(const Neighbours<T>& near, T total_d, T total_s, Result& result) const {
+    const T per_d = total_d > T(0) ? T(1) / total_d : T(0), per_s = total_s > T(0) ? T(1) / total_s : T(0);
     for_each_blocked(near, [&](int k, int64_t i, Vec3<T> sent) {
-      if (total_d > T(0)) result.indirect_d += sent * (cosine_[i] * near.weight[k] / total_d);
-      if (total_s > T(0)) result.indirect_s += sent * (lobe_[i] * near.weight[k] / total_s);
+      result.indirect_d += sent * (cosine_[i] * near.weight[k] * per_d);
+      result.indirect_s += sent * (lobe_[i] * near.weight[k] * per_s);
     });
   }
 

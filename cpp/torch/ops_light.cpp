@@ -53,7 +53,7 @@ Tensor trace_visibility(int64_t scene, Tensor origins, Tensor directions, double
 
 std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Tensor normals, Tensor lobe_dirs,
                                              Tensor roughness, Tensor environment, int64_t n_diffuse_rays,
-                                             int64_t n_specular_rays, double offset, int64_t seed) {
+                                             int64_t n_specular_rays, double offset, bool along_ray, int64_t seed) {
   const char* op = "occlusion_factors";
   const ScalarType type = real_type(op, "positions", positions);
   const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
@@ -65,7 +65,7 @@ std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Te
   require(n_diffuse_rays > 0 && n_specular_rays > 0 && n_diffuse_rays <= 1 << 20 && n_specular_rays <= 1 << 20, op,
           "n_diffuse_rays and n_specular_rays must be in [1, 2^20]");
   const OcclusionOptions options{static_cast<int>(n_diffuse_rays), static_cast<int>(n_specular_rays),
-                                 static_cast<float>(offset), static_cast<uint32_t>(seed)};
+                                 static_cast<float>(offset), along_ray, static_cast<uint32_t>(seed)};
   Tensor o_d = empty_like_type(x, {x.size(0), 3}, type), o_s = empty_like_type(x, {x.size(0), 3}, type);
   const auto mesh = get_scene(scene);
   dispatch_real(type, [&](auto zero) {
@@ -101,7 +101,8 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("sample_ggx_lobe(Tensor axes, Tensor roughness, int n_samples, int seed) -> Tensor");
   m.def("trace_visibility(int scene, Tensor origins, Tensor directions, float t_far) -> Tensor");
   m.def("occlusion_factors(int scene, Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, "
-        "Tensor environment, int n_diffuse_rays, int n_specular_rays, float offset, int seed) -> (Tensor, Tensor)");
+        "Tensor environment, int n_diffuse_rays, int n_specular_rays, float offset, bool along_ray, int seed) -> "
+        "(Tensor, Tensor)");
 }
 
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {

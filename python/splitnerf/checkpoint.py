@@ -48,13 +48,6 @@ def load_checkpoint(path: Path) -> dict:
     return content
 
 
-# How runs were trained that were written before these settings existed.
-FIRST_SETTINGS = {
-    "light": "mlp", "neutral_weight": 0.0, "shading": "split", "entropy_weight": 0.0, "dark_metal_weight": 0.0,
-    "normal_smoothness": 0.0,
-}  # fmt: skip
-
-
 def config_of(content: dict) -> Config:
     """The settings of the run that wrote the checkpoint."""
-    return Config().replace(FIRST_SETTINGS | content["config"])
+    return Config.stored(content["config"])

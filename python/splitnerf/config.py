@@ -19,6 +19,8 @@ else:
 
 
 MIN_EXPORT_SIZE = 8  # nodes or texels along an edge
+SUMMED_DIRECTIONS = 256  # fewer do not resolve the lobes that `shading = summed` sums
+FORMS = ("square", "smooth_l1")
 
 
 @dataclass
@@ -59,6 +61,7 @@ class Config:
     occlusion_width: int = 64
     occlusion_layers: int = 2
     initial_roughness: float = 0.3
+    min_roughness: float = 0.05  # a narrower lobe is finer than what images of this size resolve
     light: str = "pyramid"  # mlp (the paper) | pyramid
     light_resolution: int = 128  # texels along the edge of the pyramid's map, a power of 2
     light_width: int = 64
@@ -82,6 +85,7 @@ class Config:
     max_step: float = 0.04
     min_transmittance: float = 1e-3
     shade_above: float = 1e-3  # samples of less weight are not shaded; 0 shades all
+    occupancy: str = "distance"  # distance (bounds the density) | average (the paper)
     grid_resolution: int = 96
     grid_every: int = 32
     hull_until: float = 0.1  # the masks' visual hull is sampled until then
@@ -96,13 +100,14 @@ class Config:
     light_weight: float = 1.0
     occlusion_weight: float = 0.1
     eikonal_weight: float = 3.0
-    metal_weight: float = 0.001
+    metal_weight: float = 0.0001
     metal_regulariser: bool = True
-    dark_metal_weight: float = 0.03  # of metals that reflect less than any does
+    binary_metal_weight: float = 0.003  # of metallic between 0 and 1, from priors_from
+    dark_metal_weight: float = 0.002  # of metals that reflect less than any does
     mask_weight: float = 1.0
     neutral_weight: float = 0.03  # of the diffuse light's log chroma
-    entropy_weight: float = 0.003  # of the materials' quadratic entropy
-    entropy_from: float = 0.5  # the fraction at which it begins
+    entropy_weight: float = 0.003  # of the materials' quadratic entropy, from priors_from
+    priors_from: float = 0.5  # the fraction of the run at which materials are told apart
     entropy_points: int = 384
     albedo_width: float = 0.3  # log albedos this close count as one
     gloss_width: float = 0.2
@@ -110,6 +115,10 @@ class Config:
     normal_smoothness: float = 0.01  # of the normals between neighbouring surface points
     smoothness_points: int = 1024
     smoothness_radius: float = 0.02  # scene units, one standard deviation
+    light_loss_form: str = "smooth_l1"  # square (the paper) | smooth_l1 (the released code)
+    occlusion_loss_form: str = "square"  # the same choice
+    metal_loss_form: str = "square"  # the same choice
+    light_set: str = "fibonacci"  # fibonacci | uniform (the paper) | uniform_and_queries (the released code)
     light_samples: int = 2048
     light_queries: int = 512
     light_every: int = 1
@@ -122,6 +131,7 @@ class Config:
     mesh_resolution: int = 96
     occlusion_share: float = 0.1  # of the shaded samples
     occlusion_rays: int = 32
+    occlusion_ray_start: str = "normal"  # occlusion_offset along the normal | ray (the released code: along the ray)
     occlusion_offset: float = 0.0125
     environment_height: int = 32
     occlusion_directions: int = 256  # of the bits; a multiple of 32
@@ -156,6 +166,12 @@ class Config:
             "fresnel_mode": ("exact", "paper", "code"),
             "query": ("mean", "reflection"),
             "compositing": ("linear", "srgb"),
+            "light_loss_form": FORMS,
+            "occlusion_loss_form": FORMS,
+            "metal_loss_form": FORMS,
+            "light_set": ("fibonacci", "uniform", "uniform_and_queries"),
+            "occupancy": ("distance", "average"),
+            "occlusion_ray_start": ("normal", "ray"),
         }
         for key, allowed in choices.items():
             if getattr(self, key) not in allowed:
@@ -169,8 +185,19 @@ class Config:
                 raise InputError(f"{key} must be at least {MIN_EXPORT_SIZE}, got {getattr(self, key)}")
         if not 16 <= self.light_resolution <= 1024 or self.light_resolution & (self.light_resolution - 1):
             raise InputError(f"light_resolution must be a power of 2 in [16, 1024], got {self.light_resolution}")
-        if self.shading == "summed" and (self.occlusion != "bits" or self.compositing != "linear"):
-            raise InputError("shading = summed needs occlusion = bits and compositing = linear; set shading=split")
+        if self.shading == "summed" and not (
+            self.occlusion == "bits" and self.compositing == "linear" and self.fresnel_mode == "exact"
+            and self.occlusion_directions >= SUMMED_DIRECTIONS
+        ):  # fmt: skip
+            raise InputError(
+                "shading = summed needs occlusion = bits with at least 256 occlusion_directions, compositing = linear and "
+                "fresnel_mode = exact; set shading=split"
+            )
+        if not 0 <= self.min_roughness < 1:
+            raise InputError(f"min_roughness must be in [0, 1), got {self.min_roughness}")
+        for key in ("entropy_points", "smoothness_points", "neutral_queries", "albedo_width", "gloss_width"):
+            if getattr(self, key) <= 0:
+                raise InputError(f"{key} must be positive, got {getattr(self, key)}")
         if self.finetune_from < 1 and self.compositing != "linear":
             raise InputError("finetune_from below 1 needs compositing = linear")
         if self.finetune_samples < 1:
@@ -204,21 +231,40 @@ class Config:
             table = tomllib.loads(path.read_text())
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise InputError(f"{path}: not a readable run configuration ({error})") from error
-        return Config().replace(table)
+        return Config.stored(table)
 
+    @staticmethod
+    def stored(table: dict[str, object]) -> Config:
+        """The settings of a run, which may be older than some of them."""
+        return Config().replace(FIRST_SETTINGS | {k: v for k, v in table.items() if k not in RETIRED})
+
+
+# What runs did that were trained before these settings existed, and settings that no longer do.
+FIRST_SETTINGS: dict[str, object] = dict(
+    light="mlp", neutral_weight=0.0, shading="split", entropy_weight=0.0, dark_metal_weight=0.0, normal_smoothness=0.0,
+    binary_metal_weight=0.0,
+)
+RETIRED = ("albedo_smoothness", "gloss_smoothness", "entropy_from")
 
 # Section 4 and supplement of the paper; fractions stand for 20,000 steps.
 PAPER = dict(
-    preset="paper", shading="split", dark_metal_weight=0.0, entropy_weight=0.0, normal_smoothness=0.0, final_learning_rate=0.1, light="mlp", occlusion="mlp", occlusion_channels=1, indirect=False, neutral_weight=0.0, steps=20000, n_levels=16,
-    base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4,
-    levels_open_by=0.6, sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0, material_width=256, initial_roughness=0.5,
-    head_inputs="outputs", occlusion_directional=False, occlusion_width=256, light_width=256, light_layers=5,
-    light_direction_frequencies=10, light_roughness_frequencies=5, light_activation="softplus", fresnel_mode="paper",
-    query="reflection", compensate=False, compositing="srgb", initial_rays=256, target_samples=262144, step_scale=0.0,
-    min_step=3**0.5 * 3 / 1024, min_transmittance=0.0, shade_above=0.0, grid_resolution=128, grid_every=16,
-    hull_until=0.0, foreground_share=0.0, eikonal_weight=0.1, light_weight=10.0, occlusion_weight=0.01, mask_weight=0.0,
-    light_samples=8129, light_queries=8129, light_lobe_below=0.0, eikonal_points=0, mesh_resolution=512,
-    occlusion_rays=64, environment_height=128, warmup_steps=500, export_resolution=512,
+    preset="paper", light="mlp", occlusion="mlp", shading="split", occlusion_channels=1, indirect=False,
+    # beyond the paper
+    neutral_weight=0.0, entropy_weight=0.0, binary_metal_weight=0.0, dark_metal_weight=0.0, normal_smoothness=0.0,
+    # the scene
+    steps=20000, n_levels=16, base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4, levels_open_by=0.6,
+    sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0, material_width=256, initial_roughness=0.5,
+    min_roughness=0.0, head_inputs="outputs", occlusion_directional=False, occlusion_width=256, light_width=256,
+    light_layers=5, light_direction_frequencies=10, light_roughness_frequencies=5, light_activation="softplus",
+    fresnel_mode="paper", query="reflection", compensate=False, compositing="srgb",
+    # rays and samples
+    initial_rays=256, target_samples=262144, step_scale=0.0, min_step=3**0.5 * 3 / 1024, min_transmittance=0.0,
+    shade_above=0.0, occupancy="average", grid_resolution=128, grid_every=16, hull_until=0.0, foreground_share=0.0,
+    # losses
+    eikonal_weight=0.1, light_weight=10.0, occlusion_weight=0.01, metal_weight=0.001, mask_weight=0.0,
+    light_loss_form="square", light_set="uniform", light_samples=8129, light_queries=8129, light_lobe_below=0.0,
+    eikonal_points=0, mesh_resolution=512, occlusion_rays=64, environment_height=128, warmup_steps=500,
+    final_learning_rate=0.1, export_resolution=512,
 )  # fmt: skip
 
 PRESETS: dict[str, dict] = {"cpu": {}, "paper": PAPER}

@@ -18,6 +18,24 @@ DARKEST_METAL = 0.4  # normal reflectance
 ALBEDO_FLOOR = 0.01  # below it albedos count as one black
 
 
+def penalty(error: Tensor, form: str) -> Tensor:
+    """Elementwise error^2 (`square`), or half of it that turns linear at 1 (`smooth_l1`)."""
+    return error.square() if form == "square" else F.smooth_l1_loss(error, torch.zeros_like(error), reduction="none")
+
+
+def weighted_mean(values: Tensor, ray: RenderedRays, chosen: Tensor | None = None) -> Tensor:
+    """Mean of values [m] or [m, c] over shaded samples, the rendering weights normalised; 0 without samples.
+
+    Args:
+        values: Of the samples, per sample summed over c.
+        ray: The rendered rays.
+        chosen: [m] which of the shaded samples; None for all.
+    """
+    shaded = ray.shaded if chosen is None else ray.shaded[chosen]
+    weights = ray.weights[shaded].detach()
+    return (weights @ (values if values.dim() == 1 else values.sum(1))) / weights.sum().clamp(min=1e-8)
+
+
 def colour_loss(ray: RenderedRays, target: Tensor, background: Tensor) -> Tensor:
     """Mean squared sRGB error over the pixels, both over the same background.
 
@@ -65,39 +83,42 @@ def mask_loss(ray: RenderedRays, alpha: Tensor) -> Tensor:
 
 
 def eikonal_loss(gradients: Tensor) -> Tensor:
-    """Mean (|grad f| - 1)^2. Source: Gropp et al. 2020."""
-    return (torch.sqrt((gradients * gradients).sum(-1) + 1e-12) - 1.0).square().mean()
+    """Mean (|grad f| - 1)^2; 0 without points. Source: Gropp et al. 2020."""
+    return (torch.sqrt((gradients * gradients).sum(-1) + 1e-12) - 1.0).square().sum() / max(1, len(gradients))
 
 
-def metal_loss(ray: RenderedRays) -> Tensor:
-    """Mean w m^2 of the shaded samples. Source: SplitNeRF Eq. (18)."""
-    weights = ray.weights[ray.shaded].detach()
-    return (weights[:, None] * ray.points.metallic.square()).mean()
+def metal_loss(ray: RenderedRays, form: str = "square") -> Tensor:
+    """Weighted mean of m^2 over the shaded samples. Source: SplitNeRF Eq. (18), over all samples, not a tenth."""
+    return weighted_mean(penalty(ray.points.metallic, form), ray)
+
+
+def binary_metal_loss(ray: RenderedRays) -> Tensor:
+    """Weighted mean of m (1 - m) over the shaded samples: things are of metal or not."""
+    return weighted_mean(ray.points.metallic * (1.0 - ray.points.metallic), ray)
 
 
 def dark_metal_loss(ray: RenderedRays) -> Tensor:
-    """Mean w m (1 - F0 / .4)+ of the shaded samples, F0 the brightest channel of the albedo, taken as given.
+    """Weighted mean of m (1 - F0 / .4)+ over the shaded samples, F0 the brightest channel of the albedo, taken as given.
 
     A dark metal and a black dielectric of F0 = .04 look nearly alike, and there are no dark metals: the common ones
     reflect half of the light and more (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
     """
-    weights, points = ray.weights[ray.shaded].detach(), ray.points
-    brightest = points.albedo.detach().amax(dim=1, keepdim=True)
-    return (weights[:, None] * points.metallic * (1.0 - brightest / DARKEST_METAL).clamp(min=0.0)).mean()
+    brightest = ray.points.albedo.detach().amax(dim=1, keepdim=True)
+    return weighted_mean(ray.points.metallic * (1.0 - brightest / DARKEST_METAL).clamp(min=0.0), ray)
 
 
 def light_loss(light: Light, config: Config, generator: torch.Generator, seed: int) -> Tensor:
     """Distance of g(w, rho) from the Monte Carlo integral of g(w, 0), for random directions and roughness.
 
-    Half of the queries ask at rho = 1, the rest uniformly in [0, 1]. Broad lobes share one rotated
-    lattice of light directions; those below ``light_lobe_below`` sample their own lobe exactly. The
-    gradient flows into both sides.
+    Half of the queries ask at rho = 1, the rest uniformly in [0, 1]. Broad lobes share one set of light directions, a
+    rotated lattice or, as published, random ones (``light_set``); those below ``light_lobe_below`` sample their own lobe
+    exactly. The gradient flows into both sides.
 
     Source: SplitNeRF Eq. (11).
     """
     c = config
-    directions = fibonacci_directions(c.light_samples, generator)
     queries = F.normalize(torch.randn(c.light_queries, 3, generator=generator), dim=1)
+    directions = light_directions(c, queries, generator)
     roughness = torch.ones(c.light_queries, 1)
     roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, generator=generator)
     narrow = roughness[:, 0] < c.light_lobe_below
@@ -111,7 +132,16 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
         lobes.view(n_narrow, c.light_lobe_samples, 3).mean(1),
         prefilter_light(queries[n_narrow:], roughness[n_narrow:], directions, shared),
     ])  # fmt: skip
-    return F.smooth_l1_loss(prefiltered, g_bar, reduction="none").sum(-1).mean()
+    return penalty(prefiltered - g_bar, c.light_loss_form).sum(-1).mean()
+
+
+def light_directions(config: Config, queries: Tensor, generator: torch.Generator) -> Tensor:
+    """The directions [n, 3] that the light loss integrates over."""
+    c = config
+    if c.light_set == "fibonacci":
+        return fibonacci_directions(c.light_samples, generator)
+    uniform = F.normalize(torch.randn(c.light_samples, 3, generator=generator), dim=1)
+    return torch.cat([uniform, queries]) if c.light_set == "uniform_and_queries" else uniform
 
 
 def neutral_light_loss(light: Light, config: Config, generator: torch.Generator) -> Tensor:
@@ -141,9 +171,7 @@ def normal_smoothness_loss(model: SceneModel, ray: RenderedRays, config: Config,
     shift = c.smoothness_radius * torch.randn(len(chosen), 3, generator=generator)
     shift = shift - across * (shift * across).sum(-1, keepdim=True)
     there = unit_normals(model.surface(ray.positions[chosen].detach() + shift).gradient)
-    distance = torch.sqrt((there - normals).square().sum(-1) + 1e-8)
-    weights = ray.weights[ray.shaded[chosen]].detach()
-    return (weights * distance).mean() / weights.mean().clamp(min=1e-8)
+    return weighted_mean(torch.sqrt((there - normals).square().sum(-1) + 1e-8), ray, chosen)
 
 
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:
@@ -171,6 +199,9 @@ def occlusion_loss(
 ) -> Tensor:
     """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples.
 
+    The specular lobe is that about the light's direction, or, without ``occlusion_directional``, that about the normal,
+    as published.
+
     Source: SplitNeRF Eq. (12)-(16).
     """
     c = config
@@ -181,11 +212,10 @@ def occlusion_loss(
         normals = ray.normals[chosen]
         on_surface = ray.positions[chosen] - normals * ray.sdf[chosen, None]
         o_d, o_s = occlusion_factors(
-            scene, on_surface, normals, ray.points.lobe_dirs[chosen], ray.points.roughness[chosen], environment,
-            n_diffuse_rays=c.occlusion_rays, n_specular_rays=c.occlusion_rays, offset=c.occlusion_offset, seed=seed,
-            n_channels=c.occlusion_channels,
+            scene, on_surface, normals, ray.points.lobe_dirs[chosen] if c.occlusion_directional else normals,
+            ray.points.roughness[chosen], environment, n_diffuse_rays=c.occlusion_rays, n_specular_rays=c.occlusion_rays,
+            offset=c.occlusion_offset, along_ray=c.occlusion_ray_start == "ray", seed=seed, n_channels=c.occlusion_channels,
         )  # fmt: skip
-        weights = ray.weights[ray.shaded[chosen], None]
-        weights = weights / weights.mean().clamp(min=1e-8)
-    error = (ray.points.occlusion_d[chosen] - o_d).square() + (ray.points.occlusion_s[chosen] - o_s).square()
-    return (weights * error).mean()
+    error_d, error_s = ray.points.occlusion_d[chosen] - o_d, ray.points.occlusion_s[chosen] - o_s
+    error = penalty(error_d, c.occlusion_loss_form) + penalty(error_s, c.occlusion_loss_form)
+    return weighted_mean(error, ray, chosen) / c.occlusion_channels

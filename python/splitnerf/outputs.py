@@ -146,7 +146,7 @@ def surface_of(model: SceneModel) -> Surface:
 
 
 @torch.no_grad()
-def light_panels(model: SceneModel, height: int = 64, n_samples: int = 32768) -> list[dict]:
+def light_panels(model: SceneModel, height: int = 64, n_samples: int = 8192) -> list[dict]:
     """g(w, rho) beside its Monte Carlo estimate from g(w, 0), as [height, 2 height, 3] maps."""
     from splitnerf.fields.light import panorama_directions
 

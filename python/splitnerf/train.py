@@ -23,7 +23,7 @@ from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.render.model import SceneModel
 from splitnerf.render.monte_carlo import monte_carlo_colours
-from splitnerf.render.occupancy import OccupancyGrid, visual_hull
+from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import render_rays, sample_step
 
@@ -73,7 +73,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     hull = None
     if c.hull_until > 0:
         hull = visual_hull(c.grid_resolution, c.box, torch.from_numpy(dataset.images[..., 3]), source.poses, source.intrinsics)
-    grid = OccupancyGrid(c.grid_resolution, c.box, hull)
+    grid = make_grid(c, hull)
     scene: MeshScene | None = None
     environment: Tensor | None = None
     step, seconds, n_rays, meshed_at, previewed_at = 0, 0.0, c.initial_rays, 0.0, 0.0
@@ -85,7 +85,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         optimiser.load_state_dict(content["optimiser"])
         generator.set_state(content["generator"])
         torch.set_rng_state(content["torch_generator"])
-        grid.sdf = content["occupancy"]
+        grid.values = content["occupancy"]
         step, seconds, n_rays = content["step"], content["seconds"], content["n_rays"]
         meshed_at, previewed_at = content["meshed_at"], content["previewed_at"]
     mesh: tuple[Tensor, Tensor] | tuple[None, None] = (content["mesh_vertices"], content["mesh_faces"]) if resume else (None, None)
@@ -98,7 +98,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             state=dict(
                 step=step, seconds=seconds, n_rays=n_rays, meshed_at=meshed_at, previewed_at=previewed_at,
                 model=model.state_dict(), optimiser=optimiser.state_dict(), generator=generator.get_state(),
-                torch_generator=torch.get_rng_state(), occupancy=grid.sdf,
+                torch_generator=torch.get_rng_state(), occupancy=grid.values,
                 box_from_world=torch.from_numpy(dataset.box_from_world),
                 mesh_vertices=mesh[0], mesh_faces=mesh[1],
             ),
@@ -118,11 +118,12 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             model.open_levels(progress)
             set_learning_rate(optimiser, c, step, progress)
             if first or step % c.grid_every == 0:
-                grid.update(model.sdf_field.sdf, model.s_value, 1.0 if first else 0.1, progress < c.hull_until)
+                grid.update(model.sdf_field.sdf, model.s_value, first=first, step=step, use_hull=progress < c.hull_until)
             if (model.occlusion is not None or c.finetune_from < 1) and progress - meshed_at >= c.mesh_every:
                 meshed_at = progress
                 scene, mesh = remesh(model, c, scene, mesh)
-            if scene is not None and c.occlusion == "mlp" and (environment is None or step % ENVIRONMENT_EVERY == 0):
+            traces = scene is not None and c.occlusion == "mlp" and c.occlusion_weight > 0
+            if traces and (environment is None or step % ENVIRONMENT_EVERY == 0):
                 environment = model.light.panorama(c.environment_height)
             if scene is not None and step % ENVIRONMENT_EVERY == 0:
                 model.refresh_light()
@@ -155,13 +156,15 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 terms["neutral"] = c.neutral_weight * losses.neutral_light_loss(model.light, c, generator)
             if c.normal_smoothness:
                 terms["smoothness"] = c.normal_smoothness * losses.normal_smoothness_loss(model, ray, c, generator)
-            if c.entropy_weight and progress >= c.entropy_from:
+            if c.entropy_weight and progress >= c.priors_from:
                 terms["entropy"] = c.entropy_weight * losses.material_entropy_loss(ray, c, generator)
             if c.metal_regulariser:
-                terms["metal"] = c.metal_weight * losses.metal_loss(ray)
+                terms["metal"] = c.metal_weight * losses.metal_loss(ray, c.metal_loss_form)
+            if c.binary_metal_weight and progress >= c.priors_from:
+                terms["binary_metal"] = c.binary_metal_weight * losses.binary_metal_loss(ray)
             if c.dark_metal_weight:
                 terms["dark_metal"] = c.dark_metal_weight * losses.dark_metal_loss(ray)
-            if scene is not None and c.occlusion == "mlp":
+            if traces:
                 terms["occlusion"] = c.occlusion_weight * losses.occlusion_loss(ray, scene, environment, c, generator, step)
             loss = sum(terms.values())
             if not math.isfinite(loss.item()):
@@ -215,8 +218,10 @@ def make_optimiser(model: SceneModel, config: Config) -> torch.optim.AdamW:
 
 
 def set_learning_rate(optimiser: torch.optim.Optimizer, config: Config, step: int, progress: float) -> None:
-    """Linear warm-up over ``warmup_steps``, then exponential decay to ``final_learning_rate``."""
-    factor = min(1.0, (step + 1) / max(1, config.warmup_steps)) * config.final_learning_rate**progress
+    """Linear warm-up over ``warmup_steps``, then exponential decay to ``final_learning_rate`` at the end."""
+    warmup = min(config.warmup_steps / config.steps, 0.5)
+    decayed = max(0.0, (progress - warmup) / (1.0 - warmup))
+    factor = min(1.0, (step + 1) / max(1, config.warmup_steps)) * config.final_learning_rate**decayed
     rates = (config.learning_rate, config.variance_learning_rate, config.light_learning_rate)
     for group, rate in zip(optimiser.param_groups, rates):
         group["lr"] = rate * factor

@@ -24,7 +24,7 @@ from splitnerf.evaluate.lpips import load_distance
 from splitnerf.export.meshing import EmptyMesh
 from splitnerf.outputs import Exported, evaluate_scene, light_panels, write_assets
 from splitnerf.render.model import SceneModel
-from splitnerf.render.occupancy import OccupancyGrid
+from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.report.html import write_report
 from splitnerf.train import TrainedScene, check_same_scene, restore_mesh, train
@@ -167,7 +167,9 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     model.load_state_dict(content["model"])
     model.open_levels(1.0)
     restore_mesh(model, content)
-    grid = OccupancyGrid(config.grid_resolution, config.box)
+    grid = make_grid(config)
+    if config.occupancy == "average":  # a mean over time, unlike the distance
+        grid.values = content["occupancy"]
     grid.update(model.sdf_field.sdf, model.s_value)
     return model, grid, content
 

@@ -13,6 +13,8 @@ from splitnerf.errors import InputError
 from splitnerf.fields.light import lobe_roughness
 from splitnerf.ops import MeshScene, split_sum_shade
 from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import OccupancyGrid
+from splitnerf.render.renderer import render_rays
 from splitnerf.render.monte_carlo import monte_carlo_radiance
 
 RADIUS = 0.5
@@ -94,7 +96,7 @@ def test_the_loss_of_two_estimates_has_no_noise_in_it():
 def test_settings_that_do_not_fit_are_refused():
     with pytest.raises(InputError, match="finetune_from below 1 needs compositing"):
         Config().replace({"finetune_from": 0.8, "compositing": "srgb", "shading": "split"})
-    for setting in ({"occlusion": "mlp"}, {"occlusion": "off"}, {"compositing": "srgb"}):
+    for setting in ({"occlusion": "mlp"}, {"compositing": "srgb"}, {"fresnel_mode": "paper"}, {"occlusion_directions": 128}):
         with pytest.raises(InputError, match="shading = summed needs"):
             Config().replace(setting)
     with pytest.raises(InputError, match="finetune_samples"):
@@ -113,3 +115,19 @@ def test_with_fixed_materials_the_colours_move_the_surface_alone():
     found = torch.autograd.grad(shaded.radiance.sum(), [*parameters, scene.sdf_field.hidden_direction], retain_graph=True, allow_unused=True)
     assert all(g is None for g in found[:-1]) and (found[-1] != 0).any()
     assert all((g != 0).any() for g in torch.autograd.grad(shaded.albedo.sum(), parameters[-1:]))
+
+
+def test_with_fixed_materials_a_rendered_ray_gives_them_no_gradient():
+    """Nor through what the sum over directions adds to the split sum."""
+    torch.manual_seed(0)
+    scene = SceneModel(Config().replace({"n_levels": 2, "log2_table_size": 8, "initial_roughness": 0.8}))
+    mesh = trimesh.creation.icosphere(3, 0.7)
+    scene.use_mesh(MeshScene(mesh.vertices, mesh.faces), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces))
+    grid = OccupancyGrid(32, 1.5)
+    grid.update(scene.sdf_field.sdf, scene.s_value)
+    rays_o, rays_d = torch.tensor([[3.0, 0.0, 0.2]]).expand(8, 3), unit(torch.randn(8, 3) * 0.1 + torch.tensor([-3.0, 0, 0]))
+    weights = [p for p in scene.material.parameters()]
+    for fixed in (False, True):
+        ray = render_rays(scene, grid.cells, rays_o, rays_d, torch.full((8,), 0.5), 1.0, 0.01, fixed_materials=fixed)
+        found = torch.autograd.grad(ray.colour.sum(), [*weights, scene.light.texels], allow_unused=True)
+        assert scene.sums_light and (found[-1] != 0).any() and all(g is None for g in found[:-1]) == fixed

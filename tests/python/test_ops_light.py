@@ -118,3 +118,28 @@ def test_errors_name_what_is_wrong(device):
     check_error(lambda: prefilter_light(queries, roughness, lights[:0], light[:0]), "prefilter_light", "light_dirs", "at least one")
     check_error(lambda: sample_ggx_lobe(queries[:, :2], roughness, 4), "sample_ggx_lobe", "axes", "[n, 3]", "[6, 2]")
     check_error(lambda: sample_ggx_lobe(queries, roughness, 0), "sample_ggx_lobe", "n_samples", "[1, 2^20]")
+
+
+# ---- gbar against a million samples of the lobe ----
+
+
+def lamp(w: torch.Tensor) -> torch.Tensor:
+    """A lamp of 12 degrees over a dim sky."""
+    axis = unit(torch.tensor([[0.4, -0.2, 0.8]], dtype=w.dtype))
+    return (0.1 + 20.0 * torch.exp(40.0 * (w @ axis.T - 1.0))).expand(-1, 3)
+
+
+@pytest.mark.parametrize("rho", [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0])
+def test_gbar_against_a_million_samples_of_the_lobe(rho):
+    """The shared lattice where it resolves the lobe, 4096 of the lobe's own samples at every roughness."""
+    axes = unit(torch.tensor([[0.4, -0.2, 0.8], [0.5, 0.1, 0.7], [-0.3, 0.2, 0.5]], dtype=torch.float64))
+    roughness = torch.full((3, 1), rho, dtype=torch.float64)
+    mean = lambda n, seed: torch.stack([lamp(w).mean(0) for w in sample_ggx_lobe(axes, roughness, n, seed)])  # noqa: E731
+    exact = mean(1_000_000, 1)
+    torch.testing.assert_close(mean(4096, 2), exact, rtol=0.01, atol=0.003)
+    if rho < 0.06:  # the lobe is far narrower than the lamp
+        torch.testing.assert_close(exact, lamp(axes), rtol=0.01, atol=0)
+    if rho >= 0.2:
+        w = fibonacci_directions(8129, generator(3), torch.float64)
+        bound = {0.2: 0.03, 0.4: 0.01, 0.7: 0.01, 1.0: 0.01}[rho]
+        torch.testing.assert_close(prefilter_light(axes, roughness, w, lamp(w)), exact, rtol=bound, atol=0)

@@ -139,10 +139,10 @@ def test_under_a_sphere(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_occlusion_opcheck_precision_and_gradients(device, scene):
-    numbers = (16, 16, 0.0125, 3)
+    numbers = (16, 16, 0.0125, False, 3)
     for dtype in (torch.float32, torch.float64):
         check_op(lib.occlusion_factors, (scene.handle, *sample_inputs(device, dtype), *numbers))
-    single, double = (lib.occlusion_factors(scene.handle, *sample_inputs(device, t, 100), 64, 64, 0.0125, 3) for t in (torch.float32, torch.float64))
+    single, double = (lib.occlusion_factors(scene.handle, *sample_inputs(device, t, 100), 64, 64, 0.0125, False, 3) for t in (torch.float32, torch.float64))
     for a, b in zip(single, double):
         assert (a.double() - b).abs().mean() < 1e-3  # single rays at an edge may go either way
         assert (b >= 0).all() and (b <= 1).all()

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 import torch
+from torch.nn import functional as F
 
 from splitnerf import losses
 from splitnerf.config import Config
@@ -20,7 +21,45 @@ def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
 
 
 def test_metal_loss_is_the_weighted_square():
-    assert losses.metal_loss(rays([0.5, 0.25], [1.0, 0.4])).item() == pytest.approx((0.5 + 0.25 * 0.16) / 2)
+    assert losses.metal_loss(rays([0.5, 0.25], [1.0, 0.4])).item() == pytest.approx((0.5 + 0.25 * 0.16) / 0.75)
+    assert losses.metal_loss(rays([1.0], [0.4]), "smooth_l1").item() == pytest.approx(0.08)
+    assert losses.binary_metal_loss(rays([0.5, 0.25], [1.0, 0.4])).item() == pytest.approx(0.25 * 0.24 / 0.75)
+
+
+def test_a_batch_without_samples_costs_nothing():
+    nothing = rays([], [])
+    nothing.points.albedo = torch.zeros(0, 3)
+    for loss in (losses.metal_loss(nothing), losses.dark_metal_loss(nothing), losses.eikonal_loss(torch.zeros(0, 3))):
+        assert loss.item() == 0.0
+
+
+def test_occlusion_loss_is_the_weighted_square_of_what_is_off(monkeypatch):
+    """Eq. (16) with known factors: w (.1^2 + .3^2) and w (.2^2 + 0), w normalised."""
+    config = Config().replace({"occlusion_share": 1.1, "occlusion_channels": 1})
+    truth = torch.tensor([[0.5], [0.5]]), torch.tensor([[0.2], [1.0]])
+    asked = {}
+    monkeypatch.setattr(losses, "occlusion_factors", lambda *args, **kwargs: asked.update(args=args, **kwargs) or truth)
+    ray = rays([0.75, 0.25], [0.0, 0.0])
+    ray.positions, ray.sdf, ray.normals = torch.ones(2, 3), torch.tensor([0.1, 0.0]), F.one_hot(torch.tensor([2, 2]), 3).float()
+    ray.points.lobe_dirs, ray.points.roughness = F.one_hot(torch.tensor([0, 1]), 3).float(), torch.ones(2, 1)
+    ray.points.occlusion_d, ray.points.occlusion_s = torch.tensor([[0.6], [0.3]]), torch.tensor([[0.5], [1.0]])
+    loss = losses.occlusion_loss(ray, None, None, config, torch.Generator().manual_seed(0), 0)
+    assert loss.item() == pytest.approx(0.75 * 0.1 + 0.25 * 0.04)
+    torch.testing.assert_close(asked["args"][1], torch.tensor([[1.0, 1.0, 0.9], [1.0, 1.0, 1.0]]))  # onto the surface
+    assert torch.equal(asked["args"][3], ray.points.lobe_dirs) and not asked["along_ray"]
+    published = config.replace({"occlusion_directional": False, "occlusion_ray_start": "ray"})
+    losses.occlusion_loss(ray, None, None, published, torch.Generator().manual_seed(0), 0)
+    assert torch.equal(asked["args"][3], ray.normals) and asked["along_ray"]
+
+
+def test_the_sets_of_light_directions():
+    queries = F.normalize(torch.randn(5, 3), dim=1)
+    for name, count in (("fibonacci", 400), ("uniform", 400), ("uniform_and_queries", 405)):
+        config = Config().replace({"light_samples": 400, "light_set": name})
+        w = losses.light_directions(config, queries, torch.Generator().manual_seed(0))
+        assert w.shape == (count, 3) and w.mean(0).norm() < 0.15
+        torch.testing.assert_close(w.norm(dim=1), torch.ones(count))
+    assert torch.equal(w[400:], queries)
 
 
 class Sky:
@@ -76,10 +115,10 @@ def test_dark_metal_loss_spares_bright_metals_and_dielectrics():
     ray.points.albedo = torch.tensor([[0.1, 0.2, 0.0], [0.5, 0.1, 0.1], [0.01, 0.01, 0.01]]).requires_grad_()
     ray.points.metallic.requires_grad_()
     loss = losses.dark_metal_loss(ray)
-    assert loss.item() == pytest.approx(0.5 * (1 - 0.2 / 0.4) / 3)
+    assert loss.item() == pytest.approx((1 - 0.2 / 0.4) / 3)
     loss.backward()
     assert ray.points.albedo.grad is None
-    torch.testing.assert_close(ray.points.metallic.grad[:, 0] * 6, torch.tensor([0.5, 0.0, 1 - 0.01 / 0.4]))
+    torch.testing.assert_close(ray.points.metallic.grad[:, 0] * 3, torch.tensor([0.5, 0.0, 1 - 0.01 / 0.4]))
 
 
 def entropy(albedo: list[float], weights: list[float] | None = None, roughness: list[float] | None = None) -> float:

@@ -15,7 +15,7 @@ from splitnerf.fields.occlusion import OcclusionQuery
 from splitnerf.fields.sdf import sharpness, unit_normals
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec
 from splitnerf.render.model import SceneModel
-from splitnerf.render.occupancy import OccupancyGrid, visual_hull
+from splitnerf.render.occupancy import AveragedGrid, OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import image_rays
 from splitnerf.render.renderer import annealed_cosine, linear_to_srgb, render_rays, render_view, sample_step
 
@@ -139,7 +139,7 @@ class TestOccupancy:
         grid = OccupancyGrid(24, 1.5)
         grid.update(sphere, 100.0)
         for i in range(1, 21):
-            grid.update(lambda x, i=i: x.norm(dim=1) - RADIUS - 0.01 * i, 100.0, share=0.1)
+            grid.update(lambda x, i=i: x.norm(dim=1) - RADIUS - 0.01 * i, 100.0, first=False)
         whole = OccupancyGrid(24, 1.5)
         whole.update(lambda x: x.norm(dim=1) - RADIUS - 0.2, 100.0)
         needed = whole.cells == CELL_OCCUPIED
@@ -156,6 +156,44 @@ class TestOccupancy:
         z = torch.linspace(-1.4, 1.4, 200)
         cell = ((torch.stack([torch.full_like(z, 0.003), torch.zeros_like(z), z], 1) + 1.5) / (3.0 / 24)).long()
         assert (grid.cells[cell[:, 0], cell[:, 1], cell[:, 2]] == CELL_OCCUPIED).all()
+
+
+class TestAveragedGrid:
+    """The paper's grid: decaying maxima of the opacity."""
+
+    def test_cells_of_the_surface_are_occupied_and_far_ones_dropped(self):
+        grid = AveragedGrid(24, 1.5, 0.01)
+        for step in range(0, 256, 16):  # a point of each cell at a time
+            grid.update(sphere, 200.0, first=step == 0, step=step)
+        radius = grid.centres().norm(dim=1).view(24, 24, 24)
+        assert (grid.cells[(radius - RADIUS).abs() < 0.02] == CELL_OCCUPIED).all()
+        assert (grid.cells[radius > RADIUS + 0.3] != CELL_OCCUPIED).all()
+
+    def test_a_surface_that_left_is_forgotten(self):
+        """.95^n of an opaque cell falls below .001 after 135 refreshes, while another is seen."""
+        grid = AveragedGrid(12, 1.5, 0.01)
+        grid.update(sphere, 200.0)
+        old = (grid.cells == CELL_OCCUPIED) & (grid.centres().norm(dim=1).view(12, 12, 12) > 0.6)
+        for n in range(140):
+            grid.update(lambda x: x.norm(dim=1) - 0.2, 200.0, first=False, step=n)
+            if n == 40:
+                assert old.any() and (grid.cells[old] == CELL_OCCUPIED).any()
+        assert not (grid.cells[old] == CELL_OCCUPIED).any() and (grid.cells == CELL_OCCUPIED).any()
+
+    def test_later_half_of_the_cells_are_asked(self):
+        asked = []
+
+        def field(x):
+            asked.append(len(x))
+            return sphere(x)
+
+        grid = AveragedGrid(16, 1.5, 0.01)
+        grid.update(field, 200.0)
+        grid.update(field, 200.0, first=False, step=300)
+        assert asked[0] == 4096 and 1024 < asked[1] < 2048
+
+    def test_the_setting_chooses(self):
+        assert type(make_grid(preset("paper"))) is AveragedGrid and type(make_grid(preset("cpu"))) is OccupancyGrid
 
 
 def orbit(n: int, distance: float = 4.0) -> torch.Tensor:

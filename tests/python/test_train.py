@@ -23,7 +23,7 @@ from splitnerf.errors import InputError
 
 SMALL = [
     "--set", "n_levels=4", "--set", "log2_table_size=10", "--set", "target_samples=512", "--set", "initial_rays=64",
-    "--set", "grid_resolution=16", "--set", "light_samples=64", "--set", "light_queries=16", "--set", "eikonal_points=32",
+    "--set", "grid_resolution=16", "--set", "light_resolution=16", "--set", "light_samples=64", "--set", "light_queries=16", "--set", "eikonal_points=32",
     "--set", "mesh_resolution=24", "--set", "export_resolution=32", "--set", "export_environment_height=16",
     "--set", "export_faces=500", "--set", "export_texture_size=64",
 ]  # fmt: skip
@@ -74,7 +74,7 @@ def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     from splitnerf.workflow import load_run
 
     config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {
-        "steps": 24, "occlusion": "bits", "indirect": True, "indirect_every": 5, "occlusion_directions": 64,
+        "steps": 24, "occlusion": "bits", "indirect": True, "indirect_every": 5, "occlusion_directions": 256,
     })  # fmt: skip
     dataset = load_dataset(data)
     trained = train_scene(dataset, config, tmp_path)
@@ -96,7 +96,7 @@ def test_without_a_mesh_nothing_is_occluded():
 
     small = dict(parse_setting(s) for s in SMALL[1::2])
     for kind in ("mlp", "bits", "off"):
-        model = SceneModel(preset("cpu").replace(small | {"occlusion": kind}))
+        model = SceneModel(preset("cpu").replace(small | {"occlusion": kind, "shading": "split"}))
         points = torch.rand(5, 3)
         field = model.surface(points)
         up = torch.tensor([[0.0, 0.0, 1.0]]).expand(5, 3)
@@ -138,8 +138,9 @@ def test_resume_goes_on_where_the_run_stopped(data, tmp_path):
     assert load_checkpoint(tmp_path / "halves" / "checkpoint.pt")["step"] == 7
     halves = train_scene(dataset, config, tmp_path / "halves", resume=True)
     assert halves.step == whole.step == 14
+    # Not bit by bit: what the mesh reflects is shaded anew on resuming, a few steps later than in the whole run.
     for (name, a), b in zip(whole.model.state_dict().items(), halves.model.state_dict().values()):
-        torch.testing.assert_close(a, b, rtol=2e-2, atol=2e-3, msg=name)
+        torch.testing.assert_close(a, b, rtol=2e-2, atol=4e-3, msg=name)
 
 
 def _stop_after(steps: int, run) -> None:
@@ -303,6 +304,9 @@ def test_a_config_survives_its_file(tmp_path):
 def test_runs_from_before_a_setting_keep_what_they_were_trained_with():
     stored = dataclasses.asdict(Config())
     assert config_of({"config": stored}) == Config()
-    for name in ("light", "neutral_weight"):
+    for name in ("light", "neutral_weight", "shading", "entropy_weight", "dark_metal_weight", "normal_smoothness", "binary_metal_weight"):
         del stored[name]
-    assert config_of({"config": stored}) == Config().replace({"light": "mlp", "neutral_weight": 0.0})
+    stored |= {"occlusion": "mlp", "albedo_smoothness": 0.0, "gloss_smoothness": 0.0, "entropy_from": 0.5}
+    config = config_of({"config": stored})
+    assert (config.light, config.occlusion, config.shading) == ("mlp", "mlp", "split")
+    assert config.neutral_weight == config.entropy_weight == config.dark_metal_weight == config.normal_smoothness == 0.0

@@ -70,7 +70,7 @@ template <class T> struct Kernels {
   void (*visibility_shares)(int64_t n_directions, const VisibilityPoint<T>& point, T* known, T* visible);
   // lobe[i] = D(w_i, d)(w_i.d)+ [w_i.n > 0] up to a factor; light in the directions' r, g, b. With c = cosine,
   // sums = {sum V L c, sum L c (three channels each), sum c; the same with lobe for c}: 14 numbers.
-  void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityLobe<T>& point, const T* visible, T* lobe,
+  void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityLobe<T>& lobes, const T* visible, T* lobe,
                           T* sums);
 
   // products [rows, 3] = matrix . values, rows [begin, end); values are [columns, 4], the fourth unused.

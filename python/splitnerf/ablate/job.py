@@ -7,15 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from splitnerf.ablate.rows import FULL, Row
-from splitnerf.ablate.table import Score, differences, score_of
+from splitnerf.ablate.rows import Row
+from splitnerf.ablate.table import CLOSE, Score, differences, score_of
 from splitnerf.config import Config
 from splitnerf.data.json_files import read_json
 from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Protocol
 from splitnerf.workflow import evaluate_run, reconstruct
-
-CLOSE = 0.3  # dB: rows that differ by less from the full method are run with more seeds
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,7 @@ class Plan:
     Attributes:
         scenes: Datasets.
         rows: The first is the full method.
-        seeds: Seeds of rows that come close to the full method; others get one.
+        seeds: Seeds of rows within `CLOSE` of what they are compared with; others get one.
         protocol: How runs are scored.
         out: Folder of the runs, a folder per scene.
     """
@@ -55,16 +53,17 @@ def ablate(plan: Plan, show: Callable[[list[Score]], None]) -> list[Score]:
     scores: list[Score] = []
 
     def run(scene: Path, row: Row, seed: int) -> None:
-        scores.append(score_of(scene.resolve().name, row.name, seed, run_row(plan, scene, row, seed)))
+        scores.append(score_of(scene.resolve().name, row.name, row.reference, seed, run_row(plan, scene, row, seed)))
         show(scores)
 
     for scene in plan.scenes:
         for row in plan.rows:
             run(scene, row, 0)
     for scene in plan.scenes:
-        close = [d.row for d in differences(scores, scene.resolve().name) if abs(d.mean) < CLOSE]
+        near = [d.row for d in differences(scores, scene.resolve().name) if abs(d.mean) < CLOSE]
+        repeated = {*near, *(row.reference for row in plan.rows if row.name in near)}
         for row in plan.rows:
-            if row.name in close or (close and row.name == FULL):
+            if row.name in repeated:
                 for seed in range(1, plan.seeds):
                     run(scene, row, seed)
     return scores

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 from splitnerf.config import Config
@@ -9,40 +10,46 @@ from splitnerf.errors import InputError
 
 FULL = "full"
 
-SPLIT: dict[str, object] = {"shading": "split"}  # what has no bits, or composites in sRGB, cannot sum the light
+SPLIT: dict[str, object] = {"shading": "split", "occlusion": "bits", "compositing": "linear"}
+BY_MLP = SPLIT | {"occlusion": "mlp"}
 
-# The paper's own ablations (its table of relighting and albedo).
+# The paper's own ablations (its table of relighting and albedo), and what each is compared with.
 PAPER: dict[str, dict[str, object]] = {
     "no occlusion averaging": {"occlusion_channels": 3},
-    "no occlusion loss": SPLIT | {"occlusion": "mlp", "occlusion_weight": 0.0},
+    "split sum, occlusion by MLP, no occlusion loss": BY_MLP | {"occlusion_weight": 0.0},
     "no metal regulariser": {"metal_regulariser": False},
     "mip-map light": {"light": "pyramid"},
 }
 SWITCHES: dict[str, dict[str, object]] = {
     "MLP light": {"light": "mlp"},
     "light by the split sum": SPLIT,
-    "summed light": {"shading": "summed", "occlusion": "bits"},
+    "summed light": SPLIT | {"shading": "summed", "fresnel_mode": "exact"},
+    "split sum, occlusion by MLP": BY_MLP,
+    "split sum, occlusion by MLP, of position alone": BY_MLP | {"occlusion_directional": False},
+    "split sum, occlusion averaged over channels": SPLIT | {"occlusion_channels": 1},
     "split sum, no occlusion": SPLIT | {"occlusion": "off"},
-    "split sum, occlusion by MLP": SPLIT | {"occlusion": "mlp"},
-    "split sum, occlusion by MLP, of position alone": SPLIT | {"occlusion": "mlp", "occlusion_directional": False},
-    "occlusion averaged over channels": {"occlusion_channels": 1},
-    "occlusion by bits": {"occlusion": "bits", "indirect": False},
-    "occlusion by bits, indirect light": {"occlusion": "bits", "indirect": True},
-    "Fresnel as in the paper": {"fresnel_mode": "paper"},
-    "Fresnel as in the released code": {"fresnel_mode": "code"},
-    "no energy compensation": {"compensate": False},
-    "light asked at the reflection": {"query": "reflection"},
+    "split sum, Fresnel as in the paper": SPLIT | {"fresnel_mode": "paper"},
+    "split sum, Fresnel as in the released code": SPLIT | {"fresnel_mode": "code"},
+    "split sum, light asked at the reflection": SPLIT | {"query": "reflection"},
     "split sum, composited in sRGB": SPLIT | {"compositing": "srgb"},
+    "no indirect light": {"indirect": False},
+    "no energy compensation": {"compensate": False},
     "normals by finite differences": {"normals": "finite_difference"},
     "materials from the SDF's outputs": {"head_inputs": "outputs"},
     "no mask loss": {"mask_weight": 0.0},
     "no neutral light": {"neutral_weight": 0.0},
-    "no Monte Carlo fine-tune": {"finetune_from": 1.0},
-    "Monte Carlo fine-tune": {"finetune_from": 0.85},
     "no smoothness of normals": {"normal_smoothness": 0.0},
     "no material entropy": {"entropy_weight": 0.0},
     "dark metals allowed": {"dark_metal_weight": 0.0},
+    "metals by halves": {"binary_metal_weight": 0.0},
+    "no metal loss at all": {"metal_regulariser": False, "binary_metal_weight": 0.0, "dark_metal_weight": 0.0},
+    "Monte Carlo fine-tune": {"finetune_from": 0.85, "compositing": "linear"},
 }
+REFERENCES = {
+    "split sum, occlusion by MLP, no occlusion loss": "split sum, occlusion by MLP",
+    "split sum, occlusion by MLP, of position alone": "split sum, occlusion by MLP",
+    **{name: "light by the split sum" for name in SWITCHES if name.startswith("split sum, ") and "MLP, of" not in name},
+}  # of the rows that differ from the full method in more than what they are called by
 
 
 @dataclass(frozen=True)
@@ -52,10 +59,12 @@ class Row:
     Attributes:
         name: What it is called.
         config: All settings of its runs, but for the seed.
+        reference: The row that it is compared with.
     """
 
     name: str
     config: Config
+    reference: str = FULL
 
     @property
     def slug(self) -> str:
@@ -64,7 +73,8 @@ class Row:
 
 
 def make_rows(base: Config, names: list[str] | None = None) -> list[Row]:
-    """The full method and its variations; one that changes nothing about `base` is left out.
+    """The full method and its variations; one that changes nothing about `base` is left out, and the row that another is
+    compared with comes along.
 
     Args:
         base: The full method.
@@ -77,9 +87,15 @@ def make_rows(base: Config, names: list[str] | None = None) -> list[Row]:
     unknown = [name for name in names or [] if name not in known]
     if unknown:
         raise InputError(f"--rows: no row is called {unknown[0]!r}; there are: {'; '.join(known)}")
+    wanted = set(known if names is None else names)
+    while missing := {REFERENCES[name] for name in wanted if name in REFERENCES} - wanted:
+        wanted |= missing
     rows = [Row(FULL, base)]
-    for name in known if names is None else names:
+    same = {}
+    for name in (n for n in known if n in wanted):
         config = base.replace(known[name])
-        if all(config != row.config for row in rows):
-            rows.append(Row(name, config))
-    return rows
+        equal = next((row.name for row in rows if row.config == config), None)
+        same[name] = equal or name
+        if equal is None:
+            rows.append(Row(name, config, REFERENCES.get(name, FULL)))
+    return [dataclasses.replace(row, reference=same.get(row.reference, row.reference)) for row in rows]

@@ -11,7 +11,7 @@ import numpy as np
 
 from splitnerf.ablate.rows import FULL
 
-NOISE = 0.3  # dB: a smaller difference of single runs says nothing
+CLOSE = 0.3  # dB: a smaller difference of single runs says nothing
 COLUMNS = (
     ("relight", "relight, dB", "{:.2f}"),
     ("albedo", "albedo, dB", "{:.2f}"),
@@ -26,7 +26,8 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Score:
-    """One run's scores; None where the data hold no truth. Units as in the column titles."""
+    """One run's scores; None where the data hold no truth. Units as in the column titles. `reference` names the row
+    that it is compared with."""
 
     scene: str
     row: str
@@ -39,15 +40,16 @@ class Score:
     metallic: float | None
     light: float | None
     minutes: float | None
+    reference: str = FULL
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A row against the full method in its scene: relit views, or novel views where none are known.
+    """A row against its reference in its scene: relit views, or novel views where none are known.
 
     Attributes:
         row: Its name.
-        mean: dB, over the seeds that both have; positive is better than the full method.
+        mean: dB, over the seeds that both have; positive is better than the reference.
         error: Standard error of the mean, None with one seed.
     """
 
@@ -58,29 +60,30 @@ class Difference:
     def verdict(self) -> str:
         """In words: a number, or that there is no difference."""
         if self.error is None:
-            return "no difference" if abs(self.mean) < NOISE else f"{self.mean:+.2f} dB"
+            return "no difference" if abs(self.mean) < CLOSE else f"{self.mean:+.2f} dB"
         text = f"{self.mean:+.2f} ± {self.error:.2f} dB"
         return f"no difference ({text})" if abs(self.mean) < 2 * self.error else text
 
 
-def score_of(scene: str, row: str, seed: int, evaluation: dict) -> Score:
+def score_of(scene: str, row: str, reference: str, seed: int, evaluation: dict) -> Score:
     """The columns of an evaluation.json."""
     psnr = {key: (evaluation.get(key) or {}).get("psnr") for key in ("relight", "albedo", "novel_view")}
     seconds = evaluation.get("seconds")
     return Score(
         scene, row, seed, **psnr, normals=evaluation["normal_mae_deg"], roughness=evaluation["roughness_mae"],
         metallic=evaluation["metallic_balanced_accuracy"], light=evaluation["light_psnr"],
-        minutes=None if seconds is None else seconds / 60,
+        minutes=None if seconds is None else seconds / 60, reference=reference,
     )  # fmt: skip
 
 
 def differences(scores: Sequence[Score], scene: str) -> list[Difference]:
-    """Each row of a scene against the full method there, seed by seed."""
+    """Each row of a scene against its reference there, seed by seed."""
     here = [s for s in scores if s.scene == scene]
-    full = {s.seed: s for s in here if s.row == FULL}
+    by_run = {(s.row, s.seed): s for s in here}
     found = []
     for name in dict.fromkeys(s.row for s in here if s.row != FULL):
-        gaps = [_judged(s) - _judged(full[s.seed]) for s in here if s.row == name and s.seed in full]
+        runs = [s for s in here if s.row == name and (s.reference, s.seed) in by_run]
+        gaps = [_judged(s) - _judged(by_run[s.reference, s.seed]) for s in runs]
         if gaps:
             error = float(np.std(gaps, ddof=1) / np.sqrt(len(gaps))) if len(gaps) > 1 else None
             found.append(Difference(name, float(np.mean(gaps)), error))
@@ -101,15 +104,16 @@ def csv_table(scores: Sequence[Score]) -> str:
 
 
 def markdown_table(scores: Sequence[Score]) -> str:
-    """A table per scene, means over the seeds of a row, and the difference to the full method."""
+    """A table per scene, means over the seeds of a row, and the difference to the row's reference."""
     parts = []
     for scene in dict.fromkeys(s.scene for s in scores):
         verdicts = {d.row: d.verdict() for d in differences(scores, scene)}
-        lines = [["", *(title for _, title, _ in COLUMNS), "seeds", "against full"], ["---"] + ["---:"] * (len(COLUMNS) + 2)]
+        lines = [["", *(title for _, title, _ in COLUMNS), "seeds", "difference", "to"]]
+        lines.append(["---"] + ["---:"] * (len(COLUMNS) + 2) + ["---"])
         for name in dict.fromkeys(s.row for s in scores if s.scene == scene):
             runs = [s for s in scores if s.scene == scene and s.row == name]
             cells = [_mean([getattr(s, key) for s in runs], text) for key, _, text in COLUMNS]
-            lines.append([name, *cells, str(len(runs)), verdicts.get(name, "")])
+            lines.append([name, *cells, str(len(runs)), verdicts.get(name, ""), "" if name == FULL else runs[0].reference])
         parts.append(f"## {scene}\n\n" + "".join("| " + " | ".join(line) + " |\n" for line in lines))
     return "\n".join(parts)
 

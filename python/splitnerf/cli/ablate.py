@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
@@ -22,7 +23,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps of each run")
     parser.add_argument("--rows", metavar="LIST", help="names of rows, by semicolons (default: all; --list names them)")
     parser.add_argument("--list", action="store_true", help="print the rows and what they set, and train nothing")
-    parser.add_argument("--seeds", type=int, default=1, metavar="N", help="runs of a row within 0.3 dB of the full method (default: 1)")
+    parser.add_argument("--seeds", type=int, default=1, metavar="N", help="runs of rows within 0.3 dB of what they are compared with, 3 or more (default: 1)")
     parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
     parser.add_argument("--views", type=int, metavar="N", help="test views to score (default: all)")
     parser.add_argument("--spp", type=int, default=32, metavar="N", help="paths a pixel of relit views (default: 32)")
@@ -35,14 +36,17 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.ablate.rows import PAPER, SWITCHES, make_rows
     from splitnerf.config import parse_setting, preset
 
-    if args.seeds < 1:
-        raise InputError(f"--seeds must be at least 1, got {args.seeds}")
+    if args.seeds != 1 and args.seeds < 3:
+        raise InputError(f"--seeds must be 1, or 3 and more, for two say nothing of their spread; got {args.seeds}")
     if args.minutes is not None and args.minutes <= 0:
         raise InputError(f"--minutes must be positive, got {args.minutes}")
     minutes = 6.0 if args.minutes is None and args.steps is None else args.minutes
     settings = dict(parse_setting(text) for text in args.settings) | budget(args.steps, minutes)
     names = None if args.rows is None else [name.strip() for name in args.rows.split(";") if name.strip()]
     rows = make_rows(preset(args.preset).replace(settings), names)
+    for name in names or []:
+        if all(row.name != name for row in rows):
+            print(f"{name}: changes nothing here, left out", file=sys.stderr)
     if args.list:
         for row in rows[1:]:
             print(f"{row.name}: {', '.join(f'{k} = {v}' for k, v in (PAPER | SWITCHES)[row.name].items())}")

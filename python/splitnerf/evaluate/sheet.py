@@ -47,21 +47,33 @@ def write_sheet(
     rows = list(_rows(shown, dataset, predictions, truths, evaluation, relit))
     kinds = ("truth", "prediction", f"error x{ERROR_GAIN}")
     heads = [f"{dataset.frame_names[i]}: {kind}" for i in shown for kind in kinds]
-    factor = -(-PANEL_WIDTH // dataset.width)
-    width, height = dataset.width * factor, dataset.height * factor
+    shown_rows = []
+    for label, pairs in rows:
+        errors = [np.clip(ERROR_GAIN * np.abs(prediction - truth), 0, 1) for truth, prediction in pairs]
+        shown_rows.append((label, [panel for pair, error in zip(pairs, errors) for panel in (*pair, error)]))
+    write_image(path, picture_grid(heads, shown_rows))
+
+
+def picture_grid(heads: Sequence[str], rows: Sequence[tuple[str, Sequence[np.ndarray]]]) -> np.ndarray:
+    """One picture of many, float32 [H, W, 3] in [0, 1].
+
+    Args:
+        heads: A text above each column.
+        rows: A text before each row and its pictures, [h, w, 3] sRGB in [0, 1], all of one size; small ones are enlarged.
+    """
+    height, width = rows[0][1][0].shape[:2]
+    factor = -(-PANEL_WIDTH // width)
+    width, height = width * factor, height * factor
     sheet = Image.new("RGB", (LABEL_WIDTH + len(heads) * width, LABEL_HEIGHT + len(rows) * height), "white")
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(size=12)
     for column, head in enumerate(heads):
         draw.text((LABEL_WIDTH + column * width + 4, 2), head, "black", font)
-    for line, (label, pairs) in enumerate(rows):
+    for line, (label, pictures) in enumerate(rows):
         top = LABEL_HEIGHT + line * height
         draw.multiline_text((4, top + 4), label, "black", font)
-        for i, (truth, prediction) in enumerate(pairs):
-            error = np.clip(ERROR_GAIN * np.abs(prediction - truth), 0, 1)
-            panels = Image.fromarray(to_uint8(np.concatenate([truth, prediction, error], axis=1)))
-            panels = panels.resize((3 * width, height), Image.Resampling.NEAREST)
-            sheet.paste(panels, (LABEL_WIDTH + 3 * i * width, top))
-    write_image(path, np.asarray(sheet, np.float32) / 255)
+        panels = Image.fromarray(to_uint8(np.concatenate(pictures, axis=1)))
+        sheet.paste(panels.resize((len(pictures) * width, height), Image.Resampling.NEAREST), (LABEL_WIDTH, top))
+    return np.asarray(sheet, np.float32) / 255
 
 
 def _rows(

@@ -7,8 +7,6 @@ import math
 import torch
 from torch import Tensor, nn
 
-MIN_ROUGHNESS = 0.05  # below it a mirror's lobe is narrower than what images of this size resolve
-
 
 def relu_mlp(n_inputs: int, width: int, n_layers: int, n_outputs: int) -> nn.Sequential:
     """``n_layers`` hidden ReLU layers of ``width`` units and a linear output that starts near 0."""
@@ -24,15 +22,17 @@ def relu_mlp(n_inputs: int, width: int, n_layers: int, n_outputs: int) -> nn.Seq
 
 
 class MaterialHead(nn.Module):
-    """Albedo (linear), roughness (perceptual) and metallic of a point, each in [0, 1] by a sigmoid.
+    """Albedo (linear), roughness (perceptual) and metallic of a point, each in [0, 1] by a sigmoid; roughness from
+    ``min_roughness``.
 
     Source: SplitNeRF, section 4.2.
     """
 
-    def __init__(self, n_inputs: int, width: int = 256, n_layers: int = 2, initial_roughness: float = 0.5):
+    def __init__(self, n_inputs: int, width: int = 256, n_layers: int = 2, initial_roughness: float = 0.5, min_roughness: float = 0.0):
         super().__init__()
         self.net = relu_mlp(n_inputs, width, n_layers, 5)
-        share = min(max((initial_roughness - MIN_ROUGHNESS) / (1.0 - MIN_ROUGHNESS), 1e-3), 1.0 - 1e-3)
+        self.min_roughness = min_roughness
+        share = min(max((initial_roughness - min_roughness) / (1.0 - min_roughness), 1e-3), 1.0 - 1e-3)
         with torch.no_grad():
             self.net[-1].bias[3] = math.log(share / (1.0 - share))
             self.net[-1].bias[4] = -2.0  # most of the world is no metal
@@ -40,4 +40,4 @@ class MaterialHead(nn.Module):
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """features [n, n_inputs] -> albedo [n, 3], roughness [n, 1], metallic [n, 1]."""
         out = torch.sigmoid(self.net(features))
-        return out[:, :3], MIN_ROUGHNESS + (1.0 - MIN_ROUGHNESS) * out[:, 3:4], out[:, 4:5]
+        return out[:, :3], self.min_roughness + (1.0 - self.min_roughness) * out[:, 3:4], out[:, 4:5]

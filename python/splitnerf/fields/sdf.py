@@ -84,17 +84,9 @@ class SdfField(nn.Module):
         h = F.softplus(F.linear(inputs, hidden, self.hidden_bias), SOFTPLUS_BETA)
         return F.linear(h, out[:n_outputs], self.out_bias[:n_outputs])
 
-    def encode(self, positions: Tensor) -> Tensor:
-        """Hash-grid features [n, C] at positions [n, 3], scene units."""
-        return self.grid(self._to_unit(positions))
-
-    def outputs_at(self, positions: Tensor, features: Tensor) -> Tensor:
-        """outputs [n, n_outputs] at positions [n, 3] whose features are known."""
-        return self._outputs(self._inputs(positions, features))
-
     def forward(self, positions: Tensor) -> Tensor:
         """outputs [n, n_outputs] at positions [n, 3], scene units."""
-        return self.outputs_at(positions, self.encode(positions))
+        return self._outputs(self._inputs(positions, self.grid(self._to_unit(positions))))
 
     def sdf(self, positions: Tensor) -> Tensor:
         """Signed distance [n] at positions [n, 3], scene units."""

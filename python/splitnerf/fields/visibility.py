@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -17,7 +18,22 @@ from splitnerf.fields.occlusion import Occlusion, OcclusionQuery
 from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility
 
 TEXELS_PER_CELL = 8  # of the light, for its mean over a direction's cell
+LOBE_DIRECTIONS = 15  # within the lobe that a sum over the directions resolves
 SHADED_CHUNK = 1 << 15  # vertices shaded at a time
+
+
+class CellLight(NamedTuple):
+    """The environment as the directions of the bits see it.
+
+    Attributes:
+        radiance: [k, 3] mean over a direction's cell.
+        directions: [k, 3] unit, where in the cell it comes from, by power: a small lamp shines from where it is.
+        solid_angles: [k] sr, of the cells; they sum to 4 pi.
+    """
+
+    radiance: Tensor
+    directions: Tensor
+    solid_angles: Tensor
 
 
 class VisibilityBits(nn.Module):
@@ -38,7 +54,7 @@ class VisibilityBits(nn.Module):
         super().__init__()
         self.offset, self.n_channels, self.indirect = offset, n_channels, indirect
         self.directions = torch.from_numpy(_core.fibonacci_sphere(n_directions)).float()
-        self.light_height = height = math.ceil(math.sqrt(TEXELS_PER_CELL * n_directions / 2))
+        height = math.ceil(math.sqrt(TEXELS_PER_CELL * n_directions / 2))
         texels = torch.from_numpy(_core.equirect_directions(height, 2 * height)).float().reshape(-1, 3)
         self._texels, self._texel_roughness = texels, lobe_roughness(4.0 * math.pi / len(texels))
         self._cell = torch.cat([(part @ self.directions.T).argmax(1) for part in texels.split(4096)])
@@ -63,29 +79,32 @@ class VisibilityBits(nn.Module):
         )  # fmt: skip
         self.radiance = None
 
-    def set_light(self, panorama: Tensor) -> None:
-        """Takes the light's mean over each direction's cell from an equirectangular map of ``light_height`` rows."""
-        weighted = torch.cat([panorama.reshape(-1, 3) * self._solid_angle, self._solid_angle], dim=1)
-        sums = torch.zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
-        self.light = sums[:, :3] / sums[:, 3:]
+    @torch.no_grad()
+    def set_light(self, light: Light) -> None:
+        """Takes the light that weighs the factors, its mean over each direction's cell."""
+        self.light = self.cell_light(light).radiance
 
-    def cell_light(self, light: Light) -> tuple[Tensor, Tensor]:
-        """The light's mean over each direction's cell [k, 3], and where in the cell it comes from [k, 3] unit.
-
-        The first is differentiable in the light. The second is the cell's mean direction by luminance: a small lamp
-        shines from where it is.
-        """
+    def cell_light(self, light: Light) -> CellLight:
+        """The light's mean over each direction's cell, differentiable in the light."""
         radiance = light(self._texels, torch.full_like(self._solid_angle, self._texel_roughness))
         weighted = torch.cat([radiance * self._solid_angle, self._solid_angle], dim=1)
         sums = torch.zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
         power = weighted[:, :3].detach().sum(1, keepdim=True)
         centres = torch.zeros_like(self.directions).index_add(0, self._cell, self._texels * power)
-        return sums[:, :3] / sums[:, 3:], F.normalize(centres, dim=1)
+        area = sums[:, 3].detach()
+        return CellLight(sums[:, :3] / sums[:, 3:], F.normalize(centres, dim=1), area * (4.0 * math.pi / area.sum()))
 
-    def incoming(self, positions: Tensor, normals: Tensor, cell_light: Tensor) -> Tensor:
-        """Radiance [n, k, 3] that arrives at points from each direction, the mesh's own light included."""
+    @property
+    def summed_from(self) -> float:
+        """Roughness from which a sum over the directions resolves the lobe, whose effective number of them is 3 k a^2
+        (see :func:`splitnerf.ops.cached_occlusion`)."""
+        return (LOBE_DIRECTIONS / (3.0 * len(self.directions))) ** 0.25
+
+    def incoming(self, positions: Tensor, normals: Tensor, light: CellLight) -> Tensor:
+        """Radiance [n, k, 3] that arrives at points from each direction, the mesh's own light included. Below the
+        horizon it means nothing."""
         visible, arriving = cached_visibility(self.cache, positions, normals, self.radiance)
-        incoming = visible[..., None] * cell_light
+        incoming = visible[..., None] * light.radiance
         return incoming if arriving is None else incoming + arriving
 
     @torch.no_grad()

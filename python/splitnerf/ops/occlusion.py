@@ -65,6 +65,7 @@ def occlusion_factors(
     n_diffuse_rays: int = 64,
     n_specular_rays: int = 64,
     offset: float = 0.0125,
+    along_ray: bool = False,
     seed: int = 0,
     n_channels: int = 1,
 ) -> tuple[Tensor, Tensor]:
@@ -81,7 +82,8 @@ def occlusion_factors(
         roughness: [n, 1].
         environment: [height, width, 3] radiance, equirectangular (z up, centre column along +x).
         n_diffuse_rays, n_specular_rays: Rays a point.
-        offset: Rays start this far off the point along its normal, scene units.
+        offset: Rays start this far off the point, scene units.
+        along_ray: They start along themselves, not along the normal.
         seed: The rays' lattice is shifted at random by point and seed.
         n_channels: 1 averages the factors over the colour channels, 3 keeps them.
 
@@ -98,7 +100,7 @@ def occlusion_factors(
         raise ValueError(f"occlusion_factors: n_channels must be 1 or 3, got {n_channels}")
     o_d, o_s = lib.occlusion_factors(
         scene.handle, positions, normals, lobe_dirs, roughness, environment,
-        n_diffuse_rays, n_specular_rays, offset, seed,
+        n_diffuse_rays, n_specular_rays, offset, along_ray, seed,
     )  # fmt: skip
     return (o_d, o_s) if n_channels == 3 else (o_d.mean(-1, keepdim=True), o_s.mean(-1, keepdim=True))
 

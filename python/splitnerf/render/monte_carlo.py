@@ -10,8 +10,8 @@ from torch import Tensor
 from splitnerf.fields.light import lobe_roughness
 from splitnerf.ops import MeshScene, composite, monte_carlo_light, sample_bsdf, trace_visibility
 from splitnerf.render.model import SceneModel
-from splitnerf.render.sums import radiance_of_sums
 from splitnerf.render.renderer import MIN_OPACITY, RenderedRays, linear_to_srgb
+from splitnerf.render.sums import radiance_of_sums
 
 
 def monte_carlo_radiance(

@@ -7,11 +7,15 @@ from collections.abc import Callable
 
 import torch
 from torch import Tensor
+from torch.nn.functional import logsigmoid
 
+from splitnerf.config import Config
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
 
 DENSITY_CUTOFF = 7.0  # beyond |f| = cutoff / s the NeuS density is below e^-7 of its peak
 LIPSCHITZ = 1.25  # bound of |grad f| that the eikonal loss keeps in practice
+REFRESHED_SHARE = 0.1  # of the cells far from the surface
+DECAY, MIN_CELL_OPACITY, ALL_CELLS_UNTIL = 0.95, 1e-3, 256
 
 
 class OccupancyGrid:
@@ -25,12 +29,16 @@ class OccupancyGrid:
         resolution: Cells along an edge.
         box: Half size of the cube.
         hull: [r, r, r] bool or None.
+
+    Attributes:
+        values: [r^3] what is kept of each cell, part of a checkpoint: its signed distance.
+        cells: [r, r, r] uint8.
     """
 
     def __init__(self, resolution: int, box: float, hull: Tensor | None = None):
         self.resolution, self.box, self.hull = resolution, box, hull
         self.half_diagonal = math.sqrt(3.0) * box / resolution
-        self.sdf = torch.zeros(resolution**3)
+        self.values = torch.zeros(resolution**3)
         self.cells = torch.full((resolution,) * 3, CELL_OCCUPIED, dtype=torch.uint8)
 
     def centres(self) -> Tensor:
@@ -39,21 +47,80 @@ class OccupancyGrid:
         return torch.stack(torch.meshgrid(axis, axis, axis, indexing="ij"), dim=-1).reshape(-1, 3)
 
     @torch.no_grad()
-    def update(self, sdf: Callable[[Tensor], Tensor], s: float, share: float = 1.0, use_hull: bool = False) -> None:
-        """Re-evaluates the cells near the surface and a random share of the rest, and classes all cells anew."""
+    def update(
+        self, sdf: Callable[[Tensor], Tensor], s: float, *, first: bool = True, step: int = 0, use_hull: bool = False
+    ) -> None:
+        """Evaluates the field anew and classes all cells.
+
+        Args:
+            sdf: Signed distance [n] of points [n, 3].
+            s: Sharpness of the density.
+            first: Evaluate all cells; later the ones near the surface and a random share of the rest do.
+            step: Of the training.
+            use_hull: Keep the visual hull occupied.
+        """
         bound = LIPSCHITZ * self.half_diagonal + DENSITY_CUTOFF / s
-        due = torch.ones_like(self.sdf, dtype=torch.bool)
-        if share < 1.0:
-            due = (self.sdf.abs() < 2.0 * bound) | (torch.rand_like(self.sdf) < share)
-        index = due.nonzero().squeeze(1)
-        centres = self.centres()[index]
-        self.sdf[index] = torch.cat([sdf(chunk) for chunk in centres.split(1 << 16)]) if len(index) else self.sdf[index]
-        cells = torch.full_like(self.sdf, CELL_OCCUPIED, dtype=torch.uint8)
-        cells[self.sdf > bound] = CELL_EMPTY
-        cells[self.sdf < -bound] = CELL_OPAQUE
+        if first:
+            due = torch.arange(len(self.values))
+        else:
+            near = self.values.abs() < 2.0 * bound
+            due = (near | (torch.rand_like(self.values) < REFRESHED_SHARE)).nonzero().squeeze(1)
+        self.values[due] = evaluate(sdf, self.centres()[due])
+        cells = torch.full_like(self.values, CELL_OCCUPIED, dtype=torch.uint8)
+        cells[self.values > bound] = CELL_EMPTY
+        cells[self.values < -bound] = CELL_OPAQUE
+        self._set(cells, use_hull)
+
+    def _set(self, cells: Tensor, use_hull: bool) -> None:
         if use_hull and self.hull is not None:
             cells[self.hull.reshape(-1)] = CELL_OCCUPIED
         self.cells = cells.view((self.resolution,) * 3)
+
+
+class AveragedGrid(OccupancyGrid):
+    """The paper's grid: a cell is occupied while the decaying maximum of its opacity exceeds min(mean, .001).
+
+    It gives no bound: a cell whose point was drawn beside a thin part may be dropped. Opacity is that of a sample of
+    length ``step`` seen head-on.
+
+    Source: SplitNeRF, supplement, after nerfacc's description of its occupancy grid.
+    """
+
+    def __init__(self, resolution: int, box: float, step: float, hull: Tensor | None = None):
+        super().__init__(resolution, box, hull)
+        self.step = step
+
+    @torch.no_grad()
+    def update(
+        self, sdf: Callable[[Tensor], Tensor], s: float, *, first: bool = True, step: int = 0, use_hull: bool = False
+    ) -> None:
+        """All cells during the first 256 steps; then a quarter at random and a quarter of the cells from the occupied."""
+        n = len(self.values)
+        due = torch.arange(n)
+        if not first and step >= ALL_CELLS_UNTIL:
+            occupied = (self.cells.reshape(-1) == CELL_OCCUPIED).nonzero().squeeze(1)
+            due = torch.randint(n, (n // 4,))
+            if len(occupied):
+                due = torch.cat([due, occupied[torch.randint(len(occupied), (n // 4,))]]).unique()
+        cell = 2 * self.box / self.resolution
+        points = self.centres()[due] + (torch.rand(len(due), 3) - 0.5) * cell
+        f, half = evaluate(sdf, points), 0.5 * self.step
+        opacity = -torch.expm1(logsigmoid(s * (f - half)) - logsigmoid(s * (f + half)))
+        self.values[due] = torch.maximum(DECAY * self.values[due], opacity)
+        threshold = min(float(self.values.mean()), MIN_CELL_OPACITY)
+        self._set(torch.where(self.values > threshold, CELL_OCCUPIED, CELL_EMPTY).to(torch.uint8), use_hull)
+
+
+def make_grid(config: Config, hull: Tensor | None = None) -> OccupancyGrid:
+    """The grid that the setting ``occupancy`` names."""
+    if config.occupancy == "average":
+        return AveragedGrid(config.grid_resolution, config.box, config.min_step, hull)
+    return OccupancyGrid(config.grid_resolution, config.box, hull)
+
+
+def evaluate(sdf: Callable[[Tensor], Tensor], points: Tensor) -> Tensor:
+    """The field at points [n, 3], in chunks."""
+    return torch.cat([sdf(chunk) for chunk in points.split(1 << 16)]) if len(points) else torch.empty(0)
 
 
 def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intrinsics: Tensor) -> Tensor:

@@ -24,7 +24,8 @@ class RenderedRays:
         opacity: [n_rays].
         samples: The packed samples.
         weights: [n].
-        values: [n, 3] what is composited: radiance, linear or sRGB as `compositing` says.
+        values: [n, 3] what is composited: radiance of the split sum, linear or sRGB as `compositing` says. With `shading =
+            summed` the colour has, beside their composite, what the sum adds at each ray's heaviest sample.
         gradients: [n, 3] d sdf / d position of all samples.
         shaded: [m] indices of the samples that were shaded.
         positions: [m, 3] of the shaded samples, on the level set through the sample.
@@ -100,7 +101,7 @@ def render_rays(
     values = _fill_skipped(radiance, shaded, weights, samples)
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
     if model.sums_light:
-        mean = mean + _summed_less_split(model, positions, directions, field.sdf, normals, weights, shaded, samples, points)
+        mean = mean + _summed_less_split(model, positions, directions, field.sdf, normals, weights, shaded, samples, points, fixed_materials)
     colour = linear_to_srgb(mean) if c.compositing == "linear" else mean
     return RenderedRays(
         colour, opacity, samples, weights, values, field.gradient, shaded, positions[shaded], normals[shaded],
@@ -110,7 +111,7 @@ def render_rays(
 
 def _summed_less_split(
     model: SceneModel, positions: Tensor, directions: Tensor, sdf: Tensor, normals: Tensor, weights: Tensor, shaded: Tensor,
-    samples: PackedSamples, points: ShadedPoints,
+    samples: PackedSamples, points: ShadedPoints, fixed_materials: bool,
 ) -> Tensor:  # fmt: skip
     """[n_rays, 3] what summing the light adds to the split sum, at each ray's heaviest sample: 0 without one."""
     rays, weight = samples.ray_indices[shaded], weights.detach()[shaded]
@@ -121,6 +122,8 @@ def _summed_less_split(
     first[rays[at]] = at
     at = first[first >= 0]
     here = ShadedPoints(*(part[at] for part in points))
+    if fixed_materials:
+        here = here._replace(albedo=here.albedo.detach(), roughness=here.roughness.detach(), metallic=here.metallic.detach())
     i = shaded[at]
     on_surface = (positions[i] - normals[i] * sdf[i, None]).detach()
     summed = model.summed_radiance(on_surface, normals[i], -directions[i], here)
