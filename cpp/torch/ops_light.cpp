@@ -65,7 +65,7 @@ std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Te
   require(n_diffuse_rays > 0 && n_specular_rays > 0 && n_diffuse_rays <= 1 << 20 && n_specular_rays <= 1 << 20, op,
           "n_diffuse_rays and n_specular_rays must be in [1, 2^20]");
   const OcclusionOptions options{static_cast<int>(n_diffuse_rays), static_cast<int>(n_specular_rays),
-                                 static_cast<float>(offset), along_ray, static_cast<uint32_t>(seed)};
+                                 static_cast<float>(offset), static_cast<uint32_t>(seed), along_ray};
   Tensor o_d = empty_like_type(x, {x.size(0), 3}, type), o_s = empty_like_type(x, {x.size(0), 3}, type);
   const auto mesh = get_scene(scene);
   dispatch_real(type, [&](auto zero) {

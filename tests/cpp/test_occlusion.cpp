@@ -10,7 +10,7 @@ namespace splitnerf {
 namespace {
 
 constexpr int kHeight = 16, kWidth = 32;
-constexpr OcclusionOptions kFine{8192, 8192, 0.0125f, false, 1};
+constexpr OcclusionOptions kFine{8192, 8192, 0.0125f, 1};
 
 template <class Light> std::vector<double> environment(Light light) {
   std::vector<double> map;

@@ -162,3 +162,15 @@ def test_occlusion_seed_and_errors(device, scene):
     check_error(lambda: occlusion_factors(scene, positions, normals, lobes, roughness, environment[:0]), "environment", "at least one texel")
     check_error(lambda: occlusion_factors(scene, *inputs, n_diffuse_rays=0), "n_diffuse_rays", "[1, 2^20]")
     check_error(lambda: occlusion_factors(scene, *inputs, n_channels=2), "occlusion_factors", "n_channels", "1 or 3", "2")
+
+
+def test_rays_that_start_along_themselves():
+    """Under a plane at .02, offset .05: from off the surface all is open; along the ray only what has left the plane
+    behind, cos > .4, which is 1 - .4^2 of the cosine-weighted sky."""
+    plane = trimesh.Trimesh([[-9, -9, 0.02], [9, -9, 0.02], [9, 9, 0.02], [-9, 9, 0.02]], [[0, 1, 2], [0, 2, 3]])
+    up, white = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(4, 8, 3)
+    for along_ray, expected in ((False, 1.0), (True, 0.84)):
+        o_d, _ = occlusion_factors(
+            make_scene(plane), 0 * up, up, up, torch.ones(1, 1), white, n_diffuse_rays=4096, offset=0.05, along_ray=along_ray
+        )
+        assert o_d.item() == pytest.approx(expected, abs=0.01)

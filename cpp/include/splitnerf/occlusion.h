@@ -8,9 +8,9 @@ namespace splitnerf {
 struct OcclusionOptions {
   int n_diffuse_rays;   // cosine-weighted about n
   int n_specular_rays;  // D(w)(w.d)+ about the lobe's axis d
-  float offset;         // rays start this far from the surface, scene units,
-  bool along_ray;       // along themselves or along n
+  float offset;         // rays start this far from the surface along n, scene units
   uint32_t seed;
+  bool along_ray = false;  // they start as far along themselves
 };
 
 inline constexpr double kBlackLight = 1e-4;
