@@ -419,7 +419,7 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
 @pytest.mark.parametrize("metallic", [0.0, 1.0])
 def test_the_furnace_of_the_whole_model(metallic):
     """Under constant light a white metal without fuzz returns that light, and a white dielectric no more: the split sum to
-    1 %, which is the table's, down to n.v = .1; the sum over 256 directions to 1.5 % in the mean and 12 % at a point."""
+    1 %, which is the table's, down to n.v = .1; the sum over 256 directions to .2 % in the mean and 5 % at a point."""
     torch.manual_seed(0)
     model = SceneModel(Config().replace({"n_levels": 2, "log2_table_size": 8}))
     with torch.no_grad():
@@ -434,8 +434,8 @@ def test_the_furnace_of_the_whole_model(metallic):
     points = model.shade(0.5 * n, torch.zeros(k, 13), torch.zeros(k, 4), n, views)
     summed = model.summed_radiance(0.5 * n, n, views, points)
     torch.testing.assert_close(points.radiance, torch.ones(k, 3), rtol=0, atol=0.01)
-    assert summed[rough[:, 0] > 0.45].mean().item() == pytest.approx(1.0, abs=0.015)
-    assert (summed - 1).abs().max() < 0.12
+    assert summed[rough[:, 0] > 0.45].mean().item() == pytest.approx(1.0, abs=0.002)
+    assert (summed - 1).abs().max() < 0.05
 
 
 class Given(torch.nn.Module):
