@@ -21,16 +21,13 @@ from splitnerf.ops import (
     VisibilityCache,
     cached_occlusion,
     cached_visibility,
-    monte_carlo_light,
     occlusion_factors,
-    prefilter_light,
     query_direction,
     split_sum_shade,
     trace_visibility,
     visibility_bits,
 )
-from splitnerf.render.model import SceneModel, ShadedPoints
-from splitnerf.render.sums import radiance_of_sums
+from splitnerf.render.model import SceneModel
 
 OFFSET = 0.0125
 UP = torch.tensor([[0.0, 0.0, 1.0]])
@@ -354,105 +351,6 @@ def test_sums_of_directions_agree_with_the_factors():
     cosine = (n @ cache.directions.T).clamp(min=0)
     torch.testing.assert_close((visible * cosine) @ light / (cosine @ light), o_d, rtol=1e-4, atol=1e-5)
     torch.testing.assert_close((arriving * cosine[..., None]).sum(1) / cosine.sum(1, keepdim=True), i_d, rtol=1e-4, atol=1e-5)
-
-
-class Lamp(Light):
-    """A dim sky with a lamp of a few degrees."""
-
-    def __init__(self, axis: tuple[float, float, float], power: float = 50.0):
-        super().__init__()
-        self.axis, self.power = unit(torch.tensor([axis]))[0], torch.nn.Parameter(torch.tensor(power))
-
-    def forward(self, directions, roughness):
-        lobe = torch.exp(200.0 * (directions @ self.axis - 1.0))[:, None]
-        return (0.2 + self.power * lobe).expand(-1, 3)
-
-
-def test_the_cells_light_keeps_power_and_place():
-    bits, lamp = VisibilityBits(256, OFFSET, 3, True), Lamp((0.3, -0.5, 0.7))
-    light = bits.cell_light(lamp)
-    exact = 4 * math.pi * 0.2 + 50.0 * 2 * math.pi / 200.0
-    power = light.radiance[:, :1] * light.solid_angles[:, None]
-    assert power.sum().item() == pytest.approx(exact, rel=0.04)  # the lamp is as wide as two texels
-    power = power - 0.2 * light.solid_angles[:, None]
-    off = lambda w: math.degrees(math.acos((unit((power * w).sum(0, keepdim=True)) @ lamp.axis).item()))  # noqa: E731
-    assert off(light.directions) < 0.7 < 1.0 < off(bits.directions)
-    light.radiance.sum().backward()
-    assert lamp.power.grad.item() > 0
-
-
-def brute_force(lamp, normals, views, albedo, roughness, metallic) -> torch.Tensor:
-    """The rendering equation over 200 x 400 directions, without what blocks them."""
-    w = panorama_directions(200).reshape(-1, 3)
-    area = (1 - w[:, 2] ** 2).sqrt()
-    area = area * (4 * math.pi / area.sum())
-    pdf = (1.0 / (len(w) * area)).expand(len(normals), -1)
-    light = lamp(w, torch.zeros(len(w), 1)).expand(len(normals), -1, -1)
-    sums = monte_carlo_light(normals, views, roughness, w.expand(len(normals), -1, 3), pdf, light)
-    return radiance_of_sums(normals, views, albedo, roughness, metallic, sums, compensate=True)
-
-
-def test_summed_light_is_nearer_to_the_integral_than_the_split():
-    """A dark convex object under a lamp: the sum is 2.7 % off where the lamp shines, the split sum 7.4 %."""
-    torch.manual_seed(0)
-    model = SceneModel(Config().replace({"n_levels": 2, "log2_table_size": 8}))
-    model.light = Lamp((0.3, -0.5, 0.7))
-    mesh = trimesh.creation.icosphere(3, 0.5)
-    model.use_mesh(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces))
-    g = generator(5)
-    n = unit(torch.randn(200, 3, generator=g))
-    views = unit(n + 0.9 * unit(torch.randn(200, 3, generator=g)))
-    rough, metal, albedo = torch.full((200, 1), 0.6), torch.zeros(200, 1), torch.full((200, 3), 0.05)
-    exact = brute_force(model.light, n, views, albedo, rough, metal).detach()
-    light = prefiltered(model.light, torch.cat([query_direction(n, views, rough), n]), torch.cat([rough, torch.ones_like(rough)]))
-    one = torch.ones(200, 3)
-    split = split_sum_shade(n, views, albedo, rough, metal, light[:200], light[200:], one, one, "exact", True)
-    points = ShadedPoints(split, albedo, rough, metal, one, one, n)
-    summed = model.summed_radiance(0.5 * n, n, views, points)
-    lit = n @ model.light.axis > 0
-    error = lambda radiance: ((radiance - exact) / exact)[lit].abs().mean().item()  # noqa: E731
-    assert error(summed) < 0.035 and 0.06 < error(split) < 0.09
-    narrow = points._replace(roughness=torch.full((200, 1), 0.29))
-    assert torch.equal(model.summed_radiance(0.5 * n, n, views, narrow), split)  # too narrow for so few directions
-
-
-@pytest.mark.parametrize("metallic", [0.0, 1.0])
-def test_the_furnace_of_the_whole_model(metallic):
-    """Under constant light white things, of metal or not, return that light: the split sum to 1 %, which is the
-    table's; the sum over 256 directions to .2 % in the mean and 5 % at a point."""
-    torch.manual_seed(0)
-    model = SceneModel(Config().replace({"n_levels": 2, "log2_table_size": 8}))
-    with torch.no_grad():
-        model.light.texels.zero_()  # exp(0) = 1
-    mesh = trimesh.creation.icosphere(3, 0.5)
-    model.use_mesh(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces))
-    g, k = generator(5), 600
-    n = unit(torch.randn(k, 3, generator=g))
-    views = unit(n + 0.9 * unit(torch.randn(k, 3, generator=g)))
-    rough = 0.05 + 0.95 * torch.rand(k, 1, generator=g)
-    model.material = Given((torch.ones(k, 3), rough, torch.full((k, 1), metallic)))
-    points = model.shade(0.5 * n, torch.zeros(k, 13), torch.zeros(k, 4), n, views)
-    summed = model.summed_radiance(0.5 * n, n, views, points)
-    torch.testing.assert_close(points.radiance, torch.ones(k, 3), rtol=0, atol=0.01)
-    assert summed[rough[:, 0] > 0.45].mean().item() == pytest.approx(1.0, abs=0.002)
-    assert (summed - 1).abs().max() < 0.05
-
-
-class Given(torch.nn.Module):
-    """Materials that do not depend on where."""
-
-    def __init__(self, materials):
-        super().__init__()
-        self.materials = materials
-
-    def forward(self, inputs):
-        return self.materials
-
-
-def prefiltered(lamp, directions, roughness) -> torch.Tensor:
-    """gbar of the lamp from many directions."""
-    w = torch.from_numpy(_core.fibonacci_sphere(1 << 14)).float()
-    return prefilter_light(directions, roughness, w, lamp(w, torch.zeros(len(w), 1)).detach())
 
 
 # ---- the operators ----
