@@ -134,7 +134,10 @@ def test_gbar_against_a_million_samples_of_the_lobe(rho):
     """The shared lattice where it resolves the lobe, 4096 of the lobe's own samples at every roughness."""
     axes = unit(torch.tensor([[0.4, -0.2, 0.8], [0.5, 0.1, 0.7], [-0.3, 0.2, 0.5]], dtype=torch.float64))
     roughness = torch.full((3, 1), rho, dtype=torch.float64)
-    mean = lambda n, seed: torch.stack([lamp(w).mean(0) for w in sample_ggx_lobe(axes, roughness, n, seed)])  # noqa: E731
+
+    def mean(n: int, seed: int) -> torch.Tensor:
+        return torch.stack([lamp(w).mean(0) for w in sample_ggx_lobe(axes, roughness, n, seed)])
+
     exact = mean(1_000_000, 1)
     torch.testing.assert_close(mean(4096, 2), exact, rtol=0.01, atol=0.003)
     if rho < 0.06:  # the lobe is far narrower than the lamp

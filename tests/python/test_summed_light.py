@@ -38,7 +38,10 @@ def test_the_cells_light_keeps_power_and_place():
     power = light.radiance[:, :1] * light.solid_angles[:, None]
     assert power.sum().item() == pytest.approx(exact, rel=0.04)  # the lamp is as wide as two texels
     power = power - 0.2 * light.solid_angles[:, None]
-    off = lambda w: math.degrees(math.acos((unit((power * w).sum(0, keepdim=True)) @ lamp.axis).item()))  # noqa: E731
+
+    def off(w: torch.Tensor) -> float:
+        return math.degrees(math.acos((unit((power * w).sum(0, keepdim=True)) @ lamp.axis).item()))
+
     assert off(light.directions) < 0.7 < 1.0 < off(bits.directions)
     light.radiance.sum().backward()
     assert lamp.power.grad.item() > 0
@@ -73,7 +76,10 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
     points = ShadedPoints(split, albedo, rough, metal, one, one, n)
     summed = model.summed_radiance(0.5 * n, n, views, points)
     lit = n @ model.light.axis > 0
-    error = lambda radiance: ((radiance - exact) / exact)[lit].abs().mean().item()  # noqa: E731
+
+    def error(radiance: torch.Tensor) -> float:
+        return ((radiance - exact) / exact)[lit].abs().mean().item()
+
     assert error(summed) < 0.035 and 0.06 < error(split) < 0.09
     narrow = points._replace(roughness=torch.full((200, 1), 0.29))
     assert torch.equal(model.summed_radiance(0.5 * n, n, views, narrow), split)  # too narrow for so few directions

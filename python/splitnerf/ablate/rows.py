@@ -10,10 +10,11 @@ from splitnerf.errors import InputError
 
 FULL = "full"
 
+# The settings without which the split sum's own switches mean nothing.
 SPLIT: dict[str, object] = {"shading": "split", "occlusion": "bits", "compositing": "linear"}
 BY_MLP = SPLIT | {"occlusion": "mlp"}
 
-# The paper's own ablations (its table of relighting and albedo), and what each is compared with.
+# The paper's own ablations (its table of relighting and albedo).
 PAPER: dict[str, dict[str, object]] = {
     "no occlusion averaging": {"occlusion_channels": 3},
     "split sum, occlusion by MLP, no occlusion loss": BY_MLP | {"occlusion_weight": 0.0},
@@ -45,11 +46,12 @@ SWITCHES: dict[str, dict[str, object]] = {
     "no metal loss at all": {"metal_regulariser": False, "binary_metal_weight": 0.0, "dark_metal_weight": 0.0},
     "Monte Carlo fine-tune": {"finetune_from": 0.85, "compositing": "linear"},
 }
+# What rows are compared with that differ from the full method in more than what they are called by.
 REFERENCES = {
     "split sum, occlusion by MLP, no occlusion loss": "split sum, occlusion by MLP",
     "split sum, occlusion by MLP, of position alone": "split sum, occlusion by MLP",
     **{name: "light by the split sum" for name in SWITCHES if name.startswith("split sum, ") and "MLP, of" not in name},
-}  # of the rows that differ from the full method in more than what they are called by
+}
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,9 @@ class MaterialHead(nn.Module):
     Source: SplitNeRF, section 4.2.
     """
 
-    def __init__(self, n_inputs: int, width: int = 256, n_layers: int = 2, initial_roughness: float = 0.5, min_roughness: float = 0.0):
+    def __init__(
+        self, n_inputs: int, width: int = 256, n_layers: int = 2, initial_roughness: float = 0.5, min_roughness: float = 0.0
+    ):  # fmt: skip
         super().__init__()
         self.net = relu_mlp(n_inputs, width, n_layers, 5)
         self.min_roughness = min_roughness

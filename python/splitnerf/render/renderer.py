@@ -101,7 +101,9 @@ def render_rays(
     values = _fill_skipped(radiance, shaded, weights, samples)
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
     if model.sums_light:
-        mean = mean + _summed_less_split(model, positions, directions, field.sdf, normals, weights, shaded, samples, points, fixed_materials)
+        mean = mean + _summed_less_split(
+            model, positions, directions, field.sdf, normals, weights, shaded, samples, points, fixed_materials
+        )
     colour = linear_to_srgb(mean) if c.compositing == "linear" else mean
     return RenderedRays(
         colour, opacity, samples, weights, values, field.gradient, shaded, positions[shaded], normals[shaded],
