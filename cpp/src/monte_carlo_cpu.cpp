@@ -6,7 +6,13 @@
 namespace splitnerf::cpu {
 namespace {
 
-constexpr int64_t kGrain = 32;  // points
+constexpr int64_t kGrain = 32;         // points with many directions each
+constexpr int64_t kShadeGrain = 1024;  // points
+
+template <class T> SummedPoint<T> load_point(const SummedArrays<const T>& in, int64_t i) {
+  return {load3(in.normals + 3 * i), load3(in.view_dirs + 3 * i), load3(in.albedo + 3 * i), in.roughness[i], in.metallic[i],
+          {load3(in.all + 3 * i), load3(in.grazing + 3 * i), load3(in.diffuse + 3 * i)}};
+}
 
 }  // namespace
 
@@ -61,11 +67,39 @@ void monte_carlo_light_backward(int64_t n, int n_samples, const T* normals, cons
   });
 }
 
+template <class T>
+void shade_sums(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in, T* radiance) {
+  parallel_for(n, kShadeGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) store3(radiance + 3 * i, splitnerf::shade_sums(lut, compensate, load_point(in, i)));
+  });
+}
+
+template <class T>
+void shade_sums_backward(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in,
+                         const T* grad_radiance, const SummedArrays<T>& grad) {
+  parallel_for(n, kShadeGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const SummedPoint<T> g = splitnerf::shade_sums_backward(lut, compensate, load_point(in, i), load3(grad_radiance + 3 * i));
+      store3(grad.normals + 3 * i, g.normal);
+      store3(grad.view_dirs + 3 * i, g.view);
+      store3(grad.albedo + 3 * i, g.albedo);
+      grad.roughness[i] = g.roughness;
+      grad.metallic[i] = g.metallic;
+      store3(grad.all + 3 * i, g.light.all);
+      store3(grad.grazing + 3 * i, g.light.grazing);
+      store3(grad.diffuse + 3 * i, g.light.diffuse);
+    }
+  });
+}
+
 #define SPLITNERF_INSTANTIATE(T)                                                                                     \
   template void sample_bsdf<T>(int64_t, const T*, const T*, const T*, int, uint32_t, T*, T*);                        \
   template void monte_carlo_light<T>(int64_t, int, const T*, const T*, const T*, const T*, const T*, const T*, T*);  \
   template void monte_carlo_light_backward<T>(int64_t, int, const T*, const T*, const T*, const T*, const T*, const T*, \
-                                              const T*, T*, T*, T*);
+                                              const T*, T*, T*, T*);                                                 \
+  template void shade_sums<T>(const float*, bool, int64_t, const SummedArrays<const T>&, T*);                        \
+  template void shade_sums_backward<T>(const float*, bool, int64_t, const SummedArrays<const T>&, const T*,          \
+                                       const SummedArrays<T>&);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

@@ -1,4 +1,4 @@
-// sample_bsdf and monte_carlo_light as torch operators.
+// sample_bsdf, monte_carlo_light and shade_sums as torch operators.
 #include <tuple>
 
 #include "check.h"
@@ -75,20 +75,80 @@ std::tuple<Tensor, Tensor, Tensor> monte_carlo_light_backward(Tensor normals, Te
   return {grad_normals, grad_roughness, grad_radiance};
 }
 
+// What both directions of shade_sums read: the fields of SummedPoint and the table.
+struct SummedInputs {
+  ScalarType type;
+  Tensor normals, view_dirs, albedo, roughness, metallic, all, grazing, diffuse, lut;
+
+  SummedInputs(const char* op, const Tensor& n, const Tensor& v, const Tensor& a, const Tensor& rho, const Tensor& m,
+               const Tensor& specular, const Tensor& g, const Tensor& d, const Tensor& table)
+      : type(real_type(op, "normals", n)),
+        normals(checked(op, "normals", n, {kAny, 3}, type)),
+        view_dirs(checked(op, "view_dirs", v, {n_points(), 3}, type)),
+        albedo(checked(op, "albedo", a, {n_points(), 3}, type)),
+        roughness(checked(op, "roughness", rho, {n_points(), 1}, type)),
+        metallic(checked(op, "metallic", m, {n_points(), 1}, type)),
+        all(checked(op, "specular", specular, {n_points(), 3}, type)),
+        grazing(checked(op, "grazing", g, {n_points(), 3}, type)),
+        diffuse(checked(op, "diffuse", d, {n_points(), 3}, type)),
+        lut(checked(op, "lut", table, {kLutSize, kLutSize, 3}, ScalarType::Float)) {}
+  int64_t n_points() const { return normals.size(0); }
+  template <class T> cpu::SummedArrays<const T> arrays() const {
+    return {in<T>(normals),  in<T>(view_dirs), in<T>(albedo),  in<T>(roughness),
+            in<T>(metallic), in<T>(all),       in<T>(grazing), in<T>(diffuse)};
+  }
+};
+
+Tensor shade_sums(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular,
+                  Tensor grazing, Tensor diffuse, Tensor lut, bool compensate) {
+  const SummedInputs i("shade_sums", normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, lut);
+  Tensor radiance = empty_like_type(i.normals, {i.n_points(), 3}, i.type);
+  dispatch_real(i.type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::shade_sums(in<float>(i.lut), compensate, i.n_points(), i.arrays<T>(), out<T>(radiance));
+  });
+  return radiance;
+}
+
+std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade_sums_backward(
+    Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, Tensor grazing,
+    Tensor diffuse, Tensor lut, bool compensate, Tensor grad_radiance) {
+  const char* op = "shade_sums_backward";
+  const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, lut);
+  const Tensor g = checked(op, "grad_radiance", grad_radiance, {i.n_points(), 3}, i.type);
+  const auto make = [&](int64_t columns) { return empty_like_type(g, {i.n_points(), columns}, i.type); };
+  Tensor grad[8] = {make(3), make(3), make(3), make(1), make(1), make(3), make(3), make(3)};
+  dispatch_real(i.type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::shade_sums_backward(in<float>(i.lut), compensate, i.n_points(), i.arrays<T>(), in<T>(g),
+                             cpu::SummedArrays<T>{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]),
+                                                  out<T>(grad[4]), out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7])});
+  });
+  return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7]};
+}
+
 }  // namespace
 
+#define SPLITNERF_SUMMED_POINT                                                                            \
+  "Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, " \
+  "Tensor grazing, Tensor diffuse, Tensor lut, bool compensate"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("sample_bsdf(Tensor normals, Tensor view_dirs, Tensor roughness, int n_samples, int seed) -> (Tensor, Tensor)");
   m.def("monte_carlo_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
         "Tensor radiance) -> Tensor");
   m.def("monte_carlo_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
         "Tensor radiance, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
+  m.def("shade_sums(" SPLITNERF_SUMMED_POINT ") -> Tensor");
+  m.def("shade_sums_backward(" SPLITNERF_SUMMED_POINT ", Tensor grad_radiance) -> "
+        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
   m.impl("sample_bsdf", TORCH_BOX(&sample_bsdf));
   m.impl("monte_carlo_light", TORCH_BOX(&monte_carlo_light));
   m.impl("monte_carlo_light_backward", TORCH_BOX(&monte_carlo_light_backward));
+  m.impl("shade_sums", TORCH_BOX(&shade_sums));
+  m.impl("shade_sums_backward", TORCH_BOX(&shade_sums_backward));
 }
 
 }  // namespace splitnerf::glue

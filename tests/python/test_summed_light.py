@@ -14,9 +14,8 @@ from splitnerf import _core
 from splitnerf.config import Config
 from splitnerf.fields import Light, VisibilityBits
 from splitnerf.fields.light import panorama_directions
-from splitnerf.ops import monte_carlo_light, prefilter_light, query_direction, split_sum_shade
+from splitnerf.ops import monte_carlo_light, prefilter_light, query_direction, shade_sums, split_sum_shade
 from splitnerf.render.model import SceneModel, ShadedPoints
-from splitnerf.render.sums import radiance_of_sums
 
 
 class Lamp(Light):
@@ -55,7 +54,7 @@ def brute_force(lamp, normals, views, albedo, roughness, metallic) -> torch.Tens
     pdf = (1.0 / (len(w) * area)).expand(len(normals), -1)
     light = lamp(w, torch.zeros(len(w), 1)).expand(len(normals), -1, -1)
     sums = monte_carlo_light(normals, views, roughness, w.expand(len(normals), -1, 3), pdf, light)
-    return radiance_of_sums(normals, views, albedo, roughness, metallic, sums, compensate=True)
+    return shade_sums(normals, views, albedo, roughness, metallic, sums, compensate=True)
 
 
 def test_summed_light_is_nearer_to_the_integral_than_the_split():

@@ -1,5 +1,5 @@
-// Monte Carlo shading of one point: directions from the BSDF's two lobes, and the sums over incoming
-// light that stand where the split sum has L_s and L_d, each with its adjoint.
+// Monte Carlo shading of one point: directions from the BSDF's two lobes, the sums over incoming light
+// that stand where the split sum has L_s and L_d, and the radiance that follows, each with its adjoint.
 #pragma once
 
 #include "splitnerf/sampling.h"
@@ -127,6 +127,61 @@ SPLITNERF_HD LightSumsGrad<T> monte_carlo_light_backward(Vec3<T> normal, Vec3<T>
   out.normal = out.normal * sign;
   // ggx_alpha = roughness^2 above its floor
   out.roughness = roughness * roughness > T(kMinSampledAlpha) ? grad_alpha * T(2) * roughness : T(0);
+  return out;
+}
+
+template <class T> struct SummedPoint {
+  Vec3<T> normal, view, albedo;
+  T roughness, metallic;
+  LightSums<T> light;
+};
+
+// L = gain (F0 (all - grazing) + grazing) + (1 - m)(1 - E) albedo diffuse, Schlick's Fresnel term inside the sums;
+// gain and E as in the split sum with FresnelMode::kExact.        Source: SplitNeRF Eq. (4)-(6).
+template <class T> SPLITNERF_HD Vec3<T> shade_sums(const float* lut, bool compensate, const SummedPoint<T>& p) {
+  const T nv = dot(p.normal, p.view) * facing(p.normal, p.view), m = p.metallic;
+  const Vec3<T> table = lookup_brdf_lut(lut, nv, p.roughness);
+  Vec3<T> radiance;
+  for (int c = 0; c < 3; ++c) {
+    const T f0 = normal_reflectance(m, p.albedo[c]);
+    const T gain = scattering_gain(f0, table.x, table.y, compensate).value;
+    const T k_d = (T(1) - m) * (T(1) - specular_albedo(f0, table.x, table.y, compensate).value);
+    radiance[c] = gain * (f0 * (p.light.all[c] - p.light.grazing[c]) + p.light.grazing[c]) +
+                  k_d * p.albedo[c] * p.light.diffuse[c];
+  }
+  return radiance;
+}
+
+// Gradients to every field of the point; recomputes the forward pass.
+template <class T>
+SPLITNERF_HD SummedPoint<T> shade_sums_backward(const float* lut, bool compensate, const SummedPoint<T>& p,
+                                                Vec3<T> grad) {
+  const T sign = facing(p.normal, p.view), nv = dot(p.normal, p.view) * sign, m = p.metallic;
+  const LutSample<T> table = sample_brdf_lut(lut, nv, p.roughness);
+  SummedPoint<T> out{};
+  T grad_f1 = T(0), grad_f2 = T(0);
+  for (int c = 0; c < 3; ++c) {
+    const T albedo = p.albedo[c], diffuse = p.light.diffuse[c], spread = p.light.all[c] - p.light.grazing[c];
+    const T f0 = normal_reflectance(m, albedo), reflected = f0 * spread + p.light.grazing[c];
+    const ScatteringGain<T> gain = scattering_gain(f0, table.value.x, table.value.y, compensate);
+    const SpecularAlbedo<T> e = specular_albedo(f0, table.value.x, table.value.y, compensate);
+    const T kept = T(1) - e.value, g = grad[c];
+    // radiance = gain reflected + (1 - m) kept albedo diffuse
+    out.light.all[c] = g * gain.value * f0;
+    out.light.grazing[c] = g * gain.value * (T(1) - f0);
+    out.light.diffuse[c] = g * (T(1) - m) * kept * albedo;
+    const T grad_gain = g * reflected, grad_e = -g * (T(1) - m) * albedo * diffuse;
+    const T grad_f0 = g * gain.value * spread + grad_gain * gain.d_fr + grad_e * e.d_fr;
+    out.albedo[c] = g * (T(1) - m) * kept * diffuse + grad_f0 * m;
+    out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - g * kept * albedo * diffuse;
+    grad_f1 += grad_gain * gain.d_f + grad_e * e.d_f1;
+    grad_f2 += grad_gain * gain.d_f + grad_e * e.d_f2;
+  }
+  // F1, F2 = table(n.v, roughness)
+  out.roughness = grad_f1 * table.d_roughness.x + grad_f2 * table.d_roughness.y;
+  const T grad_nv = grad_f1 * table.d_n_dot_v.x + grad_f2 * table.d_n_dot_v.y;
+  out.normal = p.view * (sign * grad_nv);
+  out.view = p.normal * (sign * grad_nv);
   return out;
 }
 

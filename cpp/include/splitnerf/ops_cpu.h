@@ -103,6 +103,16 @@ SPLITNERF_API void monte_carlo_light_backward(int64_t n, int n_samples, const T*
                                               const T* roughness, const T* light_dirs, const T* pdf, const T* radiance,
                                               const T* grad_sums, T* grad_normals, T* grad_roughness, T* grad_radiance);
 
+// The fields of SummedPoint as arrays, 3 values each but for roughness and metallic.
+template <class T> struct SummedArrays {
+  T *normals, *view_dirs, *albedo, *roughness, *metallic, *all, *grazing, *diffuse;
+};
+template <class T>
+SPLITNERF_API void shade_sums(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in, T* radiance);
+template <class T>
+SPLITNERF_API void shade_sums_backward(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in,
+                                       const T* grad_radiance, const SummedArrays<T>& grad);
+
 // ---- rays ----
 
 // jitter [n_rays] in [0, 1). offsets [n_rays + 1] is filled with the exclusive sum of the counts.

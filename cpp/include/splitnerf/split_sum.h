@@ -153,6 +153,11 @@ struct ShadeOptions {
 
 inline constexpr double kDielectricF0 = 0.04;
 
+// Reflectance at normal incidence of one channel.
+template <class T> SPLITNERF_HD T normal_reflectance(T metallic, T albedo) {
+  return T(kDielectricF0) * (T(1) - metallic) + metallic * albedo;
+}
+
 // Effective Fresnel colour Fr of one channel that multiplies F1, and its partial derivatives.
 //   exact: Fr = F0 (F1 and F2 already hold Schlick's term)
 //   paper: Fr = F0 + (1 - rho - F0)(1 - n.v)^5                     SplitNeRF Eq. (7)
@@ -171,16 +176,26 @@ template <class T> SPLITNERF_HD FresnelTerm<T> fresnel_term(FresnelMode mode, T 
           nv_free ? T(-5) * edge * square(c * c) : T(0)};
 }
 
-// Directional albedo E of the specular lobe for one channel, and its partial derivatives.
-//   E0 = Fr F1 + F2;  E = E0 or, compensated, E0 (1 + Fr (1 / (F1 + F2) - 1))
+// What multiple scattering adds to the specular lobe of one channel, a factor, and its partial derivatives:
+// 1 or, compensated, 1 + Fr (1 / (F1 + F2) - 1).
+template <class T> struct ScatteringGain {
+  T value, d_fr, d_f;  // d_f: the same for F1 and F2
+};
+template <class T> SPLITNERF_HD ScatteringGain<T> scattering_gain(T fr, T f1, T f2, bool compensate) {
+  if (!compensate) return {T(1), T(0), T(0)};
+  const T inv_s = T(1) / (f1 + f2);
+  return {T(1) + fr * (inv_s - T(1)), inv_s - T(1), -fr * inv_s * inv_s};
+}
+
+// Directional albedo E = (Fr F1 + F2) gain of the specular lobe for one channel, and its partial derivatives.
 template <class T> struct SpecularAlbedo {
   T value, d_fr, d_f1, d_f2;
 };
 template <class T> SPLITNERF_HD SpecularAlbedo<T> specular_albedo(T fr, T f1, T f2, bool compensate) {
   const T single = fr * f1 + f2;
-  if (!compensate) return {single, f1, fr, T(1)};
-  const T inv_s = T(1) / (f1 + f2), gain = T(1) + fr * (inv_s - T(1)), d_s = -single * fr * inv_s * inv_s;
-  return {single * gain, f1 * gain + single * (inv_s - T(1)), fr * gain + d_s, gain + d_s};
+  const ScatteringGain<T> gain = scattering_gain(fr, f1, f2, compensate);
+  return {single * gain.value, f1 * gain.value + single * gain.d_fr, fr * gain.value + single * gain.d_f,
+          gain.value + single * gain.d_f};
 }
 
 template <class T> struct ShadePoint {
@@ -197,7 +212,7 @@ template <class T> SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeO
   const Vec3<T> table = lookup_brdf_lut(lut, nv, p.roughness);
   Vec3<T> radiance;
   for (int c = 0; c < 3; ++c) {
-    const T f0 = T(kDielectricF0) * (T(1) - m) + m * p.albedo[c];
+    const T f0 = normal_reflectance(m, p.albedo[c]);
     const T fr = fresnel_term(options.fresnel, f0, p.roughness, nv).value;
     const T e = specular_albedo(fr, table.x, table.y, options.compensate).value;
     const T k_d = (T(1) - m) * (T(1) - (options.fresnel == FresnelMode::kExact ? e : fr));
@@ -217,7 +232,7 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
   T grad_f1 = T(0), grad_f2 = T(0), grad_nv = T(0);
   for (int c = 0; c < 3; ++c) {
     const T albedo = p.albedo[c], l_d = p.diffuse[c], l_s = p.specular[c], o_d = p.occlusion_d[c], o_s = p.occlusion_s[c];
-    const T f0 = T(kDielectricF0) * (T(1) - m) + m * albedo;
+    const T f0 = normal_reflectance(m, albedo);
     const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
     const SpecularAlbedo<T> e = specular_albedo(fr.value, table.value.x, table.value.y, options.compensate);
     const T kept = T(1) - (exact ? e.value : fr.value), k_d = (T(1) - m) * kept;

@@ -12,7 +12,7 @@ from splitnerf.ops.light_pyramid import (
     sparse_product,
     zonal_factors,
 )
-from splitnerf.ops.monte_carlo import LightSums, monte_carlo_light, sample_bsdf
+from splitnerf.ops.monte_carlo import LightSums, monte_carlo_light, sample_bsdf, shade_sums
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
 from splitnerf.ops.rays import (
     CELL_EMPTY,
@@ -31,6 +31,6 @@ __all__ = [
     "MeshScene", "PackedSamples", "SparseMap", "VisibilityCache", "brdf_lut", "cached_occlusion", "cached_visibility", "composite",
     "fibonacci_directions", "growth_for", "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters",
     "light_lookup", "light_sum_of_levels", "march_rays", "monte_carlo_light", "neus_weights", "occlusion_factors",
-    "prefilter_light", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sh_projection", "sparse_product",
-    "split_sum_shade", "trace_visibility", "visibility_bits", "zonal_factors",
+    "prefilter_light", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sh_projection", "shade_sums",
+    "sparse_product", "split_sum_shade", "trace_visibility", "visibility_bits", "zonal_factors",
 ]  # fmt: skip

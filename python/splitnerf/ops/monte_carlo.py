@@ -1,6 +1,7 @@
-"""Monte Carlo shading: directions from the BSDF, and the sums over the light that comes from them.
+"""Monte Carlo shading: directions from the BSDF, the sums over the light that comes from them, and what is reflected.
 
-``monte_carlo_light`` is differentiable once in normals, roughness and radiance; a gradient to the rest raises.
+``monte_carlo_light`` is differentiable once in normals, roughness and radiance, ``shade_sums`` once in all; a gradient to
+the rest raises.
 
 Source: the rendering equation, SplitNeRF Eq. (4)-(6), without the split.
 """
@@ -12,6 +13,7 @@ from typing import NamedTuple
 from torch import Tensor
 
 from splitnerf.ops._library import lib, refuse_gradients, register
+from splitnerf.ops.shading import brdf_lut
 
 
 class LightSums(NamedTuple):
@@ -68,6 +70,38 @@ def monte_carlo_light(
     return LightSums(*lib.monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance).unbind(1))
 
 
+def shade_sums(
+    normals: Tensor,
+    view_dirs: Tensor,
+    albedo: Tensor,
+    roughness: Tensor,
+    metallic: Tensor,
+    sums: LightSums,
+    compensate: bool = False,
+) -> Tensor:
+    """Outgoing linear radiance of points from their sums over incoming light, Schlick's Fresnel term inside the sums.
+
+    ``L = gain (F0 (specular - grazing) + grazing) + (1 - m)(1 - E) albedo diffuse``, with F0, E and the gain of multiple
+    scattering as in :func:`splitnerf.ops.split_sum_shade` in its ``exact`` mode.
+
+    Args:
+        normals, view_dirs: [n, 3] unit; the normal is turned towards the viewer.
+        albedo: [n, 3] linear, in [0, 1].
+        roughness, metallic: [n, 1], in [0, 1].
+        sums: Of the light at the points, from :func:`monte_carlo_light`.
+        compensate: Multiple-scattering compensation (Turquin 2019).
+
+    Returns:
+        [n, 3] linear radiance.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+    """
+    return lib.shade_sums(
+        normals, view_dirs, albedo, roughness, metallic, *sums, brdf_lut(normals.device), compensate
+    )
+
+
 def _keep(ctx, inputs, output):
     ctx.save_for_backward(*inputs)
 
@@ -76,6 +110,16 @@ def _backward(ctx, grad_sums):
     refuse_gradients(ctx, "monte_carlo_light", view_dirs=1, light_dirs=3, pdf=4)
     normals, roughness, radiance = lib.monte_carlo_light_backward(*ctx.saved_tensors, grad_sums)
     return normals, None, roughness, None, None, radiance
+
+
+def _keep_summed(ctx, inputs, output):
+    ctx.save_for_backward(*inputs[:9])
+    ctx.compensate = inputs[9]
+
+
+def _summed_backward(ctx, grad):
+    refuse_gradients(ctx, "shade_sums", lut=8)
+    return *lib.shade_sums_backward(*ctx.saved_tensors, ctx.compensate, grad), None, None
 
 
 register(
@@ -98,4 +142,14 @@ register(
         roughness.new_empty(roughness.shape),
         radiance.new_empty(radiance.shape),
     ),
+)
+register(
+    "shade_sums",
+    fake=lambda normals, *rest: normals.new_empty(normals.shape),
+    setup_context=_keep_summed,
+    backward=_summed_backward,
+)
+register(
+    "shade_sums_backward",
+    fake=lambda *inputs: tuple(t.new_empty(t.shape) for t in inputs[:8]),
 )

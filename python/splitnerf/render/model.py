@@ -21,8 +21,7 @@ from splitnerf.fields import (
     VisibilityBits,
 )
 from splitnerf.fields.sdf import SdfSample, sharpness
-from splitnerf.ops import HashGridSpec, MeshScene, monte_carlo_light, query_direction, split_sum_shade
-from splitnerf.render.sums import radiance_of_sums
+from splitnerf.ops import HashGridSpec, MeshScene, monte_carlo_light, query_direction, shade_sums, split_sum_shade
 
 START_BOUNCES = 3  # of indirect light on a new mesh
 SUMMED_BAND = 0.15  # of roughness, in which the sum over directions takes the split sum's place
@@ -187,8 +186,8 @@ class SceneModel(nn.Module):
         n, k = len(wide), len(light.directions)
         pdf = (1.0 / (k * light.solid_angles)).expand(n, k)
         sums = monte_carlo_light(normals, view_dirs, here.roughness, light.directions.expand(n, k, 3), pdf, incoming)
-        radiance = radiance_of_sums(
-            normals, view_dirs, here.albedo, here.roughness, here.metallic, sums, compensate=self.config.compensate
+        radiance = shade_sums(
+            normals, view_dirs, here.albedo, here.roughness, here.metallic, sums, self.config.compensate
         )
         return points.radiance.index_copy(0, wide, torch.lerp(here.radiance, radiance, t * t * (3.0 - 2.0 * t)))
 

@@ -8,10 +8,9 @@ import torch
 from torch import Tensor
 
 from splitnerf.fields.light import lobe_roughness
-from splitnerf.ops import MeshScene, composite, monte_carlo_light, sample_bsdf, trace_visibility
+from splitnerf.ops import MeshScene, composite, monte_carlo_light, sample_bsdf, shade_sums, trace_visibility
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import MIN_OPACITY, RenderedRays, linear_to_srgb
-from splitnerf.render.sums import radiance_of_sums
 
 
 def monte_carlo_radiance(
@@ -56,7 +55,7 @@ def monte_carlo_radiance(
     light = model.light(directions.reshape(-1, 3)[lit], filter_roughness)
     radiance = torch.zeros_like(directions).view(-1, 3).index_copy(0, lit, light).view_as(directions)
     sums = monte_carlo_light(normals, view_dirs, roughness, directions, pdf, radiance)
-    return radiance_of_sums(normals, view_dirs, albedo, roughness, metallic, sums, compensate=c.compensate)
+    return shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, c.compensate)
 
 
 def monte_carlo_colours(
