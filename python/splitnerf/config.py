@@ -106,10 +106,10 @@ class Config:
     dark_metal_weight: float = 0.002  # of metals that reflect less than any does
     mask_weight: float = 1.0
     neutral_weight: float = 0.03  # of the diffuse light's log chroma
-    entropy_weight: float = 0.003  # of the materials' quadratic entropy, from priors_from
+    entropy_weight: float = 0.002  # of the materials' quadratic entropy, from priors_from
     priors_from: float = 0.5  # the fraction of the run at which materials are told apart
     entropy_points: int = 384
-    albedo_width: float = 0.3  # log albedos this close count as one
+    albedo_width: float = 0.6  # log albedos this close count as one
     gloss_width: float = 0.2
     neutral_queries: int = 256
     normal_smoothness: float = 0.01  # of the normals between neighbouring surface points
