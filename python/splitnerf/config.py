@@ -84,7 +84,8 @@ class Config:
     min_step: float = 0.005
     max_step: float = 0.04
     min_transmittance: float = 1e-3
-    shade_above: float = 1e-3  # samples of less weight are not shaded; 0 shades all
+    sample_above: float = 1e-3  # samples of less weight are left out; 0 takes all
+    shades_per_ray: int = 4  # samples of a ray that are shaded, others interpolate; 0 shades all
     occupancy: str = "distance"  # distance (bounds the density) | average (the paper)
     grid_resolution: int = 96
     grid_every: int = 32
@@ -244,7 +245,7 @@ FIRST_SETTINGS: dict[str, object] = dict(
     light="mlp", neutral_weight=0.0, shading="split", entropy_weight=0.0, dark_metal_weight=0.0, normal_smoothness=0.0,
     binary_metal_weight=0.0,
 )
-RETIRED = ("albedo_smoothness", "gloss_smoothness", "entropy_from")
+RETIRED = ("albedo_smoothness", "gloss_smoothness", "entropy_from", "shade_above")
 
 # Section 4 and supplement of the paper; fractions stand for 20,000 steps.
 PAPER = dict(
@@ -259,7 +260,7 @@ PAPER = dict(
     fresnel_mode="paper", query="reflection", compensate=False, compositing="srgb",
     # rays and samples
     initial_rays=256, target_samples=262144, step_scale=0.0, min_step=3**0.5 * 3 / 1024, min_transmittance=0.0,
-    shade_above=0.0, occupancy="average", grid_resolution=128, grid_every=16, hull_until=0.0, foreground_share=0.0,
+    sample_above=0.0, shades_per_ray=0, occupancy="average", grid_resolution=128, grid_every=16, hull_until=0.0, foreground_share=0.0,
     # losses
     eikonal_weight=0.1, light_weight=10.0, occlusion_weight=0.01, metal_weight=0.001, mask_weight=0.0,
     light_loss_form="square", light_set="uniform", light_samples=8129, light_queries=8129, light_lobe_below=0.0,

@@ -31,8 +31,7 @@ def weighted_mean(values: Tensor, ray: RenderedRays, chosen: Tensor | None = Non
         ray: The rendered rays.
         chosen: [m] which of the shaded samples; None for all.
     """
-    shaded = ray.shaded if chosen is None else ray.shaded[chosen]
-    weights = ray.weights[shaded].detach()
+    weights = ray.shares if chosen is None else ray.shares[chosen]
     return (weights @ (values if values.dim() == 1 else values.sum(1))) / weights.sum().clamp(min=1e-8)
 
 
@@ -184,7 +183,7 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
     Source: Barron and Malik 2015 (SIRFS), section 4.2, for reflectance; the gloss is our addition.
     """
     c, points = config, ray.points
-    weights = ray.weights[ray.shaded].detach()
+    weights = ray.shares
     if len(weights) == 0:
         return torch.zeros(())
     chosen = torch.multinomial(weights + 1e-12, c.entropy_points, replacement=True, generator=generator)

@@ -20,6 +20,25 @@ template <class T> struct HashEncodeArgs {
   const T* table;       // [n_entries, n_features]
 };
 
+// The distance field: position and hash-grid features into one hidden layer of softplus units, whose weighted sum it is.
+template <class T> struct SdfNetwork {
+  HashEncodeArgs<T> grid;  // without points
+  int width;               // hidden units
+  const T* hidden;         // [width, 3 + n_levels * n_features]
+  const T* hidden_bias;    // [width]
+  const T* out;            // [width]
+  T out_bias;
+  T beta;                  // of the softplus
+  T box;                   // half size of the cube that the grid covers
+
+  int64_t n_features() const { return int64_t(grid.n_levels) * grid.n_features; }
+};
+
+inline constexpr int kSdfBlock = 64;  // points that are evaluated together
+
+// Values that `sdf_values` needs as work memory.
+template <class T> int64_t sdf_work_size(const SdfNetwork<T>& net) { return kSdfBlock * (6 + 2 * net.n_features()); }
+
 // Weights of all (query, source) pairs of the pre-integration lobe, structure of arrays.
 template <class T> struct LobeSide {
   const T *x, *y, *z;     // unit directions
@@ -60,6 +79,8 @@ template <class T> struct Kernels {
   // grad_positions [n, 3], overwritten. Points [begin, end).
   void (*hash_position_gradient)(const HashEncodeArgs<T>&, int64_t begin, int64_t end, const T* grad_features,
                                  const T* grad_jacobian, T* grad_positions);
+  // values [n] at positions [n, 3], scene units; n <= kSdfBlock, work [sdf_work_size].
+  void (*sdf_values)(const SdfNetwork<T>&, int64_t n, const T* positions, T* work, T* values);
   // sums[i - begin] = {sum K r, sum K g, sum K b, sum K} over the sources, for queries [begin, end).
   void (*lobe_gather)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
   // sums[i - begin] = {sum K r, sum K g, sum K b} over the queries, for lights [begin, end).

@@ -27,47 +27,64 @@ template <class T> SPLITNERF_HD void clip_slab(T origin, T direction, T box, T& 
   t_far = min_of(t_far, max_of(t0, t1));
 }
 
-// Calls emit(t_start, t_end) for each sample of the lattice t_near + (k + jitter - 1) step whose midpoint
-// stands in an occupied cell, front to back; returns their number. jitter in [0, 1) shifts the
-// lattice of this ray. Empty cells are crossed in one go: k advances to the first midpoint
-// behind the cell's exit.
-template <class T, class Emit>
-SPLITNERF_HD int64_t march_ray(Vec3<T> o, Vec3<T> d, T jitter, const uint8_t* cells, MarchOptions options, Emit emit) {
-  const T box = T(options.box), step = T(options.step), cells_per_unit = T(options.resolution) / (T(2) * box);
-  if (!(dot(o, o) + dot(d, d) < T(INFINITY))) return 0;  // a ray that is not finite meets nothing
-  T t_near = T(0), t_far = T(INFINITY);
-  for (int axis = 0; axis < 3; ++axis) clip_slab(o[axis], d[axis], box, t_near, t_far);
-  if (!(t_near < t_far) || !(t_far < T(INFINITY))) return 0;
-  const int64_t n_steps = static_cast<int64_t>(std::ceil((t_far - t_near) / step)) + 1;
-  const T lattice = t_near + (jitter - T(1)) * step;
-  int64_t n = 0;
-  for (int64_t k = 0; k < n_steps && n < options.max_samples;) {
-    const T t_start = lattice + T(k) * step, t_mid = t_start + T(0.5) * step;
-    if (t_mid <= t_near) {
+// The samples of one ray: number k is [lattice + k step, lattice + (k + 1) step], and counts where its midpoint
+// stands in the box. jitter in [0, 1) shifts the lattice.
+template <class T> struct RayLattice {
+  Vec3<T> origin, direction;
+  T t_near, t_far, lattice, step;
+  int64_t n_steps;  // 0: the ray misses the box
+
+  SPLITNERF_HD RayLattice(Vec3<T> o, Vec3<T> d, T jitter, const MarchOptions& options)
+      : origin(o), direction(d), t_near(T(0)), t_far(T(INFINITY)), lattice(T(0)), step(T(options.step)), n_steps(0) {
+    if (!(dot(o, o) + dot(d, d) < T(INFINITY))) return;  // a ray that is not finite meets nothing
+    for (int axis = 0; axis < 3; ++axis) clip_slab(o[axis], d[axis], T(options.box), t_near, t_far);
+    if (!(t_near < t_far) || !(t_far < T(INFINITY))) return;
+    n_steps = static_cast<int64_t>(std::ceil((t_far - t_near) / step)) + 1;
+    lattice = t_near + (jitter - T(1)) * step;
+  }
+  SPLITNERF_HD T start(int64_t k) const { return lattice + T(k) * step; }
+  SPLITNERF_HD Vec3<T> middle(int64_t k) const { return origin + direction * (start(k) + T(0.5) * step); }
+};
+
+// The first sample from k on whose midpoint stands in an occupied cell; -1 where the ray ends before. Empty cells
+// are crossed in one go: k advances to the first midpoint behind the cell's exit.
+template <class T>
+SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const uint8_t* cells, const MarchOptions& options, int64_t k) {
+  const T box = T(options.box), cells_per_unit = T(options.resolution) / (T(2) * box);
+  const Vec3<T>&o = ray.origin, &d = ray.direction;
+  while (k < ray.n_steps) {
+    const T t_mid = ray.start(k) + T(0.5) * ray.step;
+    if (t_mid <= ray.t_near) {
       ++k;
       continue;
     }
-    if (t_mid >= t_far) break;
+    if (t_mid >= ray.t_far) return -1;
     int cell[3];
     for (int axis = 0; axis < 3; ++axis)
       cell[axis] = clamp(static_cast<int>((o[axis] + t_mid * d[axis] + box) * cells_per_unit), 0, options.resolution - 1);
     const auto state = static_cast<Cell>(
         cells[(static_cast<int64_t>(cell[0]) * options.resolution + cell[1]) * options.resolution + cell[2]]);
-    if (state == Cell::kOpaque) break;
-    if (state == Cell::kOccupied) {
-      emit(t_start, t_start + step);
-      ++n, ++k;
-      continue;
-    }
-    T t_exit = t_far;
+    if (state == Cell::kOpaque) return -1;
+    if (state == Cell::kOccupied) return k;
+    T t_exit = ray.t_far;
     for (int axis = 0; axis < 3; ++axis) {
       if (d[axis] == T(0)) continue;
       const T face = T(cell[axis] + (d[axis] > T(0) ? 1 : 0)) / cells_per_unit - box;
       t_exit = min_of(t_exit, (face - o[axis]) / d[axis]);
     }
-    const int64_t behind = static_cast<int64_t>(std::ceil((t_exit - lattice) / step - T(0.5)));
-    k = max_of(k + 1, behind);
+    k = max_of(k + 1, static_cast<int64_t>(std::ceil((t_exit - ray.lattice) / ray.step - T(0.5))));
   }
+  return -1;
+}
+
+// Calls emit(t_start, t_end) for each sample in an occupied cell, front to back; returns their number.
+template <class T, class Emit>
+SPLITNERF_HD int64_t march_ray(Vec3<T> o, Vec3<T> d, T jitter, const uint8_t* cells, MarchOptions options, Emit emit) {
+  const RayLattice<T> ray(o, d, jitter, options);
+  int64_t n = 0;
+  for (int64_t k = next_occupied(ray, cells, options, 0); k >= 0 && n < options.max_samples;
+       k = next_occupied(ray, cells, options, k + 1), ++n)
+    emit(ray.start(k), ray.start(k) + ray.step);
   return n;
 }
 

@@ -124,6 +124,28 @@ SPLITNERF_API void march_rays_fill(const MarchOptions& options, const uint8_t* c
                                    const T* rays_d, const T* jitter, const int64_t* offsets, int64_t* ray_indices,
                                    T* t_starts, T* t_ends);
 
+// Which samples of a ray are worth a gradient.
+template <class T> struct SampleRules {
+  T s;           // sharpness of the density
+  T min_weight;  // of the stretch between two samples' midpoints, for both to be kept
+  T max_depth;   // optical depth at which the ray ends
+  T reach;       // beyond |f| = reach there is no density
+  T lipschitz;   // bound of |grad f|
+};
+
+// What is kept of a ray: where its samples start, front to back.
+template <class T> struct SampledRay {
+  std::vector<T> starts;
+  int64_t n_evaluated = 0;  // points at which the distance was asked for
+};
+
+// Follows each ray through the occupied cells and asks for the distance on the way; at distance f from the surface it
+// leaves out the samples within (|f| - reach) / lipschitz. sampled [n_rays].
+template <class T>
+SPLITNERF_API void sample_rays(const SdfNetwork<T>& net, const MarchOptions& march, const uint8_t* cells,
+                               const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d,
+                               const T* jitter, SampledRay<T>* sampled);
+
 // f_prev, f_next [n], offsets [n_rays + 1] -> weights [n], opacity [n_rays].
 template <class T>
 SPLITNERF_API void neus_weights(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s,

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from splitnerf.ops import HashGrid, HashGridSpec
+from splitnerf.ops import HashGrid, HashGridSpec, SdfNetwork
 
 SOFTPLUS_BETA = 100.0
 
@@ -91,6 +91,15 @@ class SdfField(nn.Module):
     def sdf(self, positions: Tensor) -> Tensor:
         """Signed distance [n] at positions [n, 3], scene units."""
         return self._outputs(self._inputs(positions, self.grid(self._to_unit(positions))), 1)[:, 0]
+
+    @torch.no_grad()
+    def network(self) -> SdfNetwork:
+        """The field's numbers as they stand, for operators that ask for distances on their own."""
+        hidden, out = self._weights()
+        return SdfNetwork(
+            self.grid.spec, self.grid.n_active, self.grid.table.detach(), hidden, self.hidden_bias.detach(), out[0].clone(),
+            self.out_bias[0].item(), SOFTPLUS_BETA, self.box,
+        )  # fmt: skip
 
     def sample(self, positions: Tensor) -> SdfSample:
         """Outputs, grid features and the analytic gradient in one pass.

@@ -67,7 +67,7 @@ def monte_carlo_colours(
     variate). The gradient flows to materials and light alone: the surface would be roughened by its noise, and follows
     the split sum's colours instead.
     """
-    weights = ray.weights[ray.shaded].detach()
+    weights = ray.shares
     rays = ray.samples.ray_indices[ray.shaded]
     key = torch.log(weights) - torch.log(-torch.log(torch.rand(len(weights), generator=generator).clamp(1e-7, 1 - 1e-7)))
     best = torch.full((len(ray.opacity),), -math.inf).scatter_reduce(0, rays, key, "amax")

@@ -8,9 +8,11 @@ import torch
 from torch import Tensor
 
 from splitnerf.fields.sdf import unit_normals
-from splitnerf.ops import PackedSamples, composite, march_rays, neus_weights
+from splitnerf.ops import PackedSamples, composite, march_rays, neus_weights, sample_rays
 from splitnerf.render.model import SceneModel, ShadedPoints
+from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
 from splitnerf.render.rays import image_rays
+from splitnerf.render.selection import between_shaded, spread_by_weight
 
 MIN_OPACITY = 1e-4
 
@@ -23,11 +25,13 @@ class RenderedRays:
         colour: [n_rays, 3] sRGB of the object alone, un-premultiplied, not clipped above 1.
         opacity: [n_rays].
         samples: The packed samples.
+        n_evaluated: Points at which the distance was asked for.
         weights: [n].
         values: [n, 3] what is composited: radiance of the split sum, linear or sRGB as `compositing` says. With `shading =
             summed` the colour has, beside their composite, what the sum adds at each ray's heaviest sample.
         gradients: [n, 3] d sdf / d position of all samples.
         shaded: [m] indices of the samples that were shaded.
+        shares: [m] how much of their ray's colour they are, no gradient.
         positions: [m, 3] of the shaded samples, on the level set through the sample.
         normals: [m, 3].
         sdf: [m].
@@ -37,10 +41,12 @@ class RenderedRays:
     colour: Tensor
     opacity: Tensor
     samples: PackedSamples
+    n_evaluated: int
     weights: Tensor
     values: Tensor
     gradients: Tensor
     shaded: Tensor
+    shares: Tensor
     positions: Tensor
     normals: Tensor
     sdf: Tensor
@@ -56,6 +62,22 @@ def sample_step(model: SceneModel) -> float:
 def annealed_cosine(cosine: Tensor, anneal: float) -> Tensor:
     """-[relu(1/2 - c/2)(1 - t) + relu(-c) t]: early on, back-facing samples keep a gradient. Source: NeuS."""
     return -(torch.relu(0.5 - 0.5 * cosine) * (1.0 - anneal) + torch.relu(-cosine) * anneal)
+
+
+def find_samples(
+    model: SceneModel, cells: Tensor, rays_o: Tensor, rays_d: Tensor, jitter: Tensor, step: float
+) -> tuple[PackedSamples, int]:
+    """The samples that pixels are made of, and at how many points the distance was asked for to find them."""
+    c = model.config
+    if c.sample_above == 0:
+        samples = march_rays(rays_o, rays_d, jitter, cells, c.box, step, c.max_samples_per_ray)
+        return samples, len(samples.ray_indices)
+    samples, evaluated = sample_rays(
+        rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=model.s_value, min_weight=c.sample_above,
+        min_transmittance=c.min_transmittance, reach=DENSITY_CUTOFF / model.s_value, lipschitz=LIPSCHITZ,
+        max_samples=c.max_samples_per_ray,
+    )  # fmt: skip
+    return samples, int(evaluated.sum())
 
 
 def render_rays(
@@ -83,7 +105,7 @@ def render_rays(
     Source: SplitNeRF Eq. (1)-(2), (17).
     """
     c = model.config
-    samples = march_rays(rays_o, rays_d, jitter, cells, c.box, step, c.max_samples_per_ray)
+    samples, n_evaluated = find_samples(model, cells, rays_o, rays_d, jitter, step)
     directions = rays_d[samples.ray_indices]
     middle = 0.5 * (samples.t_starts + samples.t_ends)
     positions = rays_o[samples.ray_indices] + directions * middle[:, None]
@@ -92,13 +114,17 @@ def render_rays(
     half = 0.5 * step * annealed_cosine((directions * normals).sum(-1), anneal)
     weights, opacity = neus_weights(field.sdf - half, field.sdf + half, model.s, samples.offsets, c.min_transmittance)
 
-    shaded = (weights.detach() > c.shade_above).nonzero().squeeze(1) if c.shade_above > 0 else torch.arange(len(weights))
+    shaded = torch.arange(len(weights))
+    if c.shades_per_ray:
+        shaded = spread_by_weight(weights.detach(), samples, c.shades_per_ray, jitter)
     points = model.shade(
         positions[shaded], field.outputs[shaded], field.features[shaded], normals[shaded], -directions[shaded],
         fixed_materials=fixed_materials,
     )
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
-    values = _fill_skipped(radiance, shaded, weights, samples)
+    between = between_shaded(shaded, samples)
+    values = between.interpolate(radiance) if len(shaded) < len(weights) else radiance
+    shares = between.gather(weights.detach(), len(shaded))
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
     if model.sums_light:
         mean = mean + _summed_less_split(
@@ -106,8 +132,8 @@ def render_rays(
         )
     colour = linear_to_srgb(mean) if c.compositing == "linear" else mean
     return RenderedRays(
-        colour, opacity, samples, weights, values, field.gradient, shaded, positions[shaded], normals[shaded],
-        field.sdf[shaded], points,
+        colour, opacity, samples, n_evaluated, weights, values, field.gradient, shaded, shares, positions[shaded],
+        normals[shaded], field.sdf[shaded], points,
     )  # fmt: skip
 
 
@@ -130,21 +156,6 @@ def _summed_less_split(
     on_surface = (positions[i] - normals[i] * sdf[i, None]).detach()
     summed = model.summed_radiance(on_surface, normals[i], -directions[i], here)
     return torch.zeros(n_rays, 3).index_add(0, rays[at], summed - here.radiance)
-
-
-def _fill_skipped(radiance: Tensor, shaded: Tensor, weights: Tensor, samples: PackedSamples) -> Tensor:
-    """Radiance of all samples: the skipped ones count as their ray's mean, so that their weights' gradient is not
-    that of black."""
-    n = len(weights)
-    if len(shaded) == n:
-        return radiance
-    with torch.no_grad():
-        seen = torch.zeros(n, 4)
-        seen[shaded] = torch.cat([radiance.detach(), torch.ones(len(shaded), 1)], dim=1)
-        sums = composite(weights.detach(), seen, samples.offsets)
-        mean = sums[:, :3] / sums[:, 3:].clamp(min=MIN_OPACITY)
-        filled = mean[samples.ray_indices]
-    return filled.index_copy(0, shaded, radiance)
 
 
 def linear_to_srgb(linear: Tensor) -> Tensor:
@@ -172,9 +183,8 @@ def render_view(
         maps = torch.cat(
             [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), ray.normals], 1
         )
-        values = torch.zeros(len(ray.weights), maps.shape[1] + 1)
-        values[ray.shaded] = torch.cat([maps, torch.ones(len(maps), 1)], 1)
-        sums = composite(ray.weights, values, ray.samples.offsets)
+        weighed = ray.shares[:, None] * torch.cat([maps, torch.ones(len(maps), 1)], 1)
+        sums = torch.zeros(len(o), weighed.shape[1]).index_add(0, ray.samples.ray_indices[ray.shaded], weighed)
         mean = sums[:, :-1] / sums[:, -1:].clamp(min=MIN_OPACITY)
         rows.append(torch.cat([ray.colour.clamp(0, 1), ray.opacity[:, None], mean], 1))
     image = torch.cat(rows).view(height, width, -1)

@@ -1,0 +1,170 @@
+"""sample_rays: what it keeps against all samples, thin parts, errors."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from op_checks import check_op, generator, lib, unit
+
+from splitnerf.fields.sdf import SdfField
+from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, HashGridSpec, SdfNetwork, march_rays, sample_rays
+
+BOX, STEP = 1.5, 0.02
+SPEC = HashGridSpec(n_levels=3, n_features=2, base_resolution=4, growth=1.7, log2_table_size=9)
+
+
+def bumpy_field(scale: float = 0.02) -> SdfField:
+    torch.manual_seed(0)
+    field = SdfField(SPEC, BOX, width=32, radius=0.7).double()
+    with torch.no_grad():
+        field.grid.table.copy_(scale * torch.randn(field.grid.table.shape, generator=generator(), dtype=torch.float64))
+        field.hidden_direction[:, 3:] = torch.randn(32, SPEC.n_outputs, generator=generator(1), dtype=torch.float64)
+        field.hidden_length.copy_(field.hidden_direction.norm(dim=1, keepdim=True))
+    return field
+
+
+def rays(n: int = 200, dtype=torch.float64) -> tuple:
+    g = generator(2)
+    origins = 3 * unit(torch.randn(n, 3, generator=g, dtype=dtype))
+    directions = unit(0.9 * torch.rand(n, 3, generator=g, dtype=dtype) - 0.45 - origins)
+    return origins, directions, torch.rand(n, generator=g, dtype=dtype)
+
+
+def cells(resolution: int = 12) -> torch.Tensor:
+    return torch.full((resolution,) * 3, CELL_OCCUPIED, dtype=torch.uint8)
+
+
+def stretches(field, samples, origins, directions, s: float) -> tuple[torch.Tensor, torch.Tensor]:
+    """NeuS weight of the stretch from each sample's midpoint to the next one's, and that one's index."""
+    middle = 0.5 * (samples.t_starts + samples.t_ends)
+    x = origins[samples.ray_indices] + directions[samples.ray_indices] * middle[:, None]
+    log_phi = torch.nn.functional.logsigmoid(s * field.sdf(x).detach())
+    depth, weights = 0.0, torch.zeros(len(x), dtype=torch.float64)
+    for i in range(len(x) - 1):
+        if samples.ray_indices[i + 1] != samples.ray_indices[i]:
+            depth = 0.0
+            continue
+        tau = max(0.0, float(log_phi[i] - log_phi[i + 1]))
+        weights[i] = math.exp(-depth) * -math.expm1(-tau)
+        depth += tau
+    return weights, depth
+
+
+def settings(**changes) -> dict:
+    return dict(step=STEP, s=60.0, min_weight=0.01, min_transmittance=0.0, reach=10.0, lipschitz=1.25) | changes
+
+
+def test_keeps_both_ends_of_the_stretches_that_weigh():
+    field, (o, d, jitter) = bumpy_field(), rays()
+    samples = march_rays(o, d, jitter, cells(), BOX, STEP)
+    weights, _ = stretches(field, samples, o, d, 60.0)
+    heavy = weights > 0.01
+    wanted = heavy | torch.cat([torch.tensor([False]), heavy[:-1]])
+    kept, evaluated = sample_rays(o, d, jitter, cells(), field.network(), **settings())
+    assert int(evaluated.sum()) == len(weights)
+    assert torch.equal(kept.ray_indices, samples.ray_indices[wanted])
+    torch.testing.assert_close(kept.t_starts, samples.t_starts[wanted])
+    torch.testing.assert_close(kept.t_ends - kept.t_starts, torch.full_like(kept.t_starts, STEP))
+    counts = torch.bincount(kept.ray_indices, minlength=len(o))
+    assert torch.equal(kept.offsets, torch.cat([torch.zeros(1, dtype=torch.int64), counts.cumsum(0)]))
+    assert 0.03 < wanted.double().mean() < 0.5
+
+
+def test_far_from_the_surface_it_asks_less_and_keeps_the_same():
+    field, (o, d, jitter) = bumpy_field(), rays()
+    with torch.no_grad():  # a field whose gradient is bounded by 1
+        x = 3 * torch.rand(4000, 3, generator=generator(), dtype=torch.float64) - 1.5
+        bound = field.sample(x).gradient.norm(dim=1).max().item() * 1.1
+    everything, all_points = sample_rays(o, d, jitter, cells(), field.network(), **settings())
+    some, points = sample_rays(o, d, jitter, cells(), field.network(), **settings(reach=8 / 60.0, lipschitz=bound))
+    assert torch.equal(some.ray_indices, everything.ray_indices)
+    torch.testing.assert_close(some.t_starts, everything.t_starts)
+    assert points.sum() < 0.5 * all_points.sum()
+
+
+@pytest.mark.parametrize("thickness", [0.002, 0.02])
+@pytest.mark.parametrize("s", [200.0, 2000.0])
+def test_a_thin_sheet_is_never_jumped_over(thickness, s):
+    """|z| - thickness / 2 as two softplus units: every ray that crosses the sheet keeps samples at it."""
+    zeros = torch.zeros(SPEC.n_entries, SPEC.n_features)
+    hidden = torch.zeros(2, 3 + SPEC.n_outputs)
+    hidden[0, 2], hidden[1, 2] = 1.0, -1.0
+    sheet = SdfNetwork(SPEC, 3, zeros, hidden, torch.zeros(2), torch.ones(2), -thickness / 2, 1e5, BOX)
+    o, d, jitter = (x.float() for x in rays())
+    kept, evaluated = sample_rays(
+        o, d, jitter, cells(), sheet, **settings(step=0.005, s=s, min_weight=1e-3, reach=7.0 / s, lipschitz=1.25)
+    )
+    t = -o[:, 2] / d[:, 2]
+    crosses = (t > 0) & ((o + d * t[:, None])[:, :2].abs().amax(1) < 1.4) & (d[:, 2].abs() > 0.3)
+    z = o[kept.ray_indices, 2] + d[kept.ray_indices, 2] * 0.5 * (kept.t_starts + kept.t_ends)
+    nearest = torch.full((len(o),), math.inf).scatter_reduce(0, kept.ray_indices, z.abs(), "amin")
+    assert crosses.sum() > 100
+    assert (nearest[crosses] < thickness / 2 + 0.005 + 3.0 / s).all()
+    assert evaluated[crosses].max() < 120
+
+
+def test_a_ray_ends_where_nothing_gets_through():
+    field, (o, d, jitter) = bumpy_field(), rays()
+    whole, all_points = sample_rays(o, d, jitter, cells(), field.network(), **settings(min_weight=0.0))
+    ended, points = sample_rays(o, d, jitter, cells(), field.network(), **settings(min_weight=0.0, min_transmittance=1e-3))
+    assert points.sum() < 0.8 * all_points.sum()
+    assert len(ended.t_starts) < len(whole.t_starts)
+    weights, _ = stretches(field, ended, o, d, 60.0)
+    full, _ = stretches(field, whole, o, d, 60.0)
+    lost = torch.zeros(len(o), dtype=torch.float64).index_add(0, whole.ray_indices, full)
+    lost = lost - torch.zeros(len(o), dtype=torch.float64).index_add(0, ended.ray_indices, weights)
+    assert lost.max() < 1e-3
+
+
+def test_empty_cells_are_not_asked():
+    field, (o, d, jitter) = bumpy_field(), rays()
+    samples, evaluated = sample_rays(o, d, jitter, torch.full_like(cells(), CELL_EMPTY), field.network(), **settings())
+    assert len(samples.t_starts) == 0 and int(evaluated.sum()) == 0
+
+
+def test_a_nan_is_kept_for_the_loss_to_see():
+    field, (o, d, jitter) = bumpy_field(), rays(8)
+    network = field.network()._replace(out_bias=math.nan)
+    samples, evaluated = sample_rays(o, d, jitter, cells(), network, **settings())
+    assert len(samples.t_starts) == int(evaluated.sum()) > 0
+
+
+def arguments(dtype=torch.float64) -> tuple:
+    n = bumpy_field().to(dtype).network()
+    o, d, jitter = rays(12, dtype)
+    return (
+        o, d, jitter, cells(), n.table, n.hidden, n.hidden_bias, n.out, n.out_bias, n.beta, *n.spec.arguments(2), n.box,
+        STEP, 64, 60.0, 0.01, 1e-3, 0.1, 1.25,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_opcheck_and_empty_batch(dtype):
+    x = arguments(dtype)
+    check_op(lib.sample_rays, x)
+    nothing = lib.sample_rays(x[0][:0], x[1][:0], x[2][:0], *x[3:])
+    assert nothing[0].shape == (0,) and nothing[3].tolist() == [0]
+
+
+def test_float32_keeps_what_float64_does():
+    field, (o, d, jitter) = bumpy_field(), rays()
+    exact, _ = sample_rays(o, d, jitter, cells(), field.network(), **settings())
+    single, _ = sample_rays(o.float(), d.float(), jitter.float(), cells(), field.float().network(), **settings())
+    assert abs(len(single.t_starts) - len(exact.t_starts)) < 0.01 * len(exact.t_starts)
+
+
+def test_errors_name_what_is_wrong():
+    x = list(arguments())
+    x[7] = x[7][:3]
+    with pytest.raises(Exception, match=r"sample_rays: out must be \[32\] float64"):
+        lib.sample_rays(*x)
+    x = list(arguments())
+    x[16] = 0.0
+    with pytest.raises(Exception, match="step.* must be positive"):
+        lib.sample_rays(*x)
+    with pytest.raises(RuntimeError, match="no gradient"):
+        x = list(arguments())
+        x[4] = x[4].clone().requires_grad_()
+        lib.sample_rays(*x)[1].sum().backward()
