@@ -189,8 +189,9 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
     chosen = torch.multinomial(weights + 1e-12, c.entropy_points, replacement=True, generator=generator)
     gloss = torch.cat([points.roughness[chosen], points.metallic[chosen]], dim=1)
     x = torch.cat([torch.log(points.albedo[chosen] + ALBEDO_FLOOR) / c.albedo_width, gloss / c.gloss_width], dim=1)
-    squared = (x[:, None] - x).square().sum(-1)
-    return -torch.log(torch.exp(-0.25 * squared).mean())
+    centred = x - x.detach().mean(0)  # so that the square below loses no digits
+    half = 0.5 * centred.square().sum(1)
+    return -torch.log(torch.exp(0.5 * (centred @ centred.T - half[:, None] - half)).mean())
 
 
 def occlusion_loss(

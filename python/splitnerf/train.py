@@ -111,10 +111,11 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     if resume:
         model.open_levels(progress_now())
         scene = restore_mesh(model, content)
+    model.light.collect()
     started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True
     psnr_mean = samples_mean = None
     with Interrupt() as interrupt, Progress(progress_now()) as bar, open(run / "metrics.jsonl", "a") as log:
-        while (progress := progress_now()) < 1.0 and not interrupt.asked:
+        while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % c.light_step_every == 0):
             model.open_levels(progress)
             set_learning_rate(optimiser, c, step, progress)
             if first or step % c.grid_every == 0:
@@ -172,6 +173,8 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 raise Diverged(f"step {step}: the loss is not finite ({bad}); lower --set learning_rate and --resume")
             optimiser.zero_grad(set_to_none=True)
             loss.backward()
+            if (step + 1) % c.light_step_every == 0:
+                model.light.deliver()
             optimiser.step()
 
             n_samples = len(ray.weights)
@@ -179,20 +182,21 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             step, first, seconds = step + 1, False, time.monotonic() - started
             psnr = -10.0 * math.log10(max(terms["colour"].item() / max(c.colour_weight, 1e-12), 1e-10))
             psnr_mean = psnr if psnr_mean is None else 0.95 * psnr_mean + 0.05 * psnr
-            samples_mean = n_samples / len(rays_o)
+            samples_mean = ray.n_evaluated / len(rays_o)
             bar.show(progress_now(), step, psnr_mean, samples_mean)
             if step % LOG_EVERY == 0 or step <= LOG_EVERY or progress_now() >= 1.0:
                 log.write(json.dumps({
                     "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss.item(),
                     **{f"loss_{name}": term.item() for name, term in terms.items()}, "psnr": psnr_mean,
-                    "rays": len(rays_o), "samples_per_ray": samples_mean, "shaded": len(ray.shaded) / max(1, n_samples),
+                    "rays": len(rays_o), "samples_per_ray": samples_mean,
+                    "kept": n_samples / max(1, ray.n_evaluated), "shaded": len(ray.shaded) / max(1, ray.n_evaluated),
                     "s": model.s_value,
                 }) + "\n")  # fmt: skip
                 log.flush()
             if progress_now() - previewed_at >= c.preview_every:
                 previewed_at = progress_now()
                 write_preview(run, model, grid, dataset, step)
-            if time.monotonic() - saved_at > 60.0 * c.checkpoint_minutes:
+            if time.monotonic() - saved_at > 60.0 * c.checkpoint_minutes and step % c.light_step_every == 0:
                 save()
                 saved_at = time.monotonic()
         finished = progress_now() >= 1.0

@@ -79,13 +79,14 @@ template <class T> void check_network(double tolerance) {
   const Case c;
   const std::vector<T> table(c.table.begin(), c.table.end()), hidden(c.hidden.begin(), c.hidden.end());
   const std::vector<T> bias(c.bias.begin(), c.bias.end()), out(c.out.begin(), c.out.end());
+  const T out_bias = T(0.25);
   const std::vector<T> positions(c.positions.begin(), c.positions.end());
   for (const Kernels<T>& kernels : usable_kernels<T>()) {
     for (int n_active : {0, 2, 3}) {
-      const SdfNetwork<T> net{{c.levels.data(), 2, 3, n_active, 0, nullptr, table.data()}, c.width, hidden.data(),
-                              bias.data(), out.data(), T(0.25), T(100), T(1.5)};
+      const PreparedSdfLayer<T> layer({9, c.width, 1, hidden.data(), bias.data(), out.data(), &out_bias, T(100), T(1.5)});
+      const SdfNetwork<T> net{{c.levels.data(), 2, 3, n_active, 0, nullptr, table.data()}, layer.layer()};
       for (int64_t n : {0, 1, 7, kSdfBlock}) {
-        std::vector<T> work(sdf_work_size(net)), values(n + 1, T(-77));
+        std::vector<T> work(sdf_work_size(net.layer)), values(n + 1, T(-77));
         kernels.sdf_values(net, n, positions.data(), work.data(), values.data());
         for (int64_t p = 0; p < n; ++p) EXPECT_NEAR(values[p], c.expected(p, n_active), tolerance) << kernels.name << " " << p;
         EXPECT_EQ(values[n], T(-77)) << "wrote past the points";

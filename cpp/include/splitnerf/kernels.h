@@ -7,6 +7,7 @@
 #include "splitnerf/config.h"
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/light_pyramid.h"
+#include "splitnerf/sdf_layer.h"
 
 namespace splitnerf {
 
@@ -20,24 +21,11 @@ template <class T> struct HashEncodeArgs {
   const T* table;       // [n_entries, n_features]
 };
 
-// The distance field: position and hash-grid features into one hidden layer of softplus units, whose weighted sum it is.
+// The distance field: hash-grid features and a layer over them.
 template <class T> struct SdfNetwork {
   HashEncodeArgs<T> grid;  // without points
-  int width;               // hidden units
-  const T* hidden;         // [width, 3 + n_levels * n_features]
-  const T* hidden_bias;    // [width]
-  const T* out;            // [width]
-  T out_bias;
-  T beta;                  // of the softplus
-  T box;                   // half size of the cube that the grid covers
-
-  int64_t n_features() const { return int64_t(grid.n_levels) * grid.n_features; }
+  SdfLayer<T> layer;
 };
-
-inline constexpr int kSdfBlock = 64;  // points that are evaluated together
-
-// Values that `sdf_values` needs as work memory.
-template <class T> int64_t sdf_work_size(const SdfNetwork<T>& net) { return kSdfBlock * (6 + 2 * net.n_features()); }
 
 // Weights of all (query, source) pairs of the pre-integration lobe, structure of arrays.
 template <class T> struct LobeSide {
@@ -81,6 +69,11 @@ template <class T> struct Kernels {
                                  const T* grad_jacobian, T* grad_positions);
   // values [n] at positions [n, 3], scene units; n <= kSdfBlock, work [sdf_work_size].
   void (*sdf_values)(const SdfNetwork<T>&, int64_t n, const T* positions, T* work, T* values);
+  // outputs [n, M], gradient [n, 3] d distance / d position.
+  void (*sdf_layer)(const SdfLayer<T>&, const SdfPoints<T>&, T* work, T* outputs, T* gradient);
+  // grad_features [n, C] and grad_jacobian [n, 3, C], overwritten; adds to the weights' gradients.
+  void (*sdf_layer_backward)(const SdfLayer<T>&, const SdfPoints<T>&, const T* grad_outputs, const T* grad_gradient,
+                             T* work, T* grad_features, T* grad_jacobian, const SdfLayerGrad<T>&);
   // sums[i - begin] = {sum K r, sum K g, sum K b, sum K} over the sources, for queries [begin, end).
   void (*lobe_gather)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
   // sums[i - begin] = {sum K r, sum K g, sum K b} over the queries, for lights [begin, end).

@@ -124,6 +124,27 @@ SPLITNERF_API void march_rays_fill(const MarchOptions& options, const uint8_t* c
                                    const T* rays_d, const T* jitter, const int64_t* offsets, int64_t* ray_indices,
                                    T* t_starts, T* t_ends);
 
+// The distance field as it comes.
+template <class T> struct SdfField {
+  HashGridShape shape;
+  int n_active;
+  const T* table;
+  SdfWeights<T> weights;
+};
+
+// positions [n, 3] -> values [n], scene units.
+template <class T> SPLITNERF_API void sdf_values(const SdfField<T>& field, int64_t n, const T* positions, T* values);
+
+// positions [n, 3], features [n, C], jacobian [n, 3, C] of the hash grid -> outputs [n, n_outputs], gradient [n, 3].
+template <class T>
+SPLITNERF_API void sdf_layer(const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features,
+                             const T* jacobian, T* outputs, T* gradient);
+// grads of the weights in their own shapes, all overwritten.
+template <class T>
+SPLITNERF_API void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features,
+                                      const T* jacobian, const T* grad_outputs, const T* grad_gradient, T* grad_features,
+                                      T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias, T* grad_out, T* grad_out_bias);
+
 // Which samples of a ray are worth a gradient.
 template <class T> struct SampleRules {
   T s;           // sharpness of the density
@@ -142,7 +163,7 @@ template <class T> struct SampledRay {
 // Follows each ray through the occupied cells and asks for the distance on the way; at distance f from the surface it
 // leaves out the samples within (|f| - reach) / lipschitz. sampled [n_rays].
 template <class T>
-SPLITNERF_API void sample_rays(const SdfNetwork<T>& net, const MarchOptions& march, const uint8_t* cells,
+SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& march, const uint8_t* cells,
                                const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d,
                                const T* jitter, SampledRay<T>* sampled);
 

@@ -1,46 +1,179 @@
+#include <algorithm>
+
+#include "block_product.h"
 #include "kernel_set.h"
 #include "splitnerf/vector_math.h"
 
+// Points are the rows of all matrices here, units the columns, padded to whole vectors.
 namespace splitnerf::SPLITNERF_ISA {
+namespace {
 
-constexpr int64_t kSdfLanes = 16;  // points are padded to a multiple of it
-
-// Points lie along the rows, so that the loops over them are vector code: inputs[k][p].
-template <class T> void sdf_values(const SdfNetwork<T>& net, int64_t n, const T* positions, T* work, T* values) {
-  const int64_t n_features = net.n_features(), n_inputs = 3 + n_features;
-  const int64_t n_open = 3 + int64_t(net.grid.n_active) * net.grid.n_features;
-  T *unit = work, *features = unit + 3 * kSdfBlock, *inputs = features + n_features * kSdfBlock;
-  for (int64_t i = 0; i < 3 * n; ++i) unit[i] = positions[i] * (T(0.5) / net.box) + T(0.5);
-  HashEncodeArgs<T> grid = net.grid;
-  grid.n_points = n, grid.positions = unit;
-  hash_encode<T>(grid, 0, n, features, nullptr);
-  for (int64_t p = 0; p < n; ++p) {
-    for (int64_t k = 0; k < 3; ++k) inputs[k * kSdfBlock + p] = positions[3 * p + k];
-    for (int64_t k = 3; k < n_open; ++k) inputs[k * kSdfBlock + p] = features[p * n_features + k - 3];
+// Work memory of a block, carved from one array.
+template <class T> struct Workspace {
+  T* next;
+  T* take(int64_t rows, int64_t columns) {
+    T* first = next;
+    next += rows * columns;
+    return first;
   }
-  const int64_t padded = (n + kSdfLanes - 1) / kSdfLanes * kSdfLanes;
-  for (int64_t k = 0; k < n_open; ++k)
-    for (int64_t p = n; p < padded; ++p) inputs[k * kSdfBlock + p] = T(0);
+};
 
-  T sum[kSdfBlock], pre[kSdfBlock];
-  for (int64_t p = 0; p < padded; ++p) sum[p] = net.out_bias;
-  for (int h = 0; h < net.width; ++h) {
-    for (int64_t p = 0; p < padded; ++p) pre[p] = net.hidden_bias[h];
-    for (int64_t k = 0; k < n_open; ++k) {
-      const T weight = net.hidden[h * n_inputs + k];
-      const T* row = inputs + k * kSdfBlock;
-#pragma omp simd
-      for (int64_t p = 0; p < padded; ++p) pre[p] += weight * row[p];
-    }
-    const T weight = net.out[h];
-#pragma omp simd
-    for (int64_t p = 0; p < padded; ++p) sum[p] += weight * softplus_and_slope(pre[p], net.beta).value;
-  }
-  for (int64_t p = 0; p < n; ++p) values[p] = sum[p];
+template <class T> void fill_rows(int64_t rows, int64_t columns, const T* row, T* matrix) {
+  for (int64_t r = 0; r < rows; ++r) std::copy_n(row, columns, matrix + r * columns);
 }
 
-#define SPLITNERF_INSTANTIATE(T) \
-  template void sdf_values<T>(const SdfNetwork<T>&, int64_t, const T*, T*, T*);
+// inputs [n, padded K] = position, features.
+template <class T>
+void join_inputs(const SdfLayer<T>& layer, int64_t n, const T* positions, const T* features, T* inputs) {
+  const int64_t n_features = layer.n_inputs - 3;
+  for (int64_t p = 0; p < n; ++p) {
+    T* row = inputs + p * layer.input_columns;
+    std::copy_n(positions + 3 * p, 3, row);
+    std::copy_n(features + p * n_features, n_features, row + 3);
+    std::fill(row + layer.n_inputs, row + layer.input_columns, T(0));
+  }
+}
+
+// hidden [n, H]: softplus of the first layer; slope: its derivative, null where it is not wanted.
+template <class T> void first_layer(const SdfLayer<T>& layer, int64_t n, const T* inputs, T* hidden, T* slope) {
+  const int64_t columns = layer.width_columns;
+  fill_rows(n, columns, layer.hidden_bias, hidden);
+  add_product<T>(n, layer.n_inputs, columns, {inputs, layer.input_columns, 1}, layer.hidden_transposed, columns, hidden, columns);
+  const T beta = layer.beta;
+  if (!slope) {
+#pragma omp simd
+    for (int64_t i = 0; i < n * columns; ++i) hidden[i] = softplus_and_slope(hidden[i], beta).value;
+    return;
+  }
+#pragma omp simd
+  for (int64_t i = 0; i < n * columns; ++i) {
+    const Softplus<T> s = softplus_and_slope(hidden[i], beta);
+    hidden[i] = s.value;
+    slope[i] = s.slope;
+  }
+}
+
+// steepness [n, padded K] = d sdf / d input = (slope * out[0]) hidden; weighted: slope * out[0].
+template <class T>
+void input_gradient(const SdfLayer<T>& layer, int64_t n, const T* slope, T* weighted, T* steepness) {
+  const int64_t columns = layer.width_columns;
+  for (int64_t p = 0; p < n; ++p)
+#pragma omp simd
+    for (int64_t h = 0; h < columns; ++h) weighted[p * columns + h] = slope[p * columns + h] * layer.out[h];
+  std::fill(steepness, steepness + n * layer.input_columns, T(0));
+  add_product<T>(n, layer.width, layer.input_columns, {weighted, columns, 1}, layer.hidden, layer.input_columns, steepness,
+                 layer.input_columns);
+}
+
+}  // namespace
+
+template <class T> void sdf_values(const SdfNetwork<T>& net, int64_t n, const T* positions, T* work, T* values) {
+  const SdfLayer<T>& layer = net.layer;
+  Workspace<T> space{work};
+  T *unit = space.take(n, 3), *features = space.take(n, layer.n_inputs - 3);
+  T *inputs = space.take(n, layer.input_columns), *hidden = space.take(n, layer.width_columns);
+  for (int64_t i = 0; i < 3 * n; ++i) unit[i] = positions[i] * layer.scale + T(0.5);
+  HashEncodeArgs<T> grid = net.grid;
+  grid.n_points = n, grid.positions = unit;
+  std::fill(features, features + n * (layer.n_inputs - 3), T(0));
+  hash_encode<T>(grid, 0, n, features, nullptr);
+  join_inputs(layer, n, positions, features, inputs);
+  first_layer<T>(layer, n, inputs, hidden, nullptr);
+  for (int64_t p = 0; p < n; ++p) {
+    T sum = layer.out_bias[0];
+    const T* row = hidden + p * layer.width_columns;
+#pragma omp simd reduction(+ : sum)
+    for (int64_t h = 0; h < layer.width_columns; ++h) sum += row[h] * layer.out[h];
+    values[p] = sum;
+  }
+}
+
+template <class T>
+void sdf_layer(const SdfLayer<T>& layer, const SdfPoints<T>& in, T* work, T* outputs, T* gradient) {
+  const int64_t n = in.n, n_features = layer.n_inputs - 3, columns = layer.width_columns;
+  Workspace<T> space{work};
+  T *inputs = space.take(n, layer.input_columns), *hidden = space.take(n, columns), *slope = space.take(n, columns);
+  T *weighted = space.take(n, columns), *steepness = space.take(n, layer.input_columns);
+  T* padded = space.take(n, layer.output_columns);
+  join_inputs(layer, n, in.positions, in.features, inputs);
+  first_layer(layer, n, inputs, hidden, slope);
+  fill_rows(n, layer.output_columns, layer.out_bias, padded);
+  add_product<T>(n, layer.width, layer.output_columns, {hidden, columns, 1}, layer.out_transposed, layer.output_columns, padded,
+                 layer.output_columns);
+  input_gradient(layer, n, slope, weighted, steepness);
+  for (int64_t p = 0; p < n; ++p) {
+    std::copy_n(padded + p * layer.output_columns, layer.n_outputs, outputs + p * layer.n_outputs);
+    const T* steep = steepness + p * layer.input_columns;
+    for (int axis = 0; axis < 3; ++axis) {
+      const T* jacobian = in.jacobian + (3 * p + axis) * n_features;
+      T sum = T(0);
+#pragma omp simd reduction(+ : sum)
+      for (int64_t c = 0; c < n_features; ++c) sum += jacobian[c] * steep[3 + c];
+      gradient[3 * p + axis] = steep[axis] + layer.scale * sum;
+    }
+  }
+}
+
+template <class T>
+void sdf_layer_backward(const SdfLayer<T>& layer, const SdfPoints<T>& in, const T* grad_outputs, const T* grad_gradient,
+                        T* work, T* grad_features, T* grad_jacobian, const SdfLayerGrad<T>& grad) {
+  const int64_t n = in.n, n_features = layer.n_inputs - 3, columns = layer.width_columns, inputs_row = layer.input_columns;
+  Workspace<T> space{work};
+  T *inputs = space.take(n, inputs_row), *hidden = space.take(n, columns), *slope = space.take(n, columns);
+  T *weighted = space.take(n, columns), *steepness = space.take(n, inputs_row), *grad_steepness = space.take(n, inputs_row);
+  T *grad_weighted = space.take(n, columns), *grad_hidden = space.take(n, columns), *grad_inputs = space.take(n, inputs_row);
+  join_inputs(layer, n, in.positions, in.features, inputs);
+  first_layer(layer, n, inputs, hidden, slope);
+  input_gradient(layer, n, slope, weighted, steepness);
+
+  // gradient[axis] = steepness[axis] + scale jacobian[axis] . steepness[3:]
+  std::fill(grad_steepness, grad_steepness + n * inputs_row, T(0));
+  for (int64_t p = 0; p < n; ++p) {
+    const T* steep = steepness + p * inputs_row + 3;
+    T* grad_steep = grad_steepness + p * inputs_row;
+    for (int axis = 0; axis < 3; ++axis) {
+      const T g = grad_gradient[3 * p + axis], scaled = g * layer.scale;
+      const T* jacobian = in.jacobian + (3 * p + axis) * n_features;
+      T* out = grad_jacobian + (3 * p + axis) * n_features;
+      grad_steep[axis] = g;
+#pragma omp simd
+      for (int64_t c = 0; c < n_features; ++c) {
+        out[c] = scaled * steep[c];
+        grad_steep[3 + c] += scaled * jacobian[c];
+      }
+    }
+  }
+  // steepness = weighted hidden_weights,  outputs = hidden out^T + out_bias
+  std::fill(grad_weighted, grad_weighted + n * columns, T(0));
+  add_product<T>(n, layer.n_inputs, columns, {grad_steepness, inputs_row, 1}, layer.hidden_transposed, columns, grad_weighted, columns);
+  std::fill(grad_hidden, grad_hidden + n * columns, T(0));
+  add_product<T>(n, layer.n_outputs, columns, {grad_outputs, layer.n_outputs, 1}, layer.out, columns, grad_hidden, columns);
+  add_product<T>(layer.n_outputs, n, columns, {grad_outputs, 1, layer.n_outputs}, hidden, columns, grad.out, columns);
+  add_product<T>(layer.width, n, inputs_row, {weighted, 1, columns}, grad_steepness, inputs_row, grad.hidden, inputs_row);
+  // weighted = slope out[0],  hidden = softplus(pre): grad_hidden becomes that of pre
+  for (int64_t p = 0; p < n; ++p) {
+    const T *s = slope + p * columns, *g = grad_weighted + p * columns;
+    T* pre = grad_hidden + p * columns;
+#pragma omp simd
+    for (int64_t h = 0; h < columns; ++h) {
+      grad.out[h] += g[h] * s[h];
+      pre[h] = pre[h] * s[h] + g[h] * layer.out[h] * layer.beta * s[h] * (T(1) - s[h]);
+      grad.hidden_bias[h] += pre[h];
+    }
+    for (int64_t m = 0; m < layer.n_outputs; ++m) grad.out_bias[m] += grad_outputs[p * layer.n_outputs + m];
+  }
+  // pre = inputs hidden_weights^T + hidden_bias
+  add_product<T>(layer.width, n, inputs_row, {grad_hidden, 1, columns}, inputs, inputs_row, grad.hidden, inputs_row);
+  std::fill(grad_inputs, grad_inputs + n * inputs_row, T(0));
+  add_product<T>(n, layer.width, inputs_row, {grad_hidden, columns, 1}, layer.hidden, inputs_row, grad_inputs, inputs_row);
+  for (int64_t p = 0; p < n; ++p) std::copy_n(grad_inputs + p * inputs_row + 3, n_features, grad_features + p * n_features);
+}
+
+#define SPLITNERF_INSTANTIATE(T)                                                                      \
+  template void sdf_values<T>(const SdfNetwork<T>&, int64_t, const T*, T*, T*);                       \
+  template void sdf_layer<T>(const SdfLayer<T>&, const SdfPoints<T>&, T*, T*, T*);                    \
+  template void sdf_layer_backward<T>(const SdfLayer<T>&, const SdfPoints<T>&, const T*, const T*, T*, T*, T*, \
+                                      const SdfLayerGrad<T>&);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

@@ -30,6 +30,12 @@ class Light(nn.Module, abc.ABC):
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
 
+    def collect(self) -> None:
+        """From now on gradients may stop short of the parameters until :meth:`deliver`; here they do not."""
+
+    def deliver(self) -> None:
+        """Takes gradients that have come together since :meth:`collect` to the parameters."""
+
     @torch.no_grad()
     def panorama(self, height: int, roughness: float = 0.0) -> Tensor:
         """[height, 2 height, 3] equirectangular radiance at one roughness (z up, centre column along +x)."""

@@ -98,7 +98,8 @@ class LightPyramid(Light):
     They are computed when first asked for and shared by all calls until a parameter changes, a backward
     pass has used up their graph, or gradients are wanted that they do not carry. Losses of several calls in
     one step therefore go into one ``backward``. Writing through ``.data`` goes unseen: change parameters
-    under ``no_grad``.
+    under ``no_grad``. After :meth:`collect` gradients add up at the maps until :meth:`deliver` takes them on to the
+    parameters, so that several steps share one pass through the linear maps.
 
     Args:
         resolution: n, a power of 2 >= 16; 64 resolves 3 degrees.
@@ -117,9 +118,11 @@ class LightPyramid(Light):
         with torch.no_grad():
             self.texels[: 4 * 4] = math.log(start)
         self._cached: tuple | None = None
+        self._collects = False
+        self._held: tuple[Tensor, ...] | None = None  # maps and harmonics, then the leaves that stand for them
 
     def __getstate__(self) -> dict:
-        return {**super().__getstate__(), "_cached": None}  # copies compute their own
+        return {**super().__getstate__(), "_cached": None, "_held": None}  # copies compute their own
 
     def radiance(self) -> Tensor:
         """[n^2, 3] radiance of the texels."""
@@ -130,20 +133,43 @@ class LightPyramid(Light):
         state = (self.texels._version, self.texels.data_ptr())
         wanted = torch.is_grad_enabled() and self.texels.requires_grad
         inference = torch.is_inference_mode_enabled()
+        if self._held is not None and not wanted:
+            return self._held[2].detach(), self._held[3].detach()
         if self._cached is not None:
             cached_state, cached_inference, levels, sh = self._cached
             if cached_state == state and inference >= cached_inference and levels.requires_grad >= wanted:
                 return (levels, sh) if wanted else (levels.detach(), sh.detach())
-        radiance = self.radiance()
-        averages = sparse_product(self.maps.averages, radiance)
-        levels = torch.cat([radiance, sparse_product(self.maps.filters, averages)])
-        # Three rows times a matrix, forward and backward: several times faster than the matrix times three columns.
-        sh = (averages[self.maps.projected].T.contiguous() @ self.maps.projection.T).T.contiguous()
+        if self._collects and wanted:
+            if self._held is None:
+                levels, sh = self._compute()
+                self._held = levels, sh, levels.detach().requires_grad_(), sh.detach().requires_grad_()
+            return self._held[2:]
+        levels, sh = self._compute()
         self._cached = (state, inference, levels, sh)
         if wanted:
             levels.register_hook(self._forget)
             sh.register_hook(self._forget)
         return levels, sh
+
+    def _compute(self) -> tuple[Tensor, Tensor]:
+        radiance = self.radiance()
+        averages = sparse_product(self.maps.averages, radiance)
+        levels = torch.cat([radiance, sparse_product(self.maps.filters, averages)])
+        # Three rows times a matrix, forward and backward: several times faster than the matrix times three columns.
+        return levels, (averages[self.maps.projected].T.contiguous() @ self.maps.projection.T).T.contiguous()
+
+    def collect(self) -> None:
+        """From now on the gradients of backward passes stop at the maps and add up there."""
+        self._collects = True
+
+    def deliver(self) -> None:
+        """Takes the gradients that have come together to the parameters; what is asked for next is computed anew."""
+        if self._held is None:
+            return
+        levels, sh, *leaves = self._held
+        self._held = None
+        grads = [torch.zeros_like(leaf) if leaf.grad is None else leaf.grad for leaf in leaves]
+        torch.autograd.backward([levels, sh], grads)
 
     def _forget(self, grad: Tensor) -> None:
         self._cached = None

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from splitnerf.ops import HashGrid, HashGridSpec, SdfNetwork
+from splitnerf.ops import HashGrid, HashGridSpec, SdfNetwork, sdf_layer, sdf_values
 
 SOFTPLUS_BETA = 100.0
 
@@ -35,8 +35,8 @@ class SdfSample(NamedTuple):
 class SdfField(nn.Module):
     """sdf(x) = W2 softplus_100(W1 [x, hash(x)] + b1) + b2, with weight normalisation.
 
-    One hidden layer has its gradient in closed form, so normals need a single backward pass:
-    ``d sdf / d input = (W2[0] * sigmoid(100 pre)) W1``; the hash grid's part goes through its Jacobian.
+    One hidden layer has its gradient in closed form, so normals need a single backward pass; the hash grid's part goes
+    through its Jacobian (:func:`splitnerf.ops.sdf_layer`).
 
     Args:
         spec: Shape of the hash grid.
@@ -90,16 +90,18 @@ class SdfField(nn.Module):
 
     def sdf(self, positions: Tensor) -> Tensor:
         """Signed distance [n] at positions [n, 3], scene units."""
+        if not torch.is_grad_enabled():
+            return sdf_values(positions, self.network())
         return self._outputs(self._inputs(positions, self.grid(self._to_unit(positions))), 1)[:, 0]
 
     @torch.no_grad()
     def network(self) -> SdfNetwork:
         """The field's numbers as they stand, for operators that ask for distances on their own."""
         hidden, out = self._weights()
+        table, biases = self.grid.table.detach(), (self.hidden_bias.detach(), self.out_bias.detach())
         return SdfNetwork(
-            self.grid.spec, self.grid.n_active, self.grid.table.detach(), hidden, self.hidden_bias.detach(), out[0].clone(),
-            self.out_bias[0].item(), SOFTPLUS_BETA, self.box,
-        )  # fmt: skip
+            self.grid.spec, self.grid.n_active, table, hidden, biases[0], out, biases[1], SOFTPLUS_BETA, self.box
+        )
 
     def sample(self, positions: Tensor) -> SdfSample:
         """Outputs, grid features and the analytic gradient in one pass.
@@ -108,10 +110,9 @@ class SdfField(nn.Module):
         """
         hidden, out = self._weights()
         features, jacobian = self.grid.jacobian(self._to_unit(positions))
-        pre = F.linear(self._inputs(positions, features), hidden, self.hidden_bias)
-        outputs = F.linear(F.softplus(pre, SOFTPLUS_BETA), out, self.out_bias)
-        slope = (torch.sigmoid(SOFTPLUS_BETA * pre) * out[0]) @ hidden  # d sdf / d input, [n, 3 + C]
-        gradient = slope[:, :3] + (jacobian * slope[:, None, 3:]).sum(-1) * (0.5 / self.box)
+        outputs, gradient = sdf_layer(
+            positions, features, jacobian, hidden, self.hidden_bias, out, self.out_bias, SOFTPLUS_BETA, self.box
+        )
         return SdfSample(outputs, features, gradient)
 
     def sample_finite_difference(self, positions: Tensor) -> SdfSample:

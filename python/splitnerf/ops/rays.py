@@ -2,7 +2,7 @@
 
 Samples of all rays lie in one array, ray after ray; ``offsets`` [n_rays + 1] says where each begins.
 ``neus_weights`` is differentiable once in f_prev, f_next and s; ``composite`` once in weights and
-values; a second derivative raises. ``march_rays`` and ``sample_rays`` have no gradient.
+values; a second derivative raises. ``march_rays`` has no gradient.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import torch
 from torch import Tensor
 
 from splitnerf.ops._library import lib, register
-from splitnerf.ops.hash_grid import HashGridSpec
 
 CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE = 0, 1, 2
 
@@ -31,31 +30,6 @@ class PackedSamples(NamedTuple):
     t_starts: Tensor
     t_ends: Tensor
     offsets: Tensor
-
-
-class SdfNetwork(NamedTuple):
-    """The numbers of a distance field ``sdf(x) = out . softplus(hidden [x, features(x)] + hidden_bias) + out_bias``.
-
-    Attributes:
-        spec: Shape of the hash grid that gives the features.
-        n_active: Its open levels.
-        table: [spec.n_entries, spec.n_features].
-        hidden, hidden_bias: [width, 3 + spec.n_outputs], [width].
-        out: [width].
-        out_bias: Scene units.
-        beta: softplus(y) = log(1 + exp(beta y)) / beta.
-        box: Half size of the cube that the grid covers, scene units.
-    """
-
-    spec: HashGridSpec
-    n_active: int
-    table: Tensor
-    hidden: Tensor
-    hidden_bias: Tensor
-    out: Tensor
-    out_bias: float
-    beta: float
-    box: float
 
 
 def march_rays(
@@ -79,54 +53,6 @@ def march_rays(
         ValueError: A shape, dtype or size does not fit.
     """
     return PackedSamples(*lib.march_rays(rays_o, rays_d, jitter, cells, box, step, max_samples))
-
-
-def sample_rays(
-    rays_o: Tensor,
-    rays_d: Tensor,
-    jitter: Tensor,
-    cells: Tensor,
-    network: SdfNetwork,
-    *,
-    step: float,
-    s: float,
-    min_weight: float,
-    min_transmittance: float,
-    reach: float,
-    lipschitz: float,
-    max_samples: int = 1024,
-) -> tuple[PackedSamples, Tensor]:
-    """Those samples of :func:`march_rays` that a pixel is made of: the distance is asked for on the way.
-
-    Two neighbouring samples are kept where the stretch between their midpoints has a NeuS weight above `min_weight`; the
-    ray ends where less than `min_transmittance` of the light gets through. At distance f from the surface the samples
-    within ``(|f| - reach) / lipschitz`` are left out. What a pixel loses is at most the weight of what is not kept.
-
-    Args:
-        rays_o, rays_d: [n_rays, 3]; directions unit.
-        jitter: [n_rays] in [0, 1).
-        cells: [r, r, r] uint8, as of :func:`march_rays`; they cover the network's box.
-        network: The distance field.
-        step: Length of a sample, scene units.
-        s: Sharpness of the density, positive.
-        min_weight: In [0, 1).
-        min_transmittance: In [0, 1).
-        reach: Distance beyond which there is no density, scene units.
-        lipschitz: Bound of the field's gradient.
-        max_samples: Distances of one ray at most.
-
-    Returns:
-        The kept samples, and [n_rays] int64 at how many points each ray asked for the distance.
-
-    Raises:
-        ValueError: A shape, dtype or number does not fit.
-    """
-    n = network
-    *samples, evaluated = lib.sample_rays(
-        rays_o, rays_d, jitter, cells, n.table, n.hidden, n.hidden_bias, n.out, n.out_bias, n.beta,
-        *n.spec.arguments(n.n_active), n.box, step, max_samples, s, min_weight, min_transmittance, reach, lipschitz,
-    )  # fmt: skip
-    return PackedSamples(*samples), evaluated
 
 
 def neus_weights(
@@ -202,17 +128,7 @@ def _composite_backward(ctx, grad):
     return *lib.composite_backward(*ctx.saved_tensors, grad), None
 
 
-def _fake_sample(rays_o, rays_d, jitter, cells, table, *rest):
-    n = torch.library.get_ctx().new_dynamic_size()
-    long, n_rays = torch.int64, rays_o.shape[0]
-    return (
-        rays_o.new_empty(n, dtype=long), rays_o.new_empty(n), rays_o.new_empty(n), rays_o.new_empty(n_rays + 1, dtype=long),
-        rays_o.new_empty(n_rays, dtype=long),
-    )  # fmt: skip
-
-
 register("march_rays", fake=_fake_march)
-register("sample_rays", fake=_fake_sample)
 register(
     "neus_weights",
     fake=lambda f_prev, f_next, s, offsets, eps: (

@@ -1,4 +1,4 @@
-"""sample_rays: what it keeps against all samples, thin parts, errors."""
+"""sdf_layer, sdf_values, and sample_rays: what it keeps against all samples, thin parts, errors."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import math
 
 import pytest
 import torch
-from op_checks import check_op, generator, lib, unit
+from op_checks import check_op, generator, grad_leaves, lib, unit
 
 from splitnerf.fields.sdf import SdfField
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, HashGridSpec, SdfNetwork, march_rays, sample_rays
+from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, HashGridSpec, SdfNetwork, march_rays, sample_rays, sdf_values
 
 BOX, STEP = 1.5, 0.02
 SPEC = HashGridSpec(n_levels=3, n_features=2, base_resolution=4, growth=1.7, log2_table_size=9)
@@ -91,7 +91,8 @@ def test_a_thin_sheet_is_never_jumped_over(thickness, s):
     zeros = torch.zeros(SPEC.n_entries, SPEC.n_features)
     hidden = torch.zeros(2, 3 + SPEC.n_outputs)
     hidden[0, 2], hidden[1, 2] = 1.0, -1.0
-    sheet = SdfNetwork(SPEC, 3, zeros, hidden, torch.zeros(2), torch.ones(2), -thickness / 2, 1e5, BOX)
+    bias = torch.tensor([-thickness / 2])
+    sheet = SdfNetwork(SPEC, 3, zeros, hidden, torch.zeros(2), torch.ones(1, 2), bias, 1e5, BOX)
     o, d, jitter = (x.float() for x in rays())
     kept, evaluated = sample_rays(
         o, d, jitter, cells(), sheet, **settings(step=0.005, s=s, min_weight=1e-3, reach=7.0 / s, lipschitz=1.25)
@@ -118,6 +119,16 @@ def test_a_ray_ends_where_nothing_gets_through():
     assert lost.max() < 1e-3
 
 
+@pytest.mark.parametrize("n", [0, 1, 63, 64, 1000])
+def test_values_are_the_field(n):
+    field = bumpy_field()
+    x = 4 * torch.rand(n, 3, generator=generator(), dtype=torch.float64) - 2
+    expected = field.sdf(x).detach()
+    torch.testing.assert_close(sdf_values(x, field.network()), expected)
+    single = sdf_values(x.float(), field.float().network())
+    torch.testing.assert_close(single.double(), expected, rtol=1e-5, atol=2e-6)
+
+
 def test_empty_cells_are_not_asked():
     field, (o, d, jitter) = bumpy_field(), rays()
     samples, evaluated = sample_rays(o, d, jitter, torch.full_like(cells(), CELL_EMPTY), field.network(), **settings())
@@ -126,7 +137,7 @@ def test_empty_cells_are_not_asked():
 
 def test_a_nan_is_kept_for_the_loss_to_see():
     field, (o, d, jitter) = bumpy_field(), rays(8)
-    network = field.network()._replace(out_bias=math.nan)
+    network = field.network()._replace(out_bias=torch.full((13,), math.nan, dtype=torch.float64))
     samples, evaluated = sample_rays(o, d, jitter, cells(), network, **settings())
     assert len(samples.t_starts) == int(evaluated.sum()) > 0
 
@@ -135,8 +146,7 @@ def arguments(dtype=torch.float64) -> tuple:
     n = bumpy_field().to(dtype).network()
     o, d, jitter = rays(12, dtype)
     return (
-        o, d, jitter, cells(), n.table, n.hidden, n.hidden_bias, n.out, n.out_bias, n.beta, *n.spec.arguments(2), n.box,
-        STEP, 64, 60.0, 0.01, 1e-3, 0.1, 1.25,
+        o, d, jitter, cells(), *n._replace(n_active=2).arguments(), STEP, 64, 60.0, 0.01, 1e-3, 0.1, 1.25,
     )  # fmt: skip
 
 
@@ -144,6 +154,7 @@ def arguments(dtype=torch.float64) -> tuple:
 def test_opcheck_and_empty_batch(dtype):
     x = arguments(dtype)
     check_op(lib.sample_rays, x)
+    check_op(lib.sdf_values, (x[0], *x[4:16]))
     nothing = lib.sample_rays(x[0][:0], x[1][:0], x[2][:0], *x[3:])
     assert nothing[0].shape == (0,) and nothing[3].tolist() == [0]
 
@@ -157,8 +168,8 @@ def test_float32_keeps_what_float64_does():
 
 def test_errors_name_what_is_wrong():
     x = list(arguments())
-    x[7] = x[7][:3]
-    with pytest.raises(Exception, match=r"sample_rays: out must be \[32\] float64"):
+    x[7] = x[7][:, :3]
+    with pytest.raises(Exception, match=r"sample_rays: out must be \[n, 32\] float64"):
         lib.sample_rays(*x)
     x = list(arguments())
     x[16] = 0.0
@@ -168,3 +179,66 @@ def test_errors_name_what_is_wrong():
         x = list(arguments())
         x[4] = x[4].clone().requires_grad_()
         lib.sample_rays(*x)[1].sum().backward()
+
+
+# ---- sdf_layer ----
+
+
+def layer_inputs(n: int = 7, dtype=torch.float64) -> tuple:
+    g = generator(5)
+
+    def randn(*shape: int) -> torch.Tensor:
+        return torch.randn(*shape, generator=g, dtype=torch.float64).to(dtype)
+
+    beta_scale = 0.02  # around the bend of softplus_100
+    return (
+        randn(n, 3), randn(n, 6), randn(n, 3, 6), beta_scale * randn(10, 9), beta_scale * randn(10), randn(4, 10), randn(4),
+        100.0, BOX,
+    )  # fmt: skip
+
+
+def layer_by_formula(positions, features, jacobian, hidden, hidden_bias, out, out_bias, beta, box) -> tuple:
+    a = torch.cat([positions, features], 1) @ hidden.T + hidden_bias
+    outputs = torch.nn.functional.softplus(a, beta, threshold=200) @ out.T + out_bias
+    q = (torch.sigmoid(beta * a) * out[0]) @ hidden
+    return outputs, q[:, :3] + (jacobian * q[:, None, 3:]).sum(-1) / (2 * box)
+
+
+@pytest.mark.parametrize("n", [0, 1, 63, 64, 65, 1500])
+def test_layer_and_its_gradients_are_the_formula(n):
+    x = layer_inputs(n)
+    leaves, twins = grad_leaves(x, range(1, 7)), grad_leaves(x, range(1, 7))
+    ours, theirs = lib.sdf_layer(*leaves), layer_by_formula(*twins)
+    weights = [torch.randn(t.shape, generator=generator(6), dtype=t.dtype) for t in theirs]
+    for outputs in (ours, theirs):
+        (outputs[0] * weights[0]).sum().add((outputs[1] * weights[1]).sum()).backward()
+    for a, b in zip(ours, theirs):
+        torch.testing.assert_close(a, b)
+    for a, b in zip(leaves[1:7], twins[1:7]):
+        torch.testing.assert_close(a.grad, b.grad)
+
+
+def test_layer_float32_is_close_to_float64():
+    exact = lib.sdf_layer(*layer_inputs(500))
+    single = lib.sdf_layer(*layer_inputs(500, torch.float32))
+    for a, b in zip(single, exact):
+        torch.testing.assert_close(a.double(), b, rtol=1e-5, atol=1e-5)
+
+
+def test_the_fields_gradient_is_that_of_its_values():
+    field = bumpy_field()
+    x = torch.rand(50, 3, generator=generator(), dtype=torch.float64) * 2 - 1
+    h = 1e-6 * torch.eye(3, dtype=torch.float64)
+    numeric = torch.stack([(field.sdf(x + e) - field.sdf(x - e)) / 2e-6 for e in h], 1)
+    torch.testing.assert_close(field.sample(x).gradient, numeric, rtol=1e-5, atol=1e-7)
+
+
+def test_layer_opcheck_gradcheck_and_errors():
+    x = layer_inputs()
+    check_op(lib.sdf_layer, x, tuple(range(1, 7)))
+    check_op(lib.sdf_layer_backward, (*x, torch.ones(7, 4).double(), torch.ones(7, 3).double()))
+    assert torch.autograd.gradcheck(lambda *y: lib.sdf_layer(*y), grad_leaves(x, range(1, 7)), atol=1e-6, rtol=1e-5)
+    with pytest.raises(RuntimeError, match="no gradient to positions"):
+        lib.sdf_layer(*grad_leaves(x, (0,)))[0].sum().backward()
+    with pytest.raises(Exception, match=r"sdf_layer: jacobian must be \[7, 3, 6\] float64"):
+        lib.sdf_layer(x[0], x[1], x[2][:, :2], *x[3:])

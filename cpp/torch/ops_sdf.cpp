@@ -1,0 +1,203 @@
+// sdf_layer, sdf_values and sample_rays as torch operators.
+#include <algorithm>
+#include <tuple>
+#include <vector>
+
+#include "check_hash.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf::glue {
+namespace {
+
+// Kept samples of all rays in one array, ray after ray.
+template <class T>
+std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> packed(const Tensor& like, ScalarType type, T step,
+                                                          const std::vector<cpu::SampledRay<T>>& rays) {
+  const int64_t n_rays = static_cast<int64_t>(rays.size());
+  Tensor offsets = empty_like_type(like, {n_rays + 1}, ScalarType::Long), evaluated = empty_like_type(like, {n_rays}, ScalarType::Long);
+  int64_t n = 0;
+  for (int64_t r = 0; r < n_rays; ++r) {
+    out<int64_t>(offsets)[r] = n;
+    out<int64_t>(evaluated)[r] = rays[r].n_evaluated;
+    n += static_cast<int64_t>(rays[r].starts.size());
+  }
+  out<int64_t>(offsets)[n_rays] = n;
+  Tensor ray_indices = empty_like_type(like, {n}, ScalarType::Long);
+  Tensor t_starts = empty_like_type(like, {n}, type), t_ends = empty_like_type(like, {n}, type);
+  for (int64_t r = 0, i = 0; r < n_rays; ++r) {
+    for (const T start : rays[r].starts) {
+      out<int64_t>(ray_indices)[i] = r;
+      out<T>(t_starts)[i] = start;
+      out<T>(t_ends)[i] = start + step;
+      ++i;
+    }
+  }
+  return {ray_indices, t_starts, t_ends, offsets, evaluated};
+}
+
+// The weights of the layer, checked and contiguous.
+struct Weights {
+  ScalarType type;
+  Tensor hidden, hidden_bias, out, out_bias;
+  double beta, box;
+
+  Weights(const char* op, int64_t n_features, const Tensor& hidden_in, const Tensor& hidden_bias_in, const Tensor& out_in,
+          const Tensor& out_bias_in, double beta, double box)
+      : type(real_type(op, "hidden", hidden_in)),
+        hidden(checked(op, "hidden", hidden_in, {kAny, 3 + n_features}, type)),
+        hidden_bias(checked(op, "hidden_bias", hidden_bias_in, {hidden.size(0)}, type)),
+        out(checked(op, "out", out_in, {kAny, hidden.size(0)}, type)),
+        out_bias(checked(op, "out_bias", out_bias_in, {out.size(0)}, type)),
+        beta(beta),
+        box(box) {
+    require(out.size(0) > 0, op, "out must have a row, the distance's");
+    require(beta > 0 && box > 0, op, "beta and box must be positive");
+  }
+  template <class T> SdfWeights<T> view() const {
+    return {static_cast<int>(hidden.size(1)), static_cast<int>(hidden.size(0)), static_cast<int>(out.size(0)), in<T>(hidden),
+            in<T>(hidden_bias), in<T>(out), in<T>(out_bias), T(beta), T(box)};
+  }
+};
+
+// A distance field: hash grid and layer.
+struct Field {
+  HashGridShape shape;
+  Weights weights;
+  ScalarType type;
+  Tensor table;
+  int n_active;
+
+  Field(const char* op, const Tensor& table_in, const Tensor& hidden, const Tensor& hidden_bias, const Tensor& out,
+        const Tensor& out_bias, double beta, int64_t n_levels, int64_t base_resolution, double growth,
+        int64_t log2_table_size, int64_t n_active, double box)
+      : shape(checked_table_shape(op, table_in, n_levels, base_resolution, growth, log2_table_size, n_active)),
+        weights(op, n_levels * shape.n_features, hidden, hidden_bias, out, out_bias, beta, box),
+        type(weights.type),
+        table(checked(op, "table", table_in, {n_entries(shape), shape.n_features}, type)),
+        n_active(static_cast<int>(n_active)) {}
+  template <class T> cpu::SdfField<T> view() const { return {shape, n_active, in<T>(table), weights.view<T>()}; }
+
+ private:
+  static HashGridShape checked_table_shape(const char* op, const Tensor& table, int64_t n_levels, int64_t base_resolution,
+                                           double growth, int64_t log2_table_size, int64_t n_active) {
+    require(table.dim() == 2, op, "table must be [n_entries, n_features]");
+    return checked_shape(op, n_levels, base_resolution, growth, log2_table_size, table.size(1), n_active);
+  }
+};
+
+// Points with their hash-grid features.
+struct Points {
+  Tensor positions, features, jacobian;
+
+  Points(const char* op, const Tensor& positions_in, const Tensor& features_in, const Tensor& jacobian_in)
+      : positions(checked(op, "positions", positions_in, {kAny, 3}, real_type(op, "positions", positions_in))),
+        features(checked(op, "features", features_in, {n(), kAny}, positions.scalar_type())),
+        jacobian(checked(op, "jacobian", jacobian_in, {n(), 3, features.size(1)}, positions.scalar_type())) {}
+  int64_t n() const { return positions.size(0); }
+};
+
+std::tuple<Tensor, Tensor> sdf_layer(Tensor positions, Tensor features, Tensor jacobian, Tensor hidden, Tensor hidden_bias,
+                                     Tensor out_weights, Tensor out_bias, double beta, double box) {
+  const char* op = "sdf_layer";
+  const Points x(op, positions, features, jacobian);
+  const Weights w(op, x.features.size(1), hidden, hidden_bias, out_weights, out_bias, beta, box);
+  require(w.type == x.positions.scalar_type(), op, "positions and hidden must have one dtype");
+  Tensor outputs = empty_like_type(x.positions, {x.n(), w.out.size(0)}, w.type);
+  Tensor gradient = empty_like_type(x.positions, {x.n(), 3}, w.type);
+  dispatch_real(w.type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::sdf_layer(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), out<T>(outputs), out<T>(gradient));
+  });
+  return {outputs, gradient};
+}
+
+std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> sdf_layer_backward(
+    Tensor positions, Tensor features, Tensor jacobian, Tensor hidden, Tensor hidden_bias, Tensor out_weights,
+    Tensor out_bias, double beta, double box, Tensor grad_outputs, Tensor grad_gradient) {
+  const char* op = "sdf_layer_backward";
+  const Points x(op, positions, features, jacobian);
+  const Weights w(op, x.features.size(1), hidden, hidden_bias, out_weights, out_bias, beta, box);
+  require(w.type == x.positions.scalar_type(), op, "positions and hidden must have one dtype");
+  const Tensor go = checked(op, "grad_outputs", grad_outputs, {x.n(), w.out.size(0)}, w.type);
+  const Tensor gg = checked(op, "grad_gradient", grad_gradient, {x.n(), 3}, w.type);
+  const auto like = [&](const Tensor& t) { return torch::stable::empty_like(t); };
+  Tensor grad_features = like(x.features), grad_jacobian = like(x.jacobian), grad_hidden = like(w.hidden);
+  Tensor grad_hidden_bias = like(w.hidden_bias), grad_out = like(w.out), grad_out_bias = like(w.out_bias);
+  dispatch_real(w.type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::sdf_layer_backward(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), in<T>(go), in<T>(gg),
+                            out<T>(grad_features), out<T>(grad_jacobian), out<T>(grad_hidden), out<T>(grad_hidden_bias),
+                            out<T>(grad_out), out<T>(grad_out_bias));
+  });
+  return {grad_features, grad_jacobian, grad_hidden, grad_hidden_bias, grad_out, grad_out_bias};
+}
+
+Tensor sdf_values(Tensor positions, Tensor table, Tensor hidden, Tensor hidden_bias, Tensor out_weights, Tensor out_bias,
+                  double beta, int64_t n_levels, int64_t base_resolution, double growth, int64_t log2_table_size,
+                  int64_t n_active, double box) {
+  const char* op = "sdf_values";
+  const Field field(op, table, hidden, hidden_bias, out_weights, out_bias, beta, n_levels, base_resolution, growth,
+                    log2_table_size, n_active, box);
+  const Tensor x = checked(op, "positions", positions, {kAny, 3}, field.type);
+  Tensor values = empty_like_type(x, {x.size(0)}, field.type);
+  dispatch_real(field.type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::sdf_values(field.view<T>(), x.size(0), in<T>(x), out<T>(values));
+  });
+  return values;
+}
+
+std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
+    Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, Tensor table, Tensor hidden, Tensor hidden_bias,
+    Tensor out_weights, Tensor out_bias, double beta, int64_t n_levels, int64_t base_resolution, double growth,
+    int64_t log2_table_size, int64_t n_active, double box, double step, int64_t max_samples, double s, double min_weight,
+    double min_transmittance, double reach, double lipschitz) {
+  const char* op = "sample_rays";
+  const Field field(op, table, hidden, hidden_bias, out_weights, out_bias, beta, n_levels, base_resolution, growth,
+                    log2_table_size, n_active, box);
+  const Tensor o = checked(op, "rays_o", rays_o, {kAny, 3}, field.type);
+  const int64_t n_rays = o.size(0);
+  const Tensor d = checked(op, "rays_d", rays_d, {n_rays, 3}, field.type), u = checked(op, "jitter", jitter, {n_rays}, field.type);
+  require(cells.dim() == 3 && cells.size(0) > 0, op, "cells must be [r, r, r] uint8 with r > 0");
+  const int64_t resolution = cells.size(0);
+  const Tensor grid = checked(op, "cells", cells, {resolution, resolution, resolution}, ScalarType::Byte);
+  require(step > 0 && s > 0 && lipschitz > 0, op, "step, s and lipschitz must be positive");
+  require(min_transmittance >= 0 && min_transmittance < 1, op, "min_transmittance must be in [0, 1)");
+  const MarchOptions march{static_cast<float>(box), static_cast<int>(resolution), static_cast<float>(step), max_samples};
+  std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> result;
+  dispatch_real(field.type, [&](auto zero) {
+    using T = decltype(zero);
+    const cpu::SampleRules<T> rules{T(s), T(min_weight), T(-std::log(min_transmittance)), T(reach), T(lipschitz)};
+    std::vector<cpu::SampledRay<T>> rays(n_rays);
+    cpu::sample_rays(field.view<T>(), march, in<uint8_t>(grid), rules, n_rays, in<T>(o), in<T>(d), in<T>(u), rays.data());
+    result = packed(o, field.type, T(step), rays);
+  });
+  return result;
+}
+
+}  // namespace
+
+#define SPLITNERF_SDF_LAYER                                                                                      \
+  "Tensor positions, Tensor features, Tensor jacobian, Tensor hidden, Tensor hidden_bias, Tensor out, "           \
+  "Tensor out_bias, float beta, float box"
+#define SPLITNERF_SDF_NETWORK                                                                                    \
+  "Tensor table, Tensor hidden, Tensor hidden_bias, Tensor out, Tensor out_bias, float beta, int n_levels, "     \
+  "int base_resolution, float growth, int log2_table_size, int n_active, float box"
+STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
+  m.def("sdf_layer(" SPLITNERF_SDF_LAYER ") -> (Tensor, Tensor)");
+  m.def("sdf_layer_backward(" SPLITNERF_SDF_LAYER ", Tensor grad_outputs, Tensor grad_gradient) -> "
+        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
+  m.def("sdf_values(Tensor positions, " SPLITNERF_SDF_NETWORK ") -> Tensor");
+  m.def("sample_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, " SPLITNERF_SDF_NETWORK
+        ", float step, int max_samples, float s, float min_weight, float min_transmittance, float reach, "
+        "float lipschitz) -> (Tensor, Tensor, Tensor, Tensor, Tensor)");
+}
+
+STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+  m.impl("sdf_layer", TORCH_BOX(&sdf_layer));
+  m.impl("sdf_layer_backward", TORCH_BOX(&sdf_layer_backward));
+  m.impl("sdf_values", TORCH_BOX(&sdf_values));
+  m.impl("sample_rays", TORCH_BOX(&sample_rays));
+}
+
+}  // namespace splitnerf::glue

@@ -1,0 +1,172 @@
+"""The distance field: its layer over hash-grid features, and the whole of it asked for without gradients, at points and
+along rays to find the samples that count.
+
+``sdf_layer`` is differentiable once in features, jacobian and weights; the other two have no gradient.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from splitnerf.ops._library import lib, refuse_gradients, register
+from splitnerf.ops.hash_grid import HashGridSpec
+from splitnerf.ops.rays import PackedSamples
+
+
+class SdfNetwork(NamedTuple):
+    """The numbers of a field ``outputs(x) = out softplus(hidden [x, features(x)] + hidden_bias) + out_bias``, the first of
+    which is the signed distance.
+
+    Attributes:
+        spec: Shape of the hash grid that gives the features.
+        n_active: Its open levels.
+        table: [spec.n_entries, spec.n_features].
+        hidden, hidden_bias: [width, 3 + spec.n_outputs], [width].
+        out, out_bias: [m, width], [m].
+        beta: softplus(y) = log(1 + exp(beta y)) / beta.
+        box: Half size of the cube that the grid covers, scene units.
+    """
+
+    spec: HashGridSpec
+    n_active: int
+    table: Tensor
+    hidden: Tensor
+    hidden_bias: Tensor
+    out: Tensor
+    out_bias: Tensor
+    beta: float
+    box: float
+
+    def arguments(self) -> tuple:
+        """As the operators take them."""
+        return (
+            self.table, self.hidden, self.hidden_bias, self.out, self.out_bias, self.beta,
+            *self.spec.arguments(self.n_active), self.box,
+        )  # fmt: skip
+
+
+def sdf_layer(
+    positions: Tensor,
+    features: Tensor,
+    jacobian: Tensor,
+    hidden: Tensor,
+    hidden_bias: Tensor,
+    out: Tensor,
+    out_bias: Tensor,
+    beta: float,
+    box: float,
+) -> tuple[Tensor, Tensor]:
+    """The layer of a distance field and the distance's gradient, in one pass.
+
+    ``a = hidden [positions, features] + hidden_bias``, ``outputs = out softplus(a) + out_bias``, and by the chain rule
+    ``d outputs[0] / d positions = q[:3] + jacobian q[3:] / (2 box)`` with ``q = (out[0] softplus'(a)) hidden``.
+
+    Args:
+        positions: [n, 3], scene units in [-box, box].
+        features, jacobian: [n, C], [n, 3, C] of :func:`hash_encode_jacobian` at ``positions / (2 box) + 1/2``.
+        hidden, hidden_bias: [width, 3 + C], [width].
+        out, out_bias: [m, width], [m].
+        beta: softplus(y) = log(1 + exp(beta y)) / beta.
+        box: Half size of the cube that the grid covers.
+
+    Returns:
+        outputs [n, m] and gradient [n, 3].
+
+    Raises:
+        ValueError: A shape, dtype or number does not fit.
+    """
+    return lib.sdf_layer(positions, features, jacobian, hidden, hidden_bias, out, out_bias, beta, box)
+
+
+def sdf_values(positions: Tensor, network: SdfNetwork) -> Tensor:
+    """Signed distances [n] at positions [n, 3], scene units: hash grid and network in one pass.
+
+    Raises:
+        ValueError: A shape, dtype or number does not fit.
+    """
+    return lib.sdf_values(positions, *network.arguments())
+
+
+def sample_rays(
+    rays_o: Tensor,
+    rays_d: Tensor,
+    jitter: Tensor,
+    cells: Tensor,
+    network: SdfNetwork,
+    *,
+    step: float,
+    s: float,
+    min_weight: float,
+    min_transmittance: float,
+    reach: float,
+    lipschitz: float,
+    max_samples: int = 1024,
+) -> tuple[PackedSamples, Tensor]:
+    """Those samples of :func:`march_rays` that a pixel is made of: the distance is asked for on the way.
+
+    Two neighbouring samples are kept where the stretch between their midpoints has a NeuS weight above `min_weight`; the
+    ray ends where less than `min_transmittance` of the light gets through. At distance f from the surface the samples
+    within ``(|f| - reach) / lipschitz`` are left out. What a pixel loses is at most the weight of what is not kept.
+
+    Args:
+        rays_o, rays_d: [n_rays, 3]; directions unit.
+        jitter: [n_rays] in [0, 1).
+        cells: [r, r, r] uint8, as of :func:`march_rays`; they cover the network's box.
+        network: The distance field.
+        step: Length of a sample, scene units.
+        s: Sharpness of the density, positive.
+        min_weight: In [0, 1).
+        min_transmittance: In [0, 1).
+        reach: Distance beyond which there is no density, scene units.
+        lipschitz: Bound of the field's gradient.
+        max_samples: Distances of one ray at most.
+
+    Returns:
+        The kept samples, and [n_rays] int64 at how many points each ray asked for the distance.
+
+    Raises:
+        ValueError: A shape, dtype or number does not fit.
+    """
+    *samples, evaluated = lib.sample_rays(
+        rays_o, rays_d, jitter, cells, *network.arguments(), step, max_samples, s, min_weight, min_transmittance, reach,
+        lipschitz,
+    )  # fmt: skip
+    return PackedSamples(*samples), evaluated
+
+
+def _fake_sample(rays_o, rays_d, jitter, cells, table, *rest):
+    n = torch.library.get_ctx().new_dynamic_size()
+    long, n_rays = torch.int64, rays_o.shape[0]
+    return (
+        rays_o.new_empty(n, dtype=long), rays_o.new_empty(n), rays_o.new_empty(n), rays_o.new_empty(n_rays + 1, dtype=long),
+        rays_o.new_empty(n_rays, dtype=long),
+    )  # fmt: skip
+
+
+def _keep_layer(ctx, inputs, output):
+    *tensors, ctx.beta, ctx.box = inputs
+    ctx.save_for_backward(*tensors)
+
+
+def _layer_backward(ctx, grad_outputs, grad_gradient):
+    refuse_gradients(ctx, "sdf_layer", positions=0)
+    return None, *lib.sdf_layer_backward(*ctx.saved_tensors, ctx.beta, ctx.box, grad_outputs, grad_gradient), None, None
+
+
+register(
+    "sdf_layer",
+    fake=lambda positions, features, jacobian, hidden, hidden_bias, out, *rest: (
+        positions.new_empty(positions.shape[0], out.shape[0]),
+        positions.new_empty(positions.shape),
+    ),
+    setup_context=_keep_layer,
+    backward=_layer_backward,
+)
+register(
+    "sdf_layer_backward", fake=lambda positions, *rest: tuple(t.new_empty(t.shape) for t in rest[:6])
+)
+register("sdf_values", fake=lambda positions, *rest: positions.new_empty(positions.shape[0]))
+register("sample_rays", fake=_fake_sample)
