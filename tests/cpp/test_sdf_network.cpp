@@ -63,7 +63,7 @@ struct Case {
     for (int l = 0; l < n_active; ++l) {
       const HashCell<double> cell = hash_cell(levels[l], unit);
       for (int i = 0; i < 8; ++i)
-        for (int f = 0; f < 2; ++f) input[3 + 2 * l + f] += corner_weight(cell, i) * table[2 * cell.index[i] + f];
+        for (int f = 0; f < 2; ++f) input[3 + 2 * l + f] += corner_weight_derivatives(cell, i).value * table[2 * cell.index[i] + f];
     }
     double sum = 0.25;
     for (int h = 0; h < width; ++h) {

@@ -68,6 +68,28 @@ SPLITNERF_HD uint32_t spatial_hash(uint32_t x, uint32_t y, uint32_t z, uint32_t 
   return (x ^ y * 2654435761u ^ z * 805459861u) & (n_entries - 1u);
 }
 
+// One axis of the cell that holds a coordinate of the unit cube; one outside is clamped to it.
+template <class T> struct CellAxis {
+  uint32_t node;
+  T f;      // position inside the cell, in [0, 1]; NaN for a NaN, with a node that exists
+  T scale;  // d f / d coordinate: the resolution, or 0 where the coordinate was clamped
+};
+template <class T> SPLITNERF_HD CellAxis<T> cell_axis(int resolution, T coordinate) {
+  const T raised = coordinate < T(0) ? T(0) : coordinate, x = (raised > T(1) ? T(1) : raised) * T(resolution);
+  const auto floor = static_cast<int32_t>(x >= T(0) ? x : T(0));
+  const int32_t node = floor < resolution ? floor : resolution - 1;
+  return {static_cast<uint32_t>(node), x - T(node), coordinate >= T(0) && coordinate <= T(1) ? T(resolution) : T(0)};
+}
+
+// The entry of a node, counted within its level. A dense level has at most 2^30 of them.
+template <bool Dense> SPLITNERF_HD uint32_t node_entry(uint32_t x, uint32_t y, uint32_t z, uint32_t resolution, uint32_t n_entries) {
+  if constexpr (Dense) {
+    return (x * (resolution + 1) + y) * (resolution + 1) + z;
+  } else {
+    return spatial_hash(x, y, z, n_entries);
+  }
+}
+
 // The cell of a level that holds a point of the unit cube, and the eight corners' entries.
 template <class T> struct HashCell {
   int64_t index[8];  // entry of corner (i & 1, i >> 1 & 1, i >> 2), counted in the whole table
@@ -77,22 +99,39 @@ template <class T> struct HashCell {
 
 template <class T> SPLITNERF_HD HashCell<T> hash_cell(const HashLevel& level, Vec3<T> position) {
   HashCell<T> cell;
-  const T resolution = T(level.resolution);
   uint32_t node[3];
   for (int axis = 0; axis < 3; ++axis) {
-    const T p = position[axis];
-    const bool inside = p >= T(0) && p <= T(1);
-    const T x = (inside ? p : p > T(1) ? T(1) : T(0)) * resolution;
-    node[axis] = min_of(static_cast<uint32_t>(x), static_cast<uint32_t>(level.resolution - 1));
-    cell.f[axis] = p == p ? x - T(node[axis]) : p;  // NaN stays NaN, with an index that exists
-    cell.scale[axis] = inside ? resolution : T(0);
+    const CellAxis<T> along = cell_axis(level.resolution, position[axis]);
+    node[axis] = along.node, cell.f[axis] = along.f, cell.scale[axis] = along.scale;
   }
+  const auto resolution = static_cast<uint32_t>(level.resolution), n_entries = static_cast<uint32_t>(level.n_entries);
   for (int i = 0; i < 8; ++i) {
     const uint32_t x = node[0] + (i & 1), y = node[1] + (i >> 1 & 1), z = node[2] + (i >> 2);
-    cell.index[i] = level.offset + (level.dense ? dense_index(x, y, z, level.resolution)
-                                                : spatial_hash(x, y, z, static_cast<uint32_t>(level.n_entries)));
+    cell.index[i] = level.offset + (level.dense ? node_entry<true>(x, y, z, resolution, n_entries)
+                                                : node_entry<false>(x, y, z, resolution, n_entries));
   }
   return cell;
+}
+
+// A value between the eight corners of a cell, c[i] at corner (i & 1, i >> 1 & 1, i >> 2), and its derivatives in the
+// position (x, y, z) inside the cell. Written out, so that loops over points become vector code.
+template <class T> struct Trilinear {
+  T value, dx, dy, dz;
+};
+template <class T> SPLITNERF_HD T blend(T a, T b, T t) { return a * (T(1) - t) + b * t; }
+template <class T>
+SPLITNERF_HD Trilinear<T> trilinear(T c0, T c1, T c2, T c3, T c4, T c5, T c6, T c7, T x, T y, T z) {
+  const T a0 = blend(c0, c4, z), a1 = blend(c1, c5, z), a2 = blend(c2, c6, z), a3 = blend(c3, c7, z);
+  const T b0 = blend(a0, a2, y), b1 = blend(a1, a3, y);
+  const T z0 = blend(c4 - c0, c6 - c2, y), z1 = blend(c5 - c1, c7 - c3, y);
+  return {blend(b0, b1, x), b1 - b0, blend(a2 - a0, a3 - a1, x), blend(z0, z1, x)};
+}
+
+// Gradient to corner (I & 1, I >> 1 & 1, I >> 2).
+template <int I, class T> SPLITNERF_HD T trilinear_backward(const Trilinear<T>& grad, T x, T y, T z) {
+  const T wx = I & 1 ? x : T(1) - x, wy = I & 2 ? y : T(1) - y, wz = I & 4 ? z : T(1) - z;
+  const T along_x = I & 1 ? grad.dx : -grad.dx, along_y = I & 2 ? grad.dy : -grad.dy, along_z = I & 4 ? grad.dz : -grad.dz;
+  return wz * (wy * (wx * grad.value + along_x) + wx * along_y) + wy * (wx * along_z);
 }
 
 // Trilinear weight of corner i, and its first and mixed second derivatives in the position.
@@ -102,11 +141,6 @@ template <class T> struct CornerWeight {
   Vec3<T> d;         // d/dx, d/dy, d/dz
   T dxy, dxz, dyz;
 };
-
-template <class T> SPLITNERF_HD T corner_weight(const HashCell<T>& cell, int i) {
-  return (i & 1 ? cell.f.x : T(1) - cell.f.x) * (i & 2 ? cell.f.y : T(1) - cell.f.y) *
-         (i & 4 ? cell.f.z : T(1) - cell.f.z);
-}
 
 template <class T> SPLITNERF_HD CornerWeight<T> corner_weight_derivatives(const HashCell<T>& cell, int i) {
   const T wx = i & 1 ? cell.f.x : T(1) - cell.f.x, sx = i & 1 ? cell.scale.x : -cell.scale.x;

@@ -1,60 +1,114 @@
+#include <cstring>
+
 #include "kernel_set.h"
 
 namespace splitnerf::SPLITNERF_ISA {
 namespace {
 
-// Features of one level, at compile time so that the inner loops unroll.
+constexpr int64_t kPoints = 64;  // worked out together
+
+// Where points stand in one level, structure of arrays. A lane is one feature of one point, so that the features of
+// an entry lie side by side: lane p F + f.
+template <class T, int F> struct Cells {
+  static constexpr int64_t kLanes = kPoints * F;
+  uint32_t entry[8][kLanes];  // of the corners, counted within the level
+  T x[kLanes], y[kLanes], z[kLanes];
+  T scale_x[kLanes], scale_y[kLanes], scale_z[kLanes];
+};
+
+template <class T, int F> struct Lanes {
+  T x[kPoints * F], y[kPoints * F], z[kPoints * F];
+
+  void load(int64_t n, const T* positions) {
+    for (int64_t p = 0; p < n; ++p)
+      for (int f = 0; f < F; ++f)
+        x[p * F + f] = positions[3 * p], y[p * F + f] = positions[3 * p + 1], z[p * F + f] = positions[3 * p + 2];
+  }
+};
+
+template <bool Dense, class T, int F> void locate(const HashLevel& level, int64_t n, const Lanes<T, F>& at, Cells<T, F>& cells) {
+  const int resolution = level.resolution;
+  const auto n_entries = static_cast<uint32_t>(level.n_entries), side = static_cast<uint32_t>(resolution);
+#pragma omp simd
+  for (int64_t q = 0; q < n * F; ++q) {
+    const CellAxis<T> x = cell_axis(resolution, at.x[q]), y = cell_axis(resolution, at.y[q]), z = cell_axis(resolution, at.z[q]);
+    cells.x[q] = x.f, cells.y[q] = y.f, cells.z[q] = z.f;
+    cells.scale_x[q] = x.scale, cells.scale_y[q] = y.scale, cells.scale_z[q] = z.scale;
+    cells.entry[0][q] = node_entry<Dense>(x.node, y.node, z.node, side, n_entries);
+    cells.entry[1][q] = node_entry<Dense>(x.node + 1, y.node, z.node, side, n_entries);
+    cells.entry[2][q] = node_entry<Dense>(x.node, y.node + 1, z.node, side, n_entries);
+    cells.entry[3][q] = node_entry<Dense>(x.node + 1, y.node + 1, z.node, side, n_entries);
+    cells.entry[4][q] = node_entry<Dense>(x.node, y.node, z.node + 1, side, n_entries);
+    cells.entry[5][q] = node_entry<Dense>(x.node + 1, y.node, z.node + 1, side, n_entries);
+    cells.entry[6][q] = node_entry<Dense>(x.node, y.node + 1, z.node + 1, side, n_entries);
+    cells.entry[7][q] = node_entry<Dense>(x.node + 1, y.node + 1, z.node + 1, side, n_entries);
+  }
+}
+template <class T, int F> void locate(const HashLevel& level, int64_t n, const Lanes<T, F>& at, Cells<T, F>& cells) {
+  level.dense ? locate<true>(level, n, at, cells) : locate<false>(level, n, at, cells);
+}
+
+// F values, in one go.
+template <int F, class T> void copy_entry(const T* from, T* to) { std::memcpy(to, from, F * sizeof(T)); }
+
 template <class T, int F>
-void encode_level(const HashEncodeArgs<T>& args, int l, int64_t begin, int64_t end, T* features, T* jacobian) {
-  const HashLevel& level = args.levels[l];
+void encode_level(const HashEncodeArgs<T>& args, int l, int64_t n, const Cells<T, F>& cells, T* features, T* jacobian) {
+  constexpr int64_t kLanes = kPoints * F;
+  const T* table = args.table + args.levels[l].offset * F;
+  T corner[8][kLanes], value[kLanes], dx[kLanes], dy[kLanes], dz[kLanes];
+  for (int64_t p = 0; p < n; ++p)
+    for (int i = 0; i < 8; ++i) copy_entry<F>(table + int64_t(cells.entry[i][p * F]) * F, corner[i] + p * F);
+#pragma omp simd
+  for (int64_t q = 0; q < n * F; ++q) {
+    const Trilinear<T> t = trilinear(corner[0][q], corner[1][q], corner[2][q], corner[3][q], corner[4][q], corner[5][q],
+                                     corner[6][q], corner[7][q], cells.x[q], cells.y[q], cells.z[q]);
+    value[q] = t.value;
+    dx[q] = t.dx * cells.scale_x[q], dy[q] = t.dy * cells.scale_y[q], dz[q] = t.dz * cells.scale_z[q];
+  }
   const int64_t n_columns = int64_t(args.n_levels) * F;
-  for (int64_t p = begin; p < end; ++p) {
-    const HashCell<T> cell = hash_cell(level, load3(args.positions + 3 * p));
-    T value[F] = {}, dx[F] = {}, dy[F] = {}, dz[F] = {};
-    if (jacobian) {
-      for (int i = 0; i < 8; ++i) {
-        const CornerWeight<T> w = corner_weight_derivatives(cell, i);
-        const T* entry = args.table + cell.index[i] * F;
-        for (int f = 0; f < F; ++f) {
-          value[f] += w.value * entry[f];
-          dx[f] += w.d.x * entry[f];
-          dy[f] += w.d.y * entry[f];
-          dz[f] += w.d.z * entry[f];
-        }
-      }
-      T* row = jacobian + p * 3 * n_columns + l * F;
-      for (int f = 0; f < F; ++f) {
-        row[f] = dx[f];
-        row[n_columns + f] = dy[f];
-        row[2 * n_columns + f] = dz[f];
-      }
-    } else {
-      for (int i = 0; i < 8; ++i) {
-        const T w = corner_weight(cell, i);
-        const T* entry = args.table + cell.index[i] * F;
-        for (int f = 0; f < F; ++f) value[f] += w * entry[f];
-      }
-    }
-    T* row = features + p * n_columns + l * F;
-    for (int f = 0; f < F; ++f) row[f] = value[f];
+  for (int64_t p = 0; p < n; ++p) copy_entry<F>(value + p * F, features + p * n_columns + l * F);
+  if (!jacobian) return;
+  for (int64_t p = 0; p < n; ++p) {
+    T* row = jacobian + 3 * p * n_columns + l * F;
+    copy_entry<F>(dx + p * F, row);
+    copy_entry<F>(dy + p * F, row + n_columns);
+    copy_entry<F>(dz + p * F, row + 2 * n_columns);
   }
 }
 
 template <class T, int F>
 void scatter_level(const HashEncodeArgs<T>& args, int l, const T* grad_features, const T* grad_jacobian, T* grad_table) {
-  const HashLevel& level = args.levels[l];
+  constexpr int64_t kLanes = kPoints * F;
   const int64_t n_columns = int64_t(args.n_levels) * F;
-  for (int64_t p = 0; p < args.n_points; ++p) {
-    const HashCell<T> cell = hash_cell(level, load3(args.positions + 3 * p));
-    const T* g = grad_features ? grad_features + p * n_columns + l * F : nullptr;
-    const T* gj = grad_jacobian ? grad_jacobian + p * 3 * n_columns + l * F : nullptr;
-    for (int i = 0; i < 8; ++i) {
-      const CornerWeight<T> w = corner_weight_derivatives(cell, i);
-      T* entry = grad_table + cell.index[i] * F;
-      for (int f = 0; f < F; ++f) {
-        T grad = g ? w.value * g[f] : T(0);
-        if (gj) grad += w.d.x * gj[f] + w.d.y * gj[n_columns + f] + w.d.z * gj[2 * n_columns + f];
-        entry[f] += grad;
+  T* table = grad_table + args.levels[l].offset * F;
+  Lanes<T, F> at;
+  Cells<T, F> cells;
+  T value[kLanes] = {}, dx[kLanes] = {}, dy[kLanes] = {}, dz[kLanes] = {}, grad[8][kLanes];
+  for (int64_t b = 0; b < args.n_points; b += kPoints) {
+    const int64_t n = min_of(kPoints, args.n_points - b);
+    at.load(n, args.positions + 3 * b);
+    locate(args.levels[l], n, at, cells);
+    for (int64_t p = 0; p < n; ++p) {
+      if (grad_features) copy_entry<F>(grad_features + (b + p) * n_columns + l * F, value + p * F);
+      if (!grad_jacobian) continue;
+      const T* row = grad_jacobian + 3 * (b + p) * n_columns + l * F;
+      copy_entry<F>(row, dx + p * F);
+      copy_entry<F>(row + n_columns, dy + p * F);
+      copy_entry<F>(row + 2 * n_columns, dz + p * F);
+    }
+#pragma omp simd
+    for (int64_t q = 0; q < n * F; ++q) {
+      const Trilinear<T> g{value[q], dx[q] * cells.scale_x[q], dy[q] * cells.scale_y[q], dz[q] * cells.scale_z[q]};
+      const T x = cells.x[q], y = cells.y[q], z = cells.z[q];
+      grad[0][q] = trilinear_backward<0>(g, x, y, z), grad[1][q] = trilinear_backward<1>(g, x, y, z);
+      grad[2][q] = trilinear_backward<2>(g, x, y, z), grad[3][q] = trilinear_backward<3>(g, x, y, z);
+      grad[4][q] = trilinear_backward<4>(g, x, y, z), grad[5][q] = trilinear_backward<5>(g, x, y, z);
+      grad[6][q] = trilinear_backward<6>(g, x, y, z), grad[7][q] = trilinear_backward<7>(g, x, y, z);
+    }
+    for (int64_t p = 0; p < n; ++p) {
+      for (int i = 0; i < 8; ++i) {
+        T* entry = table + int64_t(cells.entry[i][p * F]) * F;
+        for (int f = 0; f < F; ++f) entry[f] += grad[i][p * F + f];
       }
     }
   }
@@ -84,12 +138,19 @@ void position_gradient(const HashEncodeArgs<T>& args, int64_t begin, int64_t end
   }
 }
 
-constexpr int64_t kBlock = 512;  // points whose output rows stay in the L2 while all levels fill them
-
 template <class T, int F>
 void encode_all(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, T* features, T* jacobian) {
-  for (int64_t b = begin; b < end; b += kBlock)
-    for (int l = 0; l < args.n_active; ++l) encode_level<T, F>(args, l, b, min_of(end, b + kBlock), features, jacobian);
+  const int64_t n_columns = int64_t(args.n_levels) * F;
+  Lanes<T, F> at;
+  Cells<T, F> cells;
+  for (int64_t b = begin; b < end; b += kPoints) {
+    const int64_t n = min_of(kPoints, end - b);
+    at.load(n, args.positions + 3 * b);
+    for (int l = 0; l < args.n_active; ++l) {
+      locate(args.levels[l], n, at, cells);
+      encode_level(args, l, n, cells, features + b * n_columns, jacobian ? jacobian + 3 * b * n_columns : nullptr);
+    }
+  }
 }
 
 }  // namespace
