@@ -3,6 +3,7 @@
 #include "splitnerf/neus.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/parallel.h"
+#include "splitnerf/spread.h"
 
 namespace splitnerf::cpu {
 namespace {
@@ -94,6 +95,46 @@ void composite_backward(int64_t n_rays, int64_t n_channels, const int64_t* offse
   });
 }
 
+template <class T>
+Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase, int per_ray, T* share) {
+  const int64_t n = offsets[n_rays];
+  Spread s{{}, std::vector<int64_t>(n), std::vector<int64_t>(n)};
+  for (int64_t r = 0; r < n_rays; ++r) {
+    const int64_t begin = offsets[r], end = offsets[r + 1];
+    auto at = static_cast<int64_t>(s.shaded.size());
+    spread_by_weight(weights + begin, end - begin, per_ray, double(phase[r]), [&](int64_t i) { s.shaded.push_back(begin + i); });
+    const auto last = static_cast<int64_t>(s.shaded.size()) - 1;
+    for (int64_t i = begin; i < end; ++i) {
+      while (at < last && s.shaded[at + 1] <= i) ++at;
+      const int64_t next = min_of(last, s.shaded[at] < i ? at + 1 : at);
+      s.first[i] = at, s.second[i] = next;
+      share[i] = share_between(t[i], t[s.shaded[at]], t[s.shaded[next]]);
+    }
+  }
+  return s;
+}
+
+template <class T>
+void interpolate(int64_t n, int64_t n_channels, const int64_t* first, const int64_t* second, const T* share, const T* values,
+                 T* interpolated) {
+  for (int64_t i = 0; i < n; ++i)
+    for (int64_t c = 0; c < n_channels; ++c)
+      interpolated[i * n_channels + c] = lerp(values[first[i] * n_channels + c], values[second[i] * n_channels + c], share[i]);
+}
+
+template <class T>
+void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_t* first, const int64_t* second, const T* share,
+                          const T* grad_interpolated, T* grad_values) {
+  std::fill(grad_values, grad_values + m * n_channels, T(0));
+  for (int64_t i = 0; i < n; ++i) {
+    for (int64_t c = 0; c < n_channels; ++c) {
+      const T g = grad_interpolated[i * n_channels + c];
+      grad_values[first[i] * n_channels + c] += g * (T(1) - share[i]);
+      grad_values[second[i] * n_channels + c] += g * share[i];
+    }
+  }
+}
+
 #define SPLITNERF_INSTANTIATE(T)                                                                                      \
   template void march_rays_count<T>(const MarchOptions&, const uint8_t*, int64_t, const T*, const T*, const T*,       \
                                     int64_t*);                                                                        \
@@ -103,7 +144,10 @@ void composite_backward(int64_t n_rays, int64_t n_channels, const int64_t* offse
   template void neus_weights_backward<T>(int64_t, const int64_t*, const T*, const T*, T, T, const T*, const T*,       \
                                          const T*, const T*, T*, T*, T*);                                             \
   template void composite<T>(int64_t, int64_t, const int64_t*, const T*, const T*, T*);                               \
-  template void composite_backward<T>(int64_t, int64_t, const int64_t*, const T*, const T*, const T*, T*, T*);
+  template void composite_backward<T>(int64_t, int64_t, const int64_t*, const T*, const T*, const T*, T*, T*); \
+  template Spread spread_samples<T>(int64_t, const int64_t*, const T*, const T*, const T*, int, T*);                  \
+  template void interpolate<T>(int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);             \
+  template void interpolate_backward<T>(int64_t, int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

@@ -1,4 +1,5 @@
-// march_rays, neus_weights and composite as torch operators.
+// march_rays, neus_weights, spread_samples, interpolate and composite as torch operators.
+#include <algorithm>
 #include <tuple>
 
 #include "check.h"
@@ -113,6 +114,67 @@ std::tuple<Tensor, Tensor> composite_backward(Tensor weights, Tensor values, Ten
   return {grad_w, grad_v};
 }
 
+Tensor index_tensor(const Tensor& like, const std::vector<int64_t>& values) {
+  Tensor t = empty_like_type(like, {static_cast<int64_t>(values.size())}, ScalarType::Long);
+  std::copy(values.begin(), values.end(), out<int64_t>(t));
+  return t;
+}
+
+std::tuple<Tensor, Tensor, Tensor, Tensor> spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, int64_t per_ray) {
+  const char* op = "spread_samples";
+  const ScalarType type = real_type(op, "weights", weights);
+  const Tensor w = checked(op, "weights", weights, {kAny}, type), at = checked(op, "t", t, {w.size(0)}, type);
+  const Tensor o = checked_offsets(op, offsets, w.size(0)), u = checked(op, "phase", phase, {o.size(0) - 1}, type);
+  require(per_ray > 0 && per_ray < 1 << 20, op, "per_ray must be in [1, 2^20)");
+  Tensor share = empty_like_type(w, {w.size(0)}, type);
+  cpu::Spread spread;
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    spread = cpu::spread_samples(o.size(0) - 1, in<int64_t>(o), in<T>(w), in<T>(at), in<T>(u), static_cast<int>(per_ray), out<T>(share));
+  });
+  return {index_tensor(w, spread.shaded), index_tensor(w, spread.first), index_tensor(w, spread.second), share};
+}
+
+// Positions in [0, m), one for each of n samples.
+Tensor checked_positions(const char* op, const char* name, const Tensor& positions, int64_t n, int64_t m) {
+  const Tensor p = checked(op, name, positions, {n}, ScalarType::Long);
+  const int64_t* begin = in<int64_t>(p);
+  require(std::all_of(begin, begin + n, [&](int64_t i) { return i >= 0 && i < m; }), op,
+          std::string(name) + " must be in [0, " + std::to_string(m) + ")");
+  return p;
+}
+
+Tensor interpolate(Tensor values, Tensor first, Tensor second, Tensor share) {
+  const char* op = "interpolate";
+  const ScalarType type = real_type(op, "values", values);
+  const Tensor v = checked(op, "values", values, {kAny, kAny}, type), x = checked(op, "share", share, {kAny}, type);
+  const Tensor a = checked_positions(op, "first", first, x.size(0), v.size(0));
+  const Tensor b = checked_positions(op, "second", second, x.size(0), v.size(0));
+  Tensor interpolated = empty_like_type(v, {x.size(0), v.size(1)}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::interpolate(x.size(0), v.size(1), in<int64_t>(a), in<int64_t>(b), in<T>(x), in<T>(v), out<T>(interpolated));
+  });
+  return interpolated;
+}
+
+// Of `shaded` only the first size counts: that of the values.
+Tensor interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor second, Tensor share, Tensor shaded) {
+  const char* op = "interpolate_backward";
+  require(shaded.dim() >= 1, op, "shaded must be [m, ...]");
+  const int64_t m = shaded.size(0);
+  const ScalarType type = real_type(op, "grad_interpolated", grad_interpolated);
+  const Tensor g = checked(op, "grad_interpolated", grad_interpolated, {kAny, kAny}, type);
+  const Tensor x = checked(op, "share", share, {g.size(0)}, type);
+  const Tensor a = checked_positions(op, "first", first, x.size(0), m), b = checked_positions(op, "second", second, x.size(0), m);
+  Tensor grad_values = empty_like_type(g, {m, g.size(1)}, type);
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::interpolate_backward(x.size(0), m, g.size(1), in<int64_t>(a), in<int64_t>(b), in<T>(x), in<T>(g), out<T>(grad_values));
+  });
+  return grad_values;
+}
+
 }  // namespace
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
@@ -122,6 +184,10 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
         "(Tensor, Tensor)");
   m.def("neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance, "
         "Tensor weights, Tensor opacity, Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
+  m.def("spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, int per_ray) -> "
+        "(Tensor, Tensor, Tensor, Tensor)");
+  m.def("interpolate(Tensor values, Tensor first, Tensor second, Tensor share) -> Tensor");
+  m.def("interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor second, Tensor share, Tensor shaded) -> Tensor");
   m.def("composite(Tensor weights, Tensor values, Tensor offsets) -> Tensor");
   m.def("composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor grad_sums) -> (Tensor, Tensor)");
 }
@@ -130,6 +196,9 @@ STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
   m.impl("march_rays", TORCH_BOX(&march_rays));
   m.impl("neus_weights", TORCH_BOX(&neus_weights));
   m.impl("neus_weights_backward", TORCH_BOX(&neus_weights_backward));
+  m.impl("spread_samples", TORCH_BOX(&spread_samples));
+  m.impl("interpolate", TORCH_BOX(&interpolate));
+  m.impl("interpolate_backward", TORCH_BOX(&interpolate_backward));
   m.impl("composite", TORCH_BOX(&composite));
   m.impl("composite_backward", TORCH_BOX(&composite_backward));
 }

@@ -1,4 +1,4 @@
-"""march_rays, neus_weights and composite."""
+"""march_rays, neus_weights, spread_samples, interpolate and composite."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import reference
 import torch
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 
-from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE, composite, march_rays, neus_weights
+from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE, PackedSamples, composite, march_rays, neus_weights, spread_samples
 
 OFFSETS = [0, 9, 9, 10, 24]  # one ray without samples
 
@@ -155,6 +155,82 @@ def test_neus_errors(device):
     check_error(lambda: neus_weights(f_prev, f_next, s, offsets + 1), "neus_weights", "offsets must rise from 0", "24")
     check_error(lambda: neus_weights(f_prev, f_next, s, offsets[[0, 2, 3, 1, 4]]), "offsets must rise")
     check_error(lambda: neus_weights(f_prev, f_next, s, offsets[:0]), "offsets")
+
+
+# ---- spread_samples, interpolate ----
+
+
+def packed(dtype=torch.float64, seed: int = 4) -> tuple:
+    """Weights and samples of 50 rays, the third without samples and the fifth without weight."""
+    g = generator(seed)
+    counts = torch.randint(1, 12, (50,), generator=g)
+    counts[2] = 0
+    offsets = torch.cat([torch.zeros(1, dtype=torch.int64), counts.cumsum(0)])
+    n = int(offsets[-1])
+    rays = torch.repeat_interleave(torch.arange(50), counts)
+    starts = torch.rand(n, generator=g, dtype=torch.float64).cumsum(0)
+    weights = torch.rand(n, generator=g, dtype=torch.float64) ** 4
+    weights[rays == 4] = 0
+    phase = torch.rand(50, generator=g, dtype=torch.float64)
+    samples = PackedSamples(rays, starts.to(dtype), (starts + 0.1).to(dtype), offsets)
+    return weights.to(dtype), samples, phase.to(dtype)
+
+
+@pytest.mark.parametrize("per_ray", [1, 3, 7])
+def test_spread_draws_what_weighs_and_one_of_each_ray(per_ray):
+    weights, samples, phase = packed()
+    shaded = spread_samples(weights, samples, per_ray, phase).shaded
+    assert (shaded.diff() > 0).all()
+    drawn = torch.bincount(samples.ray_indices[shaded], minlength=50)
+    counts = samples.offsets.diff()
+    assert drawn[2] == 0 and drawn[4] == 1 and (drawn[counts > 0] >= 1).all() and (drawn <= per_ray).all()
+    total = torch.zeros(50, dtype=torch.float64).index_add(0, samples.ray_indices, weights)[samples.ray_indices]
+    certain = (weights > total / per_ray).nonzero().squeeze(1)
+    assert (len(certain) > 0) == (per_ray > 1) and torch.isin(certain, shaded).all()
+
+
+def test_spread_draws_in_proportion_to_the_weights():
+    weights, samples, _ = packed()
+    counts = torch.zeros(len(weights), dtype=torch.float64)
+    for phase in torch.linspace(0, 1, 1001, dtype=torch.float64)[:-1]:
+        counts[spread_samples(weights, samples, 3, phase.expand(50)).shaded] += 1e-3
+    total = torch.zeros(50, dtype=torch.float64).index_add(0, samples.ray_indices, weights)[samples.ray_indices]
+    expected = torch.where(total > 0, 3 * weights / total.clamp(min=1e-12), 0.0).clamp(max=1)
+    heard = samples.ray_indices != 4
+    torch.testing.assert_close(counts[heard], expected[heard], atol=3e-3, rtol=0)
+
+
+def test_interpolation_is_exact_for_what_is_linear_along_a_ray():
+    weights, samples, phase = packed()
+    spread = spread_samples(weights, samples, 4, phase)
+    middle = 0.5 * (samples.t_starts + samples.t_ends)
+    slope = torch.randn(50, 2, generator=generator(), dtype=torch.float64)[samples.ray_indices]
+    values = slope * middle[:, None] + 1
+    got = spread.interpolate(values[spread.shaded])
+    rays = samples.ray_indices
+    lowest, highest = (
+        torch.zeros(50, dtype=torch.float64).scatter_reduce(0, rays[spread.shaded], middle[spread.shaded], kind, include_self=False)[rays]
+        for kind in ("amin", "amax")
+    )
+    expected = slope * middle.clamp(lowest, highest)[:, None] + 1  # the nearest counts beyond the ends
+    torch.testing.assert_close(got, expected)
+    assert (rays[spread.shaded[spread.first]] == rays).all() and (rays[spread.shaded[spread.second]] == rays).all()
+    shares = spread.gather(weights)
+    torch.testing.assert_close(shares @ values[spread.shaded], weights @ got)
+
+
+def test_interpolate_opcheck_gradcheck_and_errors():
+    weights, samples, phase = packed()
+    spread = spread_samples(weights, samples, 2, phase)
+    middle = 0.5 * (samples.t_starts + samples.t_ends)
+    check_op(lib.spread_samples, (weights, middle, samples.offsets, phase, 2))
+    values = torch.randn(len(spread.shaded), 3, generator=generator(), dtype=torch.float64)
+    where = spread.first, spread.second, spread.share
+    check_op(lib.interpolate, (values, *where), (0,))
+    check_op(lib.interpolate_backward, (torch.ones(len(weights), 3).double(), *where, spread.shaded))
+    assert torch.autograd.gradcheck(lambda v: lib.interpolate(v, *where), values.requires_grad_())
+    check_error(lambda: lib.spread_samples(weights, middle, samples.offsets, phase, 0), "spread_samples", "per_ray")
+    check_error(lambda: lib.interpolate(values[1:], *where), "interpolate", "must be in [0,")
 
 
 # ---- composite ----

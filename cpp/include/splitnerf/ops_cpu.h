@@ -167,6 +167,24 @@ SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& mar
                                const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d,
                                const T* jitter, SampledRay<T>* sampled);
 
+// Which samples are shaded, `per_ray` of each ray spread by weight, and where the others lie between them.
+struct Spread {
+  std::vector<int64_t> shaded;         // [m] samples, ascending
+  std::vector<int64_t> first, second;  // [n] positions in `shaded`: the neighbours of each sample in its ray
+};
+// weights [n], t [n] along the ray, phase [n_rays] -> share [n] of the second neighbour.
+template <class T>
+SPLITNERF_API Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase,
+                                    int per_ray, T* share);
+// values [m, c] -> [n, c], between the first and the second neighbour.
+template <class T>
+SPLITNERF_API void interpolate(int64_t n, int64_t n_channels, const int64_t* first, const int64_t* second, const T* share,
+                               const T* values, T* interpolated);
+// grad_interpolated [n, c] -> grad_values [m, c], overwritten.
+template <class T>
+SPLITNERF_API void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_t* first, const int64_t* second,
+                                        const T* share, const T* grad_interpolated, T* grad_values);
+
 // f_prev, f_next [n], offsets [n_rays + 1] -> weights [n], opacity [n_rays].
 template <class T>
 SPLITNERF_API void neus_weights(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s,

@@ -19,9 +19,11 @@ from splitnerf.ops.rays import (
     CELL_OCCUPIED,
     CELL_OPAQUE,
     PackedSamples,
+    Spread,
     composite,
     march_rays,
     neus_weights,
+    spread_samples,
 )
 from splitnerf.ops.sdf import SdfNetwork, sample_rays, sdf_layer, sdf_values
 from splitnerf.ops.shading import FRESNEL_MODES, QUERIES, brdf_lut, query_direction, split_sum_shade
@@ -29,9 +31,9 @@ from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_v
 
 __all__ = [
     "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "QUERIES", "HashGrid", "HashGridSpec", "LightSums",
-    "MeshScene", "PackedSamples", "SdfNetwork", "SparseMap", "VisibilityCache", "brdf_lut", "cached_occlusion", "cached_visibility", "composite",
+    "MeshScene", "PackedSamples", "SdfNetwork", "SparseMap", "Spread", "VisibilityCache", "brdf_lut", "cached_occlusion", "cached_visibility", "composite",
     "fibonacci_directions", "growth_for", "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters",
     "light_lookup", "light_sum_of_levels", "march_rays", "monte_carlo_light", "neus_weights", "occlusion_factors",
     "prefilter_light", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer", "sdf_values", "sh_projection", "shade_sums",
-    "sparse_product", "split_sum_shade", "trace_visibility", "visibility_bits", "zonal_factors",
+    "sparse_product", "split_sum_shade", "spread_samples", "trace_visibility", "visibility_bits", "zonal_factors",
 ]  # fmt: skip

@@ -2,7 +2,8 @@
 
 Samples of all rays lie in one array, ray after ray; ``offsets`` [n_rays + 1] says where each begins.
 ``neus_weights`` is differentiable once in f_prev, f_next and s; ``composite`` once in weights and
-values; a second derivative raises. ``march_rays`` has no gradient.
+values, ``Spread.interpolate`` once in values; a second derivative raises. ``march_rays`` and ``spread_samples`` have no
+gradient.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from splitnerf.ops._library import lib, register
+from splitnerf.ops._library import lib, refuse_gradients, register
 
 CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE = 0, 1, 2
 
@@ -80,6 +81,50 @@ def neus_weights(
     return lib.neus_weights(f_prev, f_next, s, offsets, min_transmittance)
 
 
+class Spread(NamedTuple):
+    """Which samples are shaded, and between which of them each sample lies.
+
+    Attributes:
+        shaded: [m] int64, ascending indices of samples; every ray with samples has one.
+        first, second: [n] int64 positions in ``shaded``: the neighbours of each sample within its ray, equal beyond the ends.
+        share: [n] of the second, in [0, 1], by the distance along the ray.
+    """
+
+    shaded: Tensor
+    first: Tensor
+    second: Tensor
+    share: Tensor
+
+    def interpolate(self, values: Tensor) -> Tensor:
+        """Values [m, c] at the shaded samples -> [n, c] at all."""
+        return lib.interpolate(values, self.first, self.second, self.share)
+
+    def gather(self, weights: Tensor) -> Tensor:
+        """The transpose: what [m] the shaded samples count for where all samples count for weights [n]. No gradient."""
+        return lib.interpolate_backward(weights[:, None], self.first, self.second, self.share, self.shaded)[:, 0]
+
+
+def spread_samples(weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor) -> Spread:
+    """Draws samples of each ray in proportion to their weights, for what is asked at few of them.
+
+    The weights of a ray are laid end to end, and a sample is drawn where one of `per_ray` evenly spaced marks falls on it:
+    one of more than 1 / per_ray of the ray's weight always is.
+
+    Args:
+        weights: [n].
+        samples: The packed samples.
+        per_ray: Marks on a ray, at least 1.
+        phase: [n_rays] in [0, 1), where the marks begin.
+
+    Raises:
+        ValueError: A shape, dtype or number does not fit.
+
+    Source: Systematic resampling (Kitagawa 1996).
+    """
+    middle = 0.5 * (samples.t_starts + samples.t_ends)
+    return Spread(*lib.spread_samples(weights, middle, samples.offsets, phase, per_ray))
+
+
 def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:
     """Weighted sum of the samples' values along each ray.
 
@@ -128,7 +173,33 @@ def _composite_backward(ctx, grad):
     return *lib.composite_backward(*ctx.saved_tensors, grad), None
 
 
+def _fake_spread(weights, t, offsets, phase, per_ray):
+    m, n = torch.library.get_ctx().new_dynamic_size(), weights.shape[0]
+    long = torch.int64
+    return weights.new_empty(m, dtype=long), weights.new_empty(n, dtype=long), weights.new_empty(n, dtype=long), weights.new_empty(n)
+
+
+def _keep_interpolation(ctx, inputs, output):
+    values, first, second, share = inputs
+    ctx.save_for_backward(first, second, share, values)
+
+
+def _interpolation_backward(ctx, grad):
+    refuse_gradients(ctx, "interpolate", share=3)
+    return lib.interpolate_backward(grad, *ctx.saved_tensors), None, None, None
+
+
 register("march_rays", fake=_fake_march)
+register("spread_samples", fake=_fake_spread)
+register(
+    "interpolate",
+    fake=lambda values, first, second, share: values.new_empty(share.shape[0], values.shape[1]),
+    setup_context=_keep_interpolation,
+    backward=_interpolation_backward,
+)
+register(
+    "interpolate_backward", fake=lambda grad, first, second, share, shaded: grad.new_empty(shaded.shape[0], grad.shape[1])
+)
 register(
     "neus_weights",
     fake=lambda f_prev, f_next, s, offsets, eps: (

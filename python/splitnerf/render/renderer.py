@@ -8,11 +8,10 @@ import torch
 from torch import Tensor
 
 from splitnerf.fields.sdf import unit_normals
-from splitnerf.ops import PackedSamples, composite, march_rays, neus_weights, sample_rays
+from splitnerf.ops import PackedSamples, Spread, composite, march_rays, neus_weights, sample_rays, spread_samples
 from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
 from splitnerf.render.rays import image_rays
-from splitnerf.render.selection import between_shaded, spread_by_weight
 
 MIN_OPACITY = 1e-4
 
@@ -114,17 +113,18 @@ def render_rays(
     half = 0.5 * step * annealed_cosine((directions * normals).sum(-1), anneal)
     weights, opacity = neus_weights(field.sdf - half, field.sdf + half, model.s, samples.offsets, c.min_transmittance)
 
+    spread: Spread | None = None
     shaded = torch.arange(len(weights))
     if c.shades_per_ray:
-        shaded = spread_by_weight(weights.detach(), samples, c.shades_per_ray, jitter)
+        spread = spread_samples(weights.detach(), samples, c.shades_per_ray, jitter)
+        shaded = spread.shaded
     points = model.shade(
         positions[shaded], field.outputs[shaded], field.features[shaded], normals[shaded], -directions[shaded],
         fixed_materials=fixed_materials,
     )
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
-    between = between_shaded(shaded, samples)
-    values = between.interpolate(radiance) if len(shaded) < len(weights) else radiance
-    shares = between.gather(weights.detach(), len(shaded))
+    values = spread.interpolate(radiance) if spread else radiance
+    shares = spread.gather(weights.detach()) if spread else weights.detach()
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
     if model.sums_light:
         mean = mean + _summed_less_split(
