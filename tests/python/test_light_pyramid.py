@@ -204,6 +204,26 @@ def test_a_chain_without_gradients_or_of_inference_mode_is_not_handed_to_autogra
     assert light.texels.grad.abs().sum() > 0
 
 
+def test_collected_gradients_are_those_of_the_steps_together():
+    """Three backward passes that share one chain give the parameters what one pass over the sum of the losses does."""
+    steps = [(unit(torch.randn(30, 3, generator=generator(i))), torch.rand(30, 1, generator=generator(9 + i))) for i in range(3)]
+    together, collected = LightPyramid(16), LightPyramid(16)
+    sum(together(*step).square().sum() for step in steps).backward()
+    collected.collect()
+    for step in steps:
+        collected(*step).square().sum().backward()
+        assert collected.texels.grad is None
+        torch.testing.assert_close(collected.panorama(8), together.panorama(8))
+    collected.deliver()
+    torch.testing.assert_close(collected.texels.grad, together.texels.grad)
+    with torch.no_grad():
+        collected.texels[: 4 * 4] += 0.5  # the coarsest level alone
+    torch.testing.assert_close(collected(*steps[0]), together(*steps[0]) * math.exp(0.5))
+    collected.texels.grad = None
+    collected.deliver()  # what was asked for since has no backward pass behind it
+    assert collected.texels.grad.abs().sum() == 0
+
+
 def test_settings_choose_the_light_and_its_rate():
     config = Config(light="pyramid", light_resolution=16, light_learning_rate=0.03, warmup_steps=0)
     model = SceneModel(config)

@@ -119,7 +119,7 @@ class LightPyramid(Light):
             self.texels[: 4 * 4] = math.log(start)
         self._cached: tuple | None = None
         self._collects = False
-        self._held: tuple[Tensor, ...] | None = None  # maps and harmonics, then the leaves that stand for them
+        self._held: tuple | None = None  # state, maps and harmonics, and the leaves that stand for them
 
     def __getstate__(self) -> dict:
         return {**super().__getstate__(), "_cached": None, "_held": None}  # copies compute their own
@@ -133,18 +133,19 @@ class LightPyramid(Light):
         state = (self.texels._version, self.texels.data_ptr())
         wanted = torch.is_grad_enabled() and self.texels.requires_grad
         inference = torch.is_inference_mode_enabled()
-        if self._held is not None and not wanted:
-            return self._held[2].detach(), self._held[3].detach()
+        if self._held is not None and self._held[0] != state:  # gradients of maps that are no more
+            self._held = None
+        if self._held is not None:
+            leaves = self._held[-2:]
+            return leaves if wanted else tuple(leaf.detach() for leaf in leaves)
         if self._cached is not None:
             cached_state, cached_inference, levels, sh = self._cached
             if cached_state == state and inference >= cached_inference and levels.requires_grad >= wanted:
                 return (levels, sh) if wanted else (levels.detach(), sh.detach())
-        if self._collects and wanted:
-            if self._held is None:
-                levels, sh = self._compute()
-                self._held = levels, sh, levels.detach().requires_grad_(), sh.detach().requires_grad_()
-            return self._held[2:]
         levels, sh = self._compute()
+        if self._collects and wanted:
+            self._held = state, levels, sh, levels.detach().requires_grad_(), sh.detach().requires_grad_()
+            return self._held[-2:]
         self._cached = (state, inference, levels, sh)
         if wanted:
             levels.register_hook(self._forget)
@@ -166,7 +167,7 @@ class LightPyramid(Light):
         """Takes the gradients that have come together to the parameters; what is asked for next is computed anew."""
         if self._held is None:
             return
-        levels, sh, *leaves = self._held
+        _, levels, sh, *leaves = self._held
         self._held = None
         grads = [torch.zeros_like(leaf) if leaf.grad is None else leaf.grad for leaf in leaves]
         torch.autograd.backward([levels, sh], grads)
