@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <vector>
 
 #include "splitnerf/neus.h"
 #include "splitnerf/ops_cpu.h"
@@ -9,6 +10,30 @@ namespace splitnerf::cpu {
 namespace {
 
 constexpr int64_t kGrain = 64;  // rays
+
+// The distances at both ends of a ray's samples, [0, n) of both arrays.
+template <class T> void interval_ends(const SurfaceSamples<T>& in, int64_t ray, const Vec3<T>* normals, T* f_prev, T* f_next) {
+  const Vec3<T> direction = load3(in.directions + 3 * ray);
+  const int64_t first = in.offsets[ray], n = in.offsets[ray + 1] - first;
+  for (int64_t i = 0; i < n; ++i) {
+    const T half = T(0.5) * in.step * annealed_cosine(dot(direction, normals[i]), in.anneal).value;
+    f_prev[i] = in.sdf[first + i] - half;
+    f_next[i] = in.sdf[first + i] + half;
+  }
+}
+
+// Work memory of one ray.
+template <class T> struct RayWork {
+  std::vector<Vec3<T>> normals;
+  std::vector<T> f_prev, f_next, grad_prev, grad_next;
+
+  void load(const SurfaceSamples<T>& in, int64_t ray) {
+    const int64_t first = in.offsets[ray], n = in.offsets[ray + 1] - first;
+    normals.resize(n), f_prev.resize(n), f_next.resize(n), grad_prev.resize(n), grad_next.resize(n);
+    for (int64_t i = 0; i < n; ++i) normals[i] = unit_normal(load3(in.gradient + 3 * (first + i)));
+    interval_ends(in, ray, normals.data(), f_prev.data(), f_next.data());
+  }
+};
 
 }  // namespace
 
@@ -95,6 +120,42 @@ void composite_backward(int64_t n_rays, int64_t n_channels, const int64_t* offse
   });
 }
 
+template <class T> void surface_weights(const SurfaceSamples<T>& in, T* normals, T* weights, T* opacity) {
+  parallel_for(in.n_rays, kGrain, [&](int64_t begin, int64_t end) {
+    RayWork<T> work;
+    for (int64_t r = begin; r < end; ++r) {
+      const int64_t first = in.offsets[r], n = in.offsets[r + 1] - first;
+      work.load(in, r);
+      for (int64_t i = 0; i < n; ++i) store3(normals + 3 * (first + i), work.normals[i]);
+      opacity[r] = neus_ray_weights(work.f_prev.data(), work.f_next.data(), in.s, n, in.min_transmittance, weights + first);
+    }
+  });
+}
+
+template <class T>
+void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, const T* opacity, const T* grad_normals,
+                              const T* grad_weights, const T* grad_opacity, T* grad_sdf, T* grad_gradient, T* grad_s_rays) {
+  parallel_for(in.n_rays, kGrain, [&](int64_t begin, int64_t end) {
+    RayWork<T> work;
+    for (int64_t r = begin; r < end; ++r) {
+      const int64_t first = in.offsets[r], n = in.offsets[r + 1] - first;
+      const Vec3<T> direction = load3(in.directions + 3 * r);
+      work.load(in, r);
+      grad_s_rays[r] = neus_ray_weights_backward(work.f_prev.data(), work.f_next.data(), in.s, n, in.min_transmittance,
+                                                 weights + first, opacity[r], grad_weights + first, grad_opacity[r],
+                                                 work.grad_prev.data(), work.grad_next.data());
+      for (int64_t i = 0; i < n; ++i) {
+        // f_prev, f_next = sdf -+ half,  half = step / 2 annealed(direction . normal)
+        const T slope = annealed_cosine(dot(direction, work.normals[i]), in.anneal).slope;
+        const T grad_cosine = (work.grad_next[i] - work.grad_prev[i]) * T(0.5) * in.step * slope;
+        grad_sdf[first + i] = work.grad_prev[i] + work.grad_next[i];
+        const Vec3<T> grad_normal = load3(grad_normals + 3 * (first + i)) + direction * grad_cosine;
+        store3(grad_gradient + 3 * (first + i), unit_normal_backward(load3(in.gradient + 3 * (first + i)), grad_normal));
+      }
+    }
+  });
+}
+
 template <class T>
 Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase, int per_ray, T* share) {
   const int64_t n = offsets[n_rays];
@@ -145,6 +206,9 @@ void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_
                                          const T*, const T*, T*, T*, T*);                                             \
   template void composite<T>(int64_t, int64_t, const int64_t*, const T*, const T*, T*);                               \
   template void composite_backward<T>(int64_t, int64_t, const int64_t*, const T*, const T*, const T*, T*, T*); \
+  template void surface_weights<T>(const SurfaceSamples<T>&, T*, T*, T*);                                             \
+  template void surface_weights_backward<T>(const SurfaceSamples<T>&, const T*, const T*, const T*, const T*, const T*, T*, \
+                                            T*, T*);                                                                  \
   template Spread spread_samples<T>(int64_t, const int64_t*, const T*, const T*, const T*, int, T*);                  \
   template void interpolate<T>(int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);             \
   template void interpolate_backward<T>(int64_t, int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);

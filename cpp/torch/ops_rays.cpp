@@ -1,4 +1,4 @@
-// march_rays, neus_weights, spread_samples, interpolate and composite as torch operators.
+// march_rays, neus_weights, surface_weights, spread_samples, interpolate and composite as torch operators.
 #include <algorithm>
 #include <tuple>
 
@@ -114,6 +114,66 @@ std::tuple<Tensor, Tensor> composite_backward(Tensor weights, Tensor values, Ten
   return {grad_w, grad_v};
 }
 
+// Samples of a surface, checked and contiguous.
+struct Surface {
+  ScalarType type;
+  Tensor sdf, gradient, rays_d, s, offsets;
+  double step, anneal, min_transmittance;
+
+  Surface(const char* op, const Tensor& sdf_in, const Tensor& gradient_in, const Tensor& rays_d_in, const Tensor& s_in,
+          const Tensor& offsets_in, double step, double anneal, double min_transmittance)
+      : type(real_type(op, "sdf", sdf_in)),
+        sdf(checked(op, "sdf", sdf_in, {kAny}, type)),
+        gradient(checked(op, "gradient", gradient_in, {sdf.size(0), 3}, type)),
+        rays_d(checked(op, "rays_d", rays_d_in, {kAny, 3}, type)),
+        s(checked(op, "s", s_in, {}, type)),
+        offsets(checked_offsets(op, offsets_in, sdf.size(0))),
+        step(step),
+        anneal(anneal),
+        min_transmittance(min_transmittance) {
+    require(offsets.size(0) == n_rays() + 1, op, "offsets must be [n_rays + 1]");
+    require(step > 0, op, "step must be positive");
+  }
+  int64_t n_rays() const { return rays_d.size(0); }
+  template <class T> cpu::SurfaceSamples<T> view() const {
+    return {n_rays(),  in<int64_t>(offsets), in<T>(sdf), in<T>(gradient),     in<T>(rays_d), scalar_value<T>(s),
+            T(step), T(anneal),            T(min_transmittance)};
+  }
+};
+
+std::tuple<Tensor, Tensor, Tensor> surface_weights(Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets,
+                                                   double step, double anneal, double min_transmittance) {
+  const Surface x("surface_weights", sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance);
+  Tensor normals = empty_like_type(x.sdf, {x.sdf.size(0), 3}, x.type), weights = empty_like_type(x.sdf, {x.sdf.size(0)}, x.type);
+  Tensor opacity = empty_like_type(x.sdf, {x.n_rays()}, x.type);
+  dispatch_real(x.type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::surface_weights(x.view<T>(), out<T>(normals), out<T>(weights), out<T>(opacity));
+  });
+  return {normals, weights, opacity};
+}
+
+std::tuple<Tensor, Tensor, Tensor> surface_weights_backward(Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s,
+                                                            Tensor offsets, double step, double anneal,
+                                                            double min_transmittance, Tensor weights, Tensor opacity,
+                                                            Tensor grad_normals, Tensor grad_weights, Tensor grad_opacity) {
+  const char* op = "surface_weights_backward";
+  const Surface x(op, sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance);
+  const int64_t n = x.sdf.size(0), n_rays = x.n_rays();
+  const Tensor w = checked(op, "weights", weights, {n}, x.type), a = checked(op, "opacity", opacity, {n_rays}, x.type);
+  const Tensor gn = checked(op, "grad_normals", grad_normals, {n, 3}, x.type);
+  const Tensor gw = checked(op, "grad_weights", grad_weights, {n}, x.type);
+  const Tensor ga = checked(op, "grad_opacity", grad_opacity, {n_rays}, x.type);
+  Tensor grad_sdf = empty_like_type(w, {n}, x.type), grad_gradient = empty_like_type(w, {n, 3}, x.type);
+  Tensor grad_s = empty_like_type(w, {n_rays}, x.type);
+  dispatch_real(x.type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::surface_weights_backward(x.view<T>(), in<T>(w), in<T>(a), in<T>(gn), in<T>(gw), in<T>(ga), out<T>(grad_sdf),
+                                  out<T>(grad_gradient), out<T>(grad_s));
+  });
+  return {grad_sdf, grad_gradient, grad_s};
+}
+
 Tensor index_tensor(const Tensor& like, const std::vector<int64_t>& values) {
   Tensor t = empty_like_type(like, {static_cast<int64_t>(values.size())}, ScalarType::Long);
   std::copy(values.begin(), values.end(), out<int64_t>(t));
@@ -177,6 +237,9 @@ Tensor interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor secon
 
 }  // namespace
 
+#define SPLITNERF_SURFACE                                                                                  \
+  "Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets, float step, float anneal, float " \
+  "min_transmittance"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("march_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, float box, float step, "
         "int max_samples) -> (Tensor, Tensor, Tensor, Tensor)");
@@ -184,6 +247,9 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
         "(Tensor, Tensor)");
   m.def("neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance, "
         "Tensor weights, Tensor opacity, Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
+  m.def("surface_weights(" SPLITNERF_SURFACE ") -> (Tensor, Tensor, Tensor)");
+  m.def("surface_weights_backward(" SPLITNERF_SURFACE ", Tensor weights, Tensor opacity, Tensor grad_normals, "
+        "Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
   m.def("spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, int per_ray) -> "
         "(Tensor, Tensor, Tensor, Tensor)");
   m.def("interpolate(Tensor values, Tensor first, Tensor second, Tensor share) -> Tensor");
@@ -196,6 +262,8 @@ STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
   m.impl("march_rays", TORCH_BOX(&march_rays));
   m.impl("neus_weights", TORCH_BOX(&neus_weights));
   m.impl("neus_weights_backward", TORCH_BOX(&neus_weights_backward));
+  m.impl("surface_weights", TORCH_BOX(&surface_weights));
+  m.impl("surface_weights_backward", TORCH_BOX(&surface_weights_backward));
   m.impl("spread_samples", TORCH_BOX(&spread_samples));
   m.impl("interpolate", TORCH_BOX(&interpolate));
   m.impl("interpolate_backward", TORCH_BOX(&interpolate_backward));

@@ -174,6 +174,18 @@ TEST(Neus, FloatAdjointFollowsDoubleAlongOpaqueRays) {
   }
 }
 
+TEST(AnnealedCosine, GoesFromSoftToSharp) {
+  const double cosines[] = {-1, 0, 1}, soft[] = {-1, -0.5, 0}, sharp[] = {-1, 0, 0};
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(annealed_cosine(cosines[i], 0.0).value, soft[i]);
+    EXPECT_EQ(annealed_cosine(cosines[i], 1.0).value, sharp[i]);
+  }
+  for (double c : {-0.7, 0.4}) {
+    const double h = 1e-6, slope = (annealed_cosine(c + h, 0.3).value - annealed_cosine(c - h, 0.3).value) / (2 * h);
+    EXPECT_NEAR(annealed_cosine(c, 0.3).slope, slope, 1e-9) << c;
+  }
+}
+
 TEST(Composite, SumsEachRayAndItsAdjointIsExact) {
   const std::vector<int64_t> offsets{0, 2, 2, 3};
   std::vector<double> w{1, 2, 3}, v{1, 10, 2, 20, 3, 30}, sums(6, -7);

@@ -1,4 +1,4 @@
-"""march_rays, neus_weights, spread_samples, interpolate and composite."""
+"""march_rays, neus_weights, surface_weights, spread_samples, interpolate and composite."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import reference
 import torch
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 
-from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE, PackedSamples, composite, march_rays, neus_weights, spread_samples
+from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE, PackedSamples, composite, march_rays, neus_weights, spread_samples, surface_weights
 
 OFFSETS = [0, 9, 9, 10, 24]  # one ray without samples
 
@@ -155,6 +155,56 @@ def test_neus_errors(device):
     check_error(lambda: neus_weights(f_prev, f_next, s, offsets + 1), "neus_weights", "offsets must rise from 0", "24")
     check_error(lambda: neus_weights(f_prev, f_next, s, offsets[[0, 2, 3, 1, 4]]), "offsets must rise")
     check_error(lambda: neus_weights(f_prev, f_next, s, offsets[:0]), "offsets")
+
+
+# ---- surface_weights ----
+
+
+def surface_inputs(dtype=torch.float64) -> tuple:
+    """Samples of 50 rays around a surface, some seen from behind, one with next to no gradient."""
+    _, samples, _ = packed()
+    n, g = int(samples.offsets[-1]), generator(8)
+    sdf = 0.2 * torch.randn(n, generator=g, dtype=torch.float64)
+    gradient = torch.randn(n, 3, generator=g, dtype=torch.float64)
+    gradient[5] *= 1e-5
+    rays_d = unit(torch.randn(50, 3, generator=g, dtype=torch.float64))
+    s = torch.tensor(12.0, dtype=torch.float64)
+    return *(x.to(dtype) for x in (sdf, gradient, rays_d, s)), samples.offsets
+
+
+def surface_by_formula(sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance) -> tuple:
+    squared = (gradient * gradient).sum(1, keepdim=True)
+    gradient = torch.where(squared < 1e-6, gradient.detach(), gradient)
+    normals = gradient * torch.rsqrt((gradient * gradient).sum(1, keepdim=True) + 1e-12)
+    rays = torch.repeat_interleave(torch.arange(len(rays_d)), offsets.diff())
+    c = (rays_d[rays] * normals).sum(1)
+    half = 0.5 * step * -(torch.relu(0.5 - 0.5 * c) * (1 - anneal) + torch.relu(-c) * anneal)
+    return normals, *neus_weights(sdf - half, sdf + half, s, offsets, min_transmittance)
+
+
+@pytest.mark.parametrize("anneal", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("min_transmittance", [0.0, 0.3])
+def test_surface_weights_and_their_gradients_are_the_formula(anneal, min_transmittance):
+    x = surface_inputs()
+    ours, theirs = grad_leaves(x, (0, 1, 3)), grad_leaves(x, (0, 1, 3))
+    got = surface_weights(*ours, step=0.1, anneal=anneal, min_transmittance=min_transmittance)
+    expected = surface_by_formula(*theirs, 0.1, anneal, min_transmittance)
+    for outputs in (got, expected):
+        sum((torch.randn(o.shape, generator=generator(9), dtype=o.dtype) * o).sum() for o in outputs).backward()
+    for a, b in zip((*got, *(ours[i].grad for i in (0, 1, 3))), (*expected, *(theirs[i].grad for i in (0, 1, 3)))):
+        torch.testing.assert_close(a, b)
+    assert ours[1].grad[5].abs().sum() == 0
+
+
+def test_surface_weights_opcheck_and_errors():
+    x = surface_inputs()
+    check_op(lib.surface_weights, (*x, 0.1, 0.4, 1e-3), (0, 1, 3))
+    outputs = lib.surface_weights(*x, 0.1, 0.4, 1e-3)
+    check_op(lib.surface_weights_backward, (*x, 0.1, 0.4, 1e-3, *outputs[1:], *(torch.ones_like(o) for o in outputs)))
+    with pytest.raises(RuntimeError, match="no gradient to rays_d"):
+        surface_weights(*grad_leaves(x, (2,)), step=0.1)[1].sum().backward()
+    check_error(lambda: surface_weights(x[0], x[1][:, :2], *x[2:], step=0.1), "surface_weights", "gradient")
+    check_error(lambda: surface_weights(*x, step=0.0), "surface_weights", "step")
 
 
 # ---- spread_samples, interpolate ----

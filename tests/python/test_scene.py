@@ -17,7 +17,7 @@ from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import AveragedGrid, OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import image_rays
-from splitnerf.render.renderer import annealed_cosine, linear_to_srgb, render_rays, render_view, sample_step
+from splitnerf.render.renderer import linear_to_srgb, render_rays, render_view, sample_step
 
 RADIUS = 0.7
 
@@ -276,11 +276,12 @@ class TestRendering:
         rays_o, rays_d = image_rays(orbit(1)[0], torch.tensor([50.0, 50.0, 16.0, 16.0]), 32, 32)
         jitter = torch.full((len(rays_o),), 0.5)
         colours = []
-        for threshold in (0.0, 1e-3):
-            model.config.shade_above = threshold
+        for threshold, shades in ((0.0, 0), (1e-3, 0), (1e-3, 4)):
+            model.config.sample_above, model.config.shades_per_ray = threshold, shades
             ray = render_rays(model, grid.cells, rays_o, rays_d, jitter, 1.0, sample_step(model))
             colours.append((ray.colour * ray.opacity[:, None]).detach())
         assert (colours[0] - colours[1]).abs().max() < 0.02
+        assert (colours[1] - colours[2]).abs().max() < 0.02
 
     def test_srgb_has_a_finite_slope_at_black(self):
         x = torch.tensor([0.0, 1e-9, 0.0031308, 0.5, 4.0], requires_grad=True)
@@ -288,11 +289,6 @@ class TestRendering:
         y.sum().backward()
         assert torch.isfinite(x.grad).all() and x.grad[0] == pytest.approx(12.92)
         assert y[3].item() == pytest.approx(0.735357, abs=1e-5) and y[4] > 1.0
-
-    def test_the_cosine_anneals_from_soft_to_sharp(self):
-        c = torch.tensor([-1.0, 0.0, 1.0])
-        assert annealed_cosine(c, 1.0).tolist() == [-1.0, 0.0, 0.0]
-        assert annealed_cosine(c, 0.0).tolist() == [-1.0, -0.5, 0.0]
 
 
 class TestColourLoss:

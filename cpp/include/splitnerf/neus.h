@@ -78,4 +78,28 @@ SPLITNERF_HD T neus_ray_weights_backward(const T* f_prev, const T* f_next, T s, 
   return grad_s;
 }
 
+// ---- from the field at a sample to its normal and its interval --------------------------------
+
+// The gradient's direction; below a length of 1e-3 it has none to speak of, and no gradient flows back.
+inline constexpr double kMinGradientSquared = 1e-6;
+template <class T> SPLITNERF_HD Vec3<T> unit_normal(Vec3<T> gradient) {
+  return gradient * (T(1) / std::sqrt(dot(gradient, gradient) + T(1e-12)));
+}
+template <class T> SPLITNERF_HD Vec3<T> unit_normal_backward(Vec3<T> gradient, Vec3<T> grad) {
+  const T squared = dot(gradient, gradient), inverse = T(1) / std::sqrt(squared + T(1e-12));
+  if (squared < T(kMinGradientSquared)) return {T(0), T(0), T(0)};
+  return (grad - gradient * (dot(gradient, grad) * inverse * inverse)) * inverse;
+}
+
+// Slope of the distance along the ray, never positive: relu(-c), or, while t < 1, in part relu(1/2 - c/2), so that
+// samples that face away keep a gradient early on.        Source: NeuS, the released code's cos_anneal_ratio.
+template <class T> struct AnnealedCosine {
+  T value, slope;
+};
+template <class T> SPLITNERF_HD AnnealedCosine<T> annealed_cosine(T cosine, T t) {
+  const T soft = T(0.5) - T(0.5) * cosine;
+  return {-((soft > T(0) ? soft : T(0)) * (T(1) - t) + (cosine < T(0) ? -cosine : T(0)) * t),
+          (soft > T(0) ? T(0.5) : T(0)) * (T(1) - t) + (cosine < T(0) ? t : T(0))};
+}
+
 }  // namespace splitnerf

@@ -167,6 +167,23 @@ SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& mar
                                const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d,
                                const T* jitter, SampledRay<T>* sampled);
 
+// Samples of a surface: distance and gradient in their middles, for which the distance is taken as linear over a
+// sample's length `step`, seen under the annealed cosine.
+template <class T> struct SurfaceSamples {
+  int64_t n_rays;
+  const int64_t* offsets;                 // [n_rays + 1]
+  const T *sdf, *gradient, *directions;   // [n], [n, 3], [n_rays, 3] unit
+  T s, step, anneal, min_transmittance;
+};
+// normals [n, 3], weights [n], opacity [n_rays].
+template <class T>
+SPLITNERF_API void surface_weights(const SurfaceSamples<T>& samples, T* normals, T* weights, T* opacity);
+// grad_sdf [n], grad_gradient [n, 3], grad_s_rays [n_rays]: each ray's share of the gradient to s.
+template <class T>
+SPLITNERF_API void surface_weights_backward(const SurfaceSamples<T>& samples, const T* weights, const T* opacity,
+                                            const T* grad_normals, const T* grad_weights, const T* grad_opacity,
+                                            T* grad_sdf, T* grad_gradient, T* grad_s_rays);
+
 // Which samples are shaded, `per_ray` of each ray spread by weight, and where the others lie between them.
 struct Spread {
   std::vector<int64_t> shaded;         // [m] samples, ascending

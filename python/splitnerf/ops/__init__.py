@@ -24,6 +24,7 @@ from splitnerf.ops.rays import (
     march_rays,
     neus_weights,
     spread_samples,
+    surface_weights,
 )
 from splitnerf.ops.sdf import SdfNetwork, sample_rays, sdf_layer, sdf_values
 from splitnerf.ops.shading import FRESNEL_MODES, QUERIES, brdf_lut, query_direction, split_sum_shade
@@ -35,5 +36,5 @@ __all__ = [
     "fibonacci_directions", "growth_for", "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters",
     "light_lookup", "light_sum_of_levels", "march_rays", "monte_carlo_light", "neus_weights", "occlusion_factors",
     "prefilter_light", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer", "sdf_values", "sh_projection", "shade_sums",
-    "sparse_product", "split_sum_shade", "spread_samples", "trace_visibility", "visibility_bits", "zonal_factors",
+    "sparse_product", "split_sum_shade", "spread_samples", "surface_weights", "trace_visibility", "visibility_bits", "zonal_factors",
 ]  # fmt: skip

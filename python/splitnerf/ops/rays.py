@@ -1,7 +1,7 @@
 """Packed samples along rays: marching, NeuS weights and compositing.
 
 Samples of all rays lie in one array, ray after ray; ``offsets`` [n_rays + 1] says where each begins.
-``neus_weights`` is differentiable once in f_prev, f_next and s; ``composite`` once in weights and
+``neus_weights`` is differentiable once in f_prev, f_next and s, ``surface_weights`` in sdf, gradient and s; ``composite`` once in weights and
 values, ``Spread.interpolate`` once in values; a second derivative raises. ``march_rays`` and ``spread_samples`` have no
 gradient.
 """
@@ -79,6 +79,42 @@ def neus_weights(
     Source: NeuS Eq. (13); SplitNeRF Eq. (1)-(2).
     """
     return lib.neus_weights(f_prev, f_next, s, offsets, min_transmittance)
+
+
+def surface_weights(
+    sdf: Tensor,
+    gradient: Tensor,
+    rays_d: Tensor,
+    s: Tensor,
+    offsets: Tensor,
+    *,
+    step: float,
+    anneal: float = 1.0,
+    min_transmittance: float = 0.0,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Normals and rendering weights of samples that know the distance and its gradient in their middles.
+
+    ``n = gradient / |gradient|``, ``half = step / 2 c(d . n)`` and :func:`neus_weights` of ``sdf -+ half``, where
+    ``c(x) = -(relu(1/2 - x/2)(1 - anneal) + relu(-x) anneal)``. Where the gradient is shorter than .001 none flows back to it.
+
+    Args:
+        sdf, gradient: [n], [n, 3].
+        rays_d: [n_rays, 3] unit.
+        s: [] sharpness, positive.
+        offsets: [n_rays + 1] int64.
+        step: Length of a sample, scene units.
+        anneal: Of the cosine, 0 at the start of a training, 1 when done.
+        min_transmittance: As of :func:`neus_weights`.
+
+    Returns:
+        normals [n, 3], weights [n] and opacity [n_rays]. Differentiable once in sdf, gradient and s.
+
+    Raises:
+        ValueError: A shape, dtype or number does not fit.
+
+    Source: NeuS Eq. (13) and its released code's estimate of both ends from one evaluation.
+    """
+    return lib.surface_weights(sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance)
 
 
 class Spread(NamedTuple):
@@ -189,7 +225,35 @@ def _interpolation_backward(ctx, grad):
     return lib.interpolate_backward(grad, *ctx.saved_tensors), None, None, None
 
 
+def _keep_surface(ctx, inputs, output):
+    *tensors, ctx.step, ctx.anneal, ctx.min_transmittance = inputs
+    ctx.save_for_backward(*tensors, *output[1:])
+
+
+def _surface_backward(ctx, grad_normals, grad_weights, grad_opacity):
+    refuse_gradients(ctx, "surface_weights", rays_d=2)
+    *tensors, weights, opacity = ctx.saved_tensors
+    grad_sdf, grad_gradient, grad_s = lib.surface_weights_backward(
+        *tensors, ctx.step, ctx.anneal, ctx.min_transmittance, weights, opacity, grad_normals, grad_weights, grad_opacity
+    )
+    return grad_sdf, grad_gradient, None, grad_s.sum(), None, None, None, None
+
+
 register("march_rays", fake=_fake_march)
+register(
+    "surface_weights",
+    fake=lambda sdf, gradient, rays_d, *rest: (
+        gradient.new_empty(gradient.shape), sdf.new_empty(sdf.shape), sdf.new_empty(rays_d.shape[0])
+    ),
+    setup_context=_keep_surface,
+    backward=_surface_backward,
+)
+register(
+    "surface_weights_backward",
+    fake=lambda sdf, gradient, rays_d, *rest: (
+        sdf.new_empty(sdf.shape), gradient.new_empty(gradient.shape), sdf.new_empty(rays_d.shape[0])
+    ),
+)
 register("spread_samples", fake=_fake_spread)
 register(
     "interpolate",

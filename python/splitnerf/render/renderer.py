@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from splitnerf.fields.sdf import unit_normals
-from splitnerf.ops import PackedSamples, Spread, composite, march_rays, neus_weights, sample_rays, spread_samples
+from splitnerf.ops import PackedSamples, Spread, composite, march_rays, sample_rays, spread_samples, surface_weights
 from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
 from splitnerf.render.rays import image_rays
@@ -58,11 +57,6 @@ def sample_step(model: SceneModel) -> float:
     return min(max(c.step_scale / model.s_value, c.min_step), max(c.max_step, c.min_step))
 
 
-def annealed_cosine(cosine: Tensor, anneal: float) -> Tensor:
-    """-[relu(1/2 - c/2)(1 - t) + relu(-c) t]: early on, back-facing samples keep a gradient. Source: NeuS."""
-    return -(torch.relu(0.5 - 0.5 * cosine) * (1.0 - anneal) + torch.relu(-cosine) * anneal)
-
-
 def find_samples(
     model: SceneModel, cells: Tensor, rays_o: Tensor, rays_d: Tensor, jitter: Tensor, step: float
 ) -> tuple[PackedSamples, int]:
@@ -109,9 +103,10 @@ def render_rays(
     middle = 0.5 * (samples.t_starts + samples.t_ends)
     positions = rays_o[samples.ray_indices] + directions * middle[:, None]
     field = model.surface(positions)
-    normals = unit_normals(field.gradient)
-    half = 0.5 * step * annealed_cosine((directions * normals).sum(-1), anneal)
-    weights, opacity = neus_weights(field.sdf - half, field.sdf + half, model.s, samples.offsets, c.min_transmittance)
+    normals, weights, opacity = surface_weights(
+        field.sdf, field.gradient, rays_d, model.s, samples.offsets, step=step, anneal=anneal,
+        min_transmittance=c.min_transmittance,
+    )  # fmt: skip
 
     spread: Spread | None = None
     shaded = torch.arange(len(weights))
