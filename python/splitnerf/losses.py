@@ -10,8 +10,7 @@ from splitnerf.config import Config
 from splitnerf.fields import Light
 from splitnerf.fields.sdf import unit_normals
 from splitnerf.ops import MeshScene, fibonacci_directions, occlusion_factors, prefilter_light, sample_ggx_lobe
-from splitnerf.render.model import SceneModel
-from splitnerf.render.renderer import RenderedRays
+from splitnerf.render.renderer import ProbePoints, RenderedRays
 
 SATURATED = 254.0 / 255.0
 DARKEST_METAL = 0.4  # normal reflectance
@@ -154,23 +153,29 @@ def neutral_light_loss(light: Light, config: Config, generator: torch.Generator)
     return (log_light - log_light.mean(1, keepdim=True)).square().mean()
 
 
-def normal_smoothness_loss(model: SceneModel, ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:
-    """Mean distance of the unit normals of surface points from those of neighbours on their tangent planes.
+def draw_probes(config: Config, generator: torch.Generator) -> ProbePoints:
+    """Where the eikonal loss and that of the normals' smoothness look beside the samples."""
+    c = config
+    n_beside = c.smoothness_points if c.normal_smoothness else 0
+    return ProbePoints(
+        (torch.rand(c.eikonal_points, 3, generator=generator) * 2 - 1) * c.box,
+        torch.rand(n_beside, generator=generator),
+        c.smoothness_radius * torch.randn(n_beside, 3, generator=generator),
+    )
+
+
+def normal_smoothness_loss(ray: RenderedRays) -> Tensor:
+    """Mean distance of the unit normals of samples from those at points beside them, by the rendering weights.
 
     Of the surfaces that explain the images this prefers the one that wavers least: the distance adds up to the same
     along a smooth bend and along a sharp edge, so that edges stay.
     """
-    c = config
-    m = len(ray.shaded)
+    m = len(ray.beside)
     if m == 0:
         return torch.zeros(())
-    chosen = torch.randint(m, (min(m, c.smoothness_points),), generator=generator)
-    normals = ray.normals[chosen]
-    across = normals.detach()
-    shift = c.smoothness_radius * torch.randn(len(chosen), 3, generator=generator)
-    shift = shift - across * (shift * across).sum(-1, keepdim=True)
-    there = unit_normals(model.surface(ray.positions[chosen].detach() + shift).gradient)
-    return weighted_mean(torch.sqrt((there - normals).square().sum(-1) + 1e-8), ray, chosen)
+    here, there = unit_normals(ray.gradients[ray.beside]), unit_normals(ray.gradients[-m:])
+    weights = ray.weights.detach()[ray.beside]
+    return weights @ torch.sqrt((there - here).square().sum(-1) + 1e-8) / weights.sum().clamp(min=1e-8)
 
 
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:

@@ -137,18 +137,15 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             anneal = min(1.0, progress / c.cos_anneal_by) if c.cos_anneal_by > 0 else 1.0
             finetune = progress >= c.finetune_from and scene is not None
             ray = render_rays(
-                model, grid.cells, rays_o, rays_d, jitter, anneal, sample_step(model), fixed_materials=finetune
-            )
+                model, grid.cells, rays_o, rays_d, jitter, anneal, sample_step(model),
+                probes=losses.draw_probes(c, generator), fixed_materials=finetune,
+            )  # fmt: skip
 
             terms = {"colour": c.colour_weight * losses.colour_loss(ray, target, background)}
             if finetune:
                 colours = monte_carlo_colours(model, scene, ray, -rays_d, generator)
                 terms["finetune"] = c.colour_weight * losses.monte_carlo_colour_loss(colours, ray, target, background)
-            gradients = ray.gradients
-            if c.eikonal_points:
-                points = (torch.rand(c.eikonal_points, 3, generator=generator) * 2 - 1) * c.box
-                gradients = torch.cat([gradients, model.surface(points).gradient])
-            terms["eikonal"] = c.eikonal_weight * losses.eikonal_loss(gradients)
+            terms["eikonal"] = c.eikonal_weight * losses.eikonal_loss(ray.gradients)
             if c.mask_weight:
                 terms["mask"] = c.mask_weight * losses.mask_loss(ray, target[:, 3])
             if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
@@ -156,7 +153,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             if c.neutral_weight:
                 terms["neutral"] = c.neutral_weight * losses.neutral_light_loss(model.light, c, generator)
             if c.normal_smoothness:
-                terms["smoothness"] = c.normal_smoothness * losses.normal_smoothness_loss(model, ray, c, generator)
+                terms["smoothness"] = c.normal_smoothness * losses.normal_smoothness_loss(ray)
             if c.entropy_weight and progress >= c.priors_from:
                 terms["entropy"] = c.entropy_weight * losses.material_entropy_loss(ray, c, generator)
             if c.metal_regulariser:

@@ -15,7 +15,7 @@ from splitnerf.config import Config
 
 def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
     return SimpleNamespace(
-        weights=torch.tensor(weights), shaded=torch.arange(len(weights)),
+        weights=torch.tensor(weights), shares=torch.tensor(weights), shaded=torch.arange(len(weights)),
         points=SimpleNamespace(metallic=torch.tensor(metallic)[:, None]),
     )  # fmt: skip
 
@@ -81,29 +81,25 @@ def test_neutral_light_loss_measures_chroma_alone():
     assert tinted == pytest.approx(2.0 / 3.0 * 0.36 / 3.0, rel=0.03)
 
 
-def surface_rays(n: int, x: float) -> SimpleNamespace:
-    """Points at (x, 0, 0) whose normal is that of `crease`."""
-    positions = torch.tensor([x, 0.0, 0.0]).expand(n, 3)
-    return SimpleNamespace(
-        shaded=torch.arange(n), weights=torch.ones(n), positions=positions, normals=crease(positions).gradient
-    )
-
-
-def crease(positions: torch.Tensor) -> SimpleNamespace:
+def crease(positions: torch.Tensor) -> torch.Tensor:
     """Normals up on the left of x = 0, and on its right, by 60 degrees to the side."""
     right = (positions[:, :1] > 0).float()
     tilted = torch.tensor([math.sin(math.pi / 3), 0.0, math.cos(math.pi / 3)])
-    return SimpleNamespace(gradient=right * tilted + (1 - right) * torch.tensor([0.0, 0.0, 1.0]))
+    return right * tilted + (1 - right) * torch.tensor([0.0, 0.0, 1.0])
 
 
 def test_normal_smoothness_counts_bends():
     """Flat ground costs nothing; beside an edge of 60 degrees, whose normals are 1 apart, the share that the shift
     carries across it."""
-    config = Config().replace({"smoothness_points": 20000, "smoothness_radius": 0.02})
-    model = SimpleNamespace(surface=crease)
+    config = Config().replace({"smoothness_points": 20000, "smoothness_radius": 0.02, "eikonal_points": 3})
+    probes = losses.draw_probes(config, torch.Generator().manual_seed(0))
+    assert probes.anywhere.shape == (3, 3) and probes.chosen.shape == (20000,)
 
     def loss(x: float) -> float:
-        return losses.normal_smoothness_loss(model, surface_rays(20000, x), config, torch.Generator().manual_seed(0)).item()
+        at = torch.tensor([[x, 0.0, 0.0]])
+        gradients = 7 * torch.cat([crease(at), crease(probes.anywhere), crease(at + probes.shifts)])
+        beside = torch.zeros(20000, dtype=torch.int64)
+        return losses.normal_smoothness_loss(SimpleNamespace(gradients=gradients, beside=beside, weights=torch.ones(1))).item()
 
     crossed = 0.5 * torch.erfc(torch.tensor(0.5) / 2**0.5).item()  # a normal variable beyond half its deviation
     assert loss(-0.5) == pytest.approx(1e-4, abs=1e-6) and loss(0.5) == pytest.approx(1e-4, abs=1e-6)
@@ -126,7 +122,7 @@ def entropy(albedo: list[float], weights: list[float] | None = None, roughness: 
     n = len(albedo)
     config = Config().replace({"entropy_points": 4000, "albedo_width": 0.3, "gloss_width": 0.2})
     ray = SimpleNamespace(
-        weights=torch.tensor(weights or [1.0] * n).repeat(2000), shaded=torch.arange(2000 * n),
+        shares=torch.tensor(weights or [1.0] * n).repeat(2000), shaded=torch.arange(2000 * n),
         points=SimpleNamespace(
             albedo=torch.tensor(albedo)[:, None].expand(-1, 3).repeat(2000, 1),
             roughness=torch.tensor(roughness or [0.5] * n)[:, None].repeat(2000, 1),

@@ -3,16 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
+from splitnerf.fields.sdf import SdfSample
 from splitnerf.ops import PackedSamples, Spread, composite, march_rays, sample_rays, spread_samples, surface_weights
 from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
 from splitnerf.render.rays import image_rays
 
 MIN_OPACITY = 1e-4
+
+
+class ProbePoints(NamedTuple):
+    """Points at which the field is asked for along with the samples of the rays, in one go.
+
+    Attributes:
+        anywhere: [k, 3].
+        chosen: [m] in [0, 1), which of the samples get a neighbour.
+        shifts: [m, 3] from there to the neighbour.
+    """
+
+    anywhere: Tensor
+    chosen: Tensor
+    shifts: Tensor
 
 
 @dataclass
@@ -27,7 +43,8 @@ class RenderedRays:
         weights: [n].
         values: [n, 3] what is composited: radiance of the split sum, linear or sRGB as `compositing` says. With `shading =
             summed` the colour has, beside their composite, what the sum adds at each ray's heaviest sample.
-        gradients: [n, 3] d sdf / d position of all samples.
+        gradients: [n + k + m, 3] d sdf / d position of all samples and probes.
+        beside: [m] the samples whose neighbours the last m are.
         shaded: [m] indices of the samples that were shaded.
         shares: [m] how much of their ray's colour they are, no gradient.
         positions: [m, 3] of the shaded samples, on the level set through the sample.
@@ -43,6 +60,7 @@ class RenderedRays:
     weights: Tensor
     values: Tensor
     gradients: Tensor
+    beside: Tensor
     shaded: Tensor
     shares: Tensor
     positions: Tensor
@@ -82,6 +100,7 @@ def render_rays(
     anneal: float,
     step: float,
     *,
+    probes: ProbePoints | None = None,
     fixed_materials: bool = False,
 ) -> RenderedRays:
     """Renders rays through the occupied cells.
@@ -93,6 +112,7 @@ def render_rays(
         jitter: [n_rays] in [0, 1).
         anneal: Of the cosine, 0 at the start, 1 when done.
         step: Length of a sample.
+        probes: More points at which the field is wanted.
         fixed_materials: The colours have a gradient to surface and light alone.
 
     Source: SplitNeRF Eq. (1)-(2), (17).
@@ -102,7 +122,7 @@ def render_rays(
     directions = rays_d[samples.ray_indices]
     middle = 0.5 * (samples.t_starts + samples.t_ends)
     positions = rays_o[samples.ray_indices] + directions * middle[:, None]
-    field = model.surface(positions)
+    field, gradients, beside = ask_field(model, positions, probes)
     normals, weights, opacity = surface_weights(
         field.sdf, field.gradient, rays_d, model.s, samples.offsets, step=step, anneal=anneal,
         min_transmittance=c.min_transmittance,
@@ -127,9 +147,20 @@ def render_rays(
         )
     colour = linear_to_srgb(mean) if c.compositing == "linear" else mean
     return RenderedRays(
-        colour, opacity, samples, n_evaluated, weights, values, field.gradient, shaded, shares, positions[shaded],
+        colour, opacity, samples, n_evaluated, weights, values, gradients, beside, shaded, shares, positions[shaded],
         normals[shaded], field.sdf[shaded], points,
     )  # fmt: skip
+
+
+def ask_field(model: SceneModel, positions: Tensor, probes: ProbePoints | None) -> tuple[SdfSample, Tensor, Tensor]:
+    """The field at the samples, the gradients there and at the probes, and which samples the last of these stand beside."""
+    n = len(positions)
+    if probes is None or n == 0:
+        field = model.surface(positions if probes is None else probes.anywhere)
+        return SdfSample(*(part[:n] for part in field)), field.gradient, torch.empty(0, dtype=torch.int64)
+    beside = (probes.chosen * n).long()
+    field = model.surface(torch.cat([positions, probes.anywhere, positions[beside] + probes.shifts]))
+    return SdfSample(*(part[:n] for part in field)), field.gradient, beside
 
 
 def _summed_less_split(
