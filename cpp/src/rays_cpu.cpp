@@ -159,12 +159,17 @@ void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, con
 template <class T>
 Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase, int per_ray, T* share) {
   const int64_t n = offsets[n_rays];
-  Spread s{{}, std::vector<int64_t>(n), std::vector<int64_t>(n)};
+  Spread s{{}, std::vector<int64_t>(n), std::vector<int64_t>(n), {}};
   for (int64_t r = 0; r < n_rays; ++r) {
     const int64_t begin = offsets[r], end = offsets[r + 1];
     auto at = static_cast<int64_t>(s.shaded.size());
     spread_by_weight(weights + begin, end - begin, per_ray, double(phase[r]), [&](int64_t i) { s.shaded.push_back(begin + i); });
     const auto last = static_cast<int64_t>(s.shaded.size()) - 1;
+    if (at > last) continue;
+    int64_t heaviest = at;
+    for (int64_t k = at; k <= last; ++k)
+      if (weights[s.shaded[k]] > weights[s.shaded[heaviest]]) heaviest = k;
+    s.heaviest.push_back(heaviest);
     for (int64_t i = begin; i < end; ++i) {
       while (at < last && s.shaded[at + 1] <= i) ++at;
       const int64_t next = min_of(last, s.shaded[at] < i ? at + 1 : at);

@@ -239,6 +239,19 @@ def test_spread_draws_what_weighs_and_one_of_each_ray(per_ray):
     assert (len(certain) > 0) == (per_ray > 1) and torch.isin(certain, shaded).all()
 
 
+def test_spread_draws_all_and_names_the_heaviest():
+    weights, samples, phase = packed()
+    spread = spread_samples(weights, samples, 0, phase)
+    n = len(weights)
+    assert torch.equal(spread.shaded, torch.arange(n)) and torch.equal(spread.interpolate(weights[:, None])[:, 0], weights)
+    for per_ray in (0, 2):
+        spread = spread_samples(weights, samples, per_ray, phase)
+        rays = samples.ray_indices[spread.shaded]
+        most = torch.zeros(50, dtype=torch.float64).scatter_reduce(0, rays, weights[spread.shaded], "amax")
+        assert rays[spread.heaviest].tolist() == [r for r in range(50) if r != 2]
+        assert torch.equal(weights[spread.shaded[spread.heaviest]], most[rays[spread.heaviest]])
+
+
 def test_spread_draws_in_proportion_to_the_weights():
     weights, samples, _ = packed()
     counts = torch.zeros(len(weights), dtype=torch.float64)
@@ -279,7 +292,7 @@ def test_interpolate_opcheck_gradcheck_and_errors():
     check_op(lib.interpolate, (values, *where), (0,))
     check_op(lib.interpolate_backward, (torch.ones(len(weights), 3).double(), *where, spread.shaded))
     assert torch.autograd.gradcheck(lambda v: lib.interpolate(v, *where), values.requires_grad_())
-    check_error(lambda: lib.spread_samples(weights, middle, samples.offsets, phase, 0), "spread_samples", "per_ray")
+    check_error(lambda: lib.spread_samples(weights, middle, samples.offsets, phase, -1), "spread_samples", "per_ray")
     check_error(lambda: lib.interpolate(values[1:], *where), "interpolate", "must be in [0,")
 
 

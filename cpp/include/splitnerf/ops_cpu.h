@@ -184,10 +184,11 @@ SPLITNERF_API void surface_weights_backward(const SurfaceSamples<T>& samples, co
                                             const T* grad_normals, const T* grad_weights, const T* grad_opacity,
                                             T* grad_sdf, T* grad_gradient, T* grad_s_rays);
 
-// Which samples are shaded, `per_ray` of each ray spread by weight, and where the others lie between them.
+// Which samples are shaded, `per_ray` of each ray spread by weight (0: all), and where the others lie between them.
 struct Spread {
   std::vector<int64_t> shaded;         // [m] samples, ascending
   std::vector<int64_t> first, second;  // [n] positions in `shaded`: the neighbours of each sample in its ray
+  std::vector<int64_t> heaviest;       // [rays with samples] positions in `shaded`: that of the largest weight
 };
 // weights [n], t [n] along the ray, phase [n_rays] -> share [n] of the second neighbour.
 template <class T>

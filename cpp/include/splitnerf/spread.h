@@ -9,9 +9,13 @@ namespace splitnerf {
 
 // Calls draw(i) for the samples on which one of `per_ray` evenly spaced marks falls when the weights are laid end to end,
 // ascending: systematic sampling. One of more than 1 / per_ray of all weight is always drawn, and at least one is. phase in
-// [0, 1): where the marks begin.
+// [0, 1): where the marks begin. per_ray = 0 draws all.
 template <class T, class Draw>
 SPLITNERF_HD void spread_by_weight(const T* weights, int64_t n, int per_ray, double phase, Draw draw) {
+  if (per_ray == 0) {
+    for (int64_t i = 0; i < n; ++i) draw(i);
+    return;
+  }
   double total = 0;
   for (int64_t i = 0; i < n; ++i) total += weights[i];
   if (!(total > 0)) {

@@ -124,12 +124,14 @@ class Spread(NamedTuple):
         shaded: [m] int64, ascending indices of samples; every ray with samples has one.
         first, second: [n] int64 positions in ``shaded``: the neighbours of each sample within its ray, equal beyond the ends.
         share: [n] of the second, in [0, 1], by the distance along the ray.
+        heaviest: [rays with samples] int64 positions in ``shaded``: the one with the largest weight.
     """
 
     shaded: Tensor
     first: Tensor
     second: Tensor
     share: Tensor
+    heaviest: Tensor
 
     def interpolate(self, values: Tensor) -> Tensor:
         """Values [m, c] at the shaded samples -> [n, c] at all."""
@@ -149,7 +151,7 @@ def spread_samples(weights: Tensor, samples: PackedSamples, per_ray: int, phase:
     Args:
         weights: [n].
         samples: The packed samples.
-        per_ray: Marks on a ray, at least 1.
+        per_ray: Marks on a ray; 0 draws all samples.
         phase: [n_rays] in [0, 1), where the marks begin.
 
     Raises:
@@ -210,9 +212,9 @@ def _composite_backward(ctx, grad):
 
 
 def _fake_spread(weights, t, offsets, phase, per_ray):
-    m, n = torch.library.get_ctx().new_dynamic_size(), weights.shape[0]
-    long = torch.int64
-    return weights.new_empty(m, dtype=long), weights.new_empty(n, dtype=long), weights.new_empty(n, dtype=long), weights.new_empty(n)
+    shaded, heaviest = (weights.new_empty(torch.library.get_ctx().new_dynamic_size(), dtype=torch.int64) for _ in range(2))
+    first, second = (weights.new_empty(weights.shape, dtype=torch.int64) for _ in range(2))
+    return shaded, first, second, weights.new_empty(weights.shape), heaviest
 
 
 def _keep_interpolation(ctx, inputs, output):

@@ -164,36 +164,41 @@ class SceneModel(nn.Module):
         )  # fmt: skip
         return ShadedPoints(radiance, *materials, occlusion.diffuse, occlusion.specular, lobe_dirs)
 
-    def summed_radiance(self, positions: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints) -> Tensor:
-        """Outgoing radiance [n, 3] without the split: the BRDF summed over the light from the bits' directions.
+    def summed_less_split(
+        self, positions: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints, at: Tensor, *, fixed_materials: bool = False
+    ) -> Tensor:
+        """What the radiance [n, 3] gains without the split: the BRDF summed over the light from the bits' directions.
 
-        It takes the split sum's place smoothly where lobes are wide enough for so few directions: at 256 of them between
-        a roughness of .3 and .45. Narrower ones keep what `points` holds.
+        The sum takes the split sum's place smoothly where lobes are wide enough for so few directions: at 256 of them
+        between a roughness of .3 and .45. Narrower ones gain nothing.
 
         Args:
             positions: [n, 3] on the surface.
             normals, view_dirs: [n, 3] unit.
-            points: What :meth:`shade` gave there.
+            points: What :meth:`shade` gave, for these points and others.
+            at: [n] their positions in the list.
+            fixed_materials: No gradient flows to the materials.
 
         Source: SplitNeRF Eq. (4)-(6), by quadrature.
         """
-        t = ((points.roughness.detach() - self.occlusion.summed_from) / SUMMED_BAND + 0.5).clamp(0.0, 1.0)
+        n_points, roughness = len(at), points.roughness.detach()[at]
+        t = ((roughness - self.occlusion.summed_from) / SUMMED_BAND + 0.5).clamp(0.0, 1.0)
         wide = (t > 0).squeeze(1).nonzero().squeeze(1)
-        positions, normals, view_dirs, t = positions[wide], normals[wide], view_dirs[wide], t[wide]
-        here = ShadedPoints(*(part[wide] for part in points))
+        positions, normals, view_dirs, t, at = positions[wide], normals[wide], view_dirs[wide], t[wide], at[wide]
+        materials = (points.albedo[at], points.roughness[at], points.metallic[at])
+        albedo, roughness, metallic = (m.detach() for m in materials) if fixed_materials else materials
         light = self.occlusion.cell_light(self.light)
         incoming = self.occlusion.incoming(positions, turned_to(normals, view_dirs).detach(), light)
         n, k = len(wide), len(light.directions)
         pdf = (1.0 / (k * light.solid_angles)).expand(n, k)
-        sums = monte_carlo_light(normals, view_dirs, here.roughness, light.directions.expand(n, k, 3), pdf, incoming)
-        radiance = shade_sums(
-            normals, view_dirs, here.albedo, here.roughness, here.metallic, sums, self.config.compensate
-        )
-        return points.radiance.index_copy(0, wide, torch.lerp(here.radiance, radiance, t * t * (3.0 - 2.0 * t)))
+        sums = monte_carlo_light(normals, view_dirs, roughness, light.directions.expand(n, k, 3), pdf, incoming)
+        radiance = shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, self.config.compensate)
+        gained = (radiance - points.radiance[at]) * (t * t * (3.0 - 2.0 * t))
+        return torch.zeros(n_points, 3).index_add(0, wide, gained)
 
     @property
     def sums_light(self) -> bool:
-        """Whether :meth:`summed_radiance` stands in for the split sum: once there is a mesh."""
+        """Whether :meth:`summed_less_split` stands in for the split sum: once there is a mesh."""
         return self.config.shading == "summed" and self.occlusion_ready
 
     def occlusion_factors(

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from splitnerf.fields.sdf import SdfSample
-from splitnerf.ops import PackedSamples, Spread, composite, march_rays, sample_rays, spread_samples, surface_weights
+from splitnerf.ops import PackedSamples, composite, march_rays, sample_rays, spread_samples, surface_weights
 from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
 from splitnerf.render.rays import image_rays
@@ -128,23 +128,21 @@ def render_rays(
         min_transmittance=c.min_transmittance,
     )  # fmt: skip
 
-    spread: Spread | None = None
-    shaded = torch.arange(len(weights))
-    if c.shades_per_ray:
-        spread = spread_samples(weights.detach(), samples, c.shades_per_ray, jitter)
-        shaded = spread.shaded
+    spread = spread_samples(weights.detach(), samples, c.shades_per_ray, jitter)
+    shaded = spread.shaded
     points = model.shade(
         positions[shaded], field.outputs[shaded], field.features[shaded], normals[shaded], -directions[shaded],
         fixed_materials=fixed_materials,
     )
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
-    values = spread.interpolate(radiance) if spread else radiance
-    shares = spread.gather(weights.detach()) if spread else weights.detach()
+    values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
     if model.sums_light:
-        mean = mean + _summed_less_split(
-            model, positions, directions, field.sdf, normals, weights, shaded, samples, points, fixed_materials
-        )
+        at = spread.heaviest
+        i = shaded[at]
+        on_surface = (positions[i] - normals[i] * field.sdf[i, None]).detach()
+        added = model.summed_less_split(on_surface, normals[i], -directions[i], points, at, fixed_materials=fixed_materials)
+        mean = mean.index_add(0, samples.ray_indices[i], added)
     colour = linear_to_srgb(mean) if c.compositing == "linear" else mean
     return RenderedRays(
         colour, opacity, samples, n_evaluated, weights, values, gradients, beside, shaded, shares, positions[shaded],
@@ -161,27 +159,6 @@ def ask_field(model: SceneModel, positions: Tensor, probes: ProbePoints | None) 
     beside = (probes.chosen * n).long()
     field = model.surface(torch.cat([positions, probes.anywhere, positions[beside] + probes.shifts]))
     return SdfSample(*(part[:n] for part in field)), field.gradient, beside
-
-
-def _summed_less_split(
-    model: SceneModel, positions: Tensor, directions: Tensor, sdf: Tensor, normals: Tensor, weights: Tensor, shaded: Tensor,
-    samples: PackedSamples, points: ShadedPoints, fixed_materials: bool,
-) -> Tensor:  # fmt: skip
-    """[n_rays, 3] what summing the light adds to the split sum, at each ray's heaviest sample: 0 without one."""
-    rays, weight = samples.ray_indices[shaded], weights.detach()[shaded]
-    n_rays = len(samples.offsets) - 1
-    heaviest = torch.zeros(n_rays).scatter_reduce(0, rays, weight, "amax")
-    first = torch.full((n_rays,), -1)
-    at = (weight == heaviest[rays]).nonzero().squeeze(1)
-    first[rays[at]] = at
-    at = first[first >= 0]
-    here = ShadedPoints(*(part[at] for part in points))
-    if fixed_materials:
-        here = here._replace(albedo=here.albedo.detach(), roughness=here.roughness.detach(), metallic=here.metallic.detach())
-    i = shaded[at]
-    on_surface = (positions[i] - normals[i] * sdf[i, None]).detach()
-    summed = model.summed_radiance(on_surface, normals[i], -directions[i], here)
-    return torch.zeros(n_rays, 3).index_add(0, rays[at], summed - here.radiance)
 
 
 def linear_to_srgb(linear: Tensor) -> Tensor:
