@@ -208,8 +208,9 @@ class Config:
             raise InputError(
                 f"occlusion_directions must be a multiple of 32 in 64 to 1024, got {self.occlusion_directions}"
             )
-        if self.indirect_every < 1:
-            raise InputError(f"indirect_every must be at least 1, got {self.indirect_every}")
+        for key in ("indirect_every", "light_step_every"):
+            if getattr(self, key) < 1:
+                raise InputError(f"{key} must be at least 1, got {getattr(self, key)}")
         if self.steps < 1:
             raise InputError(f"steps must be at least 1, got {self.steps}")
 

@@ -112,10 +112,11 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         model.open_levels(progress_now())
         scene = restore_mesh(model, content)
     model.light.collect()
+    light_steps = c.light_step_every if c.light == "pyramid" else 1
     started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True
     psnr_mean = samples_mean = None
     with Interrupt() as interrupt, Progress(progress_now()) as bar, open(run / "metrics.jsonl", "a") as log:
-        while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % c.light_step_every == 0):
+        while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % light_steps == 0):
             model.open_levels(progress)
             set_learning_rate(optimiser, c, step, progress)
             if first or step % c.grid_every == 0:
@@ -150,8 +151,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 terms["mask"] = c.mask_weight * losses.mask_loss(ray, target[:, 3])
             if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
                 terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
-            if c.neutral_weight:
-                terms["neutral"] = c.neutral_weight * losses.neutral_light_loss(model.light, c, generator)
+            light_moves = (step + 1) % light_steps == 0  # its prior then counts for all steps since it did
+            if c.neutral_weight and light_moves:
+                terms["neutral"] = c.neutral_weight * light_steps * losses.neutral_light_loss(model.light, c, generator)
             if c.normal_smoothness:
                 terms["smoothness"] = c.normal_smoothness * losses.normal_smoothness_loss(ray)
             if c.entropy_weight and progress >= c.priors_from:
@@ -170,7 +172,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 raise Diverged(f"step {step}: the loss is not finite ({bad}); lower --set learning_rate and --resume")
             optimiser.zero_grad(set_to_none=True)
             loss.backward()
-            if (step + 1) % c.light_step_every == 0:
+            if light_moves:
                 model.light.deliver()
             optimiser.step()
 
@@ -193,7 +195,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             if progress_now() - previewed_at >= c.preview_every:
                 previewed_at = progress_now()
                 write_preview(run, model, grid, dataset, step)
-            if time.monotonic() - saved_at > 60.0 * c.checkpoint_minutes and step % c.light_step_every == 0:
+            if time.monotonic() - saved_at > 60.0 * c.checkpoint_minutes and step % light_steps == 0:
                 save()
                 saved_at = time.monotonic()
         finished = progress_now() >= 1.0

@@ -36,6 +36,15 @@ class Light(nn.Module, abc.ABC):
     def deliver(self) -> None:
         """Takes gradients that have come together since :meth:`collect` to the parameters."""
 
+    def stand_in(self, value: Tensor) -> tuple[Tensor, object]:
+        """What takes the place of a value computed from the light until the next :meth:`deliver`, and a token that is the
+        same as long as it may. Here that is the value itself, for one backward pass."""
+        return value, object()
+
+    def stands(self, token: object) -> bool:
+        """Whether a stand-in with this token still may be used."""
+        return False
+
     @torch.no_grad()
     def panorama(self, height: int, roughness: float = 0.0) -> Tensor:
         """[height, 2 height, 3] equirectangular radiance at one roughness (z up, centre column along +x)."""

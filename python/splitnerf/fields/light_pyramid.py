@@ -120,9 +120,10 @@ class LightPyramid(Light):
         self._cached: tuple | None = None
         self._collects = False
         self._held: tuple | None = None  # state, maps and harmonics, and the leaves that stand for them
+        self._stand_ins: list[tuple[Tensor, Tensor]] = []
 
     def __getstate__(self) -> dict:
-        return {**super().__getstate__(), "_cached": None, "_held": None}  # copies compute their own
+        return {**super().__getstate__(), "_cached": None, "_held": None, "_stand_ins": []}  # copies compute their own
 
     def radiance(self) -> Tensor:
         """[n^2, 3] radiance of the texels."""
@@ -130,11 +131,11 @@ class LightPyramid(Light):
 
     def chain(self) -> tuple[Tensor, Tensor]:
         """All maps [texels, 3] and the harmonics' coefficients [169, 3], as they follow from the parameters now."""
-        state = (self.texels._version, self.texels.data_ptr())
+        state = self._state()
         wanted = torch.is_grad_enabled() and self.texels.requires_grad
         inference = torch.is_inference_mode_enabled()
         if self._held is not None and self._held[0] != state:  # gradients of maps that are no more
-            self._held = None
+            self._held, self._stand_ins = None, []
         if self._held is not None:
             leaves = self._held[-2:]
             return leaves if wanted else tuple(leaf.detach() for leaf in leaves)
@@ -167,10 +168,26 @@ class LightPyramid(Light):
         """Takes the gradients that have come together to the parameters; what is asked for next is computed anew."""
         if self._held is None:
             return
+        for value, leaf in self._stand_ins:
+            if leaf.grad is not None:
+                value.backward(leaf.grad)
         _, levels, sh, *leaves = self._held
-        self._held = None
+        self._held, self._stand_ins = None, []
         grads = [torch.zeros_like(leaf) if leaf.grad is None else leaf.grad for leaf in leaves]
         torch.autograd.backward([levels, sh], grads)
+
+    def stand_in(self, value: Tensor) -> tuple[Tensor, object]:
+        if not self._collects or not value.requires_grad:
+            return super().stand_in(value)
+        leaf = value.detach().requires_grad_()
+        self._stand_ins.append((value, leaf))
+        return leaf, self._held
+
+    def stands(self, token: object) -> bool:
+        return self._held is not None and token is self._held and self._held[0] == self._state()
+
+    def _state(self) -> tuple[int, int]:
+        return self.texels._version, self.texels.data_ptr()
 
     def _forget(self, grad: Tensor) -> None:
         self._cached = None

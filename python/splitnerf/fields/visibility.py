@@ -60,6 +60,7 @@ class VisibilityBits(nn.Module):
         self._cell = torch.cat([(part @ self.directions.T).argmax(1) for part in texels.split(4096)])
         self._solid_angle = (1.0 - texels[:, 2:] ** 2).clamp(min=0.0).sqrt()  # up to a factor
         self.light = torch.ones_like(self.directions)
+        self._cell_light: tuple[CellLight, object] | None = None
         self.cache: VisibilityCache | None = None
         self.radiance: Tensor | None = None
 
@@ -85,7 +86,18 @@ class VisibilityBits(nn.Module):
         self.light = self.cell_light(light).radiance
 
     def cell_light(self, light: Light) -> CellLight:
-        """The light's mean over each direction's cell, differentiable in the light."""
+        """The light's mean over each direction's cell, differentiable in the light; asked for again while nothing has
+        changed, the same."""
+        if torch.is_grad_enabled() and self._cell_light is not None and light.stands(self._cell_light[1]):
+            return self._cell_light[0]
+        cells = self._cell_means(light)
+        if torch.is_grad_enabled():
+            radiance, token = light.stand_in(cells.radiance)
+            cells = cells._replace(radiance=radiance)
+            self._cell_light = (cells, token) if light.stands(token) else None
+        return cells
+
+    def _cell_means(self, light: Light) -> CellLight:
         radiance = light(self._texels, torch.full_like(self._solid_angle, self._texel_roughness))
         weighted = torch.cat([radiance * self._solid_angle, self._solid_angle], dim=1)
         sums = torch.zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
