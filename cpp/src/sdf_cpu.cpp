@@ -45,7 +45,7 @@ void advance(Walker<T>& w, T f, const uint8_t* cells, const MarchOptions& march,
   }
   // Within (|f| - reach) / Lipschitz there is no density.
   const T free = (std::abs(f) - rules.reach) / (rules.lipschitz * w.lattice.step);
-  w.k = next_occupied(w.lattice, cells, march, w.k + (free > T(1) ? static_cast<int64_t>(free) : 1));
+  w.k = next_occupied(w.lattice, cells, march, w.k + (free > T(1) ? static_cast<int64_t>(min_of(free, T(w.lattice.n_steps))) : 1));
 }
 
 // A field as the kernels read it.
