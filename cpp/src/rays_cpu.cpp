@@ -157,24 +157,31 @@ void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, con
 }
 
 template <class T>
-Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase, int per_ray, T* share) {
+Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase, T gap, int per_ray,
+                      T* share) {
   const int64_t n = offsets[n_rays];
   Spread s{{}, std::vector<int64_t>(n), std::vector<int64_t>(n), {}};
   for (int64_t r = 0; r < n_rays; ++r) {
     const int64_t begin = offsets[r], end = offsets[r + 1];
     auto at = static_cast<int64_t>(s.shaded.size());
-    spread_by_weight(weights + begin, end - begin, per_ray, double(phase[r]), [&](int64_t i) { s.shaded.push_back(begin + i); });
+    spread_by_weight(weights + begin, t + begin, end - begin, gap, per_ray, double(phase[r]), [&](int64_t i) { s.shaded.push_back(begin + i); });
     const auto last = static_cast<int64_t>(s.shaded.size()) - 1;
     if (at > last) continue;
     int64_t heaviest = at;
     for (int64_t k = at; k <= last; ++k)
       if (weights[s.shaded[k]] > weights[s.shaded[heaviest]]) heaviest = k;
     s.heaviest.push_back(heaviest);
-    for (int64_t i = begin; i < end; ++i) {
+    int64_t stretch_end = begin;
+    for (int64_t i = begin, first_drawn = at; i < end; ++i) {
+      if (i == stretch_end) {  // a new stretch: its neighbours are drawn samples of its own
+        for (stretch_end = i + 1; stretch_end < end && !(t[stretch_end] - t[stretch_end - 1] > gap);) ++stretch_end;
+        while (s.shaded[first_drawn] < i) ++first_drawn;
+        at = first_drawn;
+      }
       while (at < last && s.shaded[at + 1] <= i) ++at;
-      const int64_t next = min_of(last, s.shaded[at] < i ? at + 1 : at);
-      s.first[i] = at, s.second[i] = next;
-      share[i] = share_between(t[i], t[s.shaded[at]], t[s.shaded[next]]);
+      const bool more = at < last && s.shaded[at + 1] < stretch_end;
+      s.first[i] = at, s.second[i] = s.shaded[at] < i && more ? at + 1 : at;
+      share[i] = share_between(t[i], t[s.shaded[s.first[i]]], t[s.shaded[s.second[i]]]);
     }
   }
   return s;
@@ -214,7 +221,7 @@ void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_
   template void surface_weights<T>(const SurfaceSamples<T>&, T*, T*, T*);                                             \
   template void surface_weights_backward<T>(const SurfaceSamples<T>&, const T*, const T*, const T*, const T*, const T*, T*, \
                                             T*, T*);                                                                  \
-  template Spread spread_samples<T>(int64_t, const int64_t*, const T*, const T*, const T*, int, T*);                  \
+  template Spread spread_samples<T>(int64_t, const int64_t*, const T*, const T*, const T*, T, int, T*);               \
   template void interpolate<T>(int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);             \
   template void interpolate_backward<T>(int64_t, int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);
 SPLITNERF_INSTANTIATE(float)

@@ -180,17 +180,20 @@ Tensor index_tensor(const Tensor& like, const std::vector<int64_t>& values) {
   return t;
 }
 
-std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, int64_t per_ray) {
+std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, double gap,
+                                                                  int64_t per_ray) {
   const char* op = "spread_samples";
   const ScalarType type = real_type(op, "weights", weights);
   const Tensor w = checked(op, "weights", weights, {kAny}, type), at = checked(op, "t", t, {w.size(0)}, type);
   const Tensor o = checked_offsets(op, offsets, w.size(0)), u = checked(op, "phase", phase, {o.size(0) - 1}, type);
+  require(gap > 0, op, "gap must be positive");
   require(per_ray >= 0 && per_ray < 1 << 20, op, "per_ray must be in [0, 2^20)");
   Tensor share = empty_like_type(w, {w.size(0)}, type);
   cpu::Spread spread;
   dispatch_real(type, [&](auto zero) {
     using T = decltype(zero);
-    spread = cpu::spread_samples(o.size(0) - 1, in<int64_t>(o), in<T>(w), in<T>(at), in<T>(u), static_cast<int>(per_ray), out<T>(share));
+    require(std::all_of(in<T>(u), in<T>(u) + u.size(0), [](T p) { return p >= T(0) && p < T(1); }), op, "phase must be in [0, 1)");
+    spread = cpu::spread_samples(o.size(0) - 1, in<int64_t>(o), in<T>(w), in<T>(at), in<T>(u), T(gap), static_cast<int>(per_ray), out<T>(share));
   });
   return {index_tensor(w, spread.shaded), index_tensor(w, spread.first), index_tensor(w, spread.second), share,
           index_tensor(w, spread.heaviest)};
@@ -251,7 +254,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("surface_weights(" SPLITNERF_SURFACE ") -> (Tensor, Tensor, Tensor)");
   m.def("surface_weights_backward(" SPLITNERF_SURFACE ", Tensor weights, Tensor opacity, Tensor grad_normals, "
         "Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
-  m.def("spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, int per_ray) -> "
+  m.def("spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray) -> "
         "(Tensor, Tensor, Tensor, Tensor, Tensor)");
   m.def("interpolate(Tensor values, Tensor first, Tensor second, Tensor share) -> Tensor");
   m.def("interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor second, Tensor share, Tensor shaded) -> Tensor");

@@ -150,8 +150,8 @@ Tensor sdf_values(Tensor positions, Tensor table, Tensor hidden, Tensor hidden_b
 std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
     Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, Tensor table, Tensor hidden, Tensor hidden_bias,
     Tensor out_weights, Tensor out_bias, double beta, int64_t n_levels, int64_t base_resolution, double growth,
-    int64_t log2_table_size, int64_t n_active, double box, double step, int64_t max_samples, double s, double min_weight,
-    double min_transmittance, double reach, double lipschitz) {
+    int64_t log2_table_size, int64_t n_active, double box, double step, int64_t max_samples, double s, double anneal,
+    double min_weight, double min_transmittance, double reach, double lipschitz) {
   const char* op = "sample_rays";
   const Field field(op, table, hidden, hidden_bias, out_weights, out_bias, beta, n_levels, base_resolution, growth,
                     log2_table_size, n_active, box);
@@ -162,15 +162,17 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
   const int64_t resolution = cells.size(0);
   const Tensor grid = checked(op, "cells", cells, {resolution, resolution, resolution}, ScalarType::Byte);
   require(step > 0 && s > 0 && lipschitz > 0, op, "step, s and lipschitz must be positive");
-  require(min_transmittance >= 0 && min_transmittance < 1, op, "min_transmittance must be in [0, 1)");
+  require(min_transmittance >= 0 && min_transmittance < 1 && min_weight >= 0 && min_weight < 1, op,
+          "min_weight and min_transmittance must be in [0, 1)");
+  require(reach >= 0 && anneal >= 0 && anneal <= 1, op, "reach must not be negative, anneal must be in [0, 1]");
   const MarchOptions march{static_cast<float>(box), static_cast<int>(resolution), static_cast<float>(step), max_samples};
   std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> result;
   dispatch_real(field.type, [&](auto zero) {
     using T = decltype(zero);
-    const cpu::SampleRules<T> rules{T(s), T(min_weight), T(-std::log(min_transmittance)), T(reach), T(lipschitz)};
+    const SampleRules<T> rules{T(s), T(anneal), T(min_weight), T(-std::log(min_transmittance)), T(reach), T(lipschitz)};
     std::vector<cpu::SampledRay<T>> rays(n_rays);
     cpu::sample_rays(field.view<T>(), march, in<uint8_t>(grid), rules, n_rays, in<T>(o), in<T>(d), in<T>(u), rays.data());
-    result = packed(o, field.type, T(step), rays);
+    result = packed(o, field.type, T(march.step), rays);
   });
   return result;
 }
@@ -189,8 +191,8 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
         "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
   m.def("sdf_values(Tensor positions, " SPLITNERF_SDF_NETWORK ") -> Tensor");
   m.def("sample_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, " SPLITNERF_SDF_NETWORK
-        ", float step, int max_samples, float s, float min_weight, float min_transmittance, float reach, "
-        "float lipschitz) -> (Tensor, Tensor, Tensor, Tensor, Tensor)");
+        ", float step, int max_samples, float s, float anneal, float min_weight, float min_transmittance, "
+        "float reach, float lipschitz) -> (Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {

@@ -208,9 +208,14 @@ class Config:
             raise InputError(
                 f"occlusion_directions must be a multiple of 32 in 64 to 1024, got {self.occlusion_directions}"
             )
-        for key in ("indirect_every", "light_step_every"):
-            if getattr(self, key) < 1:
-                raise InputError(f"{key} must be at least 1, got {getattr(self, key)}")
+        if self.indirect_every < 1:
+            raise InputError(f"indirect_every must be at least 1, got {self.indirect_every}")
+        if not 1 <= self.light_step_every <= 64:
+            raise InputError(f"light_step_every must be in 1 to 64, got {self.light_step_every}")
+        if self.shades_per_ray > 1024:
+            raise InputError(f"shades_per_ray must be at most 1024, got {self.shades_per_ray}")
+        if self.sample_above >= 1:
+            raise InputError(f"sample_above must be in [0, 1), got {self.sample_above}")
         if self.steps < 1:
             raise InputError(f"steps must be at least 1, got {self.steps}")
 
@@ -245,7 +250,7 @@ class Config:
 # What runs did that were trained before these settings existed, and settings that no longer do.
 FIRST_SETTINGS: dict[str, object] = dict(
     light="mlp", neutral_weight=0.0, shading="split", entropy_weight=0.0, dark_metal_weight=0.0, normal_smoothness=0.0,
-    binary_metal_weight=0.0,
+    binary_metal_weight=0.0, sample_above=0.0, shades_per_ray=0, light_step_every=1,
 )
 RETIRED = ("albedo_smoothness", "gloss_smoothness", "entropy_from", "shade_above")
 

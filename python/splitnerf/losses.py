@@ -14,6 +14,7 @@ from splitnerf.render.renderer import ProbePoints, RenderedRays
 
 SATURATED = 254.0 / 255.0
 DARKEST_METAL = 0.4  # normal reflectance
+OTHER_SIDE = 2.0  # squared distance of normals beyond which a neighbour is on the other side of a thin part
 ALBEDO_FLOOR = 0.01  # below it albedos count as one black
 
 
@@ -168,14 +169,16 @@ def normal_smoothness_loss(ray: RenderedRays) -> Tensor:
     """Mean distance of the unit normals of samples from those at points beside them, by the rendering weights.
 
     Of the surfaces that explain the images this prefers the one that wavers least: the distance adds up to the same
-    along a smooth bend and along a sharp edge, so that edges stay.
+    along a smooth bend and along a sharp edge, so that edges stay. Neighbours on the other side of a thin part, whose normals
+    are more than 90 degrees off, do not count.
     """
     m = len(ray.beside)
     if m == 0:
         return torch.zeros(())
-    here, there = unit_normals(ray.gradients[ray.beside]), unit_normals(ray.gradients[-m:])
-    weights = ray.weights.detach()[ray.beside]
-    return weights @ torch.sqrt((there - here).square().sum(-1) + 1e-8) / weights.sum().clamp(min=1e-8)
+    here, there = unit_normals(torch.cat([ray.gradients[ray.beside], ray.gradients[-m:]])).split(m)
+    squared = (there - here).square().sum(-1)
+    weights = ray.weights.detach()[ray.beside] * (squared.detach() < OTHER_SIDE)
+    return weights @ torch.sqrt(squared + 1e-8) / weights.sum().clamp(min=1e-8)
 
 
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:

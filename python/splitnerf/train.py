@@ -50,7 +50,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     """Trains a scene and keeps a checkpoint, a log and previews in the run's folder.
 
     The schedule (learning rate, levels, annealing, meshes) follows the progress: the share of steps
-    done or of minutes used, whichever is more. Ctrl-C ends the run after the current step with a checkpoint.
+    done or of minutes used, whichever is more. Ctrl-C ends the run with a checkpoint, after the current step or when the light moves next.
 
     Args:
         dataset: The train split.
@@ -151,9 +151,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 terms["mask"] = c.mask_weight * losses.mask_loss(ray, target[:, 3])
             if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
                 terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
-            light_moves = (step + 1) % light_steps == 0  # its prior then counts for all steps since it did
-            if c.neutral_weight and light_moves:
-                terms["neutral"] = c.neutral_weight * light_steps * losses.neutral_light_loss(model.light, c, generator)
+            light_moves = (step + 1) % light_steps == 0 or step + 1 == c.steps
+            if c.neutral_weight and light_moves:  # for all steps since it moved
+                terms["neutral"] = c.neutral_weight * (step % light_steps + 1) * losses.neutral_light_loss(model.light, c, generator)
             if c.normal_smoothness:
                 terms["smoothness"] = c.normal_smoothness * losses.normal_smoothness_loss(ray)
             if c.entropy_weight and progress >= c.priors_from:
@@ -201,6 +201,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         finished = progress_now() >= 1.0
         if finished and c.occlusion == "bits":  # what is rendered from here on sees the final surface
             scene, mesh = remesh(model, c, scene, mesh)
+        model.light.collect(False)
         grid.update(model.sdf_field.sdf, model.s_value)
         save()
     return TrainedScene(model, grid, step, seconds, finished)

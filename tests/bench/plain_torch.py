@@ -131,7 +131,7 @@ def composite(weights, values, offsets):
     return torch.zeros(len(offsets) - 1, values.shape[1]).index_add(0, rays, weights[:, None] * values)
 
 
-def spread_samples(weights, t, offsets, phase, per_ray):
+def spread_samples(weights, t, offsets, phase, gap, per_ray):
     every = torch.arange(len(weights))
     rays = torch.repeat_interleave(torch.arange(len(offsets) - 1), offsets.diff())
     most = torch.zeros(len(offsets) - 1).scatter_reduce(0, rays, weights, "amax")

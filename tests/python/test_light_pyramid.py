@@ -224,6 +224,27 @@ def test_collected_gradients_are_those_of_the_steps_together():
     assert collected.texels.grad.abs().sum() == 0
 
 
+def test_a_stand_in_carries_its_gradient_on():
+    """What is computed once for several steps gives the parameters the gradient of being computed in each."""
+    w, rough = unit(torch.randn(30, 3, generator=generator(1))), torch.full((30, 1), 0.4)
+    each, once = LightPyramid(16), LightPyramid(16)
+    (each(w, rough).square().sum() + each(w, rough).exp().sum()).backward()
+    once.collect()
+    value, token = once.stand_in(once(w, rough))
+    value.square().sum().backward()
+    assert once.stands(token)
+    value.exp().sum().backward()
+    once.deliver()
+    assert not once.stands(token)
+    torch.testing.assert_close(once.texels.grad, each.texels.grad)
+    copied = copy.deepcopy(once)
+    copied.texels.grad = None
+    copied(w, rough).sum().backward()  # a copy does not collect
+    assert copied.texels.grad.abs().sum() > 0
+    plain, token = each.stand_in(each(w, rough))
+    assert plain.grad_fn is not None and not each.stands(token)
+
+
 def test_settings_choose_the_light_and_its_rate():
     config = Config(light="pyramid", light_resolution=16, light_learning_rate=0.03, warmup_steps=0)
     model = SceneModel(config)

@@ -252,6 +252,21 @@ def test_spread_draws_all_and_names_the_heaviest():
         assert torch.equal(weights[spread.shaded[spread.heaviest]], most[rays[spread.heaviest]])
 
 
+def test_a_second_surface_has_a_sample_and_a_colour_of_its_own():
+    """Nine tenths of the weight in front, one tenth behind a gap."""
+    t = torch.tensor([0.0, 0.1, 0.2, 1.0, 1.1], dtype=torch.float64)
+    samples = PackedSamples(torch.zeros(5, dtype=torch.int64), t - 0.05, t + 0.05, torch.tensor([0, 5]))
+    weights = torch.tensor([0.3, 0.3, 0.3, 0.04, 0.06], dtype=torch.float64)
+    for phase in torch.linspace(0, 0.99, 34, dtype=torch.float64):
+        spread = spread_samples(weights, samples, 2, phase[None], gap=0.15)
+        behind = spread.shaded >= 3
+        assert behind.any() and not behind.all()
+        colours = spread.interpolate(behind[:, None].double())[:, 0]
+        assert colours.tolist() == [0, 0, 0, 1, 1]
+        assert weights[spread.shaded[spread.heaviest]].tolist() == [0.3]
+    assert spread_samples(weights, samples, 0, phase[None], gap=0.15).shaded.tolist() == [0, 1, 2, 3, 4]
+
+
 def test_spread_draws_in_proportion_to_the_weights():
     weights, samples, _ = packed()
     counts = torch.zeros(len(weights), dtype=torch.float64)
@@ -286,13 +301,15 @@ def test_interpolate_opcheck_gradcheck_and_errors():
     weights, samples, phase = packed()
     spread = spread_samples(weights, samples, 2, phase)
     middle = 0.5 * (samples.t_starts + samples.t_ends)
-    check_op(lib.spread_samples, (weights, middle, samples.offsets, phase, 2))
+    check_op(lib.spread_samples, (weights, middle, samples.offsets, phase, 0.5, 2))
     values = torch.randn(len(spread.shaded), 3, generator=generator(), dtype=torch.float64)
     where = spread.first, spread.second, spread.share
     check_op(lib.interpolate, (values, *where), (0,))
     check_op(lib.interpolate_backward, (torch.ones(len(weights), 3).double(), *where, spread.shaded))
     assert torch.autograd.gradcheck(lambda v: lib.interpolate(v, *where), values.requires_grad_())
-    check_error(lambda: lib.spread_samples(weights, middle, samples.offsets, phase, -1), "spread_samples", "per_ray")
+    check_error(lambda: spread_samples(weights, samples, -1, phase), "spread_samples", "per_ray")
+    check_error(lambda: spread_samples(weights, samples, 2, phase + 1), "spread_samples", "phase must be in [0, 1)")
+    check_error(lambda: spread_samples(weights, samples, 2, phase, 0.0), "spread_samples", "gap")
     check_error(lambda: lib.interpolate(values[1:], *where), "interpolate", "must be in [0,")
 
 

@@ -9,7 +9,7 @@ import torch
 from op_checks import check_op, generator, grad_leaves, lib, unit
 
 from splitnerf.fields.sdf import SdfField
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, HashGridSpec, SdfNetwork, march_rays, sample_rays, sdf_values
+from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, HashGridSpec, SdfNetwork, march_rays, sample_rays, sdf_values, surface_weights
 
 BOX, STEP = 1.5, 0.02
 SPEC = HashGridSpec(n_levels=3, n_features=2, base_resolution=4, growth=1.7, log2_table_size=9)
@@ -36,33 +36,44 @@ def cells(resolution: int = 12) -> torch.Tensor:
     return torch.full((resolution,) * 3, CELL_OCCUPIED, dtype=torch.uint8)
 
 
-def stretches(field, samples, origins, directions, s: float) -> tuple[torch.Tensor, torch.Tensor]:
-    """NeuS weight of the stretch from each sample's midpoint to the next one's, and that one's index."""
+def depth_between(f, f_next, s: float):
+    """Of an interval whose ends have these distances: log Phi(f) - log Phi(f_next), at least 0."""
+    log_phi = torch.nn.functional.logsigmoid
+    return (log_phi(s * f) - log_phi(s * f_next)).clamp(min=0)
+
+
+def stretches(field, samples, origins, directions, s: float, anneal: float = 1.0) -> torch.Tensor:
+    """The weight that a sample or its successor may have: by the slope between them, or of what may lie between."""
     middle = 0.5 * (samples.t_starts + samples.t_ends)
     x = origins[samples.ray_indices] + directions[samples.ray_indices] * middle[:, None]
-    log_phi = torch.nn.functional.logsigmoid(s * field.sdf(x).detach())
+    f, apart = field.sdf(x).detach(), middle.diff()
+    slope = (f.diff() / apart).clamp(-1, 1)
+    half = -0.5 * STEP * ((0.5 - 0.5 * slope) * (1 - anneal) + torch.relu(-slope) * anneal)
+    between = depth_between(f[:-1], torch.minimum(f[1:], (f[:-1] + f[1:] - apart) / 2), s)
+    rendered = torch.maximum(depth_between(f[:-1] - half, f[:-1] + half, s), depth_between(f[1:] - half, f[1:] + half, s))
+    tau, passed = torch.maximum(between, rendered), depth_between(f[:-1], f[1:], s)
     depth, weights = 0.0, torch.zeros(len(x), dtype=torch.float64)
     for i in range(len(x) - 1):
         if samples.ray_indices[i + 1] != samples.ray_indices[i]:
             depth = 0.0
             continue
-        tau = max(0.0, float(log_phi[i] - log_phi[i + 1]))
-        weights[i] = math.exp(-depth) * -math.expm1(-tau)
-        depth += tau
-    return weights, depth
+        weights[i] = math.exp(-depth) * -math.expm1(-tau[i])
+        depth += passed[i].item()
+    return weights
 
 
 def settings(**changes) -> dict:
     return dict(step=STEP, s=60.0, min_weight=0.01, min_transmittance=0.0, reach=10.0, lipschitz=1.25) | changes
 
 
-def test_keeps_both_ends_of_the_stretches_that_weigh():
+@pytest.mark.parametrize("anneal", [0.0, 0.4, 1.0])
+def test_keeps_the_neighbours_that_may_weigh(anneal):
     field, (o, d, jitter) = bumpy_field(), rays()
     samples = march_rays(o, d, jitter, cells(), BOX, STEP)
-    weights, _ = stretches(field, samples, o, d, 60.0)
+    weights = stretches(field, samples, o, d, 60.0, anneal)
     heavy = weights > 0.01
     wanted = heavy | torch.cat([torch.tensor([False]), heavy[:-1]])
-    kept, evaluated = sample_rays(o, d, jitter, cells(), field.network(), **settings())
+    kept, evaluated = sample_rays(o, d, jitter, cells(), field.network(), **settings(anneal=anneal))
     assert int(evaluated.sum()) == len(weights)
     assert torch.equal(kept.ray_indices, samples.ray_indices[wanted])
     torch.testing.assert_close(kept.t_starts, samples.t_starts[wanted])
@@ -84,8 +95,8 @@ def test_far_from_the_surface_it_asks_less_and_keeps_the_same():
     assert points.sum() < 0.5 * all_points.sum()
 
 
-@pytest.mark.parametrize("thickness", [0.002, 0.02])
-@pytest.mark.parametrize("s", [200.0, 2000.0])
+@pytest.mark.parametrize("thickness", [0.0005, 0.002, 0.02])
+@pytest.mark.parametrize("s", [200.0, 2000.0, 8000.0])
 def test_a_thin_sheet_is_never_jumped_over(thickness, s):
     """|z| - thickness / 2 as two softplus units: every ray that crosses the sheet keeps samples at it."""
     zeros = torch.zeros(SPEC.n_entries, SPEC.n_features)
@@ -112,11 +123,35 @@ def test_a_ray_ends_where_nothing_gets_through():
     ended, points = sample_rays(o, d, jitter, cells(), field.network(), **settings(min_weight=0.0, min_transmittance=1e-3))
     assert points.sum() < 0.8 * all_points.sum()
     assert len(ended.t_starts) < len(whole.t_starts)
-    weights, _ = stretches(field, ended, o, d, 60.0)
-    full, _ = stretches(field, whole, o, d, 60.0)
-    lost = torch.zeros(len(o), dtype=torch.float64).index_add(0, whole.ray_indices, full)
-    lost = lost - torch.zeros(len(o), dtype=torch.float64).index_add(0, ended.ray_indices, weights)
-    assert lost.max() < 1e-3
+    lost = whole_opacity(field, whole, o, d) - whole_opacity(field, ended, o, d)
+    assert 0 <= lost.min() and lost.max() < 1e-3
+
+
+def whole_opacity(field, samples, origins, directions) -> torch.Tensor:
+    """[n_rays] 1 - exp(-depth) between the middles of neighbouring samples."""
+    middle = 0.5 * (samples.t_starts + samples.t_ends)
+    f = field.sdf(origins[samples.ray_indices] + directions[samples.ray_indices] * middle[:, None]).detach()
+    same = samples.ray_indices[1:] == samples.ray_indices[:-1]
+    depth = torch.zeros(len(origins), dtype=torch.float64)
+    return -torch.expm1(-depth.index_add(0, samples.ray_indices[:-1], same * depth_between(f[:-1], f[1:], 60.0)))
+
+
+@pytest.mark.parametrize("anneal", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("s", [15.0, 60.0, 400.0])
+def test_what_is_left_out_weighs_little(s, anneal):
+    """The weights that surface_weights gives to all samples: those not kept are faint, while the cosine anneals too."""
+    field, (o, d, jitter) = bumpy_field(), rays()
+    samples = march_rays(o, d, jitter, cells(), BOX, STEP)
+    at = o[samples.ray_indices] + d[samples.ray_indices] * (0.5 * (samples.t_starts + samples.t_ends))[:, None]
+    there = field.sample(at)
+    _, weights, _ = surface_weights(
+        there.sdf.detach(), there.gradient.detach(), d, torch.tensor(s, dtype=torch.float64), samples.offsets, step=STEP, anneal=anneal
+    )
+    rules = settings(s=s, anneal=anneal, min_weight=1e-3, reach=7.0 / s)
+    kept, _ = sample_rays(o, d, jitter, cells(), field.network(), **rules)
+    key = lambda rays, starts: rays * 100000 + (starts / STEP * 8).round().long()  # noqa: E731
+    left_out = ~torch.isin(key(samples.ray_indices, samples.t_starts), key(kept.ray_indices, kept.t_starts))
+    assert left_out.any() and weights[left_out].max() < 4e-3
 
 
 @pytest.mark.parametrize("n", [0, 1, 63, 64, 1000])
@@ -146,7 +181,7 @@ def arguments(dtype=torch.float64) -> tuple:
     n = bumpy_field().to(dtype).network()
     o, d, jitter = rays(12, dtype)
     return (
-        o, d, jitter, cells(), *n._replace(n_active=2).arguments(), STEP, 64, 60.0, 0.01, 1e-3, 0.1, 1.25,
+        o, d, jitter, cells(), *n._replace(n_active=2).arguments(), STEP, 64, 60.0, 1.0, 0.01, 1e-3, 0.1, 1.25,
     )  # fmt: skip
 
 

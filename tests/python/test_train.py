@@ -135,7 +135,8 @@ def test_resume_goes_on_where_the_run_stopped(data, tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         _stop_after(7, lambda: train_scene(dataset, config, tmp_path / "halves"))
-    assert load_checkpoint(tmp_path / "halves" / "checkpoint.pt")["step"] == 7
+    # The light moves every 4 steps: the run goes on until it has.
+    assert load_checkpoint(tmp_path / "halves" / "checkpoint.pt")["step"] == 8
     halves = train_scene(dataset, config, tmp_path / "halves", resume=True)
     assert halves.step == whole.step == 14
     # Not bit by bit: what the mesh reflects is shaded anew on resuming, a few steps later than in the whole run.
@@ -304,9 +305,11 @@ def test_a_config_survives_its_file(tmp_path):
 def test_runs_from_before_a_setting_keep_what_they_were_trained_with():
     stored = dataclasses.asdict(Config())
     assert config_of({"config": stored}) == Config()
-    for name in ("light", "neutral_weight", "shading", "entropy_weight", "dark_metal_weight", "normal_smoothness", "binary_metal_weight"):
+    later = ("sample_above", "shades_per_ray", "light_step_every")
+    for name in ("light", "neutral_weight", "shading", "entropy_weight", "dark_metal_weight", "normal_smoothness", "binary_metal_weight", *later):
         del stored[name]
-    stored |= {"occlusion": "mlp", "albedo_smoothness": 0.0, "gloss_smoothness": 0.0, "entropy_from": 0.5}
+    stored |= {"occlusion": "mlp", "albedo_smoothness": 0.0, "gloss_smoothness": 0.0, "entropy_from": 0.5, "shade_above": 1e-3}
     config = config_of({"config": stored})
     assert (config.light, config.occlusion, config.shading) == ("mlp", "mlp", "split")
+    assert (config.sample_above, config.shades_per_ray, config.light_step_every) == (0.0, 0, 1)
     assert config.neutral_weight == config.entropy_weight == config.dark_metal_weight == config.normal_smoothness == 0.0

@@ -97,8 +97,8 @@ template <class T> struct AnnealedCosine {
   T value, slope;
 };
 template <class T> SPLITNERF_HD AnnealedCosine<T> annealed_cosine(T cosine, T t) {
-  const T soft = T(0.5) - T(0.5) * cosine;
-  return {-((soft > T(0) ? soft : T(0)) * (T(1) - t) + (cosine < T(0) ? -cosine : T(0)) * t),
+  const T soft = T(0.5) - T(0.5) * cosine;  // a NaN goes on to the caller
+  return {-((soft < T(0) ? T(0) : soft) * (T(1) - t) + (cosine > T(0) ? T(0) : -cosine) * t),
           (soft > T(0) ? T(0.5) : T(0)) * (T(1) - t) + (cosine < T(0) ? t : T(0))};
 }
 

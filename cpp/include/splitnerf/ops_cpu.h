@@ -10,6 +10,7 @@
 #include "splitnerf/light_pyramid.h"
 #include "splitnerf/march.h"
 #include "splitnerf/occlusion.h"
+#include "splitnerf/ray_walk.h"
 #include "splitnerf/scene.h"
 #include "splitnerf/split_sum.h"
 #include "splitnerf/visibility_cache.h"
@@ -145,23 +146,13 @@ SPLITNERF_API void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, c
                                       const T* jacobian, const T* grad_outputs, const T* grad_gradient, T* grad_features,
                                       T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias, T* grad_out, T* grad_out_bias);
 
-// Which samples of a ray are worth a gradient.
-template <class T> struct SampleRules {
-  T s;           // sharpness of the density
-  T min_weight;  // of the stretch between two samples' midpoints, for both to be kept
-  T max_depth;   // optical depth at which the ray ends
-  T reach;       // beyond |f| = reach there is no density
-  T lipschitz;   // bound of |grad f|
-};
-
 // What is kept of a ray: where its samples start, front to back.
 template <class T> struct SampledRay {
   std::vector<T> starts;
   int64_t n_evaluated = 0;  // points at which the distance was asked for
 };
 
-// Follows each ray through the occupied cells and asks for the distance on the way; at distance f from the surface it
-// leaves out the samples within (|f| - reach) / lipschitz. sampled [n_rays].
+// Follows each ray through the occupied cells and asks for the distance on the way, see ray_walk.h. sampled [n_rays].
 template <class T>
 SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& march, const uint8_t* cells,
                                const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d,
@@ -184,16 +175,17 @@ SPLITNERF_API void surface_weights_backward(const SurfaceSamples<T>& samples, co
                                             const T* grad_normals, const T* grad_weights, const T* grad_opacity,
                                             T* grad_sdf, T* grad_gradient, T* grad_s_rays);
 
-// Which samples are shaded, `per_ray` of each ray spread by weight (0: all), and where the others lie between them.
+// Which samples are shaded, `per_ray` of each ray spread by weight (0: all), and where the others lie between them. What is
+// more than `gap` apart along the ray is drawn for and interpolated on its own.
 struct Spread {
   std::vector<int64_t> shaded;         // [m] samples, ascending
   std::vector<int64_t> first, second;  // [n] positions in `shaded`: the neighbours of each sample in its ray
-  std::vector<int64_t> heaviest;       // [rays with samples] positions in `shaded`: that of the largest weight
+  std::vector<int64_t> heaviest;       // [rays with samples] positions in `shaded`: the largest weight of those
 };
 // weights [n], t [n] along the ray, phase [n_rays] -> share [n] of the second neighbour.
 template <class T>
 SPLITNERF_API Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase,
-                                    int per_ray, T* share);
+                                    T gap, int per_ray, T* share);
 // values [m, c] -> [n, c], between the first and the second neighbour.
 template <class T>
 SPLITNERF_API void interpolate(int64_t n, int64_t n_channels, const int64_t* first, const int64_t* second, const T* share,

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <cstring>
 
 #ifndef SPLITNERF_ISA
 #define SPLITNERF_ISA base
@@ -50,12 +49,6 @@ inline void product_columns(int64_t rows, int64_t inner, Strided<T> a, const T* 
   for (; r + kTileRows <= rows; r += kTileRows)
     product_tile<T, kTileRows, Vectors>(inner, {a.data + r * a.row, a.row, a.column}, b, b_row, c + r * c_row, c_row);
   for (; r < rows; ++r) product_tile<T, 1, Vectors>(inner, {a.data + r * a.row, a.row, a.column}, b, b_row, c + r * c_row, c_row);
-}
-
-// Columns of a padded matrix: the next multiple of the widest vector's lanes.
-template <class T> constexpr int64_t padded_columns(int64_t n) {
-  constexpr int64_t lanes = 64 / sizeof(T);
-  return (n + lanes - 1) / lanes * lanes;
 }
 
 // c [rows, columns] += a [rows, inner] b [inner, columns]; columns is a padded number.

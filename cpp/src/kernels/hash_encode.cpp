@@ -51,7 +51,7 @@ template <class T, int F> void locate(const HashLevel& level, int64_t n, const L
 // F values, in one go.
 template <int F, class T> void copy_entry(const T* from, T* to) { std::memcpy(to, from, F * sizeof(T)); }
 
-template <class T, int F>
+template <bool WithJacobian, class T, int F>
 void encode_level(const HashEncodeArgs<T>& args, int l, int64_t n, const Cells<T, F>& cells, T* features, T* jacobian) {
   constexpr int64_t kLanes = kPoints * F;
   const T* table = args.table + args.levels[l].offset * F;
@@ -63,11 +63,11 @@ void encode_level(const HashEncodeArgs<T>& args, int l, int64_t n, const Cells<T
     const Trilinear<T> t = trilinear(corner[0][q], corner[1][q], corner[2][q], corner[3][q], corner[4][q], corner[5][q],
                                      corner[6][q], corner[7][q], cells.x[q], cells.y[q], cells.z[q]);
     value[q] = t.value;
-    dx[q] = t.dx * cells.scale_x[q], dy[q] = t.dy * cells.scale_y[q], dz[q] = t.dz * cells.scale_z[q];
+    if constexpr (WithJacobian) dx[q] = t.dx * cells.scale_x[q], dy[q] = t.dy * cells.scale_y[q], dz[q] = t.dz * cells.scale_z[q];
   }
   const int64_t n_columns = int64_t(args.n_levels) * F;
   for (int64_t p = 0; p < n; ++p) copy_entry<F>(value + p * F, features + p * n_columns + l * F);
-  if (!jacobian) return;
+  if constexpr (!WithJacobian) return;
   for (int64_t p = 0; p < n; ++p) {
     T* row = jacobian + 3 * p * n_columns + l * F;
     copy_entry<F>(dx + p * F, row);
@@ -148,7 +148,11 @@ void encode_all(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, T* fe
     at.load(n, args.positions + 3 * b);
     for (int l = 0; l < args.n_active; ++l) {
       locate(args.levels[l], n, at, cells);
-      encode_level(args, l, n, cells, features + b * n_columns, jacobian ? jacobian + 3 * b * n_columns : nullptr);
+      if (jacobian) {
+        encode_level<true>(args, l, n, cells, features + b * n_columns, jacobian + 3 * b * n_columns);
+      } else {
+        encode_level<false, T, F>(args, l, n, cells, features + b * n_columns, nullptr);
+      }
     }
   }
 }

@@ -1,5 +1,3 @@
-#include <algorithm>
-
 #include "block_product.h"
 #include "kernel_set.h"
 #include "splitnerf/vector_math.h"
@@ -7,6 +5,14 @@
 // Points are the rows of all matrices here, units the columns, padded to whole vectors.
 namespace splitnerf::SPLITNERF_ISA {
 namespace {
+
+// Not the standard library's: its templates would be compiled for this instruction set and kept for all.
+template <class T> void copy(const T* from, int64_t n, T* to) {
+  for (int64_t i = 0; i < n; ++i) to[i] = from[i];
+}
+template <class T> void clear(T* values, int64_t n) {
+  for (int64_t i = 0; i < n; ++i) values[i] = T(0);
+}
 
 // Work memory of a block, carved from one array.
 template <class T> struct Workspace {
@@ -19,7 +25,7 @@ template <class T> struct Workspace {
 };
 
 template <class T> void fill_rows(int64_t rows, int64_t columns, const T* row, T* matrix) {
-  for (int64_t r = 0; r < rows; ++r) std::copy_n(row, columns, matrix + r * columns);
+  for (int64_t r = 0; r < rows; ++r) copy(row, columns, matrix + r * columns);
 }
 
 // inputs [n, padded K] = position, features.
@@ -28,9 +34,9 @@ void join_inputs(const SdfLayer<T>& layer, int64_t n, const T* positions, const 
   const int64_t n_features = layer.n_inputs - 3;
   for (int64_t p = 0; p < n; ++p) {
     T* row = inputs + p * layer.input_columns;
-    std::copy_n(positions + 3 * p, 3, row);
-    std::copy_n(features + p * n_features, n_features, row + 3);
-    std::fill(row + layer.n_inputs, row + layer.input_columns, T(0));
+    copy(positions + 3 * p, 3, row);
+    copy(features + p * n_features, n_features, row + 3);
+    clear(row + layer.n_inputs, layer.input_columns - layer.n_inputs);
   }
 }
 
@@ -60,7 +66,7 @@ void input_gradient(const SdfLayer<T>& layer, int64_t n, const T* slope, T* weig
   for (int64_t p = 0; p < n; ++p)
 #pragma omp simd
     for (int64_t h = 0; h < columns; ++h) weighted[p * columns + h] = slope[p * columns + h] * layer.out[h];
-  std::fill(steepness, steepness + n * layer.input_columns, T(0));
+  clear(steepness, n * layer.input_columns);
   add_product<T>(n, layer.width, layer.input_columns, {weighted, columns, 1}, layer.hidden, layer.input_columns, steepness,
                  layer.input_columns);
 }
@@ -75,7 +81,7 @@ template <class T> void sdf_values(const SdfNetwork<T>& net, int64_t n, const T*
   for (int64_t i = 0; i < 3 * n; ++i) unit[i] = positions[i] * layer.scale + T(0.5);
   HashEncodeArgs<T> grid = net.grid;
   grid.n_points = n, grid.positions = unit;
-  std::fill(features, features + n * (layer.n_inputs - 3), T(0));
+  clear(features, n * (layer.n_inputs - 3));
   hash_encode<T>(grid, 0, n, features, nullptr);
   join_inputs(layer, n, positions, features, inputs);
   first_layer<T>(layer, n, inputs, hidden, nullptr);
@@ -102,7 +108,7 @@ void sdf_layer(const SdfLayer<T>& layer, const SdfPoints<T>& in, T* work, T* out
                  layer.output_columns);
   input_gradient(layer, n, slope, weighted, steepness);
   for (int64_t p = 0; p < n; ++p) {
-    std::copy_n(padded + p * layer.output_columns, layer.n_outputs, outputs + p * layer.n_outputs);
+    copy(padded + p * layer.output_columns, layer.n_outputs, outputs + p * layer.n_outputs);
     const T* steep = steepness + p * layer.input_columns;
     for (int axis = 0; axis < 3; ++axis) {
       const T* jacobian = in.jacobian + (3 * p + axis) * n_features;
@@ -127,7 +133,7 @@ void sdf_layer_backward(const SdfLayer<T>& layer, const SdfPoints<T>& in, const 
   input_gradient(layer, n, slope, weighted, steepness);
 
   // gradient[axis] = steepness[axis] + scale jacobian[axis] . steepness[3:]
-  std::fill(grad_steepness, grad_steepness + n * inputs_row, T(0));
+  clear(grad_steepness, n * inputs_row);
   for (int64_t p = 0; p < n; ++p) {
     const T* steep = steepness + p * inputs_row + 3;
     T* grad_steep = grad_steepness + p * inputs_row;
@@ -144,9 +150,9 @@ void sdf_layer_backward(const SdfLayer<T>& layer, const SdfPoints<T>& in, const 
     }
   }
   // steepness = weighted hidden_weights,  outputs = hidden out^T + out_bias
-  std::fill(grad_weighted, grad_weighted + n * columns, T(0));
+  clear(grad_weighted, n * columns);
   add_product<T>(n, layer.n_inputs, columns, {grad_steepness, inputs_row, 1}, layer.hidden_transposed, columns, grad_weighted, columns);
-  std::fill(grad_hidden, grad_hidden + n * columns, T(0));
+  clear(grad_hidden, n * columns);
   add_product<T>(n, layer.n_outputs, columns, {grad_outputs, layer.n_outputs, 1}, layer.out, columns, grad_hidden, columns);
   add_product<T>(layer.n_outputs, n, columns, {grad_outputs, 1, layer.n_outputs}, hidden, columns, grad.out, columns);
   add_product<T>(layer.width, n, inputs_row, {weighted, 1, columns}, grad_steepness, inputs_row, grad.hidden, inputs_row);
@@ -164,9 +170,9 @@ void sdf_layer_backward(const SdfLayer<T>& layer, const SdfPoints<T>& in, const 
   }
   // pre = inputs hidden_weights^T + hidden_bias
   add_product<T>(layer.width, n, inputs_row, {grad_hidden, 1, columns}, inputs, inputs_row, grad.hidden, inputs_row);
-  std::fill(grad_inputs, grad_inputs + n * inputs_row, T(0));
+  clear(grad_inputs, n * inputs_row);
   add_product<T>(n, layer.width, inputs_row, {grad_hidden, columns, 1}, layer.hidden, inputs_row, grad_inputs, inputs_row);
-  for (int64_t p = 0; p < n; ++p) std::copy_n(grad_inputs + p * inputs_row + 3, n_features, grad_features + p * n_features);
+  for (int64_t p = 0; p < n; ++p) copy(grad_inputs + p * inputs_row + 3, n_features, grad_features + p * n_features);
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                                      \

@@ -30,8 +30,9 @@ class Light(nn.Module, abc.ABC):
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
 
-    def collect(self) -> None:
-        """From now on gradients may stop short of the parameters until :meth:`deliver`; here they do not."""
+    def collect(self, on: bool = True) -> None:
+        """From now on gradients may stop short of the parameters until :meth:`deliver`, or, off, no longer; here they never
+        do."""
 
     def deliver(self) -> None:
         """Takes gradients that have come together since :meth:`collect` to the parameters."""

@@ -123,7 +123,7 @@ class LightPyramid(Light):
         self._stand_ins: list[tuple[Tensor, Tensor]] = []
 
     def __getstate__(self) -> dict:
-        return {**super().__getstate__(), "_cached": None, "_held": None, "_stand_ins": []}  # copies compute their own
+        return {**super().__getstate__(), "_cached": None, "_collects": False, "_held": None, "_stand_ins": []}  # copies start anew
 
     def radiance(self) -> Tensor:
         """[n^2, 3] radiance of the texels."""
@@ -160,9 +160,9 @@ class LightPyramid(Light):
         # Three rows times a matrix, forward and backward: several times faster than the matrix times three columns.
         return levels, (averages[self.maps.projected].T.contiguous() @ self.maps.projection.T).T.contiguous()
 
-    def collect(self) -> None:
-        """From now on the gradients of backward passes stop at the maps and add up there."""
-        self._collects = True
+    def collect(self, on: bool = True) -> None:
+        """From now on the gradients of backward passes stop at the maps and add up there; off: they no longer do."""
+        self._collects, self._held, self._stand_ins = on, None, []
 
     def deliver(self) -> None:
         """Takes the gradients that have come together to the parameters; what is asked for next is computed anew."""

@@ -64,6 +64,9 @@ class VisibilityBits(nn.Module):
         self.cache: VisibilityCache | None = None
         self.radiance: Tensor | None = None
 
+    def __getstate__(self) -> dict:
+        return {**super().__getstate__(), "_cell_light": None}  # copies compute their own
+
     def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> None:
         """Traces every vertex of the mesh. What the vertices send out is unknown until :meth:`refresh`.
 

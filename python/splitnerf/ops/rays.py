@@ -8,6 +8,7 @@ gradient.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import torch
@@ -122,9 +123,10 @@ class Spread(NamedTuple):
 
     Attributes:
         shaded: [m] int64, ascending indices of samples; every ray with samples has one.
-        first, second: [n] int64 positions in ``shaded``: the neighbours of each sample within its ray, equal beyond the ends.
+        first, second: [n] int64 positions in ``shaded``: the neighbours of each sample within its stretch of the ray, equal
+            beyond the ends.
         share: [n] of the second, in [0, 1], by the distance along the ray.
-        heaviest: [rays with samples] int64 positions in ``shaded``: the one with the largest weight.
+        heaviest: [rays with samples] int64 positions in ``shaded``: the largest weight among these.
     """
 
     shaded: Tensor
@@ -142,17 +144,19 @@ class Spread(NamedTuple):
         return lib.interpolate_backward(weights[:, None], self.first, self.second, self.share, self.shaded)[:, 0]
 
 
-def spread_samples(weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor) -> Spread:
+def spread_samples(weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor, gap: float = math.inf) -> Spread:
     """Draws samples of each ray in proportion to their weights, for what is asked at few of them.
 
     The weights of a ray are laid end to end, and a sample is drawn where one of `per_ray` evenly spaced marks falls on it:
-    one of more than 1 / per_ray of the ray's weight always is.
+    one of more than 1 / per_ray of the ray's weight always is. Samples more than `gap` apart may be of two surfaces: each
+    stretch of the ray without such a gap has a sample drawn, and is interpolated on its own.
 
     Args:
         weights: [n].
         samples: The packed samples.
         per_ray: Marks on a ray; 0 draws all samples.
         phase: [n_rays] in [0, 1), where the marks begin.
+        gap: Along the ray, scene units, positive.
 
     Raises:
         ValueError: A shape, dtype or number does not fit.
@@ -160,7 +164,7 @@ def spread_samples(weights: Tensor, samples: PackedSamples, per_ray: int, phase:
     Source: Systematic resampling (Kitagawa 1996).
     """
     middle = 0.5 * (samples.t_starts + samples.t_ends)
-    return Spread(*lib.spread_samples(weights, middle, samples.offsets, phase, per_ray))
+    return Spread(*lib.spread_samples(weights, middle, samples.offsets, phase, gap, per_ray))
 
 
 def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:
@@ -211,7 +215,7 @@ def _composite_backward(ctx, grad):
     return *lib.composite_backward(*ctx.saved_tensors, grad), None
 
 
-def _fake_spread(weights, t, offsets, phase, per_ray):
+def _fake_spread(weights, t, offsets, phase, gap, per_ray):
     shaded, heaviest = (weights.new_empty(torch.library.get_ctx().new_dynamic_size(), dtype=torch.int64) for _ in range(2))
     first, second = (weights.new_empty(weights.shape, dtype=torch.int64) for _ in range(2))
     return shaded, first, second, weights.new_empty(weights.shape), heaviest

@@ -99,6 +99,7 @@ def sample_rays(
     *,
     step: float,
     s: float,
+    anneal: float = 1.0,
     min_weight: float,
     min_transmittance: float,
     reach: float,
@@ -107,9 +108,10 @@ def sample_rays(
 ) -> tuple[PackedSamples, Tensor]:
     """Those samples of :func:`march_rays` that a pixel is made of: the distance is asked for on the way.
 
-    Two neighbouring samples are kept where the stretch between their midpoints has a NeuS weight above `min_weight`; the
-    ray ends where less than `min_transmittance` of the light gets through. At distance f from the surface the samples
-    within ``(|f| - reach) / lipschitz`` are left out. What a pixel loses is at most the weight of what is not kept.
+    Two neighbouring samples are kept where either may have a rendering weight above `min_weight`: by
+    :func:`surface_weights` with the slope between their middles, or for what may lie between the middles. The ray ends
+    where less than `min_transmittance` of the light gets through. At distance f from the surface the samples within
+    ``(|f| - reach) / lipschitz`` are left out.
 
     Args:
         rays_o, rays_d: [n_rays, 3]; directions unit.
@@ -118,9 +120,10 @@ def sample_rays(
         network: The distance field.
         step: Length of a sample, scene units.
         s: Sharpness of the density, positive.
+        anneal: Of the cosine, in [0, 1], as of :func:`surface_weights`.
         min_weight: In [0, 1).
         min_transmittance: In [0, 1).
-        reach: Distance beyond which there is no density, scene units.
+        reach: Distance outside the surface beyond which there is no density, scene units.
         lipschitz: Bound of the field's gradient.
         max_samples: Distances of one ray at most.
 
@@ -131,8 +134,8 @@ def sample_rays(
         ValueError: A shape, dtype or number does not fit.
     """
     *samples, evaluated = lib.sample_rays(
-        rays_o, rays_d, jitter, cells, *network.arguments(), step, max_samples, s, min_weight, min_transmittance, reach,
-        lipschitz,
+        rays_o, rays_d, jitter, cells, *network.arguments(), step, max_samples, s, anneal, min_weight, min_transmittance,
+        reach, lipschitz,
     )  # fmt: skip
     return PackedSamples(*samples), evaluated
 

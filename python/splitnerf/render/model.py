@@ -181,9 +181,8 @@ class SceneModel(nn.Module):
 
         Source: SplitNeRF Eq. (4)-(6), by quadrature.
         """
-        n_points, roughness = len(at), points.roughness.detach()[at]
-        t = ((roughness - self.occlusion.summed_from) / SUMMED_BAND + 0.5).clamp(0.0, 1.0)
-        wide = (t > 0).squeeze(1).nonzero().squeeze(1)
+        t = ((points.roughness.detach()[at] - self.occlusion.summed_from) / SUMMED_BAND + 0.5).clamp(0.0, 1.0)
+        n_points, wide = len(at), (t > 0).squeeze(1).nonzero().squeeze(1)
         positions, normals, view_dirs, t, at = positions[wide], normals[wide], view_dirs[wide], t[wide], at[wide]
         materials = (points.albedo[at], points.roughness[at], points.metallic[at])
         albedo, roughness, metallic = (m.detach() for m in materials) if fixed_materials else materials

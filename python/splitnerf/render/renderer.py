@@ -15,6 +15,8 @@ from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
 from splitnerf.render.rays import image_rays
 
 MIN_OPACITY = 1e-4
+PHASES = 1024.0
+SURFACE_GAP = 2.5  # samples farther apart, in steps, may be of two surfaces
 
 
 class ProbePoints(NamedTuple):
@@ -76,16 +78,17 @@ def sample_step(model: SceneModel) -> float:
 
 
 def find_samples(
-    model: SceneModel, cells: Tensor, rays_o: Tensor, rays_d: Tensor, jitter: Tensor, step: float
+    model: SceneModel, cells: Tensor, rays_o: Tensor, rays_d: Tensor, jitter: Tensor, anneal: float, step: float
 ) -> tuple[PackedSamples, int]:
     """The samples that pixels are made of, and at how many points the distance was asked for to find them."""
     c = model.config
     if c.sample_above == 0:
         samples = march_rays(rays_o, rays_d, jitter, cells, c.box, step, c.max_samples_per_ray)
         return samples, len(samples.ray_indices)
+    s = model.s_value
     samples, evaluated = sample_rays(
-        rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=model.s_value, min_weight=c.sample_above,
-        min_transmittance=c.min_transmittance, reach=DENSITY_CUTOFF / model.s_value, lipschitz=LIPSCHITZ,
+        rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=s, anneal=anneal,
+        min_weight=c.sample_above, min_transmittance=c.min_transmittance, reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
         max_samples=c.max_samples_per_ray,
     )  # fmt: skip
     return samples, int(evaluated.sum())
@@ -118,47 +121,48 @@ def render_rays(
     Source: SplitNeRF Eq. (1)-(2), (17).
     """
     c = model.config
-    samples, n_evaluated = find_samples(model, cells, rays_o, rays_d, jitter, step)
+    samples, n_evaluated = find_samples(model, cells, rays_o, rays_d, jitter, anneal, step)
     directions = rays_d[samples.ray_indices]
     middle = 0.5 * (samples.t_starts + samples.t_ends)
     positions = rays_o[samples.ray_indices] + directions * middle[:, None]
-    field, gradients, beside = ask_field(model, positions, probes)
+    n = len(positions)
+    field, beside = ask_field(model, positions, probes)
+    sdf = field.sdf[:n]
     normals, weights, opacity = surface_weights(
-        field.sdf, field.gradient, rays_d, model.s, samples.offsets, step=step, anneal=anneal,
-        min_transmittance=c.min_transmittance,
-    )  # fmt: skip
+        sdf, field.gradient[:n], rays_d, model.s, samples.offsets, step=step, anneal=anneal, min_transmittance=c.min_transmittance
+    )
 
-    spread = spread_samples(weights.detach(), samples, c.shades_per_ray, jitter)
+    phase = (PHASES * jitter) % 1.0  # where samples stand shall not decide which are shaded
+    spread = spread_samples(weights.detach(), samples, c.shades_per_ray, phase, SURFACE_GAP * step)
     shaded = spread.shaded
+    positions, normals, sdf, view_dirs = positions[shaded], normals[shaded], sdf[shaded], -directions[shaded]
     points = model.shade(
-        positions[shaded], field.outputs[shaded], field.features[shaded], normals[shaded], -directions[shaded],
-        fixed_materials=fixed_materials,
+        positions, field.outputs[shaded], field.features[shaded], normals, view_dirs, fixed_materials=fixed_materials
     )
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
     if model.sums_light:
         at = spread.heaviest
-        i = shaded[at]
-        on_surface = (positions[i] - normals[i] * field.sdf[i, None]).detach()
-        added = model.summed_less_split(on_surface, normals[i], -directions[i], points, at, fixed_materials=fixed_materials)
-        mean = mean.index_add(0, samples.ray_indices[i], added)
+        on_surface = (positions[at] - normals[at] * sdf[at, None]).detach()
+        added = model.summed_less_split(
+            on_surface, normals[at], view_dirs[at], points, at, fixed_materials=fixed_materials
+        )
+        mean = mean.index_add(0, samples.ray_indices[shaded[at]], added)
     colour = linear_to_srgb(mean) if c.compositing == "linear" else mean
     return RenderedRays(
-        colour, opacity, samples, n_evaluated, weights, values, gradients, beside, shaded, shares, positions[shaded],
-        normals[shaded], field.sdf[shaded], points,
+        colour, opacity, samples, n_evaluated, weights, values, field.gradient, beside, shaded, shares, positions, normals,
+        sdf, points,
     )  # fmt: skip
 
 
-def ask_field(model: SceneModel, positions: Tensor, probes: ProbePoints | None) -> tuple[SdfSample, Tensor, Tensor]:
-    """The field at the samples, the gradients there and at the probes, and which samples the last of these stand beside."""
-    n = len(positions)
-    if probes is None or n == 0:
-        field = model.surface(positions if probes is None else probes.anywhere)
-        return SdfSample(*(part[:n] for part in field)), field.gradient, torch.empty(0, dtype=torch.int64)
-    beside = (probes.chosen * n).long()
-    field = model.surface(torch.cat([positions, probes.anywhere, positions[beside] + probes.shifts]))
-    return SdfSample(*(part[:n] for part in field)), field.gradient, beside
+def ask_field(model: SceneModel, positions: Tensor, probes: ProbePoints | None) -> tuple[SdfSample, Tensor]:
+    """The field at the samples and, behind them, at the probes; and which samples the last of these stand beside."""
+    n, nothing = len(positions), torch.empty(0, dtype=torch.int64)
+    if probes is None:
+        return model.surface(positions), nothing
+    beside = (probes.chosen * n).long() if n else nothing
+    return model.surface(torch.cat([positions, probes.anywhere, positions[beside] + probes.shifts[: len(beside)]])), beside
 
 
 def linear_to_srgb(linear: Tensor) -> Tensor:
