@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,19 +18,17 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
 from splitnerf.outputs import render_maps
 from splitnerf.train import train
-from splitnerf.workflow import load_splits
 
-SCORED_VIEWS = 8
-
-# Each skip alone: what it sets, against what stands without it.
-SWITCHES: dict[str, tuple[dict[str, object], dict[str, object]]] = {
-    "samples found without gradients": ({"sample_above": 1e-3}, {"sample_above": 0.0}),
-    "few shaded samples a ray": ({"shades_per_ray": 4}, {"shades_per_ray": 0}),
-    "light moved every 4 steps": ({"light_step_every": 4}, {"light_step_every": 1}),
-    "visibility traced when the mesh has moved": ({"occlusion": "bits"}, {}),
+# What stands where a skip is off.
+UNSKIPPED: dict[str, object] = {"sample_above": 0.0, "shades_per_ray": 0, "light_step_every": 1}
+# The settings that each skip alone has as in the full configuration.
+SKIPS: dict[str, tuple[str, ...]] = {
+    "samples found without gradients": ("sample_above",),
+    "few shaded samples a ray": ("shades_per_ray",),
+    "light moved every few steps": ("light_step_every",),
 }
-NOTHING = "nothing skipped"
-ALL = "all"
+BASELINE, ALL = "nothing skipped", "all"
+NEVER = 10**7  # steps that no run reaches
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,7 @@ class Line:
     """One line of the table.
 
     Attributes:
-        name: Of the skip; `all` for the settings as they are.
+        name: Of the skip.
         steps_per_second: Of the run of equal time, all its work included.
         psnr_equal_steps: Mean over the test views, dB, after as many steps as the baseline made.
         psnr_equal_time: The same after as many minutes.
@@ -50,25 +47,60 @@ class Line:
     psnr_equal_steps: float
     psnr_equal_time: float
 
+    def text(self, baseline: Line) -> str:
+        ratio = self.steps_per_second / baseline.steps_per_second
+        return f"{self.name:34s} {ratio:5.1f}x {self.psnr_equal_steps:10.2f} dB {self.psnr_equal_time:10.2f} dB"
+
+
+HEADER = f"{'':34s} {'steps/s':>6s} {'equal steps':>13s} {'equal time':>13s}"
+
+
+def skip_table(
+    full: Config, minutes: float, training: Dataset, views: Dataset, out: Path, other: Callable[[], tuple[Line, int]] | None,
+    show: Callable[[str], None],
+) -> list[Line]:  # fmt: skip
+    """Trains without any skip, with one at a time, and with all.
+
+    Args:
+        full: The configuration with all skips.
+        minutes: Of each run of equal time.
+        training: What is trained on.
+        views: What is scored.
+        out: Folder of the runs.
+        other: The baseline's line and number of steps by another build; None: nothing skipped in this one.
+        show: Called with each line.
+    """
+    plain = full.replace(UNSKIPPED)
+    baseline, steps = other() if other else run_line(BASELINE, plain, minutes, None, training, views, out / "baseline")
+    lines = [baseline]
+    show(HEADER)
+    show(baseline.text(baseline))
+    alone = {name: plain.replace({key: getattr(full, key) for key in keys}) for name, keys in SKIPS.items()}
+    for i, (name, config) in enumerate((alone | {ALL: full}).items()):
+        line, _ = run_line(name, config, minutes, steps, training, views, out / f"skip_{i}")
+        lines.append(line)
+        show(line.text(baseline))
+    return lines
+
 
 def run_line(
-    name: str, config: Config, minutes: float, steps: int | None, train_split: Dataset, views: Dataset, out: Path
+    name: str, config: Config, minutes: float, steps: int | None, training: Dataset, views: Dataset, out: Path
 ) -> tuple[Line, int]:
     """Trains for the minutes, and for the baseline's steps where they are known; the line and the steps made."""
-    timed = config.replace({"max_minutes": minutes, "steps": 10**7})
-    rate, by_time, made = train_and_score(timed, train_split, views, out / "time")
+    timed = config.replace({"max_minutes": minutes, "steps": NEVER})
+    rate, by_time, made = train_and_score(timed, training, views, out / "equal_time")
     if steps is None:
         return Line(name, rate, by_time, by_time), made
     counted = config.replace({"max_minutes": 0.0, "steps": steps})
-    _, by_steps, _ = train_and_score(counted, train_split, views, out / "steps")
+    _, by_steps, _ = train_and_score(counted, training, views, out / "equal_steps")
     return Line(name, rate, by_steps, by_time), made
 
 
-def train_and_score(config: Config, train_split: Dataset, views: Dataset, run: Path) -> tuple[float, float, int]:
+def train_and_score(config: Config, training: Dataset, views: Dataset, run: Path) -> tuple[float, float, int]:
     """Steps a second, mean PSNR over the views, and the number of steps."""
     run.mkdir(parents=True, exist_ok=True)
     config.write(run / "config.toml")
-    trained = train(train_split, config, run)
+    trained = train(training, config, run)
     scores = []
     for i in range(len(views)):
         maps = render_maps(trained.model, trained.grid, views, i)
@@ -77,19 +109,22 @@ def train_and_score(config: Config, train_split: Dataset, views: Dataset, run: P
     return trained.step / trained.seconds, float(np.mean(scores)), trained.step
 
 
-def run_other(executable: Path, data: Path, minutes: float, downscale: int, out: Path) -> tuple[Line, int]:
-    """The same by another build of this program, told by its command line: a baseline from before.
+def run_other(executable: Path, data: Path, minutes: float, downscale: int, run: Path) -> tuple[Line, int]:
+    """The same by another build of this program through its command line: a baseline from before.
 
     Raises:
         InputError: It cannot be run, or fails.
     """
-    command = [str(executable), "train", str(data), "--out", str(out), "--max-minutes", str(minutes), "--downscale", str(downscale)]
+    command = [
+        str(executable), "train", str(data), "--out", str(run), "--max-minutes", str(minutes), "--downscale", str(downscale),
+        "--steps", str(NEVER),
+    ]  # fmt: skip
     try:
-        done = subprocess.run([*command, "--steps", str(10**7)], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        done = subprocess.run(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     except OSError as error:
         raise InputError(f"{executable}: cannot be run ({error.strerror})") from error
     if done.returncode != 0:
-        raise InputError(f"{executable}: train failed ({done.stderr.strip().splitlines()[-1]})")
-    last = json.loads((out / "metrics.jsonl").read_text().splitlines()[-1])
-    score = read_json(out / "evaluation.json", "novel_view")["novel_view"]["psnr"]
-    return Line(str(executable), last["step"] / last["seconds"], score, score), last["step"]
+        raise InputError(f"{executable}: train failed ({(done.stderr.strip().splitlines() or ['no message'])[-1]})")
+    last = json.loads((run / "metrics.jsonl").read_text().splitlines()[-1])
+    score = read_json(run / "evaluation.json", "novel_view")["novel_view"]["psnr"]
+    return Line(executable.name, last["step"] / last["seconds"], score, score), last["step"]

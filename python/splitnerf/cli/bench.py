@@ -1,0 +1,50 @@
+"""splitnerf bench."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from splitnerf.cli.exit_codes import DONE
+from splitnerf.errors import InputError
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    parser = commands.add_parser("bench", help="measure run time against error")
+    benchmarks = parser.add_subparsers(dest="benchmark", required=True, metavar="BENCHMARK")
+    skip = benchmarks.add_parser(
+        "skip", help="what it is worth to leave out what a scene does not need",
+        description="Trains on DATA without any skip, with one at a time, and with all, for M minutes and for as many steps as "
+        "the first run made, and prints steps a second as a ratio, and the PSNR of novel views at equal steps and time.",
+    )  # fmt: skip
+    skip.add_argument("--data", type=Path, required=True, metavar="DATA")
+    skip.add_argument("--minutes", type=float, default=3.0, metavar="M", help="training time of each run (default: 3)")
+    skip.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
+    skip.add_argument("--against", type=Path, metavar="SPLITNERF", help="the program of another build, for the first line")
+    skip.add_argument("--out", type=Path, metavar="OUT", help="keep the runs (default: a folder that is removed)")
+    skip.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all runs")
+    skip.set_defaults(execute=run_skip)
+
+
+def run_skip(args: argparse.Namespace) -> int:
+    from splitnerf.bench.skip import run_other, skip_table
+    from splitnerf.config import parse_setting, preset
+    from splitnerf.workflow import load_splits
+
+    if args.minutes <= 0:
+        raise InputError(f"--minutes must be positive, got {args.minutes}")
+    if args.out is not None and args.out.exists() and any(args.out.iterdir()):
+        raise InputError(f"{args.out}: is not empty; give another --out")
+    full = preset("cpu").replace(dict(parse_setting(text) for text in args.settings))
+    training, test = load_splits(args.data, args.downscale)
+    if test is None:
+        raise InputError(f"{args.data}: has no test views to score")
+    with tempfile.TemporaryDirectory() as temporary:
+        out = args.out or Path(temporary)
+        out.mkdir(parents=True, exist_ok=True)
+        other = None
+        if args.against is not None:
+            other = lambda: run_other(args.against, args.data, args.minutes, args.downscale, out / "against")  # noqa: E731
+        skip_table(full, args.minutes, training, test, out, other, lambda line: print(line, flush=True))
+    return DONE
