@@ -38,24 +38,24 @@ template <class T> struct RayWork {
 }  // namespace
 
 template <class T>
-void march_rays_count(const MarchOptions& options, const uint8_t* cells, int64_t n_rays, const T* rays_o,
+void march_rays_count(const MarchOptions& options, const OccupancyView& grid, int64_t n_rays, const T* rays_o,
                       const T* rays_d, const T* jitter, int64_t* offsets) {
   parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
     for (int64_t r = begin; r < end; ++r)
-      offsets[r + 1] = march_ray(load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], cells, options, [](T, T) {});
+      offsets[r + 1] = march_ray(load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], grid, options, [](T, T) {});
   });
   offsets[0] = 0;
   for (int64_t r = 0; r < n_rays; ++r) offsets[r + 1] += offsets[r];
 }
 
 template <class T>
-void march_rays_fill(const MarchOptions& options, const uint8_t* cells, int64_t n_rays, const T* rays_o,
+void march_rays_fill(const MarchOptions& options, const OccupancyView& grid, int64_t n_rays, const T* rays_o,
                      const T* rays_d, const T* jitter, const int64_t* offsets, int64_t* ray_indices, T* t_starts,
                      T* t_ends) {
   parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
     for (int64_t r = begin; r < end; ++r) {
       int64_t i = offsets[r];
-      march_ray(load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], cells, options, [&](T t_start, T t_end) {
+      march_ray(load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], grid, options, [&](T t_start, T t_end) {
         ray_indices[i] = r;
         t_starts[i] = t_start;
         t_ends[i] = t_end;
@@ -209,9 +209,9 @@ void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                                                      \
-  template void march_rays_count<T>(const MarchOptions&, const uint8_t*, int64_t, const T*, const T*, const T*,       \
+  template void march_rays_count<T>(const MarchOptions&, const OccupancyView&, int64_t, const T*, const T*, const T*,       \
                                     int64_t*);                                                                        \
-  template void march_rays_fill<T>(const MarchOptions&, const uint8_t*, int64_t, const T*, const T*, const T*,        \
+  template void march_rays_fill<T>(const MarchOptions&, const OccupancyView&, int64_t, const T*, const T*, const T*,        \
                                    const int64_t*, int64_t*, T*, T*);                                                 \
   template void neus_weights<T>(int64_t, const int64_t*, const T*, const T*, T, T, T*, T*);                           \
   template void neus_weights_backward<T>(int64_t, const int64_t*, const T*, const T*, T, T, const T*, const T*,       \

@@ -104,7 +104,7 @@ void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, const T* positi
 }
 
 template <class T>
-void sample_rays(const SdfField<T>& field, const MarchOptions& march, const uint8_t* cells, const SampleRules<T>& rules,
+void sample_rays(const SdfField<T>& field, const MarchOptions& march, const OccupancyView& grid, const SampleRules<T>& rules,
                  int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter, SampledRay<T>* sampled) {
   const Kernels<T>& k = kernels<T>();
   const PreparedField<T> prepared(field);
@@ -113,7 +113,7 @@ void sample_rays(const SdfField<T>& field, const MarchOptions& march, const uint
     std::vector<Walk<T>> walks;
     for (int64_t r = begin; r < end || !walks.empty();) {
       for (; r < end && walks.size() < kSdfBlock; ++r) {
-        Walk<T> walk(RayLattice<T>(load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], march), r, march, cells);
+        Walk<T> walk(RayLattice<T>(load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], march), r, march, grid);
         if (walk.next >= 0) walks.push_back(walk);
       }
       const int64_t n = static_cast<int64_t>(walks.size());
@@ -121,7 +121,7 @@ void sample_rays(const SdfField<T>& field, const MarchOptions& march, const uint
       k.sdf_values(prepared.network, n, positions.data(), work.data(), values.data());
       for (int64_t i = 0; i < n; ++i) {
         SampledRay<T>& ray = sampled[walks[i].ray];
-        advance(walks[i], values[i], cells, march, rules, [&](T start) { ray.starts.push_back(start); });
+        advance(walks[i], values[i], grid, march, rules, [&](T start) { ray.starts.push_back(start); });
         ray.n_evaluated = walks[i].n_evaluated;
       }
       walks.erase(std::remove_if(walks.begin(), walks.end(), [](const Walk<T>& w) { return w.next < 0; }), walks.end());
@@ -134,7 +134,7 @@ void sample_rays(const SdfField<T>& field, const MarchOptions& march, const uint
   template void sdf_layer<T>(const SdfWeights<T>&, int64_t, const T*, const T*, const T*, T*, T*);                    \
   template void sdf_layer_backward<T>(const SdfWeights<T>&, int64_t, const T*, const T*, const T*, const T*, const T*, \
                                       T*, T*, T*, T*, T*, T*);                                                        \
-  template void sample_rays<T>(const SdfField<T>&, const MarchOptions&, const uint8_t*, const SampleRules<T>&,        \
+  template void sample_rays<T>(const SdfField<T>&, const MarchOptions&, const OccupancyView&, const SampleRules<T>&,        \
                                int64_t, const T*, const T*, const T*, SampledRay<T>*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

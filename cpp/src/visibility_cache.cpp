@@ -133,8 +133,8 @@ template <class T> class CacheReader {
     if (!look(near, normal)) return;
     std::copy(visible_.begin(), visible_.end(), visible);
     if (!cache_.hits) return;
-    for_each_blocked(near, [&](int k, int64_t i, Vec3<T> sent) {
-      store3(arriving + 3 * i, load3(arriving + 3 * i) + sent * near.weight[k]);
+    for_each_blocked(near, [&](int64_t i, T share, Vec3<T> sent) {
+      store3(arriving + 3 * i, load3(arriving + 3 * i) + sent * share);
     });
   }
 
@@ -161,8 +161,8 @@ template <class T> class CacheReader {
     return true;
   }
 
-  // visit(neighbour, direction, what the hit vertex sends over the weight of those that know the direction). Few
-  // directions above the horizon are blocked: they are taken one by one.
+  // visit(direction, a neighbour's share of those that know it, what the vertex that it meets sends). Few directions above
+  // the horizon are blocked: they are taken one by one.
   template <class Visit> void for_each_blocked(const Neighbours<T>& near, Visit&& visit) const {
     for (int k = 0; k < near.n; ++k) {
       const int32_t* hits = cache_.hits + int64_t(near.vertex[k]) * cache_.n_directions;
@@ -170,7 +170,7 @@ template <class T> class CacheReader {
         for (uint32_t blocked = blocked_words(near.vertex[k])[word] & above_[word]; blocked; blocked &= blocked - 1) {
           const int64_t i = word * kBitsPerWord + lowest_bit(blocked);
           if (hits[i] < 0 || hits[i] >= cache_.grids.n_vertices) continue;
-          visit(k, i, load3(cache_.radiance + 3 * int64_t(hits[i])) / known_[i]);
+          visit(i, near.weight[k] / known_[i], load3(cache_.radiance + 3 * int64_t(hits[i])));
         }
       }
     }
@@ -179,10 +179,12 @@ template <class T> class CacheReader {
   // sum (1 - V_i) C_i c_i / sum c_i over both kernels.
   void add_indirect(const Neighbours<T>& near, T total_d, T total_s, Result& result) const {
     const T per_d = total_d > T(0) ? T(1) / total_d : T(0), per_s = total_s > T(0) ? T(1) / total_s : T(0);
-    for_each_blocked(near, [&](int k, int64_t i, Vec3<T> sent) {
-      result.indirect_d += sent * (cosine_[i] * near.weight[k] * per_d);
-      result.indirect_s += sent * (lobe_[i] * near.weight[k] * per_s);
+    for_each_blocked(near, [&](int64_t i, T share, Vec3<T> sent) {
+      result.indirect_d += sent * (cosine_[i] * share);
+      result.indirect_s += sent * (lobe_[i] * share);
     });
+    result.indirect_d = result.indirect_d * per_d;
+    result.indirect_s = result.indirect_s * per_s;
   }
 
   const VisibilityCache<T>& cache_;

@@ -20,16 +20,17 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> march_rays(Tensor rays_o, Tensor rays
   const int64_t resolution = cells.size(0);
   const Tensor grid = checked(op, "cells", cells, {resolution, resolution, resolution}, ScalarType::Byte);
   require(box > 0 && step > 0, op, "box and step must be positive");
-  const MarchOptions options{static_cast<float>(box), static_cast<int>(resolution), static_cast<float>(step), max_samples};
+  const MarchOptions options{static_cast<float>(box), static_cast<float>(step), max_samples};
+  const OccupancyCells occupancy(in<uint8_t>(grid), static_cast<int>(resolution));
   Tensor offsets = empty_like_type(o, {n_rays + 1}, ScalarType::Long), ray_indices, t_starts, t_ends;
   dispatch_real(type, [&](auto zero) {
     using T = decltype(zero);
-    cpu::march_rays_count(options, in<uint8_t>(grid), n_rays, in<T>(o), in<T>(d), in<T>(u), out<int64_t>(offsets));
+    cpu::march_rays_count(options, occupancy.view(), n_rays, in<T>(o), in<T>(d), in<T>(u), out<int64_t>(offsets));
     const int64_t n = in<int64_t>(offsets)[n_rays];
     ray_indices = empty_like_type(o, {n}, ScalarType::Long);
     t_starts = empty_like_type(o, {n}, type);
     t_ends = empty_like_type(o, {n}, type);
-    cpu::march_rays_fill(options, in<uint8_t>(grid), n_rays, in<T>(o), in<T>(d), in<T>(u), in<int64_t>(offsets),
+    cpu::march_rays_fill(options, occupancy.view(), n_rays, in<T>(o), in<T>(d), in<T>(u), in<int64_t>(offsets),
                          out<int64_t>(ray_indices), out<T>(t_starts), out<T>(t_ends));
   });
   return {ray_indices, t_starts, t_ends, offsets};

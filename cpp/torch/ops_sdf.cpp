@@ -165,13 +165,14 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
   require(min_transmittance >= 0 && min_transmittance < 1 && min_weight >= 0 && min_weight < 1, op,
           "min_weight and min_transmittance must be in [0, 1)");
   require(reach >= 0 && anneal >= 0 && anneal <= 1, op, "reach must not be negative, anneal must be in [0, 1]");
-  const MarchOptions march{static_cast<float>(box), static_cast<int>(resolution), static_cast<float>(step), max_samples};
+  const MarchOptions march{static_cast<float>(box), static_cast<float>(step), max_samples};
+  const OccupancyCells occupancy(in<uint8_t>(grid), static_cast<int>(resolution));
   std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> result;
   dispatch_real(field.type, [&](auto zero) {
     using T = decltype(zero);
-    const SampleRules<T> rules{T(s), T(anneal), T(min_weight), T(-std::log(min_transmittance)), T(reach), T(lipschitz)};
+    const SampleRules<T> rules{T(s), T(anneal), T(min_weight), T(-std::log(min_weight)), T(-std::log(min_transmittance)), T(reach), T(lipschitz)};
     std::vector<cpu::SampledRay<T>> rays(n_rays);
-    cpu::sample_rays(field.view<T>(), march, in<uint8_t>(grid), rules, n_rays, in<T>(o), in<T>(d), in<T>(u), rays.data());
+    cpu::sample_rays(field.view<T>(), march, occupancy.view(), rules, n_rays, in<T>(o), in<T>(d), in<T>(u), rays.data());
     result = packed(o, field.type, T(march.step), rays);
   });
   return result;

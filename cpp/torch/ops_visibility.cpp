@@ -49,9 +49,9 @@ std::tuple<Tensor, Tensor> vertex_grids(Tensor vertices, double radius, int64_t 
 // Numbers in [0, high): the grids are walked without further checks.
 void check_indices(const char* op, const char* name, const Tensor& t, int64_t high) {
   const int32_t* values = in<int32_t>(t);
-  bool fits = true;
-  for (int64_t i = 0; i < t.size(0) * t.size(1); ++i) fits = fits && values[i] >= 0 && values[i] < high;
-  require(fits, op, std::string(name) + " must hold numbers in [0, " + std::to_string(high) + ")");
+  int32_t least = 0, most = 0;
+  for (int64_t i = 0, n = t.size(0) * t.size(1); i < n; ++i) least = min_of(least, values[i]), most = max_of(most, values[i]);
+  require(least >= 0 && most < high, op, std::string(name) + " must hold numbers in [0, " + std::to_string(high) + ")");
 }
 
 // The cache as both readers take it.

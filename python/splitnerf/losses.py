@@ -9,8 +9,15 @@ from torch.nn import functional as F
 from splitnerf.config import Config
 from splitnerf.fields import Light
 from splitnerf.fields.sdf import unit_normals
-from splitnerf.ops import MeshScene, fibonacci_directions, occlusion_factors, prefilter_light, sample_ggx_lobe
-from splitnerf.render.renderer import ProbePoints, RenderedRays
+from splitnerf.ops import (
+    MeshScene,
+    fibonacci_directions,
+    occlusion_factors,
+    prefilter_light,
+    quadratic_entropy,
+    sample_ggx_lobe,
+)
+from splitnerf.render.renderer import ProbePoints, RenderedRays, normalised
 
 SATURATED = 254.0 / 255.0
 DARKEST_METAL = 0.4  # normal reflectance
@@ -31,8 +38,8 @@ def weighted_mean(values: Tensor, ray: RenderedRays, chosen: Tensor | None = Non
         ray: The rendered rays.
         chosen: [m] which of the shaded samples; None for all.
     """
-    weights = ray.shares if chosen is None else ray.shares[chosen]
-    return (weights @ (values if values.dim() == 1 else values.sum(1))) / weights.sum().clamp(min=1e-8)
+    weights = ray.normalised_shares if chosen is None else normalised(ray.shares[chosen])
+    return weights @ (values if values.dim() == 1 else values.sum(1))
 
 
 def colour_loss(ray: RenderedRays, target: Tensor, background: Tensor) -> Tensor:
@@ -68,12 +75,12 @@ def monte_carlo_colour_loss(
 def over_background(colour: Tensor, opacity: Tensor, target: Tensor, background: Tensor) -> Tensor:
     """[n_rays, 3] predicted pixels; where the photo is saturated the colour is clipped like it."""
     colour = torch.where(target[:, :3] >= SATURATED, colour.clamp(max=1.0), colour)
-    return colour * opacity[:, None] + background * (1.0 - opacity[:, None])
+    return torch.lerp(background, colour, opacity[:, None])
 
 
 def blended(target: Tensor, background: Tensor) -> Tensor:
     """[n_rays, 3] pixels of the photo over the background."""
-    return target[:, :3] * target[:, 3:] + background * (1.0 - target[:, 3:])
+    return torch.lerp(background, target[:, :3], target[:, 3:])
 
 
 def mask_loss(ray: RenderedRays, alpha: Tensor) -> Tensor:
@@ -83,17 +90,18 @@ def mask_loss(ray: RenderedRays, alpha: Tensor) -> Tensor:
 
 def eikonal_loss(gradients: Tensor) -> Tensor:
     """Mean (|grad f| - 1)^2; 0 without points. Source: Gropp et al. 2020."""
-    return (torch.sqrt((gradients * gradients).sum(-1) + 1e-12) - 1.0).square().sum() / max(1, len(gradients))
+    return (torch.linalg.vector_norm(gradients, dim=-1) - 1.0).square().sum() / max(1, len(gradients))
 
 
 def metal_loss(ray: RenderedRays, form: str = "square") -> Tensor:
     """Weighted mean of m^2 over the shaded samples. Source: SplitNeRF Eq. (18), over all samples, not a tenth."""
-    return weighted_mean(penalty(ray.points.metallic, form), ray)
+    return weighted_mean(penalty(ray.points.metallic.squeeze(1), form), ray)
 
 
 def binary_metal_loss(ray: RenderedRays) -> Tensor:
     """Weighted mean of m (1 - m) over the shaded samples: things are of metal or not."""
-    return weighted_mean(ray.points.metallic * (1.0 - ray.points.metallic), ray)
+    metallic = ray.points.metallic.squeeze(1)
+    return weighted_mean(metallic - metallic.square(), ray)
 
 
 def dark_metal_loss(ray: RenderedRays) -> Tensor:
@@ -102,8 +110,8 @@ def dark_metal_loss(ray: RenderedRays) -> Tensor:
     A dark metal and a black dielectric of F0 = .04 look nearly alike, and there are no dark metals: the common ones
     reflect half of the light and more (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
     """
-    brightest = ray.points.albedo.detach().amax(dim=1, keepdim=True)
-    return weighted_mean(ray.points.metallic * (1.0 - brightest / DARKEST_METAL).clamp(min=0.0), ray)
+    darkness = (1.0 - ray.points.albedo.detach().amax(dim=1) / DARKEST_METAL).clamp(min=0.0)
+    return weighted_mean(ray.points.metallic.squeeze(1) * darkness, ray)
 
 
 def light_loss(light: Light, config: Config, generator: torch.Generator, seed: int) -> Tensor:
@@ -197,9 +205,7 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
     chosen = torch.multinomial(weights + 1e-12, c.entropy_points, replacement=True, generator=generator)
     gloss = torch.cat([points.roughness[chosen], points.metallic[chosen]], dim=1)
     x = torch.cat([torch.log(points.albedo[chosen] + ALBEDO_FLOOR) / c.albedo_width, gloss / c.gloss_width], dim=1)
-    centred = x - x.detach().mean(0)  # so that the square below loses no digits
-    half = 0.5 * centred.square().sum(1)
-    return -torch.log(torch.exp(0.5 * (centred @ centred.T - half[:, None] - half)).mean())
+    return quadratic_entropy(x)
 
 
 def occlusion_loss(

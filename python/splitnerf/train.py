@@ -139,7 +139,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             finetune = progress >= c.finetune_from and scene is not None
             ray = render_rays(
                 model, grid.cells, rays_o, rays_d, jitter, anneal, sample_step(model),
-                probes=losses.draw_probes(c, generator), fixed_materials=finetune,
+                shades_per_ray=c.shades_per_ray, probes=losses.draw_probes(c, generator), fixed_materials=finetune,
             )  # fmt: skip
 
             terms = {"colour": c.colour_weight * losses.colour_loss(ray, target, background)}

@@ -277,8 +277,8 @@ class TestRendering:
         jitter = torch.full((len(rays_o),), 0.5)
         colours = []
         for threshold, shades in ((0.0, 0), (1e-3, 0), (1e-3, 4)):
-            model.config.sample_above, model.config.shades_per_ray = threshold, shades
-            ray = render_rays(model, grid.cells, rays_o, rays_d, jitter, 1.0, sample_step(model))
+            model.config.sample_above = threshold
+            ray = render_rays(model, grid.cells, rays_o, rays_d, jitter, 1.0, sample_step(model), shades_per_ray=shades)
             colours.append((ray.colour * ray.opacity[:, None]).detach())
         assert (colours[0] - colours[1]).abs().max() < 0.02
         assert (colours[1] - colours[2]).abs().max() < 0.02

@@ -74,6 +74,9 @@ template <class T> struct Kernels {
   // grad_features [n, C] and grad_jacobian [n, 3, C], overwritten; adds to the weights' gradients.
   void (*sdf_layer_backward)(const SdfLayer<T>&, const SdfPoints<T>&, const T* grad_outputs, const T* grad_gradient,
                              T* work, T* grad_features, T* grad_jacobian, const SdfLayerGrad<T>&);
+  // likeness[j] = k_ij = exp(-|x_i - x_j|^2 / 4), i = point, work memory of n; sums = {sum_j k_ij (x_i - x_j) for each
+  // channel, sum_j k_ij}. planes [n_channels, n] hold x.
+  void (*pair_likeness)(int64_t n, int64_t n_channels, const T* planes, int64_t point, T* likeness, T* sums);
   // sums[i - begin] = {sum K r, sum K g, sum K b, sum K} over the sources, for queries [begin, end).
   void (*lobe_gather)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
   // sums[i - begin] = {sum K r, sum K g, sum K b} over the queries, for lights [begin, end).

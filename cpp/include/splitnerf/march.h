@@ -1,6 +1,9 @@
 // Marching rays through an occupancy grid.
 #pragma once
 
+#include <cstring>
+#include <vector>
+
 #include "splitnerf/vec.h"
 
 namespace splitnerf {
@@ -9,9 +12,51 @@ namespace splitnerf {
 // that reaches one ends there.
 enum class Cell : uint8_t { kEmpty = 0, kOccupied = 1, kOpaque = 2 };
 
+inline constexpr int kBlockCells = 8;  // along an edge of a block of cells
+
+// Cells [x][y][z], and which blocks of them hold one that is not empty: the others are crossed in one go.
+struct OccupancyView {
+  const uint8_t *cells, *blocks;
+  int resolution, n_blocks;  // along an edge
+
+  SPLITNERF_HD static int64_t at(int x, int y, int z, int n) { return (static_cast<int64_t>(x) * n + y) * n + z; }
+  SPLITNERF_HD bool empty_block(const int* cell) const {
+    return !blocks[at(cell[0] / kBlockCells, cell[1] / kBlockCells, cell[2] / kBlockCells, n_blocks)];
+  }
+  SPLITNERF_HD Cell cell(const int* cell) const { return static_cast<Cell>(cells[at(cell[0], cell[1], cell[2], resolution)]); }
+};
+
+// Finds the blocks of a grid, which it does not own.
+class OccupancyCells {
+ public:
+  OccupancyCells(const uint8_t* cells, int resolution) : n_blocks_((resolution + kBlockCells - 1) / kBlockCells) {
+    blocks_.resize(int64_t{n_blocks_} * n_blocks_ * n_blocks_);
+    view_ = {cells, blocks_.data(), resolution, n_blocks_};
+    for (int x = 0; x < resolution; ++x) {
+      for (int y = 0; y < resolution; ++y) {
+        const uint8_t* row = cells + OccupancyView::at(x, y, 0, resolution);
+        uint8_t* blocks = &blocks_[OccupancyView::at(x / kBlockCells, y / kBlockCells, 0, n_blocks_)];
+        for (int b = 0; b < n_blocks_; ++b) {
+          uint64_t word = 0;
+          std::memcpy(&word, row + b * kBlockCells, min_of(kBlockCells, resolution - b * kBlockCells));
+          blocks[b] |= word != 0;
+        }
+      }
+    }
+  }
+  OccupancyCells(const OccupancyCells&) = delete;
+  OccupancyCells& operator=(const OccupancyCells&) = delete;
+
+  const OccupancyView& view() const { return view_; }
+
+ private:
+  int n_blocks_;
+  std::vector<uint8_t> blocks_;
+  OccupancyView view_;
+};
+
 struct MarchOptions {
   float box;          // half size of the cube [-box, box]^3 that the grid covers
-  int resolution;     // cells along an edge; cells are [x][y][z]
   float step;         // length of one sample, scene units
   int64_t max_samples;  // of one ray
 };
@@ -30,12 +75,12 @@ template <class T> SPLITNERF_HD void clip_slab(T origin, T direction, T box, T& 
 // The samples of one ray: number k is [lattice + k step, lattice + (k + 1) step], and counts where its midpoint
 // stands in the box. jitter in [0, 1) shifts the lattice.
 template <class T> struct RayLattice {
-  Vec3<T> origin, direction;
+  Vec3<T> origin, direction, inverse_direction;
   T t_near, t_far, lattice, step;
   int64_t n_steps;  // 0: the ray misses the box
 
   SPLITNERF_HD RayLattice(Vec3<T> o, Vec3<T> d, T jitter, const MarchOptions& options)
-      : origin(o), direction(d), t_near(T(0)), t_far(T(INFINITY)), lattice(T(0)), step(T(options.step)), n_steps(0) {
+      : origin(o), direction(d), inverse_direction{T(1) / d.x, T(1) / d.y, T(1) / d.z}, t_near(T(0)), t_far(T(INFINITY)), lattice(T(0)), step(T(options.step)), n_steps(0) {
     if (!(dot(o, o) + dot(d, d) < T(INFINITY))) return;  // a ray that is not finite meets nothing
     for (int axis = 0; axis < 3; ++axis) clip_slab(o[axis], d[axis], T(options.box), t_near, t_far);
     if (!(t_near < t_far) || !(t_far < T(INFINITY))) return;
@@ -46,11 +91,11 @@ template <class T> struct RayLattice {
   SPLITNERF_HD Vec3<T> middle(int64_t k) const { return origin + direction * (start(k) + T(0.5) * step); }
 };
 
-// The first sample from k on whose midpoint stands in an occupied cell; -1 where the ray ends before. Empty cells
-// are crossed in one go: k advances to the first midpoint behind the cell's exit.
+// The first sample from k on whose midpoint stands in an occupied cell; -1 where the ray ends before. Empty blocks and
+// cells are crossed in one go: k advances to the first midpoint behind the exit.
 template <class T>
-SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const uint8_t* cells, const MarchOptions& options, int64_t k) {
-  const T box = T(options.box), cells_per_unit = T(options.resolution) / (T(2) * box);
+SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView& grid, const MarchOptions& options, int64_t k) {
+  const T box = T(options.box), cell_size = T(2) * box / T(grid.resolution), cells_per_unit = T(1) / cell_size;
   const Vec3<T>&o = ray.origin, &d = ray.direction;
   while (k < ray.n_steps) {
     const T t_mid = ray.start(k) + T(0.5) * ray.step;
@@ -61,16 +106,19 @@ SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const uint8_t* cell
     if (t_mid >= ray.t_far) return -1;
     int cell[3];
     for (int axis = 0; axis < 3; ++axis)
-      cell[axis] = clamp(static_cast<int>((o[axis] + t_mid * d[axis] + box) * cells_per_unit), 0, options.resolution - 1);
-    const auto state = static_cast<Cell>(
-        cells[(static_cast<int64_t>(cell[0]) * options.resolution + cell[1]) * options.resolution + cell[2]]);
-    if (state == Cell::kOpaque) return -1;
-    if (state == Cell::kOccupied) return k;
+      cell[axis] = clamp(static_cast<int>((o[axis] + t_mid * d[axis] + box) * cells_per_unit), 0, grid.resolution - 1);
+    int size = kBlockCells;  // of what is crossed
+    if (!grid.empty_block(cell)) {
+      const Cell state = grid.cell(cell);
+      if (state == Cell::kOpaque) return -1;
+      if (state == Cell::kOccupied) return k;
+      size = 1;
+    }
     T t_exit = ray.t_far;
     for (int axis = 0; axis < 3; ++axis) {
       if (d[axis] == T(0)) continue;
-      const T face = T(cell[axis] + (d[axis] > T(0) ? 1 : 0)) / cells_per_unit - box;
-      t_exit = min_of(t_exit, (face - o[axis]) / d[axis]);
+      const int face = cell[axis] / size * size + (d[axis] > T(0) ? size : 0);
+      t_exit = min_of(t_exit, (T(face) * cell_size - box - o[axis]) * ray.inverse_direction[axis]);
     }
     k = max_of(k + 1, static_cast<int64_t>(std::ceil((t_exit - ray.lattice) / ray.step - T(0.5))));
   }
@@ -79,11 +127,11 @@ SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const uint8_t* cell
 
 // Calls emit(t_start, t_end) for each sample in an occupied cell, front to back; returns their number.
 template <class T, class Emit>
-SPLITNERF_HD int64_t march_ray(Vec3<T> o, Vec3<T> d, T jitter, const uint8_t* cells, MarchOptions options, Emit emit) {
+SPLITNERF_HD int64_t march_ray(Vec3<T> o, Vec3<T> d, T jitter, const OccupancyView& grid, MarchOptions options, Emit emit) {
   const RayLattice<T> ray(o, d, jitter, options);
   int64_t n = 0;
-  for (int64_t k = next_occupied(ray, cells, options, 0); k >= 0 && n < options.max_samples;
-       k = next_occupied(ray, cells, options, k + 1), ++n)
+  for (int64_t k = next_occupied(ray, grid, options, 0); k >= 0 && n < options.max_samples;
+       k = next_occupied(ray, grid, options, k + 1), ++n)
     emit(ray.start(k), ray.start(k) + ray.step);
   return n;
 }

@@ -114,14 +114,20 @@ template <class T>
 SPLITNERF_API void shade_sums_backward(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in,
                                        const T* grad_radiance, const SummedArrays<T>& grad);
 
+// ---- priors ----
+
+// x [n, n_channels], n > 0 -> its quadratic entropy and the gradient [n, n_channels] of that.
+template <class T>
+SPLITNERF_API void quadratic_entropy(int64_t n, int64_t n_channels, const T* x, T* entropy, T* gradient);
+
 // ---- rays ----
 
 // jitter [n_rays] in [0, 1). offsets [n_rays + 1] is filled with the exclusive sum of the counts.
 template <class T>
-SPLITNERF_API void march_rays_count(const MarchOptions& options, const uint8_t* cells, int64_t n_rays, const T* rays_o,
+SPLITNERF_API void march_rays_count(const MarchOptions& options, const OccupancyView& grid, int64_t n_rays, const T* rays_o,
                                     const T* rays_d, const T* jitter, int64_t* offsets);
 template <class T>
-SPLITNERF_API void march_rays_fill(const MarchOptions& options, const uint8_t* cells, int64_t n_rays, const T* rays_o,
+SPLITNERF_API void march_rays_fill(const MarchOptions& options, const OccupancyView& grid, int64_t n_rays, const T* rays_o,
                                    const T* rays_d, const T* jitter, const int64_t* offsets, int64_t* ray_indices,
                                    T* t_starts, T* t_ends);
 
@@ -154,7 +160,7 @@ template <class T> struct SampledRay {
 
 // Follows each ray through the occupied cells and asks for the distance on the way, see ray_walk.h. sampled [n_rays].
 template <class T>
-SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& march, const uint8_t* cells,
+SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& march, const OccupancyView& grid,
                                const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d,
                                const T* jitter, SampledRay<T>* sampled);
 

@@ -106,9 +106,9 @@ SPLITNERF_HD Neighbours<T> find_neighbours(const VertexGrids<T>& grids, Vec3<T> 
       const int64_t bucket = cell.bucket(grids.n_buckets);
       for (int32_t j = starts[bucket]; j < starts[bucket + 1]; ++j) {
         const Vec3<T> vertex = load3(grids.vertices + 3 * int64_t(order[j]));
-        const T relative = length(vertex - position) / reach;
-        if (relative >= T(1) || !(grid_cell(vertex, inverse_size) == cell)) continue;
-        const T weight = neighbour_weight(relative, dot(normal, load3(grids.normals + 3 * int64_t(order[j]))));
+        const T squared = dot(vertex - position, vertex - position);
+        if (!(squared < reach * reach) || !(grid_cell(vertex, inverse_size) == cell)) continue;
+        const T weight = neighbour_weight(std::sqrt(squared) / reach, dot(normal, load3(grids.normals + 3 * int64_t(order[j]))));
         if (weight > T(1e-6)) found.add(order[j], weight);
       }
     }

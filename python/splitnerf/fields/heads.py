@@ -41,5 +41,5 @@ class MaterialHead(nn.Module):
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """features [n, n_inputs] -> albedo [n, 3], roughness [n, 1], metallic [n, 1]."""
-        out = torch.sigmoid(self.net(features))
-        return out[:, :3], self.min_roughness + (1.0 - self.min_roughness) * out[:, 3:4], out[:, 4:5]
+        albedo, roughness, metallic = torch.sigmoid(self.net(features)).split([3, 1, 1], dim=1)
+        return albedo, self.min_roughness + (1.0 - self.min_roughness) * roughness, metallic

@@ -68,8 +68,8 @@ class SdfField(nn.Module):
     def _weights(self) -> tuple[Tensor, Tensor]:
         """Weight normalisation: each row is length * direction / |direction|."""
         return (
-            F.normalize(self.hidden_direction, dim=1) * self.hidden_length,
-            F.normalize(self.out_direction, dim=1) * self.out_length,
+            torch._weight_norm(self.hidden_direction, self.hidden_length),
+            torch._weight_norm(self.out_direction, self.out_length),
         )
 
     def _to_unit(self, positions: Tensor) -> Tensor:

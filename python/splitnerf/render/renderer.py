@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -70,6 +71,16 @@ class RenderedRays:
     sdf: Tensor
     points: ShadedPoints
 
+    @functools.cached_property
+    def normalised_shares(self) -> Tensor:
+        """[m] that sum to 1."""
+        return normalised(self.shares)
+
+
+def normalised(weights: Tensor) -> Tensor:
+    """Weights that sum to 1, or to 0 where they are next to nothing."""
+    return weights / weights.sum().clamp(min=1e-8)
+
 
 def sample_step(model: SceneModel) -> float:
     """Length of a sample: it follows the width 1/s of the density, within the configured bounds."""
@@ -103,6 +114,7 @@ def render_rays(
     anneal: float,
     step: float,
     *,
+    shades_per_ray: int = 0,
     probes: ProbePoints | None = None,
     fixed_materials: bool = False,
 ) -> RenderedRays:
@@ -115,6 +127,7 @@ def render_rays(
         jitter: [n_rays] in [0, 1).
         anneal: Of the cosine, 0 at the start, 1 when done.
         step: Length of a sample.
+        shades_per_ray: Samples of a ray that are shaded, about; others take what lies between. 0 shades all.
         probes: More points at which the field is wanted.
         fixed_materials: The colours have a gradient to surface and light alone.
 
@@ -133,7 +146,7 @@ def render_rays(
     )
 
     phase = (PHASES * jitter) % 1.0  # where samples stand shall not decide which are shaded
-    spread = spread_samples(weights.detach(), samples, c.shades_per_ray, phase, SURFACE_GAP * step)
+    spread = spread_samples(weights.detach(), samples, shades_per_ray, phase, SURFACE_GAP * step)
     shaded = spread.shaded
     positions, normals, sdf, view_dirs = positions[shaded], normals[shaded], sdf[shaded], -directions[shaded]
     points = model.shade(
