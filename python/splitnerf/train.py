@@ -8,6 +8,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -25,7 +26,7 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.monte_carlo import monte_carlo_colours
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
-from splitnerf.render.renderer import render_rays, sample_step
+from splitnerf.render.renderer import RenderedRays, render_rays, sample_step
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first ones are logged one by one
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion rays
@@ -41,6 +42,8 @@ class TrainedScene:
 
     model: SceneModel
     grid: OccupancyGrid
+    scene: MeshScene | None
+    n_rays: int
     step: int
     seconds: float
     finished: bool
@@ -112,7 +115,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         model.open_levels(progress_now())
         scene = restore_mesh(model, content)
     model.light.collect()
-    light_steps = c.light_step_every if c.light == "pyramid" else 1
+    light_steps = light_period(c)
     started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True
     psnr_mean = samples_mean = None
     with Interrupt() as interrupt, Progress(progress_now()) as bar, open(run / "metrics.jsonl", "a") as log:
@@ -132,47 +135,15 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             if c.indirect and scene is not None and step % c.indirect_every == 0:
                 model.refresh_indirect()
 
-            rays_o, rays_d, target = source.draw(n_rays)
-            background = torch.rand(n_rays, 3, generator=generator)
-            jitter = torch.rand(n_rays, generator=generator)
-            anneal = min(1.0, progress / c.cos_anneal_by) if c.cos_anneal_by > 0 else 1.0
-            finetune = progress >= c.finetune_from and scene is not None
-            ray = render_rays(
-                model, grid.cells, rays_o, rays_d, jitter, anneal, sample_step(model),
-                shades_per_ray=c.shades_per_ray, probes=losses.draw_probes(c, generator), fixed_materials=finetune,
-            )  # fmt: skip
-
-            terms = {"colour": c.colour_weight * losses.colour_loss(ray, target, background)}
-            if finetune:
-                colours = monte_carlo_colours(model, scene, ray, -rays_d, generator)
-                terms["finetune"] = c.colour_weight * losses.monte_carlo_colour_loss(colours, ray, target, background)
-            terms["eikonal"] = c.eikonal_weight * losses.eikonal_loss(ray.gradients)
-            if c.mask_weight:
-                terms["mask"] = c.mask_weight * losses.mask_loss(ray, target[:, 3])
-            if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
-                terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
-            light_moves = (step + 1) % light_steps == 0 or step + 1 == c.steps
-            if c.neutral_weight and light_moves:  # for all steps since it moved
-                terms["neutral"] = c.neutral_weight * (step % light_steps + 1) * losses.neutral_light_loss(model.light, c, generator)
-            if c.normal_smoothness:
-                terms["smoothness"] = c.normal_smoothness * losses.normal_smoothness_loss(ray)
-            if c.entropy_weight and progress >= c.priors_from:
-                terms["entropy"] = c.entropy_weight * losses.material_entropy_loss(ray, c, generator)
-            if c.metal_regulariser:
-                terms["metal"] = c.metal_weight * losses.metal_loss(ray, c.metal_loss_form)
-            if c.binary_metal_weight and progress >= c.priors_from:
-                terms["binary_metal"] = c.binary_metal_weight * losses.binary_metal_loss(ray)
-            if c.dark_metal_weight:
-                terms["dark_metal"] = c.dark_metal_weight * losses.dark_metal_loss(ray)
-            if traces:
-                terms["occlusion"] = c.occlusion_weight * losses.occlusion_loss(ray, scene, environment, c, generator, step)
+            batch = draw_batch(source, n_rays, generator)
+            ray, terms = batch_losses(model, grid.cells, batch, scene, environment if traces else None, generator, step, progress)
             loss = sum(terms.values())
             if not math.isfinite(loss.item()):
                 bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term.item()))
                 raise Diverged(f"step {step}: the loss is not finite ({bad}); lower --set learning_rate and --resume")
             optimiser.zero_grad(set_to_none=True)
             loss.backward()
-            if light_moves:
+            if light_moves(c, step):
                 model.light.deliver()
             optimiser.step()
 
@@ -181,15 +152,15 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             step, first, seconds = step + 1, False, time.monotonic() - started
             psnr = -10.0 * math.log10(max(terms["colour"].item() / max(c.colour_weight, 1e-12), 1e-10))
             psnr_mean = psnr if psnr_mean is None else 0.95 * psnr_mean + 0.05 * psnr
-            samples_mean = ray.n_evaluated / len(rays_o)
+            samples_mean = ray.n_evaluated / len(batch.target)
             bar.show(progress_now(), step, psnr_mean, samples_mean)
             if step % LOG_EVERY == 0 or step <= LOG_EVERY or progress_now() >= 1.0:
                 log.write(json.dumps({
                     "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss.item(),
                     **{f"loss_{name}": term.item() for name, term in terms.items()}, "psnr": psnr_mean,
-                    "rays": len(rays_o), "samples_per_ray": samples_mean,
+                    "rays": len(batch.target), "samples_per_ray": samples_mean,
                     "kept": n_samples / max(1, ray.n_evaluated), "shaded": len(ray.shaded) / max(1, ray.n_evaluated),
-                    "s": model.s_value,
+                    "s": model.s_value, "sees_all": getattr(model.occlusion, "sees_all", False),
                 }) + "\n")  # fmt: skip
                 log.flush()
             if progress_now() - previewed_at >= c.preview_every:
@@ -204,7 +175,88 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         model.light.collect(False)
         grid.update(model.sdf_field.sdf, model.s_value)
         save()
-    return TrainedScene(model, grid, step, seconds, finished)
+    return TrainedScene(model, grid, scene, n_rays, step, seconds, finished)
+
+
+class Batch(NamedTuple):
+    """Rays of one step, and what they shall look like.
+
+    Attributes:
+        rays_o, rays_d: [n, 3].
+        target: [n, 4] sRGB, straight alpha.
+        background: [n, 3] sRGB behind both.
+        jitter: [n] in [0, 1), of the samples.
+    """
+
+    rays_o: Tensor
+    rays_d: Tensor
+    target: Tensor
+    background: Tensor
+    jitter: Tensor
+
+
+def draw_batch(source: PixelSource, n_rays: int, generator: torch.Generator) -> Batch:
+    rays_o, rays_d, target = source.draw(n_rays)
+    return Batch(rays_o, rays_d, target, torch.rand(n_rays, 3, generator=generator), torch.rand(n_rays, generator=generator))
+
+
+def batch_losses(
+    model: SceneModel, cells: Tensor, batch: Batch, scene: MeshScene | None, environment: Tensor | None,
+    generator: torch.Generator, step: int, progress: float,
+) -> tuple[RenderedRays, dict[str, Tensor]]:  # fmt: skip
+    """The rays as they are rendered now, and the weighted terms of the loss by name.
+
+    Args:
+        model: The scene.
+        cells: [r, r, r] uint8 occupancy.
+        batch: The rays.
+        scene: The surface as a mesh, once there is one.
+        environment: [h, 2h, 3], the light that weighs the occlusion rays; None: none are traced.
+        generator: Draws probes and subsets.
+        step, progress: Where the training stands.
+    """
+    c = model.config
+    anneal = min(1.0, progress / c.cos_anneal_by) if c.cos_anneal_by > 0 else 1.0
+    finetune = progress >= c.finetune_from and scene is not None
+    ray = render_rays(
+        model, cells, batch.rays_o, batch.rays_d, batch.jitter, anneal, sample_step(model),
+        shades_per_ray=c.shades_per_ray, probes=losses.draw_probes(c, generator), fixed_materials=finetune,
+    )  # fmt: skip
+    terms = {"colour": c.colour_weight * losses.colour_loss(ray, batch.target, batch.background)}
+    if finetune:
+        colours = monte_carlo_colours(model, scene, ray, -batch.rays_d, generator)
+        terms["finetune"] = c.colour_weight * losses.monte_carlo_colour_loss(colours, ray, batch.target, batch.background)
+    terms["eikonal"] = c.eikonal_weight * losses.eikonal_loss(ray.gradients)
+    if c.mask_weight:
+        terms["mask"] = c.mask_weight * losses.mask_loss(ray, batch.target[:, 3])
+    if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
+        terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
+    if c.neutral_weight and light_moves(c, step):  # for all steps since it moved
+        since = step % light_period(c) + 1
+        terms["neutral"] = c.neutral_weight * since * losses.neutral_light_loss(model.light, c, generator)
+    if c.normal_smoothness:
+        terms["smoothness"] = c.normal_smoothness * losses.normal_smoothness_loss(ray)
+    if c.entropy_weight and progress >= c.priors_from:
+        terms["entropy"] = c.entropy_weight * losses.material_entropy_loss(ray, c, generator)
+    if c.metal_regulariser:
+        terms["metal"] = c.metal_weight * losses.metal_loss(ray, c.metal_loss_form)
+    if c.binary_metal_weight and progress >= c.priors_from:
+        terms["binary_metal"] = c.binary_metal_weight * losses.binary_metal_loss(ray)
+    if c.dark_metal_weight:
+        terms["dark_metal"] = c.dark_metal_weight * losses.dark_metal_loss(ray)
+    if environment is not None:
+        terms["occlusion"] = c.occlusion_weight * losses.occlusion_loss(ray, scene, environment, c, generator, step)
+    return ray, terms
+
+
+def light_period(config: Config) -> int:
+    """Steps that share one pass through the light's maps."""
+    return config.light_step_every if config.light == "pyramid" else 1
+
+
+def light_moves(config: Config, step: int) -> bool:
+    """Whether the light takes its gradients in this step."""
+    return (step + 1) % light_period(config) == 0 or step + 1 == config.steps
 
 
 def make_optimiser(model: SceneModel, config: Config) -> torch.optim.AdamW:

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+import torch
 import trimesh
 
 from splitnerf.checkpoint import config_of, load_checkpoint
@@ -16,7 +17,7 @@ from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.json_files import write_json
+from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.truth import load_scene_truth, load_view_truths, read_mesh
 from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Evaluated, Protocol, asset_mesh, choose_views, evaluation_path, relit_scores
@@ -26,12 +27,14 @@ from splitnerf.outputs import Exported, evaluate_scene, light_panels, write_asse
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.render.rays import PixelSource
 from splitnerf.report.html import write_report
+from splitnerf.skipped import measure_skips
 from splitnerf.train import TrainedScene, check_same_scene, restore_mesh, train
 
 RUN_FILES = (
     "config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
-    "evaluation.json", "report.html",
+    "evaluation.json", "skipped.json", "report.html",
 )  # fmt: skip
 REPORT_VIEWS = 4
 
@@ -80,6 +83,9 @@ def reconstruct(
     trained = train(dataset, config, run, resume=resume)
     if not trained.finished:
         return trained, None
+    source = PixelSource(dataset, config.foreground_share, torch.Generator().manual_seed(0))
+    skips = measure_skips(trained.model, trained.grid, trained.scene, source, trained.n_rays, trained.step)
+    write_json(run / "skipped.json", {skip.name: skip.text() for skip in skips})
     return trained, finish(trained.model, trained.grid, dataset, test, run, {"training": trained.seconds})
 
 
@@ -124,10 +130,11 @@ def write_run_report(
         truth |= {"rgb": views.images[i, ..., :3], "alpha": views.images[i, ..., 3]}
         pages.append({"name": views.frame_names[i], "truth": truth, "prediction": prediction})
     lines = (run / "metrics.jsonl").read_text().splitlines()
+    skipped = {"Skipped": read_json(run / "skipped.json", "empty space")} if (run / "skipped.json").is_file() else {}
     write_report(
         run / "report.html",
         title=views.name,
-        summary={"Result": headline(evaluation), "All scores": evaluation, "Settings": asdict(model.config)},
+        summary={"Result": headline(evaluation), **skipped, "All scores": evaluation, "Settings": asdict(model.config)},
         views=pages,
         lights=light_panels(model),
         light_truth=load_scene_truth(views.root).light,

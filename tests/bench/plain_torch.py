@@ -33,6 +33,7 @@ from splitnerf.ops import HashGridSpec
 from splitnerf.ops import hash_grid as hash_module
 from splitnerf.ops import light_pyramid as pyramid_module
 from splitnerf.ops import monte_carlo as monte_carlo_module
+from splitnerf.ops import priors as priors_module
 from splitnerf.ops import rays as rays_module
 from splitnerf.ops import shading as shading_module
 from splitnerf.ops import visibility as visibility_module
@@ -333,12 +334,17 @@ class Plain:
         return getattr(self.library, name)
 
 
+def quadratic_entropy(x: Tensor) -> tuple[Tensor, None]:
+    return -torch.log(torch.exp(-0.25 * (x[:, None] - x[None]).square().sum(-1)).mean()), None
+
+
 REPLACED = {
     rays_module: dict(
         march_rays=march_rays, surface_weights=surface_weights, composite=composite, spread_samples=spread_samples,
         interpolate=lambda values, first, second, share: values,
         interpolate_backward=lambda grad, first, second, share, shaded: grad,
     ),
+    priors_module: dict(quadratic_entropy=quadratic_entropy),
     shading_module: dict(query_direction=query_direction, split_sum_shade=split_sum_shade),
     monte_carlo_module: dict(monte_carlo_light=monte_carlo_light, shade_sums=shade_sums),
     pyramid_module: dict(sparse_product=sparse_product, light_lookup=light_lookup),

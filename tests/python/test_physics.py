@@ -11,12 +11,13 @@ from torch.nn import functional as F
 
 from splitnerf import losses
 from splitnerf.config import Config
+from splitnerf.render.renderer import normalised
 
 
 def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
     return SimpleNamespace(
-        weights=torch.tensor(weights), shares=torch.tensor(weights), shaded=torch.arange(len(weights)),
-        points=SimpleNamespace(metallic=torch.tensor(metallic)[:, None]),
+        weights=torch.tensor(weights), shares=torch.tensor(weights), normalised_shares=normalised(torch.tensor(weights)),
+        shaded=torch.arange(len(weights)), points=SimpleNamespace(metallic=torch.tensor(metallic)[:, None]),
     )  # fmt: skip
 
 

@@ -143,6 +143,27 @@ def test_a_lone_sphere_is_open_at_and_between_its_vertices():
             assert (o_d == 1).all() and (o_s == 1).all() and i_d is None
 
 
+@pytest.mark.parametrize("solid, sees_all", [("sphere", True), ("box", True), ("torus", False)])
+def test_convex_surfaces_are_known_to_see_the_whole_sky(solid, sees_all):
+    """What is left out for them changes no factor; asked for or not."""
+    mesh = {
+        "sphere": trimesh.creation.icosphere(4), "box": trimesh.creation.box().subdivide_loop(4), "torus": trimesh.creation.torus(1, 0.4)
+    }[solid]  # fmt: skip
+    vertices, faces = torch.tensor(np.asarray(mesh.vertices)).float(), torch.tensor(np.asarray(mesh.faces))
+    answers = []
+    for open_below in (0.02, 0.0):
+        bits = VisibilityBits(256, OFFSET, 3, True, open_below)
+        bits.trace(scene_of(mesh), vertices, faces)
+        assert bits.sees_all == (sees_all and open_below > 0)
+        n = torch.tensor(np.array(mesh.vertex_normals)).float()
+        answers.append(bits(OcclusionQuery(torch.empty(0), vertices, n, n, torch.full((len(n), 1), 0.3))))
+    (first, second) = answers
+    assert first.diffuse.shape == second.diffuse.shape == (len(vertices), 3)
+    torch.testing.assert_close(first.diffuse, second.diffuse, rtol=0, atol=0.02)
+    torch.testing.assert_close(first.specular, second.specular, rtol=0, atol=0.02)
+    assert (first.diffuse.min() == 1) == sees_all
+
+
 def test_the_sides_of_a_thin_plate_do_not_mix():
     """A lid over one side of a plate thinner than its mesh's spacing darkens that side alone."""
     top, bottom = grid_mesh(1.0, 20, 0.002), grid_mesh(1.0, 20, -0.002)

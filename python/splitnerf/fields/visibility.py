@@ -36,6 +36,12 @@ class CellLight(NamedTuple):
     solid_angles: Tensor
 
 
+def bit_counts(words: Tensor) -> Tensor:
+    """How many bits of [n, k] int32 words are set, [n]."""
+    bits = np.unpackbits(words.contiguous().numpy().view(np.uint8).reshape(len(words), -1), axis=1)
+    return torch.from_numpy(bits.sum(axis=1, dtype=np.int64))
+
+
 class VisibilityBits(nn.Module):
     """o_d and o_s from what each mesh vertex sees in a fixed set of directions, and the light of what it does not see.
 
@@ -48,11 +54,13 @@ class VisibilityBits(nn.Module):
         offset: Rays start this far off a vertex along its normal, scene units.
         n_channels: 1 averages the factors over the colour channels, 3 keeps them.
         indirect: Keep which vertex each blocked ray meets.
+        open_below: A mesh none of whose vertices has a larger share of its directions blocked is taken to see the whole sky:
+            its factors are 1, and nothing is looked up. 0: never.
     """
 
-    def __init__(self, n_directions: int, offset: float, n_channels: int, indirect: bool):
+    def __init__(self, n_directions: int, offset: float, n_channels: int, indirect: bool, open_below: float = 0.0):
         super().__init__()
-        self.offset, self.n_channels, self.indirect = offset, n_channels, indirect
+        self.offset, self.n_channels, self.indirect, self.open_below = offset, n_channels, indirect, open_below
         self.directions = torch.from_numpy(_core.fibonacci_sphere(n_directions)).float()
         height = math.ceil(math.sqrt(TEXELS_PER_CELL * n_directions / 2))
         texels = torch.from_numpy(_core.equirect_directions(height, 2 * height)).float().reshape(-1, 3)
@@ -62,6 +70,7 @@ class VisibilityBits(nn.Module):
         self.light = torch.ones_like(self.directions)
         self._cell_light: tuple[CellLight, object] | None = None
         self.cache: VisibilityCache | None = None
+        self.sees_all = False  # the surface is convex, near enough
         self.radiance: Tensor | None = None
 
     def __getstate__(self) -> dict:
@@ -82,6 +91,9 @@ class VisibilityBits(nn.Module):
             with_hits=self.indirect,
         )  # fmt: skip
         self.radiance = None
+        open_bits, blocked_bits = (bit_counts(self.cache.bits[:, side]) for side in (0, 1))
+        blocked = blocked_bits / (open_bits + blocked_bits).clamp(min=1)
+        self.sees_all = len(blocked) > 0 and blocked.max().item() < self.open_below
 
     @torch.no_grad()
     def set_light(self, light: Light) -> None:
@@ -118,6 +130,8 @@ class VisibilityBits(nn.Module):
     def incoming(self, positions: Tensor, normals: Tensor, light: CellLight) -> Tensor:
         """Radiance [n, k, 3] that arrives at points from each direction, the mesh's own light included. Below the
         horizon it means nothing."""
+        if self.sees_all:
+            return light.radiance.expand(len(positions), -1, 3)
         visible, arriving = cached_visibility(self.cache, positions, normals, self.radiance)
         incoming = visible[..., None] * light.radiance
         return incoming if arriving is None else incoming + arriving
@@ -128,13 +142,16 @@ class VisibilityBits(nn.Module):
 
         The shading itself reads the radiance of the former refresh: a bounce is added each time.
         """
-        if self.indirect and self.cache is not None:
+        if self.indirect and self.cache is not None and not self.sees_all:
             parts = zip(self.cache.vertices.split(SHADED_CHUNK), self.cache.normals.split(SHADED_CHUNK))
             self.radiance = torch.cat([shade(x, n) for x, n in parts])
 
     @torch.no_grad()
     def forward(self, query: OcclusionQuery) -> Occlusion:
         """The factors at points; before :meth:`trace` there is nothing to answer from."""
+        if self.sees_all:
+            ones = torch.ones_like(query.roughness).expand(-1, self.n_channels)
+            return Occlusion(ones, ones)
         o_d, o_s, i_d, i_s = cached_occlusion(
             self.cache, query.positions, query.normals, query.lobe_dirs, query.roughness, self.light, self.radiance
         )

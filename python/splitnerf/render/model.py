@@ -65,7 +65,9 @@ def make_occlusion(config: Config, n_inputs: int) -> OcclusionHead | VisibilityB
             n_inputs, c.occlusion_width, c.occlusion_layers, c.occlusion_channels, c.occlusion_directional
         )
     if c.occlusion == "bits":
-        return VisibilityBits(c.occlusion_directions, c.occlusion_offset, c.occlusion_channels, c.indirect)
+        return VisibilityBits(
+            c.occlusion_directions, c.occlusion_offset, c.occlusion_channels, c.indirect, c.open_below
+        )
     return None
 
 
