@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.config import Config
 from splitnerf.fields import Light
-from splitnerf.fields.sdf import unit_normals
 from splitnerf.ops import (
     MeshScene,
     fibonacci_directions,
@@ -21,7 +22,8 @@ from splitnerf.render.renderer import ProbePoints, RenderedRays, normalised
 
 SATURATED = 254.0 / 255.0
 DARKEST_METAL = 0.4  # normal reflectance
-OTHER_SIDE = 2.0  # squared distance of normals beyond which a neighbour is on the other side of a thin part
+OTHER_SIDE = math.sqrt(2.0)  # distance of normals beyond which a neighbour is on the other side of a thin part
+SHORTEST_GRADIENT = 1e-3  # that has a direction
 ALBEDO_FLOOR = 0.01  # below it albedos count as one black
 
 
@@ -183,10 +185,11 @@ def normal_smoothness_loss(ray: RenderedRays) -> Tensor:
     m = len(ray.beside)
     if m == 0:
         return torch.zeros(())
-    here, there = unit_normals(torch.cat([ray.gradients[ray.beside], ray.gradients[-m:]])).split(m)
-    squared = (there - here).square().sum(-1)
-    weights = ray.weights.detach()[ray.beside] * (squared.detach() < OTHER_SIDE)
-    return weights @ torch.sqrt(squared + 1e-8) / weights.sum().clamp(min=1e-8)
+    gradients = torch.cat([ray.gradients[ray.beside], ray.gradients[-m:]])
+    here, there = F.normalize(gradients, dim=1, eps=SHORTEST_GRADIENT).split(m)
+    apart = torch.linalg.vector_norm(there - here, dim=1)
+    weights = ray.weights.detach()[ray.beside] * (apart.detach() < OTHER_SIDE)
+    return normalised(weights) @ apart
 
 
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:

@@ -27,7 +27,6 @@ from splitnerf.export.simplify import drop_floaters, is_closed
 from splitnerf.export.surface import Surface, surface_materials
 from splitnerf.export.textured import textured_asset
 from splitnerf.export.usdz import require_usd, write_usdz
-from splitnerf.fields.sdf import unit_normals
 from splitnerf.ops import fibonacci_directions, prefilter_light
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
@@ -140,7 +139,7 @@ def surface_of(model: SceneModel) -> Surface:
     def materials(points: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         field = model.surface(points)
         material = model.material(model.head_inputs(points, field.outputs, field.features))
-        return (*material, unit_normals(field.gradient))
+        return (*material, torch.nn.functional.normalize(field.gradient, dim=1))
 
     return Surface(model.sdf_field.sdf, gradient, materials)
 

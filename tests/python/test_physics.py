@@ -103,7 +103,7 @@ def test_normal_smoothness_counts_bends():
         return losses.normal_smoothness_loss(SimpleNamespace(gradients=gradients, beside=beside, weights=torch.ones(1))).item()
 
     crossed = 0.5 * torch.erfc(torch.tensor(0.5) / 2**0.5).item()  # a normal variable beyond half its deviation
-    assert loss(-0.5) == pytest.approx(1e-4, abs=1e-6) and loss(0.5) == pytest.approx(1e-4, abs=1e-6)
+    assert loss(-0.5) == pytest.approx(0.0, abs=1e-6) and loss(0.5) == pytest.approx(0.0, abs=1e-6)
     assert loss(-0.01) == pytest.approx(crossed, rel=0.05)
 
 

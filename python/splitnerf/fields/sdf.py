@@ -129,13 +129,6 @@ class SdfField(nn.Module):
         return SdfSample(outputs, features, (taps[:, 0] - taps[:, 1]) / (2.0 * eps))
 
 
-def unit_normals(gradient: Tensor) -> Tensor:
-    """gradient / sqrt(|gradient|^2 + 1e-12); where |gradient| < 1e-3 no gradient flows back."""
-    squared = (gradient * gradient).sum(-1, keepdim=True)
-    gradient = torch.where(squared < 1e-6, gradient.detach(), gradient)
-    return gradient * torch.rsqrt((gradient * gradient).sum(-1, keepdim=True) + 1e-12)
-
-
 def sharpness(variance: Tensor) -> Tensor:
     """s = exp(10 v) of the NeuS density Phi(f) = sigmoid(s f), exponent clamped to [0, 9]."""
     return torch.exp(torch.clamp(10.0 * variance, 0.0, 9.0))

@@ -73,7 +73,8 @@ def make_occlusion(config: Config, n_inputs: int) -> OcclusionHead | VisibilityB
 
 def turned_to(normals: Tensor, view_dirs: Tensor) -> Tensor:
     """Normals [n, 3] on the viewer's side."""
-    return torch.where((normals * view_dirs).sum(-1, keepdim=True) < 0, -normals, normals)
+    side = (normals.detach() * view_dirs).sum(-1, keepdim=True)
+    return normals * torch.copysign(torch.ones_like(side), side)
 
 
 class SceneModel(nn.Module):

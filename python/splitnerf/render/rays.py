@@ -20,10 +20,22 @@ def pixel_rays(pose: Tensor, intrinsics: Tensor, x: Tensor, y: Tensor) -> tuple[
     Returns:
         origins and unit directions, [n, 3] each.
     """
+    directions = through_pixels(pixel_matrix(pose, intrinsics), x, y)
+    return pose[..., :3, 3].expand_as(directions).contiguous(), directions
+
+
+def pixel_matrix(pose: Tensor, intrinsics: Tensor) -> Tensor:
+    """[..., 3, 3] from (x, y, 1) of an image point to its direction in the world, up to length; of :func:`pixel_rays`."""
     fx, fy, cx, cy = intrinsics.unbind(-1)
-    camera = torch.stack([(x - cx) / fx, (cy - y) / fy, -torch.ones_like(x)], dim=-1)
-    directions = F.normalize((pose[..., :3, :3] @ camera[..., None])[..., 0], dim=-1)
-    return pose[..., :3, 3].expand_as(directions).contiguous(), directions.contiguous()
+    zero, one = torch.zeros_like(fx), torch.ones_like(fx)
+    rows = [1 / fx, zero, -cx / fx, zero, -1 / fy, cy / fy, zero, zero, -one]
+    return pose[..., :3, :3] @ torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
+
+
+def through_pixels(matrix: Tensor, x: Tensor, y: Tensor) -> Tensor:
+    """[n, 3] unit directions through image points x, y [n], by matrices [n, 3, 3] or [3, 3]."""
+    points = torch.stack([x, y, torch.ones_like(x)], dim=-1)
+    return F.normalize((matrix @ points[..., None]).squeeze(-1), dim=-1)
 
 
 def image_rays(pose: Tensor, intrinsics: Tensor, height: int, width: int) -> tuple[Tensor, Tensor]:
@@ -43,6 +55,7 @@ class PixelSource:
     def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator):
         self.pixels = torch.from_numpy(dataset.images).reshape(-1, 4)
         self.poses, self.intrinsics = torch.from_numpy(dataset.poses), torch.from_numpy(dataset.intrinsics)
+        self.matrices, self.origins = pixel_matrix(self.poses, self.intrinsics), self.poses[:, :3, 3].contiguous()
         self.height, self.width = dataset.height, dataset.width
         self.share, self.generator = foreground_share, generator
         margin = max(2, self.width // 50)
@@ -56,6 +69,7 @@ class PixelSource:
         near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), generator=self.generator)]
         anywhere = torch.randint(len(self.pixels), (n - n_near,), generator=self.generator)
         index = torch.cat([near, anywhere])
-        view, row, column = index // (self.height * self.width), index // self.width % self.height, index % self.width
-        rays_o, rays_d = pixel_rays(self.poses[view], self.intrinsics[view], column + 0.5, row + 0.5)
-        return rays_o, rays_d, self.pixels[index]
+        row = index // self.width
+        view, column = row // self.height, index - row * self.width
+        y = row - view * self.height
+        return self.origins[view], through_pixels(self.matrices[view], column + 0.5, y + 0.5), self.pixels[index]
