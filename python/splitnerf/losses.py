@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import torch
 from torch import Tensor
 from torch.nn import functional as F
@@ -18,12 +16,9 @@ from splitnerf.ops import (
     quadratic_entropy,
     sample_ggx_lobe,
 )
-from splitnerf.render.renderer import ProbePoints, RenderedRays, normalised
+from splitnerf.render.renderer import ProbePoints, RenderedRays
 
 SATURATED = 254.0 / 255.0
-DARKEST_METAL = 0.4  # normal reflectance
-OTHER_SIDE = math.sqrt(2.0)  # distance of normals beyond which a neighbour is on the other side of a thin part
-SHORTEST_GRADIENT = 1e-3  # that has a direction
 ALBEDO_FLOOR = 0.01  # below it albedos count as one black
 
 
@@ -32,38 +27,10 @@ def penalty(error: Tensor, form: str) -> Tensor:
     return error.square() if form == "square" else F.smooth_l1_loss(error, torch.zeros_like(error), reduction="none")
 
 
-def weighted_mean(values: Tensor, ray: RenderedRays, chosen: Tensor | None = None) -> Tensor:
-    """Mean of values [m] or [m, c] over shaded samples, the rendering weights normalised; 0 without samples.
-
-    Args:
-        values: Of the samples, per sample summed over c.
-        ray: The rendered rays.
-        chosen: [m] which of the shaded samples; None for all.
-    """
-    weights = ray.normalised_shares if chosen is None else normalised(ray.shares[chosen])
-    return weights @ (values if values.dim() == 1 else values.sum(1))
-
-
-def colour_loss(ray: RenderedRays, target: Tensor, background: Tensor) -> Tensor:
-    """Mean squared sRGB error over the pixels, both over the same background.
-
-    A channel that the photo clipped says only that the truth is at least as bright: there, and only
-    there, the prediction is clipped too.
-
-    Args:
-        ray: The rendered rays.
-        target: [n_rays, 4] sRGB, straight alpha.
-        background: [n_rays, 3] sRGB.
-
-    Source: SplitNeRF Eq. (3).
-    """
-    return F.mse_loss(over_background(ray.colour, ray.opacity, target, background), blended(target, background))
-
-
 def monte_carlo_colour_loss(
     colours: tuple[Tensor, Tensor], ray: RenderedRays, target: Tensor, background: Tensor
 ) -> Tensor:
-    """As :func:`colour_loss` for two independent noisy estimates: the mean product of their errors.
+    """As the colour's error for two independent noisy estimates: the mean product of their errors.
 
     Its expectation is the squared error of the mean; that of one estimate would add the noise's variance, and the
     materials would turn to whatever is less noisy. It can be negative.
@@ -83,37 +50,6 @@ def over_background(colour: Tensor, opacity: Tensor, target: Tensor, background:
 def blended(target: Tensor, background: Tensor) -> Tensor:
     """[n_rays, 3] pixels of the photo over the background."""
     return torch.lerp(background, target[:, :3], target[:, 3:])
-
-
-def mask_loss(ray: RenderedRays, alpha: Tensor) -> Tensor:
-    """Binary cross entropy of the opacity against the mask [n_rays]. Source: NeuS Eq. (17)."""
-    return F.binary_cross_entropy(ray.opacity.clamp(1e-3, 1.0 - 1e-3), alpha)
-
-
-def eikonal_loss(gradients: Tensor) -> Tensor:
-    """Mean (|grad f| - 1)^2; 0 without points. Source: Gropp et al. 2020."""
-    return (torch.linalg.vector_norm(gradients, dim=-1) - 1.0).square().sum() / max(1, len(gradients))
-
-
-def metal_loss(ray: RenderedRays, form: str = "square") -> Tensor:
-    """Weighted mean of m^2 over the shaded samples. Source: SplitNeRF Eq. (18), over all samples, not a tenth."""
-    return weighted_mean(penalty(ray.points.metallic.squeeze(1), form), ray)
-
-
-def binary_metal_loss(ray: RenderedRays) -> Tensor:
-    """Weighted mean of m (1 - m) over the shaded samples: things are of metal or not."""
-    metallic = ray.points.metallic.squeeze(1)
-    return weighted_mean(metallic - metallic.square(), ray)
-
-
-def dark_metal_loss(ray: RenderedRays) -> Tensor:
-    """Weighted mean of m (1 - F0 / .4)+ over the shaded samples, F0 the brightest channel of the albedo, taken as given.
-
-    A dark metal and a black dielectric of F0 = .04 look nearly alike, and there are no dark metals: the common ones
-    reflect half of the light and more (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
-    """
-    darkness = (1.0 - ray.points.albedo.detach().amax(dim=1) / DARKEST_METAL).clamp(min=0.0)
-    return weighted_mean(ray.points.metallic.squeeze(1) * darkness, ray)
 
 
 def light_loss(light: Light, config: Config, generator: torch.Generator, seed: int) -> Tensor:
@@ -175,23 +111,6 @@ def draw_probes(config: Config, generator: torch.Generator) -> ProbePoints:
     )
 
 
-def normal_smoothness_loss(ray: RenderedRays) -> Tensor:
-    """Mean distance of the unit normals of samples from those at points beside them, by the rendering weights.
-
-    Of the surfaces that explain the images this prefers the one that wavers least: the distance adds up to the same
-    along a smooth bend and along a sharp edge, so that edges stay. Neighbours on the other side of a thin part, whose normals
-    are more than 90 degrees off, do not count.
-    """
-    m = len(ray.beside)
-    if m == 0:
-        return torch.zeros(())
-    gradients = torch.cat([ray.gradients[ray.beside], ray.gradients[-m:]])
-    here, there = F.normalize(gradients, dim=1, eps=SHORTEST_GRADIENT).split(m)
-    apart = torch.linalg.vector_norm(there - here, dim=1)
-    weights = ray.weights.detach()[ray.beside] * (apart.detach() < OTHER_SIDE)
-    return normalised(weights) @ apart
-
-
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:
     """Quadratic entropy of the materials of surface points, -ln mean exp(-|x_i - x_j|^2 / 4) over all pairs.
 
@@ -235,4 +154,5 @@ def occlusion_loss(
         )  # fmt: skip
     error_d, error_s = ray.points.occlusion_d[chosen] - o_d, ray.points.occlusion_s[chosen] - o_s
     error = penalty(error_d, c.occlusion_loss_form) + penalty(error_s, c.occlusion_loss_form)
-    return weighted_mean(error, ray, chosen) / c.occlusion_channels
+    shares = ray.shares[chosen]
+    return shares @ error.sum(1) / (shares.sum().clamp(min=1e-8) * c.occlusion_channels)

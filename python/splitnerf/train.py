@@ -19,7 +19,7 @@ from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
 from splitnerf.errors import InputError
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
-from splitnerf.ops import MeshScene
+from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
 from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.render.model import SceneModel
@@ -222,28 +222,32 @@ def batch_losses(
         model, cells, batch.rays_o, batch.rays_d, batch.jitter, anneal, sample_step(model),
         shades_per_ray=c.shades_per_ray, probes=losses.draw_probes(c, generator), fixed_materials=finetune,
     )  # fmt: skip
-    terms = {"colour": c.colour_weight * losses.colour_loss(ray, batch.target, batch.background)}
+    colour, mask = pixel_losses(ray.mean, ray.opacity, batch.target, batch.background, linear=ray.linear)
+    eikonal, smoothness = gradient_losses(ray.gradients, ray.weights.detach(), ray.beside)
+    metal, binary_metal, dark_metal = material_losses(
+        ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.metal_loss_form == "smooth_l1"
+    )
+    terms = {"colour": c.colour_weight * colour, "eikonal": c.eikonal_weight * eikonal}
     if finetune:
         colours = monte_carlo_colours(model, scene, ray, -batch.rays_d, generator)
         terms["finetune"] = c.colour_weight * losses.monte_carlo_colour_loss(colours, ray, batch.target, batch.background)
-    terms["eikonal"] = c.eikonal_weight * losses.eikonal_loss(ray.gradients)
     if c.mask_weight:
-        terms["mask"] = c.mask_weight * losses.mask_loss(ray, batch.target[:, 3])
+        terms["mask"] = c.mask_weight * mask
     if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
         terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
     if c.neutral_weight and light_moves(c, step):  # for all steps since it moved
         since = step % light_period(c) + 1
         terms["neutral"] = c.neutral_weight * since * losses.neutral_light_loss(model.light, c, generator)
     if c.normal_smoothness:
-        terms["smoothness"] = c.normal_smoothness * losses.normal_smoothness_loss(ray)
+        terms["smoothness"] = c.normal_smoothness * smoothness
     if c.entropy_weight and progress >= c.priors_from:
         terms["entropy"] = c.entropy_weight * losses.material_entropy_loss(ray, c, generator)
     if c.metal_regulariser:
-        terms["metal"] = c.metal_weight * losses.metal_loss(ray, c.metal_loss_form)
+        terms["metal"] = c.metal_weight * metal
     if c.binary_metal_weight and progress >= c.priors_from:
-        terms["binary_metal"] = c.binary_metal_weight * losses.binary_metal_loss(ray)
+        terms["binary_metal"] = c.binary_metal_weight * binary_metal
     if c.dark_metal_weight:
-        terms["dark_metal"] = c.dark_metal_weight * losses.dark_metal_loss(ray)
+        terms["dark_metal"] = c.dark_metal_weight * dark_metal
     if environment is not None:
         terms["occlusion"] = c.occlusion_weight * losses.occlusion_loss(ray, scene, environment, c, generator, step)
     return ray, terms

@@ -17,6 +17,7 @@ import functools
 import math
 import shutil
 import statistics
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -25,7 +26,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-import splitnerf.ops as ops
+sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
+import reference  # noqa: E402
+
+import splitnerf.ops as ops  # noqa: E402
 from splitnerf import train as training
 from splitnerf.config import Config
 from splitnerf.fields.sdf import SOFTPLUS_BETA, SdfField, SdfSample
@@ -33,7 +37,7 @@ from splitnerf.ops import HashGridSpec
 from splitnerf.ops import hash_grid as hash_module
 from splitnerf.ops import light_pyramid as pyramid_module
 from splitnerf.ops import monte_carlo as monte_carlo_module
-from splitnerf.ops import priors as priors_module
+from splitnerf.ops import losses as losses_module
 from splitnerf.ops import rays as rays_module
 from splitnerf.ops import shading as shading_module
 from splitnerf.ops import visibility as visibility_module
@@ -334,6 +338,11 @@ class Plain:
         return getattr(self.library, name)
 
 
+def stacked(losses):
+    """As the operators return them: all in the first tensor."""
+    return lambda *inputs: (torch.stack(losses(*inputs)), None)
+
+
 def quadratic_entropy(x: Tensor) -> tuple[Tensor, None]:
     return -torch.log(torch.exp(-0.25 * (x[:, None] - x[None]).square().sum(-1)).mean()), None
 
@@ -344,7 +353,10 @@ REPLACED = {
         interpolate=lambda values, first, second, share: values,
         interpolate_backward=lambda grad, first, second, share, shaded: grad,
     ),
-    priors_module: dict(quadratic_entropy=quadratic_entropy),
+    losses_module: dict(
+        quadratic_entropy=quadratic_entropy, pixel_losses=stacked(reference.pixel_losses),
+        gradient_losses=stacked(reference.gradient_losses), material_losses=stacked(reference.material_losses),
+    ),
     shading_module: dict(query_direction=query_direction, split_sum_shade=split_sum_shade),
     monte_carlo_module: dict(monte_carlo_light=monte_carlo_light, shade_sums=shade_sums),
     pyramid_module: dict(sparse_product=sparse_product, light_lookup=light_lookup),

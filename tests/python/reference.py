@@ -135,3 +135,33 @@ def march_ray(origin, direction, jitter, cells, box, step, max_samples) -> list[
         if cells[cell] == 1:
             starts.append(start)
     return starts
+
+
+def srgb(linear: torch.Tensor) -> torch.Tensor:
+    power = 1.055 * linear.clamp(min=0.0031308) ** (1 / 2.4) - 0.055
+    return torch.where(linear <= 0.0031308, 12.92 * linear.clamp(min=0), power)
+
+
+def pixel_losses(mean, opacity, target, background, linear: bool = True) -> tuple[torch.Tensor, torch.Tensor]:
+    colour = srgb(mean) if linear else mean
+    colour = torch.where(target[:, :3] >= 254 / 255, colour.clamp(max=1), colour)
+    o, a = opacity[:, None], target[:, 3:]
+    error = colour * o + background * (1 - o) - (target[:, :3] * a + background * (1 - a))
+    mask = torch.nn.functional.binary_cross_entropy(opacity.clamp(1e-3, 1 - 1e-3), target[:, 3])
+    return error.square().mean(), mask
+
+
+def gradient_losses(gradients, weights, beside) -> tuple[torch.Tensor, torch.Tensor]:
+    m = len(beside)
+    eikonal = (torch.sqrt(gradients.square().sum(-1) + 1e-24) - 1).square().mean()
+    here, there = (torch.nn.functional.normalize(g, dim=1) for g in (gradients[beside], gradients[len(gradients) - m :]))
+    apart = (there - here).square().sum(1)
+    counts = weights[beside] * (apart.detach() < 2)
+    return eikonal, (counts * torch.sqrt(apart + 1e-24)).sum() / counts.sum().clamp(min=1e-8)
+
+
+def material_losses(albedo, metallic, shares, smooth_l1: bool = False) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    m, shares = metallic[:, 0], shares / shares.sum()
+    metal = torch.nn.functional.smooth_l1_loss(m, torch.zeros_like(m), reduction="none") if smooth_l1 else m.square()
+    darkness = (1 - albedo.detach().amax(1) / 0.4).clamp(min=0)
+    return shares @ metal, shares @ (m * (1 - m)), shares @ (m * darkness)

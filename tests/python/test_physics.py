@@ -11,27 +11,13 @@ from torch.nn import functional as F
 
 from splitnerf import losses
 from splitnerf.config import Config
-from splitnerf.render.renderer import normalised
 
 
 def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
     return SimpleNamespace(
-        weights=torch.tensor(weights), shares=torch.tensor(weights), normalised_shares=normalised(torch.tensor(weights)),
-        shaded=torch.arange(len(weights)), points=SimpleNamespace(metallic=torch.tensor(metallic)[:, None]),
+        weights=torch.tensor(weights), shares=torch.tensor(weights), shaded=torch.arange(len(weights)),
+        points=SimpleNamespace(metallic=torch.tensor(metallic)[:, None]),
     )  # fmt: skip
-
-
-def test_metal_loss_is_the_weighted_square():
-    assert losses.metal_loss(rays([0.5, 0.25], [1.0, 0.4])).item() == pytest.approx((0.5 + 0.25 * 0.16) / 0.75)
-    assert losses.metal_loss(rays([1.0], [0.4]), "smooth_l1").item() == pytest.approx(0.08)
-    assert losses.binary_metal_loss(rays([0.5, 0.25], [1.0, 0.4])).item() == pytest.approx(0.25 * 0.24 / 0.75)
-
-
-def test_a_batch_without_samples_costs_nothing():
-    nothing = rays([], [])
-    nothing.points.albedo = torch.zeros(0, 3)
-    for loss in (losses.metal_loss(nothing), losses.dark_metal_loss(nothing), losses.eikonal_loss(torch.zeros(0, 3))):
-        assert loss.item() == 0.0
 
 
 def test_occlusion_loss_is_the_weighted_square_of_what_is_off(monkeypatch):
@@ -80,42 +66,6 @@ def test_neutral_light_loss_measures_chroma_alone():
     assert losses.neutral_light_loss(Sky([3.0, 3.0, 3.0], 0.0), config, generator).item() == pytest.approx(0.0, abs=1e-9)
     tinted = losses.neutral_light_loss(Sky([1.0, 1.0, 1.0], 0.6), config, generator).item()
     assert tinted == pytest.approx(2.0 / 3.0 * 0.36 / 3.0, rel=0.03)
-
-
-def crease(positions: torch.Tensor) -> torch.Tensor:
-    """Normals up on the left of x = 0, and on its right, by 60 degrees to the side."""
-    right = (positions[:, :1] > 0).float()
-    tilted = torch.tensor([math.sin(math.pi / 3), 0.0, math.cos(math.pi / 3)])
-    return right * tilted + (1 - right) * torch.tensor([0.0, 0.0, 1.0])
-
-
-def test_normal_smoothness_counts_bends():
-    """Flat ground costs nothing; beside an edge of 60 degrees, whose normals are 1 apart, the share that the shift
-    carries across it."""
-    config = Config().replace({"smoothness_points": 20000, "smoothness_radius": 0.02, "eikonal_points": 3})
-    probes = losses.draw_probes(config, torch.Generator().manual_seed(0))
-    assert probes.anywhere.shape == (3, 3) and probes.chosen.shape == (20000,)
-
-    def loss(x: float) -> float:
-        at = torch.tensor([[x, 0.0, 0.0]])
-        gradients = 7 * torch.cat([crease(at), crease(probes.anywhere), crease(at + probes.shifts)])
-        beside = torch.zeros(20000, dtype=torch.int64)
-        return losses.normal_smoothness_loss(SimpleNamespace(gradients=gradients, beside=beside, weights=torch.ones(1))).item()
-
-    crossed = 0.5 * torch.erfc(torch.tensor(0.5) / 2**0.5).item()  # a normal variable beyond half its deviation
-    assert loss(-0.5) == pytest.approx(0.0, abs=1e-6) and loss(0.5) == pytest.approx(0.0, abs=1e-6)
-    assert loss(-0.01) == pytest.approx(crossed, rel=0.05)
-
-
-def test_dark_metal_loss_spares_bright_metals_and_dielectrics():
-    ray = rays([0.5, 0.5, 0.5], [1.0, 1.0, 0.0])
-    ray.points.albedo = torch.tensor([[0.1, 0.2, 0.0], [0.5, 0.1, 0.1], [0.01, 0.01, 0.01]]).requires_grad_()
-    ray.points.metallic.requires_grad_()
-    loss = losses.dark_metal_loss(ray)
-    assert loss.item() == pytest.approx((1 - 0.2 / 0.4) / 3)
-    loss.backward()
-    assert ray.points.albedo.grad is None
-    torch.testing.assert_close(ray.points.metallic.grad[:, 0] * 3, torch.tensor([0.5, 0.0, 1 - 0.01 / 0.4]))
 
 
 def entropy(albedo: list[float], weights: list[float] | None = None, roughness: list[float] | None = None) -> float:

@@ -114,7 +114,21 @@ template <class T>
 SPLITNERF_API void shade_sums_backward(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in,
                                        const T* grad_radiance, const SummedArrays<T>& grad);
 
-// ---- priors ----
+// ---- losses, with their gradients ----
+
+// mean, background [n, 3], opacity [n], target [n, 4] -> losses [2]: colour and mask, means over the values and the rays.
+template <class T>
+SPLITNERF_API void pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, const T* background, bool linear,
+                                T* losses, T* colour_by_mean, T* colour_by_opacity, T* mask_by_opacity);
+// gradients [n, 3], the last m of which stand beside those at beside [m], weights of the first ones -> losses [2]: eikonal,
+// smoothness; their gradients [n, 3] each.
+template <class T>
+SPLITNERF_API void gradient_losses(int64_t n, int64_t m, const T* gradients, const T* weights, const int64_t* beside, T* losses,
+                                   T* eikonal_by, T* smoothness_by);
+// albedo [n, 3], metallic, shares [n] -> losses [3]: metal, binary, dark, means by the shares; by_metallic [3, n].
+template <class T>
+SPLITNERF_API void material_losses(int64_t n, const T* albedo, const T* metallic, const T* shares, bool smooth_l1, T* losses,
+                                   T* by_metallic);
 
 // x [n, n_channels], n > 0 -> its quadratic entropy and the gradient [n, n_channels] of that.
 template <class T>

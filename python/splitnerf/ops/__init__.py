@@ -12,9 +12,9 @@ from splitnerf.ops.light_pyramid import (
     sparse_product,
     zonal_factors,
 )
+from splitnerf.ops.losses import gradient_losses, material_losses, pixel_losses, quadratic_entropy
 from splitnerf.ops.monte_carlo import LightSums, monte_carlo_light, sample_bsdf, shade_sums
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
-from splitnerf.ops.priors import quadratic_entropy
 from splitnerf.ops.rays import (
     CELL_EMPTY,
     CELL_OCCUPIED,
@@ -35,9 +35,9 @@ __all__ = [
     "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "QUERIES", "HashGrid", "HashGridSpec", "LightSums",
     "MeshScene", "PackedSamples", "SdfNetwork", "SparseMap", "Spread", "VisibilityCache", "brdf_lut", "cached_occlusion",
     "cached_visibility", "composite",
-    "fibonacci_directions", "growth_for", "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters",
-    "light_lookup", "light_sum_of_levels", "march_rays", "monte_carlo_light", "neus_weights", "occlusion_factors",
-    "prefilter_light", "quadratic_entropy", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer",
+    "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters",
+    "light_lookup", "light_sum_of_levels", "march_rays", "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors",
+    "pixel_losses",     "prefilter_light", "quadratic_entropy", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer",
     "sdf_values", "sh_projection", "shade_sums", "sparse_product", "split_sum_shade", "spread_samples", "surface_weights",
     "trace_visibility", "visibility_bits", "zonal_factors",
 ]  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -39,7 +38,8 @@ class RenderedRays:
     """What one batch of rays leaves behind.
 
     Attributes:
-        colour: [n_rays, 3] sRGB of the object alone, un-premultiplied, not clipped above 1.
+        mean: [n_rays, 3] colour of the object alone, un-premultiplied, not clipped above 1.
+        linear: Whether that is linear, or sRGB.
         opacity: [n_rays].
         samples: The packed samples.
         n_evaluated: Points at which the distance was asked for.
@@ -56,7 +56,8 @@ class RenderedRays:
         points: Their materials and light.
     """
 
-    colour: Tensor
+    mean: Tensor
+    linear: bool
     opacity: Tensor
     samples: PackedSamples
     n_evaluated: int
@@ -71,15 +72,10 @@ class RenderedRays:
     sdf: Tensor
     points: ShadedPoints
 
-    @functools.cached_property
-    def normalised_shares(self) -> Tensor:
-        """[m] that sum to 1."""
-        return normalised(self.shares)
-
-
-def normalised(weights: Tensor) -> Tensor:
-    """Weights that sum to 1, or to 0 where they are next to nothing."""
-    return weights / weights.sum().clamp(min=1e-8)
+    @property
+    def colour(self) -> Tensor:
+        """[n_rays, 3] the same in sRGB."""
+        return linear_to_srgb(self.mean) if self.linear else self.mean
 
 
 def sample_step(model: SceneModel) -> float:
@@ -162,9 +158,8 @@ def render_rays(
             on_surface, normals[at], view_dirs[at], points, at, fixed_materials=fixed_materials
         )
         mean = mean.index_add(0, samples.ray_indices[shaded[at]], added)
-    colour = linear_to_srgb(mean) if c.compositing == "linear" else mean
     return RenderedRays(
-        colour, opacity, samples, n_evaluated, weights, values, field.gradient, beside, shaded, shares, positions, normals,
+        mean, c.compositing == "linear", opacity, samples, n_evaluated, weights, values, field.gradient, beside, shaded, shares, positions, normals,
         sdf, points,
     )  # fmt: skip
 

@@ -1,0 +1,96 @@
+// Terms of the training loss, each with its gradient: of pixels, of the field's gradients, and of materials.
+#pragma once
+
+#include "splitnerf/neus.h"
+#include "splitnerf/vec.h"
+
+namespace splitnerf {
+
+template <class T> struct ValueAndSlope {
+  T value, slope;
+};
+
+// IEC 61966-2-1, not clipped above 1; values below 0 count as 0, with the slope of 0.
+template <class T> SPLITNERF_HD ValueAndSlope<T> srgb_from_linear(T linear) {
+  if (linear <= T(0.0031308)) return {T(12.92) * max_of(linear, T(0)), linear < T(0) ? T(0) : T(12.92)};
+  const T power = T(1.055) * std::pow(linear, T(1) / T(2.4));
+  return {power - T(0.055), power / (T(2.4) * linear)};
+}
+
+// ---- pixels ----------------------------------------------------------------------------------
+
+inline constexpr double kSaturated = 254.0 / 255.0;  // of a photo's channel: the truth is at least as bright
+inline constexpr double kLeastOpacity = 1e-3;         // in the mask's logarithms
+
+// Squared error of a pixel against the photo, both over one background, summed over the channels, and the cross entropy of
+// its opacity against the mask, with their gradients. Where the photo is saturated the colour is clipped like it.
+//   C = b + o (c - b),  c = sRGB(mean)                   Source: SplitNeRF Eq. (3); the mask: NeuS Eq. (17).
+template <class T> struct PixelLosses {
+  T colour, mask;
+  Vec3<T> colour_by_mean;
+  T colour_by_opacity, mask_by_opacity;
+};
+template <class T>
+SPLITNERF_HD PixelLosses<T> pixel_losses(Vec3<T> mean, T opacity, const T* target, Vec3<T> background, bool linear) {
+  PixelLosses<T> out{};
+  const T alpha = target[3];
+  for (int k = 0; k < 3; ++k) {
+    ValueAndSlope<T> c = linear ? srgb_from_linear(mean[k]) : ValueAndSlope<T>{mean[k], T(1)};
+    if (target[k] >= T(kSaturated) && c.value > T(1)) c = {T(1), T(0)};
+    const T b = background[k], error = lerp(b, c.value, opacity) - lerp(b, target[k], alpha);
+    out.colour += square(error);
+    out.colour_by_mean[k] = T(2) * error * opacity * c.slope;
+    out.colour_by_opacity += T(2) * error * (c.value - b);
+  }
+  const T o = clamp(opacity, T(kLeastOpacity), T(1) - T(kLeastOpacity));
+  out.mask = -(alpha * std::log(o) + (T(1) - alpha) * std::log1p(-o));
+  out.mask_by_opacity = o == opacity ? (o - alpha) / (o * (T(1) - o)) : T(0);
+  return out;
+}
+
+// ---- gradients of the field ------------------------------------------------------------------
+
+// (|g| - 1)^2 and its gradient, 0 for g = 0.                                    Source: Gropp et al. 2020.
+template <class T> struct EikonalLoss {
+  T value;
+  Vec3<T> by_gradient;
+};
+template <class T> SPLITNERF_HD EikonalLoss<T> eikonal_loss(Vec3<T> g) {
+  const T size = length(g), excess = size - T(1);
+  return {square(excess), g * (size > T(0) ? T(2) * excess / size : T(0))};
+}
+
+// Distance of the unit normals of two gradients, and its gradients. Beyond the square root of 2 the normals are of two sides
+// of a thin part, and the pair does not count.
+inline constexpr double kOtherSide = 1.4142135623730951;
+template <class T> struct NormalDistance {
+  T value;
+  Vec3<T> by_here, by_there;
+};
+template <class T> SPLITNERF_HD NormalDistance<T> normal_distance(Vec3<T> here, Vec3<T> there) {
+  const Vec3<T> step = unit_normal(there) - unit_normal(here);
+  const T size = length(step);
+  const Vec3<T> direction = step * (size > T(0) ? T(1) / size : T(0));
+  return {size, unit_normal_backward(here, -direction), unit_normal_backward(there, direction)};
+}
+
+// ---- materials -------------------------------------------------------------------------------
+
+inline constexpr double kDarkestMetal = 0.4;  // normal reflectance
+
+// Penalties of a metallic m in [0, 1] and their slopes: m^2 (or the smooth L1 of m, half of that below 1), m (1 - m), and
+// m (1 - F0 / .4)+, F0 the brightest channel of the albedo, taken as given.
+//   Sources: SplitNeRF Eq. (18); common metals reflect half of the light and more (Akenine-Moller et al., Real-Time
+//   Rendering, 4th ed., table 9.2).
+template <class T> struct MaterialLosses {
+  T metal, binary, dark;
+  T metal_slope, binary_slope, dark_slope;
+};
+template <class T> SPLITNERF_HD MaterialLosses<T> material_losses(Vec3<T> albedo, T metallic, bool smooth_l1) {
+  const T scale = smooth_l1 ? T(0.5) : T(1), brightest = max_of(albedo.x, max_of(albedo.y, albedo.z));
+  const T darkness = max_of(T(1) - brightest / T(kDarkestMetal), T(0));
+  return {scale * square(metallic), metallic - square(metallic), metallic * darkness,
+          T(2) * scale * metallic,  T(1) - T(2) * metallic,      darkness};
+}
+
+}  // namespace splitnerf
