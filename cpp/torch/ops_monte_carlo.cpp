@@ -1,4 +1,4 @@
-// sample_bsdf, monte_carlo_light and shade_sums as torch operators.
+// sample_bsdf, monte_carlo_light, summed_light and shade_sums as torch operators.
 #include <tuple>
 
 #include "check.h"
@@ -76,6 +76,58 @@ std::tuple<Tensor, Tensor, Tensor> monte_carlo_light_backward(Tensor normals, Te
 }
 
 // What both directions of shade_sums read: the fields of SummedPoint and the table.
+// What both directions of summed_light read.
+struct SharedInputs {
+  ScalarType type;
+  Tensor normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent;
+
+  SharedInputs(const char* op, const Tensor& n, const Tensor& v, const Tensor& rho, const Tensor& d, const Tensor& a,
+               const Tensor& r, const Tensor& open, const Tensor& s)
+      : type(real_type(op, "normals", n)),
+        normals(checked(op, "normals", n, {kAny, 3}, type)),
+        view_dirs(checked(op, "view_dirs", v, {n_points(), 3}, type)),
+        roughness(checked(op, "roughness", rho, {n_points(), 1}, type)),
+        directions(checked(op, "directions", d, {kAny, 3}, type)),
+        solid_angles(checked(op, "solid_angles", a, {directions.size(0)}, type)),
+        radiance(checked(op, "radiance", r, {directions.size(0), 3}, type)),
+        visible(checked(op, "visible", open, {n_points(), directions.size(0)}, type)),
+        sent(checked(op, "sent", s, {s.size(0), directions.size(0), 3}, type)) {
+    require(sent.size(0) == 0 || sent.size(0) == n_points(), op, "sent must hold as many points as normals, or none");
+  }
+  int64_t n_points() const { return normals.size(0); }
+  template <class T> cpu::SharedLight<T> light() const {
+    return {static_cast<int>(directions.size(0)), in<T>(directions), in<T>(solid_angles), in<T>(radiance), in<T>(visible),
+            sent.size(0) ? in<T>(sent) : nullptr};
+  }
+};
+
+Tensor summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor solid_angles,
+                    Tensor radiance, Tensor visible, Tensor sent) {
+  const SharedInputs i("summed_light", normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent);
+  Tensor sums = empty_like_type(i.normals, {i.n_points(), 3, 3}, i.type);
+  dispatch_real(i.type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::summed_light(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(), out<T>(sums));
+  });
+  return sums;
+}
+
+std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions,
+                                                         Tensor solid_angles, Tensor radiance, Tensor visible, Tensor sent,
+                                                         Tensor grad_sums) {
+  const char* op = "summed_light_backward";
+  const SharedInputs i(op, normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent);
+  const Tensor g = checked(op, "grad_sums", grad_sums, {i.n_points(), 3, 3}, i.type);
+  const auto like = [&](const Tensor& t) { return torch::stable::empty_like(t); };
+  Tensor grad_normals = like(i.normals), grad_roughness = like(i.roughness), grad_light = like(i.radiance);
+  dispatch_real(i.type, [&](auto zero) {
+    using T = decltype(zero);
+    cpu::summed_light_backward(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(), in<T>(g),
+                               out<T>(grad_normals), out<T>(grad_roughness), out<T>(grad_light));
+  });
+  return {grad_normals, grad_roughness, grad_light};
+}
+
 struct SummedInputs {
   ScalarType type;
   Tensor normals, view_dirs, albedo, roughness, metallic, all, grazing, diffuse, lut;
@@ -136,6 +188,10 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("sample_bsdf(Tensor normals, Tensor view_dirs, Tensor roughness, int n_samples, int seed) -> (Tensor, Tensor)");
   m.def("monte_carlo_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
         "Tensor radiance) -> Tensor");
+  m.def("summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor solid_angles, "
+        "Tensor radiance, Tensor visible, Tensor sent) -> Tensor");
+  m.def("summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor solid_angles, "
+        "Tensor radiance, Tensor visible, Tensor sent, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
   m.def("monte_carlo_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
         "Tensor radiance, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
   m.def("shade_sums(" SPLITNERF_SUMMED_POINT ") -> Tensor");
@@ -145,6 +201,8 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
 
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
   m.impl("sample_bsdf", TORCH_BOX(&sample_bsdf));
+  m.impl("summed_light", TORCH_BOX(&summed_light));
+  m.impl("summed_light_backward", TORCH_BOX(&summed_light_backward));
   m.impl("monte_carlo_light", TORCH_BOX(&monte_carlo_light));
   m.impl("monte_carlo_light_backward", TORCH_BOX(&monte_carlo_light_backward));
   m.impl("shade_sums", TORCH_BOX(&shade_sums));

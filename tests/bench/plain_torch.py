@@ -207,6 +207,14 @@ def monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance):
     return weights @ share
 
 
+def summed_light(normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent):
+    n, k = visible.shape
+    incoming = visible[..., None] * radiance
+    incoming = incoming + sent if len(sent) else incoming
+    pdf = (1 / (k * solid_angles)).expand(n, k)
+    return monte_carlo_light(normals, view_dirs, roughness, directions.expand(n, k, 3), pdf, incoming)
+
+
 # ---- light and visibility ----
 
 
@@ -358,7 +366,9 @@ REPLACED = {
         gradient_losses=stacked(reference.gradient_losses), material_losses=stacked(reference.material_losses),
     ),
     shading_module: dict(query_direction=query_direction, split_sum_shade=split_sum_shade),
-    monte_carlo_module: dict(monte_carlo_light=monte_carlo_light, shade_sums=shade_sums),
+    monte_carlo_module: dict(
+        monte_carlo_light=monte_carlo_light, summed_light=summed_light, shade_sums=shade_sums
+    ),
     pyramid_module: dict(sparse_product=sparse_product, light_lookup=light_lookup),
     visibility_module: dict(cached_occlusion=cached_occlusion, cached_visibility=cached_visibility),
     hash_module: dict(hash_encode=hash_encode),

@@ -6,7 +6,7 @@ import math
 
 import pytest
 import torch
-from op_checks import check_op, generator, grad_leaves, lib, unit
+from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 
 from splitnerf.ops import brdf_lut, monte_carlo_light, sample_bsdf
 
@@ -119,3 +119,48 @@ def test_errors_name_what_is_wrong():
         monte_carlo_light(n, v, r, d, p[:, :3], l)
     with pytest.raises(Exception, match="n_samples must be in"):
         sample_bsdf(n, v, r, 0)
+
+
+# ---- one set of directions for all points ----
+
+
+def shared_inputs(n: int = 5, k: int = 24, dtype=torch.float64, with_sent: bool = True) -> tuple:
+    g = generator(8)
+    normals, view_dirs, roughness = (x.to(dtype) for x in inputs(n)[:3])
+    directions = unit(torch.randn(k, 3, generator=g, dtype=torch.float64)).to(dtype)
+    solid_angles, radiance, visible, sent = (
+        torch.rand(*shape, generator=g, dtype=torch.float64).to(dtype) for shape in ((k,), (k, 3), (n, k), (n if with_sent else 0, k, 3))
+    )
+    return normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent
+
+
+@pytest.mark.parametrize("with_sent", [True, False])
+@pytest.mark.parametrize("n", [0, 1, 5, 700])
+def test_shared_directions_sum_as_drawn_ones_of_their_solid_angle(n, with_sent):
+    x = shared_inputs(n, with_sent=with_sent)
+    ours, theirs = grad_leaves(x, GRADIENTS), grad_leaves(x, GRADIENTS)
+    sums = lib.summed_light(*ours)
+    normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent = theirs
+    k = len(directions)
+    incoming = visible[..., None] * radiance + (sent if with_sent else 0)
+    pdf = (1 / (k * solid_angles)).expand(n, k)
+    expected = lib.monte_carlo_light(normals, view_dirs, roughness, directions.expand(n, k, 3), pdf, incoming)
+    torch.testing.assert_close(sums, expected)
+    weights = torch.randn(sums.shape, generator=generator(), dtype=torch.float64)
+    for s in (sums, expected):
+        (s * weights).sum().backward()
+    for i in GRADIENTS:
+        torch.testing.assert_close(ours[i].grad, theirs[i].grad)
+
+
+def test_shared_directions_opcheck_gradcheck_precision_and_errors():
+    check_op(lib.summed_light, shared_inputs(), GRADIENTS)
+    check_op(lib.summed_light_backward, (*shared_inputs(), torch.ones(5, 3, 3, dtype=torch.float64)))
+    assert torch.autograd.gradcheck(lambda *x: lib.summed_light(*x), grad_leaves(shared_inputs(3, 5), GRADIENTS), atol=1e-6)
+    single, exact = lib.summed_light(*shared_inputs(dtype=torch.float32)), lib.summed_light(*shared_inputs())
+    torch.testing.assert_close(single.double(), exact, rtol=2e-4, atol=1e-5)
+    for index in (1, 3, 4, 6, 7):
+        check_no_gradient(lib.summed_light, shared_inputs(), index)
+    x = list(shared_inputs())
+    x[7] = x[7][:2]
+    check_error(lambda: lib.summed_light(*x), "summed_light", "sent must hold as many points")

@@ -76,16 +76,23 @@ template <class T> struct LightSums {
   Vec3<T> all, grazing, diffuse;
 };
 
-template <class T>
-SPLITNERF_HD LightSums<T> monte_carlo_light(Vec3<T> normal, Vec3<T> view, T roughness, int n, const T* light_dirs,
-                                            const T* pdf, const T* radiance) {
+//
+// incoming(i) says where light comes from, 1 / (n p_i), or the solid angle of a fixed set of directions, and L_i.
+template <class T> struct IncomingLight {
+  Vec3<T> direction;
+  T measure;  // 0: does not count
+  Vec3<T> radiance;
+};
+template <class T, class Incoming>
+SPLITNERF_HD LightSums<T> sum_light(Vec3<T> normal, Vec3<T> view, T roughness, int n, Incoming incoming) {
   const Vec3<T> facing_normal = normal * facing(normal, view);
   const T ggx_alpha = sampled_alpha(roughness);
   LightSums<T> sums{{T(0), T(0), T(0)}, {T(0), T(0), T(0)}, {T(0), T(0), T(0)}};
   for (int i = 0; i < n; ++i) {
-    if (!(pdf[i] > T(0))) continue;
-    const LobeWeight<T> w = lobe_weight(facing_normal, view, load3(light_dirs + 3 * i), ggx_alpha).value;
-    const Vec3<T> share = load3(radiance + 3 * i) * (T(1) / (T(n) * pdf[i]));
+    const IncomingLight<T> light = incoming(i);
+    if (!(light.measure > T(0))) continue;
+    const LobeWeight<T> w = lobe_weight(facing_normal, view, light.direction, ggx_alpha).value;
+    const Vec3<T> share = light.radiance * light.measure;
     sums.all += share * w.specular;
     sums.grazing += share * (w.specular * w.schlick);
     sums.diffuse += share * w.cosine;
@@ -98,31 +105,29 @@ template <class T> struct LightSumsGrad {
   T roughness;
 };
 
-// Gradients to normal and roughness, and to the radiance [n, 3]. Directions and densities are taken as given:
+// Gradients to normal and roughness; receive(i, gradient) takes that to L_i. Directions and measures are taken as given:
 // the integral does not depend on them.
-template <class T>
-SPLITNERF_HD LightSumsGrad<T> monte_carlo_light_backward(Vec3<T> normal, Vec3<T> view, T roughness, int n,
-                                                         const T* light_dirs, const T* pdf, const T* radiance,
-                                                         const LightSums<T>& grad, T* grad_radiance) {
+template <class T, class Incoming, class Receive>
+SPLITNERF_HD LightSumsGrad<T> sum_light_backward(Vec3<T> normal, Vec3<T> view, T roughness, int n, Incoming incoming,
+                                                 const LightSums<T>& grad, Receive receive) {
   const T sign = facing(normal, view), ggx_alpha = sampled_alpha(roughness);
   const Vec3<T> facing_normal = normal * sign;
   LightSumsGrad<T> out{{T(0), T(0), T(0)}, T(0)};
   T grad_alpha = T(0);
   for (int i = 0; i < n; ++i) {
     Vec3<T> grad_share{T(0), T(0), T(0)};
-    if (pdf[i] > T(0)) {
-      const Vec3<T> light = load3(light_dirs + 3 * i);
-      const LobeWeightGrad<T> w = lobe_weight(facing_normal, view, light, ggx_alpha);
-      const T scale = T(1) / (T(n) * pdf[i]);
-      const Vec3<T> share = load3(radiance + 3 * i) * scale;
+    const IncomingLight<T> light = incoming(i);
+    if (light.measure > T(0)) {
+      const LobeWeightGrad<T> w = lobe_weight(facing_normal, view, light.direction, ggx_alpha);
+      const Vec3<T> share = light.radiance * light.measure;
       const Vec3<T> grad_specular = grad.all + grad.grazing * w.value.schlick;
-      grad_share = (grad_specular * w.value.specular + grad.diffuse * w.value.cosine) * scale;
+      grad_share = (grad_specular * w.value.specular + grad.diffuse * w.value.cosine) * light.measure;
       const T grad_w = dot(grad_specular, share);
       grad_alpha += grad_w * w.d_ggx_alpha;
       out.normal += w.d_normal * grad_w;
-      if (w.value.cosine > T(0)) out.normal += light * (dot(grad.diffuse, share) * T(1 / kPi));
+      if (w.value.cosine > T(0)) out.normal += light.direction * (dot(grad.diffuse, share) * T(1 / kPi));
     }
-    store3(grad_radiance + 3 * i, grad_share);
+    receive(i, grad_share);
   }
   out.normal = out.normal * sign;
   // ggx_alpha = roughness^2 above its floor

@@ -104,6 +104,20 @@ SPLITNERF_API void monte_carlo_light_backward(int64_t n, int n_samples, const T*
                                               const T* roughness, const T* light_dirs, const T* pdf, const T* radiance,
                                               const T* grad_sums, T* grad_normals, T* grad_roughness, T* grad_radiance);
 
+// Light from n directions that all points share, and what of it arrives at each.
+template <class T> struct SharedLight {
+  int n;
+  const T *directions, *solid_angles, *radiance;  // [n, 3], [n], [n, 3]
+  const T *visible, *sent;                        // [points, n]; [points, n, 3] what arrives beside it, or null
+};
+template <class T>
+SPLITNERF_API void summed_light(int64_t n, const T* normals, const T* view_dirs, const T* roughness, const SharedLight<T>& light,
+                                T* sums);
+template <class T>
+SPLITNERF_API void summed_light_backward(int64_t n, const T* normals, const T* view_dirs, const T* roughness,
+                                         const SharedLight<T>& light, const T* grad_sums, T* grad_normals, T* grad_roughness,
+                                         T* grad_light);
+
 // The fields of SummedPoint as arrays, 3 values each but for roughness and metallic.
 template <class T> struct SummedArrays {
   T *normals, *view_dirs, *albedo, *roughness, *metallic, *all, *grazing, *diffuse;

@@ -127,14 +127,12 @@ class VisibilityBits(nn.Module):
         (see :func:`splitnerf.ops.cached_occlusion`)."""
         return (LOBE_DIRECTIONS / (3.0 * len(self.directions))) ** 0.25
 
-    def incoming(self, positions: Tensor, normals: Tensor, light: CellLight) -> Tensor:
-        """Radiance [n, k, 3] that arrives at points from each direction, the mesh's own light included. Below the
-        horizon it means nothing."""
+    def visibility(self, positions: Tensor, normals: Tensor) -> tuple[Tensor, Tensor | None]:
+        """The share [n, k] of the light from each direction that arrives at points, and what the mesh sends from there,
+        [n, k, 3] or None. Below the horizon both mean nothing."""
         if self.sees_all:
-            return light.radiance.expand(len(positions), -1, 3)
-        visible, arriving = cached_visibility(self.cache, positions, normals, self.radiance)
-        incoming = visible[..., None] * light.radiance
-        return incoming if arriving is None else incoming + arriving
+            return torch.ones(len(positions), len(self.directions)), None
+        return cached_visibility(self.cache, positions, normals, self.radiance)
 
     @torch.no_grad()
     def refresh(self, shade: Callable[[Tensor, Tensor], Tensor]) -> None:

@@ -13,7 +13,7 @@ from splitnerf.ops.light_pyramid import (
     zonal_factors,
 )
 from splitnerf.ops.losses import gradient_losses, material_losses, pixel_losses, quadratic_entropy
-from splitnerf.ops.monte_carlo import LightSums, monte_carlo_light, sample_bsdf, shade_sums
+from splitnerf.ops.monte_carlo import LightSums, monte_carlo_light, sample_bsdf, shade_sums, summed_light
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
 from splitnerf.ops.rays import (
     CELL_EMPTY,
@@ -38,6 +38,7 @@ __all__ = [
     "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters",
     "light_lookup", "light_sum_of_levels", "march_rays", "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors",
     "pixel_losses",     "prefilter_light", "quadratic_entropy", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer",
-    "sdf_values", "sh_projection", "shade_sums", "sparse_product", "split_sum_shade", "spread_samples", "surface_weights",
+    "sdf_values", "sh_projection", "shade_sums", "sparse_product", "split_sum_shade", "spread_samples", "summed_light",
+    "surface_weights",
     "trace_visibility", "visibility_bits", "zonal_factors",
 ]  # fmt: skip

@@ -70,6 +70,34 @@ def monte_carlo_light(
     return LightSums(*lib.monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance).unbind(1))
 
 
+def summed_light(
+    normals: Tensor, view_dirs: Tensor, roughness: Tensor, directions: Tensor, solid_angles: Tensor, radiance: Tensor,
+    visible: Tensor, sent: Tensor | None = None,
+) -> LightSums:  # fmt: skip
+    """As :func:`monte_carlo_light` for one fixed set of directions that all points share, each for its solid angle.
+
+    Args:
+        normals, view_dirs: [n, 3] unit; a normal that faces away is turned.
+        roughness: [n, 1].
+        directions: [k, 3] unit.
+        solid_angles: [k] sr.
+        radiance: [k, 3] of the light from there.
+        visible: [n, k] in [0, 1], the share of it that arrives.
+        sent: [n, k, 3], what arrives beside it, or None.
+
+    Returns:
+        LightSums; differentiable in normals, roughness and radiance.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+    """
+    nothing = normals.new_empty(0, len(directions), 3)
+    sums = lib.summed_light(
+        normals, view_dirs, roughness, directions, solid_angles, radiance, visible, nothing if sent is None else sent
+    )
+    return LightSums(*sums.unbind(1))
+
+
 def shade_sums(
     normals: Tensor,
     view_dirs: Tensor,
@@ -112,6 +140,12 @@ def _backward(ctx, grad_sums):
     return normals, None, roughness, None, None, radiance
 
 
+def _shared_backward(ctx, grad_sums):
+    refuse_gradients(ctx, "summed_light", view_dirs=1, directions=3, solid_angles=4, visible=6, sent=7)
+    normals, roughness, radiance = lib.summed_light_backward(*ctx.saved_tensors, grad_sums)
+    return normals, None, roughness, None, None, radiance, None, None
+
+
 def _keep_summed(ctx, inputs, output):
     ctx.save_for_backward(*inputs[:9])
     ctx.compensate = inputs[9]
@@ -141,6 +175,18 @@ register(
         normals.new_empty(normals.shape),
         roughness.new_empty(roughness.shape),
         radiance.new_empty(radiance.shape),
+    ),
+)
+register(
+    "summed_light",
+    fake=lambda normals, *rest: normals.new_empty(normals.shape[0], 3, 3),
+    setup_context=_keep,
+    backward=_shared_backward,
+)
+register(
+    "summed_light_backward",
+    fake=lambda normals, view_dirs, roughness, directions, solid_angles, radiance, *rest: tuple(
+        t.new_empty(t.shape) for t in (normals, roughness, radiance)
     ),
 )
 register(

@@ -21,7 +21,7 @@ from splitnerf.fields import (
     VisibilityBits,
 )
 from splitnerf.fields.sdf import SdfSample, sharpness
-from splitnerf.ops import HashGridSpec, MeshScene, monte_carlo_light, query_direction, shade_sums, split_sum_shade
+from splitnerf.ops import HashGridSpec, MeshScene, query_direction, shade_sums, split_sum_shade, summed_light
 
 START_BOUNCES = 3  # of indirect light on a new mesh
 SUMMED_BAND = 0.15  # of roughness, in which the sum over directions takes the split sum's place
@@ -190,10 +190,10 @@ class SceneModel(nn.Module):
         materials = (points.albedo[at], points.roughness[at], points.metallic[at])
         albedo, roughness, metallic = (m.detach() for m in materials) if fixed_materials else materials
         light = self.occlusion.cell_light(self.light)
-        incoming = self.occlusion.incoming(positions, turned_to(normals, view_dirs).detach(), light)
-        n, k = len(wide), len(light.directions)
-        pdf = (1.0 / (k * light.solid_angles)).expand(n, k)
-        sums = monte_carlo_light(normals, view_dirs, roughness, light.directions.expand(n, k, 3), pdf, incoming)
+        visible, sent = self.occlusion.visibility(positions, turned_to(normals, view_dirs).detach())
+        sums = summed_light(
+            normals, view_dirs, roughness, light.directions, light.solid_angles, light.radiance, visible, sent
+        )
         radiance = shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, self.config.compensate)
         gained = (radiance - points.radiance[at]) * (t * t * (3.0 - 2.0 * t))
         return torch.zeros(n_points, 3).index_add(0, wide, gained)
