@@ -145,7 +145,7 @@ def spread_samples(weights, t, offsets, phase, gap, per_ray):
     rays = torch.repeat_interleave(torch.arange(len(offsets) - 1), offsets.diff())
     most = torch.zeros(len(offsets) - 1).scatter_reduce(0, rays, weights, "amax")
     heaviest = torch.full((len(offsets) - 1,), -1).scatter_reduce(0, rays, torch.where(weights == most[rays], every, -1), "amax")
-    return every, every, every, torch.zeros_like(weights), heaviest[heaviest >= 0]
+    return every, every, every, torch.zeros_like(weights), heaviest[heaviest >= 0], every
 
 
 # ---- shading ----

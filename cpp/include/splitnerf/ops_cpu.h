@@ -215,6 +215,7 @@ struct Spread {
   std::vector<int64_t> shaded;         // [m] samples, ascending
   std::vector<int64_t> first, second;  // [n] positions in `shaded`: the neighbours of each sample in its ray
   std::vector<int64_t> heaviest;       // [rays with samples] positions in `shaded`: the largest weight of those
+  std::vector<int64_t> leader;         // [m] positions in `shaded`: the largest weight of the same stretch
 };
 // weights [n], t [n] along the ray, phase [n_rays] -> share [n] of the second neighbour.
 template <class T>

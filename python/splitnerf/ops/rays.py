@@ -127,6 +127,7 @@ class Spread(NamedTuple):
             beyond the ends.
         share: [n] of the second, in [0, 1], by the distance along the ray.
         heaviest: [rays with samples] int64 positions in ``shaded``: the largest weight among these.
+        leader: [m] int64 positions in ``shaded``: the largest weight among those of the same stretch.
     """
 
     shaded: Tensor
@@ -134,6 +135,7 @@ class Spread(NamedTuple):
     second: Tensor
     share: Tensor
     heaviest: Tensor
+    leader: Tensor
 
     def interpolate(self, values: Tensor) -> Tensor:
         """Values [m, c] at the shaded samples -> [n, c] at all."""
@@ -218,7 +220,7 @@ def _composite_backward(ctx, grad):
 def _fake_spread(weights, t, offsets, phase, gap, per_ray):
     shaded, heaviest = (weights.new_empty(torch.library.get_ctx().new_dynamic_size(), dtype=torch.int64) for _ in range(2))
     first, second = (weights.new_empty(weights.shape, dtype=torch.int64) for _ in range(2))
-    return shaded, first, second, weights.new_empty(weights.shape), heaviest
+    return shaded, first, second, weights.new_empty(weights.shape), heaviest, shaded.new_empty(shaded.shape)
 
 
 def _keep_interpolation(ctx, inputs, output):

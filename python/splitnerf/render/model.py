@@ -134,6 +134,7 @@ class SceneModel(nn.Module):
         features: Tensor,
         normals: Tensor,
         view_dirs: Tensor,
+        leader: Tensor | None = None,
         *,
         fixed_materials: bool = False,
     ) -> ShadedPoints:
@@ -143,6 +144,7 @@ class SceneModel(nn.Module):
             positions: [n, 3].
             outputs, features: [n, 13] and [n, C] of the SDF there.
             normals, view_dirs: [n, 3] unit; view_dirs point to the camera.
+            leader: [n] positions in the list: the point next to each whose cached visibility serves it; None: its own.
             fixed_materials: No gradient flows from the radiance to the materials, which are returned with theirs.
 
         Source: SplitNeRF Eq. (6)-(10), (17).
@@ -154,7 +156,8 @@ class SceneModel(nn.Module):
         lobe_dirs = query_direction(normals, view_dirs, roughness, c.query)
         n, facing = len(normals), turned_to(normals, view_dirs)
         light = self.light(torch.cat([lobe_dirs, facing]), torch.cat([roughness, torch.ones_like(roughness)]))
-        occlusion = self.occlusion_factors(inputs, positions - normals * outputs[:, :1], facing, lobe_dirs, roughness)
+        query = OcclusionQuery(inputs, positions - normals * outputs[:, :1], facing, lobe_dirs, roughness)
+        occlusion = self.occlusion_factors(query, leader if isinstance(self.occlusion, VisibilityBits) else None)
         light_s, light_d = light[:n], light[n:]
         factor_s, factor_d = occlusion.specular, occlusion.diffuse
         if occlusion.indirect_specular is not None:
@@ -203,15 +206,18 @@ class SceneModel(nn.Module):
         """Whether :meth:`summed_less_split` stands in for the split sum: once there is a mesh."""
         return self.config.shading == "summed" and self.occlusion_ready
 
-    def occlusion_factors(
-        self, inputs: Tensor, positions: Tensor, normals: Tensor, lobe_dirs: Tensor, roughness: Tensor
-    ) -> Occlusion:
-        """The factors at surface points; 1 before the first mesh."""
+    def occlusion_factors(self, query: OcclusionQuery, leader: Tensor | None = None) -> Occlusion:
+        """The factors at surface points, or those of their leaders; 1 before the first mesh. The geometry gets no gradient."""
         if self.occlusion is None or not self.occlusion_ready:
-            ones = torch.ones_like(roughness).expand(-1, self.config.occlusion_channels)
+            ones = torch.ones_like(query.roughness).expand(-1, self.config.occlusion_channels)
             return Occlusion(ones, ones)
-        geometry = (t.detach() for t in (positions, normals, lobe_dirs, roughness))
-        return self.occlusion(OcclusionQuery(inputs, *geometry))
+        query = OcclusionQuery(query.inputs, *(part.detach() for part in query[1:]))
+        if leader is None:
+            return self.occlusion(query)
+        asked = (leader == torch.arange(len(leader))).nonzero().squeeze(1)
+        answers = self.occlusion(OcclusionQuery(*(part[asked] for part in query)))
+        which = torch.searchsorted(asked, leader)
+        return Occlusion(*(None if part is None else part[which] for part in answers))
 
     def use_mesh(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> None:
         """From now on occlusion factors count; bits are traced anew on this mesh, and its light bounces a few times.

@@ -146,7 +146,8 @@ def render_rays(
     shaded = spread.shaded
     positions, normals, sdf, view_dirs = positions[shaded], normals[shaded], sdf[shaded], -directions[shaded]
     points = model.shade(
-        positions, field.outputs[shaded], field.features[shaded], normals, view_dirs, fixed_materials=fixed_materials
+        positions, field.outputs[shaded], field.features[shaded], normals, view_dirs, spread.leader,
+        fixed_materials=fixed_materials,
     )
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
