@@ -58,14 +58,13 @@ TEST(HashLevels, OffsetsPassTwoToThe31) {
   EXPECT_EQ(n_entries(huge), int64_t(1) << 35);
 }
 
-TEST(HashIndex, DenseIndexCountsEveryNodeOnceAndPassesTwoToThe31) {
+TEST(HashIndex, DenseEntriesCountEveryNodeOnceUpToTheLargestLevel) {
   std::vector<int> seen(6 * 6 * 6);
   for (int x = 0; x < 6; ++x)
     for (int y = 0; y < 6; ++y)
-      for (int z = 0; z < 6; ++z) ++seen.at(dense_index(x, y, z, 5));
+      for (int z = 0; z < 6; ++z) ++seen.at(node_entry<true>(x, y, z, 5, 216));
   for (int count : seen) EXPECT_EQ(count, 1);
-  EXPECT_EQ(dense_index(1290, 1290, 1290, 1290), int64_t(1291) * 1291 * 1291 - 1);
-  EXPECT_GT(dense_index(1290, 1290, 1290, 1290), int64_t(1) << 31);
+  EXPECT_EQ(node_entry<true>(1023, 1023, 1023, 1023, 1u << 30), (1u << 30) - 1);
 }
 
 TEST(HashIndex, SpatialHashIsTheXorOfPrimeMultiplesModuloTwoToThe32) {
@@ -138,7 +137,7 @@ std::vector<double> linear_table() {
       for (int y = 0; y <= level.resolution; ++y)
         for (int z = 0; z <= level.resolution; ++z) {
           const double p[] = {double(x) / level.resolution, double(y) / level.resolution, double(z) / level.resolution};
-          for (int f = 0; f < 2; ++f) table[size_t(level.offset + dense_index(x, y, z, level.resolution)) * 2 + f] = linear(f, p);
+          for (int f = 0; f < 2; ++f) table[size_t(level.offset + node_entry<true>(x, y, z, level.resolution, uint32_t(level.n_entries))) * 2 + f] = linear(f, p);
         }
   }
   return table;

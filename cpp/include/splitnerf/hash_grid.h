@@ -59,10 +59,6 @@ inline int64_t hash_levels(const HashGridShape& shape, HashLevel* levels) {
   return offset;
 }
 
-SPLITNERF_HD int64_t dense_index(int64_t x, int64_t y, int64_t z, int64_t resolution) {
-  return (x * (resolution + 1) + y) * (resolution + 1) + z;
-}
-
 // Source: Teschner et al. 2003 (the primes as instant-ngp uses them). n_entries is a power of two.
 SPLITNERF_HD uint32_t spatial_hash(uint32_t x, uint32_t y, uint32_t z, uint32_t n_entries) {
   return (x ^ y * 2654435761u ^ z * 805459861u) & (n_entries - 1u);

@@ -20,7 +20,7 @@ from splitnerf.outputs import render_maps
 from splitnerf.train import train
 
 # What stands where a skip is off.
-UNSKIPPED: dict[str, object] = {"sample_above": 0.0, "shades_per_ray": 0, "light_step_every": 1}
+UNSKIPPED: dict[str, object] = {"sample_above": 0.0, "shades_per_ray": 0, "light_step_every": 1, "open_below": 0.0}
 # The settings that each skip alone has as in the full configuration.
 SKIPS: dict[str, tuple[str, ...]] = {
     "samples found without gradients": ("sample_above",),
