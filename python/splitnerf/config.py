@@ -78,10 +78,10 @@ class Config:
     # Rays and samples.
     initial_rays: int = 1024
     max_rays: int = 8192
-    target_samples: int = 16384
+    target_samples: int = 4608
     max_samples_per_ray: int = 1024
-    step_scale: float = 1.0  # sample length = step_scale / s, between the two bounds below
-    min_step: float = 0.005
+    step_scale: float = 2.0  # sample length = step_scale / s, between the two bounds below
+    min_step: float = 0.01
     max_step: float = 0.04
     min_transmittance: float = 1e-3
     sample_above: float = 1e-3  # samples of less weight are left out; 0 takes all
@@ -114,7 +114,7 @@ class Config:
     gloss_width: float = 0.2
     neutral_queries: int = 256
     normal_smoothness: float = 0.01  # of the normals between neighbouring surface points
-    smoothness_points: int = 1024
+    smoothness_points: int = 512
     smoothness_radius: float = 0.02  # scene units, one standard deviation
     light_loss_form: str = "smooth_l1"  # square (the paper) | smooth_l1 (the released code)
     occlusion_loss_form: str = "square"  # the same choice
@@ -126,7 +126,7 @@ class Config:
     light_step_every: int = 4  # steps that share one pass through the pyramid's maps and one step of its texels
     light_lobe_below: float = 0.25  # narrower lobes are sampled exactly
     light_lobe_samples: int = 16
-    eikonal_points: int = 1024  # uniform in the box, beside the rays' samples
+    eikonal_points: int = 256  # uniform in the box, beside the rays' samples
 
     # Occlusion by tracing the mesh.
     mesh_every: float = 0.1
