@@ -74,7 +74,7 @@ def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     from splitnerf.workflow import load_run
 
     config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {
-        "steps": 24, "occlusion": "bits", "indirect": True, "indirect_every": 5, "occlusion_directions": 256,
+        "steps": 24, "occlusion": "bits", "indirect": True, "indirect_every": 5, "occlusion_directions": 256, "open_below": 0.0,
     })  # fmt: skip
     dataset = load_dataset(data)
     trained = train_scene(dataset, config, tmp_path)
