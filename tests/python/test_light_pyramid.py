@@ -260,3 +260,33 @@ def test_settings_choose_the_light_and_its_rate():
         Config(light_resolution=48)
     with pytest.raises(ValueError, match="power of 2"):
         LightPyramid(8)
+
+
+def test_after_a_fused_step_the_maps_are_new():
+    """Fused optimisers do not tell that they wrote; what was computed without gradients before must not outlive them."""
+    light = LightPyramid(16)
+    optimiser = torch.optim.AdamW([light.texels], lr=0.5, fused=True)
+    directions, roughness = unit(torch.randn(50, 3, generator=generator())), torch.full((50, 1), 0.4)
+    light.collect()
+    for step in range(6):
+        with torch.no_grad():
+            seen = light(directions, roughness)
+            fresh = copy.deepcopy(light)(directions, roughness)
+        torch.testing.assert_close(seen, fresh, msg=f"step {step}")
+        optimiser.zero_grad(set_to_none=True)
+        light(directions, roughness).sum().backward()
+        if step % 2:
+            light.deliver()
+        optimiser.step()
+
+
+def test_collecting_begins_without_what_was_computed_before():
+    light = LightPyramid(16)
+    directions, roughness = unit(torch.randn(9, 3, generator=generator())), torch.full((9, 1), 0.4)
+    expected = torch.autograd.grad(light(directions, roughness).sum(), light.texels)[0]
+    light.chain()  # with a graph of its own
+    light.collect()
+    value, _ = light.stand_in(light(directions, roughness))
+    value.sum().backward()
+    light.deliver()
+    torch.testing.assert_close(light.texels.grad, expected)

@@ -97,8 +97,8 @@ class LightPyramid(Light):
 
     They are computed when first asked for and shared by all calls until a parameter changes, a backward
     pass has used up their graph, or gradients are wanted that they do not carry. Losses of several calls in
-    one step therefore go into one ``backward``. Writing through ``.data`` goes unseen: change parameters
-    under ``no_grad``. After :meth:`collect` gradients add up at the maps until :meth:`deliver` takes them on to the
+    one step therefore go into one ``backward``. Writing through ``.data``, or by a fused optimiser without a
+    backward pass or :meth:`deliver` before it, goes unseen: change parameters under ``no_grad``. After :meth:`collect` gradients add up at the maps until :meth:`deliver` takes them on to the
     parameters, so that several steps share one pass through the linear maps.
 
     Args:
@@ -162,7 +162,7 @@ class LightPyramid(Light):
 
     def collect(self, on: bool = True) -> None:
         """From now on the gradients of backward passes stop at the maps and add up there; off: they no longer do."""
-        self._collects, self._held, self._stand_ins = on, None, []
+        self._collects, self._held, self._stand_ins, self._cached = on, None, [], None
 
     def deliver(self) -> None:
         """Takes the gradients that have come together to the parameters; what is asked for next is computed anew."""
@@ -172,7 +172,7 @@ class LightPyramid(Light):
             if leaf.grad is not None:
                 value.backward(leaf.grad)
         _, levels, sh, *leaves = self._held
-        self._held, self._stand_ins = None, []
+        self._held, self._stand_ins, self._cached = None, [], None
         grads = [torch.zeros_like(leaf) if leaf.grad is None else leaf.grad for leaf in leaves]
         torch.autograd.backward([levels, sh], grads)
 
