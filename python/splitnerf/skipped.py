@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from splitnerf.config import Config
 from splitnerf.fields import VisibilityBits
 from splitnerf.ops import CELL_OCCUPIED, MeshScene
 from splitnerf.render.model import SceneModel
