@@ -35,21 +35,23 @@ void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t n, const T* d
   const int64_t n_levels = 3 * (pyramid.offset[last] + int64_t(side) * side), n_sh = 3 * kShCoefficients;
   const int64_t n_chunks = std::clamp<int64_t>((n + kChunkPoints - 1) / kChunkPoints, 1, kLightChunks);
   const int64_t stride = n_levels + n_sh;
-  std::vector<T> copies(n_chunks * stride);
+  std::vector<T> copies((n_chunks - 1) * stride);  // the first chunk writes to the result
+  std::fill(grad_levels, grad_levels + n_levels, T(0));
+  std::fill(grad_sh, grad_sh + n_sh, T(0));
   parallel_for(n_chunks, 1, [&](int64_t first, int64_t end) {
     for (int64_t c = first; c < end; ++c) {
-      T* copy = &copies[c * stride];
+      T *to_levels = c ? &copies[(c - 1) * stride] : grad_levels, *to_sh = c ? to_levels + n_levels : grad_sh;
       kernels<T>().light_lookup_backward(pyramid, c * n / n_chunks, (c + 1) * n / n_chunks, directions, roughness,
-                                         grad_radiance, grad_directions, grad_roughness, copy, copy + n_levels);
+                                         grad_radiance, grad_directions, grad_roughness, to_levels, to_sh);
     }
   });
-  parallel_for(stride, 1 << 14, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      T sum = T(0);
-      for (int64_t c = 0; c < n_chunks; ++c) sum += copies[c * stride + i];
-      (i < n_levels ? grad_levels[i] : grad_sh[i - n_levels]) = sum;
-    }
-  });
+  for (int64_t c = 1; c < n_chunks; ++c) {
+    const T* copy = &copies[(c - 1) * stride];
+    parallel_for(n_levels, 1 << 14, [&](int64_t begin, int64_t end) {
+      for (int64_t i = begin; i < end; ++i) grad_levels[i] += copy[i];
+    });
+    for (int64_t i = 0; i < n_sh; ++i) grad_sh[i] += copy[n_levels + i];
+  }
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                                                     \

@@ -160,7 +160,7 @@ template <class T>
 Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase, T gap, int per_ray,
                       T* share) {
   const int64_t n = offsets[n_rays];
-  Spread s{{}, std::vector<int64_t>(n), std::vector<int64_t>(n), {}, {}};
+  Spread s{{}, std::vector<int64_t>(n), std::vector<int64_t>(n), {}, {}, {}};
   for (int64_t r = 0; r < n_rays; ++r) {
     const int64_t begin = offsets[r], end = offsets[r + 1];
     auto at = static_cast<int64_t>(s.shaded.size());
@@ -180,7 +180,8 @@ Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, 
         int64_t leader = at, after = at;
         for (; after <= last && s.shaded[after] < stretch_end; ++after)
           if (weights[s.shaded[after]] > weights[s.shaded[leader]]) leader = after;
-        s.leader.resize(after, leader);
+        s.leaders.push_back(leader);
+        s.stretch.resize(after, static_cast<int64_t>(s.leaders.size()) - 1);
       }
       while (at < last && s.shaded[at + 1] <= i) ++at;
       const bool more = at < last && s.shaded[at + 1] < stretch_end;

@@ -10,6 +10,7 @@
 #include "splitnerf/environment.h"
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/kernels.h"
+#include "splitnerf/losses.h"
 #include "splitnerf/sampling.h"
 #include "splitnerf/split_sum.h"
 
@@ -19,6 +20,7 @@ PYBIND11_MODULE(_core, m) {
   m.doc() = "Embree scenes, the path tracer, marching cubes and build information of SplitNeRF.";
 
   m.attr("DIELECTRIC_F0") = splitnerf::kDielectricF0;
+  m.attr("SATURATED") = splitnerf::kSaturated;
   m.def(
       "hash_grid_levels",
       [](int64_t n_levels, int64_t n_features, int64_t base_resolution, double growth, int64_t log2_table_size) {

@@ -181,8 +181,8 @@ Tensor index_tensor(const Tensor& like, const std::vector<int64_t>& values) {
   return t;
 }
 
-std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, double gap,
-                                                                  int64_t per_ray) {
+std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> spread_samples(Tensor weights, Tensor t, Tensor offsets,
+                                                                                  Tensor phase, double gap, int64_t per_ray) {
   const char* op = "spread_samples";
   const ScalarType type = real_type(op, "weights", weights);
   const Tensor w = checked(op, "weights", weights, {kAny}, type), at = checked(op, "t", t, {w.size(0)}, type);
@@ -197,7 +197,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> spread_samples(Tensor
     spread = cpu::spread_samples(o.size(0) - 1, in<int64_t>(o), in<T>(w), in<T>(at), in<T>(u), T(gap), static_cast<int>(per_ray), out<T>(share));
   });
   return {index_tensor(w, spread.shaded), index_tensor(w, spread.first), index_tensor(w, spread.second), share,
-          index_tensor(w, spread.heaviest), index_tensor(w, spread.leader)};
+          index_tensor(w, spread.heaviest), index_tensor(w, spread.leaders), index_tensor(w, spread.stretch)};
 }
 
 // Positions in [0, m), one for each of n samples.
@@ -256,7 +256,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("surface_weights_backward(" SPLITNERF_SURFACE ", Tensor weights, Tensor opacity, Tensor grad_normals, "
         "Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
   m.def("spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray) -> "
-        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
+        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
   m.def("interpolate(Tensor values, Tensor first, Tensor second, Tensor share) -> Tensor");
   m.def("interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor second, Tensor share, Tensor shaded) -> Tensor");
   m.def("composite(Tensor weights, Tensor values, Tensor offsets) -> Tensor");

@@ -170,7 +170,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
   std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> result;
   dispatch_real(field.type, [&](auto zero) {
     using T = decltype(zero);
-    const SampleRules<T> rules{T(s), T(anneal), T(min_weight), T(-std::log(min_weight)), T(-std::log(min_transmittance)), T(reach), T(lipschitz)};
+    const SampleRules<T> rules{T(s), T(anneal), T(min_weight), T(-std::log(min_weight)), T(min_transmittance), T(reach), T(lipschitz)};
     std::vector<cpu::SampledRay<T>> rays(n_rays);
     cpu::sample_rays(field.view<T>(), march, occupancy.view(), rules, n_rays, in<T>(o), in<T>(d), in<T>(u), rays.data());
     result = packed(o, field.type, T(march.step), rays);

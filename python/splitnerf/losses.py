@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from splitnerf import _core
 from splitnerf.config import Config
 from splitnerf.fields import Light
 from splitnerf.ops import (
@@ -16,9 +17,8 @@ from splitnerf.ops import (
     quadratic_entropy,
     sample_ggx_lobe,
 )
-from splitnerf.render.renderer import ProbePoints, RenderedRays
+from splitnerf.render.renderer import RenderedRays
 
-SATURATED = 254.0 / 255.0
 ALBEDO_FLOOR = 0.01  # below it albedos count as one black
 
 
@@ -43,7 +43,7 @@ def monte_carlo_colour_loss(
 
 def over_background(colour: Tensor, opacity: Tensor, target: Tensor, background: Tensor) -> Tensor:
     """[n_rays, 3] predicted pixels; where the photo is saturated the colour is clipped like it."""
-    colour = torch.where(target[:, :3] >= SATURATED, colour.clamp(max=1.0), colour)
+    colour = torch.where(target[:, :3] >= _core.SATURATED, colour.clamp(max=1.0), colour)
     return torch.lerp(background, colour, opacity[:, None])
 
 
@@ -98,17 +98,6 @@ def neutral_light_loss(light: Light, config: Config, generator: torch.Generator)
     normals = F.normalize(torch.randn(config.neutral_queries, 3, generator=generator), dim=1)
     log_light = torch.log(light(normals, torch.ones(len(normals), 1)) + 1e-6)
     return (log_light - log_light.mean(1, keepdim=True)).square().mean()
-
-
-def draw_probes(config: Config, generator: torch.Generator) -> ProbePoints:
-    """Where the eikonal loss and that of the normals' smoothness look beside the samples."""
-    c = config
-    n_beside = c.smoothness_points if c.normal_smoothness else 0
-    return ProbePoints(
-        (torch.rand(c.eikonal_points, 3, generator=generator) * 2 - 1) * c.box,
-        torch.rand(n_beside, generator=generator),
-        c.smoothness_radius * torch.randn(n_beside, 3, generator=generator),
-    )
 
 
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:

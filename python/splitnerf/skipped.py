@@ -9,12 +9,14 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from splitnerf.batches import Batch, draw_batch
 from splitnerf.fields import VisibilityBits
 from splitnerf.ops import CELL_OCCUPIED, MeshScene
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.rays import PixelSource
-from splitnerf.train import Batch, batch_losses, draw_batch, light_moves, light_period
+from splitnerf.render.renderer import find_samples
+from splitnerf.train import batch_losses, light_moves, light_period
 
 WARM_UP, REPEATS = 1, 3
 EVERYWHERE_RAYS = 32  # of the batch where no space is empty
@@ -68,7 +70,7 @@ def measure_skips(
     """
     c = model.config
     generator = torch.Generator().manual_seed(0)
-    batch = draw_batch(source, n_rays, generator)
+    batch = draw_batch(source, n_rays, c)
 
     def work(batch: Batch, cells: Tensor = grid.cells, **settings: object) -> Work:
         model.config = c.replace(settings)
@@ -79,7 +81,7 @@ def measure_skips(
 
     now = work(batch)
     skips = []
-    everywhere = work(Batch(*(part[:EVERYWHERE_RAYS] for part in batch)), torch.full_like(grid.cells, CELL_OCCUPIED), sample_above=0.0)
+    everywhere = work(Batch(*(part[:EVERYWHERE_RAYS] for part in batch[:-1]), batch.probes), torch.full_like(grid.cells, CELL_OCCUPIED), sample_above=0.0)
     all_samples = work(batch, sample_above=0.0)
     scale = n_rays / EVERYWHERE_RAYS
     saved = scale * everywhere.seconds - all_samples.seconds
@@ -109,7 +111,8 @@ def timed_work(model: SceneModel, cells: Tensor, batch: Batch, scene: MeshScene 
         for repeat in range(WARM_UP + REPEATS):
             started = time.perf_counter()
             for step in range(period):
-                ray, terms = batch_losses(model, cells, batch, scene, None, generator, step, 1.0)
+                found = find_samples(model, cells, *batch.rays, probes=batch.probes)
+                ray, terms = batch_losses(model, batch, found, scene, None, generator, step, 1.0)
                 sum(terms.values()).backward()
                 if light_moves(c, step):
                     model.light.deliver()

@@ -8,12 +8,12 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from splitnerf import losses
+from splitnerf.batches import Batch, draw_batch
 from splitnerf.checkpoint import load_checkpoint, save_checkpoint
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
@@ -26,7 +26,7 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.monte_carlo import monte_carlo_colours
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
-from splitnerf.render.renderer import RenderedRays, render_rays, sample_step
+from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first ones are logged one by one
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion rays
@@ -135,8 +135,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             if c.indirect and scene is not None and step % c.indirect_every == 0:
                 model.refresh_indirect()
 
-            batch = draw_batch(source, n_rays, generator)
-            ray, terms = batch_losses(model, grid.cells, batch, scene, environment if traces else None, generator, step, progress)
+            batch = draw_batch(source, n_rays, c)
+            found = find_samples(model, grid.cells, *batch.rays, anneal=cosine_anneal(c, progress), probes=batch.probes)
+            ray, terms = batch_losses(model, batch, found, scene, environment if traces else None, generator, step, progress)
             loss = sum(terms.values())
             if not math.isfinite(loss.item()):
                 bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term.item()))
@@ -178,50 +179,24 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     return TrainedScene(model, grid, scene, n_rays, step, seconds, finished)
 
 
-class Batch(NamedTuple):
-    """Rays of one step, and what they shall look like.
-
-    Attributes:
-        rays_o, rays_d: [n, 3].
-        target: [n, 4] sRGB, straight alpha.
-        background: [n, 3] sRGB behind both.
-        jitter: [n] in [0, 1), of the samples.
-    """
-
-    rays_o: Tensor
-    rays_d: Tensor
-    target: Tensor
-    background: Tensor
-    jitter: Tensor
-
-
-def draw_batch(source: PixelSource, n_rays: int, generator: torch.Generator) -> Batch:
-    rays_o, rays_d, target = source.draw(n_rays)
-    return Batch(rays_o, rays_d, target, torch.rand(n_rays, 3, generator=generator), torch.rand(n_rays, generator=generator))
-
-
 def batch_losses(
-    model: SceneModel, cells: Tensor, batch: Batch, scene: MeshScene | None, environment: Tensor | None,
+    model: SceneModel, batch: Batch, found: FoundSamples, scene: MeshScene | None, environment: Tensor | None,
     generator: torch.Generator, step: int, progress: float,
 ) -> tuple[RenderedRays, dict[str, Tensor]]:  # fmt: skip
     """The rays as they are rendered now, and the weighted terms of the loss by name.
 
     Args:
         model: The scene.
-        cells: [r, r, r] uint8 occupancy.
         batch: The rays.
+        found: Their samples.
         scene: The surface as a mesh, once there is one.
         environment: [h, 2h, 3], the light that weighs the occlusion rays; None: none are traced.
-        generator: Draws probes and subsets.
+        generator: Draws subsets.
         step, progress: Where the training stands.
     """
     c = model.config
-    anneal = min(1.0, progress / c.cos_anneal_by) if c.cos_anneal_by > 0 else 1.0
     finetune = progress >= c.finetune_from and scene is not None
-    ray = render_rays(
-        model, cells, batch.rays_o, batch.rays_d, batch.jitter, anneal, sample_step(model),
-        shades_per_ray=c.shades_per_ray, probes=losses.draw_probes(c, generator), fixed_materials=finetune,
-    )  # fmt: skip
+    ray = render_rays(model, found, shades_per_ray=c.shades_per_ray, fixed_materials=finetune)
     colour, mask = pixel_losses(ray.mean, ray.opacity, batch.target, batch.background, linear=ray.linear)
     eikonal, smoothness = gradient_losses(ray.gradients, ray.weights.detach(), ray.beside)
     metal, binary_metal, dark_metal = material_losses(
@@ -251,6 +226,11 @@ def batch_losses(
     if environment is not None:
         terms["occlusion"] = c.occlusion_weight * losses.occlusion_loss(ray, scene, environment, c, generator, step)
     return ray, terms
+
+
+def cosine_anneal(config: Config, progress: float) -> float:
+    """0 at the start, 1 from ``cos_anneal_by`` of the run."""
+    return min(1.0, progress / config.cos_anneal_by) if config.cos_anneal_by > 0 else 1.0
 
 
 def light_period(config: Config) -> int:

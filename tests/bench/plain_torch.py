@@ -42,7 +42,7 @@ from splitnerf.ops import rays as rays_module
 from splitnerf.ops import shading as shading_module
 from splitnerf.ops import visibility as visibility_module
 from splitnerf.render.rays import PixelSource
-from splitnerf.render.renderer import render_rays, sample_step
+from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.train import restore_mesh
 from splitnerf.workflow import load_run, load_splits
 
@@ -145,7 +145,7 @@ def spread_samples(weights, t, offsets, phase, gap, per_ray):
     rays = torch.repeat_interleave(torch.arange(len(offsets) - 1), offsets.diff())
     most = torch.zeros(len(offsets) - 1).scatter_reduce(0, rays, weights, "amax")
     heaviest = torch.full((len(offsets) - 1,), -1).scatter_reduce(0, rays, torch.where(weights == most[rays], every, -1), "amax")
-    return every, every, every, torch.zeros_like(weights), heaviest[heaviest >= 0], every
+    return every, every, every, torch.zeros_like(weights), heaviest[heaviest >= 0], every, every
 
 
 # ---- shading ----
@@ -401,8 +401,9 @@ def colours(data: Path, source: Path) -> Tensor:
     model.config = model.config.replace(UNSKIPPED)
     restore_mesh(model, content)
     rays = PixelSource(load_splits(data, DOWNSCALE)[0], 0.85, torch.Generator().manual_seed(0)).draw(300)[:2]
+    rays = *rays, torch.full((300,), 0.5)
     with torch.no_grad():
-        ray = render_rays(model, grid.cells, *rays, torch.full((300,), 0.5), 1.0, sample_step(model))
+        ray = render_rays(model, find_samples(model, grid.cells, *rays))
     return ray.colour * ray.opacity[:, None]
 
 

@@ -14,7 +14,7 @@ from splitnerf.fields.light import lobe_roughness
 from splitnerf.ops import MeshScene, split_sum_shade
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
-from splitnerf.render.renderer import render_rays
+from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.render.monte_carlo import monte_carlo_radiance
 
 RADIUS = 0.5
@@ -127,7 +127,8 @@ def test_with_fixed_materials_a_rendered_ray_gives_them_no_gradient():
     grid.update(scene.sdf_field.sdf, scene.s_value)
     rays_o, rays_d = torch.tensor([[3.0, 0.0, 0.2]]).expand(8, 3), unit(torch.randn(8, 3) * 0.1 + torch.tensor([-3.0, 0, 0]))
     weights = [p for p in scene.material.parameters()]
+    rays = rays_o, rays_d, torch.full((8,), 0.5)
     for fixed in (False, True):
-        ray = render_rays(scene, grid.cells, rays_o, rays_d, torch.full((8,), 0.5), 1.0, 0.01, fixed_materials=fixed)
+        ray = render_rays(scene, find_samples(scene, grid.cells, *rays), fixed_materials=fixed)
         found = torch.autograd.grad(ray.colour.sum(), [*weights, scene.light.texels], allow_unused=True)
         assert scene.sums_light and (found[-1] != 0).any() and all(g is None for g in found[:-1]) == fixed

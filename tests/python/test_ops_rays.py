@@ -263,8 +263,8 @@ def test_a_second_surface_has_a_sample_and_a_colour_of_its_own():
         assert behind.any() and not behind.all()
         colours = spread.interpolate(behind[:, None].double())[:, 0]
         assert colours.tolist() == [0, 0, 0, 1, 1]
-        assert (behind[spread.leader] == behind).all() and (spread.leader[spread.leader] == spread.leader).all()
-        assert (weights[spread.shaded[spread.leader]] >= weights[spread.shaded]).all()
+        assert behind[spread.leaders].tolist() == [False, True] and spread.stretch.tolist() == behind.long().tolist()
+        assert (weights[spread.shaded[spread.leaders]][spread.stretch] >= weights[spread.shaded]).all()
         assert weights[spread.shaded[spread.heaviest]].tolist() == [0.3]
     assert spread_samples(weights, samples, 0, phase[None], gap=0.15).shaded.tolist() == [0, 1, 2, 3, 4]
 

@@ -2,20 +2,10 @@
 #pragma once
 
 #include "splitnerf/neus.h"
+#include "splitnerf/srgb.h"
 #include "splitnerf/vec.h"
 
 namespace splitnerf {
-
-template <class T> struct ValueAndSlope {
-  T value, slope;
-};
-
-// IEC 61966-2-1, not clipped above 1; values below 0 count as 0, with the slope of 0.
-template <class T> SPLITNERF_HD ValueAndSlope<T> srgb_from_linear(T linear) {
-  if (linear <= T(0.0031308)) return {T(12.92) * max_of(linear, T(0)), linear < T(0) ? T(0) : T(12.92)};
-  const T power = T(1.055) * std::pow(linear, T(1) / T(2.4));
-  return {power - T(0.055), power / (T(2.4) * linear)};
-}
 
 // ---- pixels ----------------------------------------------------------------------------------
 

@@ -1,7 +1,6 @@
 // Marching rays through an occupancy grid.
 #pragma once
 
-#include <cstring>
 #include <vector>
 
 #include "splitnerf/vec.h"
@@ -30,19 +29,18 @@ struct OccupancyView {
 class OccupancyCells {
  public:
   OccupancyCells(const uint8_t* cells, int resolution) : n_blocks_((resolution + kBlockCells - 1) / kBlockCells) {
-    blocks_.resize(int64_t{n_blocks_} * n_blocks_ * n_blocks_);
-    view_ = {cells, blocks_.data(), resolution, n_blocks_};
+    const int padded = n_blocks_ * kBlockCells;
+    std::vector<uint8_t> columns(size_t(n_blocks_) * n_blocks_ * padded);  // of the cells along z in each block of x and y
     for (int x = 0; x < resolution; ++x) {
       for (int y = 0; y < resolution; ++y) {
         const uint8_t* row = cells + OccupancyView::at(x, y, 0, resolution);
-        uint8_t* blocks = &blocks_[OccupancyView::at(x / kBlockCells, y / kBlockCells, 0, n_blocks_)];
-        for (int b = 0; b < n_blocks_; ++b) {
-          uint64_t word = 0;
-          std::memcpy(&word, row + b * kBlockCells, min_of(kBlockCells, resolution - b * kBlockCells));
-          blocks[b] |= word != 0;
-        }
+        uint8_t* column = &columns[OccupancyView::at(x / kBlockCells, y / kBlockCells, 0, n_blocks_) * kBlockCells];
+        for (int z = 0; z < resolution; ++z) column[z] |= row[z];
       }
     }
+    blocks_.resize(columns.size() / kBlockCells);
+    for (size_t i = 0; i < columns.size(); ++i) blocks_[i / kBlockCells] |= columns[i];
+    view_ = {cells, blocks_.data(), resolution, n_blocks_};
   }
   OccupancyCells(const OccupancyCells&) = delete;
   OccupancyCells& operator=(const OccupancyCells&) = delete;
@@ -76,15 +74,16 @@ template <class T> SPLITNERF_HD void clip_slab(T origin, T direction, T box, T& 
 // stands in the box. jitter in [0, 1) shifts the lattice.
 template <class T> struct RayLattice {
   Vec3<T> origin, direction, inverse_direction;
-  T t_near, t_far, lattice, step;
+  T t_near, t_far, lattice, step, inverse_step;
   int64_t n_steps;  // 0: the ray misses the box
 
   SPLITNERF_HD RayLattice(Vec3<T> o, Vec3<T> d, T jitter, const MarchOptions& options)
-      : origin(o), direction(d), inverse_direction{T(1) / d.x, T(1) / d.y, T(1) / d.z}, t_near(T(0)), t_far(T(INFINITY)), lattice(T(0)), step(T(options.step)), n_steps(0) {
+      : origin(o), direction(d), inverse_direction{T(1) / d.x, T(1) / d.y, T(1) / d.z}, t_near(T(0)), t_far(T(INFINITY)), lattice(T(0)),
+        step(T(options.step)), inverse_step(T(1) / step), n_steps(0) {
     if (!(dot(o, o) + dot(d, d) < T(INFINITY))) return;  // a ray that is not finite meets nothing
     for (int axis = 0; axis < 3; ++axis) clip_slab(o[axis], d[axis], T(options.box), t_near, t_far);
     if (!(t_near < t_far) || !(t_far < T(INFINITY))) return;
-    n_steps = static_cast<int64_t>(std::ceil((t_far - t_near) / step)) + 1;
+    n_steps = static_cast<int64_t>(std::ceil((t_far - t_near) * inverse_step)) + 1;
     lattice = t_near + (jitter - T(1)) * step;
   }
   SPLITNERF_HD T start(int64_t k) const { return lattice + T(k) * step; }
@@ -95,7 +94,7 @@ template <class T> struct RayLattice {
 // cells are crossed in one go: k advances to the first midpoint behind the exit.
 template <class T>
 SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView& grid, const MarchOptions& options, int64_t k) {
-  const T box = T(options.box), cell_size = T(2) * box / T(grid.resolution), cells_per_unit = T(1) / cell_size;
+  const T box = T(options.box), cell_size = T(2) * box / T(grid.resolution), cells_per_unit = T(0.5) * T(grid.resolution) / box;
   const Vec3<T>&o = ray.origin, &d = ray.direction;
   while (k < ray.n_steps) {
     const T t_mid = ray.start(k) + T(0.5) * ray.step;
@@ -120,7 +119,7 @@ SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView
       const int face = cell[axis] / size * size + (d[axis] > T(0) ? size : 0);
       t_exit = min_of(t_exit, (T(face) * cell_size - box - o[axis]) * ray.inverse_direction[axis]);
     }
-    k = max_of(k + 1, static_cast<int64_t>(std::ceil((t_exit - ray.lattice) / ray.step - T(0.5))));
+    k = max_of(k + 1, static_cast<int64_t>(std::ceil((t_exit - ray.lattice) * ray.inverse_step - T(0.5))));
   }
   return -1;
 }

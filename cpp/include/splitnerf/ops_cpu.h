@@ -130,6 +130,11 @@ SPLITNERF_API void shade_sums_backward(const float* lut, bool compensate, int64_
 
 // ---- losses, with their gradients ----
 
+// The sRGB curve, elementwise.
+template <class T> SPLITNERF_API void linear_to_srgb(int64_t n, const T* linear, T* srgb);
+template <class T> SPLITNERF_API void linear_to_srgb_backward(int64_t n, const T* linear, const T* grad_srgb, T* grad_linear);
+template <class T> SPLITNERF_API void srgb_to_linear(int64_t n, const T* srgb, T* linear);
+
 // mean, background [n, 3], opacity [n], target [n, 4] -> losses [2]: colour and mask, means over the values and the rays.
 template <class T>
 SPLITNERF_API void pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, const T* background, bool linear,
@@ -215,7 +220,8 @@ struct Spread {
   std::vector<int64_t> shaded;         // [m] samples, ascending
   std::vector<int64_t> first, second;  // [n] positions in `shaded`: the neighbours of each sample in its ray
   std::vector<int64_t> heaviest;       // [rays with samples] positions in `shaded`: the largest weight of those
-  std::vector<int64_t> leader;         // [m] positions in `shaded`: the largest weight of the same stretch
+  std::vector<int64_t> leaders;        // [stretches] positions in `shaded`: the largest weight of each
+  std::vector<int64_t> stretch;        // [m] the stretch of each of `shaded`
 };
 // weights [n], t [n] along the ray, phase [n_rays] -> share [n] of the second neighbour.
 template <class T>

@@ -3,21 +3,26 @@
 
 #include "splitnerf/march.h"
 #include "splitnerf/neus.h"
+#include "splitnerf/vector_math.h"
 
 namespace splitnerf {
 
 // Which samples of a ray are worth a gradient.
 template <class T> struct SampleRules {
-  T s;           // sharpness of the density
-  T anneal;      // of the cosine, see annealed_cosine
-  T min_weight;  // of a sample to be kept
-  T faint;       // -log(min_weight)
-  T max_depth;   // optical depth at which the ray ends
-  T reach;       // farther than this outside the surface there is no density
-  T lipschitz;   // bound of |grad f|
+  T s;                  // sharpness of the density
+  T anneal;             // of the cosine, see annealed_cosine
+  T min_weight;         // of a sample to be kept
+  T faint;              // -log(min_weight)
+  T min_transmittance;  // below it the ray ends
+  T reach;              // farther than this outside the surface there is no density
+  T lipschitz;          // bound of |grad f|
 };
 
 inline constexpr int kNoDepth = 20;  // where s f is above, an interval that ends there has a depth below 2e-9
+
+// Depth of the density behind a distance f: that of an interval is the depth at its end less that at its start, see
+// neus_optical_depth.
+template <class T> SPLITNERF_HD T depth_at(T f, T s) { return s * f < T(kNoDepth) ? softplus_and_slope(-s * f, T(1)).value : T(0); }
 
 // A ray on its way.
 template <class T> struct Walk {
@@ -27,25 +32,35 @@ template <class T> struct Walk {
   int64_t last = -1;        // the one before, -1 for none
   int64_t n_evaluated = 0;
   T f_last = T(0);          // the distance at `last`
-  T depth = T(0);           // optical depth between the middles of the first and the last sample
+  T depth_last = T(0);      // depth_at there
+  T transmittance = T(1);   // between the middles of the first and the last sample
   bool last_kept = false;
 
   SPLITNERF_HD Walk(const RayLattice<T>& lattice, int64_t ray, const MarchOptions& march, const OccupancyView& grid)
       : lattice(lattice), ray(ray), next(next_occupied(lattice, grid, march, 0)) {}
 };
 
-// Whether either of two neighbouring samples may weigh more than min_weight, f and f_next at their middles, `apart` from
-// each other: by what may lie between the middles, where with a slope of 1 at most f falls to (f + f_next - apart) / 2; or as
-// surface_weights renders them, from the slope between them. No interval is deeper than exp(-s f) at its end.
-template <class T>
-SPLITNERF_HD bool may_weigh(const SampleRules<T>& rules, T passed_depth, T f, T f_next, T apart, T step) {
-  const T lowest = min_of(f_next, T(0.5) * (f + f_next - apart)), end = min_of(lowest, min_of(f, f_next) - T(0.5) * step);
-  if (rules.s * end > rules.faint || passed_depth > rules.faint) return false;
-  const T least = -std::log1p(-rules.min_weight * std::exp(passed_depth));  // the depth that weighs min_weight
-  if (neus_optical_depth(f, lowest, rules.s) > least) return true;
-  const T slope = clamp((f_next - f) / apart, T(-1), T(1)), half = T(0.5) * step * annealed_cosine(slope, rules.anneal).value;
-  return neus_optical_depth(f - half, f + half, rules.s) > least ||
-         neus_optical_depth(f_next - half, f_next + half, rules.s) > least;
+// The neighbour of a walk's last sample.
+template <class T> struct NextSample {
+  T f, depth;    // the distance at its middle, and depth_at there
+  T apart;       // from the last sample's middle
+  T transmitted;  // share of the light that passes between the middles
+};
+
+// Whether the walk's last sample or its neighbour may weigh more than min_weight: by what lies between the middles, where with
+// a slope of 1 at most f falls to (f + f_next - apart) / 2; or as surface_weights renders them, from the slope between them.
+// No interval is deeper than exp(-s f) at its end.
+template <class T> SPLITNERF_HD bool may_weigh(const SampleRules<T>& rules, const Walk<T>& walk, const NextSample<T>& next) {
+  const T f = walk.f_last, step = walk.lattice.step, passed = walk.transmittance;
+  const T lowest = min_of(next.f, T(0.5) * (f + next.f - next.apart)), end = min_of(lowest, min_of(f, next.f) - T(0.5) * step);
+  if (rules.s * end > rules.faint || passed < rules.min_weight) return false;
+  if (passed * (T(1) - next.transmitted) > rules.min_weight) return true;
+  const auto weighs = [&](T depth) { return depth > T(0) && passed * (T(1) - exp_of_minus(depth)) > rules.min_weight; };
+  if (weighs(depth_at(lowest, rules.s) - walk.depth_last)) return true;
+  const T slope = clamp((next.f - f) / next.apart, T(-1), T(1));
+  const T half = T(0.5) * step * annealed_cosine(slope, rules.anneal).value;
+  return weighs(depth_at(f + half, rules.s) - depth_at(f - half, rules.s)) ||
+         weighs(depth_at(next.f + half, rules.s) - depth_at(next.f - half, rules.s));
 }
 
 // Takes the distance f at walk.next and moves on; keep(t_start) is called for the samples to be kept, front to back. Within
@@ -64,17 +79,19 @@ SPLITNERF_HD void advance(Walk<T>& walk, T f, const OccupancyView& grid, const M
     }
   }
   bool kept = !(std::abs(f) < T(INFINITY));
+  const T depth = depth_at(f, rules.s);
   if (walk.last >= 0) {
-    if (may_weigh(rules, walk.depth, walk.f_last, f, T(walk.next - walk.last) * step, step)) {
+    const T transmitted = exp_of_minus(max_of(depth - walk.depth_last, T(0)));
+    if (may_weigh(rules, walk, {f, depth, T(walk.next - walk.last) * step, transmitted})) {
       if (!walk.last_kept) keep(walk.lattice.start(walk.last));
       kept = true;
     }
-    if (rules.s * f < kNoDepth) walk.depth += neus_optical_depth(walk.f_last, f, rules.s);
+    walk.transmittance *= transmitted;
   }
   if (kept) keep(walk.lattice.start(walk.next));
   const int64_t here = walk.next;
-  walk.last = here, walk.f_last = f, walk.last_kept = kept;
-  if (walk.depth > rules.max_depth || walk.n_evaluated >= march.max_samples) {
+  walk.last = here, walk.f_last = f, walk.depth_last = depth, walk.last_kept = kept;
+  if (walk.transmittance < rules.min_transmittance || walk.n_evaluated >= march.max_samples) {
     walk.next = -1;
     return;
   }

@@ -16,6 +16,8 @@ template <> struct Lanes<double> {
   static constexpr int n = 8;
 };
 
+constexpr int kRowSums = 4;  // of a sparse row, side by side
+
 // Points that wait for the harmonics, evaluated one lane each. `share` is how much of the harmonics'
 // value the point takes, `slope` the derivative of that by its roughness.
 template <class T> struct Waiting {
@@ -92,16 +94,17 @@ template <class T>
 void sparse_product(const SparseRows<T>& matrix, int64_t begin, int64_t end, const T* values, T* products) {
   using Row = typename Lanes<T>::Row;
   for (int64_t r = begin; r < end; ++r) {
-    Row even = {}, odd = {};
+    const auto entry = [&](int64_t k) {
+      return *reinterpret_cast<const Row*>(values + 4 * int64_t(matrix.columns[k])) * matrix.weights[k];
+    };
+    Row sums[kRowSums] = {};
     int64_t k = matrix.offsets[r];
     const int64_t last = matrix.offsets[r + 1];
-    for (; k + 1 < last; k += 2) {
-      even += *reinterpret_cast<const Row*>(values + 4 * int64_t(matrix.columns[k])) * matrix.weights[k];
-      odd += *reinterpret_cast<const Row*>(values + 4 * int64_t(matrix.columns[k + 1])) * matrix.weights[k + 1];
-    }
-    if (k < last) even += *reinterpret_cast<const Row*>(values + 4 * int64_t(matrix.columns[k])) * matrix.weights[k];
-    even += odd;
-    for (int c = 0; c < 3; ++c) products[3 * r + c] = even[c];
+    for (; k + kRowSums <= last; k += kRowSums)
+      for (int j = 0; j < kRowSums; ++j) sums[j] += entry(k + j);
+    for (; k < last; ++k) sums[0] += entry(k);
+    for (int j = 1; j < kRowSums; ++j) sums[0] += sums[j];
+    for (int c = 0; c < 3; ++c) products[3 * r + c] = sums[0][c];
   }
 }
 

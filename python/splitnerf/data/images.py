@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
+import torch
 
+from splitnerf import ops
 from splitnerf.errors import InputError
 
 LDR_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -168,16 +170,13 @@ def to_uint8(pixels: np.ndarray) -> np.ndarray:
 
 
 def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
-    """Decodes the IEC 61966-2-1 curve; any shape, values >= 0."""
-    srgb = np.asarray(srgb)
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4).astype(srgb.dtype)
+    """:func:`splitnerf.ops.srgb_to_linear` of an array."""
+    return ops.srgb_to_linear(torch.from_numpy(np.array(srgb, order="C"))).numpy()
 
 
 def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
-    """Encodes the IEC 61966-2-1 curve; any shape, values >= 0, not clipped above 1."""
-    linear = np.asarray(linear)
-    curve = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, 12.92 * linear, curve).astype(linear.dtype)
+    """:func:`splitnerf.ops.linear_to_srgb` of an array."""
+    return ops.linear_to_srgb(torch.from_numpy(np.array(linear, order="C"))).numpy()
 
 
 def area_average(pixels: np.ndarray, factor: int) -> np.ndarray:

@@ -29,16 +29,17 @@ from splitnerf.ops.rays import (
 )
 from splitnerf.ops.sdf import SdfNetwork, sample_rays, sdf_layer, sdf_values
 from splitnerf.ops.shading import FRESNEL_MODES, QUERIES, brdf_lut, query_direction, split_sum_shade
+from splitnerf.ops.srgb import linear_to_srgb, srgb_to_linear
 from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_visibility, visibility_bits
 
 __all__ = [
-    "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "QUERIES", "HashGrid", "HashGridSpec", "LightSums",
-    "MeshScene", "PackedSamples", "SdfNetwork", "SparseMap", "Spread", "VisibilityCache", "brdf_lut", "cached_occlusion",
-    "cached_visibility", "composite",
-    "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters",
-    "light_lookup", "light_sum_of_levels", "march_rays", "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors",
-    "pixel_losses",     "prefilter_light", "quadratic_entropy", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer",
-    "sdf_values", "sh_projection", "shade_sums", "sparse_product", "split_sum_shade", "spread_samples", "summed_light",
-    "surface_weights",
-    "trace_visibility", "visibility_bits", "zonal_factors",
+    "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "LightSums",
+    "MeshScene", "PackedSamples", "QUERIES", "SdfNetwork", "SparseMap", "Spread", "VisibilityCache", "brdf_lut",
+    "cached_occlusion", "cached_visibility", "composite", "fibonacci_directions", "gradient_losses", "growth_for",
+    "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters", "light_lookup", "light_sum_of_levels",
+    "linear_to_srgb", "march_rays", "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors",
+    "pixel_losses", "prefilter_light", "quadratic_entropy", "query_direction", "sample_bsdf", "sample_ggx_lobe",
+    "sample_rays", "sdf_layer", "sdf_values", "sh_projection", "shade_sums", "sparse_product", "split_sum_shade",
+    "spread_samples", "srgb_to_linear", "summed_light", "surface_weights", "trace_visibility", "visibility_bits",
+    "zonal_factors",
 ]  # fmt: skip

@@ -33,6 +33,11 @@ class PackedSamples(NamedTuple):
     t_ends: Tensor
     offsets: Tensor
 
+    @property
+    def middles(self) -> Tensor:
+        """[n] distances along the ray."""
+        return 0.5 * (self.t_starts + self.t_ends)
+
 
 def march_rays(
     rays_o: Tensor, rays_d: Tensor, jitter: Tensor, cells: Tensor, box: float, step: float, max_samples: int = 1024
@@ -127,7 +132,8 @@ class Spread(NamedTuple):
             beyond the ends.
         share: [n] of the second, in [0, 1], by the distance along the ray.
         heaviest: [rays with samples] int64 positions in ``shaded``: the largest weight among these.
-        leader: [m] int64 positions in ``shaded``: the largest weight among those of the same stretch.
+        leaders: [stretches] int64 positions in ``shaded``: the largest weight among those of a stretch.
+        stretch: [m] int64, which stretch each of ``shaded`` is of.
     """
 
     shaded: Tensor
@@ -135,7 +141,8 @@ class Spread(NamedTuple):
     second: Tensor
     share: Tensor
     heaviest: Tensor
-    leader: Tensor
+    leaders: Tensor
+    stretch: Tensor
 
     def interpolate(self, values: Tensor) -> Tensor:
         """Values [m, c] at the shaded samples -> [n, c] at all."""
@@ -165,8 +172,7 @@ def spread_samples(weights: Tensor, samples: PackedSamples, per_ray: int, phase:
 
     Source: Systematic resampling (Kitagawa 1996).
     """
-    middle = 0.5 * (samples.t_starts + samples.t_ends)
-    return Spread(*lib.spread_samples(weights, middle, samples.offsets, phase, gap, per_ray))
+    return Spread(*lib.spread_samples(weights, samples.middles, samples.offsets, phase, gap, per_ray))
 
 
 def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:
@@ -218,9 +224,10 @@ def _composite_backward(ctx, grad):
 
 
 def _fake_spread(weights, t, offsets, phase, gap, per_ray):
-    shaded, heaviest = (weights.new_empty(torch.library.get_ctx().new_dynamic_size(), dtype=torch.int64) for _ in range(2))
+    sizes = (torch.library.get_ctx().new_dynamic_size() for _ in range(3))
+    shaded, heaviest, leaders = (weights.new_empty(size, dtype=torch.int64) for size in sizes)
     first, second = (weights.new_empty(weights.shape, dtype=torch.int64) for _ in range(2))
-    return shaded, first, second, weights.new_empty(weights.shape), heaviest, shaded.new_empty(shaded.shape)
+    return shaded, first, second, weights.new_empty(weights.shape), heaviest, leaders, shaded.new_empty(shaded.shape)
 
 
 def _keep_interpolation(ctx, inputs, output):

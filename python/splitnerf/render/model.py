@@ -34,6 +34,7 @@ class ShadedPoints(NamedTuple):
         albedo: [n, 3] linear.
         roughness, metallic: [n, 1].
         occlusion_d, occlusion_s: [n, 1] or [n, 3], 1 = open.
+        facing: [n, 3] the normals, turned to the viewer.
         lobe_dirs: [n, 3], where the light was asked for the specular lobe.
     """
 
@@ -43,6 +44,7 @@ class ShadedPoints(NamedTuple):
     metallic: Tensor
     occlusion_d: Tensor
     occlusion_s: Tensor
+    facing: Tensor
     lobe_dirs: Tensor
 
 
@@ -133,7 +135,7 @@ class SceneModel(nn.Module):
         features: Tensor,
         normals: Tensor,
         view_dirs: Tensor,
-        leader: Tensor | None = None,
+        stretches: tuple[Tensor, Tensor] | None = None,
         *,
         fixed_materials: bool = False,
     ) -> ShadedPoints:
@@ -143,7 +145,8 @@ class SceneModel(nn.Module):
             positions: [n, 3].
             outputs, features: [n, 13] and [n, C] of the SDF there.
             normals, view_dirs: [n, 3] unit; view_dirs point to the camera.
-            leader: [n] positions in the list: the point next to each whose cached visibility serves it; None: its own.
+            stretches: [k] the points whose cached visibility serves all of their stretch of a ray, and [n] the stretch of
+                each point; None: each its own.
             fixed_materials: No gradient flows from the radiance to the materials, which are returned with theirs.
 
         Source: SplitNeRF Eq. (6)-(10), (17).
@@ -156,7 +159,7 @@ class SceneModel(nn.Module):
         n, facing = len(normals), turned_to(normals, view_dirs)
         light = self.light(torch.cat([lobe_dirs, facing]), torch.cat([roughness, torch.ones_like(roughness)]))
         query = OcclusionQuery(inputs, positions - normals * outputs[:, :1], facing, lobe_dirs, roughness)
-        occlusion = self.occlusion_factors(query, leader if isinstance(self.occlusion, VisibilityBits) else None)
+        occlusion = self.occlusion_factors(query, stretches if isinstance(self.occlusion, VisibilityBits) else None)
         light_s, light_d = light[:n], light[n:]
         factor_s, factor_d = occlusion.specular, occlusion.diffuse
         if occlusion.indirect_specular is not None:
@@ -167,56 +170,60 @@ class SceneModel(nn.Module):
             normals, view_dirs, albedo, roughness, metallic, light_s, light_d, factor_s, factor_d,
             c.fresnel_mode, c.compensate,
         )  # fmt: skip
-        return ShadedPoints(radiance, *materials, occlusion.diffuse, occlusion.specular, lobe_dirs)
+        return ShadedPoints(radiance, *materials, occlusion.diffuse, occlusion.specular, facing, lobe_dirs)
 
     def summed_less_split(
-        self, positions: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints, at: Tensor, *, fixed_materials: bool = False
-    ) -> Tensor:
-        """What the radiance [n, 3] gains without the split: the BRDF summed over the light from the bits' directions.
+        self, on_surface: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints, among: Tensor, *,
+        fixed_materials: bool = False,
+    ) -> tuple[Tensor, Tensor]:  # fmt: skip
+        """What radiance gains without the split: the BRDF summed over the light from the bits' directions.
 
         The sum takes the split sum's place smoothly where lobes are wide enough for so few directions: at 256 of them
         between a roughness of .3 and .45. Narrower ones gain nothing.
 
         Args:
-            positions: [n, 3] on the surface.
+            on_surface: [n, 3].
             normals, view_dirs: [n, 3] unit.
-            points: What :meth:`shade` gave, for these points and others.
-            at: [n] their positions in the list.
+            points: What :meth:`shade` gave for them.
+            among: [k] int64, the points that are asked for.
             fixed_materials: No gradient flows to the materials.
+
+        Returns:
+            at: [m] int64, those of the points that gain something.
+            gained: [m, 3].
 
         Source: SplitNeRF Eq. (4)-(6), by quadrature.
         """
-        t = ((points.roughness.detach()[at] - self.occlusion.summed_from) / SUMMED_BAND + 0.5).clamp(0.0, 1.0)
-        n_points, wide = len(at), (t > 0).squeeze(1).nonzero().squeeze(1)
-        positions, normals, view_dirs, t, at = positions[wide], normals[wide], view_dirs[wide], t[wide], at[wide]
+        over = (points.roughness.detach()[among, 0] - self.occlusion.summed_from) / SUMMED_BAND + 0.5
+        wide = (over > 0).nonzero().squeeze(1)
+        at, t = among[wide], over[wide, None].clamp(max=1.0)
+        normals, view_dirs = normals[at], view_dirs[at]
         materials = (points.albedo[at], points.roughness[at], points.metallic[at])
         albedo, roughness, metallic = (m.detach() for m in materials) if fixed_materials else materials
         light = self.occlusion.cell_light(self.light)
-        visible, sent = self.occlusion.visibility(positions, turned_to(normals, view_dirs).detach())
+        visible, sent = self.occlusion.visibility(on_surface[at], points.facing.detach()[at])
         sums = summed_light(
             normals, view_dirs, roughness, light.directions, light.solid_angles, light.radiance, visible, sent
         )
         radiance = shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, self.config.compensate)
-        gained = (radiance - points.radiance[at]) * (t * t * (3.0 - 2.0 * t))
-        return torch.zeros(n_points, 3).index_add(0, wide, gained)
+        return at, (radiance - points.radiance[at]) * (t * t * (3.0 - 2.0 * t))
 
     @property
     def sums_light(self) -> bool:
         """Whether :meth:`summed_less_split` stands in for the split sum: once there is a mesh."""
         return self.config.shading == "summed" and self.occlusion_ready
 
-    def occlusion_factors(self, query: OcclusionQuery, leader: Tensor | None = None) -> Occlusion:
-        """The factors at surface points, or those of their leaders; 1 before the first mesh. The geometry gets no gradient."""
+    def occlusion_factors(self, query: OcclusionQuery, stretches: tuple[Tensor, Tensor] | None = None) -> Occlusion:
+        """The factors at surface points, or of their stretches; 1 before the first mesh. The geometry gets no gradient."""
         if self.occlusion is None or not self.occlusion_ready:
             ones = torch.ones_like(query.roughness).expand(-1, self.config.occlusion_channels)
             return Occlusion(ones, ones)
         query = OcclusionQuery(query.inputs, *(part.detach() for part in query[1:]))
-        if leader is None:
+        if stretches is None:
             return self.occlusion(query)
-        asked = (leader == torch.arange(len(leader))).nonzero().squeeze(1)
-        answers = self.occlusion(OcclusionQuery(*(part[asked] for part in query)))
-        which = torch.searchsorted(asked, leader)
-        return Occlusion(*(None if part is None else part[which] for part in answers))
+        leaders, stretch = stretches
+        answers = self.occlusion(OcclusionQuery(*(part[leaders] for part in query)))
+        return Occlusion(*(None if part is None else part[stretch] for part in answers))
 
     def use_mesh(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> None:
         """From now on occlusion factors count; bits are traced anew on this mesh, and its light bounces a few times.

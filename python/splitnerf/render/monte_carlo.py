@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from splitnerf.fields.light import lobe_roughness
-from splitnerf.ops import MeshScene, composite, monte_carlo_light, sample_bsdf, shade_sums, trace_visibility
+from splitnerf.ops import MeshScene, composite, linear_to_srgb, monte_carlo_light, sample_bsdf, shade_sums, trace_visibility
 from splitnerf.render.model import SceneModel
-from splitnerf.render.renderer import MIN_OPACITY, RenderedRays, linear_to_srgb
+from splitnerf.render.renderer import MIN_OPACITY, RenderedRays
 
 
 def monte_carlo_radiance(

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from splitnerf.fields.sdf import SdfSample
-from splitnerf.ops import PackedSamples, composite, march_rays, sample_rays, spread_samples, surface_weights
+from splitnerf.config import Config
+from splitnerf.ops import PackedSamples, composite, linear_to_srgb, march_rays, sample_rays, spread_samples, surface_weights
 from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
 from splitnerf.render.rays import image_rays
@@ -31,6 +31,32 @@ class ProbePoints(NamedTuple):
     anywhere: Tensor
     chosen: Tensor
     shifts: Tensor
+
+
+class FoundSamples(NamedTuple):
+    """The samples of a batch of rays, and all that follows from where they are.
+
+    Attributes:
+        packed: Where on the rays they are.
+        rays_d: [n_rays, 3] unit.
+        phase: [n_rays] in [0, 1), random: where the marks begin by which samples are drawn to be shaded.
+        positions: [n + k + m, 3] of the n samples in their middles, and of the probes.
+        directions: [n, 3] of their rays.
+        beside: [m] the samples whose neighbours the last m are.
+        step: Length of a sample, scene units.
+        anneal: Of the cosine by which they were chosen.
+        n_evaluated: Points at which the distance was asked for to find them.
+    """
+
+    packed: PackedSamples
+    rays_d: Tensor
+    phase: Tensor
+    positions: Tensor
+    directions: Tensor
+    beside: Tensor
+    step: float
+    anneal: float
+    n_evaluated: int
 
 
 @dataclass
@@ -78,43 +104,22 @@ class RenderedRays:
         return linear_to_srgb(self.mean) if self.linear else self.mean
 
 
-def sample_step(model: SceneModel) -> float:
+def sample_step(config: Config, s: float) -> float:
     """Length of a sample: it follows the width 1/s of the density, within the configured bounds."""
-    c = model.config
-    return min(max(c.step_scale / model.s_value, c.min_step), max(c.max_step, c.min_step))
+    return min(max(config.step_scale / s, config.min_step), max(config.max_step, config.min_step))
 
 
+@torch.no_grad()
 def find_samples(
-    model: SceneModel, cells: Tensor, rays_o: Tensor, rays_d: Tensor, jitter: Tensor, anneal: float, step: float
-) -> tuple[PackedSamples, int]:
-    """The samples that pixels are made of, and at how many points the distance was asked for to find them."""
-    c = model.config
-    if c.sample_above == 0:
-        samples = march_rays(rays_o, rays_d, jitter, cells, c.box, step, c.max_samples_per_ray)
-        return samples, len(samples.ray_indices)
-    s = model.s_value
-    samples, evaluated = sample_rays(
-        rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=s, anneal=anneal,
-        min_weight=c.sample_above, min_transmittance=c.min_transmittance, reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
-        max_samples=c.max_samples_per_ray,
-    )  # fmt: skip
-    return samples, int(evaluated.sum())
-
-
-def render_rays(
     model: SceneModel,
     cells: Tensor,
     rays_o: Tensor,
     rays_d: Tensor,
     jitter: Tensor,
-    anneal: float,
-    step: float,
-    *,
-    shades_per_ray: int = 0,
+    anneal: float = 1.0,
     probes: ProbePoints | None = None,
-    fixed_materials: bool = False,
-) -> RenderedRays:
-    """Renders rays through the occupied cells.
+) -> FoundSamples:
+    """The samples that pixels are made of, by the field as it stands.
 
     Args:
         model: The scene.
@@ -122,62 +127,72 @@ def render_rays(
         rays_o, rays_d: [n_rays, 3]; directions unit.
         jitter: [n_rays] in [0, 1).
         anneal: Of the cosine, 0 at the start, 1 when done.
-        step: Length of a sample.
+        probes: More points at which the field will be wanted.
+    """
+    c, s = model.config, model.s_value
+    step = sample_step(c, s)
+    if c.sample_above == 0:
+        packed = march_rays(rays_o, rays_d, jitter, cells, c.box, step, c.max_samples_per_ray)
+        n_evaluated = len(packed.ray_indices)
+    else:
+        packed, evaluated = sample_rays(
+            rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=s, anneal=anneal,
+            min_weight=c.sample_above, min_transmittance=c.min_transmittance, reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
+            max_samples=c.max_samples_per_ray,
+        )  # fmt: skip
+        n_evaluated = int(evaluated.sum())
+    directions = rays_d[packed.ray_indices]
+    positions = rays_o[packed.ray_indices] + directions * packed.middles[:, None]
+    beside = torch.empty(0, dtype=torch.int64)
+    if probes is not None:
+        beside = (probes.chosen * len(positions)).long() if len(positions) else beside
+        neighbours = positions[beside] + probes.shifts[: len(beside)]
+        positions = torch.cat([positions, probes.anywhere, neighbours])
+    phase = (PHASES * jitter) % 1.0  # where samples stand shall not decide which are shaded
+    return FoundSamples(packed, rays_d, phase, positions, directions, beside, step, anneal, n_evaluated)
+
+
+def render_rays(
+    model: SceneModel, found: FoundSamples, *, shades_per_ray: int = 0, fixed_materials: bool = False
+) -> RenderedRays:
+    """Renders rays from their samples.
+
+    Args:
+        model: The scene.
+        found: The samples; the field may have moved a little since.
         shades_per_ray: Samples of a ray that are shaded, about; others take what lies between. 0 shades all.
-        probes: More points at which the field is wanted.
         fixed_materials: The colours have a gradient to surface and light alone.
 
     Source: SplitNeRF Eq. (1)-(2), (17).
     """
     c = model.config
-    samples, n_evaluated = find_samples(model, cells, rays_o, rays_d, jitter, anneal, step)
-    directions = rays_d[samples.ray_indices]
-    middle = 0.5 * (samples.t_starts + samples.t_ends)
-    positions = rays_o[samples.ray_indices] + directions * middle[:, None]
-    n = len(positions)
-    field, beside = ask_field(model, positions, probes)
+    samples, step, n = found.packed, found.step, len(found.directions)
+    field = model.surface(found.positions)
     sdf = field.sdf[:n]
     normals, weights, opacity = surface_weights(
-        sdf, field.gradient[:n], rays_d, model.s, samples.offsets, step=step, anneal=anneal, min_transmittance=c.min_transmittance
+        sdf, field.gradient[:n], found.rays_d, model.s, samples.offsets, step=step, anneal=found.anneal, min_transmittance=c.min_transmittance
     )
 
-    phase = (PHASES * jitter) % 1.0  # where samples stand shall not decide which are shaded
-    spread = spread_samples(weights.detach(), samples, shades_per_ray, phase, SURFACE_GAP * step)
+    spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step)
     shaded = spread.shaded
-    positions, normals, sdf, view_dirs = positions[shaded], normals[shaded], sdf[shaded], -directions[shaded]
+    positions, normals, sdf, view_dirs = found.positions[shaded], normals[shaded], sdf[shaded], -found.directions[shaded]
     points = model.shade(
-        positions, field.outputs[shaded], field.features[shaded], normals, view_dirs, spread.leader,
+        positions, field.outputs[shaded], field.features[shaded], normals, view_dirs, (spread.leaders, spread.stretch),
         fixed_materials=fixed_materials,
     )
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
     if model.sums_light:
-        at = spread.heaviest
-        on_surface = (positions[at] - normals[at] * sdf[at, None]).detach()
-        added = model.summed_less_split(
-            on_surface, normals[at], view_dirs[at], points, at, fixed_materials=fixed_materials
+        on_surface = positions - normals.detach() * sdf.detach()[:, None]
+        at, gained = model.summed_less_split(
+            on_surface, normals, view_dirs, points, spread.heaviest, fixed_materials=fixed_materials
         )
-        mean = mean.index_add(0, samples.ray_indices[shaded[at]], added)
+        mean = mean.index_add(0, samples.ray_indices[shaded[at]], gained)
     return RenderedRays(
-        mean, c.compositing == "linear", opacity, samples, n_evaluated, weights, values, field.gradient, beside, shaded, shares, positions, normals,
+        mean, c.compositing == "linear", opacity, samples, found.n_evaluated, weights, values, field.gradient, found.beside, shaded, shares, positions, normals,
         sdf, points,
     )  # fmt: skip
-
-
-def ask_field(model: SceneModel, positions: Tensor, probes: ProbePoints | None) -> tuple[SdfSample, Tensor]:
-    """The field at the samples and, behind them, at the probes; and which samples the last of these stand beside."""
-    n, nothing = len(positions), torch.empty(0, dtype=torch.int64)
-    if probes is None:
-        return model.surface(positions), nothing
-    beside = (probes.chosen * n).long() if n else nothing
-    return model.surface(torch.cat([positions, probes.anywhere, positions[beside] + probes.shifts[: len(beside)]])), beside
-
-
-def linear_to_srgb(linear: Tensor) -> Tensor:
-    """IEC 61966-2-1, not clipped above 1; values below 0 count as 0. Finite gradient at 0."""
-    power = 1.055 * linear.clamp(min=0.0031308) ** (1.0 / 2.4) - 0.055
-    return torch.where(linear <= 0.0031308, 12.92 * linear.clamp(min=0.0), power)
 
 
 @torch.no_grad()
@@ -191,10 +206,9 @@ def render_view(
         occlusion_d, occlusion_s [H, W], normal [H, W, 3] unit, world.
     """
     rays_o, rays_d = image_rays(pose, intrinsics, height, width)
-    step = sample_step(model)
     rows = []
     for o, d in zip(rays_o.split(chunk), rays_d.split(chunk)):
-        ray = render_rays(model, cells, o, d, torch.full((len(o),), 0.5), 1.0, step)
+        ray = render_rays(model, find_samples(model, cells, o, d, torch.full((len(o),), 0.5)))
         p = ray.points
         maps = torch.cat(
             [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), ray.normals], 1
