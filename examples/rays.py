@@ -39,8 +39,12 @@ def main(path: str = "rays.png") -> None:
     inside = x * x + z * z < 0.9
     exact = 4 - torch.sqrt(1 - x * x - z * z)[inside]
     error = (depth[inside, 0] - exact).abs().mean().item()
-    write_image(path, ((normals * 0.5 + 0.5) * opacity[:, None] + 1 - opacity[:, None]).clamp(0, 1).view(SIZE, SIZE, 3).numpy())
-    print(f"{len(weights)} samples on {len(x)} rays; depth error {error:.5f} (step {STEP}), opacity {opacity[inside].min():.4f}; wrote {path}")
+    write_image(
+        path, ((normals * 0.5 + 0.5) * opacity[:, None] + 1 - opacity[:, None]).clamp(0, 1).view(SIZE, SIZE, 3).numpy()
+    )
+    print(
+        f"{len(weights)} samples on {len(x)} rays; depth error {error:.5f} (step {STEP}), opacity {opacity[inside].min():.4f}; wrote {path}"
+    )
 
 
 if __name__ == "__main__":

@@ -17,7 +17,11 @@ def sky(w: torch.Tensor) -> torch.Tensor:
     """Radiance of a blue sky over brown ground, with a soft warm lamp."""
     up = torch.sigmoid(8 * w[:, 2:])
     lamp = 15 * torch.exp(40 * (w @ torch.tensor([[-0.6], [-0.5], [0.62]]) - 1))
-    return up * torch.tensor([0.4, 0.6, 1.0]) + (1 - up) * torch.tensor([0.25, 0.2, 0.15]) + lamp * torch.tensor([1.0, 0.9, 0.7])
+    return (
+        up * torch.tensor([0.4, 0.6, 1.0])
+        + (1 - up) * torch.tensor([0.25, 0.2, 0.15])
+        + lamp * torch.tensor([1.0, 0.9, 0.7])
+    )
 
 
 def shade(albedo: list[float], roughness: float, metallic: float) -> torch.Tensor:

@@ -38,12 +38,15 @@ Isa best_isa() {
 template <class T> Kernels<T> load_kernels(Isa isa);
 
 #ifdef SPLITNERF_HAS_X86_KERNELS
-#define SPLITNERF_SELECT(function)                           \
-  switch (isa) {                                             \
-    case Isa::kAvx512: return avx512::function();            \
-    case Isa::kAvx2: return avx2::function();                \
-    case Isa::kBase: break;                                  \
-  }                                                          \
+#define SPLITNERF_SELECT(function) \
+  switch (isa) {                   \
+    case Isa::kAvx512:             \
+      return avx512::function();   \
+    case Isa::kAvx2:               \
+      return avx2::function();     \
+    case Isa::kBase:               \
+      break;                       \
+  }                                \
   return base::function();
 #else
 #define SPLITNERF_SELECT(function) \

@@ -19,7 +19,8 @@ HashEncodeArgs<T> make_args(const HashGridShape& shape, HashLevel* levels, int n
 // Zeros columns [first, n_columns) of `rows` rows.
 template <class T> void clear_columns(T* rows_begin, int64_t rows, int64_t n_columns, int64_t first) {
   if (first == n_columns) return;
-  for (int64_t r = 0; r < rows; ++r) std::fill(rows_begin + r * n_columns + first, rows_begin + (r + 1) * n_columns, T(0));
+  for (int64_t r = 0; r < rows; ++r)
+    std::fill(rows_begin + r * n_columns + first, rows_begin + (r + 1) * n_columns, T(0));
 }
 
 }  // namespace
@@ -57,8 +58,7 @@ void hash_encode_backward(const HashGridShape& shape, int n_active, int64_t n, c
 
 template <class T>
 void hash_encode_backward_positions(const HashGridShape& shape, int n_active, int64_t n, const T* positions,
-                                    const T* table, const T* grad_features, const T* grad_jacobian,
-                                    T* grad_positions) {
+                                    const T* table, const T* grad_features, const T* grad_jacobian, T* grad_positions) {
   std::array<HashLevel, kMaxLevels> levels;
   hash_levels(shape, levels.data());
   const auto args = make_args(shape, levels.data(), n_active, n, positions, table);
@@ -68,9 +68,9 @@ void hash_encode_backward_positions(const HashGridShape& shape, int n_active, in
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                   \
-  template void hash_encode<T>(const HashGridShape&, int, int64_t, const T*, const T*, T*, T*);                    \
-  template void hash_encode_backward<T>(const HashGridShape&, int, int64_t, const T*, const T*, const T*, T*);     \
+#define SPLITNERF_INSTANTIATE(T)                                                                                    \
+  template void hash_encode<T>(const HashGridShape&, int, int64_t, const T*, const T*, T*, T*);                     \
+  template void hash_encode_backward<T>(const HashGridShape&, int, int64_t, const T*, const T*, const T*, T*);      \
   template void hash_encode_backward_positions<T>(const HashGridShape&, int, int64_t, const T*, const T*, const T*, \
                                                   const T*, T*);
 SPLITNERF_INSTANTIATE(float)

@@ -54,9 +54,9 @@ void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t n, const T* d
   }
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                     \
-  template void sparse_product<T>(const SparseRows<T>&, int64_t, int64_t, const T*, T*);                             \
-  template void light_lookup<T>(const LightPyramid<T>&, int64_t, const T*, const T*, T*);                            \
+#define SPLITNERF_INSTANTIATE(T)                                                          \
+  template void sparse_product<T>(const SparseRows<T>&, int64_t, int64_t, const T*, T*);  \
+  template void light_lookup<T>(const LightPyramid<T>&, int64_t, const T*, const T*, T*); \
   template void light_lookup_backward<T>(const LightPyramid<T>&, int64_t, const T*, const T*, const T*, T*, T*, T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -155,11 +155,10 @@ std::vector<double> octahedral_solid_angles(int n) {
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       Vec3<double> corner[4];
-      for (int k = 0; k < 4; ++k)
-        corner[k] = direction_of({2.0 * (i + (k & 1)) / n - 1, 2.0 * (j + (k >> 1)) / n - 1});
+      for (int k = 0; k < 4; ++k) corner[k] = direction_of({2.0 * (i + (k & 1)) / n - 1, 2.0 * (j + (k >> 1)) / n - 1});
       // Great-circle sides: either diagonal divides the texel into two triangles.
-      out[int64_t(j) * n + i] = triangle_solid_angle(corner[0], corner[1], corner[2]) +
-                                triangle_solid_angle(corner[3], corner[2], corner[1]);
+      out[int64_t(j) * n + i] =
+          triangle_solid_angle(corner[0], corner[1], corner[2]) + triangle_solid_angle(corner[3], corner[2], corner[1]);
     }
   return out;
 }

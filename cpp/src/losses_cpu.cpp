@@ -9,12 +9,13 @@
 namespace splitnerf::cpu {
 
 template <class T>
-void pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, const T* background, bool linear, T* losses,
-                  T* colour_by_mean, T* colour_by_opacity, T* mask_by_opacity) {
+void pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, const T* background, bool linear,
+                  T* losses, T* colour_by_mean, T* colour_by_opacity, T* mask_by_opacity) {
   const T per_value = T(1) / T(max_of<int64_t>(3 * n, 1)), per_ray = T(1) / T(max_of<int64_t>(n, 1));
   double colour = 0, mask = 0;
   for (int64_t i = 0; i < n; ++i) {
-    const auto pixel = splitnerf::pixel_losses(load3(mean + 3 * i), opacity[i], target + 4 * i, load3(background + 3 * i), linear);
+    const auto pixel =
+        splitnerf::pixel_losses(load3(mean + 3 * i), opacity[i], target + 4 * i, load3(background + 3 * i), linear);
     colour += double(pixel.colour), mask += double(pixel.mask);
     store3(colour_by_mean + 3 * i, pixel.colour_by_mean * per_value);
     colour_by_opacity[i] = pixel.colour_by_opacity * per_value;
@@ -24,8 +25,8 @@ void pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, c
 }
 
 template <class T>
-void gradient_losses(int64_t n, int64_t m, const T* gradients, const T* weights, const int64_t* beside, T* losses, T* eikonal_by,
-                     T* smoothness_by) {
+void gradient_losses(int64_t n, int64_t m, const T* gradients, const T* weights, const int64_t* beside, T* losses,
+                     T* eikonal_by, T* smoothness_by) {
   const T per_point = T(1) / T(max_of<int64_t>(n, 1));
   double eikonal = 0, apart = 0, total = 0;
   for (int64_t i = 0; i < n; ++i) {
@@ -49,11 +50,13 @@ void gradient_losses(int64_t n, int64_t m, const T* gradients, const T* weights,
 }
 
 template <class T>
-void material_losses(int64_t n, const T* albedo, const T* metallic, const T* shares, bool smooth_l1, T* losses, T* by_metallic) {
+void material_losses(int64_t n, const T* albedo, const T* metallic, const T* shares, bool smooth_l1, T* losses,
+                     T* by_metallic) {
   double sums[3] = {}, total = 0;
   for (int64_t i = 0; i < n; ++i) {
     const auto point = splitnerf::material_losses(load3(albedo + 3 * i), metallic[i], smooth_l1);
-    const T values[3] = {point.metal, point.binary, point.dark}, slopes[3] = {point.metal_slope, point.binary_slope, point.dark_slope};
+    const T values[3] = {point.metal, point.binary, point.dark},
+            slopes[3] = {point.metal_slope, point.binary_slope, point.dark_slope};
     total += double(shares[i]);
     for (int k = 0; k < 3; ++k) {
       sums[k] += double(shares[i] * values[k]);
@@ -84,10 +87,10 @@ template <class T> void quadratic_entropy(int64_t n, int64_t n_channels, const T
       gradient[i * n_channels + c] = static_cast<T>(double(sums[i * (n_channels + 1) + c]) / total);
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                         \
-  template void pixel_losses<T>(int64_t, const T*, const T*, const T*, const T*, bool, T*, T*, T*, T*);                  \
-  template void gradient_losses<T>(int64_t, int64_t, const T*, const T*, const int64_t*, T*, T*, T*);                    \
-  template void material_losses<T>(int64_t, const T*, const T*, const T*, bool, T*, T*);                                 \
+#define SPLITNERF_INSTANTIATE(T)                                                                        \
+  template void pixel_losses<T>(int64_t, const T*, const T*, const T*, const T*, bool, T*, T*, T*, T*); \
+  template void gradient_losses<T>(int64_t, int64_t, const T*, const T*, const int64_t*, T*, T*, T*);   \
+  template void material_losses<T>(int64_t, const T*, const T*, const T*, bool, T*, T*);                \
   template void quadratic_entropy<T>(int64_t, int64_t, const T*, T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

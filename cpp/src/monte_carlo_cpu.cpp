@@ -13,14 +13,19 @@ constexpr int64_t kGrain = 32;         // points with many directions each
 constexpr int64_t kShadeGrain = 1024;  // points
 
 template <class T> SummedPoint<T> load_point(const SummedArrays<const T>& in, int64_t i) {
-  return {load3(in.normals + 3 * i), load3(in.view_dirs + 3 * i), load3(in.albedo + 3 * i), in.roughness[i], in.metallic[i],
+  return {load3(in.normals + 3 * i),
+          load3(in.view_dirs + 3 * i),
+          load3(in.albedo + 3 * i),
+          in.roughness[i],
+          in.metallic[i],
           {load3(in.all + 3 * i), load3(in.grazing + 3 * i), load3(in.diffuse + 3 * i)}};
 }
 
 // The directions of one point, drawn for it.
 template <class T> auto drawn_light(int n, const T* light_dirs, const T* pdf, const T* radiance) {
   return [=](int i) {
-    return IncomingLight<T>{load3(light_dirs + 3 * i), pdf[i] > T(0) ? T(1) / (T(n) * pdf[i]) : T(0), load3(radiance + 3 * i)};
+    return IncomingLight<T>{load3(light_dirs + 3 * i), pdf[i] > T(0) ? T(1) / (T(n) * pdf[i]) : T(0),
+                            load3(radiance + 3 * i)};
   };
 }
 
@@ -30,7 +35,8 @@ template <class T> auto arriving_light(const SharedLight<T>& light, int64_t p) {
   const T* sent = light.sent ? light.sent + 3 * p * light.n : nullptr;
   return [=](int i) {
     const Vec3<T> sky = load3(light.radiance + 3 * i) * visible[i];
-    return IncomingLight<T>{load3(light.directions + 3 * i), light.solid_angles[i], sent ? sky + load3(sent + 3 * i) : sky};
+    return IncomingLight<T>{load3(light.directions + 3 * i), light.solid_angles[i],
+                            sent ? sky + load3(sent + 3 * i) : sky};
   };
 }
 
@@ -81,10 +87,10 @@ void monte_carlo_light_backward(int64_t n, int n_samples, const T* normals, cons
   parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       const int64_t at = i * n_samples;
-      const LightSumsGrad<T> out =
-          sum_light_backward(load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i], n_samples,
-                             drawn_light(n_samples, light_dirs + 3 * at, pdf + at, radiance + 3 * at), load_sums(grad_sums + 9 * i),
-                             [&](int k, Vec3<T> g) { store3(grad_radiance + 3 * (at + k), g); });
+      const LightSumsGrad<T> out = sum_light_backward(
+          load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i], n_samples,
+          drawn_light(n_samples, light_dirs + 3 * at, pdf + at, radiance + 3 * at), load_sums(grad_sums + 9 * i),
+          [&](int k, Vec3<T> g) { store3(grad_radiance + 3 * (at + k), g); });
       store3(grad_normals + 3 * i, out.normal);
       grad_roughness[i] = out.roughness;
     }
@@ -92,17 +98,20 @@ void monte_carlo_light_backward(int64_t n, int n_samples, const T* normals, cons
 }
 
 template <class T>
-void summed_light(int64_t n, const T* normals, const T* view_dirs, const T* roughness, const SharedLight<T>& light, T* sums) {
+void summed_light(int64_t n, const T* normals, const T* view_dirs, const T* roughness, const SharedLight<T>& light,
+                  T* sums) {
   parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i)
-      store_sums(sum_light(load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i], light.n, arriving_light(light, i)),
-                 sums + 9 * i);
+      store_sums(
+          sum_light(load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i], light.n, arriving_light(light, i)),
+          sums + 9 * i);
   });
 }
 
 template <class T>
-void summed_light_backward(int64_t n, const T* normals, const T* view_dirs, const T* roughness, const SharedLight<T>& light,
-                           const T* grad_sums, T* grad_normals, T* grad_roughness, T* grad_light) {
+void summed_light_backward(int64_t n, const T* normals, const T* view_dirs, const T* roughness,
+                           const SharedLight<T>& light, const T* grad_sums, T* grad_normals, T* grad_roughness,
+                           T* grad_light) {
   const int64_t n_chunks = clamp<int64_t>(n / kGrain, 1, kLightChunks), stride = 3 * int64_t{light.n};
   std::vector<T> partial(n_chunks * stride);  // added in order: the same bits each time
   parallel_for(n_chunks, 1, [&](int64_t first, int64_t last) {
@@ -127,7 +136,8 @@ void summed_light_backward(int64_t n, const T* normals, const T* view_dirs, cons
 template <class T>
 void shade_sums(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in, T* radiance) {
   parallel_for(n, kShadeGrain, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) store3(radiance + 3 * i, splitnerf::shade_sums(lut, compensate, load_point(in, i)));
+    for (int64_t i = begin; i < end; ++i)
+      store3(radiance + 3 * i, splitnerf::shade_sums(lut, compensate, load_point(in, i)));
   });
 }
 
@@ -136,7 +146,8 @@ void shade_sums_backward(const float* lut, bool compensate, int64_t n, const Sum
                          const T* grad_radiance, const SummedArrays<T>& grad) {
   parallel_for(n, kShadeGrain, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
-      const SummedPoint<T> g = splitnerf::shade_sums_backward(lut, compensate, load_point(in, i), load3(grad_radiance + 3 * i));
+      const SummedPoint<T> g =
+          splitnerf::shade_sums_backward(lut, compensate, load_point(in, i), load3(grad_radiance + 3 * i));
       store3(grad.normals + 3 * i, g.normal);
       store3(grad.view_dirs + 3 * i, g.view);
       store3(grad.albedo + 3 * i, g.albedo);
@@ -152,10 +163,11 @@ void shade_sums_backward(const float* lut, bool compensate, int64_t n, const Sum
 #define SPLITNERF_INSTANTIATE(T)                                                                                     \
   template void sample_bsdf<T>(int64_t, const T*, const T*, const T*, int, uint32_t, T*, T*);                        \
   template void monte_carlo_light<T>(int64_t, int, const T*, const T*, const T*, const T*, const T*, const T*, T*);  \
-  template void monte_carlo_light_backward<T>(int64_t, int, const T*, const T*, const T*, const T*, const T*, const T*, \
-                                              const T*, T*, T*, T*);                                                 \
+  template void monte_carlo_light_backward<T>(int64_t, int, const T*, const T*, const T*, const T*, const T*,        \
+                                              const T*, const T*, T*, T*, T*);                                       \
   template void summed_light<T>(int64_t, const T*, const T*, const T*, const SharedLight<T>&, T*);                   \
-  template void summed_light_backward<T>(int64_t, const T*, const T*, const T*, const SharedLight<T>&, const T*, T*, T*, T*); \
+  template void summed_light_backward<T>(int64_t, const T*, const T*, const T*, const SharedLight<T>&, const T*, T*, \
+                                         T*, T*);                                                                    \
   template void shade_sums<T>(const float*, bool, int64_t, const SummedArrays<const T>&, T*);                        \
   template void shade_sums_backward<T>(const float*, bool, int64_t, const SummedArrays<const T>&, const T*,          \
                                        const SummedArrays<T>&);

@@ -62,7 +62,8 @@ void occlusion_factors(const Scene& scene, const OcclusionOptions& options, int6
     for (int64_t i = begin; i < end; ++i) {
       const auto counter = static_cast<uint32_t>(i);
       const auto shift = [&](uint32_t dimension) {
-        return Vec2<T>{random_unit<T>(options.seed, counter, dimension), random_unit<T>(options.seed, counter, dimension + 1)};
+        return Vec2<T>{random_unit<T>(options.seed, counter, dimension),
+                       random_unit<T>(options.seed, counter, dimension + 1)};
       };
       const Vec3<T> normal = load3(normals + 3 * i), axis = load3(lobe_dirs + 3 * i);
       const T ahead = options.along_ray ? T(options.offset) : T(0), up = T(options.offset) - ahead;
@@ -70,13 +71,14 @@ void occlusion_factors(const Scene& scene, const OcclusionOptions& options, int6
       const T ggx_alpha = ggx_alpha_from_roughness(roughness[i]);
       store3(occlusion_d + 3 * i, fan.factor(origin, ahead, normal, Frame<T>(normal), options.n_diffuse_rays, shift(0),
                                              [](T u1, T u2) { return sample_cosine_hemisphere(u1, u2); }));
-      store3(occlusion_s + 3 * i, fan.factor(origin, ahead, normal, Frame<T>(axis), options.n_specular_rays, shift(2),
-                                             [&](T u1, T u2) { return splitnerf::sample_ggx_lobe(u1, u2, ggx_alpha); }));
+      store3(occlusion_s + 3 * i,
+             fan.factor(origin, ahead, normal, Frame<T>(axis), options.n_specular_rays, shift(2),
+                        [&](T u1, T u2) { return splitnerf::sample_ggx_lobe(u1, u2, ggx_alpha); }));
     }
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                 \
+#define SPLITNERF_INSTANTIATE(T)                                                                                   \
   template void occlusion_factors<T>(const Scene&, const OcclusionOptions&, int64_t, const T*, const T*, const T*, \
                                      const T*, int, int, const T*, T*, T*);
 SPLITNERF_INSTANTIATE(float)

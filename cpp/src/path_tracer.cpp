@@ -55,12 +55,8 @@ class PathTracer {
  public:
   PathTracer(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
              const PathTracerParams& params)
-      : scene_(scene),
-        surface_(scene, surface),
-        light_(environment.radiance, environment.height, environment.width),
-        camera_(camera),
-        params_(params),
-        filter_(params.filter),
+      : scene_(scene), surface_(scene, surface), light_(environment.radiance, environment.height, environment.width),
+        camera_(camera), params_(params), filter_(params.filter),
         pattern_(params.samples_per_pixel, 1 + kPairsPerBounce * (params.max_bounces + 1), params.seed) {
     float extent = 0;
     for (int64_t i = 0; i < scene.n_vertices() * 3; ++i) extent = max_of(extent, std::abs(scene.vertices()[i]));

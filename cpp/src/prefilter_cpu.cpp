@@ -56,8 +56,8 @@ void prefilter_light_backward(int64_t n_queries, const T* query_dirs, const T* r
   }
   const LobeSide<T> queries{query.x.data(), query.y.data(), query.z.data(), alpha_squared.data(),
                             share.x.data(), share.y.data(), share.z.data(), n_queries};
-  const LobeSide<T> lights{direction.x.data(), direction.y.data(), direction.z.data(), nullptr,
-                           nullptr,            nullptr,            nullptr,            n_lights};
+  const LobeSide<T> lights{
+      direction.x.data(), direction.y.data(), direction.z.data(), nullptr, nullptr, nullptr, nullptr, n_lights};
   parallel_for(n_lights, kGrain, [&](int64_t begin, int64_t end) {
     kernels<T>().lobe_scatter(queries, lights, begin, end, grad_light + 3 * begin);
   });
@@ -80,9 +80,9 @@ void sample_ggx_lobe(int64_t n, const T* axes, const T* roughness, int n_samples
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                      \
-  template void prefilter_light<T>(int64_t, const T*, const T*, int64_t, const T*, const T*, T*, T*);                 \
-  template void prefilter_light_backward<T>(int64_t, const T*, const T*, const T*, const T*, int64_t, const T*, T*);  \
+#define SPLITNERF_INSTANTIATE(T)                                                                                     \
+  template void prefilter_light<T>(int64_t, const T*, const T*, int64_t, const T*, const T*, T*, T*);                \
+  template void prefilter_light_backward<T>(int64_t, const T*, const T*, const T*, const T*, int64_t, const T*, T*); \
   template void sample_ggx_lobe<T>(int64_t, const T*, const T*, int, uint32_t, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -12,7 +12,8 @@ namespace {
 constexpr int64_t kGrain = 64;  // rays
 
 // The distances at both ends of a ray's samples, [0, n) of both arrays.
-template <class T> void interval_ends(const SurfaceSamples<T>& in, int64_t ray, const Vec3<T>* normals, T* f_prev, T* f_next) {
+template <class T>
+void interval_ends(const SurfaceSamples<T>& in, int64_t ray, const Vec3<T>* normals, T* f_prev, T* f_next) {
   const Vec3<T> direction = load3(in.directions + 3 * ray);
   const int64_t first = in.offsets[ray], n = in.offsets[ray + 1] - first;
   for (int64_t i = 0; i < n; ++i) {
@@ -127,14 +128,16 @@ template <class T> void surface_weights(const SurfaceSamples<T>& in, T* normals,
       const int64_t first = in.offsets[r], n = in.offsets[r + 1] - first;
       work.load(in, r);
       for (int64_t i = 0; i < n; ++i) store3(normals + 3 * (first + i), work.normals[i]);
-      opacity[r] = neus_ray_weights(work.f_prev.data(), work.f_next.data(), in.s, n, in.min_transmittance, weights + first);
+      opacity[r] =
+          neus_ray_weights(work.f_prev.data(), work.f_next.data(), in.s, n, in.min_transmittance, weights + first);
     }
   });
 }
 
 template <class T>
 void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, const T* opacity, const T* grad_normals,
-                              const T* grad_weights, const T* grad_opacity, T* grad_sdf, T* grad_gradient, T* grad_s_rays) {
+                              const T* grad_weights, const T* grad_opacity, T* grad_sdf, T* grad_gradient,
+                              T* grad_s_rays) {
   parallel_for(in.n_rays, kGrain, [&](int64_t begin, int64_t end) {
     RayWork<T> work;
     for (int64_t r = begin; r < end; ++r) {
@@ -150,21 +153,23 @@ void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, con
         const T grad_cosine = (work.grad_next[i] - work.grad_prev[i]) * T(0.5) * in.step * slope;
         grad_sdf[first + i] = work.grad_prev[i] + work.grad_next[i];
         const Vec3<T> grad_normal = load3(grad_normals + 3 * (first + i)) + direction * grad_cosine;
-        store3(grad_gradient + 3 * (first + i), unit_normal_backward(load3(in.gradient + 3 * (first + i)), grad_normal));
+        store3(grad_gradient + 3 * (first + i),
+               unit_normal_backward(load3(in.gradient + 3 * (first + i)), grad_normal));
       }
     }
   });
 }
 
 template <class T>
-Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase, T gap, int per_ray,
-                      T* share) {
+Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase, T gap,
+                      int per_ray, T* share) {
   const int64_t n = offsets[n_rays];
   Spread s{{}, std::vector<int64_t>(n), std::vector<int64_t>(n), {}, {}, {}};
   for (int64_t r = 0; r < n_rays; ++r) {
     const int64_t begin = offsets[r], end = offsets[r + 1];
     auto at = static_cast<int64_t>(s.shaded.size());
-    spread_by_weight(weights + begin, t + begin, end - begin, gap, per_ray, double(phase[r]), [&](int64_t i) { s.shaded.push_back(begin + i); });
+    spread_by_weight(weights + begin, t + begin, end - begin, gap, per_ray, double(phase[r]),
+                     [&](int64_t i) { s.shaded.push_back(begin + i); });
     const auto last = static_cast<int64_t>(s.shaded.size()) - 1;
     if (at > last) continue;
     int64_t heaviest = at;
@@ -193,16 +198,17 @@ Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, 
 }
 
 template <class T>
-void interpolate(int64_t n, int64_t n_channels, const int64_t* first, const int64_t* second, const T* share, const T* values,
-                 T* interpolated) {
+void interpolate(int64_t n, int64_t n_channels, const int64_t* first, const int64_t* second, const T* share,
+                 const T* values, T* interpolated) {
   for (int64_t i = 0; i < n; ++i)
     for (int64_t c = 0; c < n_channels; ++c)
-      interpolated[i * n_channels + c] = lerp(values[first[i] * n_channels + c], values[second[i] * n_channels + c], share[i]);
+      interpolated[i * n_channels + c] =
+          lerp(values[first[i] * n_channels + c], values[second[i] * n_channels + c], share[i]);
 }
 
 template <class T>
-void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_t* first, const int64_t* second, const T* share,
-                          const T* grad_interpolated, T* grad_values) {
+void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_t* first, const int64_t* second,
+                          const T* share, const T* grad_interpolated, T* grad_values) {
   std::fill(grad_values, grad_values + m * n_channels, T(0));
   for (int64_t i = 0; i < n; ++i) {
     for (int64_t c = 0; c < n_channels; ++c) {
@@ -213,22 +219,23 @@ void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_
   }
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                      \
-  template void march_rays_count<T>(const MarchOptions&, const OccupancyView&, int64_t, const T*, const T*, const T*,       \
-                                    int64_t*);                                                                        \
-  template void march_rays_fill<T>(const MarchOptions&, const OccupancyView&, int64_t, const T*, const T*, const T*,        \
-                                   const int64_t*, int64_t*, T*, T*);                                                 \
-  template void neus_weights<T>(int64_t, const int64_t*, const T*, const T*, T, T, T*, T*);                           \
-  template void neus_weights_backward<T>(int64_t, const int64_t*, const T*, const T*, T, T, const T*, const T*,       \
-                                         const T*, const T*, T*, T*, T*);                                             \
-  template void composite<T>(int64_t, int64_t, const int64_t*, const T*, const T*, T*);                               \
-  template void composite_backward<T>(int64_t, int64_t, const int64_t*, const T*, const T*, const T*, T*, T*); \
-  template void surface_weights<T>(const SurfaceSamples<T>&, T*, T*, T*);                                             \
-  template void surface_weights_backward<T>(const SurfaceSamples<T>&, const T*, const T*, const T*, const T*, const T*, T*, \
-                                            T*, T*);                                                                  \
-  template Spread spread_samples<T>(int64_t, const int64_t*, const T*, const T*, const T*, T, int, T*);               \
-  template void interpolate<T>(int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);             \
-  template void interpolate_backward<T>(int64_t, int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);
+#define SPLITNERF_INSTANTIATE(T)                                                                                       \
+  template void march_rays_count<T>(const MarchOptions&, const OccupancyView&, int64_t, const T*, const T*, const T*,  \
+                                    int64_t*);                                                                         \
+  template void march_rays_fill<T>(const MarchOptions&, const OccupancyView&, int64_t, const T*, const T*, const T*,   \
+                                   const int64_t*, int64_t*, T*, T*);                                                  \
+  template void neus_weights<T>(int64_t, const int64_t*, const T*, const T*, T, T, T*, T*);                            \
+  template void neus_weights_backward<T>(int64_t, const int64_t*, const T*, const T*, T, T, const T*, const T*,        \
+                                         const T*, const T*, T*, T*, T*);                                              \
+  template void composite<T>(int64_t, int64_t, const int64_t*, const T*, const T*, T*);                                \
+  template void composite_backward<T>(int64_t, int64_t, const int64_t*, const T*, const T*, const T*, T*, T*);         \
+  template void surface_weights<T>(const SurfaceSamples<T>&, T*, T*, T*);                                              \
+  template void surface_weights_backward<T>(const SurfaceSamples<T>&, const T*, const T*, const T*, const T*,          \
+                                            const T*, T*, T*, T*);                                                     \
+  template Spread spread_samples<T>(int64_t, const int64_t*, const T*, const T*, const T*, T, int, T*);                \
+  template void interpolate<T>(int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);              \
+  template void interpolate_backward<T>(int64_t, int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, \
+                                        T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

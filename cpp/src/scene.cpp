@@ -16,13 +16,20 @@ constexpr int64_t kPacketsPerTask = 256;
 
 const char* error_name(RTCError error) {
   switch (error) {
-    case RTC_ERROR_NONE: return "no error";
-    case RTC_ERROR_INVALID_ARGUMENT: return "invalid argument";
-    case RTC_ERROR_INVALID_OPERATION: return "invalid operation";
-    case RTC_ERROR_OUT_OF_MEMORY: return "out of memory";
-    case RTC_ERROR_UNSUPPORTED_CPU: return "unsupported CPU (SSE2 is required)";
-    case RTC_ERROR_CANCELLED: return "cancelled";
-    default: return "unknown error";
+    case RTC_ERROR_NONE:
+      return "no error";
+    case RTC_ERROR_INVALID_ARGUMENT:
+      return "invalid argument";
+    case RTC_ERROR_INVALID_OPERATION:
+      return "invalid operation";
+    case RTC_ERROR_OUT_OF_MEMORY:
+      return "out of memory";
+    case RTC_ERROR_UNSUPPORTED_CPU:
+      return "unsupported CPU (SSE2 is required)";
+    case RTC_ERROR_CANCELLED:
+      return "cancelled";
+    default:
+      return "unknown error";
   }
 }
 
@@ -123,8 +130,7 @@ void Scene::trace_visibility(const float* origins, const float* directions, int6
   });
 }
 
-void Scene::trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far,
-                          Hit* hits) const {
+void Scene::trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far, Hit* hits) const {
   const RTCScene scene = embree_scene(impl_->tracer);
   parallel_for((n_rays + kPacket - 1) / kPacket, kPacketsPerTask, [&](int64_t begin, int64_t end) {
     alignas(64) RTCRayHit16 query{};
@@ -136,8 +142,8 @@ void Scene::trace_closest(const float* origins, const float* directions, int64_t
       embree::intersect16(valid, scene, &query);
       for (int k = 0; k < count; ++k) {
         const bool hit = query.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
-        hits[first + k] = hit ? Hit{query.ray.tfar[k], query.hit.primID[k], query.hit.u[k], query.hit.v[k]}
-                              : Hit{-1.f, 0, 0.f, 0.f};
+        hits[first + k] =
+            hit ? Hit{query.ray.tfar[k], query.hit.primID[k], query.hit.u[k], query.hit.v[k]} : Hit{-1.f, 0, 0.f, 0.f};
       }
     }
   });

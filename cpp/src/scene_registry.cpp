@@ -10,13 +10,11 @@
 
 namespace splitnerf {
 
-Scene::Impl::Impl(const float* vertex_data, int64_t vertex_count, const int32_t* triangle_data,
-                  int64_t triangle_count)
+Scene::Impl::Impl(const float* vertex_data, int64_t vertex_count, const int32_t* triangle_data, int64_t triangle_count)
     : n_vertices(vertex_count), n_triangles(triangle_count) {
   if (n_vertices <= 0 || n_triangles <= 0) {
-    throw std::invalid_argument("Scene: the mesh must have vertices and triangles, got " +
-                                std::to_string(n_vertices) + " vertices and " + std::to_string(n_triangles) +
-                                " triangles");
+    throw std::invalid_argument("Scene: the mesh must have vertices and triangles, got " + std::to_string(n_vertices) +
+                                " vertices and " + std::to_string(n_triangles) + " triangles");
   }
   if (n_triangles >= int64_t(1) << 32) {
     throw std::invalid_argument("Scene: at most 2^32 - 1 triangles, got " + std::to_string(n_triangles));
@@ -29,8 +27,8 @@ Scene::Impl::Impl(const float* vertex_data, int64_t vertex_count, const int32_t*
   for (int64_t i = 0; i < n_triangles * 3; ++i) {
     if (triangle_data[i] < 0 || triangle_data[i] >= n_vertices) {
       throw std::invalid_argument("Scene: triangle " + std::to_string(i / 3) + " names vertex " +
-                                  std::to_string(triangle_data[i]) + ", but there are " +
-                                  std::to_string(n_vertices) + " vertices");
+                                  std::to_string(triangle_data[i]) + ", but there are " + std::to_string(n_vertices) +
+                                  " vertices");
     }
   }
   vertices.reserve(n_vertices * 3 + 1);

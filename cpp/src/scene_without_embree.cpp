@@ -9,8 +9,7 @@ namespace splitnerf {
 Scene::Scene(const float* vertices, int64_t n_vertices, const int32_t* triangles, int64_t n_triangles)
     : impl_(std::make_unique<Impl>(vertices, n_vertices, triangles, n_triangles)) {}
 
-void Scene::trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far,
-                          Hit* hits) const {
+void Scene::trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far, Hit* hits) const {
   const TraceCallback callback = trace_callback();
   if (!callback) {
     throw std::runtime_error(

@@ -28,7 +28,8 @@ template <class T> struct PaddedGrad {
   std::vector<T> hidden, hidden_bias, out, out_bias;
 
   explicit PaddedGrad(const SdfLayer<T>& l)
-      : hidden(l.width * l.input_columns), hidden_bias(l.width_columns), out(l.n_outputs * l.width_columns), out_bias(l.n_outputs) {}
+      : hidden(l.width * l.input_columns), hidden_bias(l.width_columns), out(l.n_outputs * l.width_columns),
+        out_bias(l.n_outputs) {}
   SdfLayerGrad<T> view() { return {hidden.data(), hidden_bias.data(), out.data(), out_bias.data()}; }
 };
 
@@ -70,9 +71,9 @@ void sdf_layer(const SdfWeights<T>& weights, int64_t n, const T* positions, cons
 }
 
 template <class T>
-void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features, const T* jacobian,
-                        const T* grad_outputs, const T* grad_gradient, T* grad_features, T* grad_jacobian, T* grad_hidden,
-                        T* grad_hidden_bias, T* grad_out, T* grad_out_bias) {
+void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features,
+                        const T* jacobian, const T* grad_outputs, const T* grad_gradient, T* grad_features,
+                        T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias, T* grad_out, T* grad_out_bias) {
   const Kernels<T>& k = kernels<T>();
   const PreparedSdfLayer<T> prepared(weights);
   const SdfLayer<T>& layer = prepared.layer();
@@ -104,8 +105,9 @@ void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, const T* positi
 }
 
 template <class T>
-void sample_rays(const SdfField<T>& field, const MarchOptions& march, const OccupancyView& grid, const SampleRules<T>& rules,
-                 int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter, SampledRay<T>* sampled) {
+void sample_rays(const SdfField<T>& field, const MarchOptions& march, const OccupancyView& grid,
+                 const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter,
+                 SampledRay<T>* sampled) {
   const Kernels<T>& k = kernels<T>();
   const PreparedField<T> prepared(field);
   parallel_for(n_rays, kSdfBlock, [&](int64_t begin, int64_t end) {
@@ -129,12 +131,12 @@ void sample_rays(const SdfField<T>& field, const MarchOptions& march, const Occu
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                      \
-  template void sdf_values<T>(const SdfField<T>&, int64_t, const T*, T*);                                             \
-  template void sdf_layer<T>(const SdfWeights<T>&, int64_t, const T*, const T*, const T*, T*, T*);                    \
+#define SPLITNERF_INSTANTIATE(T)                                                                                       \
+  template void sdf_values<T>(const SdfField<T>&, int64_t, const T*, T*);                                              \
+  template void sdf_layer<T>(const SdfWeights<T>&, int64_t, const T*, const T*, const T*, T*, T*);                     \
   template void sdf_layer_backward<T>(const SdfWeights<T>&, int64_t, const T*, const T*, const T*, const T*, const T*, \
-                                      T*, T*, T*, T*, T*, T*);                                                        \
-  template void sample_rays<T>(const SdfField<T>&, const MarchOptions&, const OccupancyView&, const SampleRules<T>&,        \
+                                      T*, T*, T*, T*, T*, T*);                                                         \
+  template void sample_rays<T>(const SdfField<T>&, const MarchOptions&, const OccupancyView&, const SampleRules<T>&,   \
                                int64_t, const T*, const T*, const T*, SampledRay<T>*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -37,7 +37,8 @@ void query_direction(const float* lut, bool mean, int64_t n, const T* normals, c
                      T* directions) {
   parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i)
-      store3(directions + 3 * i, splitnerf::query_direction(lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i]));
+      store3(directions + 3 * i,
+             splitnerf::query_direction(lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i]));
   });
 }
 
@@ -47,9 +48,8 @@ void query_direction_backward(const float* lut, bool mean, int64_t n, const T* n
                               T* grad_roughness) {
   parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
-      const QueryDirectionGrad<T> g =
-          splitnerf::query_direction_backward(lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i],
-                                              load3(grad_directions + 3 * i));
+      const QueryDirectionGrad<T> g = splitnerf::query_direction_backward(
+          lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i], load3(grad_directions + 3 * i));
       store3(grad_normals + 3 * i, g.normal);
       store3(grad_view_dirs + 3 * i, g.view);
       grad_roughness[i] = g.roughness;
@@ -86,12 +86,12 @@ void split_sum_shade_backward(const float* lut, ShadeOptions options, int64_t n,
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                   \
-  template void query_direction<T>(const float*, bool, int64_t, const T*, const T*, const T*, T*);                 \
-  template void query_direction_backward<T>(const float*, bool, int64_t, const T*, const T*, const T*, const T*,   \
-                                            T*, T*, T*);                                                           \
-  template void split_sum_shade<T>(const float*, ShadeOptions, int64_t, int, const ShadeArrays<const T>&, T*);     \
-  template void split_sum_shade_backward<T>(const float*, ShadeOptions, int64_t, int, const ShadeArrays<const T>&, \
+#define SPLITNERF_INSTANTIATE(T)                                                                                     \
+  template void query_direction<T>(const float*, bool, int64_t, const T*, const T*, const T*, T*);                   \
+  template void query_direction_backward<T>(const float*, bool, int64_t, const T*, const T*, const T*, const T*, T*, \
+                                            T*, T*);                                                                 \
+  template void split_sum_shade<T>(const float*, ShadeOptions, int64_t, int, const ShadeArrays<const T>&, T*);       \
+  template void split_sum_shade_backward<T>(const float*, ShadeOptions, int64_t, int, const ShadeArrays<const T>&,   \
                                             const T*, const ShadeArrays<T>&);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -28,9 +28,9 @@ template <class T> void srgb_to_linear(int64_t n, const T* srgb, T* linear) {
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                  \
-  template void linear_to_srgb<T>(int64_t, const T*, T*);                         \
-  template void linear_to_srgb_backward<T>(int64_t, const T*, const T*, T*);      \
+#define SPLITNERF_INSTANTIATE(T)                                             \
+  template void linear_to_srgb<T>(int64_t, const T*, T*);                    \
+  template void linear_to_srgb_backward<T>(int64_t, const T*, const T*, T*); \
   template void srgb_to_linear<T>(int64_t, const T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -225,8 +225,9 @@ template <class T>
 void cached_visibility(const VisibilityCache<T>& cache, int64_t n, const T* positions, const T* normals, T* visible,
                        T* arriving) {
   const Planes<T> direction(cache.directions, cache.n_directions);
-  const LobeSide<T> directions{direction.x.data(), direction.y.data(), direction.z.data(), nullptr,
-                               nullptr,            nullptr,            nullptr,            cache.n_directions};
+  const LobeSide<T> directions{
+      direction.x.data(), direction.y.data(), direction.z.data(), nullptr, nullptr, nullptr, nullptr,
+      cache.n_directions};
   const int64_t k = cache.n_directions;
   parallel_for(n, kPointGrain, [&](int64_t begin, int64_t end) {
     CacheReader<T> reader(cache, directions);
@@ -237,10 +238,10 @@ void cached_visibility(const VisibilityCache<T>& cache, int64_t n, const T* posi
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                      \
-  template void build_vertex_grids<T>(int64_t, const T*, T, int, int64_t, int32_t*, int32_t*);                        \
-  template void cached_occlusion<T>(const VisibilityCache<T>&, int64_t, const T*, const T*, const T*, const T*, T*,   \
-                                    T*, T*, T*);                                                                      \
+#define SPLITNERF_INSTANTIATE(T)                                                                                    \
+  template void build_vertex_grids<T>(int64_t, const T*, T, int, int64_t, int32_t*, int32_t*);                      \
+  template void cached_occlusion<T>(const VisibilityCache<T>&, int64_t, const T*, const T*, const T*, const T*, T*, \
+                                    T*, T*, T*);                                                                    \
   template void cached_visibility<T>(const VisibilityCache<T>&, int64_t, const T*, const T*, T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -22,8 +22,7 @@ namespace {
 using splitnerf::Hit;
 using splitnerf::Scene;
 
-template <class T>
-using Array = py::array_t<T, py::array::c_style>;
+template <class T> using Array = py::array_t<T, py::array::c_style>;
 
 constexpr py::ssize_t kAny = -1;
 
@@ -40,8 +39,8 @@ std::string shape_text(const std::vector<py::ssize_t>& shape, const char* any) {
 template <class T>
 Array<T> checked(const char* function, const char* argument, const py::object& values,
                  const std::vector<py::ssize_t>& shape) {
-  const std::string expected = std::string(function) + ": " + argument + " must be " + shape_text(shape, "n") +
-                               " " + py::cast<std::string>(py::str(py::dtype::of<T>())) + ", got ";
+  const std::string expected = std::string(function) + ": " + argument + " must be " + shape_text(shape, "n") + " " +
+                               py::cast<std::string>(py::str(py::dtype::of<T>())) + ", got ";
   if (!py::isinstance<py::array>(values)) {
     throw py::value_error(expected + py::cast<std::string>(py::type::of(values).attr("__name__")));
   }
@@ -82,8 +81,7 @@ py::array_t<bool> trace_visibility(const PyScene& self, const py::object& origin
   return visible;
 }
 
-py::tuple trace_closest(const PyScene& self, const py::object& origins, const py::object& directions,
-                        float t_far) {
+py::tuple trace_closest(const PyScene& self, const py::object& origins, const py::object& directions, float t_far) {
   const auto o = checked<float>("trace_closest", "origins", origins, {kAny, 3});
   const auto d = checked<float>("trace_closest", "directions", directions, {o.shape(0), 3});
   const py::ssize_t n = o.shape(0);
@@ -141,13 +139,12 @@ splitnerf::PixelFilter pixel_filter(const std::string& name) {
   throw py::value_error("render: pixel_filter must be 'box' or 'blackman-harris', got '" + name + "'");
 }
 
-py::dict render(const PyScene& self, const py::object& albedo, const py::object& roughness,
-                const py::object& metallic, const py::object& environment, const py::object& camera_to_world,
-                float fx, float fy, float cx, float cy, int width, int height, const py::object& normals,
-                const std::string& materials_per, const PyMaterials* materials, const py::object& material_ids,
-                const py::object& uv, const py::object& tangents, int spp, int max_bounces, uint32_t seed,
-                bool light_sampling, float clamp_indirect, const std::string& filter,
-                const std::optional<float>& catcher_height) {
+py::dict render(const PyScene& self, const py::object& albedo, const py::object& roughness, const py::object& metallic,
+                const py::object& environment, const py::object& camera_to_world, float fx, float fy, float cx,
+                float cy, int width, int height, const py::object& normals, const std::string& materials_per,
+                const PyMaterials* materials, const py::object& material_ids, const py::object& uv,
+                const py::object& tangents, int spp, int max_bounces, uint32_t seed, bool light_sampling,
+                float clamp_indirect, const std::string& filter, const std::optional<float>& catcher_height) {
   if (materials_per != "vertex" && materials_per != "triangle") {
     throw py::value_error("render: materials_per must be 'vertex' or 'triangle', got '" + materials_per + "'");
   }
@@ -186,8 +183,14 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
     surface.tangents = frames.data();
   }
   const splitnerf::EnvironmentMap light{map.data(), int(map.shape(0)), int(map.shape(1))};
-  const splitnerf::PathTracerParams params{spp,           max_bounces, seed, light_sampling, clamp_indirect, pixel_filter(filter),
-                                           catcher_height.has_value(), catcher_height.value_or(0.f)};
+  const splitnerf::PathTracerParams params{spp,
+                                           max_bounces,
+                                           seed,
+                                           light_sampling,
+                                           clamp_indirect,
+                                           pixel_filter(filter),
+                                           catcher_height.has_value(),
+                                           catcher_height.value_or(0.f)};
 
   py::dict images;
   const auto allocate = [&](const char* name, int channels) {
@@ -198,9 +201,9 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
     return image.mutable_data();
   };
   const splitnerf::RenderTargets targets{
-      allocate("radiance", 3), allocate("alpha", 1),         allocate("albedo", 3), allocate("roughness", 1),
-      allocate("metallic", 1), allocate("normal", 3),        allocate("smooth_normal", 3), allocate("depth", 1),
-      catcher_height ? allocate("shadow", 1) : nullptr};
+      allocate("radiance", 3),      allocate("alpha", 1),    allocate("albedo", 3),
+      allocate("roughness", 1),     allocate("metallic", 1), allocate("normal", 3),
+      allocate("smooth_normal", 3), allocate("depth", 1),    catcher_height ? allocate("shadow", 1) : nullptr};
   int64_t n_rays;
   {
     py::gil_scoped_release release;
@@ -229,9 +232,8 @@ void trace_with_embreex(const Scene& scene, std::shared_ptr<void>& tracer, const
   std::fill_n(t_fars.mutable_data(), n_rays, t_far);
   const py::dict found =
       static_cast<py::object*>(tracer.get())
-          ->attr("run")(Array<float>({n_rays, int64_t(3)}, origins),
-                        Array<float>({n_rays, int64_t(3)}, directions), py::arg("dists") = t_fars,
-                        py::arg("query") = "INTERSECT", py::arg("output") = true);
+          ->attr("run")(Array<float>({n_rays, int64_t(3)}, origins), Array<float>({n_rays, int64_t(3)}, directions),
+                        py::arg("dists") = t_fars, py::arg("query") = "INTERSECT", py::arg("output") = true);
   const Array<float> t(found["tfar"]), u(found["u"]), v(found["v"]);
   const Array<int32_t> triangle(found["primID"]);
   for (int64_t i = 0; i < n_rays; ++i) {
@@ -247,11 +249,9 @@ void bind_scene(py::module_& m) {
 
   constexpr float infinity = std::numeric_limits<float>::infinity();
   py::class_<PyScene>(
-      m, "Scene",
-      "A triangle mesh ready for ray tracing: vertices [n, 3] float32, triangles [m, 3] int32 (copied).")
+      m, "Scene", "A triangle mesh ready for ray tracing: vertices [n, 3] float32, triangles [m, 3] int32 (copied).")
       .def(py::init<const py::object&, const py::object&>(), py::arg("vertices"), py::arg("triangles"))
-      .def_readonly("handle", &PyScene::handle,
-                    "The integer that names the scene to torch operators while it lives.")
+      .def_readonly("handle", &PyScene::handle, "The integer that names the scene to torch operators while it lives.")
       .def_property_readonly("n_vertices", [](const PyScene& s) { return s.scene->n_vertices(); })
       .def_property_readonly("n_triangles", [](const PyScene& s) { return s.scene->n_triangles(); })
       .def("trace_visibility", &trace_visibility, py::arg("origins"), py::arg("directions"),
@@ -263,34 +263,35 @@ void bind_scene(py::module_& m) {
            "miss.\n\n"
            "u and v are the barycentric coordinates of the triangle's second and third vertex.");
 
-  py::class_<PyMaterials>(m, "Materials",
-                          "Checked materials for render, from a list of splitnerf.data.asset.Material. ValueError where a\n"
-                          "factor or a texture lies outside its range.")
+  py::class_<PyMaterials>(
+      m, "Materials",
+      "Checked materials for render, from a list of splitnerf.data.asset.Material. ValueError where a\n"
+      "factor or a texture lies outside its range.")
       .def(py::init<const py::list&>(), py::arg("materials"));
 
-  m.def(
-      "render", &render, py::arg("scene"), py::arg("albedo"), py::arg("roughness"), py::arg("metallic"),
-      py::arg("environment"), py::arg("camera_to_world"), py::arg("fx"), py::arg("fy"), py::arg("cx"),
-      py::arg("cy"), py::arg("width"), py::arg("height"), py::kw_only(), py::arg("normals") = py::none(),
-      py::arg("materials_per") = "vertex", py::arg("materials") = py::none(), py::arg("material_ids") = py::none(),
-      py::arg("uv") = py::none(), py::arg("tangents") = py::none(), py::arg("spp") = 64, py::arg("max_bounces") = 4,
-      py::arg("seed") = 0, py::arg("light_sampling") = true, py::arg("clamp_indirect") = 0.f,
-      py::arg("pixel_filter") = "box", py::arg("catcher_height") = py::none(),
-      "Path-traces the scene under an equirectangular light; float32 arrays in, a dict of float32 arrays out.\n\n"
-      "albedo [n, 3], roughness [n], metallic [n]: in [0, 1], linear, per vertex or per triangle "
-      "(materials_per).\n"
-      "environment: [h, w, 3] linear radiance. camera_to_world: [3, 4], OpenGL axes; fx ... cy in pixels.\n"
-      "normals: [n_vertices, 3] shading normals, or None for flat shading.\n"
-      "clamp_indirect: largest channel of one indirect contribution, 0 for no limit (unbiased).\n"
-      "materials (Materials), material_ids [m] int32, uv [n_vertices, 2], tangents [n_vertices, 4]: see splitnerf.data.asset;\n"
-      "multiplied with albedo, roughness and metallic.\n"
-      "pixel_filter: 'box' (1 pixel) or 'blackman-harris' (1.5 pixels). catcher_height: z of an invisible ground\n"
-      "plane that catches the shadow of the direct light, or None.\n"
-      "Returns radiance [h, w, 3] (linear, premultiplied), alpha [h, w], and of the first hit, averaged over the\n"
-      "sub-samples that hit: albedo, roughness, metallic, normal and smooth_normal (world space; with and without\n"
-      "normal texture), depth (along the ray); with a catcher shadow [h, w], the opacity of the black shadow\n"
-      "(alpha + shadow <= 1); and rays, the number of rays traced.\n"
-      "Equal seeds give equal images.");
+  m.def("render", &render, py::arg("scene"), py::arg("albedo"), py::arg("roughness"), py::arg("metallic"),
+        py::arg("environment"), py::arg("camera_to_world"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
+        py::arg("width"), py::arg("height"), py::kw_only(), py::arg("normals") = py::none(),
+        py::arg("materials_per") = "vertex", py::arg("materials") = py::none(), py::arg("material_ids") = py::none(),
+        py::arg("uv") = py::none(), py::arg("tangents") = py::none(), py::arg("spp") = 64, py::arg("max_bounces") = 4,
+        py::arg("seed") = 0, py::arg("light_sampling") = true, py::arg("clamp_indirect") = 0.f,
+        py::arg("pixel_filter") = "box", py::arg("catcher_height") = py::none(),
+        "Path-traces the scene under an equirectangular light; float32 arrays in, a dict of float32 arrays out.\n\n"
+        "albedo [n, 3], roughness [n], metallic [n]: in [0, 1], linear, per vertex or per triangle "
+        "(materials_per).\n"
+        "environment: [h, w, 3] linear radiance. camera_to_world: [3, 4], OpenGL axes; fx ... cy in pixels.\n"
+        "normals: [n_vertices, 3] shading normals, or None for flat shading.\n"
+        "clamp_indirect: largest channel of one indirect contribution, 0 for no limit (unbiased).\n"
+        "materials (Materials), material_ids [m] int32, uv [n_vertices, 2], tangents [n_vertices, 4]: see "
+        "splitnerf.data.asset;\n"
+        "multiplied with albedo, roughness and metallic.\n"
+        "pixel_filter: 'box' (1 pixel) or 'blackman-harris' (1.5 pixels). catcher_height: z of an invisible ground\n"
+        "plane that catches the shadow of the direct light, or None.\n"
+        "Returns radiance [h, w, 3] (linear, premultiplied), alpha [h, w], and of the first hit, averaged over the\n"
+        "sub-samples that hit: albedo, roughness, metallic, normal and smooth_normal (world space; with and without\n"
+        "normal texture), depth (along the ray); with a catcher shadow [h, w], the opacity of the black shadow\n"
+        "(alpha + shadow <= 1); and rays, the number of rays traced.\n"
+        "Equal seeds give equal images.");
 
   m.def(
       "embree_version", [] { return std::string(splitnerf::embree_version()); },

@@ -9,7 +9,7 @@
 namespace splitnerf::glue {
 
 inline HashGridShape checked_shape(const char* op, int64_t n_levels, int64_t base_resolution, double growth,
-                            int64_t log2_table_size, int64_t n_features, int64_t n_active) {
+                                   int64_t log2_table_size, int64_t n_features, int64_t n_active) {
   const std::string error = hash_shape_error(n_levels, n_features, base_resolution, growth, log2_table_size);
   require(error.empty(), op, error);
   require(n_active >= 0 && n_active <= n_levels, op,

@@ -28,7 +28,8 @@ PYBIND11_MODULE(_core, m) {
             splitnerf::hash_shape_error(n_levels, n_features, base_resolution, growth, log2_table_size);
         if (!error.empty()) throw py::value_error("hash_grid_levels: " + error);
         const splitnerf::HashGridShape shape{static_cast<int>(n_levels), static_cast<int>(n_features),
-                                             static_cast<int>(base_resolution), growth, static_cast<int>(log2_table_size)};
+                                             static_cast<int>(base_resolution), growth,
+                                             static_cast<int>(log2_table_size)};
         std::array<splitnerf::HashLevel, splitnerf::kMaxLevels> levels;
         splitnerf::hash_levels(shape, levels.data());
         py::list out;
@@ -54,7 +55,8 @@ PYBIND11_MODULE(_core, m) {
       "fibonacci_sphere",
       [](uint32_t n) {
         py::array_t<double> points({static_cast<py::ssize_t>(n), static_cast<py::ssize_t>(3)});
-        for (uint32_t i = 0; i < n; ++i) splitnerf::store3(points.mutable_data(i, 0), splitnerf::fibonacci_sphere<double>(i, n));
+        for (uint32_t i = 0; i < n; ++i)
+          splitnerf::store3(points.mutable_data(i, 0), splitnerf::fibonacci_sphere<double>(i, n));
         return points;
       },
       py::arg("n"), "The n-point Fibonacci lattice on the unit sphere as an [n, 3] float64 array.");

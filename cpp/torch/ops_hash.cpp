@@ -105,8 +105,9 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("hash_encode_jacobian(Tensor positions, Tensor table, " SPLITNERF_GRID ") -> (Tensor, Tensor)");
   m.def("hash_encode_jacobian_backward(Tensor positions, Tensor grad_features, Tensor grad_jacobian, " SPLITNERF_GRID
         ") -> Tensor");
-  m.def("hash_encode_jacobian_backward_positions(Tensor positions, Tensor table, Tensor grad_features, "
-        "Tensor grad_jacobian, " SPLITNERF_GRID ") -> Tensor");
+  m.def(
+      "hash_encode_jacobian_backward_positions(Tensor positions, Tensor table, Tensor grad_features, "
+      "Tensor grad_jacobian, " SPLITNERF_GRID ") -> Tensor");
 }
 
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {

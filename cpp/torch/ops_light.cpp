@@ -96,13 +96,15 @@ Tensor sample_ggx_lobe(Tensor axes, Tensor roughness, int64_t n_samples, int64_t
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("prefilter_light(Tensor query_dirs, Tensor roughness, Tensor light_dirs, Tensor light) -> (Tensor, Tensor)");
-  m.def("prefilter_light_backward(Tensor query_dirs, Tensor roughness, Tensor total, Tensor grad_gbar, "
-        "Tensor light_dirs) -> Tensor");
+  m.def(
+      "prefilter_light_backward(Tensor query_dirs, Tensor roughness, Tensor total, Tensor grad_gbar, "
+      "Tensor light_dirs) -> Tensor");
   m.def("sample_ggx_lobe(Tensor axes, Tensor roughness, int n_samples, int seed) -> Tensor");
   m.def("trace_visibility(int scene, Tensor origins, Tensor directions, float t_far) -> Tensor");
-  m.def("occlusion_factors(int scene, Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, "
-        "Tensor environment, int n_diffuse_rays, int n_specular_rays, float offset, bool along_ray, int seed) -> "
-        "(Tensor, Tensor)");
+  m.def(
+      "occlusion_factors(int scene, Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, "
+      "Tensor environment, int n_diffuse_rays, int n_specular_rays, float offset, bool along_ray, int seed) -> "
+      "(Tensor, Tensor)");
 }
 
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {

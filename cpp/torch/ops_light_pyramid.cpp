@@ -108,12 +108,15 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> light_lookup_backward(Tensor directio
 }  // namespace
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor transposed_offsets, "
-        "Tensor transposed_columns, Tensor transposed_weights, Tensor values) -> Tensor");
-  m.def("light_lookup(Tensor directions, Tensor roughness, Tensor levels, Tensor sh, Tensor resolutions, "
-        "Tensor nodes, Tensor zonal) -> Tensor");
-  m.def("light_lookup_backward(Tensor directions, Tensor roughness, Tensor levels, Tensor sh, Tensor resolutions, "
-        "Tensor nodes, Tensor zonal, Tensor grad_radiance) -> (Tensor, Tensor, Tensor, Tensor)");
+  m.def(
+      "sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor transposed_offsets, "
+      "Tensor transposed_columns, Tensor transposed_weights, Tensor values) -> Tensor");
+  m.def(
+      "light_lookup(Tensor directions, Tensor roughness, Tensor levels, Tensor sh, Tensor resolutions, "
+      "Tensor nodes, Tensor zonal) -> Tensor");
+  m.def(
+      "light_lookup_backward(Tensor directions, Tensor roughness, Tensor levels, Tensor sh, Tensor resolutions, "
+      "Tensor nodes, Tensor zonal, Tensor grad_radiance) -> (Tensor, Tensor, Tensor, Tensor)");
 }
 
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {

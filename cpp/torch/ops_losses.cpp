@@ -8,7 +8,8 @@
 namespace splitnerf::glue {
 namespace {
 
-std::tuple<Tensor, Tensor, Tensor, Tensor> pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background, bool linear) {
+std::tuple<Tensor, Tensor, Tensor, Tensor> pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background,
+                                                        bool linear) {
   const char* op = "pixel_losses";
   const ScalarType type = real_type(op, "mean", mean);
   const Tensor m = checked(op, "mean", mean, {kAny, 3}, type);
@@ -28,16 +29,19 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> pixel_losses(Tensor mean, Tensor opac
 std::tuple<Tensor, Tensor, Tensor> gradient_losses(Tensor gradients, Tensor weights, Tensor beside) {
   const char* op = "gradient_losses";
   const ScalarType type = real_type(op, "gradients", gradients);
-  const Tensor g = checked(op, "gradients", gradients, {kAny, 3}, type), w = checked(op, "weights", weights, {kAny}, type);
+  const Tensor g = checked(op, "gradients", gradients, {kAny, 3}, type),
+               w = checked(op, "weights", weights, {kAny}, type);
   const Tensor b = checked(op, "beside", beside, {kAny}, ScalarType::Long);
   const int64_t n = g.size(0), m = b.size(0), n_weights = w.size(0);
   require(n_weights + m <= n, op, "gradients must hold the samples and their neighbours");
   for (int64_t j = 0; j < m; ++j)
     require(in<int64_t>(b)[j] >= 0 && in<int64_t>(b)[j] < n_weights, op, "beside must hold indices of weights");
-  Tensor losses = empty_like_type(g, {2}, type), eikonal_by = torch::stable::empty_like(g), smoothness_by = torch::stable::empty_like(g);
+  Tensor losses = empty_like_type(g, {2}, type), eikonal_by = torch::stable::empty_like(g),
+         smoothness_by = torch::stable::empty_like(g);
   dispatch_real(type, [&](auto zero) {
     using T = decltype(zero);
-    cpu::gradient_losses(n, m, in<T>(g), in<T>(w), in<int64_t>(b), out<T>(losses), out<T>(eikonal_by), out<T>(smoothness_by));
+    cpu::gradient_losses(n, m, in<T>(g), in<T>(w), in<int64_t>(b), out<T>(losses), out<T>(eikonal_by),
+                         out<T>(smoothness_by));
   });
   return {losses, eikonal_by, smoothness_by};
 }
@@ -46,7 +50,8 @@ std::tuple<Tensor, Tensor> material_losses(Tensor albedo, Tensor metallic, Tenso
   const char* op = "material_losses";
   const ScalarType type = real_type(op, "metallic", metallic);
   const Tensor m = checked(op, "metallic", metallic, {kAny, 1}, type);
-  const Tensor a = checked(op, "albedo", albedo, {m.size(0), 3}, type), s = checked(op, "shares", shares, {m.size(0)}, type);
+  const Tensor a = checked(op, "albedo", albedo, {m.size(0), 3}, type),
+               s = checked(op, "shares", shares, {m.size(0)}, type);
   Tensor losses = empty_like_type(m, {3}, type), by_metallic = empty_like_type(m, {3, m.size(0)}, type);
   dispatch_real(type, [&](auto zero) {
     using T = decltype(zero);
@@ -71,7 +76,9 @@ std::tuple<Tensor, Tensor> quadratic_entropy(Tensor x) {
 }  // namespace
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background, bool linear) -> (Tensor, Tensor, Tensor, Tensor)");
+  m.def(
+      "pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background, bool linear) -> (Tensor, Tensor, "
+      "Tensor, Tensor)");
   m.def("gradient_losses(Tensor gradients, Tensor weights, Tensor beside) -> (Tensor, Tensor, Tensor)");
   m.def("material_losses(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1) -> (Tensor, Tensor)");
   m.def("quadratic_entropy(Tensor x) -> (Tensor, Tensor)");

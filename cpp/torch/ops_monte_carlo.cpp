@@ -32,8 +32,7 @@ struct Inputs {
 
   Inputs(const char* op, const Tensor& n, const Tensor& v, const Tensor& rho, const Tensor& l, const Tensor& p,
          const Tensor& r)
-      : type(real_type(op, "normals", n)),
-        normals(checked(op, "normals", n, {kAny, 3}, type)),
+      : type(real_type(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
         view_dirs(checked(op, "view_dirs", v, {normals.size(0), 3}, type)),
         roughness(checked(op, "roughness", rho, {normals.size(0), 1}, type)),
         light_dirs(checked(op, "light_dirs", l, {normals.size(0), kAny, 3}, type)),
@@ -83,8 +82,7 @@ struct SharedInputs {
 
   SharedInputs(const char* op, const Tensor& n, const Tensor& v, const Tensor& rho, const Tensor& d, const Tensor& a,
                const Tensor& r, const Tensor& open, const Tensor& s)
-      : type(real_type(op, "normals", n)),
-        normals(checked(op, "normals", n, {kAny, 3}, type)),
+      : type(real_type(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
         view_dirs(checked(op, "view_dirs", v, {n_points(), 3}, type)),
         roughness(checked(op, "roughness", rho, {n_points(), 1}, type)),
         directions(checked(op, "directions", d, {kAny, 3}, type)),
@@ -96,25 +94,28 @@ struct SharedInputs {
   }
   int64_t n_points() const { return normals.size(0); }
   template <class T> cpu::SharedLight<T> light() const {
-    return {static_cast<int>(directions.size(0)), in<T>(directions), in<T>(solid_angles), in<T>(radiance), in<T>(visible),
-            sent.size(0) ? in<T>(sent) : nullptr};
+    return {
+        static_cast<int>(directions.size(0)), in<T>(directions), in<T>(solid_angles), in<T>(radiance), in<T>(visible),
+        sent.size(0) ? in<T>(sent) : nullptr};
   }
 };
 
 Tensor summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor solid_angles,
                     Tensor radiance, Tensor visible, Tensor sent) {
-  const SharedInputs i("summed_light", normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent);
+  const SharedInputs i("summed_light", normals, view_dirs, roughness, directions, solid_angles, radiance, visible,
+                       sent);
   Tensor sums = empty_like_type(i.normals, {i.n_points(), 3, 3}, i.type);
   dispatch_real(i.type, [&](auto zero) {
     using T = decltype(zero);
-    cpu::summed_light(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(), out<T>(sums));
+    cpu::summed_light(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(),
+                      out<T>(sums));
   });
   return sums;
 }
 
-std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions,
-                                                         Tensor solid_angles, Tensor radiance, Tensor visible, Tensor sent,
-                                                         Tensor grad_sums) {
+std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness,
+                                                         Tensor directions, Tensor solid_angles, Tensor radiance,
+                                                         Tensor visible, Tensor sent, Tensor grad_sums) {
   const char* op = "summed_light_backward";
   const SharedInputs i(op, normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent);
   const Tensor g = checked(op, "grad_sums", grad_sums, {i.n_points(), 3, 3}, i.type);
@@ -122,8 +123,8 @@ std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor 
   Tensor grad_normals = like(i.normals), grad_roughness = like(i.roughness), grad_light = like(i.radiance);
   dispatch_real(i.type, [&](auto zero) {
     using T = decltype(zero);
-    cpu::summed_light_backward(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(), in<T>(g),
-                               out<T>(grad_normals), out<T>(grad_roughness), out<T>(grad_light));
+    cpu::summed_light_backward(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(),
+                               in<T>(g), out<T>(grad_normals), out<T>(grad_roughness), out<T>(grad_light));
   });
   return {grad_normals, grad_roughness, grad_light};
 }
@@ -134,8 +135,7 @@ struct SummedInputs {
 
   SummedInputs(const char* op, const Tensor& n, const Tensor& v, const Tensor& a, const Tensor& rho, const Tensor& m,
                const Tensor& specular, const Tensor& g, const Tensor& d, const Tensor& table)
-      : type(real_type(op, "normals", n)),
-        normals(checked(op, "normals", n, {kAny, 3}, type)),
+      : type(real_type(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
         view_dirs(checked(op, "view_dirs", v, {n_points(), 3}, type)),
         albedo(checked(op, "albedo", a, {n_points(), 3}, type)),
         roughness(checked(op, "roughness", rho, {n_points(), 1}, type)),
@@ -186,16 +186,22 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade
   "Tensor grazing, Tensor diffuse, Tensor lut, bool compensate"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("sample_bsdf(Tensor normals, Tensor view_dirs, Tensor roughness, int n_samples, int seed) -> (Tensor, Tensor)");
-  m.def("monte_carlo_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
-        "Tensor radiance) -> Tensor");
-  m.def("summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor solid_angles, "
-        "Tensor radiance, Tensor visible, Tensor sent) -> Tensor");
-  m.def("summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor solid_angles, "
-        "Tensor radiance, Tensor visible, Tensor sent, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
-  m.def("monte_carlo_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
-        "Tensor radiance, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
+  m.def(
+      "monte_carlo_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
+      "Tensor radiance) -> Tensor");
+  m.def(
+      "summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor solid_angles, "
+      "Tensor radiance, Tensor visible, Tensor sent) -> Tensor");
+  m.def(
+      "summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor "
+      "solid_angles, "
+      "Tensor radiance, Tensor visible, Tensor sent, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
+  m.def(
+      "monte_carlo_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
+      "Tensor radiance, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
   m.def("shade_sums(" SPLITNERF_SUMMED_POINT ") -> Tensor");
-  m.def("shade_sums_backward(" SPLITNERF_SUMMED_POINT ", Tensor grad_radiance) -> "
+  m.def("shade_sums_backward(" SPLITNERF_SUMMED_POINT
+        ", Tensor grad_radiance) -> "
         "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 

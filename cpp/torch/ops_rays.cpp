@@ -90,7 +90,8 @@ std::tuple<Tensor, Tensor, Tensor> neus_weights_backward(Tensor f_prev, Tensor f
 Tensor composite(Tensor weights, Tensor values, Tensor offsets) {
   const char* op = "composite";
   const ScalarType type = real_type(op, "weights", weights);
-  const Tensor w = checked(op, "weights", weights, {kAny}, type), v = checked(op, "values", values, {w.size(0), kAny}, type);
+  const Tensor w = checked(op, "weights", weights, {kAny}, type),
+               v = checked(op, "values", values, {w.size(0), kAny}, type);
   const Tensor o = checked_offsets(op, offsets, w.size(0));
   Tensor sums = empty_like_type(w, {o.size(0) - 1, v.size(1)}, type);
   dispatch_real(type, [&](auto zero) {
@@ -103,7 +104,8 @@ Tensor composite(Tensor weights, Tensor values, Tensor offsets) {
 std::tuple<Tensor, Tensor> composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor grad_sums) {
   const char* op = "composite_backward";
   const ScalarType type = real_type(op, "weights", weights);
-  const Tensor w = checked(op, "weights", weights, {kAny}, type), v = checked(op, "values", values, {w.size(0), kAny}, type);
+  const Tensor w = checked(op, "weights", weights, {kAny}, type),
+               v = checked(op, "values", values, {w.size(0), kAny}, type);
   const Tensor o = checked_offsets(op, offsets, w.size(0));
   const Tensor g = checked(op, "grad_sums", grad_sums, {o.size(0) - 1, v.size(1)}, type);
   Tensor grad_w = empty_like_type(w, {w.size(0)}, type), grad_v = empty_like_type(w, {w.size(0), v.size(1)}, type);
@@ -123,29 +125,26 @@ struct Surface {
 
   Surface(const char* op, const Tensor& sdf_in, const Tensor& gradient_in, const Tensor& rays_d_in, const Tensor& s_in,
           const Tensor& offsets_in, double step, double anneal, double min_transmittance)
-      : type(real_type(op, "sdf", sdf_in)),
-        sdf(checked(op, "sdf", sdf_in, {kAny}, type)),
+      : type(real_type(op, "sdf", sdf_in)), sdf(checked(op, "sdf", sdf_in, {kAny}, type)),
         gradient(checked(op, "gradient", gradient_in, {sdf.size(0), 3}, type)),
-        rays_d(checked(op, "rays_d", rays_d_in, {kAny, 3}, type)),
-        s(checked(op, "s", s_in, {}, type)),
-        offsets(checked_offsets(op, offsets_in, sdf.size(0))),
-        step(step),
-        anneal(anneal),
+        rays_d(checked(op, "rays_d", rays_d_in, {kAny, 3}, type)), s(checked(op, "s", s_in, {}, type)),
+        offsets(checked_offsets(op, offsets_in, sdf.size(0))), step(step), anneal(anneal),
         min_transmittance(min_transmittance) {
     require(offsets.size(0) == n_rays() + 1, op, "offsets must be [n_rays + 1]");
     require(step > 0, op, "step must be positive");
   }
   int64_t n_rays() const { return rays_d.size(0); }
   template <class T> cpu::SurfaceSamples<T> view() const {
-    return {n_rays(),  in<int64_t>(offsets), in<T>(sdf), in<T>(gradient),     in<T>(rays_d), scalar_value<T>(s),
-            T(step), T(anneal),            T(min_transmittance)};
+    return {n_rays(),  in<int64_t>(offsets), in<T>(sdf), in<T>(gradient), in<T>(rays_d), scalar_value<T>(s), T(step),
+            T(anneal), T(min_transmittance)};
   }
 };
 
 std::tuple<Tensor, Tensor, Tensor> surface_weights(Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets,
                                                    double step, double anneal, double min_transmittance) {
   const Surface x("surface_weights", sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance);
-  Tensor normals = empty_like_type(x.sdf, {x.sdf.size(0), 3}, x.type), weights = empty_like_type(x.sdf, {x.sdf.size(0)}, x.type);
+  Tensor normals = empty_like_type(x.sdf, {x.sdf.size(0), 3}, x.type),
+         weights = empty_like_type(x.sdf, {x.sdf.size(0)}, x.type);
   Tensor opacity = empty_like_type(x.sdf, {x.n_rays()}, x.type);
   dispatch_real(x.type, [&](auto zero) {
     using T = decltype(zero);
@@ -157,7 +156,8 @@ std::tuple<Tensor, Tensor, Tensor> surface_weights(Tensor sdf, Tensor gradient, 
 std::tuple<Tensor, Tensor, Tensor> surface_weights_backward(Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s,
                                                             Tensor offsets, double step, double anneal,
                                                             double min_transmittance, Tensor weights, Tensor opacity,
-                                                            Tensor grad_normals, Tensor grad_weights, Tensor grad_opacity) {
+                                                            Tensor grad_normals, Tensor grad_weights,
+                                                            Tensor grad_opacity) {
   const char* op = "surface_weights_backward";
   const Surface x(op, sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance);
   const int64_t n = x.sdf.size(0), n_rays = x.n_rays();
@@ -181,8 +181,9 @@ Tensor index_tensor(const Tensor& like, const std::vector<int64_t>& values) {
   return t;
 }
 
-std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> spread_samples(Tensor weights, Tensor t, Tensor offsets,
-                                                                                  Tensor phase, double gap, int64_t per_ray) {
+std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> spread_samples(Tensor weights, Tensor t,
+                                                                                  Tensor offsets, Tensor phase,
+                                                                                  double gap, int64_t per_ray) {
   const char* op = "spread_samples";
   const ScalarType type = real_type(op, "weights", weights);
   const Tensor w = checked(op, "weights", weights, {kAny}, type), at = checked(op, "t", t, {w.size(0)}, type);
@@ -193,10 +194,12 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> spread_sample
   cpu::Spread spread;
   dispatch_real(type, [&](auto zero) {
     using T = decltype(zero);
-    require(std::all_of(in<T>(u), in<T>(u) + u.size(0), [](T p) { return p >= T(0) && p < T(1); }), op, "phase must be in [0, 1)");
-    spread = cpu::spread_samples(o.size(0) - 1, in<int64_t>(o), in<T>(w), in<T>(at), in<T>(u), T(gap), static_cast<int>(per_ray), out<T>(share));
+    require(std::all_of(in<T>(u), in<T>(u) + u.size(0), [](T p) { return p >= T(0) && p < T(1); }), op,
+            "phase must be in [0, 1)");
+    spread = cpu::spread_samples(o.size(0) - 1, in<int64_t>(o), in<T>(w), in<T>(at), in<T>(u), T(gap),
+                                 static_cast<int>(per_ray), out<T>(share));
   });
-  return {index_tensor(w, spread.shaded), index_tensor(w, spread.first), index_tensor(w, spread.second), share,
+  return {index_tensor(w, spread.shaded),   index_tensor(w, spread.first),   index_tensor(w, spread.second), share,
           index_tensor(w, spread.heaviest), index_tensor(w, spread.leaders), index_tensor(w, spread.stretch)};
 }
 
@@ -231,11 +234,13 @@ Tensor interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor secon
   const ScalarType type = real_type(op, "grad_interpolated", grad_interpolated);
   const Tensor g = checked(op, "grad_interpolated", grad_interpolated, {kAny, kAny}, type);
   const Tensor x = checked(op, "share", share, {g.size(0)}, type);
-  const Tensor a = checked_positions(op, "first", first, x.size(0), m), b = checked_positions(op, "second", second, x.size(0), m);
+  const Tensor a = checked_positions(op, "first", first, x.size(0), m),
+               b = checked_positions(op, "second", second, x.size(0), m);
   Tensor grad_values = empty_like_type(g, {m, g.size(1)}, type);
   dispatch_real(type, [&](auto zero) {
     using T = decltype(zero);
-    cpu::interpolate_backward(x.size(0), m, g.size(1), in<int64_t>(a), in<int64_t>(b), in<T>(x), in<T>(g), out<T>(grad_values));
+    cpu::interpolate_backward(x.size(0), m, g.size(1), in<int64_t>(a), in<int64_t>(b), in<T>(x), in<T>(g),
+                              out<T>(grad_values));
   });
   return grad_values;
 }
@@ -246,19 +251,26 @@ Tensor interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor secon
   "Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets, float step, float anneal, float " \
   "min_transmittance"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("march_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, float box, float step, "
-        "int max_samples) -> (Tensor, Tensor, Tensor, Tensor)");
-  m.def("neus_weights(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance) -> "
-        "(Tensor, Tensor)");
-  m.def("neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance, "
-        "Tensor weights, Tensor opacity, Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
+  m.def(
+      "march_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, float box, float step, "
+      "int max_samples) -> (Tensor, Tensor, Tensor, Tensor)");
+  m.def(
+      "neus_weights(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance) -> "
+      "(Tensor, Tensor)");
+  m.def(
+      "neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance, "
+      "Tensor weights, Tensor opacity, Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
   m.def("surface_weights(" SPLITNERF_SURFACE ") -> (Tensor, Tensor, Tensor)");
-  m.def("surface_weights_backward(" SPLITNERF_SURFACE ", Tensor weights, Tensor opacity, Tensor grad_normals, "
+  m.def("surface_weights_backward(" SPLITNERF_SURFACE
+        ", Tensor weights, Tensor opacity, Tensor grad_normals, "
         "Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
-  m.def("spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray) -> "
-        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
+  m.def(
+      "spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray) -> "
+      "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
   m.def("interpolate(Tensor values, Tensor first, Tensor second, Tensor share) -> Tensor");
-  m.def("interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor second, Tensor share, Tensor shaded) -> Tensor");
+  m.def(
+      "interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor second, Tensor share, Tensor shaded) -> "
+      "Tensor");
   m.def("composite(Tensor weights, Tensor values, Tensor offsets) -> Tensor");
   m.def("composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor grad_sums) -> (Tensor, Tensor)");
 }

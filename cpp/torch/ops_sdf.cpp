@@ -14,7 +14,8 @@ template <class T>
 std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> packed(const Tensor& like, ScalarType type, T step,
                                                           const std::vector<cpu::SampledRay<T>>& rays) {
   const int64_t n_rays = static_cast<int64_t>(rays.size());
-  Tensor offsets = empty_like_type(like, {n_rays + 1}, ScalarType::Long), evaluated = empty_like_type(like, {n_rays}, ScalarType::Long);
+  Tensor offsets = empty_like_type(like, {n_rays + 1}, ScalarType::Long),
+         evaluated = empty_like_type(like, {n_rays}, ScalarType::Long);
   int64_t n = 0;
   for (int64_t r = 0; r < n_rays; ++r) {
     out<int64_t>(offsets)[r] = n;
@@ -41,21 +42,26 @@ struct Weights {
   Tensor hidden, hidden_bias, out, out_bias;
   double beta, box;
 
-  Weights(const char* op, int64_t n_features, const Tensor& hidden_in, const Tensor& hidden_bias_in, const Tensor& out_in,
-          const Tensor& out_bias_in, double beta, double box)
+  Weights(const char* op, int64_t n_features, const Tensor& hidden_in, const Tensor& hidden_bias_in,
+          const Tensor& out_in, const Tensor& out_bias_in, double beta, double box)
       : type(real_type(op, "hidden", hidden_in)),
         hidden(checked(op, "hidden", hidden_in, {kAny, 3 + n_features}, type)),
         hidden_bias(checked(op, "hidden_bias", hidden_bias_in, {hidden.size(0)}, type)),
         out(checked(op, "out", out_in, {kAny, hidden.size(0)}, type)),
-        out_bias(checked(op, "out_bias", out_bias_in, {out.size(0)}, type)),
-        beta(beta),
-        box(box) {
+        out_bias(checked(op, "out_bias", out_bias_in, {out.size(0)}, type)), beta(beta), box(box) {
     require(out.size(0) > 0, op, "out must have a row, the distance's");
     require(beta > 0 && box > 0, op, "beta and box must be positive");
   }
   template <class T> SdfWeights<T> view() const {
-    return {static_cast<int>(hidden.size(1)), static_cast<int>(hidden.size(0)), static_cast<int>(out.size(0)), in<T>(hidden),
-            in<T>(hidden_bias), in<T>(out), in<T>(out_bias), T(beta), T(box)};
+    return {static_cast<int>(hidden.size(1)),
+            static_cast<int>(hidden.size(0)),
+            static_cast<int>(out.size(0)),
+            in<T>(hidden),
+            in<T>(hidden_bias),
+            in<T>(out),
+            in<T>(out_bias),
+            T(beta),
+            T(box)};
   }
 };
 
@@ -71,15 +77,15 @@ struct Field {
         const Tensor& out_bias, double beta, int64_t n_levels, int64_t base_resolution, double growth,
         int64_t log2_table_size, int64_t n_active, double box)
       : shape(checked_table_shape(op, table_in, n_levels, base_resolution, growth, log2_table_size, n_active)),
-        weights(op, n_levels * shape.n_features, hidden, hidden_bias, out, out_bias, beta, box),
-        type(weights.type),
+        weights(op, n_levels * shape.n_features, hidden, hidden_bias, out, out_bias, beta, box), type(weights.type),
         table(checked(op, "table", table_in, {n_entries(shape), shape.n_features}, type)),
         n_active(static_cast<int>(n_active)) {}
   template <class T> cpu::SdfField<T> view() const { return {shape, n_active, in<T>(table), weights.view<T>()}; }
 
  private:
-  static HashGridShape checked_table_shape(const char* op, const Tensor& table, int64_t n_levels, int64_t base_resolution,
-                                           double growth, int64_t log2_table_size, int64_t n_active) {
+  static HashGridShape checked_table_shape(const char* op, const Tensor& table, int64_t n_levels,
+                                           int64_t base_resolution, double growth, int64_t log2_table_size,
+                                           int64_t n_active) {
     require(table.dim() == 2, op, "table must be [n_entries, n_features]");
     return checked_shape(op, n_levels, base_resolution, growth, log2_table_size, table.size(1), n_active);
   }
@@ -96,8 +102,8 @@ struct Points {
   int64_t n() const { return positions.size(0); }
 };
 
-std::tuple<Tensor, Tensor> sdf_layer(Tensor positions, Tensor features, Tensor jacobian, Tensor hidden, Tensor hidden_bias,
-                                     Tensor out_weights, Tensor out_bias, double beta, double box) {
+std::tuple<Tensor, Tensor> sdf_layer(Tensor positions, Tensor features, Tensor jacobian, Tensor hidden,
+                                     Tensor hidden_bias, Tensor out_weights, Tensor out_bias, double beta, double box) {
   const char* op = "sdf_layer";
   const Points x(op, positions, features, jacobian);
   const Weights w(op, x.features.size(1), hidden, hidden_bias, out_weights, out_bias, beta, box);
@@ -106,7 +112,8 @@ std::tuple<Tensor, Tensor> sdf_layer(Tensor positions, Tensor features, Tensor j
   Tensor gradient = empty_like_type(x.positions, {x.n(), 3}, w.type);
   dispatch_real(w.type, [&](auto zero) {
     using T = decltype(zero);
-    cpu::sdf_layer(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), out<T>(outputs), out<T>(gradient));
+    cpu::sdf_layer(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), out<T>(outputs),
+                   out<T>(gradient));
   });
   return {outputs, gradient};
 }
@@ -125,16 +132,16 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> sdf_layer_backward(
   Tensor grad_hidden_bias = like(w.hidden_bias), grad_out = like(w.out), grad_out_bias = like(w.out_bias);
   dispatch_real(w.type, [&](auto zero) {
     using T = decltype(zero);
-    cpu::sdf_layer_backward(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), in<T>(go), in<T>(gg),
-                            out<T>(grad_features), out<T>(grad_jacobian), out<T>(grad_hidden), out<T>(grad_hidden_bias),
-                            out<T>(grad_out), out<T>(grad_out_bias));
+    cpu::sdf_layer_backward(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), in<T>(go),
+                            in<T>(gg), out<T>(grad_features), out<T>(grad_jacobian), out<T>(grad_hidden),
+                            out<T>(grad_hidden_bias), out<T>(grad_out), out<T>(grad_out_bias));
   });
   return {grad_features, grad_jacobian, grad_hidden, grad_hidden_bias, grad_out, grad_out_bias};
 }
 
-Tensor sdf_values(Tensor positions, Tensor table, Tensor hidden, Tensor hidden_bias, Tensor out_weights, Tensor out_bias,
-                  double beta, int64_t n_levels, int64_t base_resolution, double growth, int64_t log2_table_size,
-                  int64_t n_active, double box) {
+Tensor sdf_values(Tensor positions, Tensor table, Tensor hidden, Tensor hidden_bias, Tensor out_weights,
+                  Tensor out_bias, double beta, int64_t n_levels, int64_t base_resolution, double growth,
+                  int64_t log2_table_size, int64_t n_active, double box) {
   const char* op = "sdf_values";
   const Field field(op, table, hidden, hidden_bias, out_weights, out_bias, beta, n_levels, base_resolution, growth,
                     log2_table_size, n_active, box);
@@ -157,7 +164,8 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
                     log2_table_size, n_active, box);
   const Tensor o = checked(op, "rays_o", rays_o, {kAny, 3}, field.type);
   const int64_t n_rays = o.size(0);
-  const Tensor d = checked(op, "rays_d", rays_d, {n_rays, 3}, field.type), u = checked(op, "jitter", jitter, {n_rays}, field.type);
+  const Tensor d = checked(op, "rays_d", rays_d, {n_rays, 3}, field.type),
+               u = checked(op, "jitter", jitter, {n_rays}, field.type);
   require(cells.dim() == 3 && cells.size(0) > 0, op, "cells must be [r, r, r] uint8 with r > 0");
   const int64_t resolution = cells.size(0);
   const Tensor grid = checked(op, "cells", cells, {resolution, resolution, resolution}, ScalarType::Byte);
@@ -170,9 +178,11 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
   std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> result;
   dispatch_real(field.type, [&](auto zero) {
     using T = decltype(zero);
-    const SampleRules<T> rules{T(s), T(anneal), T(min_weight), T(-std::log(min_weight)), T(min_transmittance), T(reach), T(lipschitz)};
+    const SampleRules<T> rules{T(s),     T(anneal),   T(min_weight), T(-std::log(min_weight)), T(min_transmittance),
+                               T(reach), T(lipschitz)};
     std::vector<cpu::SampledRay<T>> rays(n_rays);
-    cpu::sample_rays(field.view<T>(), march, occupancy.view(), rules, n_rays, in<T>(o), in<T>(d), in<T>(u), rays.data());
+    cpu::sample_rays(field.view<T>(), march, occupancy.view(), rules, n_rays, in<T>(o), in<T>(d), in<T>(u),
+                     rays.data());
     result = packed(o, field.type, T(march.step), rays);
   });
   return result;
@@ -180,15 +190,16 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
 
 }  // namespace
 
-#define SPLITNERF_SDF_LAYER                                                                                      \
-  "Tensor positions, Tensor features, Tensor jacobian, Tensor hidden, Tensor hidden_bias, Tensor out, "           \
+#define SPLITNERF_SDF_LAYER                                                                             \
+  "Tensor positions, Tensor features, Tensor jacobian, Tensor hidden, Tensor hidden_bias, Tensor out, " \
   "Tensor out_bias, float beta, float box"
-#define SPLITNERF_SDF_NETWORK                                                                                    \
-  "Tensor table, Tensor hidden, Tensor hidden_bias, Tensor out, Tensor out_bias, float beta, int n_levels, "     \
+#define SPLITNERF_SDF_NETWORK                                                                                \
+  "Tensor table, Tensor hidden, Tensor hidden_bias, Tensor out, Tensor out_bias, float beta, int n_levels, " \
   "int base_resolution, float growth, int log2_table_size, int n_active, float box"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("sdf_layer(" SPLITNERF_SDF_LAYER ") -> (Tensor, Tensor)");
-  m.def("sdf_layer_backward(" SPLITNERF_SDF_LAYER ", Tensor grad_outputs, Tensor grad_gradient) -> "
+  m.def("sdf_layer_backward(" SPLITNERF_SDF_LAYER
+        ", Tensor grad_outputs, Tensor grad_gradient) -> "
         "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
   m.def("sdf_values(Tensor positions, " SPLITNERF_SDF_NETWORK ") -> Tensor");
   m.def("sample_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, " SPLITNERF_SDF_NETWORK

@@ -86,7 +86,8 @@ Tensor split_sum_shade(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor r
                        Tensor specular, Tensor diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut,
                        int64_t fresnel_mode, bool compensate) {
   const char* op = "split_sum_shade";
-  const ShadeInputs p(op, normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d, lut);
+  const ShadeInputs p(op, normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
+                      lut);
   const ShadeOptions options = checked_options(op, fresnel_mode, compensate);
   Tensor radiance = empty_like_type(p.normals, {p.n, 3}, p.type);
   dispatch_real(p.type, [&](auto zero) {
@@ -97,36 +98,39 @@ Tensor split_sum_shade(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor r
 }
 
 std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> split_sum_shade_backward(
-    Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular,
-    Tensor diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int64_t fresnel_mode, bool compensate,
-    Tensor grad_radiance) {
+    Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, Tensor diffuse,
+    Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int64_t fresnel_mode, bool compensate, Tensor grad_radiance) {
   const char* op = "split_sum_shade_backward";
-  const ShadeInputs p(op, normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d, lut);
+  const ShadeInputs p(op, normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
+                      lut);
   const ShadeOptions options = checked_options(op, fresnel_mode, compensate);
   const Tensor g = checked(op, "grad_radiance", grad_radiance, {p.n, 3}, p.type);
   const auto make = [&](int64_t columns) { return empty_like_type(p.normals, {p.n, columns}, p.type); };
-  Tensor grad[9] = {make(3), make(3), make(3), make(1), make(1), make(3), make(3), make(p.n_channels), make(p.n_channels)};
+  Tensor grad[9] = {make(3),           make(3), make(3), make(1), make(1), make(3), make(3), make(p.n_channels),
+                    make(p.n_channels)};
   dispatch_real(p.type, [&](auto zero) {
     using T = decltype(zero);
-    cpu::split_sum_shade_backward(in<float>(p.lut), options, p.n, p.n_channels, p.arrays<T>(), in<T>(g),
-                                  cpu::ShadeArrays<T>{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]),
-                                                 out<T>(grad[4]), out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]),
-                                                 out<T>(grad[8])});
+    cpu::split_sum_shade_backward(
+        in<float>(p.lut), options, p.n, p.n_channels, p.arrays<T>(), in<T>(g),
+        cpu::ShadeArrays<T>{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
+                            out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};
 }
 
 }  // namespace
 
-#define SPLITNERF_POINT                                                                                    \
+#define SPLITNERF_POINT                                                                                   \
   "Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, " \
   "Tensor diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int fresnel_mode, bool compensate"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("query_direction(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) -> Tensor");
-  m.def("query_direction_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean, "
-        "Tensor grad_directions) -> (Tensor, Tensor, Tensor)");
+  m.def(
+      "query_direction_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean, "
+      "Tensor grad_directions) -> (Tensor, Tensor, Tensor)");
   m.def("split_sum_shade(" SPLITNERF_POINT ") -> Tensor");
-  m.def("split_sum_shade_backward(" SPLITNERF_POINT ", Tensor grad_radiance) -> "
+  m.def("split_sum_shade_backward(" SPLITNERF_POINT
+        ", Tensor grad_radiance) -> "
         "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 

@@ -24,8 +24,8 @@ Tensor linear_to_srgb(Tensor linear) {
 
 Tensor linear_to_srgb_backward(Tensor linear, Tensor grad_srgb) {
   const char* op = "linear_to_srgb_backward";
-  require(grad_srgb.scalar_type() == linear.scalar_type() && grad_srgb.numel() == linear.numel() && grad_srgb.is_cpu(), op,
-          "grad_srgb must be like linear");
+  require(grad_srgb.scalar_type() == linear.scalar_type() && grad_srgb.numel() == linear.numel() && grad_srgb.is_cpu(),
+          op, "grad_srgb must be like linear");
   const Tensor g = torch::stable::contiguous(grad_srgb);
   return elementwise(op, "linear", linear, [&](const Tensor& x, Tensor& y, auto zero) {
     using T = decltype(zero);

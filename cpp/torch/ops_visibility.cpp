@@ -50,7 +50,8 @@ std::tuple<Tensor, Tensor> vertex_grids(Tensor vertices, double radius, int64_t 
 void check_indices(const char* op, const char* name, const Tensor& t, int64_t high) {
   const int32_t* values = in<int32_t>(t);
   int32_t least = 0, most = 0;
-  for (int64_t i = 0, n = t.size(0) * t.size(1); i < n; ++i) least = min_of(least, values[i]), most = max_of(most, values[i]);
+  for (int64_t i = 0, n = t.size(0) * t.size(1); i < n; ++i)
+    least = min_of(least, values[i]), most = max_of(most, values[i]);
   require(least >= 0 && most < high, op, std::string(name) + " must hold numbers in [0, " + std::to_string(high) + ")");
 }
 
@@ -62,16 +63,14 @@ struct Cache {
 
   Cache(const char* op, ScalarType type, const Tensor& v, const Tensor& vn, const Tensor& s, const Tensor& o, double r,
         const Tensor& b, const Tensor& h, const Tensor& c, const Tensor& w)
-      : type(type),
-        vertices(checked(op, "vertices", v, {kAny, 3}, type)),
+      : type(type), vertices(checked(op, "vertices", v, {kAny, 3}, type)),
         normals(checked(op, "vertex_normals", vn, {vertices.size(0), 3}, type)),
         starts(checked(op, "starts", s, {kAny, kAny}, ScalarType::Int)),
         order(checked(op, "order", o, {starts.size(0), vertices.size(0)}, ScalarType::Int)),
         bits(checked(op, "bits", b, {vertices.size(0), 2, kAny}, ScalarType::Int)),
         hits(checked(op, "hits", h, {vertices.size(0), kAny}, ScalarType::Int)),
         radiance(checked(op, "radiance", c, {indirect() ? vertices.size(0) : 0, 3}, type)),
-        directions(checked(op, "directions", w, {kAny, 3}, type)),
-        radius(r) {
+        directions(checked(op, "directions", w, {kAny, 3}, type)), radius(r) {
     check_directions(op, n_directions());
     checked(op, "bits", bits, {vertices.size(0), 2, n_directions() / kBitsPerWord}, ScalarType::Int);
     if (indirect()) checked(op, "hits", hits, {vertices.size(0), n_directions()}, ScalarType::Int);
@@ -88,8 +87,12 @@ struct Cache {
   template <class T> cpu::VisibilityCache<T> get(const T* light) const {
     return {{in<T>(vertices), in<T>(normals), in<int32_t>(starts), in<int32_t>(order), vertices.size(0), n_buckets(),
              static_cast<int>(starts.size(0)), T(radius)},
-            in<uint32_t>(bits), indirect() ? in<int32_t>(hits) : nullptr, in<T>(radiance), n_directions(),
-            in<T>(directions), light};
+            in<uint32_t>(bits),
+            indirect() ? in<int32_t>(hits) : nullptr,
+            in<T>(radiance),
+            n_directions(),
+            in<T>(directions),
+            light};
   }
 };
 
@@ -137,15 +140,18 @@ std::tuple<Tensor, Tensor> cached_visibility(Tensor positions, Tensor normals, T
 }  // namespace
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("visibility_bits(int scene, Tensor positions, Tensor normals, Tensor directions, float offset, bool with_hits) "
-        "-> (Tensor, Tensor)");
+  m.def(
+      "visibility_bits(int scene, Tensor positions, Tensor normals, Tensor directions, float offset, bool with_hits) "
+      "-> (Tensor, Tensor)");
   m.def("vertex_grids(Tensor vertices, float radius, int n_levels) -> (Tensor, Tensor)");
-  m.def("cached_occlusion(Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, Tensor vertices, "
-        "Tensor vertex_normals, Tensor starts, Tensor order, float radius, Tensor bits, Tensor hits, Tensor radiance, "
-        "Tensor directions, Tensor light) -> (Tensor, Tensor, Tensor, Tensor)");
-  m.def("cached_visibility(Tensor positions, Tensor normals, Tensor vertices, Tensor vertex_normals, Tensor starts, "
-        "Tensor order, float radius, Tensor bits, Tensor hits, Tensor radiance, Tensor directions) -> "
-        "(Tensor, Tensor)");
+  m.def(
+      "cached_occlusion(Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, Tensor vertices, "
+      "Tensor vertex_normals, Tensor starts, Tensor order, float radius, Tensor bits, Tensor hits, Tensor radiance, "
+      "Tensor directions, Tensor light) -> (Tensor, Tensor, Tensor, Tensor)");
+  m.def(
+      "cached_visibility(Tensor positions, Tensor normals, Tensor vertices, Tensor vertex_normals, Tensor starts, "
+      "Tensor order, float radius, Tensor bits, Tensor hits, Tensor radiance, Tensor directions) -> "
+      "(Tensor, Tensor)");
 }
 
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {

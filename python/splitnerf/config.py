@@ -137,7 +137,9 @@ class Config:
     occlusion_offset: float = 0.0125
     environment_height: int = 32
     occlusion_directions: int = 256  # of the bits; a multiple of 32
-    open_below: float = 0.02  # blocked share of any vertex's directions; where none has more, occlusion is left out; 0: never
+    open_below: float = (
+        0.02  # blocked share of any vertex's directions; where none has more, occlusion is left out; 0: never
+    )
     indirect: bool = True  # with bits: light from the object itself
     indirect_every: int = 200  # steps between refreshes of what the mesh sends out
 
@@ -250,8 +252,16 @@ class Config:
 
 # What runs did that were trained before these settings existed, and settings that no longer do.
 FIRST_SETTINGS: dict[str, object] = dict(
-    light="mlp", neutral_weight=0.0, shading="split", entropy_weight=0.0, dark_metal_weight=0.0, normal_smoothness=0.0,
-    binary_metal_weight=0.0, sample_above=0.0, shades_per_ray=0, light_step_every=1,
+    light="mlp",
+    neutral_weight=0.0,
+    shading="split",
+    entropy_weight=0.0,
+    dark_metal_weight=0.0,
+    normal_smoothness=0.0,
+    binary_metal_weight=0.0,
+    sample_above=0.0,
+    shades_per_ray=0,
+    light_step_every=1,
     open_below=0.0,
 )
 RETIRED = ("albedo_smoothness", "gloss_smoothness", "entropy_from", "shade_above")

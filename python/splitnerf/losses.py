@@ -67,7 +67,10 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     roughness = torch.ones(c.light_queries, 1)
     roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, generator=generator)
     narrow = roughness[:, 0] < c.light_lobe_below
-    queries, roughness = torch.cat([queries[narrow], queries[~narrow]]), torch.cat([roughness[narrow], roughness[~narrow]])
+    queries, roughness = (
+        torch.cat([queries[narrow], queries[~narrow]]),
+        torch.cat([roughness[narrow], roughness[~narrow]]),
+    )
     n_narrow = int(narrow.sum())
     own = sample_ggx_lobe(queries[:n_narrow], roughness[:n_narrow], c.light_lobe_samples, seed).reshape(-1, 3)
     asked = torch.cat([directions, own, queries])

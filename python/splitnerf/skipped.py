@@ -81,13 +81,19 @@ def measure_skips(
 
     now = work(batch)
     skips = []
-    everywhere = work(Batch(*(part[:EVERYWHERE_RAYS] for part in batch[:-1]), batch.probes), torch.full_like(grid.cells, CELL_OCCUPIED), sample_above=0.0)
+    everywhere = work(
+        Batch(*(part[:EVERYWHERE_RAYS] for part in batch[:-1]), batch.probes),
+        torch.full_like(grid.cells, CELL_OCCUPIED),
+        sample_above=0.0,
+    )
     all_samples = work(batch, sample_above=0.0)
     scale = n_rays / EVERYWHERE_RAYS
     saved = scale * everywhere.seconds - all_samples.seconds
     skips.append(Skip("empty space", "samples", all_samples.samples, scale * everywhere.samples, saved))
     if c.sample_above:
-        skips.append(Skip("faint samples", "samples", now.samples, all_samples.samples, all_samples.seconds - now.seconds))
+        skips.append(
+            Skip("faint samples", "samples", now.samples, all_samples.samples, all_samples.seconds - now.seconds)
+        )
     if c.shades_per_ray:
         every = work(batch, shades_per_ray=0)
         skips.append(Skip("shading", "shaded samples", now.shaded, every.shaded, every.seconds - now.seconds))
@@ -102,7 +108,9 @@ def measure_skips(
     return skips
 
 
-def timed_work(model: SceneModel, cells: Tensor, batch: Batch, scene: MeshScene | None, generator: torch.Generator) -> Work:
+def timed_work(
+    model: SceneModel, cells: Tensor, batch: Batch, scene: MeshScene | None, generator: torch.Generator
+) -> Work:
     """The median step, averaged over the period of the light."""
     c, seconds = model.config, []
     period = light_period(c)

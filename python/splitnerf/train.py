@@ -53,7 +53,8 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     """Trains a scene and keeps a checkpoint, a log and previews in the run's folder.
 
     The schedule (learning rate, levels, annealing, meshes) follows the progress: the share of steps
-    done or of minutes used, whichever is more. Ctrl-C ends the run with a checkpoint, after the current step or when the light moves next.
+    done or of minutes used, whichever is more. Ctrl-C ends the run with a checkpoint, after the current step or when
+    the light moves next.
 
     Args:
         dataset: The train split.
@@ -75,7 +76,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     optimiser = make_optimiser(model, c)
     hull = None
     if c.hull_until > 0:
-        hull = visual_hull(c.grid_resolution, c.box, torch.from_numpy(dataset.images[..., 3]), source.poses, source.intrinsics)
+        hull = visual_hull(
+            c.grid_resolution, c.box, torch.from_numpy(dataset.images[..., 3]), source.poses, source.intrinsics
+        )
     grid = make_grid(c, hull)
     scene: MeshScene | None = None
     environment: Tensor | None = None
@@ -91,7 +94,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         grid.values = content["occupancy"]
         step, seconds, n_rays = content["step"], content["seconds"], content["n_rays"]
         meshed_at, previewed_at = content["meshed_at"], content["previewed_at"]
-    mesh: tuple[Tensor, Tensor] | tuple[None, None] = (content["mesh_vertices"], content["mesh_faces"]) if resume else (None, None)
+    mesh: tuple[Tensor, Tensor] | tuple[None, None] = (
+        (content["mesh_vertices"], content["mesh_faces"]) if resume else (None, None)
+    )
 
     def save() -> None:
         save_checkpoint(
@@ -123,7 +128,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             model.open_levels(progress)
             set_learning_rate(optimiser, c, step, progress)
             if first or step % c.grid_every == 0:
-                grid.update(model.sdf_field.sdf, model.s_value, first=first, step=step, use_hull=progress < c.hull_until)
+                grid.update(
+                    model.sdf_field.sdf, model.s_value, first=first, step=step, use_hull=progress < c.hull_until
+                )
             if (model.occlusion is not None or c.finetune_from < 1) and progress - meshed_at >= c.mesh_every:
                 meshed_at = progress
                 scene, mesh = remesh(model, c, scene, mesh)
@@ -137,7 +144,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
 
             batch = draw_batch(source, n_rays, c)
             found = find_samples(model, grid.cells, *batch.rays, anneal=cosine_anneal(c, progress), probes=batch.probes)
-            ray, terms = batch_losses(model, batch, found, scene, environment if traces else None, generator, step, progress)
+            ray, terms = batch_losses(
+                model, batch, found, scene, environment if traces else None, generator, step, progress
+            )
             loss = sum(terms.values())
             if not math.isfinite(loss.item()):
                 bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term.item()))
@@ -205,7 +214,9 @@ def batch_losses(
     terms = {"colour": c.colour_weight * colour, "eikonal": c.eikonal_weight * eikonal}
     if finetune:
         colours = monte_carlo_colours(model, scene, ray, -batch.rays_d, generator)
-        terms["finetune"] = c.colour_weight * losses.monte_carlo_colour_loss(colours, ray, batch.target, batch.background)
+        terms["finetune"] = c.colour_weight * losses.monte_carlo_colour_loss(
+            colours, ray, batch.target, batch.background
+        )
     if c.mask_weight:
         terms["mask"] = c.mask_weight * mask
     if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:

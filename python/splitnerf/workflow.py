@@ -64,7 +64,9 @@ def prepare_run(run: Path, *, resume: bool, overwrite: bool) -> None:
         for preview in (run / "previews").glob("step_*.png"):
             preview.unlink()
     elif present and not resume:
-        raise InputError(f"{run}: holds a run already; go on with --resume, replace it with --overwrite, or give another --out")
+        raise InputError(
+            f"{run}: holds a run already; go on with --resume, replace it with --overwrite, or give another --out"
+        )
     run.mkdir(parents=True, exist_ok=True)
 
 

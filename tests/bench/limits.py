@@ -57,7 +57,9 @@ def vertex_materials(asset: Asset, materials: list[Material]) -> dict[str, np.nd
 def subdivided(asset: Asset, n_faces: int = 400_000) -> Asset:
     """The same surface with more vertices, its materials bare but for their normal textures."""
     vertices, faces, ids = asset.vertices, asset.triangles, asset.material_ids
-    attributes = {k: getattr(asset, k) for k in ("normals", "uv", "tangents", "colors") if getattr(asset, k) is not None}
+    attributes = {
+        k: getattr(asset, k) for k in ("normals", "uv", "tangents", "colors") if getattr(asset, k) is not None
+    }
     while 4 * len(faces) <= n_faces:
         vertices, faces, attributes = trimesh.remesh.subdivide(vertices, faces, vertex_attributes=attributes)
         ids = np.concatenate([ids] * 4) if len(np.unique(ids)) == 1 else np.repeat(ids, 4)
@@ -82,14 +84,19 @@ def main() -> None:
     )
     shapes = {"ours": subdivided(ours), "true": subdivided(truth)}
     found = {
-        (name, name): vertex_materials(shapes[name], asset.materials) for name, asset in (("ours", ours), ("true", truth))
+        (name, name): vertex_materials(shapes[name], asset.materials)
+        for name, asset in (("ours", ours), ("true", truth))
     }
     for here, there in (("ours", "true"), ("true", "ours")):
         _, nearest = cKDTree(shapes[there].vertices).query(shapes[here].vertices, workers=-1)
         found[here, there] = {part: values[nearest] for part, values in found[there, there].items()}
     rows = {"ours": ("ours", ()), "true shape": ("true", ())}
     rows |= {f"true {part}": ("ours", (part,)) for part in PARTS}
-    rows |= {"true materials": ("ours", PARTS), "true shape, albedo": ("true", ("albedo",)), "all true": ("true", PARTS)}
+    rows |= {
+        "true materials": ("ours", PARTS),
+        "true shape, albedo": ("true", ("albedo",)),
+        "all true": ("true", PARTS),
+    }
     print(f"{'':24}relight  raw")
     for name, (shape, from_truth) in rows.items():
         renderer = AssetRenderer(shapes[shape])

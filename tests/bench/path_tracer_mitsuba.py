@@ -150,7 +150,9 @@ def main() -> None:
         apart = np.clip(references["splitnerf"][0], 0, 1)[mask] - np.clip(peer[0], 0, 1)[mask]
         print(f"references apart by RMS {np.sqrt(np.mean(apart**2)):.4f} (other details of the model)")
     t0, e0, n_rays = rows["splitnerf"]
-    print(f"{'':12s} {'s at ' + str(args.spp) + ' spp':>12s} {'RMS error':>10s} {'Mrays/s':>8s} {'s to our error':>15s} {'ratio':>7s}")
+    print(
+        f"{'':12s} {'s at ' + str(args.spp) + ' spp':>12s} {'RMS error':>10s} {'Mrays/s':>8s} {'s to our error':>15s} {'ratio':>7s}"
+    )
     for name, (t, e, _) in rows.items():
         equal = t * (e / e0) ** 2
         print(f"{name:12s} {t:12.3f} {e:10.5f} {n_rays / t / 1e6:8.2f} {equal:15.3f} {equal / t0:7.2f}")

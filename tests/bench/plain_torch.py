@@ -52,7 +52,9 @@ PRIMES = (1, 2654435761, 805459861)
 # ---- hash grid and field ----
 
 
-def hash_encode(x: Tensor, table: Tensor, n_levels: int, base: int, growth: float, log2_size: int, n_active: int) -> Tensor:
+def hash_encode(
+    x: Tensor, table: Tensor, n_levels: int, base: int, growth: float, log2_size: int, n_active: int
+) -> Tensor:
     spec = HashGridSpec(n_levels, table.shape[1], base, growth, log2_size)
     columns = []
     for level, (resolution, offset, n_entries, dense) in enumerate(spec.levels()):
@@ -144,7 +146,9 @@ def spread_samples(weights, t, offsets, phase, gap, per_ray):
     every = torch.arange(len(weights))
     rays = torch.repeat_interleave(torch.arange(len(offsets) - 1), offsets.diff())
     most = torch.zeros(len(offsets) - 1).scatter_reduce(0, rays, weights, "amax")
-    heaviest = torch.full((len(offsets) - 1,), -1).scatter_reduce(0, rays, torch.where(weights == most[rays], every, -1), "amax")
+    heaviest = torch.full((len(offsets) - 1,), -1).scatter_reduce(
+        0, rays, torch.where(weights == most[rays], every, -1), "amax"
+    )
     return every, every, every, torch.zeros_like(weights), heaviest[heaviest >= 0], every, every
 
 
@@ -157,7 +161,9 @@ def brdf_table(lut: Tensor, n_dot_v: Tensor, roughness: Tensor) -> Tensor:
     x0, y0 = x.detach().long().clamp(max=n - 1), y.detach().long().clamp(max=n - 1)
     fx, fy = x - x0, y - y0
     x0, y0 = x0[:, 0], y0[:, 0]
-    return torch.lerp(torch.lerp(lut[y0, x0], lut[y0, x0 + 1], fx), torch.lerp(lut[y0 + 1, x0], lut[y0 + 1, x0 + 1], fx), fy)
+    return torch.lerp(
+        torch.lerp(lut[y0, x0], lut[y0, x0 + 1], fx), torch.lerp(lut[y0 + 1, x0], lut[y0 + 1, x0 + 1], fx), fy
+    )
 
 
 def turned(normals: Tensor, view_dirs: Tensor) -> tuple[Tensor, Tensor]:
@@ -328,7 +334,9 @@ def cached_occlusion(
     return tuple(results)
 
 
-def cached_visibility(positions, normals, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions):
+def cached_visibility(
+    positions, normals, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions
+):
     return seen(positions, normals, vertices, vertex_normals, radius, bits, hits, radiance)
 
 

@@ -28,8 +28,7 @@ inline TestMesh cube_mesh() {
   for (int axis = 0; axis < 3; ++axis) {
     const int a = 1 << (axis + 1) % 3, b = 1 << (axis + 2) % 3;
     for (int base : {0, 1 << axis}) {
-      for (int corner : {base, base + a, base + a + b, base, base + a + b, base + b})
-        mesh.triangles.push_back(corner);
+      for (int corner : {base, base + a, base + a + b, base, base + a + b, base + b}) mesh.triangles.push_back(corner);
     }
   }
   return mesh;

@@ -38,12 +38,12 @@ struct RenderJob {
     std::vector<float> colours;
     for (size_t i = 0; i < n; ++i) colours.insert(colours.end(), {albedo.x, albedo.y, albedo.z});
     const std::vector<float> rough(n, roughness), metal(n, metallic);
-    Surface surface{colours.data(), rough.data(), metal.data(), false,
-                          smooth ? mesh.vertices.data() : nullptr};
+    Surface surface{colours.data(), rough.data(), metal.data(), false, smooth ? mesh.vertices.data() : nullptr};
     adapt(surface);
     Image image;
     const RenderTargets targets = image.targets(size_t(camera.width) * camera.height);
-    image.n_rays = splitnerf::render(make_scene(mesh), surface, {map.data(), map_height, map_width}, camera, params, targets);
+    image.n_rays =
+        splitnerf::render(make_scene(mesh), surface, {map.data(), map_height, map_width}, camera, params, targets);
     return image;
   }
   void set_map(int height, int width, const std::function<float(Vec3<float>)>& radiance) {
@@ -59,7 +59,8 @@ struct RenderJob {
 // A camera at `eye` that looks at the origin, `size` pixels, about `span` wide at the origin.
 inline Camera look_at_origin(Vec3<float> eye, int size, float span) {
   const Vec3<float> back = normalize(eye),
-            right = normalize(cross(std::abs(back.z) > 0.99f ? Vec3<float>{0, 1, 0} : Vec3<float>{0, 0, 1}, back));
+                    right =
+                        normalize(cross(std::abs(back.z) > 0.99f ? Vec3<float>{0, 1, 0} : Vec3<float>{0, 0, 1}, back));
   const Vec3<float> up = cross(back, right);
   Camera c{};
   for (int r = 0; r < 3; ++r) {

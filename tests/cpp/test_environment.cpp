@@ -36,8 +36,7 @@ TEST(Environment, MappingsAreInverse) {
 TEST(Environment, SolidAnglesSumToTheSphere) {
   for (int height : {1, 2, 7, 128}) {
     double total = 0;
-    for (int row = 0; row < height; ++row)
-      total += 2 * height * texel_solid_angle<double>(row, height, 2 * height);
+    for (int row = 0; row < height; ++row) total += 2 * height * texel_solid_angle<double>(row, height, 2 * height);
     EXPECT_NEAR(total, 4 * kPi, 1e-12) << height;
   }
   // One row near the equator against (2 pi / W)(cos top - cos bottom).
@@ -68,8 +67,7 @@ TEST(Environment, LookupIsLinearBetweenCentresAndWrapsAcrossTheSeam) {
   const auto map = random_map(kHeight, kWidth);
   const auto texel = [&](int row, int column) { return map[(row * kWidth + column) * 3]; };
   const auto lookup = [&](double x, double y) {
-    return lookup_environment(map.data(), kHeight, kWidth,
-                              equirect_to_direction(Vec2<double>{x / kWidth, y / kHeight}))
+    return lookup_environment(map.data(), kHeight, kWidth, equirect_to_direction(Vec2<double>{x / kWidth, y / kHeight}))
         .x;
   };
   EXPECT_NEAR(lookup(2.75, 1.5), 0.75 * texel(1, 2) + 0.25 * texel(1, 3), 1e-12);
@@ -81,8 +79,7 @@ TEST(Environment, LookupIsLinearBetweenCentresAndWrapsAcrossTheSeam) {
 }
 
 TEST(Environment, FootprintWeightsSumToOneInEveryDirection) {
-  for (const Vec3<float> d :
-       {Vec3<float>{0, 0, 1}, {0, 0, -1}, {-1, 0.f, 0}, {-1, -0.f, 0}, {1, 0, 0}, {0, 1, 0}}) {
+  for (const Vec3<float> d : {Vec3<float>{0, 0, 1}, {0, 0, -1}, {-1, 0.f, 0}, {-1, -0.f, 0}, {1, 0, 0}, {0, 1, 0}}) {
     const auto f = equirect_footprint(direction_to_equirect(d), 5, 7);
     float total = 0;
     for (int k = 0; k < 4; ++k) {
@@ -125,9 +122,7 @@ TEST(EnvironmentSampler, DensityIntegratesToOneAndMatchesTheSamples) {
     const Vec3<float> d = sampler.sample({random_unit<float>(i, 0), random_unit<float>(i, 1)}, &pdf);
     const Vec2<float> uv = direction_to_equirect(d);
     ++counts[min_of(int(uv.y * kHeight), kHeight - 1) * kWidth + min_of(int(uv.x * kWidth), kWidth - 1)];
-    if (i < 2000) {
-      EXPECT_NEAR(sampler.pdf(d) / pdf, 1, 1e-3) << i;
-    }
+    if (i < 2000) { EXPECT_NEAR(sampler.pdf(d) / pdf, 1, 1e-3) << i; }
   }
   double chi_square = 0;
   for (size_t i = 0; i < masses.size(); ++i)

@@ -73,7 +73,8 @@ TEST(HashIndex, SpatialHashIsTheXorOfPrimeMultiplesModuloTwoToThe32) {
   EXPECT_EQ(spatial_hash(0, 0, 1, 1u << 31), 805459861u);
   Random random(1);
   for (int i = 0; i < 1000; ++i) {
-    const auto x = uint64_t(random.below(1 << 30)), y = uint64_t(random.below(1 << 30)), z = uint64_t(random.below(1 << 30));
+    const auto x = uint64_t(random.below(1 << 30)), y = uint64_t(random.below(1 << 30)),
+               z = uint64_t(random.below(1 << 30));
     const uint64_t wide = x ^ (y * 2654435761ull & 0xffffffffull) ^ (z * 805459861ull & 0xffffffffull);
     EXPECT_EQ(spatial_hash(uint32_t(x), uint32_t(y), uint32_t(z), 1u << 19), wide % (1u << 19));
   }
@@ -83,7 +84,8 @@ TEST(HashIndex, EveryCornerStaysInsideItsLevel) {
   Random random(2);
   for (const HashLevel& level : levels_of({16, 2, 32, 1.3195079, 14})) {
     for (int i = 0; i < 200; ++i) {
-      const Vec3<float> p{float(random.uniform(-0.5, 1.5)), i % 3 ? float(random.uniform()) : 1.f, i % 5 ? float(random.uniform()) : 0.f};
+      const Vec3<float> p{float(random.uniform(-0.5, 1.5)), i % 3 ? float(random.uniform()) : 1.f,
+                          i % 5 ? float(random.uniform()) : 0.f};
       const HashCell<float> cell = hash_cell(level, p);
       for (int64_t index : cell.index) EXPECT_TRUE(index >= level.offset && index < level.offset + level.n_entries);
       for (int axis = 0; axis < 3; ++axis) EXPECT_TRUE(cell.f[axis] >= 0 && cell.f[axis] <= 1);
@@ -118,7 +120,8 @@ TEST(HashIndex, KernelsReachEntriesPastTwoToThe32) {
 struct Encoding {
   std::vector<double> features, jacobian;
 };
-Encoding encode(const HashGridShape& shape, int n_active, const std::vector<double>& x, const std::vector<double>& table) {
+Encoding encode(const HashGridShape& shape, int n_active, const std::vector<double>& x,
+                const std::vector<double>& table) {
   const size_t n = x.size() / 3, columns = size_t(shape.n_levels * shape.n_features);
   Encoding e{std::vector<double>(n * columns, -7), std::vector<double>(3 * n * columns, -7)};
   cpu::hash_encode(shape, n_active, int64_t(n), x.data(), table.data(), e.features.data(), e.jacobian.data());
@@ -137,7 +140,9 @@ std::vector<double> linear_table() {
       for (int y = 0; y <= level.resolution; ++y)
         for (int z = 0; z <= level.resolution; ++z) {
           const double p[] = {double(x) / level.resolution, double(y) / level.resolution, double(z) / level.resolution};
-          for (int f = 0; f < 2; ++f) table[size_t(level.offset + node_entry<true>(x, y, z, level.resolution, uint32_t(level.n_entries))) * 2 + f] = linear(f, p);
+          for (int f = 0; f < 2; ++f)
+            table[size_t(level.offset + node_entry<true>(x, y, z, level.resolution, uint32_t(level.n_entries))) * 2 +
+                  f] = linear(f, p);
         }
   }
   return table;
@@ -151,13 +156,15 @@ TEST(HashEncode, ReproducesALinearFieldAndItsJacobian) {
   for (size_t i = 0; i < x.size() / 3; ++i) {
     for (int column = 0; column < 4; ++column) {
       EXPECT_NEAR(e.features[4 * i + column], linear(column % 2, &x[3 * i]), 1e-12);
-      for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(e.jacobian[12 * i + 4 * axis + column], kSlope[column % 2][axis], 1e-11);
+      for (int axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(e.jacobian[12 * i + 4 * axis + column], kSlope[column % 2][axis], 1e-11);
     }
   }
 }
 
 TEST(HashEncode, ClampsOutsideWithAZeroGradientAlongThatAxis) {
-  const std::vector<double> x{-0.5, 0.3, 0.7, 0.4, 2.0, 0.1, 0.4, 0.6, -1e30}, inside{0, 0.3, 0.7, 0.4, 1, 0.1, 0.4, 0.6, 0};
+  const std::vector<double> x{-0.5, 0.3, 0.7, 0.4, 2.0, 0.1, 0.4, 0.6, -1e30},
+      inside{0, 0.3, 0.7, 0.4, 1, 0.1, 0.4, 0.6, 0};
   const Encoding e = encode(kDense, 2, x, linear_table()), at = encode(kDense, 2, inside, linear_table());
   for (int point = 0; point < 3; ++point) {
     for (int column = 0; column < 4; ++column) {
@@ -194,7 +201,9 @@ TEST(HashEncode, ClosedLevelsAreZeroAndTheOpenOnesUnchanged) {
       EXPECT_EQ(e.jacobian[i], i % 8 < size_t(2 * n_active) ? all.jacobian[i] : 0);
     std::vector<double> gradient(table.size(), -7);
     cpu::hash_encode_backward<double>(kSmall, n_active, 50, x.data(), all.features.data(), nullptr, gradient.data());
-    const size_t open = n_active == 0 ? 0 : size_t(levels_of(kSmall)[n_active - 1].offset + levels_of(kSmall)[n_active - 1].n_entries) * 2;
+    const size_t open =
+        n_active == 0 ? 0
+                      : size_t(levels_of(kSmall)[n_active - 1].offset + levels_of(kSmall)[n_active - 1].n_entries) * 2;
     for (size_t i = open; i < gradient.size(); ++i) EXPECT_EQ(gradient[i], 0);
   }
 }
@@ -206,7 +215,8 @@ TEST(HashEncode, TableGradientIsTheTranspose) {
   for (const int features : {1, 2, 4, 8}) {
     const HashGridShape shape{5, features, 3, 1.9, 7};
     const size_t n = 60, columns = size_t(5 * features);
-    const std::vector<double> x = random.uniforms(3 * n, -0.1, 1.1), table = random.uniforms(size_t(n_entries(shape) * features), -1);
+    const std::vector<double> x = random.uniforms(3 * n, -0.1, 1.1),
+                              table = random.uniforms(size_t(n_entries(shape) * features), -1);
     const std::vector<double> g = random.uniforms(n * columns, -1), gj = random.uniforms(3 * n * columns, -1);
     const Encoding e = encode(shape, 4, x, table);  // linear in the table
     std::vector<double> both(table.size()), values(table.size());
@@ -223,9 +233,14 @@ TEST(HashEncode, PositionGradientsFollowCentralDifferences) {
   const std::vector<double> table = random.uniforms(size_t(n_entries(kSmall)) * 2, -1);
   const std::vector<double> g = random.uniforms(n * 8, -1), gj = random.uniforms(3 * n * 8, -1);
   std::vector<double> x = random.uniforms(3 * n, 0.01, 0.99), gradient(x.size());
-  cpu::hash_encode_backward_positions(kSmall, 4, int64_t(n), x.data(), table.data(), g.data(), gj.data(), gradient.data());
-  expect_gradient([&] { const Encoding e = encode(kSmall, 4, x, table); return inner(g, e.features) + inner(gj, e.jacobian); },
-                  x, gradient, 1e-6, "positions", 1e-7);
+  cpu::hash_encode_backward_positions(kSmall, 4, int64_t(n), x.data(), table.data(), g.data(), gj.data(),
+                                      gradient.data());
+  expect_gradient(
+      [&] {
+        const Encoding e = encode(kSmall, 4, x, table);
+        return inner(g, e.features) + inner(gj, e.jacobian);
+      },
+      x, gradient, 1e-6, "positions", 1e-7);
   const Encoding e = encode(kSmall, 4, x, table);
   for (size_t axis = 0; axis < 3; ++axis) {  // the Jacobian itself, point 0
     std::vector<double> jacobian(e.jacobian.begin() + 8 * axis, e.jacobian.begin() + 8 * axis + 8);
@@ -254,7 +269,8 @@ template <class T> void every_set_agrees_with_base() {
     const HashGridShape shape{6, features, 4, 1.6, 9};
     const std::vector<HashLevel> levels = levels_of(shape);
     const int64_t n = 700, columns = 6 * features;
-    const auto x = random.uniforms<T>(size_t(3 * n), -0.05, 1.05), table = random.uniforms<T>(size_t(n_entries(shape) * features), -1);
+    const auto x = random.uniforms<T>(size_t(3 * n), -0.05, 1.05),
+               table = random.uniforms<T>(size_t(n_entries(shape) * features), -1);
     const auto g = random.uniforms<T>(size_t(n * columns), -1), gj = random.uniforms<T>(size_t(3 * n * columns), -1);
     const HashEncodeArgs<T> args{levels.data(), features, 6, 6, n, x.data(), table.data()};
     std::vector<std::vector<T>> expected;
@@ -268,7 +284,8 @@ template <class T> void every_set_agrees_with_base() {
       k.hash_position_gradient(args, 0, n, g.data(), gj.data(), got[4].data());
       if (expected.empty()) expected = got;
       for (size_t i = 0; i < got.size(); ++i)
-        expect_close(got[i], expected[i], std::string(k.name) + " F = " + std::to_string(features) + " output " + std::to_string(i));
+        expect_close(got[i], expected[i],
+                     std::string(k.name) + " F = " + std::to_string(features) + " output " + std::to_string(i));
     }
   }
 }

@@ -77,8 +77,8 @@ template <class T> struct Scene {
     std::vector<T> out(7 * kPoints + levels.size() + sh.size());
     T *grad_directions = &out[3 * kPoints], *grad_roughness = &out[6 * kPoints], *grad_levels = &out[7 * kPoints];
     kernels.light_lookup(pyramid, 0, kPoints, directions.data(), roughness.data(), out.data());
-    kernels.light_lookup_backward(pyramid, 0, kPoints, directions.data(), roughness.data(), grad.data(), grad_directions,
-                                  grad_roughness, grad_levels, grad_levels + levels.size());
+    kernels.light_lookup_backward(pyramid, 0, kPoints, directions.data(), roughness.data(), grad.data(),
+                                  grad_directions, grad_roughness, grad_levels, grad_levels + levels.size());
     return out;
   }
 };

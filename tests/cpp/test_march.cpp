@@ -15,7 +15,8 @@ struct Grid {
   std::vector<uint8_t> cells;
 
   Grid(int resolution, double step, uint8_t state)
-      : options{1.5f, float(step), 1 << 20}, resolution(resolution), cells(size_t(resolution) * resolution * resolution, state) {}
+      : options{1.5f, float(step), 1 << 20}, resolution(resolution),
+        cells(size_t(resolution) * resolution * resolution, state) {}
   uint8_t& at(int x, int y, int z) { return cells[(size_t(x) * resolution + y) * resolution + z]; }
 };
 
@@ -74,7 +75,8 @@ TEST(March, SamplesExactlyTheOccupiedCells) {
       cell = u < 0.6 * filled ? 1 : u < 0.63 * filled ? 2 : 0;
     }
     // Cameras inside and outside the box.
-    const Vec3<double> o = random.direction() * random.uniform(0.1, 5), target = random.direction() * random.uniform(0, 2);
+    const Vec3<double> o = random.direction() * random.uniform(0.1, 5),
+                       target = random.direction() * random.uniform(0, 2);
     const Vec3<double> d = normalize(target - o);
     const double jitter = random.uniform();
     const std::vector<double> starts = march(grid, o, d, jitter);
@@ -86,8 +88,8 @@ TEST(March, SamplesExactlyTheOccupiedCells) {
 
 TEST(March, AxisParallelRaysCrossTheWholeBox) {
   const Grid grid(8, 0.01, uint8_t(Cell::kOccupied));
-  for (const Ray& ray : {Ray{{-3, 0.1, 0.2}, {1, 0, 0}}, Ray{{0.1, 4, -0.3}, {0, -1, 0}}, Ray{{0.1, 0.3, -9}, {0, 0, 1}},
-                         Ray{{3, 0.1, 0.2}, {-1, -0.0, 0.0}}}) {
+  for (const Ray& ray : {Ray{{-3, 0.1, 0.2}, {1, 0, 0}}, Ray{{0.1, 4, -0.3}, {0, -1, 0}},
+                         Ray{{0.1, 0.3, -9}, {0, 0, 1}}, Ray{{3, 0.1, 0.2}, {-1, -0.0, 0.0}}}) {
     const std::vector<double> starts = march(grid, ray.first, ray.second);
     EXPECT_NEAR(double(starts.size()), 300, 1);
     for (double t : starts) {
@@ -108,10 +110,10 @@ TEST(March, AxisParallelRaysCrossTheWholeBox) {
 
 TEST(March, RaysThatMissGiveNothing) {
   const Grid grid(4, 0.01, uint8_t(Cell::kOccupied));
-  EXPECT_TRUE(march(grid, {3, 0, 0}, {1, 0, 0}).empty());                              // behind the ray
-  EXPECT_TRUE(march(grid, {3, 2, 0}, {-1, 0, 0}).empty());                             // parallel, beside
-  EXPECT_TRUE(march(grid, {3, 0, 0}, normalize(Vec3<double>{-1, 2, 0})).empty());      // past the corner
-  EXPECT_TRUE(march(grid, {0, 0, 0}, {0, 0, 0}).empty());                              // no direction
+  EXPECT_TRUE(march(grid, {3, 0, 0}, {1, 0, 0}).empty());                          // behind the ray
+  EXPECT_TRUE(march(grid, {3, 2, 0}, {-1, 0, 0}).empty());                         // parallel, beside
+  EXPECT_TRUE(march(grid, {3, 0, 0}, normalize(Vec3<double>{-1, 2, 0})).empty());  // past the corner
+  EXPECT_TRUE(march(grid, {0, 0, 0}, {0, 0, 0}).empty());                          // no direction
   EXPECT_TRUE(march(grid, {NAN, 0, 0}, {1, 0, 0}).empty());
   EXPECT_TRUE(march(grid, {0, 0, 0}, {1, NAN, 0}).empty());
 }
@@ -170,9 +172,7 @@ TEST(March, PacksTheRaysOneAfterTheOther) {
     for (int64_t i = offsets[r]; i < offsets[r + 1]; ++i) {
       EXPECT_EQ(rays[i], r);
       EXPECT_NEAR(t_ends[i] - t_starts[i], 0.05, 1e-6);
-      if (i > offsets[r]) {
-        EXPECT_NEAR(t_starts[i] - t_starts[i - 1], 0.05, 1e-5);
-      }
+      if (i > offsets[r]) { EXPECT_NEAR(t_starts[i] - t_starts[i - 1], 0.05, 1e-5); }
     }
   }
 }

@@ -60,8 +60,10 @@ std::set<std::pair<std::set<int>, std::set<int>>> segments(int mask, int axis, i
   };
   for (const auto& [edge, n] : directed_edges(cube_cases()[mask])) {
     if ((faces_of(edge.first) & faces_of(edge.second) & 1 << (2 * axis + side)) == 0) continue;
-    if (reversed) out.insert({on_face(edge.second), on_face(edge.first)});
-    else out.insert({on_face(edge.first), on_face(edge.second)});
+    if (reversed)
+      out.insert({on_face(edge.second), on_face(edge.first)});
+    else
+      out.insert({on_face(edge.first), on_face(edge.second)});
   }
   return out;
 }
@@ -73,9 +75,7 @@ TEST(MarchingCubesTable, NeighboursAgreeOnTheirCommonFace) {
         bool same = true;  // the high side of a is the low side of b
         for (int corner = 0; corner < 8; ++corner)
           if (!(corner >> axis & 1)) same = same && inside(a, corner | 1 << axis) == inside(b, corner);
-        if (same) {
-          ASSERT_EQ(segments(a, axis, 1, false), segments(b, axis, 0, true)) << a << " " << b;
-        }
+        if (same) { ASSERT_EQ(segments(a, axis, 1, false), segments(b, axis, 0, true)) << a << " " << b; }
       }
     }
   }

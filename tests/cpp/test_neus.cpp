@@ -143,7 +143,8 @@ TEST(Neus, AdjointFollowsCentralDifferences) {
       const std::vector<double> gw = random.uniforms(size_t(b.n), -1), ga = random.uniforms(4, -1);
       std::vector<double> weights(b.n), opacity(4), gradient(b.x.size()), grad_s(4);
       const auto f = [&] {
-        cpu::neus_weights(4, b.offsets.data(), &b.x[0], &b.x[b.n], b.x.back(), min_transmittance, weights.data(), opacity.data());
+        cpu::neus_weights(4, b.offsets.data(), &b.x[0], &b.x[b.n], b.x.back(), min_transmittance, weights.data(),
+                          opacity.data());
         return inner(gw, weights) + inner(ga, opacity);
       };
       f();
@@ -164,8 +165,10 @@ TEST(Neus, FloatAdjointFollowsDoubleAlongOpaqueRays) {
   std::vector<float> gw32(n), prev32(n), next32(n);
   for (int i = 0; i < n; ++i) gw32[i] = std::cos(float(i)), gw[i] = gw32[i];
   const double opacity = neus_ray_weights(f_prev.data(), f_next.data(), 4000., n, 0., weights.data());
-  neus_ray_weights_backward(f_prev.data(), f_next.data(), 4000., n, 0., weights.data(), opacity, gw.data(), 0., prev.data(), next.data());
-  neus_ray_weights_backward(ray.f_prev.data(), ray.f_next.data(), 4000.f, n, 0.f, ray.weights.data(), ray.opacity, gw32.data(), 0.f, prev32.data(), next32.data());
+  neus_ray_weights_backward(f_prev.data(), f_next.data(), 4000., n, 0., weights.data(), opacity, gw.data(), 0.,
+                            prev.data(), next.data());
+  neus_ray_weights_backward(ray.f_prev.data(), ray.f_next.data(), 4000.f, n, 0.f, ray.weights.data(), ray.opacity,
+                            gw32.data(), 0.f, prev32.data(), next32.data());
   double largest = 0;
   for (double g : next) largest = std::max(largest, std::abs(g));
   for (int i = 0; i < n; ++i) {

@@ -33,8 +33,8 @@ Factors factors(const Scene& scene, const std::vector<double>& positions, const 
   const size_t n = positions.size() / 3;
   Factors out{std::vector<double>(3 * n, -7), std::vector<double>(3 * n, -7)};
   const std::vector<double> rho(n, roughness);
-  cpu::occlusion_factors(scene, options, int64_t(n), positions.data(), normals.data(), lobes.data(), rho.data(), kHeight,
-                         kWidth, map.data(), out.d.data(), out.s.data());
+  cpu::occlusion_factors(scene, options, int64_t(n), positions.data(), normals.data(), lobes.data(), rho.data(),
+                         kHeight, kWidth, map.data(), out.d.data(), out.s.data());
   return out;
 }
 
@@ -84,8 +84,8 @@ TEST_F(Occlusion, UnderASphereIsClosedForm) {
 // A wall of height H at distance x hides (1 - x / sqrt(x^2 + H^2)) / 2 of a floor point's hemisphere.
 TEST_F(Occlusion, RightAngledCornerIsClosedForm) {
   TestMesh mesh;
-  add_quad(mesh, {-10, -1000, 0}, {20, 0, 0}, {0, 2000, 0});   // floor z = 0
-  add_quad(mesh, {0, -1000, 0}, {0, 2000, 0}, {0, 0, 3});      // wall x = 0
+  add_quad(mesh, {-10, -1000, 0}, {20, 0, 0}, {0, 2000, 0});  // floor z = 0
+  add_quad(mesh, {0, -1000, 0}, {0, 2000, 0}, {0, 0, 3});     // wall x = 0
   const Scene scene = make_scene(mesh);
   for (const double x : {0.1, 1., 4.}) {
     const double height = 3 - 0.0125;
@@ -144,9 +144,11 @@ TEST_F(Occlusion, TheSeedDecidesTheRays) {
   EXPECT_EQ(with_seed(1), with_seed(1));
   double mean = 0;
   int different = 0;
-  for (uint32_t seed = 0; seed < 200; ++seed) mean += with_seed(seed) / 200, different += with_seed(seed) != with_seed(1);
+  for (uint32_t seed = 0; seed < 200; ++seed)
+    mean += with_seed(seed) / 200, different += with_seed(seed) != with_seed(1);
   EXPECT_GT(different, 50);
-  EXPECT_NEAR(mean, factors(scene, {0.9, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1), {1 << 16, 1, 0.0125f, 0}).d[0], 3e-3);
+  EXPECT_NEAR(mean, factors(scene, {0.9, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1), {1 << 16, 1, 0.0125f, 0}).d[0],
+              3e-3);
 }
 
 TEST_F(Occlusion, NoRayAboveTheHorizonLeavesThePointOpen) {

@@ -156,8 +156,7 @@ TEST(PathTracer, LightSamplingAgreesWithBsdfSampling) {
       s.params.samples_per_pixel = 8192;
       const Image single = s.render();
       double sum_both = 0, sum_single = 0;
-      for (size_t i = 0; i < both.radiance.size(); ++i)
-        sum_both += both.radiance[i], sum_single += single.radiance[i];
+      for (size_t i = 0; i < both.radiance.size(); ++i) sum_both += both.radiance[i], sum_single += single.radiance[i];
       EXPECT_NEAR(sum_both / sum_single, 1, 0.01) << "metallic " << metallic << " roughness " << roughness;
     }
   }

@@ -38,8 +38,10 @@ const Frame<double> kUnturned(Vec3<double>{0, 0, 1});
 
 // A smooth sky: blue gradient over a brown floor and a soft warm glow of half-width 30 degrees, 4 times as bright.
 Vec3<double> sky(Vec3<double> w) {
-  const double up = 1 / (1 + std::exp(-6 * w.z)), glow = 4 * std::exp(8 * (dot(w, normalize(Vec3<double>{1, 0.5, 0.7})) - 1));
-  return Vec3<double>{0.3, 0.5, 0.9} * (up * (0.6 + 0.4 * w.z)) + Vec3<double>{0.2, 0.15, 0.1} * (1 - up) + Vec3<double>{1, 0.8, 0.5} * glow;
+  const double up = 1 / (1 + std::exp(-6 * w.z)),
+               glow = 4 * std::exp(8 * (dot(w, normalize(Vec3<double>{1, 0.5, 0.7})) - 1));
+  return Vec3<double>{0.3, 0.5, 0.9} * (up * (0.6 + 0.4 * w.z)) + Vec3<double>{0.2, 0.15, 0.1} * (1 - up) +
+         Vec3<double>{1, 0.8, 0.5} * glow;
 }
 
 TEST(Prefilter, ConstantLightStaysItselfAtEveryRoughness) {
@@ -48,7 +50,8 @@ TEST(Prefilter, ConstantLightStaysItselfAtEveryRoughness) {
   const std::vector<double> queries = random.directions(n);
   std::vector<double> roughness = random.uniforms(n);
   roughness[0] = 0, roughness[1] = 1;
-  const std::vector<double> out = gbar(queries, roughness, lattice(500, kUnturned, [](Vec3<double>) { return Vec3<double>{0.5, 2, 7}; }));
+  const std::vector<double> out =
+      gbar(queries, roughness, lattice(500, kUnturned, [](Vec3<double>) { return Vec3<double>{0.5, 2, 7}; }));
   for (size_t i = 0; i < n; ++i) {
     EXPECT_NEAR(out[3 * i], 0.5, 1e-12);
     EXPECT_NEAR(out[3 * i + 1], 2, 1e-12);
@@ -61,7 +64,8 @@ TEST(Prefilter, RoughestLobeOfALinearLightIsClosedForm) {
   Random random(2);
   const Vec3<double> k{0.3, -0.2, 0.5};
   const std::vector<double> queries = random.directions(50), roughness(50, 1.0);
-  const Lights lights = lattice(20000, kUnturned, [&](Vec3<double> w) { return Vec3<double>{1, 1, 1} * (1 + dot(k, w)); });
+  const Lights lights =
+      lattice(20000, kUnturned, [&](Vec3<double> w) { return Vec3<double>{1, 1, 1} * (1 + dot(k, w)); });
   const std::vector<double> out = gbar(queries, roughness, lights);
   for (size_t i = 0; i < 50; ++i) EXPECT_NEAR(out[3 * i], 1 + dot(k, load3(&queries[3 * i])) * 2 / 3, 1e-4);
 }
@@ -72,7 +76,8 @@ TEST(Prefilter, IsLinearInTheLight) {
   Lights a = lattice(700, kUnturned, sky), b = a, both = a;
   b.radiance = random.uniforms(a.radiance.size());
   for (size_t i = 0; i < a.radiance.size(); ++i) both.radiance[i] = 2 * a.radiance[i] - 3 * b.radiance[i];
-  const std::vector<double> ga = gbar(queries, roughness, a), gb = gbar(queries, roughness, b), g = gbar(queries, roughness, both);
+  const std::vector<double> ga = gbar(queries, roughness, a), gb = gbar(queries, roughness, b),
+                            g = gbar(queries, roughness, both);
   for (size_t i = 0; i < g.size(); ++i) EXPECT_NEAR(g[i], 2 * ga[i] - 3 * gb[i], 1e-12);
 }
 
@@ -80,14 +85,16 @@ TEST(Prefilter, IsLinearInTheLight) {
 TEST(Prefilter, BackwardIsTheTranspose) {
   Random random(4);
   const size_t n = 37;
-  const std::vector<double> queries = random.directions(n), roughness = random.uniforms(n, 0.05), g = random.uniforms(3 * n, -1);
+  const std::vector<double> queries = random.directions(n), roughness = random.uniforms(n, 0.05),
+                            g = random.uniforms(3 * n, -1);
   Lights lights = lattice(45, kUnturned, sky);
   std::vector<double> total, gradient(lights.radiance.size());
   const std::vector<double> out = gbar(queries, roughness, lights, &total);
   cpu::prefilter_light_backward(int64_t(n), queries.data(), roughness.data(), total.data(), g.data(), 45,
                                 lights.directions.data(), gradient.data());
   EXPECT_NEAR(inner(gradient, lights.radiance), inner(g, out), 1e-12);
-  expect_gradient([&] { return inner(g, gbar(queries, roughness, lights)); }, lights.radiance, gradient, 1e-6, "light", 1e-4);
+  expect_gradient([&] { return inner(g, gbar(queries, roughness, lights)); }, lights.radiance, gradient, 1e-6, "light",
+                  1e-4);
 }
 
 TEST(Prefilter, WeightsAreTheLobe) {
@@ -97,7 +104,8 @@ TEST(Prefilter, WeightsAreTheLobe) {
     const Vec3<double> a = random.direction(), b = random.direction(), d = a - b;
     const double ggx_alpha = random.uniform(0.01, 1);
     EXPECT_NEAR(prefilter_weight(d.x, d.y, d.z, ggx_alpha * ggx_alpha),
-                kPi * ggx_alpha * ggx_alpha * ggx_d(ggx_alpha, sin2_half_angle(a, b)) * std::max(dot(a, b), 0.0), 1e-12);
+                kPi * ggx_alpha * ggx_alpha * ggx_d(ggx_alpha, sin2_half_angle(a, b)) * std::max(dot(a, b), 0.0),
+                1e-12);
   }
 }
 
@@ -106,7 +114,8 @@ TEST(Prefilter, NoLightAboveTheHorizonGivesBlack) {
   std::vector<double> total, gradient(3, -7);
   const std::vector<double> out = gbar({0, 0, 1}, {0.5}, lights, &total), g{1, 1, 1}, query{0, 0, 1}, roughness{0.5};
   EXPECT_EQ(out, std::vector<double>(3, 0));
-  cpu::prefilter_light_backward<double>(1, query.data(), roughness.data(), total.data(), g.data(), 1, lights.directions.data(), gradient.data());
+  cpu::prefilter_light_backward<double>(1, query.data(), roughness.data(), total.data(), g.data(), 1,
+                                        lights.directions.data(), gradient.data());
   EXPECT_EQ(gradient, std::vector<double>(3, 0));
 }
 
@@ -132,7 +141,8 @@ TEST(Prefilter, RotatedFibonacciErrorAtTheRoughestIsSmall) {
     const double relative = std::sqrt(error / scale), iid_relative = std::sqrt(iid_error / scale);
     EXPECT_LT(relative, 3e-3) << rho;
     EXPECT_LT(relative, 0.5 * iid_relative) << rho;
-    RecordProperty("relative_rmse_" + std::to_string(int(rho * 10)), std::to_string(relative) + " iid " + std::to_string(iid_relative));
+    RecordProperty("relative_rmse_" + std::to_string(int(rho * 10)),
+                   std::to_string(relative) + " iid " + std::to_string(iid_relative));
   }
 }
 
@@ -159,12 +169,13 @@ TEST(Prefilter, FloatFollowsDouble) {
   const std::vector<float> queries = random.directions<float>(n);
   std::vector<float> roughness = random.uniforms<float>(n, 0.05);
   const Lights lights = lattice(8192, kUnturned, sky);
-  const std::vector<float> directions(lights.directions.begin(), lights.directions.end()), radiance(lights.radiance.begin(), lights.radiance.end());
+  const std::vector<float> directions(lights.directions.begin(), lights.directions.end()),
+      radiance(lights.radiance.begin(), lights.radiance.end());
   std::vector<float> out(3 * n), total(n);
-  cpu::prefilter_light<float>(int64_t(n), queries.data(), roughness.data(), 8192, directions.data(), radiance.data(), out.data(), total.data());
-  const std::vector<double> exact =
-      gbar({queries.begin(), queries.end()}, {roughness.begin(), roughness.end()},
-           {{directions.begin(), directions.end()}, {radiance.begin(), radiance.end()}});
+  cpu::prefilter_light<float>(int64_t(n), queries.data(), roughness.data(), 8192, directions.data(), radiance.data(),
+                              out.data(), total.data());
+  const std::vector<double> exact = gbar({queries.begin(), queries.end()}, {roughness.begin(), roughness.end()},
+                                         {{directions.begin(), directions.end()}, {radiance.begin(), radiance.end()}});
   for (size_t i = 0; i < exact.size(); ++i) EXPECT_NEAR(out[i] / exact[i], 1, 1e-4) << i;
 }
 
@@ -176,7 +187,8 @@ template <class T> void every_lobe_kernel_agrees_with_base() {
   const auto a2 = random.uniforms<T>(size_t(n_queries), 0.01);
   const auto lx = plane(n_lights), ly = plane(n_lights), lz = plane(n_lights), light = plane(n_lights);
   const LobeSide<T> queries{qx.data(), qy.data(), qz.data(), a2.data(), g.data(), g.data(), g.data(), n_queries};
-  const LobeSide<T> lights{lx.data(), ly.data(), lz.data(), nullptr, light.data(), light.data(), light.data(), n_lights};
+  const LobeSide<T> lights{lx.data(),    ly.data(),    lz.data(),    nullptr,
+                           light.data(), light.data(), light.data(), n_lights};
   std::vector<T> base_gather, base_scatter;
   for (const Kernels<T>& k : usable_kernels<T>()) {
     std::vector<T> gather(4 * n_queries), scatter(3 * n_lights);

@@ -80,20 +80,17 @@ void expect_matches_density(const Sampler& sample, const Density& pdf, double wi
     chi_square += square(counts[i] - expected) / expected;
     ++n_cells;
   }
-  EXPECT_LE(pooled_count, pooled_expected + 4 * std::sqrt(pooled_expected) + 10)
-      << "samples where the density is 0";
+  EXPECT_LE(pooled_count, pooled_expected + 4 * std::sqrt(pooled_expected) + 10) << "samples where the density is 0";
   if (pooled_expected >= 10) chi_square += square(pooled_count - pooled_expected) / pooled_expected;
   EXPECT_LT(chi_square, chi_square_limit(n_cells)) << n_cells << " cells";
 }
 
 TEST(Sampling, UniformSphereMatchesItsDensity) {
-  expect_matches_density(
-      sample_uniform_sphere<double>, [](Vec) { return 1 / (4 * kPi); }, 1);
+  expect_matches_density(sample_uniform_sphere<double>, [](Vec) { return 1 / (4 * kPi); }, 1);
 }
 
 TEST(Sampling, CosineHemisphereMatchesItsDensity) {
-  expect_matches_density(
-      sample_cosine_hemisphere<double>, [](Vec w) { return pdf_cosine_hemisphere(w.z); }, 1);
+  expect_matches_density(sample_cosine_hemisphere<double>, [](Vec w) { return pdf_cosine_hemisphere(w.z); }, 1);
 }
 
 TEST(Sampling, GgxLobeMatchesItsDensity) {
@@ -128,9 +125,7 @@ TEST(Sampling, VisibleNormalWeightIsSmithsMaskingRatio) {
     const double sin2 = h.x * h.x + h.y * h.y;
     const double weight = ggx_d(a, sin2) * smith_v(a, v.z, l.z) * l.z / pdf_ggx_vndf(v, h, a);
     EXPECT_LE(weight, 1 + 1e-9);
-    if (a < 2e-3) {
-      EXPECT_NEAR(weight, 1, 1e-2);
-    }
+    if (a < 2e-3) { EXPECT_NEAR(weight, 1, 1e-2); }
   }
 }
 
@@ -145,9 +140,7 @@ TEST(Sampling, InversionSolvesItsEquation) {
 }
 
 TEST(Sampling, SeriesMeetsTheLogarithm) {
-  for (double y : {0.0999999, 0.1}) {
-    EXPECT_NEAR(y_minus_log1p(y) / (y - std::log1p(y)), 1, 1e-12) << y;
-  }
+  for (double y : {0.0999999, 0.1}) { EXPECT_NEAR(y_minus_log1p(y) / (y - std::log1p(y)), 1, 1e-12) << y; }
 }
 
 TEST(Sampling, GgxLobeIntegralMatchesQuadrature) {
@@ -255,8 +248,7 @@ TEST(Sampling, RandomRotationIsARotationAndUnbiased) {
   Vec mean_x{0, 0, 0}, mean_z{0, 0, 0};
   constexpr uint32_t kDraws = 20000;
   for (uint32_t i = 0; i < kDraws; ++i) {
-    const auto r =
-        random_rotation(random_unit<double>(i, 0), random_unit<double>(i, 1), random_unit<double>(i, 2));
+    const auto r = random_rotation(random_unit<double>(i, 0), random_unit<double>(i, 1), random_unit<double>(i, 2));
     EXPECT_NEAR(dot(cross(r.tangent, r.bitangent), r.normal), 1, 1e-9);
     EXPECT_NEAR(dot(r.tangent, r.bitangent), 0, 1e-9);
     mean_x += r.tangent / double(kDraws);

@@ -17,9 +17,8 @@ namespace {
 using Vec = Vec3<float>;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-std::vector<uint8_t> visibility(const Scene& scene, const std::vector<Vec>& origins,
-                                const std::vector<Vec>& directions, float t_far = kInfinity,
-                                const uint8_t* active = nullptr) {
+std::vector<uint8_t> visibility(const Scene& scene, const std::vector<Vec>& origins, const std::vector<Vec>& directions,
+                                float t_far = kInfinity, const uint8_t* active = nullptr) {
   std::vector<uint8_t> visible(origins.size(), 7);
   scene.trace_visibility(reinterpret_cast<const float*>(origins.data()),
                          reinterpret_cast<const float*>(directions.data()), int64_t(origins.size()), t_far, active,
@@ -74,9 +73,7 @@ TEST(Scene, PointsOnAConvexSurfaceSeeTheWholeHemisphere) {
   std::vector<Vec> origins, directions;
   for (uint32_t i = 0; i < 1000; ++i) {
     // 1e-3 above the top face, over its edges and its diagonal as well.
-    const float x = random_unit<float>(i, 0) * 2 - 1, y = i % 3 == 0   ? x
-                                                          : i % 3 == 1 ? 1.f
-                                                                       : random_unit<float>(i, 1);
+    const float x = random_unit<float>(i, 0) * 2 - 1, y = i % 3 == 0 ? x : i % 3 == 1 ? 1.f : random_unit<float>(i, 1);
     origins.push_back({x, y, 1.001f});
     directions.push_back(sample_cosine_hemisphere(random_unit<float>(i, 2), random_unit<float>(i, 3)));
   }

@@ -63,7 +63,8 @@ struct Case {
     for (int l = 0; l < n_active; ++l) {
       const HashCell<double> cell = hash_cell(levels[l], unit);
       for (int i = 0; i < 8; ++i)
-        for (int f = 0; f < 2; ++f) input[3 + 2 * l + f] += corner_weight_derivatives(cell, i).value * table[2 * cell.index[i] + f];
+        for (int f = 0; f < 2; ++f)
+          input[3 + 2 * l + f] += corner_weight_derivatives(cell, i).value * table[2 * cell.index[i] + f];
     }
     double sum = 0.25;
     for (int h = 0; h < width; ++h) {
@@ -83,12 +84,14 @@ template <class T> void check_network(double tolerance) {
   const std::vector<T> positions(c.positions.begin(), c.positions.end());
   for (const Kernels<T>& kernels : usable_kernels<T>()) {
     for (int n_active : {0, 2, 3}) {
-      const PreparedSdfLayer<T> layer({9, c.width, 1, hidden.data(), bias.data(), out.data(), &out_bias, T(100), T(1.5)});
+      const PreparedSdfLayer<T> layer(
+          {9, c.width, 1, hidden.data(), bias.data(), out.data(), &out_bias, T(100), T(1.5)});
       const SdfNetwork<T> net{{c.levels.data(), 2, 3, n_active, 0, nullptr, table.data()}, layer.layer()};
       for (int64_t n : {0, 1, 7, kSdfBlock}) {
         std::vector<T> work(sdf_work_size(net.layer)), values(n + 1, T(-77));
         kernels.sdf_values(net, n, positions.data(), work.data(), values.data());
-        for (int64_t p = 0; p < n; ++p) EXPECT_NEAR(values[p], c.expected(p, n_active), tolerance) << kernels.name << " " << p;
+        for (int64_t p = 0; p < n; ++p)
+          EXPECT_NEAR(values[p], c.expected(p, n_active), tolerance) << kernels.name << " " << p;
         EXPECT_EQ(values[n], T(-77)) << "wrote past the points";
       }
     }

@@ -32,8 +32,10 @@ TEST(BrdfTable, ChiMatchesMeasuredLobes) {
       {.993, .999, 1}, {.805, .946, .984}, {.559, .752, .877}, {.351, .465, .581}, {.131, .159, .183}};
   for (int r = 0; r < 5; ++r) {
     for (int v = 0; v < 3; ++v) {
-      EXPECT_NEAR(integrate_brdf(n_dot_v[v], roughness[r], 50000).z, chi[r][v], 2e-3) << roughness[r] << " " << n_dot_v[v];
-      EXPECT_NEAR(lookup_brdf_lut(brdf_lut(), n_dot_v[v], roughness[r]).z, chi[r][v], 6e-3) << roughness[r] << " " << n_dot_v[v];
+      EXPECT_NEAR(integrate_brdf(n_dot_v[v], roughness[r], 50000).z, chi[r][v], 2e-3)
+          << roughness[r] << " " << n_dot_v[v];
+      EXPECT_NEAR(lookup_brdf_lut(brdf_lut(), n_dot_v[v], roughness[r]).z, chi[r][v], 6e-3)
+          << roughness[r] << " " << n_dot_v[v];
     }
   }
   for (const double nv : n_dot_v) EXPECT_NEAR(lookup_brdf_lut(brdf_lut(), nv, 1.0).z, 0, 1e-3);
@@ -87,8 +89,8 @@ TEST(BrdfTable, DerivativesFollowTheValues) {
     std::vector<double> x{random.uniform(0.01, 1), random.uniform()};
     const LutSample<double> s = sample_brdf_lut(brdf_lut(), x[0], x[1]);
     for (int c = 0; c < 3; ++c)
-      expect_gradient([&] { return lookup_brdf_lut(brdf_lut(), x[0], x[1])[c]; }, x,
-                      {s.d_n_dot_v[c], s.d_roughness[c]}, 1e-6, "table", 1e-6 * x[0]);
+      expect_gradient([&] { return lookup_brdf_lut(brdf_lut(), x[0], x[1])[c]; }, x, {s.d_n_dot_v[c], s.d_roughness[c]},
+                      1e-6, "table", 1e-6 * x[0]);
   }
   EXPECT_EQ(sample_brdf_lut(brdf_lut(), 1e-5, 0.5).d_n_dot_v.x, 0);
   EXPECT_EQ(sample_brdf_lut(brdf_lut(), 0.5, 1.5).d_roughness.x, 0);
@@ -105,7 +107,8 @@ TEST(QueryDirection, MirrorsWhenSmoothAndFollowsTheNormalWhenRough) {
     EXPECT_LT(length(query_direction(brdf_lut(), true, n, v, 0.3) - w_r), 1e-12);
     EXPECT_LT(length(query_direction(brdf_lut(), false, n, v, 0.9) - w_r), 1e-12);
     EXPECT_LT(length(query_direction(brdf_lut(), true, n, v, 1.0) - turned), 3e-3);
-    EXPECT_LT(length(query_direction(brdf_lut(), true, n, v, 0.6) - query_direction(brdf_lut(), true, -n, v, 0.6)), 1e-12);
+    EXPECT_LT(length(query_direction(brdf_lut(), true, n, v, 0.6) - query_direction(brdf_lut(), true, -n, v, 0.6)),
+              1e-12);
     EXPECT_NEAR(length(query_direction(brdf_lut(), true, n, v, 0.6)), 1, 1e-12);
   }
 }
@@ -186,11 +189,12 @@ TEST(Shading, AdjointFollowsCentralDifferences) {
         std::copy(directions.begin(), directions.end(), x.begin());
         std::vector<double> gradient(x.size()), radiance(3 * n);
         const auto arrays = [&](auto* p) {
-          return cpu::ShadeArrays<std::remove_pointer_t<decltype(p)>>{p + at[0], p + at[1], p + at[2], p + at[3], p + at[4],
-                                                                      p + at[5], p + at[6], p + at[7], p + at[8]};
+          return cpu::ShadeArrays<std::remove_pointer_t<decltype(p)>>{
+              p + at[0], p + at[1], p + at[2], p + at[3], p + at[4], p + at[5], p + at[6], p + at[7], p + at[8]};
         };
         const auto f = [&] {
-          cpu::split_sum_shade(brdf_lut(), options, n, channels, arrays(static_cast<const double*>(x.data())), radiance.data());
+          cpu::split_sum_shade(brdf_lut(), options, n, channels, arrays(static_cast<const double*>(x.data())),
+                               radiance.data());
           return inner(g, radiance);
         };
         cpu::split_sum_shade_backward(brdf_lut(), options, n, channels, arrays(static_cast<const double*>(x.data())),
@@ -210,7 +214,7 @@ TEST(Shading, FloatFollowsDouble) {
     p.albedo = {random.uniform(), random.uniform(), random.uniform()}, p.metallic = random.uniform();
     ShadePoint<float> q;
     const auto narrow = [](Vec3<double> v) { return Vec3<float>{float(v.x), float(v.y), float(v.z)}; };
-    q = {narrow(p.normal), narrow(p.view), narrow(p.albedo), float(p.roughness), float(p.metallic),
+    q = {narrow(p.normal),   narrow(p.view),    narrow(p.albedo),      float(p.roughness),   float(p.metallic),
          narrow(p.specular), narrow(p.diffuse), narrow(p.occlusion_s), narrow(p.occlusion_d)};
     const Vec3<double> exact = split_sum_shade(brdf_lut(), {}, p);
     const Vec3<float> got = split_sum_shade(brdf_lut(), {}, q);

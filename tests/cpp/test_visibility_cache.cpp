@@ -76,7 +76,8 @@ TEST(VertexGrids, NeighboursAreThoseOfBruteForce) {
 
 TEST(VertexGrids, AFarPointHasNoNeighbours) {
   const Cloud cloud(4);
-  for (const double far : {1e3, 1e12, 1e30}) EXPECT_EQ(find_neighbours(cloud.grids, {far, -far, 0.0}, {0.0, 0.0, 1.0}).n, 0);
+  for (const double far : {1e3, 1e12, 1e30})
+    EXPECT_EQ(find_neighbours(cloud.grids, {far, -far, 0.0}, {0.0, 0.0, 1.0}).n, 0);
 }
 
 TEST(NeighbourWeight, FallsWithDistanceAndNeverTakesTheOtherSide) {
@@ -99,7 +100,8 @@ TEST(CachedLobe, NoLobeIsNarrowerThanTheDirectionsAllow) {
 template <class T> void check_sums(double tolerance) {
   constexpr int n = 96, words = n / kBitsPerWord, neighbours = 5;
   Random random(7);
-  const std::vector<T> x = random.uniforms<T>(n, -1, 1), y = random.uniforms<T>(n, -1, 1), z = random.uniforms<T>(n, -1, 1);
+  const std::vector<T> x = random.uniforms<T>(n, -1, 1), y = random.uniforms<T>(n, -1, 1),
+                       z = random.uniforms<T>(n, -1, 1);
   const std::vector<T> light = random.uniforms<T>(3 * n, 0, 2);
   const std::vector<T> lobe_dir{T(0.6), T(0), T(0.8)}, normal{T(0), T(0), T(1)};
   std::vector<uint32_t> bits(neighbours * 2 * words);
@@ -121,7 +123,8 @@ template <class T> void check_sums(double tolerance) {
       all += (is_open || is_blocked) * double(weights[k]), open += is_open * double(weights[k]);
     }
     const double v = all > 0 ? open / all : 1, c = std::max(double(z[i]), 0.0);
-    const double s = c > 0 ? double(prefilter_weight(lobe_dir[0] - x[i], lobe_dir[1] - y[i], lobe_dir[2] - z[i], T(0.04))) : 0;
+    const double s =
+        c > 0 ? double(prefilter_weight(lobe_dir[0] - x[i], lobe_dir[1] - y[i], lobe_dir[2] - z[i], T(0.04))) : 0;
     for (int ch = 0; ch < 3; ++ch) {
       const double l = light[ch * n + i];
       expected[ch] += v * c * l, expected[3 + ch] += c * l, expected[7 + ch] += v * s * l, expected[10 + ch] += s * l;
@@ -134,9 +137,11 @@ template <class T> void check_sums(double tolerance) {
     set.visibility_horizon(directions, normal.data(), cosine.data(), above.data());
     for (int i = 0; i < n; ++i) ASSERT_EQ(above[i / 32] >> i % 32 & 1, z[i] > 0) << set.name;
     set.visibility_shares(directions.n, {rows, weights.data(), neighbours}, known.data(), visible.data());
-    set.visibility_sums(directions, {cosine.data(), lobe_dir.data(), T(0.04)}, visible.data(), lobe.data(), sums.data());
+    set.visibility_sums(directions, {cosine.data(), lobe_dir.data(), T(0.04)}, visible.data(), lobe.data(),
+                        sums.data());
     EXPECT_EQ(visible[0], 1) << set.name;
-    for (int i = 0; i < 14; ++i) EXPECT_NEAR(sums[i], expected[i], tolerance * (1 + expected[i])) << set.name << " " << i;
+    for (int i = 0; i < 14; ++i)
+      EXPECT_NEAR(sums[i], expected[i], tolerance * (1 + expected[i])) << set.name << " " << i;
   }
 }
 TEST(CachedLobe, SumsFloat) { check_sums<float>(1e-5); }

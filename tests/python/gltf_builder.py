@@ -28,9 +28,7 @@ class Gltf:
 
     def view(self, data: bytes, **extra) -> int:
         self.binary += b"\0" * (-len(self.binary) % 4)
-        self.json["bufferViews"].append(
-            {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)} | extra
-        )
+        self.json["bufferViews"].append({"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)} | extra)
         self.binary += data
         return len(self.json["bufferViews"]) - 1
 

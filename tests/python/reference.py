@@ -129,7 +129,9 @@ def march_ray(origin, direction, jitter, cells, box, step, max_samples) -> list[
             continue
         if not middle < t_far:
             break
-        cell = tuple(np.clip(((origin + middle * direction + box) / (2 * box) * len(cells)).astype(int), 0, len(cells) - 1))
+        cell = tuple(
+            np.clip(((origin + middle * direction + box) / (2 * box) * len(cells)).astype(int), 0, len(cells) - 1)
+        )
         if cells[cell] == 2:
             break
         if cells[cell] == 1:
@@ -154,13 +156,17 @@ def pixel_losses(mean, opacity, target, background, linear: bool = True) -> tupl
 def gradient_losses(gradients, weights, beside) -> tuple[torch.Tensor, torch.Tensor]:
     m = len(beside)
     eikonal = (torch.sqrt(gradients.square().sum(-1) + 1e-24) - 1).square().mean()
-    here, there = (torch.nn.functional.normalize(g, dim=1) for g in (gradients[beside], gradients[len(gradients) - m :]))
+    here, there = (
+        torch.nn.functional.normalize(g, dim=1) for g in (gradients[beside], gradients[len(gradients) - m :])
+    )
     apart = (there - here).square().sum(1)
     counts = weights[beside] * (apart.detach() < 2)
     return eikonal, (counts * torch.sqrt(apart + 1e-24)).sum() / counts.sum().clamp(min=1e-8)
 
 
-def material_losses(albedo, metallic, shares, smooth_l1: bool = False) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+def material_losses(
+    albedo, metallic, shares, smooth_l1: bool = False
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     m, shares = metallic[:, 0], shares / shares.sum()
     metal = torch.nn.functional.smooth_l1_loss(m, torch.zeros_like(m), reduction="none") if smooth_l1 else m.square()
     darkness = (1 - albedo.detach().amax(1) / 0.4).clamp(min=0)

@@ -46,7 +46,12 @@ def surface_of(field):
 
     def materials(x):
         rough, metal = 0.5 + 0.3 * x[:, :1], (x[:, 2:] > 0).float()
-        return torch.from_numpy(albedo_at(x.numpy())), rough, metal, torch.nn.functional.normalize(gradient(x)[1], dim=1)
+        return (
+            torch.from_numpy(albedo_at(x.numpy())),
+            rough,
+            metal,
+            torch.nn.functional.normalize(gradient(x)[1], dim=1),
+        )
 
     return Surface(field, gradient, materials)
 
@@ -55,7 +60,14 @@ def surface_of(field):
 def baked():
     vertices, faces = extract_mesh(bumpy, 1.5, 80)
     return textured_asset(
-        "bumpy", vertices, faces, surface_of(bumpy), n_faces=600, texture_size=SIZE, spacing=SPACING, occlusion_offset=0.01
+        "bumpy",
+        vertices,
+        faces,
+        surface_of(bumpy),
+        n_faces=600,
+        texture_size=SIZE,
+        spacing=SPACING,
+        occlusion_offset=0.01,
     )
 
 
@@ -172,7 +184,9 @@ def test_points_move_onto_the_level_set_and_never_away():
     assert np.linalg.norm(moved - points, axis=1).max() < 0.0201
     assert (np.abs(np.linalg.norm(moved, axis=1) - 1) <= np.abs(np.linalg.norm(points, axis=1) - 1) + 1e-6).all()
     across = np.float32(np.cross(directions, [0.0, 0.0, 1.0]))
-    assert np.array_equal(to_level_set(surface, points, 0.2, across / np.linalg.norm(across, axis=1, keepdims=True)), points)
+    assert np.array_equal(
+        to_level_set(surface, points, 0.2, across / np.linalg.norm(across, axis=1, keepdims=True)), points
+    )
 
 
 def test_occlusion_beside_a_wall():

@@ -367,7 +367,7 @@ def test_masks_without_an_object(scene, alpha, reason):
 def test_masks_that_contradict_the_poses(scene):
     for i, path in enumerate(sorted((scene / "train").iterdir())):
         image = np.zeros((SIZE, SIZE, 4))
-        image[:2 + i, -2:, 3] = 1
+        image[: 2 + i, -2:, 3] = 1
         write_image(path, image)
     with pytest.raises(InputError, match="masks and poses contradict each other"):
         load_dataset(scene)

@@ -206,7 +206,10 @@ def test_a_chain_without_gradients_or_of_inference_mode_is_not_handed_to_autogra
 
 def test_collected_gradients_are_those_of_the_steps_together():
     """Three backward passes that share one chain give the parameters what one pass over the sum of the losses does."""
-    steps = [(unit(torch.randn(30, 3, generator=generator(i))), torch.rand(30, 1, generator=generator(9 + i))) for i in range(3)]
+    steps = [
+        (unit(torch.randn(30, 3, generator=generator(i))), torch.rand(30, 1, generator=generator(9 + i)))
+        for i in range(3)
+    ]
     together, collected = LightPyramid(16), LightPyramid(16)
     sum(together(*step).square().sum() for step in steps).backward()
     collected.collect()

@@ -83,7 +83,6 @@ def test_the_front_follows_a_surface_that_the_first_look_missed():
     def steep(x):
         return 3.0 * torus(x)
 
-
     vertices, faces = extract_mesh(steep, 1.5, 64)
     dense_vertices, dense_faces = extract_mesh(steep, 1.5, 64, dense=True)
     assert np.array_equal(faces, dense_faces) and np.abs(vertices - dense_vertices).max() < 1e-5

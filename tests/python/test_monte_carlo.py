@@ -96,7 +96,12 @@ def test_the_loss_of_two_estimates_has_no_noise_in_it():
 def test_settings_that_do_not_fit_are_refused():
     with pytest.raises(InputError, match="finetune_from below 1 needs compositing"):
         Config().replace({"finetune_from": 0.8, "compositing": "srgb", "shading": "split"})
-    for setting in ({"occlusion": "mlp"}, {"compositing": "srgb"}, {"fresnel_mode": "paper"}, {"occlusion_directions": 128}):
+    for setting in (
+        {"occlusion": "mlp"},
+        {"compositing": "srgb"},
+        {"fresnel_mode": "paper"},
+        {"occlusion_directions": 128},
+    ):
         with pytest.raises(InputError, match="shading = summed needs"):
             Config().replace(setting)
     with pytest.raises(InputError, match="finetune_samples"):
@@ -108,11 +113,11 @@ def test_with_fixed_materials_the_colours_move_the_surface_alone():
     p = points(16)
     field = scene.surface(p["positions"])
     normals = field.gradient / field.gradient.norm(dim=1, keepdim=True)
-    shaded = scene.shade(
-        p["positions"], field.outputs, field.features, normals, p["view_dirs"], fixed_materials=True
-    )
+    shaded = scene.shade(p["positions"], field.outputs, field.features, normals, p["view_dirs"], fixed_materials=True)
     parameters = list(scene.material.parameters())
-    found = torch.autograd.grad(shaded.radiance.sum(), [*parameters, scene.sdf_field.hidden_direction], retain_graph=True, allow_unused=True)
+    found = torch.autograd.grad(
+        shaded.radiance.sum(), [*parameters, scene.sdf_field.hidden_direction], retain_graph=True, allow_unused=True
+    )
     assert all(g is None for g in found[:-1]) and (found[-1] != 0).any()
     assert all((g != 0).any() for g in torch.autograd.grad(shaded.albedo.sum(), parameters[-1:]))
 
@@ -125,7 +130,10 @@ def test_with_fixed_materials_a_rendered_ray_gives_them_no_gradient():
     scene.use_mesh(MeshScene(mesh.vertices, mesh.faces), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces))
     grid = OccupancyGrid(32, 1.5)
     grid.update(scene.sdf_field.sdf, scene.s_value)
-    rays_o, rays_d = torch.tensor([[3.0, 0.0, 0.2]]).expand(8, 3), unit(torch.randn(8, 3) * 0.1 + torch.tensor([-3.0, 0, 0]))
+    rays_o, rays_d = (
+        torch.tensor([[3.0, 0.0, 0.2]]).expand(8, 3),
+        unit(torch.randn(8, 3) * 0.1 + torch.tensor([-3.0, 0, 0])),
+    )
     weights = [p for p in scene.material.parameters()]
     rays = rays_o, rays_d, torch.full((8,), 0.5)
     for fixed in (False, True):

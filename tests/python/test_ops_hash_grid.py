@@ -38,7 +38,9 @@ def test_matches_the_reference(device, n_active):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_float32_is_close_to_float64(device):
-    single, double = (hash_encode_jacobian(*sample_inputs(device, t, 200)[:2], SPEC) for t in (torch.float32, torch.float64))
+    single, double = (
+        hash_encode_jacobian(*sample_inputs(device, t, 200)[:2], SPEC) for t in (torch.float32, torch.float64)
+    )
     for got, expected in zip(single, double):
         torch.testing.assert_close(got.double(), expected, rtol=1e-4, atol=1e-4)
     again = hash_encode(*sample_inputs(device, torch.float32, 200)[:2], SPEC)
@@ -113,10 +115,26 @@ def test_positions_outside_and_nan(device):
 @pytest.mark.parametrize("device", DEVICES)
 def test_errors_name_what_is_wrong(device):
     positions, table, *grid = sample_inputs(device, torch.float32)
-    check_error(lambda: lib.hash_encode(positions[:, :2], table, *grid), "hash_encode", "positions", "[n, 3] float32", "[9, 2] float32")
-    check_error(lambda: lib.hash_encode(positions.double(), table, *grid), "hash_encode", "positions", "float32", "float64")
-    check_error(lambda: lib.hash_encode(positions, table[1:], *grid), "hash_encode", "table", str(SPEC.n_entries), str(SPEC.n_entries - 1))
-    check_error(lambda: lib.hash_encode(positions, table.long(), *grid), "hash_encode", "table", "float32 or float64", "int64")
+    check_error(
+        lambda: lib.hash_encode(positions[:, :2], table, *grid),
+        "hash_encode",
+        "positions",
+        "[n, 3] float32",
+        "[9, 2] float32",
+    )
+    check_error(
+        lambda: lib.hash_encode(positions.double(), table, *grid), "hash_encode", "positions", "float32", "float64"
+    )
+    check_error(
+        lambda: lib.hash_encode(positions, table[1:], *grid),
+        "hash_encode",
+        "table",
+        str(SPEC.n_entries),
+        str(SPEC.n_entries - 1),
+    )
+    check_error(
+        lambda: lib.hash_encode(positions, table.long(), *grid), "hash_encode", "table", "float32 or float64", "int64"
+    )
     check_error(lambda: lib.hash_encode(positions, table[0], *grid), "hash_encode", "table", "[n_entries, n_features]")
     check_error(lambda: hash_encode(positions, table, SPEC, 4), "hash_encode", "n_active", "[0, n_levels]", "4")
     check_error(lambda: lib.hash_encode(positions, table, 33, 4, 1.5, 8, 2), "n_levels", "[1, 32]", "33")
@@ -124,7 +142,9 @@ def test_errors_name_what_is_wrong(device):
     check_error(lambda: lib.hash_encode(positions, table, 3, 4, 0.5, 8, 2), "growth", "0.5")
     check_error(lambda: lib.hash_encode(positions, table, 3, 4, 1.5, 31, 2), "log2_table_size", "[1, 30]", "31")
     check_error(lambda: lib.hash_encode(positions, table, 32, 16, 3.0, 8, 2), "finest level")
-    check_error(lambda: hash_encode_jacobian(positions[None], table, SPEC), "hash_encode_jacobian", "positions", "[1, 9, 3]")
+    check_error(
+        lambda: hash_encode_jacobian(positions[None], table, SPEC), "hash_encode_jacobian", "positions", "[1, 9, 3]"
+    )
 
 
 IMPOSSIBLE = [("n_levels", 0), ("n_levels", 33), ("n_features", 3), ("base_resolution", 0), ("growth", 0.9), ("growth", float("nan")),

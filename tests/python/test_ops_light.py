@@ -90,7 +90,9 @@ def test_no_light_above_the_horizon_gives_black(device):
 def test_fibonacci_directions_are_uniform_and_seeded():
     directions = fibonacci_directions(4096, generator(5), torch.float64)
     torch.testing.assert_close(directions.norm(dim=1), torch.ones(4096, dtype=torch.float64))
-    torch.testing.assert_close(directions.T @ directions / 4096, torch.eye(3, dtype=torch.float64) / 3, rtol=0, atol=1e-3)
+    torch.testing.assert_close(
+        directions.T @ directions / 4096, torch.eye(3, dtype=torch.float64) / 3, rtol=0, atol=1e-3
+    )
     assert directions.mean(0).abs().max() < 1e-3
     assert torch.equal(directions, fibonacci_directions(4096, generator(5), torch.float64))
     assert not torch.equal(directions, fibonacci_directions(4096, generator(6), torch.float64))
@@ -112,10 +114,23 @@ def test_lobe_samples_estimate_the_prefiltered_light(device):
 @pytest.mark.parametrize("device", DEVICES)
 def test_errors_name_what_is_wrong(device):
     queries, roughness, lights, light = sample_inputs(device, torch.float32)
-    check_error(lambda: prefilter_light(queries, roughness[:, 0], lights, light), "prefilter_light", "roughness", "[6, 1] float32", "[6]")
-    check_error(lambda: prefilter_light(queries, roughness, lights, light[1:]), "prefilter_light", "light", "[40, 3]", "[39, 3]")
+    check_error(
+        lambda: prefilter_light(queries, roughness[:, 0], lights, light),
+        "prefilter_light",
+        "roughness",
+        "[6, 1] float32",
+        "[6]",
+    )
+    check_error(
+        lambda: prefilter_light(queries, roughness, lights, light[1:]), "prefilter_light", "light", "[40, 3]", "[39, 3]"
+    )
     check_error(lambda: prefilter_light(queries.double(), roughness, lights, light), "query_dirs", "float32", "float64")
-    check_error(lambda: prefilter_light(queries, roughness, lights[:0], light[:0]), "prefilter_light", "light_dirs", "at least one")
+    check_error(
+        lambda: prefilter_light(queries, roughness, lights[:0], light[:0]),
+        "prefilter_light",
+        "light_dirs",
+        "at least one",
+    )
     check_error(lambda: sample_ggx_lobe(queries[:, :2], roughness, 4), "sample_ggx_lobe", "axes", "[n, 3]", "[6, 2]")
     check_error(lambda: sample_ggx_lobe(queries, roughness, 0), "sample_ggx_lobe", "n_samples", "[1, 2^20]")
 

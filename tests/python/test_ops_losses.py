@@ -51,7 +51,9 @@ def test_a_clipped_photo_asks_only_for_enough():
     colour, _ = pixel_losses(bright, opacity, target, torch.zeros(4, 3), linear=False)
     colour.backward()
     assert colour.item() == 0.0 and torch.equal(bright.grad, torch.zeros(4, 3))
-    assert pixel_losses(0.5 * torch.ones(4, 3), opacity, target, torch.zeros(4, 3), linear=False)[0].item() == pytest.approx(0.25)
+    assert pixel_losses(0.5 * torch.ones(4, 3), opacity, target, torch.zeros(4, 3), linear=False)[
+        0
+    ].item() == pytest.approx(0.25)
 
 
 # ---- gradients ----
@@ -120,10 +122,14 @@ def test_metals_by_hand():
     """Eq. (18); a metal by halves; dark metals, but neither bright ones nor dielectrics."""
     metallic, shares = torch.tensor([[1.0], [0.4]]), torch.tensor([0.5, 0.25])
     metal, binary, _ = material_losses(torch.ones(2, 3), metallic, shares)
-    assert metal.item() == pytest.approx((0.5 + 0.25 * 0.16) / 0.75) and binary.item() == pytest.approx(0.25 * 0.24 / 0.75)
+    assert metal.item() == pytest.approx((0.5 + 0.25 * 0.16) / 0.75) and binary.item() == pytest.approx(
+        0.25 * 0.24 / 0.75
+    )
     assert material_losses(torch.ones(1, 3), metallic[1:], shares[1:], smooth_l1=True)[0].item() == pytest.approx(0.08)
     albedo = torch.tensor([[0.1, 0.2, 0.0], [0.5, 0.1, 0.1], [0.01, 0.01, 0.01]])
-    assert material_losses(albedo, torch.tensor([[1.0], [1.0], [0.0]]), torch.ones(3))[2].item() == pytest.approx((1 - 0.2 / 0.4) / 3)
+    assert material_losses(albedo, torch.tensor([[1.0], [1.0], [0.0]]), torch.ones(3))[2].item() == pytest.approx(
+        (1 - 0.2 / 0.4) / 3
+    )
 
 
 # ---- all ----
@@ -179,7 +185,6 @@ def test_what_has_no_gradient_and_what_does_not_fit():
 
 
 # ---- entropy ----
-
 
 
 def by_pairs(x: torch.Tensor) -> torch.Tensor:

@@ -92,7 +92,9 @@ def test_edges_stay_finite(n_dot_v, roughness):
     point = tuple(x.requires_grad_() for x in at(n_dot_v, roughness, torch.float32))
     directions, pdf = sample_bsdf(*(x.detach() for x in point), 64)
     assert torch.isfinite(directions).all() and torch.isfinite(pdf).all() and (pdf >= 0).all()
-    sums = torch.stack(monte_carlo_light(point[0], point[1].detach(), point[2], directions, pdf, torch.ones_like(directions)))
+    sums = torch.stack(
+        monte_carlo_light(point[0], point[1].detach(), point[2], directions, pdf, torch.ones_like(directions))
+    )
     sums.sum().backward()
     assert torch.isfinite(sums).all()
     assert torch.isfinite(point[0].grad).all() and torch.isfinite(point[2].grad).all()
@@ -129,7 +131,8 @@ def shared_inputs(n: int = 5, k: int = 24, dtype=torch.float64, with_sent: bool 
     normals, view_dirs, roughness = (x.to(dtype) for x in inputs(n)[:3])
     directions = unit(torch.randn(k, 3, generator=g, dtype=torch.float64)).to(dtype)
     solid_angles, radiance, visible, sent = (
-        torch.rand(*shape, generator=g, dtype=torch.float64).to(dtype) for shape in ((k,), (k, 3), (n, k), (n if with_sent else 0, k, 3))
+        torch.rand(*shape, generator=g, dtype=torch.float64).to(dtype)
+        for shape in ((k,), (k, 3), (n, k), (n if with_sent else 0, k, 3))
     )
     return normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent
 
@@ -156,7 +159,9 @@ def test_shared_directions_sum_as_drawn_ones_of_their_solid_angle(n, with_sent):
 def test_shared_directions_opcheck_gradcheck_precision_and_errors():
     check_op(lib.summed_light, shared_inputs(), GRADIENTS)
     check_op(lib.summed_light_backward, (*shared_inputs(), torch.ones(5, 3, 3, dtype=torch.float64)))
-    assert torch.autograd.gradcheck(lambda *x: lib.summed_light(*x), grad_leaves(shared_inputs(3, 5), GRADIENTS), atol=1e-6)
+    assert torch.autograd.gradcheck(
+        lambda *x: lib.summed_light(*x), grad_leaves(shared_inputs(3, 5), GRADIENTS), atol=1e-6
+    )
     single, exact = lib.summed_light(*shared_inputs(dtype=torch.float32)), lib.summed_light(*shared_inputs())
     torch.testing.assert_close(single.double(), exact, rtol=2e-4, atol=1e-5)
     for index in (1, 3, 4, 6, 7):

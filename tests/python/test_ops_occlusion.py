@@ -74,8 +74,16 @@ def test_visibility_opcheck_empty_and_errors(device, scene):
     origins, directions = ray_inputs(device, 20)
     check_op(lib.trace_visibility, (scene.handle, origins, directions, math.inf))
     assert trace_visibility(scene, origins[:0], directions[:0]).shape == (0,)
-    check_error(lambda: trace_visibility(scene, origins.double(), directions), "trace_visibility", "origins", "[n, 3] float32", "float64")
-    check_error(lambda: trace_visibility(scene, origins, directions[1:]), "trace_visibility", "directions", "[20, 3]", "[19, 3]")
+    check_error(
+        lambda: trace_visibility(scene, origins.double(), directions),
+        "trace_visibility",
+        "origins",
+        "[n, 3] float32",
+        "float64",
+    )
+    check_error(
+        lambda: trace_visibility(scene, origins, directions[1:]), "trace_visibility", "directions", "[20, 3]", "[19, 3]"
+    )
     assert not trace_visibility(scene, origins.requires_grad_(), directions).requires_grad
 
 
@@ -90,7 +98,12 @@ def test_a_released_scene_raises():
 
 def test_bad_meshes_raise():
     vertices, faces = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]])
-    for bad_vertices, bad_faces in ((vertices, faces + 1), (vertices, faces[:0]), (vertices * np.nan, faces), (vertices[:, :2], faces)):
+    for bad_vertices, bad_faces in (
+        (vertices, faces + 1),
+        (vertices, faces[:0]),
+        (vertices * np.nan, faces),
+        (vertices[:, :2], faces),
+    ):
         with pytest.raises(ValueError):
             MeshScene(bad_vertices, bad_faces)
 
@@ -103,7 +116,9 @@ def test_occlusion_agrees_with_rays_of_embreex():
     mesh = make_mesh()
     positions, normals, lobes, roughness, _ = sample_inputs("cpu", torch.float32, 12)
     white = torch.ones(4, 8, 3)
-    got, _ = occlusion_factors(make_scene(mesh), positions, normals, lobes, roughness, white, n_diffuse_rays=4096, n_specular_rays=1)
+    got, _ = occlusion_factors(
+        make_scene(mesh), positions, normals, lobes, roughness, white, n_diffuse_rays=4096, n_specular_rays=1
+    )
     rng = np.random.default_rng(0)
     oracle = embreex_oracle(mesh)
     for x, n, o in zip(positions.numpy(), normals.numpy(), got[:, 0].numpy()):
@@ -131,7 +146,17 @@ def test_under_a_sphere(device):
     rough = torch.ones_like(up[:, :1])
     for light in (1.0, 0.0):  # black light falls back to geometry
         environment = torch.full((4, 8, 3), light, dtype=torch.float64, device=device)
-        o_d, o_s = occlusion_factors(make_scene(sphere), 0 * up, up, up, rough, environment, n_diffuse_rays=8192, n_specular_rays=8192, n_channels=3)
+        o_d, o_s = occlusion_factors(
+            make_scene(sphere),
+            0 * up,
+            up,
+            up,
+            rough,
+            environment,
+            n_diffuse_rays=8192,
+            n_specular_rays=8192,
+            n_channels=3,
+        )
         assert o_d.shape == (1, 3)
         torch.testing.assert_close(o_d, torch.full_like(o_d, 0.75), rtol=0, atol=3e-3)
         torch.testing.assert_close(o_s, torch.full_like(o_s, 0.75), rtol=0, atol=3e-3)
@@ -142,13 +167,19 @@ def test_occlusion_opcheck_precision_and_gradients(device, scene):
     numbers = (16, 16, 0.0125, False, 3)
     for dtype in (torch.float32, torch.float64):
         check_op(lib.occlusion_factors, (scene.handle, *sample_inputs(device, dtype), *numbers))
-    single, double = (lib.occlusion_factors(scene.handle, *sample_inputs(device, t, 100), 64, 64, 0.0125, False, 3) for t in (torch.float32, torch.float64))
+    single, double = (
+        lib.occlusion_factors(scene.handle, *sample_inputs(device, t, 100), 64, 64, 0.0125, False, 3)
+        for t in (torch.float32, torch.float64)
+    )
     for a, b in zip(single, double):
         assert (a.double() - b).abs().mean() < 1e-3  # single rays at an edge may go either way
         assert (b >= 0).all() and (b <= 1).all()
     for index in range(1, 6):
         check_no_gradient(lib.occlusion_factors, (scene.handle, *sample_inputs(device, torch.float32), *numbers), index)
-    assert all(x.shape == (0, 3) for x in lib.occlusion_factors(scene.handle, *sample_inputs(device, torch.float32, 0), *numbers))
+    assert all(
+        x.shape == (0, 3)
+        for x in lib.occlusion_factors(scene.handle, *sample_inputs(device, torch.float32, 0), *numbers)
+    )
 
 
 @pytest.mark.parametrize("device", DEVICES)
@@ -157,11 +188,28 @@ def test_occlusion_seed_and_errors(device, scene):
     first, again, other = (occlusion_factors(scene, *inputs, seed=s)[0] for s in (0, 0, 1))
     assert torch.equal(first, again) and not torch.equal(first, other)
     positions, normals, lobes, roughness, environment = inputs
-    check_error(lambda: occlusion_factors(scene, positions, normals[1:], lobes, roughness, environment), "occlusion_factors", "normals", "[60, 3]", "[59, 3]")
-    check_error(lambda: occlusion_factors(scene, positions, normals, lobes, roughness, environment[0]), "environment", "[n, n, 3]", "[16, 3]")
-    check_error(lambda: occlusion_factors(scene, positions, normals, lobes, roughness, environment[:0]), "environment", "at least one texel")
+    check_error(
+        lambda: occlusion_factors(scene, positions, normals[1:], lobes, roughness, environment),
+        "occlusion_factors",
+        "normals",
+        "[60, 3]",
+        "[59, 3]",
+    )
+    check_error(
+        lambda: occlusion_factors(scene, positions, normals, lobes, roughness, environment[0]),
+        "environment",
+        "[n, n, 3]",
+        "[16, 3]",
+    )
+    check_error(
+        lambda: occlusion_factors(scene, positions, normals, lobes, roughness, environment[:0]),
+        "environment",
+        "at least one texel",
+    )
     check_error(lambda: occlusion_factors(scene, *inputs, n_diffuse_rays=0), "n_diffuse_rays", "[1, 2^20]")
-    check_error(lambda: occlusion_factors(scene, *inputs, n_channels=2), "occlusion_factors", "n_channels", "1 or 3", "2")
+    check_error(
+        lambda: occlusion_factors(scene, *inputs, n_channels=2), "occlusion_factors", "n_channels", "1 or 3", "2"
+    )
 
 
 def test_rays_that_start_along_themselves():
@@ -171,6 +219,14 @@ def test_rays_that_start_along_themselves():
     up, white = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(4, 8, 3)
     for along_ray, expected in ((False, 1.0), (True, 0.84)):
         o_d, _ = occlusion_factors(
-            make_scene(plane), 0 * up, up, up, torch.ones(1, 1), white, n_diffuse_rays=4096, offset=0.05, along_ray=along_ray
+            make_scene(plane),
+            0 * up,
+            up,
+            up,
+            torch.ones(1, 1),
+            white,
+            n_diffuse_rays=4096,
+            offset=0.05,
+            along_ray=along_ray,
         )
         assert o_d.item() == pytest.approx(expected, abs=0.01)

@@ -8,7 +8,16 @@ import reference
 import torch
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 
-from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE, PackedSamples, composite, march_rays, neus_weights, spread_samples, surface_weights
+from splitnerf.ops import (
+    CELL_OCCUPIED,
+    CELL_OPAQUE,
+    PackedSamples,
+    composite,
+    march_rays,
+    neus_weights,
+    spread_samples,
+    surface_weights,
+)
 
 OFFSETS = [0, 9, 9, 10, 24]  # one ray without samples
 
@@ -17,10 +26,18 @@ def sample_inputs(device, dtype, min_transmittance: float = 0.0) -> tuple:
     """Arguments of ``neus_weights``: rays that cross the surface, with some samples along which f rises."""
     n = OFFSETS[-1]
     draw = generator()
-    f_prev = torch.linspace(0.5, -0.3, n, dtype=torch.float64) + 0.1 * torch.rand(n, generator=draw, dtype=torch.float64)
+    f_prev = torch.linspace(0.5, -0.3, n, dtype=torch.float64) + 0.1 * torch.rand(
+        n, generator=draw, dtype=torch.float64
+    )
     f_next = f_prev - 0.1 + 0.15 * torch.rand(n, generator=draw, dtype=torch.float64)
     offsets = torch.tensor(OFFSETS, device=device)
-    return f_prev.to(device, dtype), f_next.to(device, dtype), torch.tensor(8.0, device=device, dtype=dtype), offsets, min_transmittance
+    return (
+        f_prev.to(device, dtype),
+        f_next.to(device, dtype),
+        torch.tensor(8.0, device=device, dtype=dtype),
+        offsets,
+        min_transmittance,
+    )
 
 
 def composite_inputs(device, dtype) -> tuple:
@@ -32,7 +49,9 @@ def composite_inputs(device, dtype) -> tuple:
 def march_inputs(device, dtype, n: int = 40) -> tuple:
     """Arguments of ``march_rays``: cameras inside and outside the box, some rays parallel to an axis."""
     draw = generator(3)
-    origins = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64)) * (1 + 2 * torch.rand(n, 1, generator=draw, dtype=torch.float64))
+    origins = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64)) * (
+        1 + 2 * torch.rand(n, 1, generator=draw, dtype=torch.float64)
+    )
     directions = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64) * 0.4 - origins)
     directions[::8] = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64)
     jitter = torch.rand(n, generator=draw, dtype=torch.float64)
@@ -73,9 +92,19 @@ def test_march_opcheck_empty_and_gradients(device):
 @pytest.mark.parametrize("device", DEVICES)
 def test_march_errors(device):
     origins, directions, jitter, cells, *rest = march_inputs(device, torch.float32)
-    check_error(lambda: march_rays(origins, directions[:, :2], jitter, cells, *rest), "march_rays", "rays_d", "[40, 3]", "[40, 2]")
-    check_error(lambda: march_rays(origins, directions, jitter[:, None], cells, *rest), "jitter", "[40] float32", "[40, 1]")
-    check_error(lambda: march_rays(origins, directions, jitter, cells[:, :3], *rest), "cells", "[7, 7, 7] uint8", "[7, 3, 7]")
+    check_error(
+        lambda: march_rays(origins, directions[:, :2], jitter, cells, *rest),
+        "march_rays",
+        "rays_d",
+        "[40, 3]",
+        "[40, 2]",
+    )
+    check_error(
+        lambda: march_rays(origins, directions, jitter[:, None], cells, *rest), "jitter", "[40] float32", "[40, 1]"
+    )
+    check_error(
+        lambda: march_rays(origins, directions, jitter, cells[:, :3], *rest), "cells", "[7, 7, 7] uint8", "[7, 3, 7]"
+    )
     check_error(lambda: march_rays(origins, directions, jitter, cells.float(), *rest), "cells", "uint8", "float32")
     check_error(lambda: march_rays(origins, directions, jitter, cells, 1.5, 0.0), "march_rays", "step", "positive")
     check_error(lambda: march_rays(origins, directions, jitter, cells, -1.0, 0.1), "march_rays", "box", "positive")
@@ -243,7 +272,9 @@ def test_spread_draws_all_and_names_the_heaviest():
     weights, samples, phase = packed()
     spread = spread_samples(weights, samples, 0, phase)
     n = len(weights)
-    assert torch.equal(spread.shaded, torch.arange(n)) and torch.equal(spread.interpolate(weights[:, None])[:, 0], weights)
+    assert torch.equal(spread.shaded, torch.arange(n)) and torch.equal(
+        spread.interpolate(weights[:, None])[:, 0], weights
+    )
     for per_ray in (0, 2):
         spread = spread_samples(weights, samples, per_ray, phase)
         rays = samples.ray_indices[spread.shaded]
@@ -289,7 +320,9 @@ def test_interpolation_is_exact_for_what_is_linear_along_a_ray():
     got = spread.interpolate(values[spread.shaded])
     rays = samples.ray_indices
     lowest, highest = (
-        torch.zeros(50, dtype=torch.float64).scatter_reduce(0, rays[spread.shaded], middle[spread.shaded], kind, include_self=False)[rays]
+        torch.zeros(50, dtype=torch.float64).scatter_reduce(
+            0, rays[spread.shaded], middle[spread.shaded], kind, include_self=False
+        )[rays]
         for kind in ("amin", "amax")
     )
     expected = slope * middle.clamp(lowest, highest)[:, None] + 1  # the nearest counts beyond the ends
@@ -341,7 +374,11 @@ def test_composite_opcheck_and_gradients(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_composite_empty_and_errors(device):
-    empty = composite(torch.zeros(0, device=device), torch.zeros(0, 3, device=device), torch.zeros(3, dtype=torch.int64, device=device))
+    empty = composite(
+        torch.zeros(0, device=device),
+        torch.zeros(0, 3, device=device),
+        torch.zeros(3, dtype=torch.int64, device=device),
+    )
     assert empty.tolist() == [[0.0] * 3] * 2
     weights, values, offsets = composite_inputs(device, torch.float32)
     check_error(lambda: composite(weights, values[1:], offsets), "composite", "values", "[24, n] float32", "[23, 4]")

@@ -9,7 +9,16 @@ import torch
 from op_checks import check_op, generator, grad_leaves, lib, unit
 
 from splitnerf.fields.sdf import SdfField
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, HashGridSpec, SdfNetwork, march_rays, sample_rays, sdf_values, surface_weights
+from splitnerf.ops import (
+    CELL_EMPTY,
+    CELL_OCCUPIED,
+    HashGridSpec,
+    SdfNetwork,
+    march_rays,
+    sample_rays,
+    sdf_values,
+    surface_weights,
+)
 
 BOX, STEP = 1.5, 0.02
 SPEC = HashGridSpec(n_levels=3, n_features=2, base_resolution=4, growth=1.7, log2_table_size=9)
@@ -50,7 +59,9 @@ def stretches(field, samples, origins, directions, s: float, anneal: float = 1.0
     slope = (f.diff() / apart).clamp(-1, 1)
     half = -0.5 * STEP * ((0.5 - 0.5 * slope) * (1 - anneal) + torch.relu(-slope) * anneal)
     between = depth_between(f[:-1], torch.minimum(f[1:], (f[:-1] + f[1:] - apart) / 2), s)
-    rendered = torch.maximum(depth_between(f[:-1] - half, f[:-1] + half, s), depth_between(f[1:] - half, f[1:] + half, s))
+    rendered = torch.maximum(
+        depth_between(f[:-1] - half, f[:-1] + half, s), depth_between(f[1:] - half, f[1:] + half, s)
+    )
     tau, passed = torch.maximum(between, rendered), depth_between(f[:-1], f[1:], s)
     depth, weights = 0.0, torch.zeros(len(x), dtype=torch.float64)
     for i in range(len(x) - 1):
@@ -120,7 +131,9 @@ def test_a_thin_sheet_is_never_jumped_over(thickness, s):
 def test_a_ray_ends_where_nothing_gets_through():
     field, (o, d, jitter) = bumpy_field(), rays()
     whole, all_points = sample_rays(o, d, jitter, cells(), field.network(), **settings(min_weight=0.0))
-    ended, points = sample_rays(o, d, jitter, cells(), field.network(), **settings(min_weight=0.0, min_transmittance=1e-3))
+    ended, points = sample_rays(
+        o, d, jitter, cells(), field.network(), **settings(min_weight=0.0, min_transmittance=1e-3)
+    )
     assert points.sum() < 0.8 * all_points.sum()
     assert len(ended.t_starts) < len(whole.t_starts)
     lost = whole_opacity(field, whole, o, d) - whole_opacity(field, ended, o, d)

@@ -40,7 +40,9 @@ def arrays(inputs) -> list:
 @pytest.mark.parametrize("mean", [True, False])
 def test_query_matches_the_reference(device, mean):
     inputs = query_inputs(device, torch.float64, mean, 200)
-    np.testing.assert_allclose(lib.query_direction(*inputs).cpu(), reference.query_direction(*arrays(inputs)), atol=1e-12)
+    np.testing.assert_allclose(
+        lib.query_direction(*inputs).cpu(), reference.query_direction(*arrays(inputs)), atol=1e-12
+    )
     single = lib.query_direction(*query_inputs(device, torch.float32, mean, 200))
     torch.testing.assert_close(single.double(), lib.query_direction(*inputs), rtol=0, atol=2e-5)
 
@@ -138,16 +140,49 @@ def test_table_made_in_inference_mode_serves_training():
 @pytest.mark.parametrize("device", DEVICES)
 def test_errors_name_what_is_wrong(device):
     normals, views, roughness, *_ = query_inputs(device, torch.float32)
-    check_error(lambda: query_direction(normals, views, roughness[:, 0]), "query_direction", "roughness", "[7, 1] float32", "[7]")
-    check_error(lambda: query_direction(normals, views.double(), roughness), "query_direction", "view_dirs", "float32", "float64")
+    check_error(
+        lambda: query_direction(normals, views, roughness[:, 0]),
+        "query_direction",
+        "roughness",
+        "[7, 1] float32",
+        "[7]",
+    )
+    check_error(
+        lambda: query_direction(normals, views.double(), roughness),
+        "query_direction",
+        "view_dirs",
+        "float32",
+        "float64",
+    )
     check_error(lambda: query_direction(normals, views[:3], roughness), "view_dirs", "[7, 3]", "[3, 3]")
-    check_error(lambda: query_direction(normals, views, roughness, "median"), "query_direction", "query", "mean", "median")
-    check_error(lambda: lib.query_direction(normals, views, roughness, brdf_lut(device)[1:], True), "lut", "[32, 32, 3]", "[31, 32, 3]")
+    check_error(
+        lambda: query_direction(normals, views, roughness, "median"), "query_direction", "query", "mean", "median"
+    )
+    check_error(
+        lambda: lib.query_direction(normals, views, roughness, brdf_lut(device)[1:], True),
+        "lut",
+        "[32, 32, 3]",
+        "[31, 32, 3]",
+    )
     inputs = sample_inputs(device, torch.float32)
-    names = ("normals", "view_dirs", "albedo", "roughness", "metallic", "specular", "diffuse", "occlusion_s", "occlusion_d")
+    names = (
+        "normals",
+        "view_dirs",
+        "albedo",
+        "roughness",
+        "metallic",
+        "specular",
+        "diffuse",
+        "occlusion_s",
+        "occlusion_d",
+    )
     for i, name in enumerate(names):
         bad = [*inputs]
         bad[i] = inputs[i].repeat(1, 2)
-        check_error(lambda bad=bad: lib.split_sum_shade(*bad), "split_sum_shade", name, "float32", f"[7, {bad[i].shape[1]}]")
-    check_error(lambda: split_sum_shade(*inputs[:9], fresnel_mode="fast"), "split_sum_shade", "fresnel_mode", "exact", "fast")
+        check_error(
+            lambda bad=bad: lib.split_sum_shade(*bad), "split_sum_shade", name, "float32", f"[7, {bad[i].shape[1]}]"
+        )
+    check_error(
+        lambda: split_sum_shade(*inputs[:9], fresnel_mode="fast"), "split_sum_shade", "fresnel_mode", "exact", "fast"
+    )
     check_error(lambda: lib.split_sum_shade(*inputs[:10], 3, False), "split_sum_shade", "fresnel_mode", "3")

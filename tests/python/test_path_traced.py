@@ -71,7 +71,9 @@ def test_wide_filter_blurs_the_outline_and_keeps_the_area():
     for name in ("box", "blackman-harris"):
         renderer = AssetRenderer(square(Material()))
         lens = (4 * SIZE / 2 + 1.3, 4 * SIZE / 2, SIZE / 2, SIZE / 2)
-        maps[name] = renderer.render(np.ones((4, 8, 3), np.float32), camera, lens, SIZE, SIZE, spp=1024, pixel_filter=name)
+        maps[name] = renderer.render(
+            np.ones((4, 8, 3), np.float32), camera, lens, SIZE, SIZE, spp=1024, pixel_filter=name
+        )
     partial = {name: ((m["alpha"] > 0.001) & (m["alpha"] < 0.999)).sum() for name, m in maps.items()}
     assert partial["blackman-harris"] > partial["box"]
     assert maps["blackman-harris"]["alpha"].sum() == pytest.approx(maps["box"]["alpha"].sum(), rel=2e-3)

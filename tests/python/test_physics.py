@@ -27,7 +27,11 @@ def test_occlusion_loss_is_the_weighted_square_of_what_is_off(monkeypatch):
     asked = {}
     monkeypatch.setattr(losses, "occlusion_factors", lambda *args, **kwargs: asked.update(args=args, **kwargs) or truth)
     ray = rays([0.75, 0.25], [0.0, 0.0])
-    ray.positions, ray.sdf, ray.normals = torch.ones(2, 3), torch.tensor([0.1, 0.0]), F.one_hot(torch.tensor([2, 2]), 3).float()
+    ray.positions, ray.sdf, ray.normals = (
+        torch.ones(2, 3),
+        torch.tensor([0.1, 0.0]),
+        F.one_hot(torch.tensor([2, 2]), 3).float(),
+    )
     ray.points.lobe_dirs, ray.points.roughness = F.one_hot(torch.tensor([0, 1]), 3).float(), torch.ones(2, 1)
     ray.points.occlusion_d, ray.points.occlusion_s = torch.tensor([[0.6], [0.3]]), torch.tensor([[0.5], [1.0]])
     loss = losses.occlusion_loss(ray, None, None, config, torch.Generator().manual_seed(0), 0)
@@ -63,7 +67,9 @@ def test_neutral_light_loss_measures_chroma_alone():
     """Grey light of any brightness costs nothing; a tint e^(t z), e^0, e^(-t z) costs the mean of 2 (t z)^2 / 3."""
     generator = torch.Generator().manual_seed(0)
     config = Config().replace({"neutral_queries": 20000})
-    assert losses.neutral_light_loss(Sky([3.0, 3.0, 3.0], 0.0), config, generator).item() == pytest.approx(0.0, abs=1e-9)
+    assert losses.neutral_light_loss(Sky([3.0, 3.0, 3.0], 0.0), config, generator).item() == pytest.approx(
+        0.0, abs=1e-9
+    )
     tinted = losses.neutral_light_loss(Sky([1.0, 1.0, 1.0], 0.6), config, generator).item()
     assert tinted == pytest.approx(2.0 / 3.0 * 0.36 / 3.0, rel=0.03)
 

@@ -69,7 +69,9 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
     views = unit(n + 0.9 * unit(torch.randn(200, 3, generator=g)))
     rough, metal, albedo = torch.full((200, 1), 0.6), torch.zeros(200, 1), torch.full((200, 3), 0.05)
     exact = brute_force(model.light, n, views, albedo, rough, metal).detach()
-    light = prefiltered(model.light, torch.cat([query_direction(n, views, rough), n]), torch.cat([rough, torch.ones_like(rough)]))
+    light = prefiltered(
+        model.light, torch.cat([query_direction(n, views, rough), n]), torch.cat([rough, torch.ones_like(rough)])
+    )
     one = torch.ones(200, 3)
     split = split_sum_shade(n, views, albedo, rough, metal, light[:200], light[200:], one, one, "exact", True)
     points = ShadedPoints(split, albedo, rough, metal, one, one, n, n)

@@ -306,10 +306,29 @@ def test_runs_from_before_a_setting_keep_what_they_were_trained_with():
     stored = dataclasses.asdict(Config())
     assert config_of({"config": stored}) == Config()
     later = ("sample_above", "shades_per_ray", "light_step_every", "open_below")
-    for name in ("light", "neutral_weight", "shading", "entropy_weight", "dark_metal_weight", "normal_smoothness", "binary_metal_weight", *later):
+    for name in (
+        "light",
+        "neutral_weight",
+        "shading",
+        "entropy_weight",
+        "dark_metal_weight",
+        "normal_smoothness",
+        "binary_metal_weight",
+        *later,
+    ):
         del stored[name]
-    stored |= {"occlusion": "mlp", "albedo_smoothness": 0.0, "gloss_smoothness": 0.0, "entropy_from": 0.5, "shade_above": 1e-3}
+    stored |= {
+        "occlusion": "mlp",
+        "albedo_smoothness": 0.0,
+        "gloss_smoothness": 0.0,
+        "entropy_from": 0.5,
+        "shade_above": 1e-3,
+    }
     config = config_of({"config": stored})
     assert (config.light, config.occlusion, config.shading) == ("mlp", "mlp", "split")
-    assert (config.sample_above, config.shades_per_ray, config.light_step_every) == (0.0, 0, 1) and config.open_below == 0.0
+    assert (config.sample_above, config.shades_per_ray, config.light_step_every) == (
+        0.0,
+        0,
+        1,
+    ) and config.open_below == 0.0
     assert config.neutral_weight == config.entropy_weight == config.dark_metal_weight == config.normal_smoothness == 0.0

@@ -47,7 +47,9 @@ def corners(mesh: trimesh.Trimesh) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def cache_of(mesh: trimesh.Trimesh, n: int = 256, offset: float = OFFSET, with_hits: bool = False) -> VisibilityCache:
-    return VisibilityCache.trace(scene_of(mesh), *corners(mesh), mesh.area, lattice(n), offset=offset, with_hits=with_hits)
+    return VisibilityCache.trace(
+        scene_of(mesh), *corners(mesh), mesh.area, lattice(n), offset=offset, with_hits=with_hits
+    )
 
 
 def grid_mesh(size: float, cells: int, z: float = 0.0) -> trimesh.Trimesh:
@@ -83,7 +85,9 @@ def test_bits_and_hits_are_those_of_single_rays():
     scene, (x, n), w = scene_of(mesh), corners(mesh), lattice(96)
     bits, hits = visibility_bits(scene, x, n, w, OFFSET, with_hits=True)
     assert bits.shape == (len(x), 2, 3) and hits.shape == (len(x), 96)
-    open_, blocked = ((bits[..., None] >> torch.arange(32, dtype=torch.int32)) & 1).bool().reshape(len(x), 2, 96).unbind(1)
+    open_, blocked = (
+        ((bits[..., None] >> torch.arange(32, dtype=torch.int32)) & 1).bool().reshape(len(x), 2, 96).unbind(1)
+    )
     origins = (x + OFFSET * n)[:, None].expand(-1, 96, 3)
     expected = trace_visibility(scene, origins.reshape(-1, 3), w.repeat(len(x), 1)).view(len(x), 96)
     above = n @ w.T > 0
@@ -226,7 +230,14 @@ def test_spheres_on_a_plane_against_4096_rays():
             lobes = query_direction(n, view, roughness)
             got = bits(OcclusionQuery(torch.empty(0), x, n, lobes, roughness))
             o_d, o_s = occlusion_factors(
-                scene_of(mesh), x, n, lobes, roughness, sky(panorama_directions(64)), n_diffuse_rays=4096, n_specular_rays=1024
+                scene_of(mesh),
+                x,
+                n,
+                lobes,
+                roughness,
+                sky(panorama_directions(64)),
+                n_diffuse_rays=4096,
+                n_specular_rays=1024,
             )
             assert (o_d < 0.95).float().mean() > 0.3
             assert (got.diffuse - o_d).square().mean().sqrt() < 0.015
@@ -301,7 +312,14 @@ def test_a_mirror_sees_what_blocks_its_lobe():
 
 def test_the_model_shades_with_the_light_of_its_mesh():
     """In a bowl: o g + i takes the place of the light, each refresh adds a bounce, and the sums converge."""
-    settings = {"n_levels": 2, "log2_table_size": 8, "occlusion": "bits", "indirect": True, "occlusion_directions": 64, "shading": "split"}
+    settings = {
+        "n_levels": 2,
+        "log2_table_size": 8,
+        "occlusion": "bits",
+        "indirect": True,
+        "occlusion_directions": 64,
+        "shading": "split",
+    }
     torch.manual_seed(0)
     model = SceneModel(Config().replace(settings | {"initial_roughness": 0.9}))
     mesh = half_shell(3)
@@ -348,7 +366,10 @@ def test_visibility_of_a_vertex_is_its_bits():
     expected = torch.where(blocked[:, None], sent[cache.hits[centre].clamp(min=0).long()], torch.zeros(3))
     torch.testing.assert_close(arriving[0], expected)
     assert (visible[0][~above] == 1).all()
-    assert torch.equal(cached_visibility(cache, 0 * UP, UP)[0], visible) and cached_visibility(cache, 0 * UP, UP)[1] is None
+    assert (
+        torch.equal(cached_visibility(cache, 0 * UP, UP)[0], visible)
+        and cached_visibility(cache, 0 * UP, UP)[1] is None
+    )
     assert cached_visibility(cache, UP * math.nan, UP, sent)[0].isnan().all()
 
 
@@ -363,7 +384,9 @@ def unpacked(words: torch.Tensor) -> torch.Tensor:
 
 def test_sums_of_directions_agree_with_the_factors():
     """Summing V L cos and (1 - V) C cos over the directions is what cached_occlusion does."""
-    mesh = trimesh.util.concatenate([grid_mesh(2.0, 8), trimesh.creation.icosphere(2, 0.4).apply_translation((0, 0, 0.7))])
+    mesh = trimesh.util.concatenate(
+        [grid_mesh(2.0, 8), trimesh.creation.icosphere(2, 0.4).apply_translation((0, 0, 0.7))]
+    )
     cache = cache_of(mesh, 256, with_hits=True)
     x, n = between(mesh, 50)
     light, sent = torch.rand(256, 3, generator=generator(3)), torch.rand(len(cache.vertices), 3, generator=generator(4))
@@ -371,14 +394,18 @@ def test_sums_of_directions_agree_with_the_factors():
     o_d, _, i_d, _ = read(cache, x, n, light=light, radiance=sent)
     cosine = (n @ cache.directions.T).clamp(min=0)
     torch.testing.assert_close((visible * cosine) @ light / (cosine @ light), o_d, rtol=1e-4, atol=1e-5)
-    torch.testing.assert_close((arriving * cosine[..., None]).sum(1) / cosine.sum(1, keepdim=True), i_d, rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(
+        (arriving * cosine[..., None]).sum(1) / cosine.sum(1, keepdim=True), i_d, rtol=1e-4, atol=1e-5
+    )
 
 
 # ---- the operators ----
 
 
 def op_inputs(dtype, n: int = 9, with_hits: bool = True) -> tuple:
-    mesh = trimesh.util.concatenate([grid_mesh(2.0, 5), trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))])
+    mesh = trimesh.util.concatenate(
+        [grid_mesh(2.0, 5), trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))]
+    )
     cache = cache_of(mesh, 64, with_hits=with_hits)
     x, normals = (t[:n].to(dtype) for t in between(mesh, 9))
     lobes = unit(normals + 0.3 * unit(torch.randn(9, 3, generator=generator(1)))[:n].to(dtype))
@@ -419,7 +446,14 @@ def test_errors():
     check_error(lambda: visibility_bits(scene, x, n, w[:40]), "visibility_bits", "multiple of 32")
     check_error(lambda: lib.vertex_grids(x, 0.0, 2), "vertex_grids", "radius")
     good = op_inputs(torch.float32)
-    for index, part in ((3, "roughness"), (5, "vertex_normals"), (9, "bits"), (10, "hits"), (11, "radiance"), (13, "light")):
+    for index, part in (
+        (3, "roughness"),
+        (5, "vertex_normals"),
+        (9, "bits"),
+        (10, "hits"),
+        (11, "radiance"),
+        (13, "light"),
+    ):
         bad = (*good[:index], good[index][1:], *good[index + 1 :])
         check_error(lambda: lib.cached_occlusion(*bad), "cached_occlusion", part)
     short = visibility_inputs(torch.float32)

@@ -10,15 +10,12 @@ namespace splitnerf {
 
 // The map coordinates (u, v) in [0, 1] of a direction (of any length but zero). The angle to +z
 // comes from atan2(|xy|, z), which is acos(z) without its loss of digits at the poles.
-template <class T>
-SPLITNERF_HD Vec2<T> direction_to_equirect(Vec3<T> d) {
-  return {T(0.5) - std::atan2(d.y, d.x) * T(0.5 / kPi),
-          std::atan2(std::sqrt(d.x * d.x + d.y * d.y), d.z) * T(1 / kPi)};
+template <class T> SPLITNERF_HD Vec2<T> direction_to_equirect(Vec3<T> d) {
+  return {T(0.5) - std::atan2(d.y, d.x) * T(0.5 / kPi), std::atan2(std::sqrt(d.x * d.x + d.y * d.y), d.z) * T(1 / kPi)};
 }
 
 // The unit direction of map coordinates; the inverse of direction_to_equirect.
-template <class T>
-SPLITNERF_HD Vec3<T> equirect_to_direction(Vec2<T> uv) {
+template <class T> SPLITNERF_HD Vec3<T> equirect_to_direction(Vec2<T> uv) {
   const T phi = T(2 * kPi) * (T(0.5) - uv.x), theta = T(kPi) * uv.y;
   const T s = std::sin(theta);
   return {s * std::cos(phi), s * std::sin(phi), std::cos(theta)};
@@ -26,21 +23,18 @@ SPLITNERF_HD Vec3<T> equirect_to_direction(Vec2<T> uv) {
 
 // Solid angle of one texel of a row: (2 pi / width)(cos theta_top - cos theta_bottom), where the
 // difference of cosines is 2 sin(theta_centre) sin(half a row). The map's sum is 4 pi exactly.
-template <class T>
-SPLITNERF_HD T texel_solid_angle(int row, int height, int width) {
+template <class T> SPLITNERF_HD T texel_solid_angle(int row, int height, int width) {
   const T half = T(0.5 * kPi) / T(height);
   return T(4 * kPi) / T(width) * std::sin(half * T(2 * row + 1)) * std::sin(half);
 }
 
 // The four texels around a point of the map and their bilinear weights.
-template <class T>
-struct EquirectFootprint {
+template <class T> struct EquirectFootprint {
   int64_t texel[4];  // row * width + column
   T weight[4];
 };
 
-template <class T>
-SPLITNERF_HD EquirectFootprint<T> equirect_footprint(Vec2<T> uv, int height, int width) {
+template <class T> SPLITNERF_HD EquirectFootprint<T> equirect_footprint(Vec2<T> uv, int height, int width) {
   const T x = uv.x * T(width) - T(0.5), y = clamp(uv.y * T(height) - T(0.5), T(0), T(height - 1));
   const T x_floor = std::floor(x);
   const T fx = x - x_floor;
@@ -54,8 +48,7 @@ SPLITNERF_HD EquirectFootprint<T> equirect_footprint(Vec2<T> uv, int height, int
 }
 
 // Bilinear radiance of the map in a direction.
-template <class T>
-SPLITNERF_HD Vec3<T> lookup_environment(const T* map, int height, int width, Vec3<T> direction) {
+template <class T> SPLITNERF_HD Vec3<T> lookup_environment(const T* map, int height, int width, Vec3<T> direction) {
   const EquirectFootprint<T> f = equirect_footprint(direction_to_equirect(direction), height, width);
   Vec3<T> radiance{T(0), T(0), T(0)};
   for (int k = 0; k < 4; ++k) radiance += load3(map + f.texel[k] * 3) * f.weight[k];

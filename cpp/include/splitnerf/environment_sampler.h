@@ -11,13 +11,8 @@ namespace splitnerf {
 class EnvironmentSampler {
  public:
   EnvironmentSampler(const float* map, int height, int width)
-      : map_(map),
-        height_(height),
-        width_(width),
-        row_cdf_(height + 1, 0.),
-        row_density_(height),
-        row_cosine_(height + 1),
-        cdf_(size_t(height) * (width + 1), 0.f) {
+      : map_(map), height_(height), width_(width), row_cdf_(height + 1, 0.), row_density_(height),
+        row_cosine_(height + 1), cdf_(size_t(height) * (width + 1), 0.f) {
     // The mean of the bilinear map over texel i is (L[i-1] + 6 L[i] + L[i+1]) / 8 on either axis,
     // so the density follows what a lookup returns, and is positive wherever that is.
     std::vector<double> weights(width);
@@ -56,9 +51,7 @@ class EnvironmentSampler {
   }
 
   bool black() const { return !(total_ > 0); }
-  Vec3<float> radiance(Vec3<float> direction) const {
-    return lookup_environment(map_, height_, width_, direction);
-  }
+  Vec3<float> radiance(Vec3<float> direction) const { return lookup_environment(map_, height_, width_, direction); }
 
   // Density per steradian of sample() at a direction.
   float pdf(Vec3<float> direction) const {
@@ -91,8 +84,7 @@ class EnvironmentSampler {
   }
 
   // guide[k] is the interval that holds k / n: a search starts there and rarely moves on.
-  template <class T>
-  static std::vector<int> make_guide(const T* cdf, int n) {
+  template <class T> static std::vector<int> make_guide(const T* cdf, int n) {
     std::vector<int> guide(n);
     for (int k = 0, i = 0; k < n; ++k) {
       while (i + 1 < n && cdf[i + 1] <= T(k) / n) ++i;
@@ -102,8 +94,7 @@ class EnvironmentSampler {
   }
 
   // The interval [cdf[i], cdf[i + 1]) that holds u; empty intervals are never chosen.
-  template <class T>
-  static int find(const T* cdf, const int* guide, int n, T u) {
+  template <class T> static int find(const T* cdf, const int* guide, int n, T u) {
     int i = guide[std::min(static_cast<int>(u * n), n - 1)];
     while (i > 0 && cdf[i] > u) --i;  // u n may round up
     while (i + 1 < n && cdf[i + 1] <= u) ++i;

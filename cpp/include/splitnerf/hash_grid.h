@@ -12,17 +12,17 @@ inline constexpr int kMaxLevels = 32;
 
 struct HashGridShape {
   int n_levels;
-  int n_features;        // per level: 1, 2, 4 or 8
-  int base_resolution;   // cells along an edge of the coarsest level
-  double growth;         // factor between the resolutions of neighbouring levels
-  int log2_table_size;   // entries of a level at most: 2^log2_table_size
+  int n_features;       // per level: 1, 2, 4 or 8
+  int base_resolution;  // cells along an edge of the coarsest level
+  double growth;        // factor between the resolutions of neighbouring levels
+  int log2_table_size;  // entries of a level at most: 2^log2_table_size
 };
 
 struct HashLevel {
-  int64_t offset;      // first entry of the level in the table
+  int64_t offset;  // first entry of the level in the table
   int64_t n_entries;
-  int resolution;      // cells along an edge; resolution + 1 nodes
-  bool dense;          // every node has an entry of its own
+  int resolution;  // cells along an edge; resolution + 1 nodes
+  bool dense;      // every node has an entry of its own
 };
 
 // What is wrong with a shape, in words; empty for one that can be built.
@@ -36,7 +36,8 @@ inline std::string hash_shape_error(int64_t n_levels, int64_t n_features, int64_
   if (!(growth >= 1.0)) return wrong("growth must be at least 1", growth);
   if (log2_table_size < 1 || log2_table_size > 30) return wrong("log2_table_size must be in [1, 30]", log2_table_size);
   const double finest = static_cast<double>(base_resolution) * std::pow(growth, static_cast<double>(n_levels - 1));
-  if (!(finest < double(1 << 30))) return wrong("the finest level must have less than 2^30 cells along an edge", finest);
+  if (!(finest < double(1 << 30)))
+    return wrong("the finest level must have less than 2^30 cells along an edge", finest);
   return "";
 }
 
@@ -78,7 +79,8 @@ template <class T> SPLITNERF_HD CellAxis<T> cell_axis(int resolution, T coordina
 }
 
 // The entry of a node, counted within its level. A dense level has at most 2^30 of them.
-template <bool Dense> SPLITNERF_HD uint32_t node_entry(uint32_t x, uint32_t y, uint32_t z, uint32_t resolution, uint32_t n_entries) {
+template <bool Dense>
+SPLITNERF_HD uint32_t node_entry(uint32_t x, uint32_t y, uint32_t z, uint32_t resolution, uint32_t n_entries) {
   if constexpr (Dense) {
     return (x * (resolution + 1) + y) * (resolution + 1) + z;
   } else {
@@ -115,8 +117,7 @@ template <class T> struct Trilinear {
   T value, dx, dy, dz;
 };
 template <class T> SPLITNERF_HD T blend(T a, T b, T t) { return a * (T(1) - t) + b * t; }
-template <class T>
-SPLITNERF_HD Trilinear<T> trilinear(T c0, T c1, T c2, T c3, T c4, T c5, T c6, T c7, T x, T y, T z) {
+template <class T> SPLITNERF_HD Trilinear<T> trilinear(T c0, T c1, T c2, T c3, T c4, T c5, T c6, T c7, T x, T y, T z) {
   const T a0 = blend(c0, c4, z), a1 = blend(c1, c5, z), a2 = blend(c2, c6, z), a3 = blend(c3, c7, z);
   const T b0 = blend(a0, a2, y), b1 = blend(a1, a3, y);
   const T z0 = blend(c4 - c0, c6 - c2, y), z1 = blend(c5 - c1, c7 - c3, y);
@@ -126,7 +127,8 @@ SPLITNERF_HD Trilinear<T> trilinear(T c0, T c1, T c2, T c3, T c4, T c5, T c6, T 
 // Gradient to corner (I & 1, I >> 1 & 1, I >> 2).
 template <int I, class T> SPLITNERF_HD T trilinear_backward(const Trilinear<T>& grad, T x, T y, T z) {
   const T wx = I & 1 ? x : T(1) - x, wy = I & 2 ? y : T(1) - y, wz = I & 4 ? z : T(1) - z;
-  const T along_x = I & 1 ? grad.dx : -grad.dx, along_y = I & 2 ? grad.dy : -grad.dy, along_z = I & 4 ? grad.dz : -grad.dz;
+  const T along_x = I & 1 ? grad.dx : -grad.dx, along_y = I & 2 ? grad.dy : -grad.dy,
+          along_z = I & 4 ? grad.dz : -grad.dz;
   return wz * (wy * (wx * grad.value + along_x) + wx * along_y) + wy * (wx * along_z);
 }
 
@@ -134,7 +136,7 @@ template <int I, class T> SPLITNERF_HD T trilinear_backward(const Trilinear<T>& 
 // (The pure second derivatives vanish.)
 template <class T> struct CornerWeight {
   T value;
-  Vec3<T> d;         // d/dx, d/dy, d/dz
+  Vec3<T> d;  // d/dx, d/dy, d/dz
   T dxy, dxz, dyz;
 };
 

@@ -13,12 +13,12 @@ namespace splitnerf {
 
 template <class T> struct HashEncodeArgs {
   const HashLevel* levels;
-  int n_features;       // of one level
-  int n_levels;         // all levels: columns of the output = n_levels * n_features
-  int n_active;         // levels [0, n_active) are open
+  int n_features;  // of one level
+  int n_levels;    // all levels: columns of the output = n_levels * n_features
+  int n_active;    // levels [0, n_active) are open
   int64_t n_points;
-  const T* positions;   // [n, 3] in the unit cube
-  const T* table;       // [n_entries, n_features]
+  const T* positions;  // [n, 3] in the unit cube
+  const T* table;      // [n_entries, n_features]
 };
 
 // The distance field: hash-grid features and a layer over them.
@@ -29,9 +29,9 @@ template <class T> struct SdfNetwork {
 
 // Weights of all (query, source) pairs of the pre-integration lobe, structure of arrays.
 template <class T> struct LobeSide {
-  const T *x, *y, *z;     // unit directions
-  const T* alpha_squared; // ggx_alpha^2 on the query side, null on the light side
-  const T *r, *g, *b;     // what is summed over this side
+  const T *x, *y, *z;      // unit directions
+  const T* alpha_squared;  // ggx_alpha^2 on the query side, null on the light side
+  const T *r, *g, *b;      // what is summed over this side
   int64_t n;
 };
 

@@ -10,9 +10,9 @@ namespace splitnerf {
 inline constexpr int kMaxLightLevels = 16;
 
 template <class T> struct LightPyramid {
-  const T* levels;                  // [sum of resolution^2, 3], one map after the other
-  const T* sh;                      // [kShCoefficients, 3]
-  const T* zonal;                   // [n_zonal, kShBands]: the lobe's zonal factors, roughness node[n_levels] ... 1
+  const T* levels;  // [sum of resolution^2, 3], one map after the other
+  const T* sh;      // [kShCoefficients, 3]
+  const T* zonal;   // [n_zonal, kShBands]: the lobe's zonal factors, roughness node[n_levels] ... 1
   int n_levels, n_zonal;
   int resolution[kMaxLightLevels];
   int64_t offset[kMaxLightLevels];  // in texels

@@ -22,7 +22,9 @@ struct OccupancyView {
   SPLITNERF_HD bool empty_block(const int* cell) const {
     return !blocks[at(cell[0] / kBlockCells, cell[1] / kBlockCells, cell[2] / kBlockCells, n_blocks)];
   }
-  SPLITNERF_HD Cell cell(const int* cell) const { return static_cast<Cell>(cells[at(cell[0], cell[1], cell[2], resolution)]); }
+  SPLITNERF_HD Cell cell(const int* cell) const {
+    return static_cast<Cell>(cells[at(cell[0], cell[1], cell[2], resolution)]);
+  }
 };
 
 // Finds the blocks of a grid, which it does not own.
@@ -30,7 +32,8 @@ class OccupancyCells {
  public:
   OccupancyCells(const uint8_t* cells, int resolution) : n_blocks_((resolution + kBlockCells - 1) / kBlockCells) {
     const int padded = n_blocks_ * kBlockCells;
-    std::vector<uint8_t> columns(size_t(n_blocks_) * n_blocks_ * padded);  // of the cells along z in each block of x and y
+    // Of the cells along z in each block of x and y.
+    std::vector<uint8_t> columns(size_t(n_blocks_) * n_blocks_ * padded);
     for (int x = 0; x < resolution; ++x) {
       for (int y = 0; y < resolution; ++y) {
         const uint8_t* row = cells + OccupancyView::at(x, y, 0, resolution);
@@ -54,8 +57,8 @@ class OccupancyCells {
 };
 
 struct MarchOptions {
-  float box;          // half size of the cube [-box, box]^3 that the grid covers
-  float step;         // length of one sample, scene units
+  float box;            // half size of the cube [-box, box]^3 that the grid covers
+  float step;           // length of one sample, scene units
   int64_t max_samples;  // of one ray
 };
 
@@ -78,8 +81,8 @@ template <class T> struct RayLattice {
   int64_t n_steps;  // 0: the ray misses the box
 
   SPLITNERF_HD RayLattice(Vec3<T> o, Vec3<T> d, T jitter, const MarchOptions& options)
-      : origin(o), direction(d), inverse_direction{T(1) / d.x, T(1) / d.y, T(1) / d.z}, t_near(T(0)), t_far(T(INFINITY)), lattice(T(0)),
-        step(T(options.step)), inverse_step(T(1) / step), n_steps(0) {
+      : origin(o), direction(d), inverse_direction{T(1) / d.x, T(1) / d.y, T(1) / d.z}, t_near(T(0)),
+        t_far(T(INFINITY)), lattice(T(0)), step(T(options.step)), inverse_step(T(1) / step), n_steps(0) {
     if (!(dot(o, o) + dot(d, d) < T(INFINITY))) return;  // a ray that is not finite meets nothing
     for (int axis = 0; axis < 3; ++axis) clip_slab(o[axis], d[axis], T(options.box), t_near, t_far);
     if (!(t_near < t_far) || !(t_far < T(INFINITY))) return;
@@ -93,8 +96,10 @@ template <class T> struct RayLattice {
 // The first sample from k on whose midpoint stands in an occupied cell; -1 where the ray ends before. Empty blocks and
 // cells are crossed in one go: k advances to the first midpoint behind the exit.
 template <class T>
-SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView& grid, const MarchOptions& options, int64_t k) {
-  const T box = T(options.box), cell_size = T(2) * box / T(grid.resolution), cells_per_unit = T(0.5) * T(grid.resolution) / box;
+SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView& grid, const MarchOptions& options,
+                                   int64_t k) {
+  const T box = T(options.box), cell_size = T(2) * box / T(grid.resolution),
+          cells_per_unit = T(0.5) * T(grid.resolution) / box;
   const Vec3<T>&o = ray.origin, &d = ray.direction;
   while (k < ray.n_steps) {
     const T t_mid = ray.start(k) + T(0.5) * ray.step;
@@ -126,7 +131,8 @@ SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView
 
 // Calls emit(t_start, t_end) for each sample in an occupied cell, front to back; returns their number.
 template <class T, class Emit>
-SPLITNERF_HD int64_t march_ray(Vec3<T> o, Vec3<T> d, T jitter, const OccupancyView& grid, MarchOptions options, Emit emit) {
+SPLITNERF_HD int64_t march_ray(Vec3<T> o, Vec3<T> d, T jitter, const OccupancyView& grid, MarchOptions options,
+                               Emit emit) {
   const RayLattice<T> ray(o, d, jitter, options);
   int64_t n = 0;
   for (int64_t k = next_occupied(ray, grid, options, 0); k >= 0 && n < options.max_samples;

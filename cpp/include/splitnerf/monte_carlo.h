@@ -25,8 +25,7 @@ template <class T> SPLITNERF_HD T bsdf_pdf(Vec3<T> normal, Vec3<T> view, Vec3<T>
 
 // Direction i of n; u in [0, 1)^2 from a lattice over all n, so that each half is stratified too. It
 // may lie below the horizon.
-template <class T>
-SPLITNERF_HD Vec3<T> sample_bsdf(Vec3<T> normal, Vec3<T> view, T ggx_alpha, int i, Vec2<T> u) {
+template <class T> SPLITNERF_HD Vec3<T> sample_bsdf(Vec3<T> normal, Vec3<T> view, T ggx_alpha, int i, Vec2<T> u) {
   const Frame<T> frame(normal);
   if (i % 2 == 0) return frame.to_world(sample_cosine_hemisphere(u.x, u.y));
   const Vec3<T> v = frame.to_local(view);

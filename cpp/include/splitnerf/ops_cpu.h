@@ -111,19 +111,20 @@ template <class T> struct SharedLight {
   const T *visible, *sent;                        // [points, n]; [points, n, 3] what arrives beside it, or null
 };
 template <class T>
-SPLITNERF_API void summed_light(int64_t n, const T* normals, const T* view_dirs, const T* roughness, const SharedLight<T>& light,
-                                T* sums);
+SPLITNERF_API void summed_light(int64_t n, const T* normals, const T* view_dirs, const T* roughness,
+                                const SharedLight<T>& light, T* sums);
 template <class T>
 SPLITNERF_API void summed_light_backward(int64_t n, const T* normals, const T* view_dirs, const T* roughness,
-                                         const SharedLight<T>& light, const T* grad_sums, T* grad_normals, T* grad_roughness,
-                                         T* grad_light);
+                                         const SharedLight<T>& light, const T* grad_sums, T* grad_normals,
+                                         T* grad_roughness, T* grad_light);
 
 // The fields of SummedPoint as arrays, 3 values each but for roughness and metallic.
 template <class T> struct SummedArrays {
   T *normals, *view_dirs, *albedo, *roughness, *metallic, *all, *grazing, *diffuse;
 };
 template <class T>
-SPLITNERF_API void shade_sums(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in, T* radiance);
+SPLITNERF_API void shade_sums(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in,
+                              T* radiance);
 template <class T>
 SPLITNERF_API void shade_sums_backward(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in,
                                        const T* grad_radiance, const SummedArrays<T>& grad);
@@ -132,22 +133,23 @@ SPLITNERF_API void shade_sums_backward(const float* lut, bool compensate, int64_
 
 // The sRGB curve, elementwise.
 template <class T> SPLITNERF_API void linear_to_srgb(int64_t n, const T* linear, T* srgb);
-template <class T> SPLITNERF_API void linear_to_srgb_backward(int64_t n, const T* linear, const T* grad_srgb, T* grad_linear);
+template <class T>
+SPLITNERF_API void linear_to_srgb_backward(int64_t n, const T* linear, const T* grad_srgb, T* grad_linear);
 template <class T> SPLITNERF_API void srgb_to_linear(int64_t n, const T* srgb, T* linear);
 
 // mean, background [n, 3], opacity [n], target [n, 4] -> losses [2]: colour and mask, means over the values and the rays.
 template <class T>
-SPLITNERF_API void pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, const T* background, bool linear,
-                                T* losses, T* colour_by_mean, T* colour_by_opacity, T* mask_by_opacity);
+SPLITNERF_API void pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, const T* background,
+                                bool linear, T* losses, T* colour_by_mean, T* colour_by_opacity, T* mask_by_opacity);
 // gradients [n, 3], the last m of which stand beside those at beside [m], weights of the first ones -> losses [2]: eikonal,
 // smoothness; their gradients [n, 3] each.
 template <class T>
-SPLITNERF_API void gradient_losses(int64_t n, int64_t m, const T* gradients, const T* weights, const int64_t* beside, T* losses,
-                                   T* eikonal_by, T* smoothness_by);
+SPLITNERF_API void gradient_losses(int64_t n, int64_t m, const T* gradients, const T* weights, const int64_t* beside,
+                                   T* losses, T* eikonal_by, T* smoothness_by);
 // albedo [n, 3], metallic, shares [n] -> losses [3]: metal, binary, dark, means by the shares; by_metallic [3, n].
 template <class T>
-SPLITNERF_API void material_losses(int64_t n, const T* albedo, const T* metallic, const T* shares, bool smooth_l1, T* losses,
-                                   T* by_metallic);
+SPLITNERF_API void material_losses(int64_t n, const T* albedo, const T* metallic, const T* shares, bool smooth_l1,
+                                   T* losses, T* by_metallic);
 
 // x [n, n_channels], n > 0 -> its quadratic entropy and the gradient [n, n_channels] of that.
 template <class T>
@@ -157,12 +159,12 @@ SPLITNERF_API void quadratic_entropy(int64_t n, int64_t n_channels, const T* x, 
 
 // jitter [n_rays] in [0, 1). offsets [n_rays + 1] is filled with the exclusive sum of the counts.
 template <class T>
-SPLITNERF_API void march_rays_count(const MarchOptions& options, const OccupancyView& grid, int64_t n_rays, const T* rays_o,
-                                    const T* rays_d, const T* jitter, int64_t* offsets);
+SPLITNERF_API void march_rays_count(const MarchOptions& options, const OccupancyView& grid, int64_t n_rays,
+                                    const T* rays_o, const T* rays_d, const T* jitter, int64_t* offsets);
 template <class T>
-SPLITNERF_API void march_rays_fill(const MarchOptions& options, const OccupancyView& grid, int64_t n_rays, const T* rays_o,
-                                   const T* rays_d, const T* jitter, const int64_t* offsets, int64_t* ray_indices,
-                                   T* t_starts, T* t_ends);
+SPLITNERF_API void march_rays_fill(const MarchOptions& options, const OccupancyView& grid, int64_t n_rays,
+                                   const T* rays_o, const T* rays_d, const T* jitter, const int64_t* offsets,
+                                   int64_t* ray_indices, T* t_starts, T* t_ends);
 
 // The distance field as it comes.
 template <class T> struct SdfField {
@@ -182,8 +184,9 @@ SPLITNERF_API void sdf_layer(const SdfWeights<T>& weights, int64_t n, const T* p
 // grads of the weights in their own shapes, all overwritten.
 template <class T>
 SPLITNERF_API void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features,
-                                      const T* jacobian, const T* grad_outputs, const T* grad_gradient, T* grad_features,
-                                      T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias, T* grad_out, T* grad_out_bias);
+                                      const T* jacobian, const T* grad_outputs, const T* grad_gradient,
+                                      T* grad_features, T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias,
+                                      T* grad_out, T* grad_out_bias);
 
 // What is kept of a ray: where its samples start, front to back.
 template <class T> struct SampledRay {
@@ -201,8 +204,8 @@ SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& mar
 // sample's length `step`, seen under the annealed cosine.
 template <class T> struct SurfaceSamples {
   int64_t n_rays;
-  const int64_t* offsets;                 // [n_rays + 1]
-  const T *sdf, *gradient, *directions;   // [n], [n, 3], [n_rays, 3] unit
+  const int64_t* offsets;                // [n_rays + 1]
+  const T *sdf, *gradient, *directions;  // [n], [n, 3], [n_rays, 3] unit
   T s, step, anneal, min_transmittance;
 };
 // normals [n, 3], weights [n], opacity [n_rays].
@@ -225,16 +228,17 @@ struct Spread {
 };
 // weights [n], t [n] along the ray, phase [n_rays] -> share [n] of the second neighbour.
 template <class T>
-SPLITNERF_API Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t, const T* phase,
-                                    T gap, int per_ray, T* share);
+SPLITNERF_API Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t,
+                                    const T* phase, T gap, int per_ray, T* share);
 // values [m, c] -> [n, c], between the first and the second neighbour.
 template <class T>
-SPLITNERF_API void interpolate(int64_t n, int64_t n_channels, const int64_t* first, const int64_t* second, const T* share,
-                               const T* values, T* interpolated);
+SPLITNERF_API void interpolate(int64_t n, int64_t n_channels, const int64_t* first, const int64_t* second,
+                               const T* share, const T* values, T* interpolated);
 // grad_interpolated [n, c] -> grad_values [m, c], overwritten.
 template <class T>
-SPLITNERF_API void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_t* first, const int64_t* second,
-                                        const T* share, const T* grad_interpolated, T* grad_values);
+SPLITNERF_API void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_t* first,
+                                        const int64_t* second, const T* share, const T* grad_interpolated,
+                                        T* grad_values);
 
 // f_prev, f_next [n], offsets [n_rays + 1] -> weights [n], opacity [n_rays].
 template <class T>
@@ -243,9 +247,8 @@ SPLITNERF_API void neus_weights(int64_t n_rays, const int64_t* offsets, const T*
 // grad_s_rays [n_rays]: each ray's share of the gradient to s.
 template <class T>
 SPLITNERF_API void neus_weights_backward(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s,
-                                         T min_transmittance, const T* weights, const T* opacity,
-                                         const T* grad_weights, const T* grad_opacity, T* grad_f_prev, T* grad_f_next,
-                                         T* grad_s_rays);
+                                         T min_transmittance, const T* weights, const T* opacity, const T* grad_weights,
+                                         const T* grad_opacity, T* grad_f_prev, T* grad_f_next, T* grad_s_rays);
 
 // weights [n], values [n, c] -> sums [n_rays, c].
 template <class T>
@@ -282,9 +285,9 @@ SPLITNERF_API void build_vertex_grids(int64_t n_vertices, const T* vertices, T r
 
 template <class T> struct VisibilityCache {
   VertexGrids<T> grids;
-  const uint32_t* bits;   // [n_vertices, 2, n_directions / 32], see visibility_bits
-  const int32_t* hits;    // [n_vertices, n_directions], or null: no indirect light
-  const T* radiance;      // [n_vertices, 3] that the vertices send out, with hits
+  const uint32_t* bits;  // [n_vertices, 2, n_directions / 32], see visibility_bits
+  const int32_t* hits;   // [n_vertices, n_directions], or null: no indirect light
+  const T* radiance;     // [n_vertices, 3] that the vertices send out, with hits
   int64_t n_directions;
   const T *directions, *light;  // [n_directions, 3]; the light's mean over each direction's cell
 };

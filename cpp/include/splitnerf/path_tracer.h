@@ -27,10 +27,10 @@ struct Camera {
 
 // One glTF metallic-roughness material: each quantity is its factor times its texture.
 struct SurfaceMaterial {
-  Vec3<float> albedo{1, 1, 1};  // linear, in [0, 1]
-  float roughness = 1;          // perceptual, in [0, 1]
-  float metallic = 1;           // in [0, 1]
-  Vec3<float> emission{0, 0, 0};  // radiance, not negative
+  Vec3<float> albedo{1, 1, 1};         // linear, in [0, 1]
+  float roughness = 1;                 // perceptual, in [0, 1]
+  float metallic = 1;                  // in [0, 1]
+  Vec3<float> emission{0, 0, 0};       // radiance, not negative
   Texture albedo_texture;              // 3 channels, linear
   Texture roughness_metallic_texture;  // 2 channels
   Texture normal_texture;              // 3 channels in [-1, 1], tangent space, y along the bitangent
@@ -81,11 +81,11 @@ struct PathTracerParams {
 // Outputs, all but shadow required. The features are those of the first hit, averaged over the sub-samples
 // that hit the mesh, and 0 where none does.
 struct RenderTargets {
-  float* radiance;   // [height, width, 3] linear, premultiplied by alpha
-  float* alpha;      // [height, width] covered fraction of the pixel; the light itself is transparent
-  float* albedo;     // [height, width, 3]
-  float* roughness;  // [height, width]
-  float* metallic;   // [height, width]
+  float* radiance;       // [height, width, 3] linear, premultiplied by alpha
+  float* alpha;          // [height, width] covered fraction of the pixel; the light itself is transparent
+  float* albedo;         // [height, width, 3]
+  float* roughness;      // [height, width]
+  float* metallic;       // [height, width]
   float* normal;         // [height, width, 3] world space, shading normal turned to the camera
   float* smooth_normal;  // [height, width, 3] the same without normal texture
   float* depth;          // [height, width] distance from the camera's centre along the ray

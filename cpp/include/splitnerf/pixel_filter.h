@@ -44,7 +44,8 @@ class PixelFilterSampler {
   // integrated and divided by a0.   Source: Harris 1978, 92 dB window.
   static double cdf(double t) {
     const double x = 2 * kPi * t;
-    return t + (-0.48829 * std::sin(x) + 0.14128 / 2 * std::sin(2 * x) - 0.01168 / 3 * std::sin(3 * x)) / (2 * kPi * 0.35875);
+    return t + (-0.48829 * std::sin(x) + 0.14128 / 2 * std::sin(2 * x) - 0.01168 / 3 * std::sin(3 * x)) /
+                   (2 * kPi * 0.35875);
   }
   static double invert(double u) {
     double lo = 0, hi = 1;

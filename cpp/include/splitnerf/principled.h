@@ -7,8 +7,7 @@
 
 namespace splitnerf {
 
-template <class T>
-struct BsdfValue {
+template <class T> struct BsdfValue {
   Vec3<T> f_cos;  // f (n.l), sr^-1
   T pdf;          // density of sample() at l, sr^-1
 };
@@ -19,8 +18,7 @@ struct PrincipledTables {
   const float* dielectric = dielectric_lut();
 };
 
-template <class T>
-class PrincipledBsdf {
+template <class T> class PrincipledBsdf {
  public:
   // view: unit, local, view.z > 0, towards the viewer.
   SPLITNERF_HD PrincipledBsdf(const PrincipledTables& tables, Vec3<T> albedo, T roughness, T metallic, Vec3<T> view)

@@ -22,18 +22,20 @@ inline constexpr int kNoDepth = 20;  // where s f is above, an interval that end
 
 // Depth of the density behind a distance f: that of an interval is the depth at its end less that at its start, see
 // neus_optical_depth.
-template <class T> SPLITNERF_HD T depth_at(T f, T s) { return s * f < T(kNoDepth) ? softplus_and_slope(-s * f, T(1)).value : T(0); }
+template <class T> SPLITNERF_HD T depth_at(T f, T s) {
+  return s * f < T(kNoDepth) ? softplus_and_slope(-s * f, T(1)).value : T(0);
+}
 
 // A ray on its way.
 template <class T> struct Walk {
   RayLattice<T> lattice;
   int64_t ray;
-  int64_t next;             // the sample at which the distance is asked for next; -1 where the ray has ended
-  int64_t last = -1;        // the one before, -1 for none
+  int64_t next;       // the sample at which the distance is asked for next; -1 where the ray has ended
+  int64_t last = -1;  // the one before, -1 for none
   int64_t n_evaluated = 0;
-  T f_last = T(0);          // the distance at `last`
-  T depth_last = T(0);      // depth_at there
-  T transmittance = T(1);   // between the middles of the first and the last sample
+  T f_last = T(0);         // the distance at `last`
+  T depth_last = T(0);     // depth_at there
+  T transmittance = T(1);  // between the middles of the first and the last sample
   bool last_kept = false;
 
   SPLITNERF_HD Walk(const RayLattice<T>& lattice, int64_t ray, const MarchOptions& march, const OccupancyView& grid)
@@ -42,17 +44,19 @@ template <class T> struct Walk {
 
 // The neighbour of a walk's last sample.
 template <class T> struct NextSample {
-  T f, depth;    // the distance at its middle, and depth_at there
-  T apart;       // from the last sample's middle
+  T f, depth;     // the distance at its middle, and depth_at there
+  T apart;        // from the last sample's middle
   T transmitted;  // share of the light that passes between the middles
 };
 
 // Whether the walk's last sample or its neighbour may weigh more than min_weight: by what lies between the middles, where with
 // a slope of 1 at most f falls to (f + f_next - apart) / 2; or as surface_weights renders them, from the slope between them.
 // No interval is deeper than exp(-s f) at its end.
-template <class T> SPLITNERF_HD bool may_weigh(const SampleRules<T>& rules, const Walk<T>& walk, const NextSample<T>& next) {
+template <class T>
+SPLITNERF_HD bool may_weigh(const SampleRules<T>& rules, const Walk<T>& walk, const NextSample<T>& next) {
   const T f = walk.f_last, step = walk.lattice.step, passed = walk.transmittance;
-  const T lowest = min_of(next.f, T(0.5) * (f + next.f - next.apart)), end = min_of(lowest, min_of(f, next.f) - T(0.5) * step);
+  const T lowest = min_of(next.f, T(0.5) * (f + next.f - next.apart)),
+          end = min_of(lowest, min_of(f, next.f) - T(0.5) * step);
   if (rules.s * end > rules.faint || passed < rules.min_weight) return false;
   if (passed * (T(1) - next.transmitted) > rules.min_weight) return true;
   const auto weighs = [&](T depth) { return depth > T(0) && passed * (T(1) - exp_of_minus(depth)) > rules.min_weight; };
@@ -67,7 +71,8 @@ template <class T> SPLITNERF_HD bool may_weigh(const SampleRules<T>& rules, cons
 // (|f| - reach) / lipschitz no density begins, and samples there are left out; where the field turns out steeper than that,
 // the walk goes back and looks. A distance that is not finite is kept: whoever renders the samples shall see it.
 template <class T, class Keep>
-SPLITNERF_HD void advance(Walk<T>& walk, T f, const OccupancyView& grid, const MarchOptions& march, const SampleRules<T>& rules, Keep keep) {
+SPLITNERF_HD void advance(Walk<T>& walk, T f, const OccupancyView& grid, const MarchOptions& march,
+                          const SampleRules<T>& rules, Keep keep) {
   const T step = walk.lattice.step;
   ++walk.n_evaluated;
   const bool jumped = walk.last >= 0 && walk.next > walk.last + 1 && walk.n_evaluated < march.max_samples;

@@ -23,48 +23,37 @@ SPLITNERF_HD uint32_t hash_u32(uint32_t a, uint32_t b) { return hash_u32(a + has
 SPLITNERF_HD uint32_t hash_u32(uint32_t a, uint32_t b, uint32_t c) { return hash_u32(a + hash_u32(b, c)); }
 
 // The upper 24 bits of a word as a number in [0, 1): exact in float, so never rounded up to 1.
-template <class T>
-SPLITNERF_HD T unit_from_bits(uint32_t bits) {
-  return T(bits >> 8) * T(1.0 / 16777216.0);
-}
+template <class T> SPLITNERF_HD T unit_from_bits(uint32_t bits) { return T(bits >> 8) * T(1.0 / 16777216.0); }
 
 // Counter-based uniform number in [0, 1): the same three counters always give the same number.
-template <class T>
-SPLITNERF_HD T random_unit(uint32_t a, uint32_t b = 0, uint32_t c = 0) {
+template <class T> SPLITNERF_HD T random_unit(uint32_t a, uint32_t b = 0, uint32_t c = 0) {
   return unit_from_bits<T>(hash_u32(a, b, c));
 }
 
-template <class T>
-struct Vec2 {
+template <class T> struct Vec2 {
   T x, y;
 };
 
 // (a + b) mod 1 of two numbers in [0, 1]; the result stays below 1 after rounding.
-template <class T>
-SPLITNERF_HD T wrap_unit(T a, T b) {
+template <class T> SPLITNERF_HD T wrap_unit(T a, T b) {
   const T s = a + b;
   return s < T(1) ? s : s - T(1) < T(1) ? s - T(1) : T(0);
 }
 
 // frac(i / golden ratio) in 32-bit fixed point (the factor is 2^32 / 1.618...): wrapping integer
 // multiplication takes the fractional part without rounding, for every i.
-template <class T>
-SPLITNERF_HD T golden_fraction(uint32_t i) {
-  return unit_from_bits<T>(i * 2654435769u);
-}
+template <class T> SPLITNERF_HD T golden_fraction(uint32_t i) { return unit_from_bits<T>(i * 2654435769u); }
 
 // Point i of the n-point Fibonacci lattice on [0, 1)^2, shifted modulo 1. A uniformly random
 // shift makes every point uniform, so that lattice averages are unbiased.
 // Source: Cranley and Patterson 1976.
-template <class T>
-SPLITNERF_HD Vec2<T> fibonacci_lattice(uint32_t i, uint32_t n, Vec2<T> shift = {T(0), T(0)}) {
+template <class T> SPLITNERF_HD Vec2<T> fibonacci_lattice(uint32_t i, uint32_t n, Vec2<T> shift = {T(0), T(0)}) {
   return {wrap_unit((T(i) + T(0.5)) / T(n), shift.x), wrap_unit(golden_fraction<T>(i), shift.y)};
 }
 
 // Point i of the R2 sequence, for an unknown number of points: steps 1/g and 1/g^2 in fixed point,
 // g = 1.32471795... the real root of g^3 = g + 1. Source: Roberts 2018.
-template <class T>
-SPLITNERF_HD Vec2<T> r2_lattice(uint32_t i, Vec2<T> shift = {T(0), T(0)}) {
+template <class T> SPLITNERF_HD Vec2<T> r2_lattice(uint32_t i, Vec2<T> shift = {T(0), T(0)}) {
   return {wrap_unit(unit_from_bits<T>(i * 3242174889u), shift.x),
           wrap_unit(unit_from_bits<T>(i * 2447445414u), shift.y)};
 }
@@ -73,31 +62,27 @@ SPLITNERF_HD Vec2<T> r2_lattice(uint32_t i, Vec2<T> shift = {T(0), T(0)}) {
 
 // Unit vector with cosine c = 1 - one_minus_c to +z at azimuth 2 pi u. sin^2 = (1 - c)(1 + c)
 // keeps all digits near the pole.
-template <class T>
-SPLITNERF_HD Vec3<T> direction_from_cosine(T one_minus_c, T u) {
+template <class T> SPLITNERF_HD Vec3<T> direction_from_cosine(T one_minus_c, T u) {
   const T phi = T(2 * kPi) * u;
   const T s = std::sqrt(max_of(one_minus_c * (T(2) - one_minus_c), T(0)));
   return {s * std::cos(phi), s * std::sin(phi), T(1) - one_minus_c};
 }
 
 // Uniform on the sphere: z is uniform in [-1, 1] (Archimedes). Density 1 / (4 pi).
-template <class T>
-SPLITNERF_HD Vec3<T> sample_uniform_sphere(T u1, T u2) {
+template <class T> SPLITNERF_HD Vec3<T> sample_uniform_sphere(T u1, T u2) {
   return direction_from_cosine(T(2) * u1, u2);
 }
 
 // Point i of an n-point uniform spherical lattice: the Fibonacci lattice by the area-preserving
 // map above. Its points keep about sqrt(4 pi / n) of distance.
-template <class T>
-SPLITNERF_HD Vec3<T> fibonacci_sphere(uint32_t i, uint32_t n) {
+template <class T> SPLITNERF_HD Vec3<T> fibonacci_sphere(uint32_t i, uint32_t n) {
   const Vec2<T> u = fibonacci_lattice<T>(i, n);
   return sample_uniform_sphere(u.x, u.y);
 }
 
 // Uniformly random rotation (Haar measure) as the frame that it maps the axes to: a uniform pole
 // and a uniform twist about it. It turns a fixed lattice into an unbiased one.
-template <class T>
-SPLITNERF_HD Frame<T> random_rotation(T u1, T u2, T u3) {
+template <class T> SPLITNERF_HD Frame<T> random_rotation(T u1, T u2, T u3) {
   const Frame<T> pole(sample_uniform_sphere(u1, u2));
   const T c = std::cos(T(2 * kPi) * u3), s = std::sin(T(2 * kPi) * u3);
   Frame<T> turned = pole;
@@ -109,14 +94,10 @@ SPLITNERF_HD Frame<T> random_rotation(T u1, T u2, T u3) {
 // ---- cosine lobe -----------------------------------------------------------------------------
 
 // Density c / pi: the CDF of c is c^2, so c = sqrt(1 - u1), 1 - c = u1 / (1 + c).
-template <class T>
-SPLITNERF_HD Vec3<T> sample_cosine_hemisphere(T u1, T u2) {
+template <class T> SPLITNERF_HD Vec3<T> sample_cosine_hemisphere(T u1, T u2) {
   return direction_from_cosine(u1 / (T(1) + std::sqrt(T(1) - u1)), u2);
 }
-template <class T>
-SPLITNERF_HD T pdf_cosine_hemisphere(T cosine) {
-  return max_of(cosine, T(0)) * T(1 / kPi);
-}
+template <class T> SPLITNERF_HD T pdf_cosine_hemisphere(T cosine) { return max_of(cosine, T(0)) * T(1 / kPi); }
 
 // ---- the pre-integration lobe D (w.z)+ -------------------------------------------------------
 //
@@ -132,8 +113,7 @@ inline constexpr double kCosineLobeLimit = 1e-3;
 
 // y - log(1 + y) for y >= 0; the difference cancels for small y, where the series
 // y^2/2 - y^3/3 + y^4/4 - ... serves instead (twelve terms leave 1e-13 at y = .1).
-template <class T>
-SPLITNERF_HD T y_minus_log1p(T y) {
+template <class T> SPLITNERF_HD T y_minus_log1p(T y) {
   if (y >= T(0.1)) return y - std::log1p(y);
   T series = T(0);
   for (int k = 13; k >= 2; --k) series = T(1) / T(k) - y * series;
@@ -143,8 +123,7 @@ SPLITNERF_HD T y_minus_log1p(T y) {
 // Solves y - log(1 + y) = t for y >= 0. sqrt(2 t) + t is an upper bound of the solution
 // (Chatzigeorgiou 2013, Eq. (1), with y = -W_{-1}(-e^{-1-t}) - 1); the function is convex and
 // increasing, so Newton's steps (y - h(y) ...) (1 + y)/y fall monotonically onto it.
-template <class T>
-SPLITNERF_HD T invert_y_minus_log1p(T t) {
+template <class T> SPLITNERF_HD T invert_y_minus_log1p(T t) {
   T y = std::sqrt(T(2) * t) + t;
   if (y < T(1e-12)) return y;
   for (int step = 0; step < (sizeof(T) > 4 ? 6 : 4); ++step) {
@@ -154,15 +133,13 @@ SPLITNERF_HD T invert_y_minus_log1p(T t) {
 }
 
 // int D (w.z)+ dw over the hemisphere, the lobe's normalisation.
-template <class T>
-SPLITNERF_HD T ggx_lobe_integral(T ggx_alpha) {
+template <class T> SPLITNERF_HD T ggx_lobe_integral(T ggx_alpha) {
   const T a2 = ggx_alpha * ggx_alpha, b = T(0.5) * (T(1) - a2);
   if (b < T(kCosineLobeLimit)) return T(1);
   return T(2) * a2 / (b * b) * y_minus_log1p(b / a2);
 }
 
-template <class T>
-SPLITNERF_HD Vec3<T> sample_ggx_lobe(T u1, T u2, T ggx_alpha) {
+template <class T> SPLITNERF_HD Vec3<T> sample_ggx_lobe(T u1, T u2, T ggx_alpha) {
   const T a2 = ggx_alpha * ggx_alpha, b = T(0.5) * (T(1) - a2);
   if (b < T(kCosineLobeLimit)) return sample_cosine_hemisphere(u1, u2);
   const T y1 = b / a2;
@@ -171,8 +148,7 @@ SPLITNERF_HD Vec3<T> sample_ggx_lobe(T u1, T u2, T ggx_alpha) {
 }
 
 // Density of sample_ggx_lobe at the unit vector w; zero below the horizon.
-template <class T>
-SPLITNERF_HD T pdf_ggx_lobe(Vec3<T> w, T ggx_alpha) {
+template <class T> SPLITNERF_HD T pdf_ggx_lobe(Vec3<T> w, T ggx_alpha) {
   if (T(0.5) * (T(1) - ggx_alpha * ggx_alpha) < T(kCosineLobeLimit)) return pdf_cosine_hemisphere(w.z);
   const T sin2_h = sin2_half_angle(w, Vec3<T>{T(0), T(0), T(1)});
   return ggx_d(ggx_alpha, sin2_h) * max_of(w.z, T(0)) / ggx_lobe_integral(ggx_alpha);
@@ -185,8 +161,7 @@ SPLITNERF_HD T pdf_ggx_lobe(Vec3<T> w, T ggx_alpha) {
 // Source: Heitz 2018 (the distribution); Dupuy and Benyoub 2023 (the cap).
 
 // A visible microfacet normal h for the unit view direction v, v.z > 0.
-template <class T>
-SPLITNERF_HD Vec3<T> sample_ggx_vndf(Vec3<T> v, T u1, T u2, T ggx_alpha) {
+template <class T> SPLITNERF_HD Vec3<T> sample_ggx_vndf(Vec3<T> v, T u1, T u2, T ggx_alpha) {
   const Vec3<T> stretched = normalize(Vec3<T>{ggx_alpha * v.x, ggx_alpha * v.y, v.z});
   // z uniform in (-stretched.z, 1], written as 1 - z = u1 (1 + stretched.z).
   const Vec3<T> h = direction_from_cosine(u1 * (T(1) + stretched.z), u2) + stretched;
@@ -195,8 +170,7 @@ SPLITNERF_HD Vec3<T> sample_ggx_vndf(Vec3<T> v, T u1, T u2, T ggx_alpha) {
 
 // Density of l = reflect(v, h), h from sample_ggx_vndf: the Jacobian dh/dl = 1 / (4 v.h) leaves
 // G1(v) D(h) / (4 v.z), with Smith's G1(v) = 2 v.z / (v.z + sqrt(a^2 + (1 - a^2) v.z^2)).
-template <class T>
-SPLITNERF_HD T pdf_ggx_vndf(Vec3<T> v, Vec3<T> h, T ggx_alpha) {
+template <class T> SPLITNERF_HD T pdf_ggx_vndf(Vec3<T> v, Vec3<T> h, T ggx_alpha) {
   const T a2 = ggx_alpha * ggx_alpha;
   const T d = ggx_d(ggx_alpha, h.x * h.x + h.y * h.y);
   return d / (T(2) * (v.z + std::sqrt(a2 + (T(1) - a2) * v.z * v.z)));

@@ -9,11 +9,11 @@ namespace splitnerf {
 
 // outputs = out softplus_beta(hidden [position, features] + hidden_bias) + out_bias; the first output is the distance.
 template <class T> struct SdfWeights {
-  int n_inputs;          // 3 + features
-  int width, n_outputs;  // hidden units; outputs
+  int n_inputs;                                    // 3 + features
+  int width, n_outputs;                            // hidden units; outputs
   const T *hidden, *hidden_bias, *out, *out_bias;  // [width, n_inputs], [width], [n_outputs, width], [n_outputs]
   T beta;
-  T box;                 // half size of the cube that the grid covers: d unit position / d position = 1 / (2 box)
+  T box;  // half size of the cube that the grid covers: d unit position / d position = 1 / (2 box)
 };
 
 // The same with rows padded to whole vectors, and transposed, as products over blocks of points need them.
@@ -57,12 +57,24 @@ template <class T> class PreparedSdfLayer {
       hidden_bias_[h] = w.hidden_bias[h];
       for (int64_t k = 0; k < w.n_inputs; ++k)
         hidden_[h * inputs + k] = hidden_transposed_[k * width + h] = w.hidden[h * w.n_inputs + k];
-      for (int64_t m = 0; m < w.n_outputs; ++m) out_[m * width + h] = out_transposed_[h * outputs + m] = w.out[m * w.width + h];
+      for (int64_t m = 0; m < w.n_outputs; ++m)
+        out_[m * width + h] = out_transposed_[h * outputs + m] = w.out[m * w.width + h];
     }
     for (int64_t m = 0; m < w.n_outputs; ++m) out_bias_[m] = w.out_bias[m];
-    layer_ = {w.n_inputs,     w.width,           w.n_outputs,         inputs,            width,
-              outputs,        hidden_.data(),    hidden_transposed_.data(), out_.data(), out_transposed_.data(),
-              hidden_bias_.data(), out_bias_.data(), w.beta,          T(0.5) / w.box};
+    layer_ = {w.n_inputs,
+              w.width,
+              w.n_outputs,
+              inputs,
+              width,
+              outputs,
+              hidden_.data(),
+              hidden_transposed_.data(),
+              out_.data(),
+              out_transposed_.data(),
+              hidden_bias_.data(),
+              out_bias_.data(),
+              w.beta,
+              T(0.5) / w.box};
   }
   PreparedSdfLayer(const PreparedSdfLayer&) = delete;
   PreparedSdfLayer& operator=(const PreparedSdfLayer&) = delete;

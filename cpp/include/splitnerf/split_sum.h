@@ -85,7 +85,9 @@ template <class T> SPLITNERF_HD T smoothstep_derivative(T lo, T hi, T x) {
 }
 
 // +1 where the normal faces the viewer, -1 where it must be turned.
-template <class T> SPLITNERF_HD T facing(Vec3<T> normal, Vec3<T> view) { return dot(normal, view) < T(0) ? T(-1) : T(1); }
+template <class T> SPLITNERF_HD T facing(Vec3<T> normal, Vec3<T> view) {
+  return dot(normal, view) < T(0) ? T(-1) : T(1);
+}
 
 template <class T> SPLITNERF_HD Vec3<T> reflect(Vec3<T> normal, Vec3<T> view) {
   return normal * (T(2) * dot(normal, view)) - view;
@@ -201,13 +203,14 @@ template <class T> SPLITNERF_HD SpecularAlbedo<T> specular_albedo(T fr, T f1, T 
 template <class T> struct ShadePoint {
   Vec3<T> normal, view, albedo;
   T roughness, metallic;
-  Vec3<T> specular, diffuse;              // g(query direction, roughness) and g(n, 1)
-  Vec3<T> occlusion_s, occlusion_d;       // the paper's o: 1 = open
+  Vec3<T> specular, diffuse;         // g(query direction, roughness) and g(n, 1)
+  Vec3<T> occlusion_s, occlusion_d;  // the paper's o: 1 = open
 };
 
 // L = o_d (1 - m)(1 - E) albedo g(n, 1) + o_s E g(d, rho), with F0 = .04 (1 - m) + m albedo.
 // paper and code modes use k_d = (1 - m)(1 - Fr).        Source: SplitNeRF Eq. (6)-(10), (17).
-template <class T> SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, const ShadePoint<T>& p) {
+template <class T>
+SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, const ShadePoint<T>& p) {
   const T nv = dot(p.normal, p.view) * facing(p.normal, p.view), m = p.metallic;
   const Vec3<T> table = lookup_brdf_lut(lut, nv, p.roughness);
   Vec3<T> radiance;
@@ -231,7 +234,8 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
   ShadePoint<T> out{};
   T grad_f1 = T(0), grad_f2 = T(0), grad_nv = T(0);
   for (int c = 0; c < 3; ++c) {
-    const T albedo = p.albedo[c], l_d = p.diffuse[c], l_s = p.specular[c], o_d = p.occlusion_d[c], o_s = p.occlusion_s[c];
+    const T albedo = p.albedo[c], l_d = p.diffuse[c], l_s = p.specular[c], o_d = p.occlusion_d[c],
+            o_s = p.occlusion_s[c];
     const T f0 = normal_reflectance(m, albedo);
     const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
     const SpecularAlbedo<T> e = specular_albedo(fr.value, table.value.x, table.value.y, options.compensate);

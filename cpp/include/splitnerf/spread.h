@@ -12,7 +12,8 @@ namespace splitnerf {
 // marks begin. Samples farther than `gap` apart along the ray may be of two surfaces: of each stretch without such a gap the
 // heaviest sample is drawn if no mark falls there. per_ray = 0 draws all.
 template <class T, class Draw>
-SPLITNERF_HD void spread_by_weight(const T* weights, const T* t, int64_t n, T gap, int per_ray, double phase, Draw draw) {
+SPLITNERF_HD void spread_by_weight(const T* weights, const T* t, int64_t n, T gap, int per_ray, double phase,
+                                   Draw draw) {
   double total = 0;
   for (int64_t i = 0; i < n; ++i) total += weights[i];
   const double scale = total > 0 ? per_ray / total : 0;

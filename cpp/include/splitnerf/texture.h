@@ -21,7 +21,8 @@ struct TextureFootprint {
 };
 
 SPLITNERF_HD TextureFootprint texture_footprint(const Texture& texture, Vec2<float> uv) {
-  const float x = (uv.x - std::floor(uv.x)) * texture.width - 0.5f, y = (uv.y - std::floor(uv.y)) * texture.height - 0.5f;
+  const float x = (uv.x - std::floor(uv.x)) * texture.width - 0.5f,
+              y = (uv.y - std::floor(uv.y)) * texture.height - 0.5f;
   const float x_floor = std::floor(x), y_floor = std::floor(y), fx = x - x_floor, fy = y - y_floor;
   // uv - floor(uv) may round to 1: both floors lie in -1 ... size - 1.
   const int x0 = static_cast<int>(x_floor), y0 = static_cast<int>(y_floor);
@@ -52,7 +53,7 @@ SPLITNERF_HD Vec2<float> lookup_texture2(const Texture& texture, Vec2<float> uv)
 // World direction (of any length) of a tangent-space normal; normal and tangent as interpolated
 // from the vertices, not normalised, which is what MikkTSpace bakes for.
 SPLITNERF_HD Vec3<float> apply_normal_map(Vec3<float> mapped, Vec3<float> normal, Vec3<float> tangent,
-                                                 float bitangent_sign) {
+                                          float bitangent_sign) {
   return tangent * mapped.x + cross(normal, tangent) * (bitangent_sign * mapped.y) + normal * mapped.z;
 }
 

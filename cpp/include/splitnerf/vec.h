@@ -20,8 +20,18 @@ template <class T> struct Vec3 {
 
   SPLITNERF_HD T& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
   SPLITNERF_HD const T& operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
-  SPLITNERF_HD Vec3& operator+=(Vec3 b) { x += b.x; y += b.y; z += b.z; return *this; }
-  SPLITNERF_HD Vec3& operator*=(Vec3 b) { x *= b.x; y *= b.y; z *= b.z; return *this; }
+  SPLITNERF_HD Vec3& operator+=(Vec3 b) {
+    x += b.x;
+    y += b.y;
+    z += b.z;
+    return *this;
+  }
+  SPLITNERF_HD Vec3& operator*=(Vec3 b) {
+    x *= b.x;
+    y *= b.y;
+    z *= b.z;
+    return *this;
+  }
 };
 
 template <class T> SPLITNERF_HD Vec3<T> operator+(Vec3<T> a, Vec3<T> b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
@@ -39,7 +49,11 @@ template <class T> SPLITNERF_HD Vec3<T> cross(Vec3<T> a, Vec3<T> b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 template <class T> SPLITNERF_HD Vec3<T> load3(const T* p) { return {p[0], p[1], p[2]}; }
-template <class T> SPLITNERF_HD void store3(T* p, Vec3<T> v) { p[0] = v.x; p[1] = v.y; p[2] = v.z; }
+template <class T> SPLITNERF_HD void store3(T* p, Vec3<T> v) {
+  p[0] = v.x;
+  p[1] = v.y;
+  p[2] = v.z;
+}
 
 // a / sqrt(|a|^2 + eps): finite, and zero for a = 0.
 template <class T> SPLITNERF_HD Vec3<T> normalize(Vec3<T> a, T eps = T(1e-20)) {

@@ -37,9 +37,9 @@ SPLITNERF_HD int lowest_bit(uint32_t word) {
 // Hash grids over the vertices of a mesh. Level l reaches radius * 2^l far and has cells twice as large, so that the
 // ball around a point touches 2 x 2 x 2 of them. The vertices of bucket b are order[starts[b] ... starts[b + 1] - 1].
 template <class T> struct VertexGrids {
-  const T *vertices, *normals;  // [n_vertices, 3]
-  const int32_t* starts;        // [n_levels, n_buckets + 1]
-  const int32_t* order;         // [n_levels, n_vertices]
+  const T *vertices, *normals;    // [n_vertices, 3]
+  const int32_t* starts;          // [n_levels, n_buckets + 1]
+  const int32_t* order;           // [n_levels, n_vertices]
   int64_t n_vertices, n_buckets;  // n_buckets is a power of two
   int n_levels;
   T radius;
@@ -108,7 +108,8 @@ SPLITNERF_HD Neighbours<T> find_neighbours(const VertexGrids<T>& grids, Vec3<T> 
         const Vec3<T> vertex = load3(grids.vertices + 3 * int64_t(order[j]));
         const T squared = dot(vertex - position, vertex - position);
         if (!(squared < reach * reach) || !(grid_cell(vertex, inverse_size) == cell)) continue;
-        const T weight = neighbour_weight(std::sqrt(squared) / reach, dot(normal, load3(grids.normals + 3 * int64_t(order[j]))));
+        const T weight =
+            neighbour_weight(std::sqrt(squared) / reach, dot(normal, load3(grids.normals + 3 * int64_t(order[j]))));
         if (weight > T(1e-6)) found.add(order[j], weight);
       }
     }

@@ -48,12 +48,14 @@ inline void product_columns(int64_t rows, int64_t inner, Strided<T> a, const T* 
   int64_t r = 0;
   for (; r + kTileRows <= rows; r += kTileRows)
     product_tile<T, kTileRows, Vectors>(inner, {a.data + r * a.row, a.row, a.column}, b, b_row, c + r * c_row, c_row);
-  for (; r < rows; ++r) product_tile<T, 1, Vectors>(inner, {a.data + r * a.row, a.row, a.column}, b, b_row, c + r * c_row, c_row);
+  for (; r < rows; ++r)
+    product_tile<T, 1, Vectors>(inner, {a.data + r * a.row, a.row, a.column}, b, b_row, c + r * c_row, c_row);
 }
 
 // c [rows, columns] += a [rows, inner] b [inner, columns]; columns is a padded number.
 template <class T>
-inline void add_product(int64_t rows, int64_t inner, int64_t columns, Strided<T> a, const T* b, int64_t b_row, T* c, int64_t c_row) {
+inline void add_product(int64_t rows, int64_t inner, int64_t columns, Strided<T> a, const T* b, int64_t b_row, T* c,
+                        int64_t c_row) {
   constexpr int64_t lanes = kVectorBytes / sizeof(T);
   int64_t k = 0;
   for (; k + kTileVectors * lanes <= columns; k += kTileVectors * lanes)

@@ -29,8 +29,7 @@ void pair_likeness(int64_t n, int64_t n_channels, const T* planes, int64_t point
   }
 }
 
-#define SPLITNERF_INSTANTIATE(T) \
-  template void pair_likeness<T>(int64_t, int64_t, const T*, int64_t, T*, T*);
+#define SPLITNERF_INSTANTIATE(T) template void pair_likeness<T>(int64_t, int64_t, const T*, int64_t, T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

@@ -26,12 +26,14 @@ template <class T, int F> struct Lanes {
   }
 };
 
-template <bool Dense, class T, int F> void locate(const HashLevel& level, int64_t n, const Lanes<T, F>& at, Cells<T, F>& cells) {
+template <bool Dense, class T, int F>
+void locate(const HashLevel& level, int64_t n, const Lanes<T, F>& at, Cells<T, F>& cells) {
   const int resolution = level.resolution;
   const auto n_entries = static_cast<uint32_t>(level.n_entries), side = static_cast<uint32_t>(resolution);
 #pragma omp simd
   for (int64_t q = 0; q < n * F; ++q) {
-    const CellAxis<T> x = cell_axis(resolution, at.x[q]), y = cell_axis(resolution, at.y[q]), z = cell_axis(resolution, at.z[q]);
+    const CellAxis<T> x = cell_axis(resolution, at.x[q]), y = cell_axis(resolution, at.y[q]),
+                      z = cell_axis(resolution, at.z[q]);
     cells.x[q] = x.f, cells.y[q] = y.f, cells.z[q] = z.f;
     cells.scale_x[q] = x.scale, cells.scale_y[q] = y.scale, cells.scale_z[q] = z.scale;
     cells.entry[0][q] = node_entry<Dense>(x.node, y.node, z.node, side, n_entries);
@@ -63,7 +65,8 @@ void encode_level(const HashEncodeArgs<T>& args, int l, int64_t n, const Cells<T
     const Trilinear<T> t = trilinear(corner[0][q], corner[1][q], corner[2][q], corner[3][q], corner[4][q], corner[5][q],
                                      corner[6][q], corner[7][q], cells.x[q], cells.y[q], cells.z[q]);
     value[q] = t.value;
-    if constexpr (WithJacobian) dx[q] = t.dx * cells.scale_x[q], dy[q] = t.dy * cells.scale_y[q], dz[q] = t.dz * cells.scale_z[q];
+    if constexpr (WithJacobian)
+      dx[q] = t.dx * cells.scale_x[q], dy[q] = t.dy * cells.scale_y[q], dz[q] = t.dz * cells.scale_z[q];
   }
   const int64_t n_columns = int64_t(args.n_levels) * F;
   for (int64_t p = 0; p < n; ++p) copy_entry<F>(value + p * F, features + p * n_columns + l * F);
@@ -77,7 +80,8 @@ void encode_level(const HashEncodeArgs<T>& args, int l, int64_t n, const Cells<T
 }
 
 template <class T, int F>
-void scatter_level(const HashEncodeArgs<T>& args, int l, const T* grad_features, const T* grad_jacobian, T* grad_table) {
+void scatter_level(const HashEncodeArgs<T>& args, int l, const T* grad_features, const T* grad_jacobian,
+                   T* grad_table) {
   constexpr int64_t kLanes = kPoints * F;
   const int64_t n_columns = int64_t(args.n_levels) * F;
   T* table = grad_table + args.levels[l].offset * F;
@@ -162,10 +166,14 @@ void encode_all(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, T* fe
 template <class T>
 void hash_encode(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, T* features, T* jacobian) {
   switch (args.n_features) {
-    case 1: return encode_all<T, 1>(args, begin, end, features, jacobian);
-    case 2: return encode_all<T, 2>(args, begin, end, features, jacobian);
-    case 4: return encode_all<T, 4>(args, begin, end, features, jacobian);
-    case 8: return encode_all<T, 8>(args, begin, end, features, jacobian);
+    case 1:
+      return encode_all<T, 1>(args, begin, end, features, jacobian);
+    case 2:
+      return encode_all<T, 2>(args, begin, end, features, jacobian);
+    case 4:
+      return encode_all<T, 4>(args, begin, end, features, jacobian);
+    case 8:
+      return encode_all<T, 8>(args, begin, end, features, jacobian);
   }
 }
 
@@ -173,10 +181,14 @@ template <class T>
 void hash_scatter(const HashEncodeArgs<T>& args, int level, const T* grad_features, const T* grad_jacobian,
                   T* grad_table) {
   switch (args.n_features) {
-    case 1: return scatter_level<T, 1>(args, level, grad_features, grad_jacobian, grad_table);
-    case 2: return scatter_level<T, 2>(args, level, grad_features, grad_jacobian, grad_table);
-    case 4: return scatter_level<T, 4>(args, level, grad_features, grad_jacobian, grad_table);
-    case 8: return scatter_level<T, 8>(args, level, grad_features, grad_jacobian, grad_table);
+    case 1:
+      return scatter_level<T, 1>(args, level, grad_features, grad_jacobian, grad_table);
+    case 2:
+      return scatter_level<T, 2>(args, level, grad_features, grad_jacobian, grad_table);
+    case 4:
+      return scatter_level<T, 4>(args, level, grad_features, grad_jacobian, grad_table);
+    case 8:
+      return scatter_level<T, 8>(args, level, grad_features, grad_jacobian, grad_table);
   }
 }
 
@@ -184,16 +196,20 @@ template <class T>
 void hash_position_gradient(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, const T* grad_features,
                             const T* grad_jacobian, T* grad_positions) {
   switch (args.n_features) {
-    case 1: return position_gradient<T, 1>(args, begin, end, grad_features, grad_jacobian, grad_positions);
-    case 2: return position_gradient<T, 2>(args, begin, end, grad_features, grad_jacobian, grad_positions);
-    case 4: return position_gradient<T, 4>(args, begin, end, grad_features, grad_jacobian, grad_positions);
-    case 8: return position_gradient<T, 8>(args, begin, end, grad_features, grad_jacobian, grad_positions);
+    case 1:
+      return position_gradient<T, 1>(args, begin, end, grad_features, grad_jacobian, grad_positions);
+    case 2:
+      return position_gradient<T, 2>(args, begin, end, grad_features, grad_jacobian, grad_positions);
+    case 4:
+      return position_gradient<T, 4>(args, begin, end, grad_features, grad_jacobian, grad_positions);
+    case 8:
+      return position_gradient<T, 8>(args, begin, end, grad_features, grad_jacobian, grad_positions);
   }
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                          \
-  template void hash_encode<T>(const HashEncodeArgs<T>&, int64_t, int64_t, T*, T*);                       \
-  template void hash_scatter<T>(const HashEncodeArgs<T>&, int, const T*, const T*, T*);                   \
+#define SPLITNERF_INSTANTIATE(T)                                                        \
+  template void hash_encode<T>(const HashEncodeArgs<T>&, int64_t, int64_t, T*, T*);     \
+  template void hash_scatter<T>(const HashEncodeArgs<T>&, int, const T*, const T*, T*); \
   template void hash_position_gradient<T>(const HashEncodeArgs<T>&, int64_t, int64_t, const T*, const T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

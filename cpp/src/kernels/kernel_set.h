@@ -15,7 +15,8 @@ template <class T> void hash_position_gradient(const HashEncodeArgs<T>&, int64_t
 template <class T> void sdf_values(const SdfNetwork<T>&, int64_t, const T*, T*, T*);
 template <class T> void sdf_layer(const SdfLayer<T>&, const SdfPoints<T>&, T*, T*, T*);
 template <class T>
-void sdf_layer_backward(const SdfLayer<T>&, const SdfPoints<T>&, const T*, const T*, T*, T*, T*, const SdfLayerGrad<T>&);
+void sdf_layer_backward(const SdfLayer<T>&, const SdfPoints<T>&, const T*, const T*, T*, T*, T*,
+                        const SdfLayerGrad<T>&);
 template <class T> void pair_likeness(int64_t, int64_t, const T*, int64_t, T*, T*);
 template <class T> void lobe_gather(const LobeSide<T>&, const LobeSide<T>&, int64_t, int64_t, T*);
 template <class T> void lobe_scatter(const LobeSide<T>&, const LobeSide<T>&, int64_t, int64_t, T*);

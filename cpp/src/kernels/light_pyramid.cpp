@@ -174,11 +174,11 @@ void light_lookup_backward(const LightPyramid<T>& p, int64_t begin, int64_t end,
   }
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                 \
-  template void sparse_product<T>(const SparseRows<T>&, int64_t, int64_t, const T*, T*);                         \
-  template void light_lookup<T>(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, T*);               \
-  template void light_lookup_backward<T>(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, const T*, \
-                                         T*, T*, T*, T*);
+#define SPLITNERF_INSTANTIATE(T)                                                                                     \
+  template void sparse_product<T>(const SparseRows<T>&, int64_t, int64_t, const T*, T*);                             \
+  template void light_lookup<T>(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, T*);                   \
+  template void light_lookup_backward<T>(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, const T*, T*, \
+                                         T*, T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

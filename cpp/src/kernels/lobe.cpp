@@ -40,8 +40,8 @@ void lobe_scatter(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t
   }
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                   \
-  template void lobe_gather<T>(const LobeSide<T>&, const LobeSide<T>&, int64_t, int64_t, T*);      \
+#define SPLITNERF_INSTANTIATE(T)                                                              \
+  template void lobe_gather<T>(const LobeSide<T>&, const LobeSide<T>&, int64_t, int64_t, T*); \
   template void lobe_scatter<T>(const LobeSide<T>&, const LobeSide<T>&, int64_t, int64_t, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -44,7 +44,8 @@ void join_inputs(const SdfLayer<T>& layer, int64_t n, const T* positions, const 
 template <class T> void first_layer(const SdfLayer<T>& layer, int64_t n, const T* inputs, T* hidden, T* slope) {
   const int64_t columns = layer.width_columns;
   fill_rows(n, columns, layer.hidden_bias, hidden);
-  add_product<T>(n, layer.n_inputs, columns, {inputs, layer.input_columns, 1}, layer.hidden_transposed, columns, hidden, columns);
+  add_product<T>(n, layer.n_inputs, columns, {inputs, layer.input_columns, 1}, layer.hidden_transposed, columns, hidden,
+                 columns);
   const T beta = layer.beta;
   if (!slope) {
 #pragma omp simd
@@ -60,15 +61,14 @@ template <class T> void first_layer(const SdfLayer<T>& layer, int64_t n, const T
 }
 
 // steepness [n, padded K] = d sdf / d input = (slope * out[0]) hidden; weighted: slope * out[0].
-template <class T>
-void input_gradient(const SdfLayer<T>& layer, int64_t n, const T* slope, T* weighted, T* steepness) {
+template <class T> void input_gradient(const SdfLayer<T>& layer, int64_t n, const T* slope, T* weighted, T* steepness) {
   const int64_t columns = layer.width_columns;
   for (int64_t p = 0; p < n; ++p)
 #pragma omp simd
     for (int64_t h = 0; h < columns; ++h) weighted[p * columns + h] = slope[p * columns + h] * layer.out[h];
   clear(steepness, n * layer.input_columns);
-  add_product<T>(n, layer.width, layer.input_columns, {weighted, columns, 1}, layer.hidden, layer.input_columns, steepness,
-                 layer.input_columns);
+  add_product<T>(n, layer.width, layer.input_columns, {weighted, columns, 1}, layer.hidden, layer.input_columns,
+                 steepness, layer.input_columns);
 }
 
 }  // namespace
@@ -94,8 +94,7 @@ template <class T> void sdf_values(const SdfNetwork<T>& net, int64_t n, const T*
   }
 }
 
-template <class T>
-void sdf_layer(const SdfLayer<T>& layer, const SdfPoints<T>& in, T* work, T* outputs, T* gradient) {
+template <class T> void sdf_layer(const SdfLayer<T>& layer, const SdfPoints<T>& in, T* work, T* outputs, T* gradient) {
   const int64_t n = in.n, n_features = layer.n_inputs - 3, columns = layer.width_columns;
   Workspace<T> space{work};
   T *inputs = space.take(n, layer.input_columns), *hidden = space.take(n, columns), *slope = space.take(n, columns);
@@ -104,8 +103,8 @@ void sdf_layer(const SdfLayer<T>& layer, const SdfPoints<T>& in, T* work, T* out
   join_inputs(layer, n, in.positions, in.features, inputs);
   first_layer(layer, n, inputs, hidden, slope);
   fill_rows(n, layer.output_columns, layer.out_bias, padded);
-  add_product<T>(n, layer.width, layer.output_columns, {hidden, columns, 1}, layer.out_transposed, layer.output_columns, padded,
-                 layer.output_columns);
+  add_product<T>(n, layer.width, layer.output_columns, {hidden, columns, 1}, layer.out_transposed, layer.output_columns,
+                 padded, layer.output_columns);
   input_gradient(layer, n, slope, weighted, steepness);
   for (int64_t p = 0; p < n; ++p) {
     copy(padded + p * layer.output_columns, layer.n_outputs, outputs + p * layer.n_outputs);
@@ -123,11 +122,14 @@ void sdf_layer(const SdfLayer<T>& layer, const SdfPoints<T>& in, T* work, T* out
 template <class T>
 void sdf_layer_backward(const SdfLayer<T>& layer, const SdfPoints<T>& in, const T* grad_outputs, const T* grad_gradient,
                         T* work, T* grad_features, T* grad_jacobian, const SdfLayerGrad<T>& grad) {
-  const int64_t n = in.n, n_features = layer.n_inputs - 3, columns = layer.width_columns, inputs_row = layer.input_columns;
+  const int64_t n = in.n, n_features = layer.n_inputs - 3, columns = layer.width_columns,
+                inputs_row = layer.input_columns;
   Workspace<T> space{work};
   T *inputs = space.take(n, inputs_row), *hidden = space.take(n, columns), *slope = space.take(n, columns);
-  T *weighted = space.take(n, columns), *steepness = space.take(n, inputs_row), *grad_steepness = space.take(n, inputs_row);
-  T *grad_weighted = space.take(n, columns), *grad_hidden = space.take(n, columns), *grad_inputs = space.take(n, inputs_row);
+  T *weighted = space.take(n, columns), *steepness = space.take(n, inputs_row),
+    *grad_steepness = space.take(n, inputs_row);
+  T *grad_weighted = space.take(n, columns), *grad_hidden = space.take(n, columns),
+    *grad_inputs = space.take(n, inputs_row);
   join_inputs(layer, n, in.positions, in.features, inputs);
   first_layer(layer, n, inputs, hidden, slope);
   input_gradient(layer, n, slope, weighted, steepness);
@@ -151,11 +153,14 @@ void sdf_layer_backward(const SdfLayer<T>& layer, const SdfPoints<T>& in, const 
   }
   // steepness = weighted hidden_weights,  outputs = hidden out^T + out_bias
   clear(grad_weighted, n * columns);
-  add_product<T>(n, layer.n_inputs, columns, {grad_steepness, inputs_row, 1}, layer.hidden_transposed, columns, grad_weighted, columns);
+  add_product<T>(n, layer.n_inputs, columns, {grad_steepness, inputs_row, 1}, layer.hidden_transposed, columns,
+                 grad_weighted, columns);
   clear(grad_hidden, n * columns);
-  add_product<T>(n, layer.n_outputs, columns, {grad_outputs, layer.n_outputs, 1}, layer.out, columns, grad_hidden, columns);
+  add_product<T>(n, layer.n_outputs, columns, {grad_outputs, layer.n_outputs, 1}, layer.out, columns, grad_hidden,
+                 columns);
   add_product<T>(layer.n_outputs, n, columns, {grad_outputs, 1, layer.n_outputs}, hidden, columns, grad.out, columns);
-  add_product<T>(layer.width, n, inputs_row, {weighted, 1, columns}, grad_steepness, inputs_row, grad.hidden, inputs_row);
+  add_product<T>(layer.width, n, inputs_row, {weighted, 1, columns}, grad_steepness, inputs_row, grad.hidden,
+                 inputs_row);
   // weighted = slope out[0],  hidden = softplus(pre): grad_hidden becomes that of pre
   for (int64_t p = 0; p < n; ++p) {
     const T *s = slope + p * columns, *g = grad_weighted + p * columns;
@@ -171,13 +176,14 @@ void sdf_layer_backward(const SdfLayer<T>& layer, const SdfPoints<T>& in, const 
   // pre = inputs hidden_weights^T + hidden_bias
   add_product<T>(layer.width, n, inputs_row, {grad_hidden, 1, columns}, inputs, inputs_row, grad.hidden, inputs_row);
   clear(grad_inputs, n * inputs_row);
-  add_product<T>(n, layer.width, inputs_row, {grad_hidden, columns, 1}, layer.hidden, inputs_row, grad_inputs, inputs_row);
+  add_product<T>(n, layer.width, inputs_row, {grad_hidden, columns, 1}, layer.hidden, inputs_row, grad_inputs,
+                 inputs_row);
   for (int64_t p = 0; p < n; ++p) copy(grad_inputs + p * inputs_row + 3, n_features, grad_features + p * n_features);
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                      \
-  template void sdf_values<T>(const SdfNetwork<T>&, int64_t, const T*, T*, T*);                       \
-  template void sdf_layer<T>(const SdfLayer<T>&, const SdfPoints<T>&, T*, T*, T*);                    \
+#define SPLITNERF_INSTANTIATE(T)                                                                               \
+  template void sdf_values<T>(const SdfNetwork<T>&, int64_t, const T*, T*, T*);                                \
+  template void sdf_layer<T>(const SdfLayer<T>&, const SdfPoints<T>&, T*, T*, T*);                             \
   template void sdf_layer_backward<T>(const SdfLayer<T>&, const SdfPoints<T>&, const T*, const T*, T*, T*, T*, \
                                       const SdfLayerGrad<T>&);
 SPLITNERF_INSTANTIATE(float)

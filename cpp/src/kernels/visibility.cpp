@@ -19,8 +19,7 @@ template <class T> void visibility_horizon(const LobeSide<T>& directions, const 
   }
 }
 
-template <class T>
-void visibility_shares(int64_t n_directions, const VisibilityPoint<T>& point, T* known, T* visible) {
+template <class T> void visibility_shares(int64_t n_directions, const VisibilityPoint<T>& point, T* known, T* visible) {
   const int64_t n_words = n_directions / kBitsPerWord;
   for (int64_t word = 0; word < n_words; ++word) {
     T *all = known + word * kBitsPerWord, *share = visible + word * kBitsPerWord;
@@ -40,7 +39,8 @@ void visibility_shares(int64_t n_directions, const VisibilityPoint<T>& point, T*
 }
 
 template <class T>
-void visibility_sums(const LobeSide<T>& directions, const VisibilityLobe<T>& lobes, const T* visible, T* lobe, T* sums) {
+void visibility_sums(const LobeSide<T>& directions, const VisibilityLobe<T>& lobes, const T* visible, T* lobe,
+                     T* sums) {
   const T x = lobes.lobe_dir[0], y = lobes.lobe_dir[1], z = lobes.lobe_dir[2], a2 = lobes.alpha_squared;
   T open_dr = 0, open_dg = 0, open_db = 0, all_dr = 0, all_dg = 0, all_db = 0, total_d = 0;
   T open_sr = 0, open_sg = 0, open_sb = 0, all_sr = 0, all_sg = 0, all_sb = 0, total_s = 0;
@@ -61,9 +61,9 @@ void visibility_sums(const LobeSide<T>& directions, const VisibilityLobe<T>& lob
   for (int i = 0; i < 14; ++i) sums[i] = all[i];
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                        \
-  template void visibility_horizon<T>(const LobeSide<T>&, const T*, T*, uint32_t*);                       \
-  template void visibility_shares<T>(int64_t, const VisibilityPoint<T>&, T*, T*);                         \
+#define SPLITNERF_INSTANTIATE(T)                                                    \
+  template void visibility_horizon<T>(const LobeSide<T>&, const T*, T*, uint32_t*); \
+  template void visibility_shares<T>(int64_t, const VisibilityPoint<T>&, T*, T*);   \
   template void visibility_sums<T>(const LobeSide<T>&, const VisibilityLobe<T>&, const T*, T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

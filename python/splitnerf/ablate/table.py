@@ -113,7 +113,9 @@ def markdown_table(scores: Sequence[Score]) -> str:
         for name in dict.fromkeys(s.row for s in scores if s.scene == scene):
             runs = [s for s in scores if s.scene == scene and s.row == name]
             cells = [_mean([getattr(s, key) for s in runs], text) for key, _, text in COLUMNS]
-            lines.append([name, *cells, str(len(runs)), verdicts.get(name, ""), "" if name == FULL else runs[0].reference])
+            lines.append(
+                [name, *cells, str(len(runs)), verdicts.get(name, ""), "" if name == FULL else runs[0].reference]
+            )
         parts.append(f"## {scene}\n\n" + "".join("| " + " | ".join(line) + " |\n" for line in lines))
     return "\n".join(parts)
 

@@ -20,7 +20,8 @@ __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "build_parser", "main"]
 
 def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="splitnerf", description="From posed images of one object to a mesh, PBR materials and the HDR environment."
+        prog="splitnerf",
+        description="From posed images of one object to a mesh, PBR materials and the HDR environment.",
     )
     parser.add_argument("--version", action="version", version=f"splitnerf {splitnerf.__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

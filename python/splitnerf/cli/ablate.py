@@ -23,12 +23,20 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps of each run")
     parser.add_argument("--rows", metavar="LIST", help="names of rows, by semicolons (default: all; --list names them)")
     parser.add_argument("--list", action="store_true", help="print the rows and what they set, and train nothing")
-    parser.add_argument("--seeds", type=int, default=1, metavar="N", help="runs of rows within 0.3 dB of what they are compared with, 3 or more (default: 1)")
+    parser.add_argument(
+        "--seeds",
+        type=int,
+        default=1,
+        metavar="N",
+        help="runs of rows within 0.3 dB of what they are compared with, 3 or more (default: 1)",
+    )
     parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
     parser.add_argument("--views", type=int, metavar="N", help="test views to score (default: all)")
     parser.add_argument("--spp", type=int, default=32, metavar="N", help="paths a pixel of relit views (default: 32)")
     parser.add_argument("--preset", choices=["cpu", "paper"], default="cpu", help="the full method (default: cpu)")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all rows")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all rows"
+    )
     parser.set_defaults(execute=run)
 
 

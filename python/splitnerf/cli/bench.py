@@ -21,9 +21,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     skip.add_argument("--data", type=Path, required=True, metavar="DATA")
     skip.add_argument("--minutes", type=float, default=3.0, metavar="M", help="training time of each run (default: 3)")
     skip.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
-    skip.add_argument("--against", type=Path, metavar="SPLITNERF", help="the program of another build, for the first line")
+    skip.add_argument(
+        "--against", type=Path, metavar="SPLITNERF", help="the program of another build, for the first line"
+    )
     skip.add_argument("--out", type=Path, metavar="OUT", help="keep the runs (default: a folder that is removed)")
-    skip.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all runs")
+    skip.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all runs"
+    )
     skip.set_defaults(execute=run_skip)
 
 

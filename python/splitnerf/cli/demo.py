@@ -17,7 +17,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Makes a scene with known shape, materials and sky, renders it with the built-in path tracer, "
         "trains on it and prints the errors. Nothing is downloaded.",
     )  # fmt: skip
-    parser.add_argument("--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)"
+    )
     parser.add_argument("--max-minutes", type=float, default=4.0, metavar="M", help="training time (default: 4)")
     parser.add_argument("--seed", type=int, default=0)
     parser.set_defaults(execute=run)

@@ -20,16 +20,48 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "FILE_evaluation.json beside it). Without --data it reads the scores written before, for --table.",
     )  # fmt: skip
     parser.add_argument("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
-    parser.add_argument("--data", type=Path, action="append", metavar="DATA", help="the data that RUN was trained on; once for all, or once for each RUN in order")
-    parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)")
-    parser.add_argument("--spp", type=int, default=64, metavar="N", help="paths a pixel of relit views and GLB files (default: 64)")
-    parser.add_argument("--views", type=int, metavar="N", help="test views, evenly spread (default: all; 20 with --lights)")
-    parser.add_argument("--lights", choices=["low", "high"], help="a published relighting protocol, 20 views: low, 8 low-frequency probes; high, 7 maps")
-    parser.add_argument("--maps", type=Path, metavar="FOLDER", help="folder of .hdr or .exr maps that DATA has relit images of (default: DATA's relight_*.hdr)")
-    parser.add_argument("--env", type=Path, metavar="MAP", help="the light of the photos, for a GLB file (default: the environment.exr or .hdr beside it)")
-    parser.add_argument("--out", type=Path, metavar="FILE.json", help="where to write the scores of one RUN; leaves RUN untouched")
-    parser.add_argument("--table", type=Path, metavar="OUT.md", help="write all scores as a markdown table, with their mean")
-    parser.add_argument("--sheet", type=Path, metavar="SHEET.png", help="write pictures of one RUN: truth, prediction, error")
+    parser.add_argument(
+        "--data",
+        type=Path,
+        action="append",
+        metavar="DATA",
+        help="the data that RUN was trained on; once for all, or once for each RUN in order",
+    )
+    parser.add_argument(
+        "--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)"
+    )
+    parser.add_argument(
+        "--spp", type=int, default=64, metavar="N", help="paths a pixel of relit views and GLB files (default: 64)"
+    )
+    parser.add_argument(
+        "--views", type=int, metavar="N", help="test views, evenly spread (default: all; 20 with --lights)"
+    )
+    parser.add_argument(
+        "--lights",
+        choices=["low", "high"],
+        help="a published relighting protocol, 20 views: low, 8 low-frequency probes; high, 7 maps",
+    )
+    parser.add_argument(
+        "--maps",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of .hdr or .exr maps that DATA has relit images of (default: DATA's relight_*.hdr)",
+    )
+    parser.add_argument(
+        "--env",
+        type=Path,
+        metavar="MAP",
+        help="the light of the photos, for a GLB file (default: the environment.exr or .hdr beside it)",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.json", help="where to write the scores of one RUN; leaves RUN untouched"
+    )
+    parser.add_argument(
+        "--table", type=Path, metavar="OUT.md", help="write all scores as a markdown table, with their mean"
+    )
+    parser.add_argument(
+        "--sheet", type=Path, metavar="SHEET.png", help="write pictures of one RUN: truth, prediction, error"
+    )
     parser.set_defaults(execute=run)
 
 
@@ -68,7 +100,9 @@ def check_usage(args: argparse.Namespace) -> None:
     if not args.data and given:
         raise InputError(f"--{given[0]} needs --data; without it the scores written before are read")
     if args.data and len(args.data) not in (1, len(args.targets)):
-        raise InputError(f"--data was given {len(args.data)} times for {len(args.targets)} runs; give it once, or once each")
+        raise InputError(
+            f"--data was given {len(args.data)} times for {len(args.targets)} runs; give it once, or once each"
+        )
     for name in ("out", "sheet"):
         if getattr(args, name) is not None and len(args.targets) > 1:
             raise InputError(f"--{name} takes one run, got {len(args.targets)}; evaluate them one by one")

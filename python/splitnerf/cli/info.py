@@ -10,7 +10,9 @@ from splitnerf.cli.exit_codes import DONE
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("info", help="show versions, the build, and the settings of a preset")
-    parser.add_argument("--settings", metavar="PRESET", nargs="?", const="cpu", help="print every setting of a preset (default: cpu)")
+    parser.add_argument(
+        "--settings", metavar="PRESET", nargs="?", const="cpu", help="print every setting of a preset (default: cpu)"
+    )
     parser.set_defaults(execute=run)
 
 
@@ -29,5 +31,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"splitnerf {splitnerf.__version__}")
     print(f"torch {torch.__version__}, {torch.get_num_threads()} threads")
     print(f"kernels: {_core.instruction_set()}")
-    print(f"ray tracing: {'Embree ' + _core.embree_version() if _core.embree_version() else 'embreex (build without Embree)'}")
+    print(
+        f"ray tracing: {'Embree ' + _core.embree_version() if _core.embree_version() else 'embreex (build without Embree)'}"
+    )
     return DONE

@@ -15,15 +15,29 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "roughness, metallic, normals and relit views, in a layout that train and evaluate read.",
     )  # fmt: skip
     parser.add_argument("asset", type=Path, metavar="ASSET.glb")
-    parser.add_argument("--light", type=Path, required=True, metavar="MAP", help="environment map of the photos, .hdr or .exr")
-    parser.add_argument("--relight", type=Path, nargs="+", default=[], metavar="MAP", help="maps of the relit test views")
+    parser.add_argument(
+        "--light", type=Path, required=True, metavar="MAP", help="environment map of the photos, .hdr or .exr"
+    )
+    parser.add_argument(
+        "--relight", type=Path, nargs="+", default=[], metavar="MAP", help="maps of the relit test views"
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="DATA", help="folder to write, absent or empty")
     parser.add_argument("--size", type=int, default=200, metavar="N", help="width and height in pixels (default: 200)")
     parser.add_argument("--train", type=int, default=100, metavar="N", help="number of train views (default: 100)")
     parser.add_argument("--test", type=int, default=20, metavar="N", help="number of test views (default: 20)")
     parser.add_argument("--spp", type=int, default=256, metavar="N", help="paths a pixel (default: 256)")
-    parser.add_argument("--layout", choices=["blender", "nerfactor", "tensoir"], default="blender", help="how the files are named (default: blender)")
-    parser.add_argument("--renderer", choices=["project", "blender"], default="project", help="the built-in path tracer (default), or Cycles through bpy")
+    parser.add_argument(
+        "--layout",
+        choices=["blender", "nerfactor", "tensoir"],
+        default="blender",
+        help="how the files are named (default: blender)",
+    )
+    parser.add_argument(
+        "--renderer",
+        choices=["project", "blender"],
+        default="project",
+        help="the built-in path tracer (default), or Cycles through bpy",
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the noise and the first camera (default: 0)")
     parser.set_defaults(execute=run)
 

@@ -28,12 +28,25 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def add_training_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--preset", choices=["cpu", "paper"], help="cpu: small, for a few cores (default); paper: the publication's settings")
+    parser.add_argument(
+        "--preset",
+        choices=["cpu", "paper"],
+        help="cpu: small, for a few cores (default); paper: the publication's settings",
+    )
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
     parser.add_argument("--max-minutes", type=float, metavar="M", help="training time; the schedule fits itself to it")
-    parser.add_argument("--device", choices=["cpu"], default="cpu", help="where to train (the operators run on the CPU)")
+    parser.add_argument(
+        "--device", choices=["cpu"], default="cpu", help="where to train (the operators run on the CPU)"
+    )
     parser.add_argument("--seed", type=int, help="of all random numbers (default: 0)")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change one setting; `splitnerf info --settings` lists them")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="settings",
+        help="change one setting; `splitnerf info --settings` lists them",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

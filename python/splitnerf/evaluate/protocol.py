@@ -59,7 +59,9 @@ def evaluate_maps(
     for prediction, image in zip(predictions, dataset.images):
         for key in prediction.keys() & {"rgb", "alpha"}:
             if prediction[key].shape[:2] != image.shape[:2]:
-                raise ValueError(f"{key} of a prediction is {list(prediction[key].shape)}, image is {list(image.shape)}")
+                raise ValueError(
+                    f"{key} of a prediction is {list(prediction[key].shape)}, image is {list(image.shape)}"
+                )
     foregrounds = [(p["alpha"] > OPAQUE) & (i[..., 3] > OPAQUE) for p, i in zip(predictions, dataset.images)]
     chamfer, f_score = (None, None) if mesh is None or mesh_truth is None else metrics.mesh_distances(mesh, mesh_truth)
 
@@ -96,7 +98,9 @@ def _novel_view(predictions: Sequence[Prediction], images: np.ndarray, distance:
         return None
     return mean_scores(
         [
-            image_scores(over_background(p["rgb"], p["alpha"]), over_background(image[..., :3], image[..., 3]), distance)
+            image_scores(
+                over_background(p["rgb"], p["alpha"]), over_background(image[..., :3], image[..., 3]), distance
+            )
             for p, image in zip(predictions, images)
         ]
     )

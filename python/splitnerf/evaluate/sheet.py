@@ -86,17 +86,21 @@ def _rows(
 ) -> Iterator[Row]:
     alphas = dataset.images[..., 3]
     if all("rgb" in predictions[i] for i in shown):
-        yield "novel view", [
-            (over_background(dataset.images[i, ..., :3], alphas[i]), over_background(p["rgb"], p["alpha"]))
-            for i, p in ((i, predictions[i]) for i in shown)
-        ]
+        yield (
+            "novel view",
+            [
+                (over_background(dataset.images[i, ..., :3], alphas[i]), over_background(p["rgb"], p["alpha"]))
+                for i, p in ((i, predictions[i]) for i in shown)
+            ],
+        )
     if relit is not None:
         scale = np.array(evaluation["relight"]["lsq"]["scale"])
         for name in relit.images:
             views = [relit.view(name, i) for i in shown]
-            yield f"relit by\n{name}", [
-                (on_white(v.truth, v.truth_alpha), on_white(v.prediction, v.alpha, scale)) for v in views
-            ]
+            yield (
+                f"relit by\n{name}",
+                [(on_white(v.truth, v.truth_alpha), on_white(v.prediction, v.alpha, scale)) for v in views],
+            )
     for key in ("albedo", "roughness", "metallic", "normal"):
         if all(getattr(truths[i], key) is not None and key in predictions[i] for i in shown):
             scale = np.array(evaluation["albedo"]["lsq"]["scale"]) if key == "albedo" else 1.0

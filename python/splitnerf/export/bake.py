@@ -132,7 +132,10 @@ def bake_occlusion(mesh: UnwrappedMesh, size: int, offset: float) -> np.ndarray:
         return np.ones((size, size), np.float32)
     points, normals = (
         torch.from_numpy(values)
-        for values in (texels.interpolate(mesh.vertices, mesh.faces), _unit(texels.interpolate(mesh.normals, mesh.faces)))
+        for values in (
+            texels.interpolate(mesh.vertices, mesh.faces),
+            _unit(texels.interpolate(mesh.normals, mesh.faces)),
+        )
     )
     open_share, _ = occlusion_factors(
         MeshScene(mesh.vertices, mesh.faces), points, normals, normals, torch.ones(len(points), 1), torch.zeros(2, 4, 3),

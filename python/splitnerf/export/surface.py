@@ -38,9 +38,7 @@ def surface_normals(surface: Surface, points: np.ndarray) -> np.ndarray:
 
 
 @torch.no_grad()
-def surface_materials(
-    surface: Surface, points: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def surface_materials(surface: Surface, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """albedo [n, 3], roughness [n], metallic [n] and normals [n, 3] float32 at [n, 3] points.
 
     Raises:

@@ -98,8 +98,9 @@ class LightPyramid(Light):
     They are computed when first asked for and shared by all calls until a parameter changes, a backward
     pass has used up their graph, or gradients are wanted that they do not carry. Losses of several calls in
     one step therefore go into one ``backward``. Writing through ``.data``, or by a fused optimiser without a
-    backward pass or :meth:`deliver` before it, goes unseen: change parameters under ``no_grad``. After :meth:`collect` gradients add up at the maps until :meth:`deliver` takes them on to the
-    parameters, so that several steps share one pass through the linear maps.
+    backward pass or :meth:`deliver` before it, goes unseen: change parameters under ``no_grad``. After
+    :meth:`collect` gradients add up at the maps until :meth:`deliver` takes them on to the parameters, so that several steps
+    share one pass through the linear maps.
 
     Args:
         resolution: n, a power of 2 >= 16; 64 resolves 3 degrees.
@@ -123,7 +124,13 @@ class LightPyramid(Light):
         self._stand_ins: list[tuple[Tensor, Tensor]] = []
 
     def __getstate__(self) -> dict:
-        return {**super().__getstate__(), "_cached": None, "_collects": False, "_held": None, "_stand_ins": []}  # copies start anew
+        return {
+            **super().__getstate__(),
+            "_cached": None,
+            "_collects": False,
+            "_held": None,
+            "_stand_ins": [],
+        }  # copies start anew
 
     def radiance(self) -> Tensor:
         """[n^2, 3] radiance of the texels."""

@@ -14,7 +14,9 @@ def _load() -> None:
     folder = Path(_core.__file__).parent
     found = sorted(folder.glob("libsplitnerf_ops.*"))
     if not found:
-        raise ImportError(f"libsplitnerf_ops is missing in {folder}: reinstall with `pip install --no-build-isolation .`")
+        raise ImportError(
+            f"libsplitnerf_ops is missing in {folder}: reinstall with `pip install --no-build-isolation .`"
+        )
     torch.ops.load_library(str(found[0]))
 
 

@@ -11,7 +11,9 @@ from torch import Tensor
 from splitnerf.ops._library import lib, refuse_gradients, register
 
 
-def pixel_losses(mean: Tensor, opacity: Tensor, target: Tensor, background: Tensor, *, linear: bool = True) -> tuple[Tensor, Tensor]:
+def pixel_losses(
+    mean: Tensor, opacity: Tensor, target: Tensor, background: Tensor, *, linear: bool = True
+) -> tuple[Tensor, Tensor]:
     """Mean squared sRGB error of pixels against photos, both over one background, and the cross entropy with their masks.
 
     A channel that the photo clipped says only that the truth is at least as bright: there, and only there, the prediction
@@ -61,7 +63,9 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple
     return eikonal, smoothness
 
 
-def material_losses(albedo: Tensor, metallic: Tensor, shares: Tensor, *, smooth_l1: bool = False) -> tuple[Tensor, Tensor, Tensor]:
+def material_losses(
+    albedo: Tensor, metallic: Tensor, shares: Tensor, *, smooth_l1: bool = False
+) -> tuple[Tensor, Tensor, Tensor]:
     """How unlikely metals are: that a point is one at all, by halves, or a dark one.
 
     Args:

@@ -125,9 +125,7 @@ def shade_sums(
     Raises:
         ValueError: A shape or dtype does not fit.
     """
-    return lib.shade_sums(
-        normals, view_dirs, albedo, roughness, metallic, *sums, brdf_lut(normals.device), compensate
-    )
+    return lib.shade_sums(normals, view_dirs, albedo, roughness, metallic, *sums, brdf_lut(normals.device), compensate)
 
 
 def _keep(ctx, inputs, output):

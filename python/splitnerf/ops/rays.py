@@ -1,8 +1,8 @@
 """Packed samples along rays: marching, NeuS weights and compositing.
 
 Samples of all rays lie in one array, ray after ray; ``offsets`` [n_rays + 1] says where each begins.
-``neus_weights`` is differentiable once in f_prev, f_next and s, ``surface_weights`` in sdf, gradient and s; ``composite`` once in weights and
-values, ``Spread.interpolate`` once in values; a second derivative raises. ``march_rays`` and ``spread_samples`` have no
+``neus_weights`` is differentiable once in f_prev, f_next and s, ``surface_weights`` in sdf, gradient and s; ``composite``
+once in weights and values, ``Spread.interpolate`` once in values; a second derivative raises. ``march_rays`` and ``spread_samples`` have no
 gradient.
 """
 
@@ -153,7 +153,9 @@ class Spread(NamedTuple):
         return lib.interpolate_backward(weights[:, None], self.first, self.second, self.share, self.shaded)[:, 0]
 
 
-def spread_samples(weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor, gap: float = math.inf) -> Spread:
+def spread_samples(
+    weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor, gap: float = math.inf
+) -> Spread:
     """Draws samples of each ray in proportion to their weights, for what is asked at few of them.
 
     The weights of a ray are laid end to end, and a sample is drawn where one of `per_ray` evenly spaced marks falls on it:
@@ -249,7 +251,15 @@ def _surface_backward(ctx, grad_normals, grad_weights, grad_opacity):
     refuse_gradients(ctx, "surface_weights", rays_d=2)
     *tensors, weights, opacity = ctx.saved_tensors
     grad_sdf, grad_gradient, grad_s = lib.surface_weights_backward(
-        *tensors, ctx.step, ctx.anneal, ctx.min_transmittance, weights, opacity, grad_normals, grad_weights, grad_opacity
+        *tensors,
+        ctx.step,
+        ctx.anneal,
+        ctx.min_transmittance,
+        weights,
+        opacity,
+        grad_normals,
+        grad_weights,
+        grad_opacity,
     )
     return grad_sdf, grad_gradient, None, grad_s.sum(), None, None, None, None
 
@@ -258,7 +268,9 @@ register("march_rays", fake=_fake_march)
 register(
     "surface_weights",
     fake=lambda sdf, gradient, rays_d, *rest: (
-        gradient.new_empty(gradient.shape), sdf.new_empty(sdf.shape), sdf.new_empty(rays_d.shape[0])
+        gradient.new_empty(gradient.shape),
+        sdf.new_empty(sdf.shape),
+        sdf.new_empty(rays_d.shape[0]),
     ),
     setup_context=_keep_surface,
     backward=_surface_backward,
@@ -266,7 +278,9 @@ register(
 register(
     "surface_weights_backward",
     fake=lambda sdf, gradient, rays_d, *rest: (
-        sdf.new_empty(sdf.shape), gradient.new_empty(gradient.shape), sdf.new_empty(rays_d.shape[0])
+        sdf.new_empty(sdf.shape),
+        gradient.new_empty(gradient.shape),
+        sdf.new_empty(rays_d.shape[0]),
     ),
 )
 register("spread_samples", fake=_fake_spread)
@@ -277,7 +291,8 @@ register(
     backward=_interpolation_backward,
 )
 register(
-    "interpolate_backward", fake=lambda grad, first, second, share, shaded: grad.new_empty(shaded.shape[0], grad.shape[1])
+    "interpolate_backward",
+    fake=lambda grad, first, second, share, shaded: grad.new_empty(shaded.shape[0], grad.shape[1]),
 )
 register(
     "neus_weights",

@@ -168,8 +168,6 @@ register(
     setup_context=_keep_layer,
     backward=_layer_backward,
 )
-register(
-    "sdf_layer_backward", fake=lambda positions, *rest: tuple(t.new_empty(t.shape) for t in rest[:6])
-)
+register("sdf_layer_backward", fake=lambda positions, *rest: tuple(t.new_empty(t.shape) for t in rest[:6]))
 register("sdf_values", fake=lambda positions, *rest: positions.new_empty(positions.shape[0]))
 register("sample_rays", fake=_fake_sample)

@@ -8,7 +8,15 @@ import torch
 from torch import Tensor
 
 from splitnerf.fields.light import lobe_roughness
-from splitnerf.ops import MeshScene, composite, linear_to_srgb, monte_carlo_light, sample_bsdf, shade_sums, trace_visibility
+from splitnerf.ops import (
+    MeshScene,
+    composite,
+    linear_to_srgb,
+    monte_carlo_light,
+    sample_bsdf,
+    shade_sums,
+    trace_visibility,
+)
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import MIN_OPACITY, RenderedRays
 
@@ -69,7 +77,9 @@ def monte_carlo_colours(
     """
     weights = ray.shares
     rays = ray.samples.ray_indices[ray.shaded]
-    key = torch.log(weights) - torch.log(-torch.log(torch.rand(len(weights), generator=generator).clamp(1e-7, 1 - 1e-7)))
+    key = torch.log(weights) - torch.log(
+        -torch.log(torch.rand(len(weights), generator=generator).clamp(1e-7, 1 - 1e-7))
+    )
     best = torch.full((len(ray.opacity),), -math.inf).scatter_reduce(0, rays, key, "amax")
     drawn = (key == best[rays]).nonzero().squeeze(1)
     rays, points = rays[drawn], ray.points

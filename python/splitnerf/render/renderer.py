@@ -9,7 +9,15 @@ import torch
 from torch import Tensor
 
 from splitnerf.config import Config
-from splitnerf.ops import PackedSamples, composite, linear_to_srgb, march_rays, sample_rays, spread_samples, surface_weights
+from splitnerf.ops import (
+    PackedSamples,
+    composite,
+    linear_to_srgb,
+    march_rays,
+    sample_rays,
+    spread_samples,
+    surface_weights,
+)
 from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
 from splitnerf.render.rays import image_rays
@@ -170,14 +178,27 @@ def render_rays(
     field = model.surface(found.positions)
     sdf = field.sdf[:n]
     normals, weights, opacity = surface_weights(
-        sdf, field.gradient[:n], found.rays_d, model.s, samples.offsets, step=step, anneal=found.anneal, min_transmittance=c.min_transmittance
+        sdf,
+        field.gradient[:n],
+        found.rays_d,
+        model.s,
+        samples.offsets,
+        step=step,
+        anneal=found.anneal,
+        min_transmittance=c.min_transmittance,
     )
 
     spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step)
     shaded = spread.shaded
-    positions, normals, sdf, view_dirs = found.positions[shaded], normals[shaded], sdf[shaded], -found.directions[shaded]
+    positions, view_dirs = found.positions[shaded], -found.directions[shaded]
+    normals, sdf = normals[shaded], sdf[shaded]
     points = model.shade(
-        positions, field.outputs[shaded], field.features[shaded], normals, view_dirs, (spread.leaders, spread.stretch),
+        positions,
+        field.outputs[shaded],
+        field.features[shaded],
+        normals,
+        view_dirs,
+        (spread.leaders, spread.stretch),
         fixed_materials=fixed_materials,
     )
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
@@ -190,8 +211,8 @@ def render_rays(
         )
         mean = mean.index_add(0, samples.ray_indices[shaded[at]], gained)
     return RenderedRays(
-        mean, c.compositing == "linear", opacity, samples, found.n_evaluated, weights, values, field.gradient, found.beside, shaded, shares, positions, normals,
-        sdf, points,
+        mean, c.compositing == "linear", opacity, samples, found.n_evaluated, weights, values, field.gradient, found.beside,
+        shaded, shares, positions, normals, sdf, points,
     )  # fmt: skip
 
 
@@ -211,7 +232,8 @@ def render_view(
         ray = render_rays(model, find_samples(model, cells, o, d, torch.full((len(o),), 0.5)))
         p = ray.points
         maps = torch.cat(
-            [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), ray.normals], 1
+            [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), ray.normals],
+            1,
         )
         weighed = ray.shares[:, None] * torch.cat([maps, torch.ones(len(maps), 1)], 1)
         sums = torch.zeros(len(o), weighed.shape[1]).index_add(0, ray.samples.ray_indices[ray.shaded], weighed)
