@@ -9,7 +9,6 @@ from skimage.transform import resize
 
 from splitnerf.data.environment import sample_environment
 from splitnerf.data.images import LDR_SUFFIXES, over_background, read_image, read_radiance, srgb_to_linear
-from splitnerf.errors import InputError
 from splitnerf.relight.cameras import View
 
 TRANSPARENT, WHITE, ENVIRONMENT = "transparent", "white", "environment"
