@@ -313,6 +313,8 @@ def seen(positions, normals, vertices, vertex_normals, radius, bits, hits, radia
     blocked = (weight[..., None] * words[:, :, 1]).sum(1)
     known = opened + blocked
     visible = torch.where(known > 0, opened / known.clamp(min=1e-9), torch.ones_like(known))
+    if not hits.shape[1]:  # nothing is known yet of what the mesh sends
+        return visible, torch.zeros(*visible.shape, 3)
     sent = radiance[hits[near].clamp(min=0)] * (weight[..., None] * words[:, :, 1])[..., None]
     return visible, sent.sum(1) / known.clamp(min=1e-9)[..., None]
 
