@@ -120,7 +120,8 @@ class Config:
     occlusion_loss_form: str = "square"  # the same choice
     metal_loss_form: str = "square"  # the same choice
     light_set: str = "fibonacci"  # fibonacci | uniform (the paper) | uniform_and_queries (the released code)
-    light_samples: int = 2048
+    light_samples: int = 2048  # of the MLP's consistency loss, at most
+    light_noise: float = 0.1  # share of that loss's squared error that their noise may make; 0: always light_samples
     light_queries: int = 512
     light_every: int = 1
     light_step_every: int = 4  # steps that share one pass through the pyramid's maps and one step of its texels
@@ -263,6 +264,7 @@ FIRST_SETTINGS: dict[str, object] = dict(
     shades_per_ray=0,
     light_step_every=1,
     open_below=0.0,
+    light_noise=0.0,
 )
 RETIRED = ("albedo_smoothness", "gloss_smoothness", "entropy_from", "shade_above")
 
@@ -282,7 +284,7 @@ PAPER = dict(
     sample_above=0.0, shades_per_ray=0, occupancy="average", grid_resolution=128, grid_every=16, hull_until=0.0, foreground_share=0.0,
     # losses
     eikonal_weight=0.1, light_weight=10.0, occlusion_weight=0.01, metal_weight=0.001, mask_weight=0.0,
-    light_loss_form="square", light_set="uniform", light_samples=8129, light_queries=8129, light_lobe_below=0.0,
+    light_loss_form="square", light_set="uniform", light_samples=8129, light_noise=0.0, light_queries=8129, light_lobe_below=0.0,
     eikonal_points=0, mesh_resolution=512, occlusion_rays=64, environment_height=128, warmup_steps=500,
     final_learning_rate=0.1, export_resolution=512,
 )  # fmt: skip

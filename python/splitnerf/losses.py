@@ -57,13 +57,17 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
 
     Half of the queries ask at rho = 1, the rest uniformly in [0, 1]. Broad lobes share one set of light directions, a
     rotated lattice or, as published, random ones (``light_set``); those below ``light_lobe_below`` sample their own lobe
-    exactly. The gradient flows into both sides.
+    exactly. The gradient flows into both sides. With ``light_noise`` the set is two of half its size, and how far their
+    integrals are apart decides its size in the steps to come.
 
-    Source: SplitNeRF Eq. (11).
+    Source: SplitNeRF Eq. (11); the size of the set is our addition.
     """
     c = config
+    n_sets, n = (
+        (2, light.loss_samples.count(c.light_noise, c.light_samples)) if c.light_noise > 0 else (1, c.light_samples)
+    )
     queries = F.normalize(torch.randn(c.light_queries, 3, generator=generator), dim=1)
-    directions = light_directions(c, queries, generator)
+    directions = torch.cat([light_directions(c, n // n_sets, queries, generator) for _ in range(n_sets)])
     roughness = torch.ones(c.light_queries, 1)
     roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, generator=generator)
     narrow = roughness[:, 0] < c.light_lobe_below
@@ -76,20 +80,23 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     asked = torch.cat([directions, own, queries])
     g = light(asked, torch.cat([torch.zeros(len(directions) + len(own), 1), roughness]))
     shared, lobes, prefiltered = g.split([len(directions), len(own), len(queries)])
-    g_bar = torch.cat([
-        lobes.view(n_narrow, c.light_lobe_samples, 3).mean(1),
-        prefilter_light(queries[n_narrow:], roughness[n_narrow:], directions, shared),
+    sums = torch.stack([
+        prefilter_light(queries[n_narrow:], roughness[n_narrow:], *part)
+        for part in zip(directions.chunk(n_sets), shared.chunk(n_sets))
     ])  # fmt: skip
-    return penalty(prefiltered - g_bar, c.light_loss_form).sum(-1).mean()
+    error = prefiltered - torch.cat([lobes.view(n_narrow, c.light_lobe_samples, 3).mean(1), sums.mean(0)])
+    if n_sets == 2:
+        noise = ((sums[0] - sums[1]) / 2).square().sum().item()
+        light.loss_samples.learn(noise, error[n_narrow:].square().sum().item(), n)
+    return penalty(error, c.light_loss_form).sum(-1).mean()
 
 
-def light_directions(config: Config, queries: Tensor, generator: torch.Generator) -> Tensor:
-    """The directions [n, 3] that the light loss integrates over."""
-    c = config
-    if c.light_set == "fibonacci":
-        return fibonacci_directions(c.light_samples, generator)
-    uniform = F.normalize(torch.randn(c.light_samples, 3, generator=generator), dim=1)
-    return torch.cat([uniform, queries]) if c.light_set == "uniform_and_queries" else uniform
+def light_directions(config: Config, n: int, queries: Tensor, generator: torch.Generator) -> Tensor:
+    """The n directions [n, 3] that the light loss integrates over, with ``uniform_and_queries`` more."""
+    if config.light_set == "fibonacci":
+        return fibonacci_directions(n, generator)
+    uniform = F.normalize(torch.randn(n, 3, generator=generator), dim=1)
+    return torch.cat([uniform, queries]) if config.light_set == "uniform_and_queries" else uniform
 
 
 def neutral_light_loss(light: Light, config: Config, generator: torch.Generator) -> Tensor:

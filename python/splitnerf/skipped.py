@@ -100,6 +100,10 @@ def measure_skips(
     if light_period(c) > 1:
         each = work(batch, light_step_every=1)
         skips.append(Skip("light's maps", "passes", 1.0 / light_period(c), 1.0, each.seconds - now.seconds))
+    if c.light_noise and model.light.needs_consistency_loss:
+        every = work(batch, light_noise=0.0)
+        wanted = model.light.loss_samples.count(c.light_noise, c.light_samples)
+        skips.append(Skip("light samples", "directions", wanted, c.light_samples, every.seconds - now.seconds))
     if getattr(model.occlusion, "sees_all", False):
         skips.append(Skip("occlusion, as the surface is convex", "lookups", 0.0, now.shaded, None))
     elif isinstance(model.occlusion, VisibilityBits) and model.occlusion.cache is not None:

@@ -10,6 +10,7 @@ import torch
 from splitnerf import losses
 from splitnerf.config import preset
 from splitnerf.fields import LightMlp, OcclusionHead, SdfField
+from splitnerf.fields.light import LightSamples
 from splitnerf.fields.occlusion import OcclusionQuery
 from splitnerf.fields.sdf import sharpness
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec
@@ -71,6 +72,28 @@ class TestSdf:
         assert sharpness(torch.tensor(0.3)) == pytest.approx(math.exp(3.0), rel=1e-5)
 
 
+LAMP_COSINE = math.cos(math.radians(3.0))
+
+
+class TwoLevels:
+    """1 everywhere, but 2 where rough: its integrals are exact and its error is not noise."""
+
+    def __init__(self):
+        self.loss_samples = LightSamples()
+
+    def __call__(self, directions, roughness):
+        return 1.0 + (roughness > 0).float().expand(-1, 3)
+
+
+class Lamp(TwoLevels):
+    """A lamp of 3 degrees, and where rough the diffuse light of it up to what the lattice makes of it."""
+
+    def __call__(self, directions, roughness):
+        cosine = directions[:, 2:]
+        flux = 2.0 * 1e3 * (1.0 - LAMP_COSINE)  # over pi
+        return torch.where(roughness > 0, flux * cosine.clamp(min=0), 1e3 * (cosine > LAMP_COSINE)).expand(-1, 3)
+
+
 class TestLight:
     @pytest.mark.parametrize("activation", ["softplus", "exp"])
     def test_it_is_never_negative_and_starts_at_half(self, activation):
@@ -98,6 +121,25 @@ class TestLight:
         loss = losses.light_loss(light, config, torch.Generator().manual_seed(0), 0)
         loss.backward()
         assert loss.item() > 1e-2 and light.out.weight.grad.abs().max() > 0
+
+    def test_the_loss_takes_as_many_directions_as_its_error_needs(self):
+        """Where integrals are exact the fewest, where noise is all that is left as many as are allowed."""
+        generator = torch.Generator().manual_seed(0)
+        config = preset("cpu").replace({"light_samples": 1024, "light_queries": 64, "light_noise": 0.1})
+        for light, expected in ((TwoLevels(), 64), (Lamp(), 1024)):
+            assert light.loss_samples.count(0.1, 1024) == 1024
+            for step in range(30):
+                losses.light_loss(light, config, generator, step)
+            assert light.loss_samples.count(0.1, 1024) == expected
+
+    def test_the_number_of_directions_is_that_of_the_share_of_noise(self):
+        """Integrals over 200 directions with a variance of .1 beside an error of 1: 20 / .1 = 200 directions."""
+        samples = LightSamples()
+        samples.learn(0.1, 1.0, 200)
+        assert samples.count(0.1, 2048) == 200
+        for _ in range(500):
+            samples.learn(0.3, 1.0, 200)
+        assert samples.count(0.1, 2048) == pytest.approx(600, abs=1)
 
 
 class TestOcclusionHead:

@@ -305,7 +305,7 @@ def test_a_config_survives_its_file(tmp_path):
 def test_runs_from_before_a_setting_keep_what_they_were_trained_with():
     stored = dataclasses.asdict(Config())
     assert config_of({"config": stored}) == Config()
-    later = ("sample_above", "shades_per_ray", "light_step_every", "open_below")
+    later = ("sample_above", "shades_per_ray", "light_step_every", "open_below", "light_noise")
     for name in (
         "light",
         "neutral_weight",
@@ -330,5 +330,5 @@ def test_runs_from_before_a_setting_keep_what_they_were_trained_with():
         0.0,
         0,
         1,
-    ) and config.open_below == 0.0
+    ) and config.open_below == config.light_noise == 0.0
     assert config.neutral_weight == config.entropy_weight == config.dark_metal_weight == config.normal_smoothness == 0.0

@@ -10,6 +10,32 @@ from torch import Tensor, nn
 
 from splitnerf import _core
 
+SAMPLES_RATE = 0.03  # of the running means that decide how many directions the light loss takes
+FEWEST_SAMPLES = 64
+
+
+class LightSamples:
+    """How many directions the light's consistency loss takes: so many that the noise of its integrals makes up the share
+    of the squared error that they are to tell that is asked for.
+
+    Both are running means, as a lamp that few directions meet is seen in few steps.
+    """
+
+    def __init__(self) -> None:
+        self.variance = self.squared_error = 0.0
+
+    def learn(self, noise: float, squared_error: float, n: int) -> None:
+        """Takes the variance of one step's integrals over n directions, and the squared error."""
+        rate = SAMPLES_RATE if self.squared_error else 1.0
+        self.variance += rate * (noise * n - self.variance)
+        self.squared_error += rate * (squared_error - self.squared_error)
+
+    def count(self, share: float, most: int) -> int:
+        """Directions of the next step for noise of this share, 64 to ``most``; before the first step the most."""
+        if not self.squared_error:
+            return most
+        return int(min(most, max(FEWEST_SAMPLES, self.variance / (share * self.squared_error))))
+
 
 class Light(nn.Module, abc.ABC):
     """The pre-integrated light g(w, rho): the environment filtered by the lobe of roughness rho.
@@ -20,11 +46,16 @@ class Light(nn.Module, abc.ABC):
     Attributes:
         needs_consistency_loss: Whether only ``losses.light_loss`` ties g(w, rho) to g(w, 0). False where
             that holds by construction.
+        loss_samples: How many light directions that loss takes. Not part of a checkpoint.
 
     Source: SplitNeRF Eq. (8)-(11).
     """
 
     needs_consistency_loss = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.loss_samples = LightSamples()
 
     @abc.abstractmethod
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
