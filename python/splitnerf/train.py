@@ -14,7 +14,14 @@ from torch import Tensor
 
 from splitnerf import losses
 from splitnerf.batches import Batch, draw_batch
-from splitnerf.checkpoint import load_checkpoint, save_checkpoint
+from splitnerf.checkpoint import (
+    load_checkpoint,
+    restore_generator,
+    restore_model,
+    restore_optimiser,
+    restored_occupancy,
+    save_checkpoint,
+)
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
 from splitnerf.errors import InputError
@@ -82,13 +89,13 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     step, seconds, n_rays, meshed_at, previewed_at = 0, 0.0, c.initial_rays, 0.0, 0.0
 
     if resume:
-        content = load_checkpoint(run / "checkpoint.pt")
+        path = run / "checkpoint.pt"
+        content = load_checkpoint(path)
         check_same_scene(content, fingerprint, run)
-        model.load_state_dict(content["model"])
-        optimiser.load_state_dict(content["optimiser"])
-        generator.set_state(content["generator"])
-        torch.set_rng_state(content["torch_generator"])
-        grid.values = content["occupancy"]
+        restore_model(model, content, path)
+        restore_optimiser(optimiser, content, path)
+        restore_generator(generator, content, path)
+        grid.values = restored_occupancy(grid.values, content, path)
         step, seconds, n_rays = content["step"], content["seconds"], content["n_rays"]
         meshed_at, previewed_at = content["meshed_at"], content["previewed_at"]
     mesh: tuple[Tensor, Tensor] | tuple[None, None] = (
