@@ -43,6 +43,7 @@ class Config:
     seed: int = 0
     steps: int = 6000
     max_minutes: float = 0.0  # training time; 0: only the steps count
+    deterministic: bool = False  # two runs give the same bits, on one machine with one number of threads
     box: float = 1.5
 
     # Surface: hash grid, progressive levels, one hidden layer.
@@ -213,6 +214,10 @@ class Config:
             raise InputError(
                 "shading = summed needs occlusion = bits with at least 256 occlusion_directions, compositing = linear and "
                 "fresnel_mode = exact; set shading=split"
+            )
+        if self.deterministic and self.max_minutes > 0:
+            raise InputError(
+                "a deterministic run ends by its steps alone; leave out --max-minutes (max_minutes) and give --steps"
             )
         if not 1 <= self.growth <= 16:
             raise InputError(f"growth must be in [1, 16], got {self.growth}")

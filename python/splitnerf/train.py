@@ -35,6 +35,7 @@ from splitnerf.render.monte_carlo import monte_carlo_colours
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
+from splitnerf.repeatable import same_bits
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first ones are logged one by one
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion rays
@@ -129,7 +130,8 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True
     psnr_mean = samples_mean = None
     watch = GradientWatch(model.parameters())
-    with Interrupt() as interrupt, Progress(progress_now()) as bar, open(run / "metrics.jsonl", "a") as log:
+    log = open(run / "metrics.jsonl", "a")
+    with log, Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic):
         while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % light_steps == 0):
             model.open_levels(progress)
             set_learning_rate(optimiser, c, step, progress)

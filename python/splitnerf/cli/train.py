@@ -40,6 +40,11 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, help="of all random numbers (default: 0)")
     parser.add_argument(
+        "--deterministic",
+        action="store_true",
+        help="two runs with one seed give the same bits, on one machine with one number of threads",
+    )
+    parser.add_argument(
         "--set",
         action="append",
         default=[],
@@ -63,6 +68,8 @@ def run(args: argparse.Namespace) -> int:
     settings |= budget(args.steps, args.max_minutes)
     if args.seed is not None:
         settings["seed"] = args.seed
+    if args.deterministic:
+        settings["deterministic"] = True
     if args.resume:
         if args.preset:
             raise InputError("--preset cannot change in a run that is resumed")
