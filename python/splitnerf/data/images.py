@@ -13,6 +13,7 @@ import OpenImageIO as oiio
 import torch
 
 from splitnerf import ops
+from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
 
 LDR_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -64,7 +65,7 @@ def read_image(path: str | os.PathLike) -> np.ndarray:
         InputError: The file is missing, unreadable, truncated, of another format, or claims a size beyond reason.
     """
     path = Path(path)
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path}: no such image; check the path")
     return _read(path, str(path))
 
