@@ -128,7 +128,9 @@ def _check_container(path: Path) -> None:
     """Raises ValueError where the file could take more memory than it is long, or names other things than tensors."""
     with zipfile.ZipFile(path) as archive:
         entries = archive.infolist()
-        if any(entry.compress_type != zipfile.ZIP_STORED or entry.file_size != entry.compress_size for entry in entries):
+        if any(
+            entry.compress_type != zipfile.ZIP_STORED or entry.file_size != entry.compress_size for entry in entries
+        ):
             raise ValueError("its parts are compressed")
         if sum(entry.file_size for entry in entries) > path.stat().st_size:
             raise ValueError("its parts are longer than the file")

@@ -113,9 +113,7 @@ def _state(model: SceneModel, optimiser: torch.optim.Optimizer) -> Iterator[tupl
             yield f"{key} of {name}", value
 
 
-def _data_flow(
-    dataset: Dataset, batch: Batch, model: SceneModel, ray: RenderedRays
-) -> Iterator[tuple[str, Tensor]]:
+def _data_flow(dataset: Dataset, batch: Batch, model: SceneModel, ray: RenderedRays) -> Iterator[tuple[str, Tensor]]:
     for i, name in enumerate(dataset.frame_names):
         yield f"image {name}", torch.from_numpy(dataset.images[i])
         yield f"pose of {name}", torch.from_numpy(dataset.poses[i])

@@ -236,7 +236,9 @@ def main() -> None:
     name, options = sys.argv[1], sys.argv[2:]
     corpus = Path("build/fuzz") / name
     corpus.mkdir(parents=True, exist_ok=True)
-    options += [f"{key}={value}" for key, value in DEFAULTS.items() if not any(o.startswith(key + "=") for o in options)]
+    options += [
+        f"{key}={value}" for key, value in DEFAULTS.items() if not any(o.startswith(key + "=") for o in options)
+    ]
     if not any(option.startswith("-artifact_prefix=") for option in options):
         options.append(f"-artifact_prefix=build/fuzz/{name}-")
     with tempfile.TemporaryDirectory() as folder:

@@ -17,6 +17,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "train", help="reconstruct an object from posed images",
         description="Trains on DATA (NeRF-Blender layout, or a transforms.json with masks) and writes mesh.glb, mesh.ply, "
         "environment.exr/.hdr, evaluation.json and report.html into the run's folder.",
+        epilog="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient "
+        "alone skips its step. The message names where it came from, and the last checkpoint stands: --resume goes on "
+        "from it.",
     )  # fmt: skip
     parser.add_argument("data", type=Path, metavar="DATA", help="folder with transforms_train.json or transforms.json")
     parser.add_argument("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
