@@ -24,11 +24,12 @@ FORMS = ("square", "smooth_l1")
 LARGEST_FLOAT = 1e30
 LARGEST_INT = 1 << 24  # these have bounds of their own, and are at least 1 but for the seed
 LARGEST = dict(
-    seed=(1 << 63) - 1, steps=10**9, n_levels=32, n_features=16, base_resolution=4096, log2_table_size=24, sdf_width=1024,
-    sdf_outputs=1024, material_width=1024, material_layers=16, occlusion_width=1024, occlusion_layers=16, light_width=1024,
-    light_layers=16, light_direction_frequencies=32, light_roughness_frequencies=32, max_rays=1 << 20, initial_rays=1 << 20,
-    grid_resolution=512, mesh_resolution=2048, export_resolution=4096, export_texture_size=1 << 15,
-    export_environment_height=1 << 13, environment_height=1 << 13,
+    seed=(1 << 63) - 1, steps=10**9, n_levels=32, n_features=8, base_resolution=4096, log2_table_size=24,
+    sdf_width=1024, sdf_outputs=1024, material_width=1024, material_layers=16, occlusion_width=1024,
+    occlusion_layers=16, light_width=1024, light_layers=16, light_direction_frequencies=32,
+    light_roughness_frequencies=32, max_rays=1 << 20, initial_rays=1 << 20, grid_resolution=512, mesh_resolution=2048,
+    export_resolution=4096, export_texture_size=1 << 15, export_environment_height=1 << 13,
+    environment_height=1 << 13,
 )  # fmt: skip
 
 

@@ -23,10 +23,11 @@ class Diverged(RuntimeError):
 
     The rule:
         - Images whose pixels are NaN, infinite or outside [0, 1] are refused when they are read.
-        - A loss that is not finite stops the run before the parameters move. The message names the loss's terms and the
-          first that is not finite of what they come from: images, cameras, parameters, rendered rays.
-        - A gradient that is not finite, or too large to be squared, skips the step: parameters and optimiser stay as they
-          are. It is said on stderr, and metrics.jsonl counts such steps as ``skipped``. The tenth in a row stops the run.
+        - A loss that is not finite stops the run before the parameters move. The message names the loss's terms and
+          the first that is not finite of what they come from: images, cameras, parameters, rendered rays.
+        - A gradient that is not finite, or too large to be squared, skips the step: parameters and optimiser stay as
+          they are. It is said on stderr, and metrics.jsonl counts such steps as ``skipped``. The tenth in a row stops
+          the run.
         - Parameters are looked at with every line of metrics.jsonl, before a mesh is made of them and before they are
           saved. Where one is not finite the run stops and no checkpoint is written.
         - A checkpoint whose numbers are not finite is refused when it is read.

@@ -26,7 +26,7 @@ from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
 from splitnerf.errors import InputError
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
-from splitnerf.finite import Diverged, GradientWatch, check_state, explain_loss
+from splitnerf.finite import GradientWatch, check_state, explain_loss
 from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
 from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
@@ -69,7 +69,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
 
     Raises:
         InputError: The checkpoint belongs to another scene or cannot be read.
-        Diverged: Numbers are no longer finite, by the rule that stands there; the last checkpoint stands.
+        splitnerf.finite.Diverged: Numbers are no longer finite, by the rule that stands there; the last checkpoint stands.
         OSError: The disk is full; the last checkpoint stands.
     """
     c = config

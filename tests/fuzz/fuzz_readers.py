@@ -1,8 +1,9 @@
 """Fuzzes the readers: python tests/fuzz/fuzz_readers.py READER [libFuzzer's options]
 
-READER is json, png, exr, hdr, glb or checkpoint. The corpus begins with small valid files that the program writes itself;
-what libFuzzer adds to it lies in build/fuzz/READER. A reader may return or raise InputError with one line; anything else,
-more than -timeout seconds or more than -rss_limit_mb of memory is a finding, and its input is kept in build/fuzz.
+READER is json, png, exr, hdr, glb or checkpoint. The corpus begins with small valid files that the program writes
+itself; what libFuzzer adds to it lies in build/fuzz/READER. A reader may return or raise InputError with one line;
+anything else, more than -timeout seconds or more than -rss_limit_mb of memory is a finding, and its input is kept in
+build/fuzz.
 
 Sums over a PNG's chunks and a zip's parts, which every mutation breaks, are mended in half of the inputs before the
 reader sees them.
@@ -14,6 +15,7 @@ import contextlib
 import gc
 import io
 import json
+import os
 import struct
 import sys
 import tempfile
@@ -113,7 +115,8 @@ class ImageReader(Reader):
 
     def corpus(self) -> list[bytes]:
         seeds = []
-        for pixels in (disc(8), disc(8)[..., :3], disc(4)[:2, ..., 0]):
+        coloured = disc(8)[..., :3] if self.suffix == ".hdr" else disc(8)
+        for pixels in (coloured, disc(4)[:2, ..., :3]):
             write_image(self.folder / f"seed{self.suffix}", pixels)
             seeds.append((self.folder / f"seed{self.suffix}").read_bytes())
         return seeds
@@ -241,13 +244,13 @@ def main() -> None:
     ]
     if not any(option.startswith("-artifact_prefix=") for option in options):
         options.append(f"-artifact_prefix=build/fuzz/{name}-")
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, open(os.devnull, "w") as unread:
         reader = READERS[name](Path(folder))
         for i, seed in enumerate(reader.corpus()):
             (corpus / f"seed_{i}").write_bytes(seed)
 
         def feed(data: bytes) -> None:
-            with contextlib.redirect_stderr(io.StringIO()):  # notes
+            with contextlib.redirect_stderr(unread):  # notes
                 try:
                     reader.read(data)
                 except InputError as error:

@@ -86,6 +86,14 @@ def test_images_that_claim_more_than_they_hold(tmp_path, suffix, content):
         read_image(path)
 
 
+def test_an_image_whose_error_is_no_text(tmp_path):
+    """OpenImageIO's message repeats the name of an attribute."""
+    header = struct.pack("<II", 20000630, 2) + b"displayWindow\0\xff\xff\xff\0" + struct.pack("<I4i", 16, 0, 0, 7, 3)
+    (tmp_path / "image.exr").write_bytes(header + b"\0" * 64)
+    with pytest.raises(InputError, match="image.exr: cannot be read as an image"):
+        read_image(tmp_path / "image.exr")
+
+
 def test_other_formats_are_not_looked_into(tmp_path):
     pixel = struct.pack("<2sIHHIIiiHHIIiiII", b"BM", 58, 0, 0, 54, 40, 1, 1, 1, 24, 0, 4, 1, 1, 0, 0) + bytes(4)
     (tmp_path / "image.png").write_bytes(pixel)

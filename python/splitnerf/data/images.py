@@ -153,11 +153,11 @@ def write_image(path: str | os.PathLike, pixels: np.ndarray, *, half: bool = Fal
     with atomic_path(path) as temporary:
         sink = oiio.ImageOutput.create(str(temporary))
         if sink is None:
-            raise OSError(f"{path}: OpenImageIO cannot write it ({_first_line(oiio.geterror())})")
+            raise OSError(f"{path}: OpenImageIO cannot write it ({_reason(oiio)})")
         written = sink.open(str(temporary), spec) and sink.write_image(np.ascontiguousarray(pixels))
         closed = sink.close()
         if not (written and closed):
-            raise OSError(f"{path}: writing failed ({_first_line(sink.geterror())})")
+            raise OSError(f"{path}: writing failed ({_reason(sink)})")
 
 
 def encode_png(pixels: np.ndarray) -> bytes:
@@ -240,19 +240,28 @@ def _read(path: Path, name: str) -> np.ndarray:
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), config)
     if source is None:
-        raise InputError(f"{name}: cannot be read as an image ({_first_line(oiio.geterror())}); replace it")
+        raise InputError(f"{name}: cannot be read as an image ({_reason(oiio)}); replace it")
     try:
         spec = source.spec()
         n_values = spec.width * spec.height * spec.depth * spec.nchannels
-        if spec.depth > 1 or n_values > min(LARGEST_IMAGE, VALUES_PER_BYTE * path.stat().st_size):
+        if (
+            min(spec.width, spec.height) < 1
+            or spec.depth > 1
+            or n_values > min(LARGEST_IMAGE, VALUES_PER_BYTE * path.stat().st_size)
+        ):
             raise InputError(f"{name}: is said to be {spec.width}x{spec.height}, too large for its file; replace it")
         pixels = source.read_image(0, 0, 0, spec.nchannels, "float")
         if pixels is None or source.has_error:
-            raise InputError(f"{name}: truncated or damaged image ({_first_line(source.geterror())}); replace it")
+            raise InputError(f"{name}: truncated or damaged image ({_reason(source)}); replace it")
     finally:
         source.close()
     return np.ascontiguousarray(pixels, dtype=np.float32).reshape(spec.height, spec.width, -1)
 
 
-def _first_line(message: str) -> str:
-    return message.strip().splitlines()[0] if message.strip() else "no reason given"
+def _reason(source) -> str:
+    """The first line of what OpenImageIO, or one of its readers or writers, has to say."""
+    try:
+        lines = source.geterror().strip().splitlines()
+    except UnicodeDecodeError:  # it repeats bytes of the file
+        lines = []
+    return lines[0] if lines else "no reason given"
