@@ -1,12 +1,17 @@
 # make demo   installs what is missing, builds, and reconstructs an embedded scene
 # make test   installs, builds, and runs gtest and pytest
+# make sanitize   builds gtest with AddressSanitizer and UndefinedBehaviorSanitizer and runs it
+# make fuzz   feeds each reader damaged files for FUZZ_SECONDS, in four parts: tracing takes memory with every run
 VENV ?= .venv
 PYTHON ?= python3
 BIN := $(VENV)/bin
 BUILD ?= build/tests
 JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 
-.PHONY: demo test test-slow install system gtest pytest clean
+FUZZ_SECONDS ?= 600
+READERS := json png exr hdr glb checkpoint
+
+.PHONY: demo test test-slow install system gtest sanitize fuzz pytest clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -17,6 +22,16 @@ gtest: install
 	$(BIN)/cmake -S . -B $(BUILD) -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 	$(BIN)/cmake --build $(BUILD) -j $(JOBS)
 	$(BUILD)/splitnerf_tests --gtest_brief=1
+
+sanitize: install
+	$(BIN)/cmake -S . -B build/sanitize -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON -DSPLITNERF_SANITIZE=ON
+	$(BIN)/cmake --build build/sanitize -j $(JOBS)
+	UBSAN_OPTIONS=print_stacktrace=1 build/sanitize/splitnerf_tests --gtest_brief=1
+
+fuzz: install
+	$(BIN)/python -m pip install --quiet -e '.[fuzz]' --no-build-isolation
+	set -e; for reader in $(READERS); do for part in 1 2 3 4; do \
+	  $(BIN)/python tests/fuzz/fuzz_readers.py $$reader -max_total_time=$$(($(FUZZ_SECONDS) / 4)); done; done
 
 pytest: install
 	$(BIN)/python -m pytest -q

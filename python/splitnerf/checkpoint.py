@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-import pickle
+import math
+import pickletools
+import zipfile
 from pathlib import Path
 
 import torch
+from torch import Tensor, nn
 
 from splitnerf.config import Config
 from splitnerf.data.images import atomic_path
 from splitnerf.errors import InputError
+from splitnerf.ops.hash_grid import HashGridSpec
 
 FORMAT = 1
+GLOBALS = {"torch._utils _rebuild_tensor_v2", "collections OrderedDict"}  # and the kinds of storage
+STORAGES = {f"torch {kind}Storage" for kind in ("Float", "Double", "Long", "Int", "Byte", "Bool")}
+LONGEST_PICKLE = 1 << 22  # bytes; ours have some ten thousand
+LARGEST = {"step": 1e12, "seconds": 1e12, "meshed_at": 1.0, "previewed_at": 1.0}
+MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
 def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict) -> None:
@@ -31,23 +40,168 @@ def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict
 
 
 def load_checkpoint(path: Path) -> dict:
-    """Reads a checkpoint with torch's restricted unpickler.
+    """Reads a checkpoint with torch's restricted unpickler, whoever wrote it.
+
+    Before, the container is looked at: nothing in it is compressed, and its pickle names nothing but tensors. So a file
+    takes no more memory than it is long. After, every value has the type, shape and range that the trainer writes.
 
     Raises:
-        InputError: The file is missing, truncated, of another format or holds anything but tensors and plain values.
+        InputError: The file is missing, truncated, of another format, holds anything but what the trainer writes, or
+            numbers that are not finite.
     """
     if not path.is_file():
         raise InputError(f"{path}: no checkpoint there; train without --resume first")
     try:
+        _check_container(path)
         content = torch.load(path, map_location="cpu", weights_only=True)
         found = content["format"]
-    except (OSError, RuntimeError, EOFError, KeyError, TypeError, pickle.UnpicklingError) as error:
-        raise InputError(f"{path}: not a readable checkpoint ({str(error).splitlines()[0]})") from error
+    except Exception as error:  # zipfile and torch raise whatever a damaged file makes them meet
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        raise InputError(f"{path}: not a readable checkpoint ({reason}); use another, or train anew") from None
     if found != FORMAT:
         raise InputError(f"{path}: checkpoint format {found}, this version reads {FORMAT}")
+    try:
+        _check_content(content)
+    except (ValueError, InputError) as error:
+        raise InputError(f"{path}: not a checkpoint of a run ({error}); use another, or train anew") from None
     return content
 
 
 def config_of(content: dict) -> Config:
     """The settings of the run that wrote the checkpoint."""
     return Config.stored(content["config"])
+
+
+def restore_model(model: nn.Module, content: dict, path: Path) -> None:
+    """Puts the parameters of a checkpoint into a model.
+
+    Raises:
+        InputError: The model has others: the settings are not those of the checkpoint.
+    """
+    ours, stored = model.state_dict(), content["model"]
+    for name in [*ours, *stored]:
+        if name not in ours or name not in stored or ours[name].shape != stored[name].shape:
+            raise InputError(f"{path}: its parameter {name} does not fit the settings; leave them as they were")
+    model.load_state_dict(stored)
+
+
+def restore_optimiser(optimiser: torch.optim.Optimizer, content: dict, path: Path) -> None:
+    """Puts the moments of a checkpoint into an AdamW; rates and decay stay those of the settings.
+
+    Raises:
+        InputError: They are not those of its parameters.
+    """
+    parameters = [parameter for group in optimiser.param_groups for parameter in group["params"]]
+    stored = content["optimiser"]["state"]
+    for index, moments in stored.items():
+        fits = isinstance(index, int) and 0 <= index < len(parameters)
+        if not fits or any(moments[name].shape != parameters[index].shape for name in MOMENTS):
+            raise InputError(f"{path}: its optimiser does not fit the settings; leave them as they were")
+    optimiser.load_state_dict({"state": stored, "param_groups": optimiser.state_dict()["param_groups"]})
+
+
+def restore_generator(generator: torch.Generator, content: dict, path: Path) -> None:
+    """Puts the states of the run's random generator and of torch's own back.
+
+    Raises:
+        InputError: They are no states of generators.
+    """
+    try:
+        generator.set_state(content["generator"])
+        torch.set_rng_state(content["torch_generator"])
+    except RuntimeError as error:
+        raise InputError(f"{path}: its random generators cannot be restored ({error}); train anew") from None
+
+
+def restored_occupancy(values: Tensor, content: dict, path: Path) -> Tensor:
+    """What the checkpoint keeps of each cell, for a grid that has ``values`` [r^3] of them.
+
+    Raises:
+        InputError: It has another number of cells.
+    """
+    if content["occupancy"].shape != values.shape:
+        raise InputError(f"{path}: its occupancy grid does not fit the settings; leave grid_resolution as it was")
+    return content["occupancy"]
+
+
+def _check_container(path: Path) -> None:
+    """Raises ValueError where the file could take more memory than it is long, or names other things than tensors."""
+    with zipfile.ZipFile(path) as archive:
+        entries = archive.infolist()
+        if any(
+            entry.compress_type != zipfile.ZIP_STORED or entry.file_size != entry.compress_size for entry in entries
+        ):
+            raise ValueError("its parts are compressed")
+        if sum(entry.file_size for entry in entries) > path.stat().st_size:
+            raise ValueError("its parts are longer than the file")
+        for entry in entries:
+            if entry.filename.endswith(".pkl"):
+                if entry.file_size > LONGEST_PICKLE:
+                    raise ValueError("its pickle is too long")
+                _check_pickle(archive.read(entry))
+
+
+def _check_pickle(pickled: bytes) -> None:
+    for operation, argument, _ in pickletools.genops(pickled):
+        named = "GLOBAL" in operation.name or operation.name in ("INST", "OBJ", "NEWOBJ", "NEWOBJ_EX")
+        if named and argument not in GLOBALS | STORAGES:
+            raise ValueError(f"it asks for {argument or operation.name}")
+
+
+def _check_content(content: dict) -> None:
+    """Raises ValueError or InputError where a value is not what the trainer writes."""
+    kinds = {"config": dict, "fingerprint": str, "step": int, "seconds": float, "n_rays": int, "meshed_at": float,
+             "previewed_at": float, "model": dict, "optimiser": dict}  # fmt: skip
+    for key, kind in kinds.items():
+        if not isinstance(content.get(key), kind):
+            raise ValueError(f"{key} is missing or of another type")
+    for key, largest in LARGEST.items():
+        if not 0 <= content[key] <= largest:
+            raise ValueError(f"{key} is {content[key]}")
+    config = config_of(content)
+    if not 1 <= content["n_rays"] <= max(config.initial_rays, config.max_rays):
+        raise ValueError(f"n_rays is {content['n_rays']}")
+    for name, parameter in content["model"].items():
+        _check_tensor(f"parameter {name}", parameter, None, torch.float32)
+    state = content["optimiser"].get("state")
+    if not isinstance(state, dict) or not all(isinstance(moments, dict) for moments in state.values()):
+        raise ValueError("the optimiser's state is missing")
+    for moments in state.values():
+        _check_tensor("the optimiser's step", moments.get("step"), (), torch.float32)
+        for name in MOMENTS:
+            _check_tensor(f"the optimiser's {name}", moments.get(name), None, torch.float32)
+    for key in ("generator", "torch_generator"):
+        _check_tensor(key, content.get(key), (-1,), torch.uint8)
+    _check_tensor("occupancy", content.get("occupancy"), (config.grid_resolution**3,), torch.float32)
+    _check_sizes(config, content["model"])
+    if "box_from_world" in content:
+        _check_tensor("box_from_world", content["box_from_world"], (4, 4), torch.float64)
+    vertices, faces = content.get("mesh_vertices"), content.get("mesh_faces")
+    if vertices is not None or faces is not None:
+        _check_tensor("mesh_vertices", vertices, (-1, 3), torch.float32)
+        _check_tensor("mesh_faces", faces, (-1, 3), torch.int32, torch.int64)
+        if not (faces.numel() and 0 <= int(faces.min()) and int(faces.max()) < len(vertices)):
+            raise ValueError("mesh_faces is empty or names vertices that are none")
+
+
+def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:
+    """Raises ValueError where the settings ask for more than the file holds: they are about to be allocated."""
+    c = config
+    grid = HashGridSpec(c.n_levels, c.n_features, c.base_resolution, c.growth, c.log2_table_size)
+    sizes = {"sdf_field.grid.table": grid.n_entries * c.n_features}
+    if c.light == "pyramid":
+        sizes["light.texels"] = 3 * sum(4**k for k in range(2, c.light_resolution.bit_length()))
+    for name, size in sizes.items():
+        if name not in parameters or parameters[name].numel() != size:
+            raise ValueError(f"parameter {name} does not fit the settings")
+
+
+def _check_tensor(name: str, value: object, shape: tuple[int, ...] | None, *dtypes: torch.dtype) -> None:
+    """Shape None is any, -1 any size."""
+    fits = type(value) is Tensor and value.dtype in dtypes and value.is_contiguous()
+    if fits and shape is not None:
+        fits = len(shape) == value.dim() and all(a in (-1, b) for a, b in zip(shape, value.shape))
+    if not fits:
+        raise ValueError(f"{name} is missing or of another type or shape")
+    if not (math.isfinite(value.sum().item()) or value.isfinite().all()):
+        raise ValueError(f"{name} has NaN or infinite values")

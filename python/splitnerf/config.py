@@ -21,6 +21,16 @@ else:
 MIN_EXPORT_SIZE = 8  # nodes or texels along an edge
 SUMMED_DIRECTIONS = 256  # fewer do not resolve the lobes that `shading = summed` sums
 FORMS = ("square", "smooth_l1")
+LARGEST_FLOAT = 1e30
+LARGEST_INT = 1 << 24  # these have bounds of their own, and are at least 1 but for the seed
+LARGEST = dict(
+    seed=(1 << 63) - 1, steps=10**9, n_levels=32, n_features=8, base_resolution=4096, log2_table_size=24,
+    sdf_width=1024, sdf_outputs=1024, material_width=1024, material_layers=16, occlusion_width=1024,
+    occlusion_layers=16, light_width=1024, light_layers=16, light_direction_frequencies=32,
+    light_roughness_frequencies=32, max_rays=1 << 20, initial_rays=1 << 20, grid_resolution=512, mesh_resolution=2048,
+    export_resolution=4096, export_texture_size=1 << 15, export_environment_height=1 << 13,
+    environment_height=1 << 13,
+)  # fmt: skip
 
 
 @dataclass
@@ -34,6 +44,7 @@ class Config:
     seed: int = 0
     steps: int = 6000
     max_minutes: float = 0.0  # training time; 0: only the steps count
+    deterministic: bool = False  # two runs give the same bits, on one machine with one number of threads
     box: float = 1.5
 
     # Surface: hash grid, progressive levels, one hidden layer.
@@ -162,6 +173,7 @@ class Config:
 
     def __post_init__(self) -> None:
         choices = {
+            "n_features": (1, 2, 4, 8),
             "normals": ("analytic", "finite_difference"),
             "head_inputs": ("outputs", "grid"),
             "occlusion": ("mlp", "bits", "off"),
@@ -186,6 +198,11 @@ class Config:
             value = getattr(self, field.name)
             if field.type in ("int", "float") and field.name != "seed" and value < 0:
                 raise InputError(f"{field.name} must not be negative, got {value}")
+            largest = LARGEST.get(field.name, LARGEST_INT) if field.type == "int" else LARGEST_FLOAT
+            if field.type in ("int", "float") and not abs(value) <= largest:  # nor is NaN
+                raise InputError(f"{field.name} must be at most {largest}, got {value}")
+            if field.name in LARGEST and field.name != "seed" and value < 1:
+                raise InputError(f"{field.name} must be at least 1, got {value}")
         for key in ("mesh_resolution", "export_resolution", "export_texture_size"):
             if getattr(self, key) < MIN_EXPORT_SIZE:
                 raise InputError(f"{key} must be at least {MIN_EXPORT_SIZE}, got {getattr(self, key)}")
@@ -199,6 +216,12 @@ class Config:
                 "shading = summed needs occlusion = bits with at least 256 occlusion_directions, compositing = linear and "
                 "fresnel_mode = exact; set shading=split"
             )
+        if self.deterministic and self.max_minutes > 0:
+            raise InputError(
+                "a deterministic run ends by its steps alone; leave out --max-minutes (max_minutes) and give --steps"
+            )
+        if not 1 <= self.growth <= 16:
+            raise InputError(f"growth must be in [1, 16], got {self.growth}")
         if not 0 <= self.min_roughness < 1:
             raise InputError(f"min_roughness must be in [0, 1), got {self.min_roughness}")
         for key in ("entropy_points", "smoothness_points", "neutral_queries", "albedo_width", "gloss_width"):
@@ -220,8 +243,6 @@ class Config:
             raise InputError(f"shades_per_ray must be at most 1024, got {self.shades_per_ray}")
         if self.sample_above >= 1:
             raise InputError(f"sample_above must be in [0, 1), got {self.sample_above}")
-        if self.steps < 1:
-            raise InputError(f"steps must be at least 1, got {self.steps}")
 
     def replace(self, settings: dict[str, object]) -> Config:
         """A copy with some settings changed. Unknown keys and values of another type raise InputError."""

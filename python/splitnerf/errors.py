@@ -8,3 +8,6 @@ class InputError(Exception):
 
     The command line prints it without a traceback and exits with code 2.
     """
+
+    def __str__(self) -> str:
+        return " ".join(super().__str__().splitlines())  # a name from a file may hold line ends

@@ -14,11 +14,19 @@ from torch import Tensor
 
 from splitnerf import losses
 from splitnerf.batches import Batch, draw_batch
-from splitnerf.checkpoint import load_checkpoint, save_checkpoint
+from splitnerf.checkpoint import (
+    load_checkpoint,
+    restore_generator,
+    restore_model,
+    restore_optimiser,
+    restored_occupancy,
+    save_checkpoint,
+)
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
 from splitnerf.errors import InputError
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
+from splitnerf.finite import GradientWatch, check_state, explain_loss
 from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
 from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
@@ -27,13 +35,10 @@ from splitnerf.render.monte_carlo import monte_carlo_colours
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
+from splitnerf.repeatable import same_bits
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first ones are logged one by one
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion rays
-
-
-class Diverged(RuntimeError):
-    """A loss or a gradient is no longer finite."""
 
 
 @dataclass
@@ -64,7 +69,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
 
     Raises:
         InputError: The checkpoint belongs to another scene or cannot be read.
-        Diverged: A loss is no longer finite; the last checkpoint stands.
+        splitnerf.finite.Diverged: Numbers are no longer finite, by the rule that stands there; the last checkpoint stands.
         OSError: The disk is full; the last checkpoint stands.
     """
     c = config
@@ -85,13 +90,13 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     step, seconds, n_rays, meshed_at, previewed_at = 0, 0.0, c.initial_rays, 0.0, 0.0
 
     if resume:
-        content = load_checkpoint(run / "checkpoint.pt")
+        path = run / "checkpoint.pt"
+        content = load_checkpoint(path)
         check_same_scene(content, fingerprint, run)
-        model.load_state_dict(content["model"])
-        optimiser.load_state_dict(content["optimiser"])
-        generator.set_state(content["generator"])
-        torch.set_rng_state(content["torch_generator"])
-        grid.values = content["occupancy"]
+        restore_model(model, content, path)
+        restore_optimiser(optimiser, content, path)
+        restore_generator(generator, content, path)
+        grid.values = restored_occupancy(grid.values, content, path)
         step, seconds, n_rays = content["step"], content["seconds"], content["n_rays"]
         meshed_at, previewed_at = content["meshed_at"], content["previewed_at"]
     mesh: tuple[Tensor, Tensor] | tuple[None, None] = (
@@ -99,6 +104,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     )
 
     def save() -> None:
+        check_state(step, model, optimiser)
         save_checkpoint(
             run / "checkpoint.pt",
             config=c,
@@ -123,7 +129,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     light_steps = light_period(c)
     started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True
     psnr_mean = samples_mean = None
-    with Interrupt() as interrupt, Progress(progress_now()) as bar, open(run / "metrics.jsonl", "a") as log:
+    watch = GradientWatch(model.parameters())
+    log = open(run / "metrics.jsonl", "a")
+    with log, Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic):
         while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % light_steps == 0):
             model.open_levels(progress)
             set_learning_rate(optimiser, c, step, progress)
@@ -133,6 +141,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 )
             if (model.occlusion is not None or c.finetune_from < 1) and progress - meshed_at >= c.mesh_every:
                 meshed_at = progress
+                check_state(step, model, optimiser)
                 scene, mesh = remesh(model, c, scene, mesh)
             traces = scene is not None and c.occlusion == "mlp" and c.occlusion_weight > 0
             if traces and (environment is None or step % ENVIRONMENT_EVERY == 0):
@@ -149,13 +158,13 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             )
             loss = sum(terms.values())
             if not math.isfinite(loss.item()):
-                bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term.item()))
-                raise Diverged(f"step {step}: the loss is not finite ({bad}); lower --set learning_rate and --resume")
+                raise explain_loss(step, terms, dataset, batch, model, ray)
             optimiser.zero_grad(set_to_none=True)
             loss.backward()
             if light_moves(c, step):
                 model.light.deliver()
-            optimiser.step()
+            if watch.allows(step):
+                optimiser.step()
 
             n_samples = len(ray.weights)
             n_rays = next_ray_count(n_rays, n_samples, c)
@@ -165,12 +174,14 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             samples_mean = ray.n_evaluated / len(batch.target)
             bar.show(progress_now(), step, psnr_mean, samples_mean)
             if step % LOG_EVERY == 0 or step <= LOG_EVERY or progress_now() >= 1.0:
+                check_state(step, model, optimiser)
                 log.write(json.dumps({
                     "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss.item(),
                     **{f"loss_{name}": term.item() for name, term in terms.items()}, "psnr": psnr_mean,
                     "rays": len(batch.target), "samples_per_ray": samples_mean,
                     "kept": n_samples / max(1, ray.n_evaluated), "shaded": len(ray.shaded) / max(1, ray.n_evaluated),
                     "s": model.s_value, "sees_all": getattr(model.occlusion, "sees_all", False),
+                    "skipped": watch.skipped,
                 }) + "\n")  # fmt: skip
                 log.flush()
             if progress_now() - previewed_at >= c.preview_every:
@@ -179,6 +190,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             if time.monotonic() - saved_at > 60.0 * c.checkpoint_minutes and step % light_steps == 0:
                 save()
                 saved_at = time.monotonic()
+        check_state(step, model, optimiser)
         finished = progress_now() >= 1.0
         if finished and c.occlusion == "bits":  # what is rendered from here on sees the final surface
             scene, mesh = remesh(model, c, scene, mesh)

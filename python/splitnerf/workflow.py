@@ -12,7 +12,7 @@ import numpy as np
 import torch
 import trimesh
 
-from splitnerf.checkpoint import config_of, load_checkpoint
+from splitnerf.checkpoint import config_of, load_checkpoint, restore_model, restored_occupancy
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
@@ -173,12 +173,12 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     content = load_checkpoint(run / "checkpoint.pt")
     config = config_of(content)
     model = SceneModel(config)
-    model.load_state_dict(content["model"])
+    restore_model(model, content, run / "checkpoint.pt")
     model.open_levels(1.0)
     restore_mesh(model, content)
     grid = make_grid(config)
     if config.occupancy == "average":  # a mean over time, unlike the distance
-        grid.values = content["occupancy"]
+        grid.values = restored_occupancy(grid.values, content, run / "checkpoint.pt")
     grid.update(model.sdf_field.sdf, model.s_value)
     return model, grid, content
 

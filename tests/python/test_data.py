@@ -291,6 +291,7 @@ BAD_JSON = {
     "zero frames": (lambda m: m["frames"].clear(), "transforms_train.json: has no frames"),
     "frames no list": (lambda m: m.update(frames={"a": 1}), "'frames' must be a list"),
     "NaN pose": (set_pose(2, nan_at_corner), r"frame 2 \(r_2.png\) has NaN"),
+    "endless pose": (set_pose(2, lambda p: (p + 1e300 * np.eye(4, k=3)).tolist()), r"frame 2 \(r_2.png\) has NaN, inf"),
     "scaled pose": (set_pose(2, lambda p: (p * [[2], [2], [2], [1]]).tolist()), r"frame 2 \(r_2.png\) is not a rigid"),
     "mirrored pose": (set_pose(2, lambda p: (p * [-1, 1, 1, 1]).tolist()), r"frame 2 \(r_2.png\) is not a rigid"),
     "3x3 pose": (set_pose(2, lambda p: p[:3, :3].tolist()), r"frame 2 \(r_2.png\) is not a 4x4"),

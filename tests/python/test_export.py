@@ -240,7 +240,11 @@ def save_run(run, **state):
         n_levels=4, log2_table_size=10, grid_resolution=16, export_resolution=48, export_environment_height=8
     )
     run.mkdir()
-    content = dict(model=SceneModel(config).state_dict(), mesh_vertices=None, mesh_faces=None, **state)
+    content = dict(
+        step=0, seconds=0.0, n_rays=64, meshed_at=0.0, previewed_at=0.0, model=SceneModel(config).state_dict(),
+        optimiser={"state": {}}, generator=torch.get_rng_state(), torch_generator=torch.get_rng_state(),
+        occupancy=torch.zeros(16**3), mesh_vertices=None, mesh_faces=None, **state,
+    )  # fmt: skip
     save_checkpoint(run / "checkpoint.pt", config=config, fingerprint="", state=content)
     return run
 

@@ -17,6 +17,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "train", help="reconstruct an object from posed images",
         description="Trains on DATA (NeRF-Blender layout, or a transforms.json with masks) and writes mesh.glb, mesh.ply, "
         "environment.exr/.hdr, evaluation.json and report.html into the run's folder.",
+        epilog="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient "
+        "alone skips its step. The message names where it came from, and the last checkpoint stands: --resume goes on "
+        "from it.",
     )  # fmt: skip
     parser.add_argument("data", type=Path, metavar="DATA", help="folder with transforms_train.json or transforms.json")
     parser.add_argument("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
@@ -39,6 +42,11 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
         "--device", choices=["cpu"], default="cpu", help="where to train (the operators run on the CPU)"
     )
     parser.add_argument("--seed", type=int, help="of all random numbers (default: 0)")
+    parser.add_argument(
+        "--deterministic",
+        action="store_true",
+        help="two runs with one seed give the same bits, on one machine with one number of threads",
+    )
     parser.add_argument(
         "--set",
         action="append",
@@ -63,6 +71,8 @@ def run(args: argparse.Namespace) -> int:
     settings |= budget(args.steps, args.max_minutes)
     if args.seed is not None:
         settings["seed"] = args.seed
+    if args.deterministic:
+        settings["deterministic"] = True
     if args.resume:
         if args.preset:
             raise InputError("--preset cannot change in a run that is resumed")

@@ -203,17 +203,25 @@ def _load_images(frames: list[Frame], downscale: int) -> list[_Image]:
     return loaded
 
 
+def _check_pixels(pixels: np.ndarray, path: Path) -> None:
+    """Raises InputError where a photo or mask, which may be a file of floats by another name, leaves [0, 1]."""
+    if not (pixels.min() >= 0 and pixels.max() <= 1):  # false for NaN
+        raise InputError(f"{path}: has NaN, infinite or negative pixels or such above 1; save it as 8 or 16 bit PNG")
+
+
 def _load_image(frame: Frame, downscale: int) -> _Image:
     path = frame.image_path
     if path.suffix.lower() not in LDR_SUFFIXES:
         raise InputError(f"{path}: training images must be PNG or JPEG; convert it")
     pixels = read_image(path)
     height, width, channels = pixels.shape
+    _check_pixels(pixels, path)
     if downscale > min(height, width):
         raise InputError(f"{path}: is {width}x{height}, too small for downscale {downscale}; use a smaller factor")
     colour = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     if frame.mask_path is not None:
         mask = read_image(frame.mask_path)
+        _check_pixels(mask, frame.mask_path)
         if mask.shape[:2] != (height, width):
             raise InputError(
                 f"{frame.mask_path}: is {mask.shape[1]}x{mask.shape[0]}, its image {path.name} is {width}x{height}; "

@@ -18,10 +18,13 @@ import numpy as np
 from splitnerf.data import view_folders
 from splitnerf.data.images import LDR_SUFFIXES
 from splitnerf.data.json_files import read_json
+from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
 
 TEST_STRIDE = 8
 RIGID_TOLERANCE = 1e-3
+SMALLEST_LENS, LARGEST_LENS = 1e-6, 1e9  # of any of a lens's numbers
+FARTHEST = 1e9  # from the origin, in the data's units
 
 
 @dataclass
@@ -159,12 +162,12 @@ def _folder_frame(folder: Path, content: dict, path: Path) -> Frame:
 def _checked_pose(matrix: object, frame: str) -> np.ndarray:
     try:
         pose = np.array(matrix, dtype=np.float64)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         pose = np.empty(0)
     if pose.shape != (4, 4):
         raise InputError(f"{frame} is not a 4x4 matrix of numbers; repair it")
-    if not np.isfinite(pose).all():
-        raise InputError(f"{frame} has NaN or infinite entries; repair or remove the frame")
+    if not (np.abs(pose) <= FARTHEST).all():
+        raise InputError(f"{frame} has NaN, infinite or endless entries; repair or remove the frame")
     rotation = pose[:3, :3]
     rigid = np.abs(rotation.T @ rotation - np.eye(3)).max() < RIGID_TOLERANCE and np.linalg.det(rotation) > 0
     if not rigid or np.abs(pose[3] - [0, 0, 0, 1]).max() > RIGID_TOLERANCE:
@@ -177,18 +180,18 @@ def _checked_lens(lens: dict, path: Path) -> dict:
     if "fl_x" not in lens and "camera_angle_x" not in lens:
         raise InputError(f"{path}: missing key 'camera_angle_x' (or 'fl_x'); add it")
     for key, value in lens.items():
-        valid = isinstance(value, (int, float)) and np.isfinite(value) and value > 0
+        valid = isinstance(value, (int, float)) and SMALLEST_LENS <= value <= LARGEST_LENS
         if not valid or (key == "camera_angle_x" and value >= np.pi):
-            raise InputError(f"{path}: '{key}' must be a positive number, got {value}; repair it")
+            raise InputError(f"{path}: '{key}' must be a positive number, got {str(value)[:40]}; repair it")
     return lens
 
 
 def _find_image(folder: Path, file_path: str, path: Path) -> Path:
     exact = folder / file_path
-    if exact.is_file():
+    if is_file(exact):
         return exact
     for suffix in LDR_SUFFIXES:
-        candidate = exact.with_name(exact.name + suffix)
-        if candidate.is_file():
+        candidate = folder / f"{file_path}{suffix}"
+        if is_file(candidate):
             return candidate
     raise InputError(f"{exact}: no such image, though {path.name} lists it; add the image or remove the frame")

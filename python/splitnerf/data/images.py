@@ -13,10 +13,14 @@ import OpenImageIO as oiio
 import torch
 
 from splitnerf import ops
+from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
 
 LDR_SUFFIXES = (".png", ".jpg", ".jpeg")
 HDR_SUFFIXES = (".exr", ".hdr")
+SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"RIFF")  # RIFF: WebP
+LARGEST_IMAGE = 1 << 29  # values of an image in memory
+VALUES_PER_BYTE = 4096  # of a file; an image of one colour has a quarter of them
 
 
 @contextmanager
@@ -47,7 +51,7 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
 
 
 def read_image(path: str | os.PathLike) -> np.ndarray:
-    """Reads a PNG, JPEG, EXR or HDR image.
+    """Reads a PNG, JPEG, WebP, EXR or HDR image, told by its content.
 
     Alpha is kept as the file stores it: straight in PNG, associated in EXR.
 
@@ -58,16 +62,16 @@ def read_image(path: str | os.PathLike) -> np.ndarray:
         [H, W, C] float32, top row first. 8- and 16-bit files in [0, 1], the others as stored.
 
     Raises:
-        InputError: The file is missing, unreadable or truncated.
+        InputError: The file is missing, unreadable, truncated, of another format, or claims a size beyond reason.
     """
     path = Path(path)
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path}: no such image; check the path")
     return _read(path, str(path))
 
 
 def decode_image(data: bytes, name: str) -> np.ndarray:
-    """Decodes an image file that lies in memory; any format that OpenImageIO tells by its content.
+    """Decodes an image file that lies in memory: PNG, JPEG, WebP, EXR or HDR, told by its content.
 
     Args:
         data: The file's bytes.
@@ -77,7 +81,7 @@ def decode_image(data: bytes, name: str) -> np.ndarray:
         As `read_image`.
 
     Raises:
-        InputError: Unreadable or truncated.
+        InputError: Unreadable, truncated, of another format or too large.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "image"
@@ -149,11 +153,11 @@ def write_image(path: str | os.PathLike, pixels: np.ndarray, *, half: bool = Fal
     with atomic_path(path) as temporary:
         sink = oiio.ImageOutput.create(str(temporary))
         if sink is None:
-            raise OSError(f"{path}: OpenImageIO cannot write it ({_first_line(oiio.geterror())})")
+            raise OSError(f"{path}: OpenImageIO cannot write it ({_reason(oiio)})")
         written = sink.open(str(temporary), spec) and sink.write_image(np.ascontiguousarray(pixels))
         closed = sink.close()
         if not (written and closed):
-            raise OSError(f"{path}: writing failed ({_first_line(sink.geterror())})")
+            raise OSError(f"{path}: writing failed ({_reason(sink)})")
 
 
 def encode_png(pixels: np.ndarray) -> bytes:
@@ -229,20 +233,35 @@ def over_background(srgb: np.ndarray, alpha: np.ndarray, background: float = 1.0
 
 
 def _read(path: Path, name: str) -> np.ndarray:
+    with open(path, "rb") as file:
+        if not file.read(16).startswith(SIGNATURES):
+            raise InputError(f"{name}: cannot be read as an image (no PNG, JPEG, WebP, EXR or HDR file); replace it")
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), config)
     if source is None:
-        raise InputError(f"{name}: cannot be read as an image ({_first_line(oiio.geterror())}); replace it")
+        raise InputError(f"{name}: cannot be read as an image ({_reason(oiio)}); replace it")
     try:
-        pixels = source.read_image(0, 0, 0, source.spec().nchannels, "float")
+        spec = source.spec()
+        n_values = spec.width * spec.height * spec.depth * spec.nchannels
+        if (
+            min(spec.width, spec.height) < 1
+            or spec.depth > 1
+            or n_values > min(LARGEST_IMAGE, VALUES_PER_BYTE * path.stat().st_size)
+        ):
+            raise InputError(f"{name}: is said to be {spec.width}x{spec.height}, too large for its file; replace it")
+        pixels = source.read_image(0, 0, 0, spec.nchannels, "float")
         if pixels is None or source.has_error:
-            raise InputError(f"{name}: truncated or damaged image ({_first_line(source.geterror())}); replace it")
+            raise InputError(f"{name}: truncated or damaged image ({_reason(source)}); replace it")
     finally:
         source.close()
-    height, width = source.spec().height, source.spec().width
-    return np.ascontiguousarray(pixels, dtype=np.float32).reshape(height, width, -1)
+    return np.ascontiguousarray(pixels, dtype=np.float32).reshape(spec.height, spec.width, -1)
 
 
-def _first_line(message: str) -> str:
-    return message.strip().splitlines()[0] if message.strip() else "no reason given"
+def _reason(source) -> str:
+    """The first line of what OpenImageIO, or one of its readers or writers, has to say."""
+    try:
+        lines = source.geterror().strip().splitlines()
+    except UnicodeDecodeError:  # it repeats bytes of the file
+        lines = []
+    return lines[0] if lines else "no reason given"

@@ -23,7 +23,7 @@ def read_json(path: Path, key: str) -> dict:
         raise InputError(f"{path}: no such file; check the path")
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, RecursionError) as error:
         raise InputError(f"{path}: is not valid json ({str(error).splitlines()[0]}); repair it") from None
     if not isinstance(content, dict):
         raise InputError(f"{path}: must hold a json object with '{key}'")

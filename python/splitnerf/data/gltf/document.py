@@ -11,11 +11,13 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 GLB_HEADER, CHUNK_HEADER = 12, 8
+LEAST_VALUES, MOST_VALUES, VALUES_PER_BYTE = 1 << 22, 1 << 30, 4096
 
 
 class Document:
@@ -39,7 +41,7 @@ class Document:
         text, self._binary = self._split_glb(data) if data[:4] == b"glTF" else (data, None)
         try:
             self.json = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             raise InputError(f"{path}: is neither a GLB nor glTF's JSON; export the mesh as GLB") from None
         if not isinstance(self.json, dict) or not isinstance(self.json.get("asset"), dict):
             raise InputError(f"{path}: is JSON but not glTF, it has no 'asset'; export the mesh as GLB")
@@ -47,6 +49,19 @@ class Document:
         if version.split(".")[0] != "2":
             raise InputError(f"{path}: is glTF {version}; only 2.0 is read, export it again")
         self._buffers: dict[int, bytes] = {}
+        self._files: dict[str, bytes] = {}
+        self._left = LEAST_VALUES
+        self._earn(len(data))
+
+    def spend(self, n_values: int) -> None:
+        """Counts numbers that are about to be unpacked; few bytes may stand for endlessly many.
+
+        Raises:
+            InputError: They are more than files of this size hold.
+        """
+        self._left -= n_values
+        if self._left < 0:
+            raise InputError(f"{self.path}: unpacks to more than its size makes likely; export it again, smaller")
 
     def get(self, name: str) -> list:
         """A top-level array such as "nodes", empty where the file has none."""
@@ -67,6 +82,7 @@ class Document:
         accessor = self.json["accessors"][index]
         dtype, width = np.dtype(COMPONENTS[accessor["componentType"]]), WIDTHS[accessor["type"]]
         count = accessor["count"]
+        self.spend(max(0, count) * width)
         values = np.zeros((count, width), dtype)
         if "bufferView" in accessor:
             values = self._table(accessor["bufferView"], accessor.get("byteOffset", 0), dtype, width, count)
@@ -117,6 +133,8 @@ class Document:
     def _table(self, view: int, offset: int, dtype: np.dtype, width: int, count: int) -> np.ndarray:
         stride = self.json["bufferViews"][view].get("byteStride", dtype.itemsize * width)
         data = self._view(view)
+        if stride < dtype.itemsize * width:
+            raise InputError(f"{self.path}: damaged, a byteStride is shorter than what it parts; export it again")
         if count and offset + stride * (count - 1) + dtype.itemsize * width > len(data):
             raise InputError(f"{self.path}: damaged, an accessor reaches beyond its buffer view; export it again")
         return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
@@ -145,6 +163,12 @@ class Document:
             except binascii.Error:
                 raise InputError(f"{self.path}: holds a data URI that is not base64; export it again") from None
         path = self.path.parent / unquote(uri)
-        if not path.is_file():
+        if not is_file(path):
             raise InputError(f"{path}: no such file, though {self.path.name} refers to it; add it or export a GLB")
-        return path.read_bytes()
+        if uri not in self._files:
+            self._files[uri] = path.read_bytes()
+            self._earn(len(self._files[uri]))
+        return self._files[uri]
+
+    def _earn(self, n_bytes: int) -> None:
+        self._left = min(MOST_VALUES, self._left + VALUES_PER_BYTE * n_bytes)

@@ -114,6 +114,7 @@ class _Slots:
             )
         data, image = document.image(texture.get("source", webp.get("source")))
         pixels = decode_image(data, image)
+        document.spend(pixels.size)
         if not np.isfinite(pixels).all():
             raise InputError(f"{image}: has NaN or infinite pixels; clean it and export again")
         return pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)

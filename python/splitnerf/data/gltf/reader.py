@@ -35,7 +35,7 @@ def read_asset(path: str | os.PathLike) -> Asset:
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # what comes out is checked
             return _read(document)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, MemoryError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError) as error:
         raise InputError(f"{path}: is not valid glTF ({type(error).__name__}: {error}); export it again") from None
 
 

@@ -1,0 +1,269 @@
+"""Fuzzes the readers: python tests/fuzz/fuzz_readers.py READER [libFuzzer's options]
+
+READER is json, png, exr, hdr, glb or checkpoint. The corpus begins with small valid files that the program writes
+itself; what libFuzzer adds to it lies in build/fuzz/READER. A reader may return or raise InputError with one line;
+anything else, more than -timeout seconds or more than -rss_limit_mb of memory is a finding, and its input is kept in
+build/fuzz.
+
+Sums over a PNG's chunks and a zip's parts, which every mutation breaks, are mended in half of the inputs before the
+reader sees them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import io
+import json
+import os
+import struct
+import sys
+import tempfile
+import types
+import zipfile
+import zlib
+from pathlib import Path
+
+import atheris
+import numpy as np
+import torch
+
+from splitnerf.checkpoint import load_checkpoint, restore_model, restore_optimiser, save_checkpoint
+from splitnerf.config import Config
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.environment import read_environment
+from splitnerf.data.frames import read_camera_path
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import read_image, read_radiance, write_image
+from splitnerf.errors import InputError
+from splitnerf.export.glb import write_glb
+from splitnerf.render.model import SceneModel
+from splitnerf.train import make_optimiser
+
+DEFAULTS = {"-rss_limit_mb": "3000", "-timeout": "20", "-max_len": "65536"}
+INSTRUMENTED = ("splitnerf", "zipfile", "pickletools", "torch._weights_only_unpickler")
+SIZE = 16
+RAW, MENDED = b"\0", b"\1"  # first byte of an input for the readers whose files hold sums
+
+
+def instrument() -> None:
+    """Has libFuzzer see which lines run. An editable install's own import hook keeps atheris's from doing so."""
+    for function in gc.get_objects():
+        if isinstance(function, types.FunctionType) and (function.__module__ or "").startswith(INSTRUMENTED):
+            atheris.instrument_func(function)
+
+
+def disc(size: int = SIZE) -> np.ndarray:
+    """[size, size, 4], grey within a circle, else transparent."""
+    y, x = np.mgrid[:size, :size] - (size - 1) / 2
+    return np.stack([np.full((size, size), 0.5)] * 3 + [(np.hypot(x, y) < size / 4) * 1.0], axis=-1)
+
+
+def write_scene(folder: Path) -> dict:
+    """Images of a ball, and the content of their transforms_train.json."""
+    frames = []
+    for i, angle in enumerate(np.linspace(0, 2 * np.pi, 6, endpoint=False)):
+        c, s = np.cos(angle), np.sin(angle)
+        pose = np.array([[-s, 0, c, 4 * c], [c, 0, s, 4 * s], [0, 1, 0, 0], [0, 0, 0, 1.0]])
+        write_image(folder / f"r_{i}.png", disc())
+        frames.append({"file_path": f"./r_{i}", "transform_matrix": pose.tolist()})
+    return {"camera_angle_x": 0.7, "frames": frames}
+
+
+class Reader:
+    """What a reader is fed: `corpus` are its seeds, `read` takes one input that lies in `self.folder`."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+
+    def corpus(self) -> list[bytes]:
+        raise NotImplementedError
+
+    def read(self, data: bytes) -> None:
+        raise NotImplementedError
+
+    def file(self, name: str, data: bytes) -> Path:
+        path = self.folder / name
+        path.write_bytes(data)
+        return path
+
+
+class JsonReader(Reader):
+    """A dataset's transforms file, and the same as a camera path."""
+
+    def __init__(self, folder: Path):
+        super().__init__(folder)
+        self.scene = write_scene(folder)
+
+    def corpus(self) -> list[bytes]:
+        lens = {"fl_x": 20.0, "fl_y": 20.0, "cx": 8.0, "cy": 8.0, "w": SIZE, "h": SIZE}
+        masked = [frame | {"mask_path": "r_0.png"} for frame in self.scene["frames"]]
+        return [json.dumps(content).encode() for content in (self.scene, lens | {"frames": masked})]
+
+    def read(self, data: bytes) -> None:
+        path = self.file("transforms_train.json", data)
+        with contextlib.suppress(InputError):
+            read_camera_path(path)
+        load_dataset(self.folder)
+
+
+class ImageReader(Reader):
+    """A file by itself; as bare pixels and, where it may be one, as an environment map."""
+
+    suffix = ""
+
+    def corpus(self) -> list[bytes]:
+        seeds = []
+        coloured = disc(8)[..., :3] if self.suffix == ".hdr" else disc(8)
+        for pixels in (coloured, disc(4)[:2, ..., :3]):
+            write_image(self.folder / f"seed{self.suffix}", pixels)
+            seeds.append((self.folder / f"seed{self.suffix}").read_bytes())
+        return seeds
+
+    def read(self, data: bytes) -> None:
+        path = self.file(f"image{self.suffix}", data)
+        with contextlib.suppress(InputError):
+            read_environment(path)
+        with contextlib.suppress(InputError):
+            read_radiance(path)
+        read_image(path)
+
+
+class ExrReader(ImageReader):
+    suffix = ".exr"
+
+
+class HdrReader(ImageReader):
+    suffix = ".hdr"
+
+
+class PngReader(ImageReader):
+    suffix = ".png"
+
+    def corpus(self) -> list[bytes]:
+        return [kind + seed for seed in super().corpus() for kind in (RAW, MENDED)]
+
+    def read(self, data: bytes) -> None:
+        super().read(self.mended(data[1:]) if data[:1] == MENDED else data[1:])
+
+    @staticmethod
+    def mended(data: bytes) -> bytes:
+        """With the sums that its chunks should have."""
+        out, at = bytearray(data[:8]), 8
+        while at + 12 <= len(data):
+            length = min(struct.unpack_from(">I", data, at)[0], len(data) - at - 12)
+            body = data[at + 4 : at + 8 + length]
+            out += struct.pack(">I", length) + body + struct.pack(">I", zlib.crc32(body))
+            at += 12 + length
+        return bytes(out)
+
+
+class GlbReader(Reader):
+    """Raw files, and a JSON before a fixed binary chunk."""
+
+    def corpus(self) -> list[bytes]:
+        corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+        normals = corners - 0.25
+        texture = np.full((4, 4, 3), 0.5, np.float32)
+        asset = Asset(
+            "seed", corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32),
+            (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32), np.zeros(4, np.int32),
+            [Material(albedo_texture=texture)], uv=corners[:, :2].copy(),
+        )  # fmt: skip
+        write_glb(self.folder / "seed.glb", asset)
+        raw = (self.folder / "seed.glb").read_bytes()
+        length = struct.unpack_from("<I", raw, 12)[0]
+        self.binary = raw[20 + length :]
+        return [RAW + raw, MENDED + raw[20 : 20 + length]]
+
+    def read(self, data: bytes) -> None:
+        if data[:1] == MENDED:
+            text = data[1:] + b" " * (-len(data[1:]) % 4)
+            chunk = struct.pack("<I4s", len(text), b"JSON") + text + self.binary
+            data = RAW + struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk
+        read_asset(self.file("asset.glb", data[1:]))
+
+
+class CheckpointReader(Reader):
+    """Raw files, and a pickle among the parts of a valid container; what loads goes into a model and its optimiser."""
+
+    def corpus(self) -> list[bytes]:
+        config = Config().replace({
+            "n_levels": 2, "log2_table_size": 4, "base_resolution": 2, "light_resolution": 16, "grid_resolution": 2,
+            "sdf_width": 4, "material_width": 4, "material_layers": 1, "start_levels": 2,
+        })  # fmt: skip
+        model = SceneModel(config)
+        optimiser = make_optimiser(model, config)
+        for parameter in model.parameters():
+            parameter.grad = torch.ones_like(parameter)
+        optimiser.step()
+        save_checkpoint(
+            self.folder / "seed.pt", config=config, fingerprint="0", state=dict(
+                step=1, seconds=1.0, n_rays=64, meshed_at=0.0, previewed_at=0.0, model=model.state_dict(),
+                optimiser=optimiser.state_dict(), generator=torch.Generator().get_state(),
+                torch_generator=torch.get_rng_state(), occupancy=torch.zeros(8), box_from_world=torch.eye(4).double(),
+                mesh_vertices=torch.eye(3), mesh_faces=torch.tensor([[0, 1, 2]]),
+            ),
+        )  # fmt: skip
+        raw = (self.folder / "seed.pt").read_bytes()
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            self.parts = {entry.filename: archive.read(entry) for entry in archive.infolist()}
+        self.pickle = next(name for name in self.parts if name.endswith("data.pkl"))
+        return [RAW + raw, MENDED + self.parts[self.pickle]]
+
+    def read(self, data: bytes) -> None:
+        if data[:1] == MENDED:
+            container = io.BytesIO()
+            with zipfile.ZipFile(container, "w") as archive:
+                for name, part in self.parts.items():
+                    archive.writestr(name, data[1:] if name == self.pickle else part)
+            data = RAW + container.getvalue()
+        path = self.file("checkpoint.pt", data[1:])
+        content = load_checkpoint(path)
+        config = Config.stored(content["config"])
+        model = SceneModel(config)
+        restore_model(model, content, path)
+        restore_optimiser(make_optimiser(model, config), content, path)
+
+
+READERS = {
+    "json": JsonReader, "png": PngReader, "exr": ExrReader, "hdr": HdrReader, "glb": GlbReader,
+    "checkpoint": CheckpointReader,
+}  # fmt: skip
+
+
+def main() -> None:
+    if len(sys.argv) < 2 or sys.argv[1] not in READERS:
+        sys.exit(f"usage: fuzz_readers.py {'|'.join(READERS)} [libFuzzer's options]")
+    name, options = sys.argv[1], sys.argv[2:]
+    corpus = Path("build/fuzz") / name
+    corpus.mkdir(parents=True, exist_ok=True)
+    options += [
+        f"{key}={value}" for key, value in DEFAULTS.items() if not any(o.startswith(key + "=") for o in options)
+    ]
+    if not any(option.startswith("-artifact_prefix=") for option in options):
+        options.append(f"-artifact_prefix=build/fuzz/{name}-")
+    with tempfile.TemporaryDirectory() as folder, open(os.devnull, "w") as unread:
+        reader = READERS[name](Path(folder))
+        for i, seed in enumerate(reader.corpus()):
+            (corpus / f"seed_{i}").write_bytes(seed)
+
+        def feed(data: bytes) -> None:
+            with contextlib.redirect_stderr(unread):  # notes
+                try:
+                    reader.read(data)
+                except InputError as error:
+                    assert len(str(error).splitlines()) == 1, error
+
+        instrument()
+        atheris.Setup([sys.argv[0], *options, *([] if _has_inputs(options) else [str(corpus)])], feed)
+        atheris.Fuzz()
+
+
+def _has_inputs(options: list[str]) -> bool:
+    return any(not option.startswith("-") for option in options)
+
+
+if __name__ == "__main__":
+    main()

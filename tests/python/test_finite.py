@@ -1,0 +1,163 @@
+"""Numbers that are not finite: each is planted once, is named, and costs no checkpoint."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+import torch
+from test_train import SMALL, data, train  # noqa: F401
+
+from splitnerf import train as trainer
+from splitnerf.checkpoint import load_checkpoint
+from splitnerf.cli import BAD_INPUT, FAILED
+from splitnerf.config import Config, parse_setting, preset
+from splitnerf.data.dataset import load_dataset
+from splitnerf.finite import MOST_SKIPPED, Diverged, first_not_finite
+
+
+def small(**settings: object) -> Config:
+    return preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | settings)
+
+
+@pytest.fixture
+def begun(data, tmp_path) -> tuple[Path, bytes]:  # noqa: F811
+    """A run of 8 steps, and its checkpoint."""
+    run = tmp_path / "run"
+    run.mkdir()
+    trainer.train(load_dataset(data), small(steps=8), run)
+    return run, (run / "checkpoint.pt").read_bytes()
+
+
+def goes_on(data: Path, run: Path, before: bytes) -> None:  # noqa: F811
+    """The checkpoint is the one from before, and the run goes on from it."""
+    assert (run / "checkpoint.pt").read_bytes() == before
+    trainer.train(load_dataset(data), small(steps=12), run, resume=True)
+    assert load_checkpoint(run / "checkpoint.pt")["step"] == 12
+
+
+def write_floats(path: Path, pixels: np.ndarray) -> None:
+    """An EXR, whatever the path is called."""
+    sink = oiio.ImageOutput.create("any.exr")
+    assert sink.open(str(path), oiio.ImageSpec(*pixels.shape[1::-1], pixels.shape[2], oiio.FLOAT))
+    assert sink.write_image(pixels) and sink.close()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -0.5, 2.0])
+def test_an_image_with_a_bad_pixel_is_refused_and_named(data, tmp_path, capsys, value):  # noqa: F811
+    shutil.copytree(data, tmp_path / "data")
+    dataset = load_dataset(tmp_path / "data")
+    pixels = dataset.images[2].copy()
+    pixels[3, 4, 1] = value
+    write_floats(dataset.image_paths[2], pixels)
+    assert train(tmp_path / "data", tmp_path / "run", "--steps", "5") == BAD_INPUT
+    error = capsys.readouterr().err
+    assert dataset.image_paths[2].name in error and "pixels" in error and len(error.splitlines()) == 1
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_nan_pixel_stops_the_run_and_is_named(data, begun):  # noqa: F811
+    """The image came another way than through the reader."""
+    run, before = begun
+    dataset = load_dataset(data)
+    resumed = trainer.dataset_fingerprint
+    dataset.images[2, 12, 12, 0] = np.nan
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(trainer, "dataset_fingerprint", lambda _: resumed(load_dataset(data)))
+        with pytest.raises(Diverged, match=rf"loss is not finite \(colour.*image {dataset.frame_names[2]} \(1 of 2304"):
+            trainer.train(dataset, small(steps=4000, foreground_share=1.0), run, resume=True)
+    goes_on(data, run, before)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_light_texel_that_is_not_finite_stops_the_run(data, begun, monkeypatch, value):  # noqa: F811
+    """An infinite one is clamped where it is used and harms no loss, but it may not be saved."""
+    run, before = begun
+    original = trainer.set_learning_rate
+
+    def planting(optimiser, config, step, progress):
+        if step == 10:
+            optimiser.param_groups[2]["params"][0].data[7, 1] = value
+        original(optimiser, config, step, progress)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(trainer, "set_learning_rate", planting)
+        with pytest.raises(Diverged, match=r"not finite: parameter light.texels \(1 of"):
+            trainer.train(load_dataset(data), small(steps=20), run, resume=True)
+    goes_on(data, run, before)
+
+
+def test_light_that_is_infinite_is_named(data, begun, monkeypatch):  # noqa: F811
+    """One sample of the light on its way to the pixels."""
+    from splitnerf.fields import LightPyramid
+
+    run, before = begun
+    original = LightPyramid.forward
+
+    def planting(self, directions, roughness):
+        radiance = original(self, directions, roughness)
+        return radiance.index_fill(0, torch.tensor([0]), torch.inf) if torch.is_grad_enabled() else radiance
+
+    with monkeypatch.context() as patch:
+        patch.setattr(LightPyramid, "forward", planting)
+        with pytest.raises(Diverged, match=r"loss is not finite .*first not finite: rendered radiance"):
+            trainer.train(load_dataset(data), small(steps=20), run, resume=True)
+    goes_on(data, run, before)
+
+
+def test_a_learning_rate_of_a_thousand_loses_no_checkpoint(data, begun, capsys):  # noqa: F811
+    run, before = begun
+    options = ["--set", "learning_rate=1e3", "--set", "warmup_steps=1"]
+    capsys.readouterr()
+    assert train(data, run, "--resume", "--steps", "400", *options) == FAILED
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert "not finite" in error and "learning_rate" in error
+    goes_on(data, run, before)
+
+
+def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path, monkeypatch, capsys):  # noqa: F811
+    original, seen = trainer.GradientWatch.allows, []
+
+    def planting(watch, step):
+        if step in (3, 5, 6):
+            watch.parameters[0].grad.view(-1)[0] = torch.nan if step == 3 else 1e30
+        before = [p.detach().clone() for p in watch.parameters]
+        allowed = original(watch, step)
+        seen.append((allowed, before))
+        return allowed
+
+    monkeypatch.setattr(trainer.GradientWatch, "allows", planting)
+    trained = trainer.train(load_dataset(data), small(steps=8), tmp_path)
+    assert [i for i, (allowed, _) in enumerate(seen) if not allowed] == [3, 5, 6]
+    for i in (3, 5, 6):
+        assert all(torch.equal(a, b) for a, b in zip(seen[i][1], seen[i + 1][1]))
+    assert all(p.isfinite().all() for p in trained.model.parameters())
+    lines = [json.loads(line) for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
+    assert [line["skipped"] for line in lines] == [0, 0, 0, 1, 1, 2, 3, 3]
+    assert capsys.readouterr().err.count("step is skipped") == 3
+
+
+def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch):  # noqa: F811
+    run, before = begun
+    original = trainer.GradientWatch.allows
+
+    def planting(watch, step):
+        if step > 12:
+            watch.parameters[0].grad.view(-1)[0] = torch.inf
+        return original(watch, step)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(trainer.GradientWatch, "allows", planting)
+        with pytest.raises(Diverged, match=f"step {12 + MOST_SKIPPED}: .*{MOST_SKIPPED} steps in a row"):
+            trainer.train(load_dataset(data), small(steps=60), run, resume=True)
+    goes_on(data, run, before)
+
+
+def test_the_first_that_is_not_finite_is_found():
+    fine, bad = torch.tensor([3e38, 3e38]), torch.tensor([1.0, torch.nan, torch.inf])
+    assert first_not_finite([("fine", fine)]) is None
+    assert first_not_finite([("fine", fine), ("bad", bad), ("worse", bad)]) == "bad (2 of 3 values)"

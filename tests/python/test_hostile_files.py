@@ -1,0 +1,288 @@
+"""Files that nobody means well with: one line that names them, no crash, no code run, little memory."""
+
+from __future__ import annotations
+
+import io
+import os
+import pickle
+import struct
+import zipfile
+import zlib
+from pathlib import Path
+
+import pytest
+import torch
+from gltf_builder import Gltf, triangle
+from test_data import edit, make_blender, set_pose
+from test_finite import begun, data, small  # noqa: F401
+
+from splitnerf import train as trainer
+from splitnerf.checkpoint import load_checkpoint
+from splitnerf.config import Config
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import read_image
+from splitnerf.errors import InputError
+from splitnerf.workflow import load_run
+
+
+def endless_number(pose):
+    rows = pose.tolist()
+    rows[0][3] = 10**400
+    return rows
+
+
+BAD_JSON = {
+    "a name too long": lambda m: m["frames"][1].update(file_path="x" * 5000),
+    "a name that is a root": lambda m: m["frames"][1].update(file_path="/"),
+    "a name of two lines": lambda m: m["frames"][1].update(file_path="a\nb"),
+    "a name of half a character": lambda m: m["frames"][1].update(file_path="\ud800"),
+    "a mask's name too long": lambda m: m["frames"][1].update(mask_path="x" * 5000),
+    "an endless angle": lambda m: m.update(camera_angle_x=10**400),
+    "an endless focal length": lambda m: m.update(fl_x=10**400),
+    "a tiny width": lambda m: m.update(w=1e-300, fl_x=20),
+    "a camera endlessly far away": set_pose(2, endless_number),
+}
+
+
+@pytest.mark.parametrize("case", BAD_JSON)
+def test_transforms_with_endless_contents(tmp_path, case):
+    scene = make_blender(tmp_path / "ball", train=3, test=1)
+    edit(scene, BAD_JSON[case])
+    with pytest.raises(InputError) as caught:
+        load_dataset(scene)
+    assert len(str(caught.value).splitlines()) == 1 and len(str(caught.value)) < 6000
+
+
+def test_json_nested_deeply(tmp_path):
+    (tmp_path / "transforms_train.json").write_text("[" * 100_000)
+    with pytest.raises(InputError, match="transforms_train.json: is not valid json"):
+        load_dataset(tmp_path)
+    (tmp_path / "a.gltf").write_text("[" * 100_000)
+    with pytest.raises(InputError, match="a.gltf: is neither"):
+        read_asset(tmp_path / "a.gltf")
+
+
+def png(width: int, height: int) -> bytes:
+    """A PNG that claims a size and holds next to nothing."""
+    parts = (b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0), b"IDAT" + zlib.compress(b""), b"IEND")
+    chunks = (struct.pack(">I", len(part) - 4) + part + struct.pack(">I", zlib.crc32(part)) for part in parts)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+@pytest.mark.parametrize(("suffix", "content"), [
+    (".png", png(4000, 4000)), (".hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4000 +X 4000\n"),
+])  # fmt: skip
+def test_images_that_claim_more_than_they_hold(tmp_path, suffix, content):
+    path = tmp_path / f"image{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=f"image{suffix}: is said to be 4000x4000, too large for its file"):
+        read_image(path)
+
+
+def test_an_image_whose_error_is_no_text(tmp_path):
+    """OpenImageIO's message repeats the name of an attribute."""
+    header = struct.pack("<II", 20000630, 2) + b"displayWindow\0\xff\xff\xff\0" + struct.pack("<I4i", 16, 0, 0, 7, 3)
+    (tmp_path / "image.exr").write_bytes(header + b"\0" * 64)
+    with pytest.raises(InputError, match="image.exr: cannot be read as an image"):
+        read_image(tmp_path / "image.exr")
+
+
+def test_other_formats_are_not_looked_into(tmp_path):
+    pixel = struct.pack("<2sIHHIIiiHHIIiiII", b"BM", 58, 0, 0, 54, 40, 1, 1, 1, 24, 0, 4, 1, 1, 0, 0) + bytes(4)
+    (tmp_path / "image.png").write_bytes(pixel)
+    with pytest.raises(InputError, match="image.png: cannot be read as an image"):
+        read_image(tmp_path / "image.png")
+
+
+def zeros_without_end(gltf: Gltf) -> None:
+    gltf.json["accessors"][0] = {"componentType": 5126, "count": 10**9, "type": "VEC3"}
+
+
+def one_vertex_for_all(gltf: Gltf) -> None:
+    gltf.json["accessors"][0]["count"] = 10**9
+    gltf.json["bufferViews"][0]["byteStride"] = 0
+
+
+def many_instances(gltf: Gltf) -> None:
+    """Of the largest mesh that the file's size allows."""
+    gltf.json["accessors"][0] = {"componentType": 5126, "count": 3 * 10**5, "type": "VEC3"}
+    for _ in range(300):
+        gltf.node(mesh=0)
+
+
+def parts_by_word(gltf: Gltf) -> None:
+    gltf.json["accessors"][0]["count"] = -3
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    (zeros_without_end, "unpacks to more"), (one_vertex_for_all, "unpacks to more|byteStride"),
+    (many_instances, "unpacks to more"), (parts_by_word, "not valid glTF"),
+    (lambda g: g.json["buffers"].append({"uri": "x" * 5000, "byteLength": 4}), None),
+])  # fmt: skip
+def test_assets_that_unpack_without_end(tmp_path, change, message):
+    gltf = triangle()
+    gltf.json["buffers"] = [{"byteLength": len(gltf.binary)}]
+    change(gltf)
+    path = gltf.write(tmp_path / "asset.glb")
+    if message is None:
+        assert len(read_asset(path).triangles) == 1
+    else:
+        with pytest.raises(InputError, match=message):
+            read_asset(path)
+
+
+def test_a_stride_shorter_than_what_it_parts(tmp_path):
+    gltf = triangle()
+    gltf.json["bufferViews"][0]["byteStride"] = 0
+    with pytest.raises(InputError, match="byteStride"):
+        read_asset(gltf.write(tmp_path / "asset.glb"))
+
+
+def repack(path: Path, change=lambda pickled: pickled, **options) -> None:
+    """Writes a checkpoint's container again, its pickle changed."""
+    with zipfile.ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w", **options) as archive:
+        for name, part in parts.items():
+            archive.writestr(name, change(part) if name.endswith("data.pkl") else part)
+
+
+class Calls:
+    """Pickled, it calls a function."""
+
+    def __init__(self, function, *arguments):
+        self.function, self.arguments = function, arguments
+
+    def __reduce__(self):
+        return self.function, self.arguments
+
+
+@pytest.mark.parametrize("payload", [
+    lambda folder: Calls(os.system, f"touch {folder / 'owned'}"),
+    lambda folder: Calls(eval, f"open({str(folder / 'owned')!r}, 'w')"),
+    lambda folder: Calls(bytearray, 10**15),
+    lambda folder: Calls(torch.FloatTensor, 10**15),
+])  # fmt: skip
+def test_a_checkpoint_calls_nothing(begun, tmp_path, payload):  # noqa: F811
+    path = begun[0] / "checkpoint.pt"
+    repack(path, lambda _: pickle.dumps({"format": 1, "model": payload(tmp_path)}, protocol=2))
+    with pytest.raises(InputError, match="checkpoint.pt: not a readable checkpoint .it asks for"):
+        load_checkpoint(path)
+    assert not (tmp_path / "owned").exists()
+
+
+def test_a_checkpoint_is_not_compressed(begun):  # noqa: F811
+    path = begun[0] / "checkpoint.pt"
+    repack(path, compression=zipfile.ZIP_DEFLATED)
+    with pytest.raises(InputError, match="compressed"):
+        load_checkpoint(path)
+
+
+def test_a_checkpoint_is_no_longer_than_its_file(begun):  # noqa: F811
+    """A directory that lists one part many times."""
+    path = begun[0] / "checkpoint.pt"
+    raw = path.read_bytes()
+    end = raw.rindex(b"PK\x05\x06")
+    count, size, start = struct.unpack_from("<HII", raw, end + 10)
+    directory = raw[start : start + size] * 50
+    tail = struct.pack("<4sHHHHIIH", b"PK\x05\x06", 0, 0, 50 * count, 50 * count, len(directory), start, 0)
+    path.write_bytes(raw[:start] + directory + tail)
+    with pytest.raises(InputError, match="not a readable checkpoint"):
+        load_checkpoint(path)
+
+
+def first(state: dict) -> dict:
+    return next(iter(state["optimiser"]["state"].values()))
+
+
+def poisoned(tensor: torch.Tensor) -> torch.Tensor:
+    return tensor.index_fill(0, torch.tensor([0]), torch.nan)
+
+
+BAD_CONTENTS = {
+    "no model": lambda c: c.pop("model"),
+    "no steps": lambda c: c.update(step="many"),
+    "endless steps": lambda c: c.update(step=10**400),
+    "endless rays": lambda c: c.update(n_rays=10**9),
+    "no rays": lambda c: c.update(n_rays=0),
+    "NaN seconds": lambda c: c.update(seconds=float("nan")),
+    "unknown settings": lambda c: c["config"].update(no_such_key=1),
+    "settings of another type": lambda c: c["config"].update(n_levels="many"),
+    "settings of a huge grid": lambda c: c["config"].update(grid_resolution=512),
+    "settings of a huge table": lambda c: c["config"].update(log2_table_size=24, base_resolution=4096, n_levels=32),
+    "settings of a huge light": lambda c: c["config"].update(light_resolution=1024),
+    "settings of an endless light": lambda c: c["config"].update(light_resolution=1 << 40),
+    "a parameter of another shape": lambda c: c["model"].update({"light.texels": torch.zeros(3)}),
+    "a parameter that is no tensor": lambda c: c["model"].update({"light.texels": [0.0]}),
+    "a parameter of another kind": lambda c: c["model"].update({"variance": torch.tensor(1)}),
+    "a parameter without memory": lambda c: c["model"].update({"light.texels": torch.zeros(1).expand(10**9, 3)}),
+    "a NaN parameter": lambda c: c["model"].update({"light.texels": poisoned(c["model"]["light.texels"])}),
+    "no optimiser": lambda c: c["optimiser"].pop("state"),
+    "a moment of NaN": lambda c: first(c).update(exp_avg=poisoned(first(c)["exp_avg"])),
+    "no moment": lambda c: first(c).pop("exp_avg_sq"),
+    "no cells": lambda c: c.update(occupancy=torch.zeros(3)),
+    "endless cells": lambda c: c.update(occupancy=torch.zeros(1).expand(16**3)),
+    "no frame": lambda c: c.update(box_from_world=torch.eye(3).double()),
+    "faces without vertices": lambda c: c.update(mesh_vertices=None, mesh_faces=torch.zeros(1, 3, dtype=torch.int64)),
+    "faces out of range": lambda c: c.update(mesh_vertices=torch.zeros(3, 3), mesh_faces=torch.tensor([[0, 1, 3]])),
+    "negative faces": lambda c: c.update(mesh_vertices=torch.zeros(3, 3), mesh_faces=torch.tensor([[0, 1, -1]])),
+    "no faces": lambda c: c.update(mesh_vertices=torch.zeros(3, 3), mesh_faces=torch.zeros(0, 3, dtype=torch.int64)),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def written(data, tmp_path_factory) -> bytes:  # noqa: F811
+    run = tmp_path_factory.mktemp("written")
+    trainer.train(load_dataset(data), small(steps=2), run)
+    return (run / "checkpoint.pt").read_bytes()
+
+
+@pytest.mark.parametrize("case", BAD_CONTENTS)
+def test_a_checkpoint_that_is_not_one_of_a_run(written, tmp_path, case):
+    path = tmp_path / "checkpoint.pt"
+    content = torch.load(io.BytesIO(written), weights_only=True)
+    BAD_CONTENTS[case](content)
+    torch.save(content, path)
+    with pytest.raises(InputError, match="checkpoint.pt: not a checkpoint of a run") as caught:
+        load_run(tmp_path)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+BAD_STATES = {
+    "a parameter too few": lambda c: c["model"].pop("variance"),
+    "a parameter too many": lambda c: c["model"].update(other=torch.zeros(3)),
+    "a moment of another shape": lambda c: first(c).update(exp_avg=torch.zeros(7)),
+    "moments of nothing": lambda c: c["optimiser"]["state"].update({999: first(c)}),
+    "no generator": lambda c: c.update(generator=torch.zeros(3, dtype=torch.uint8)),
+    "a damaged generator": lambda c: c["torch_generator"].fill_(255),
+}
+
+
+@pytest.mark.parametrize("case", BAD_STATES)
+def test_a_checkpoint_that_does_not_fit(data, written, tmp_path, case):  # noqa: F811
+    path = tmp_path / "checkpoint.pt"
+    content = torch.load(io.BytesIO(written), weights_only=True)
+    BAD_STATES[case](content)
+    torch.save(content, path)
+    before = torch.get_rng_state()
+    with pytest.raises(InputError, match="checkpoint.pt: its") as caught:
+        trainer.train(load_dataset(data), small(steps=4), tmp_path, resume=True)
+    assert len(str(caught.value).splitlines()) == 1
+    torch.set_rng_state(before)
+
+
+def test_settings_that_no_longer_fit_are_named(data, begun):  # noqa: F811
+    for settings in ({"n_levels": 5}, {"grid_resolution": 20}):
+        with pytest.raises(InputError, match="checkpoint.pt: its .* does not fit the settings"):
+            trainer.train(load_dataset(data), small(steps=12, **settings), begun[0], resume=True)
+
+
+@pytest.mark.parametrize("settings", [
+    {"learning_rate": float("nan")}, {"learning_rate": float("inf")}, {"learning_rate": 10**400}, {"n_levels": 0},
+    {"n_levels": 33}, {"n_features": 3}, {"log2_table_size": 60}, {"seed": 1 << 70}, {"target_samples": 1 << 40},
+    {"growth": 0.5},
+])  # fmt: skip
+def test_settings_beyond_reason(settings):
+    with pytest.raises(InputError, match=next(iter(settings))):
+        Config().replace(settings)
