@@ -149,7 +149,7 @@ TEST(Neus, AdjointFollowsCentralDifferences) {
       };
       f();
       cpu::neus_weights_backward(4, b.offsets.data(), &b.x[0], &b.x[b.n], b.x.back(), min_transmittance, weights.data(),
-                                 opacity.data(), gw.data(), ga.data(), &gradient[0], &gradient[b.n], grad_s.data());
+                                 gw.data(), ga.data(), &gradient[0], &gradient[b.n], grad_s.data());
       for (double g : grad_s) gradient.back() += g;
       expect_gradient(f, b.x, gradient, 1e-6, "neus", 1e-6);
     }
@@ -164,11 +164,13 @@ TEST(Neus, FloatAdjointFollowsDoubleAlongOpaqueRays) {
   std::vector<double> gw(n), weights(n), prev(n), next(n);
   std::vector<float> gw32(n), prev32(n), next32(n);
   for (int i = 0; i < n; ++i) gw32[i] = std::cos(float(i)), gw[i] = gw32[i];
-  const double opacity = neus_ray_weights(f_prev.data(), f_next.data(), 4000., n, 0., weights.data());
-  neus_ray_weights_backward(f_prev.data(), f_next.data(), 4000., n, 0., weights.data(), opacity, gw.data(), 0.,
-                            prev.data(), next.data());
-  neus_ray_weights_backward(ray.f_prev.data(), ray.f_next.data(), 4000.f, n, 0.f, ray.weights.data(), ray.opacity,
-                            gw32.data(), 0.f, prev32.data(), next32.data());
+  neus_ray_weights(f_prev.data(), f_next.data(), 4000., n, 0., weights.data());
+  neus_ray_weights_backward(
+      f_prev.data(), f_next.data(), 4000., n, 0., weights.data(), gw.data(), 0., next.data(),
+      [&](int64_t i, const OpticalDepthGrad<double>& g) { prev[i] = g.f_prev, next[i] = g.f_next; });
+  neus_ray_weights_backward(
+      ray.f_prev.data(), ray.f_next.data(), 4000.f, n, 0.f, ray.weights.data(), gw32.data(), 0.f, next32.data(),
+      [&](int64_t i, const OpticalDepthGrad<float>& g) { prev32[i] = g.f_prev, next32[i] = g.f_next; });
   double largest = 0;
   for (double g : next) largest = std::max(largest, std::abs(g));
   for (int i = 0; i < n; ++i) {

@@ -219,7 +219,8 @@ SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, con
     const T fr = fresnel_term(options.fresnel, f0, p.roughness, nv).value;
     const T e = specular_albedo(fr, table.x, table.y, options.compensate).value;
     const T k_d = (T(1) - m) * (T(1) - (options.fresnel == FresnelMode::kExact ? e : fr));
-    radiance[c] = p.occlusion_d[c] * k_d * p.albedo[c] * p.diffuse[c] + p.occlusion_s[c] * e * p.specular[c];
+    // The light first: shares of it may be so small that their product has no float.
+    radiance[c] = p.diffuse[c] * k_d * p.albedo[c] * p.occlusion_d[c] + p.specular[c] * e * p.occlusion_s[c];
   }
   return radiance;
 }
@@ -242,18 +243,18 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
     const T kept = T(1) - (exact ? e.value : fr.value), k_d = (T(1) - m) * kept;
     // radiance = o_d k_d albedo l_d + o_s e l_s
     const T g = grad[c];
-    out.occlusion_d[c] = g * k_d * albedo * l_d;
-    out.occlusion_s[c] = g * e.value * l_s;
+    out.occlusion_d[c] = l_d * k_d * albedo * g;
+    out.occlusion_s[c] = l_s * e.value * g;
     out.diffuse[c] = g * o_d * k_d * albedo;
     out.specular[c] = g * o_s * e.value;
-    const T grad_k_d = g * o_d * albedo * l_d;
+    const T grad_k_d = l_d * o_d * albedo * g;
     // k_d = (1 - m)(1 - e) or (1 - m)(1 - fr)
     const T grad_kept = grad_k_d * (T(1) - m);
-    const T grad_e = g * o_s * l_s - (exact ? grad_kept : T(0));
+    const T grad_e = l_s * o_s * g - (exact ? grad_kept : T(0));
     const T grad_fr = grad_e * e.d_fr - (exact ? T(0) : grad_kept);
     // f0 = .04 (1 - m) + m albedo
     const T grad_f0 = grad_fr * fr.d_f0;
-    out.albedo[c] = g * o_d * k_d * l_d + grad_f0 * m;
+    out.albedo[c] = l_d * o_d * k_d * g + grad_f0 * m;
     out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - grad_k_d * kept;
     out.roughness += grad_fr * fr.d_roughness;
     grad_nv += grad_fr * fr.d_n_dot_v;
