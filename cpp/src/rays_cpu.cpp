@@ -229,12 +229,12 @@ void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_
                                    const int64_t*, int64_t*, T*, T*);                                                  \
   template void neus_weights<T>(int64_t, const int64_t*, const T*, const T*, T, T, T*, T*);                            \
   template void neus_weights_backward<T>(int64_t, const int64_t*, const T*, const T*, T, T, const T*, const T*,        \
-                                         const T*, const T*, T*, T*, T*);                                              \
+                                         const T*, T*, T*, T*);                                                        \
   template void composite<T>(int64_t, int64_t, const int64_t*, const T*, const T*, T*);                                \
   template void composite_backward<T>(int64_t, int64_t, const int64_t*, const T*, const T*, const T*, T*, T*);         \
   template void surface_weights<T>(const SurfaceSamples<T>&, T*, T*, T*);                                              \
-  template void surface_weights_backward<T>(const SurfaceSamples<T>&, const T*, const T*, const T*, const T*,          \
-                                            const T*, T*, T*, T*);                                                     \
+  template void surface_weights_backward<T>(const SurfaceSamples<T>&, const T*, const T*, const T*, const T*, T*, T*,  \
+                                            T*);                                                                       \
   template Spread spread_samples<T>(int64_t, const int64_t*, const T*, const T*, const T*, T, int, T*);                \
   template void interpolate<T>(int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);              \
   template void interpolate_backward<T>(int64_t, int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, \
