@@ -166,16 +166,18 @@ template <class T> SPLITNERF_HD T normal_reflectance(T metallic, T albedo) {
 //   code:  Fr = F0 + (max(1 - rho, F0) - F0)(1 - n.v)^5            the released code
 template <class T> struct FresnelTerm {
   T value, d_f0, d_roughness, d_n_dot_v;
+  T rest;  // 1 - Fr, which the difference would lose where both are close to 1
 };
 template <class T> SPLITNERF_HD FresnelTerm<T> fresnel_term(FresnelMode mode, T f0, T roughness, T n_dot_v) {
-  if (mode == FresnelMode::kExact) return {f0, T(1), T(0), T(0)};
-  const T c = clamp(T(1) - n_dot_v, T(0), T(1)), c5 = pow5(c);
+  if (mode == FresnelMode::kExact) return {f0, T(1), T(0), T(0), T(1) - f0};
+  const T nv = clamp(n_dot_v, T(0), T(1)), c = T(1) - nv, c5 = pow5(c);
+  const T inner = nv * (T(1) + c * (T(1) + c * (T(1) + c * (T(1) + c))));  // 1 - c^5
   const T smooth = T(1) - roughness;
   const bool floored = mode == FresnelMode::kCode && smooth < f0;
   const T edge = (floored ? f0 : smooth) - f0;
   const bool nv_free = n_dot_v > T(0) && n_dot_v < T(1);
-  return {f0 + edge * c5, floored ? T(1) : T(1) - c5, floored ? T(0) : -c5,
-          nv_free ? T(-5) * edge * square(c * c) : T(0)};
+  return {f0 + edge * c5, floored ? T(1) : inner, floored ? T(0) : -c5, nv_free ? T(-5) * edge * square(c * c) : T(0),
+          floored ? T(1) - f0 : (T(1) - f0) * inner + roughness * c5};
 }
 
 // What multiple scattering adds to the specular lobe of one channel, a factor, and its partial derivatives:
@@ -216,9 +218,9 @@ SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, con
   Vec3<T> radiance;
   for (int c = 0; c < 3; ++c) {
     const T f0 = normal_reflectance(m, p.albedo[c]);
-    const T fr = fresnel_term(options.fresnel, f0, p.roughness, nv).value;
-    const T e = specular_albedo(fr, table.x, table.y, options.compensate).value;
-    const T k_d = (T(1) - m) * (T(1) - (options.fresnel == FresnelMode::kExact ? e : fr));
+    const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
+    const T e = specular_albedo(fr.value, table.x, table.y, options.compensate).value;
+    const T k_d = (T(1) - m) * (options.fresnel == FresnelMode::kExact ? T(1) - e : fr.rest);
     // The light first: shares of it may be so small that their product has no float.
     radiance[c] = p.diffuse[c] * k_d * p.albedo[c] * p.occlusion_d[c] + p.specular[c] * e * p.occlusion_s[c];
   }
@@ -240,7 +242,7 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
     const T f0 = normal_reflectance(m, albedo);
     const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
     const SpecularAlbedo<T> e = specular_albedo(fr.value, table.value.x, table.value.y, options.compensate);
-    const T kept = T(1) - (exact ? e.value : fr.value), k_d = (T(1) - m) * kept;
+    const T kept = exact ? T(1) - e.value : fr.rest, k_d = (T(1) - m) * kept;
     // radiance = o_d k_d albedo l_d + o_s e l_s
     const T g = grad[c];
     out.occlusion_d[c] = l_d * k_d * albedo * g;

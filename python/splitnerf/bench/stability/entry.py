@@ -23,7 +23,7 @@ class Entry:
 
     The error of a row is the largest difference between float32 and float64 in one output (or one gradient), over the
     size of that output: its largest component in the row, plus, where ``conditioned``, how much the true value changes
-    for a relative change of the inputs (the absolute condition number; Higham 2002, section 1.6), since no arithmetic on
+    for a relative change of the inputs, of numbers each or of a vector as a whole (the absolute condition number; Higham 2002, section 1.6), since no arithmetic on
     rounded numbers can do better than that.
 
     Attributes:
@@ -39,6 +39,7 @@ class Entry:
         floor: An output smaller than this counts as this large.
         gradient_floor: The same of a gradient.
         conditioned: See above.
+        vectors: Names of rows that count as a whole there.
         repair: Brings rows that were changed at random back to where the operator is defined.
         exact: A row, as float64 arrays by name, and the shared numbers, to its outputs in arbitrary precision, lists of
             mpmath numbers by name; None where there is no such formula.
@@ -59,6 +60,7 @@ class Entry:
     floor: float = 1e-35
     gradient_floor: float = 1e-35
     conditioned: bool = False
+    vectors: tuple[str, ...] = ()
     repair: Callable[[Rows], Rows] = unchanged
     exact: Callable[[dict[str, np.ndarray], Rows], dict[str, list]] | None = None
     exact_bound: float = 1e-11

@@ -108,9 +108,10 @@ ENTRIES = (
     ),
     Entry(
         "light_lookup", draw=draw_lookup, call=looked_up, smooth=("directions", "roughness"), smooth_shared=("levels", "sh"),
-        shared=pyramid(), repair=repaired_lookup, conditioned=True, bound=4e-6, gradient_bound=2e-5, floor=1e-6,
+        shared=pyramid(), repair=repaired_lookup, vectors=("directions",), conditioned=True, bound=4e-6, gradient_bound=2e-5, floor=1e-6,
         gradient_floor=1e-3, exact=exact_light.light_lookup, exact_bound=1e-13,
-        reason="a few roundings, and sums of 169 harmonics; radiance below a millionth of the mean light counts as that",
+        reason="a few roundings, and sums of 169 harmonics; radiance below a millionth of the mean light counts as that; "
+        "a direction is known to a rounding of its length",
     ),
     Entry(
         "sparse_product", call=products, smooth=("values",), conditioned=True, bound=2e-6, gradient_bound=2e-6, size=64,

@@ -128,7 +128,8 @@ def conditions(entry: Entry, rows: Rows, probes: int) -> tuple[tuple[Rows, Rows]
     generator, n = torch.Generator().manual_seed(0), len(next(iter(rows.values())))
     at_once = max(1, probes // 4)
     for _ in range(min(4, probes)):
-        near = {name: changed(x.repeat(at_once, *[1] * (x.dim() - 1)), generator) for name, x in rows.items()}
+        many = {name: x.repeat(at_once, *[1] * (x.dim() - 1)) for name, x in rows.items()}
+        near = {name: changed(x, generator, name in entry.vectors) for name, x in many.items()}
         shared = {name: changed(x, generator) for name, x in entry.shared.items()}
         for part, moved, widest in zip(true, evaluate(entry, near, torch.float64, shared)[:2], wide):
             for name, x in part.items():
@@ -138,7 +139,10 @@ def conditions(entry: Entry, rows: Rows, probes: int) -> tuple[tuple[Rows, Rows]
     return true, wide
 
 
-def changed(x: Tensor, generator: torch.Generator) -> Tensor:
+def changed(x: Tensor, generator: torch.Generator, whole: bool = False) -> Tensor:
+    """Numbers changed at random by CHANGE of themselves, or of the largest of their vector."""
     if not x.is_floating_point():
         return x
-    return x.double() * (1 + CHANGE * (2 * torch.rand(x.shape, generator=generator, dtype=torch.float64) - 1))
+    x = x.double()
+    size = x.abs().amax(-1, keepdim=True) if whole else x
+    return x + CHANGE * size * (2 * torch.rand(x.shape, generator=generator, dtype=torch.float64) - 1)

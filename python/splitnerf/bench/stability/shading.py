@@ -8,11 +8,14 @@ from splitnerf import ops
 from splitnerf.bench.stability import exact_shading
 from splitnerf.bench.stability.cases import Draw, unit
 from splitnerf.bench.stability.entry import Entry, Rows
+from splitnerf.ops._library import lib
 
 UNITS = ("normals", "view_dirs", "light_dirs")
 IN_UNIT_RANGE = ("albedo", "roughness", "metallic", "occlusion_s", "occlusion_d")
+SHADED = ("normals", "view_dirs", "albedo", "roughness", "metallic")
+TABLE = {"lut": ops.brdf_lut()}  # always float32; its numbers are as uncertain as the rest
 SAMPLES = 4  # directions a point
-BY_CONDITION = "a few roundings, times how much the true value changes by a relative change of the inputs"
+BY_CONDITION = "a few roundings, times how much the true value changes by a relative change of the inputs and the table"
 
 
 def repaired(rows: Rows) -> Rows:
@@ -66,21 +69,20 @@ def draw_lit(draw: Draw, n: int) -> Rows:
 
 
 def shade_modes(rows: Rows, shared: Rows) -> Rows:
-    names = ("normals", "view_dirs", "albedo", "roughness", "metallic", "specular", "diffuse", "occlusion_s", "occlusion_d")
-    given = [rows[name] for name in names]
-    out = {mode: ops.split_sum_shade(*given, fresnel_mode=mode) for mode in ops.FRESNEL_MODES}
-    return out | {"compensated": ops.split_sum_shade(*given, compensate=True)}
+    given = [rows[name] for name in (*SHADED, "specular", "diffuse", "occlusion_s", "occlusion_d")]
+    modes = {mode: (i, False) for i, mode in enumerate(ops.FRESNEL_MODES)} | {"compensated": (0, True)}
+    return {name: lib.split_sum_shade(*given, shared["lut"].float(), *mode) for name, mode in modes.items()}
 
 
 def shade_from_sums(rows: Rows, shared: Rows) -> Rows:
-    given = [rows[name] for name in ("normals", "view_dirs", "albedo", "roughness", "metallic")]
-    sums = ops.LightSums(rows["specular"], rows["grazing"], rows["diffuse"])
-    return {name: ops.shade_sums(*given, sums, name == "compensated") for name in ("single", "compensated")}
+    given = [rows[name] for name in (*SHADED, "specular", "grazing", "diffuse")]
+    modes = {"single": False, "compensated": True}
+    return {name: lib.shade_sums(*given, shared["lut"].float(), mode) for name, mode in modes.items()}
 
 
 def directions(rows: Rows, shared: Rows) -> Rows:
     given = (rows["normals"], rows["view_dirs"], rows["roughness"])
-    return {query: ops.query_direction(*given, query) for query in ops.QUERIES}
+    return {query: lib.query_direction(*given, shared["lut"].float(), query == "mean") for query in ops.QUERIES}
 
 
 def light_sums(rows: Rows, shared: Rows) -> Rows:
@@ -127,18 +129,18 @@ def draw_srgb(draw: Draw, n: int) -> Rows:
 
 ENTRIES = (
     Entry(
-        "query_direction", draw=surface, call=directions, smooth=("normals", "view_dirs", "roughness"), repair=repaired,
+        "query_direction", draw=surface, call=directions, shared=TABLE, smooth=("normals", "view_dirs", "roughness"), repair=repaired,
         conditioned=True, bound=2e-6, gradient_bound=4e-6, exact=exact_shading.query_direction, exact_bound=1e-14,
         gradient_floor=1.0, reason=BY_CONDITION + "; gradients of unit vectors count as at least 1, as theirs may vanish",
     ),
     Entry(
-        "split_sum_shade", draw=draw_shaded, call=shade_modes, repair=repaired, conditioned=True, bound=2e-6,
-        smooth=("normals", "view_dirs", "albedo", "roughness", "metallic", "specular", "diffuse", "occlusion_s", "occlusion_d"),
+        "split_sum_shade", draw=draw_shaded, call=shade_modes, shared=TABLE, repair=repaired, conditioned=True, bound=2e-6,
+        smooth=(*SHADED, "specular", "diffuse", "occlusion_s", "occlusion_d"),
         gradient_bound=4e-6, exact=exact_shading.split_sum_shade, exact_bound=1e-14, reason=BY_CONDITION,
     ),
     Entry(
-        "shade_sums", draw=draw_sums, call=shade_from_sums, repair=repaired, conditioned=True, bound=2e-6,
-        smooth=("normals", "view_dirs", "albedo", "roughness", "metallic", "specular", "grazing", "diffuse"),
+        "shade_sums", draw=draw_sums, call=shade_from_sums, shared=TABLE, repair=repaired, conditioned=True, bound=2e-6,
+        smooth=(*SHADED, "specular", "grazing", "diffuse"),
         gradient_bound=4e-6, exact=exact_shading.shade_sums, exact_bound=1e-14, reason=BY_CONDITION,
     ),
     Entry(
@@ -152,9 +154,9 @@ ENTRIES = (
         reason=BY_CONDITION,
     ),
     Entry(
-        "linear_to_srgb", draw=draw_linear, smooth=("linear",), exact=exact_shading.linear_to_srgb, exact_bound=1e-14,
+        "linear_to_srgb", draw=draw_linear, smooth=("linear",), conditioned=True, exact=exact_shading.linear_to_srgb, exact_bound=1e-14,
         call=lambda rows, shared: {"srgb": ops.linear_to_srgb(rows["linear"])}, bound=1e-5, gradient_bound=1e-5,
-        reason="x^(1/2.4): the float32 nearest to 1/2.4 is off by 4e-8, times ln x of up to 90",
+        reason="x^(1/2.4): the float32 nearest to 1/2.4 is off by 4e-8, times ln x of up to 90; the slope jumps at .0031308",
     ),
     Entry(
         "srgb_to_linear", draw=draw_srgb, exact=exact_shading.srgb_to_linear, exact_bound=1e-14,
