@@ -148,7 +148,9 @@ def test_a_float64_that_is_wrong_is_caught_by_exact_arithmetic():
 
 def test_the_same_seed_gives_the_same_errors():
     first, second = (search.run(BY_NAME["linear_to_srgb"], 2000, seed=5, exact_rows=1) for _ in range(2))
-    assert first.forward == second.forward and table.input_text(first.worst_forward) == table.input_text(second.worst_forward)
+    assert first.forward == second.forward and table.input_text(first.worst_forward) == table.input_text(
+        second.worst_forward
+    )
 
 
 # ---- the command -------------------------------------------------------------------------------
@@ -195,7 +197,9 @@ def test_the_machine_is_named(tmp_path):
 
 ENTRY_OF_EACH = {name: entry for name, entry in BY_NAME.items() if "," not in name}
 ROW_BY_ROW = [
-    name for name, entry in ENTRY_OF_EACH.items() if entry.size == 1 or name in ("monte_carlo_light", "composite", "summed_light")
+    name
+    for name, entry in ENTRY_OF_EACH.items()
+    if entry.size == 1 or name in ("monte_carlo_light", "composite", "summed_light")
 ]
 
 
@@ -212,7 +216,9 @@ def test_half_precision_raises(name, dtype):
 def test_empty_batches_give_empty_results(name, dtype):
     entry = ENTRY_OF_EACH[name]
     empty = {key: x[:0] for key, x in rows_of(name, 2).items()}
-    outputs, gradients, shared = evaluate(entry, empty, dtype) if entry.size == 1 else (entry.call(empty, entry.shared), {}, {})
+    outputs, gradients, shared = (
+        evaluate(entry, empty, dtype) if entry.size == 1 else (entry.call(empty, entry.shared), {}, {})
+    )
     assert all(len(x) == 0 for x in (*outputs.values(), *gradients.values()))
     assert all(bool((x == 0).all()) for x in shared.values())
 

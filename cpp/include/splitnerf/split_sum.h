@@ -101,7 +101,7 @@ SPLITNERF_HD Vec3<T> query_direction(const float* lut, bool mean, Vec3<T> normal
   const Vec3<T> w_r = reflect(n, view);
   if (!mean) return w_r;
   const T blend = smoothstep(T(kQueryBlendStart), T(kQueryBlendEnd), roughness);
-  const T k = lerp(T(1), lookup_brdf_lut(lut, dot(n, view), roughness).z, blend);
+  const T k = (T(1) - blend) + blend * lookup_brdf_lut(lut, dot(n, view), roughness).z;
   return normalize(n * (T(1) - k) + w_r * k);
 }
 
@@ -123,7 +123,7 @@ SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bo
   if (mean) {
     const T lo = T(kQueryBlendStart), hi = T(kQueryBlendEnd), blend = smoothstep(lo, hi, roughness);
     const LutSample<T> s = sample_brdf_lut(lut, nv, roughness);
-    const T k = lerp(T(1), s.value.z, blend);
+    const T k = (T(1) - blend) + blend * s.value.z;
     // d = normalize(n (1 - k) + w_r k)
     const Vec3<T> grad_a = normalize_backward(n * (T(1) - k) + w_r * k, grad);
     grad_n = grad_a * (T(1) - k);

@@ -34,11 +34,18 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Compares every operator in float32 with float64 on adversarial inputs, searches for the worst of them, asks "
         "these again in 50 digits, and writes the worst errors and their inputs. Exits with 1 where one breaks its promise.",
     )  # fmt: skip
-    stability.add_argument("--cases", type=int, default=10**7, metavar="N", help="inputs of an operator (default: 10^7)")
-    stability.add_argument("--op", action="append", default=[], metavar="NAME", help="only this operator; may be repeated")
+    stability.add_argument(
+        "--cases", type=int, default=10**7, metavar="N", help="inputs of an operator (default: 10^7)"
+    )
+    stability.add_argument(
+        "--op", action="append", default=[], metavar="NAME", help="only this operator; may be repeated"
+    )
     stability.add_argument("--seed", type=int, default=0, metavar="S", help="of the inputs (default: 0)")
     stability.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder of the tables (default: docs/benchmarks in a checkout, else here)"
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="folder of the tables (default: docs/benchmarks in a checkout, else here)",
     )
     stability.set_defaults(execute=run_stability)
 

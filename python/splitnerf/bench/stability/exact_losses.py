@@ -11,7 +11,11 @@ PAIRS = 6
 
 
 def srgb(x):
-    return mp.mpf("12.92") * x if x <= mp.mpf("0.0031308") else mp.mpf("1.055") * x ** (1 / mp.mpf("2.4")) - mp.mpf("0.055")
+    return (
+        mp.mpf("12.92") * x
+        if x <= mp.mpf("0.0031308")
+        else mp.mpf("1.055") * x ** (1 / mp.mpf("2.4")) - mp.mpf("0.055")
+    )
 
 
 def pixel_losses(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:

@@ -51,7 +51,11 @@ def fresnel(mode: str, f0, roughness, cosine):
 
 
 def split_sum_shade(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    view, roughness, metallic = vector(row["view_dirs"]), mp.mpf(float(row["roughness"][0])), mp.mpf(float(row["metallic"][0]))
+    view, roughness, metallic = (
+        vector(row["view_dirs"]),
+        mp.mpf(float(row["roughness"][0])),
+        mp.mpf(float(row["metallic"][0])),
+    )
     cosine = turned(vector(row["normals"]), view)[1]
     f1, f2, _ = table(cosine, roughness)
     names = ("albedo", "specular", "diffuse", "occlusion_s", "occlusion_d")
@@ -73,7 +77,9 @@ def shade_sums(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
     view, metallic = vector(row["view_dirs"]), mp.mpf(float(row["metallic"][0]))
     f1, f2, _ = table(turned(vector(row["normals"]), view)[1], mp.mpf(float(row["roughness"][0])))
     out: dict[str, list] = {"single": [], "compensated": []}
-    for albedo, specular, grazing, diffuse in zip(*(vector(row[n]) for n in ("albedo", "specular", "grazing", "diffuse"))):
+    for albedo, specular, grazing, diffuse in zip(
+        *(vector(row[n]) for n in ("albedo", "specular", "grazing", "diffuse"))
+    ):
         f0 = mp.mpf("0.04") * (1 - metallic) + metallic * albedo
         for name, values in out.items():
             gain = 1 + f0 * (1 / (f1 + f2) - 1) if name == "compensated" else mp.mpf(1)

@@ -44,7 +44,9 @@ def with_jacobian(rows: Rows, shared: Rows) -> Rows:
 
 
 def draw_layer(draw: Draw, n: int) -> Rows:
-    features = draw.signs(n, SPEC.n_outputs) * draw.mixed((0.0, 1e-38, 1e-7, 1.0), draw.logarithmic(1e-6, 3, n, SPEC.n_outputs))
+    features = draw.signs(n, SPEC.n_outputs) * draw.mixed(
+        (0.0, 1e-38, 1e-7, 1.0), draw.logarithmic(1e-6, 3, n, SPEC.n_outputs)
+    )
     jacobian = draw.signs(n, 3, SPEC.n_outputs) * draw.logarithmic(1e-4, 1e3, n, 3, SPEC.n_outputs)
     return {"positions": draw.uniform(n, 3, low=-1, high=1), "features": features, "jacobian": jacobian}
 

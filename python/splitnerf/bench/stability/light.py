@@ -25,7 +25,10 @@ def draw_queries(draw: Draw, n: int) -> Rows:
     lights = lamps()["light_dirs"].double()
     at = lights[torch.randint(LIGHTS, (n,), generator=draw.generator)]
     close = unit(at + draw.pick((0.0, 1e-7, 1e-4, 1e-2), n, 1) * draw.normal(n, 3))
-    return {"query_dirs": torch.where(draw.chance(0.5, n, 1), close, draw.directions(n)), "roughness": draw.roughness(n)}
+    return {
+        "query_dirs": torch.where(draw.chance(0.5, n, 1), close, draw.directions(n)),
+        "roughness": draw.roughness(n),
+    }
 
 
 @lru_cache(maxsize=1)

@@ -12,7 +12,7 @@ from splitnerf.bench.stability import exact_losses
 from splitnerf.bench.stability.cases import Draw
 from splitnerf.bench.stability.entry import Entry, Rows
 
-BATCH, PAIRS, POINTS = 16, 6, 12
+BATCH, PAIRS, POINTS = 48, 6, 24
 BY_CONDITION = "a few roundings of each term, times its condition; sums in float64"
 
 
@@ -20,7 +20,10 @@ def batches(rows: Rows, names: tuple[str, ...], call: Callable[..., tuple], outp
     """Calls the operator once a row."""
     n = len(rows[names[0]])
     found = [call(*(rows[name][i] for name in names)) for i in range(n)]
-    return {name: torch.stack([f[k] for f in found])[:, None] if n else rows[names[0]].new_empty(0, 1) for k, name in enumerate(outputs)}
+    return {
+        name: torch.stack([f[k] for f in found])[:, None] if n else rows[names[0]].new_empty(0, 1)
+        for k, name in enumerate(outputs)
+    }
 
 
 def draw_pixels(draw: Draw, n: int) -> Rows:
@@ -55,7 +58,9 @@ def draw_gradients(draw: Draw, n: int) -> Rows:
 
 def field_gradients(rows: Rows, shared: Rows) -> Rows:
     beside = torch.arange(PAIRS)
-    return batches(rows, ("gradients", "weights"), lambda g, w: ops.gradient_losses(g, w, beside), ("eikonal", "smoothness"))
+    return batches(
+        rows, ("gradients", "weights"), lambda g, w: ops.gradient_losses(g, w, beside), ("eikonal", "smoothness")
+    )
 
 
 def draw_metals(draw: Draw, n: int) -> Rows:
@@ -82,25 +87,25 @@ def repaired_shares(rows: Rows) -> Rows:
 ENTRIES = (
     Entry(
         "pixel_losses", draw=draw_pixels, call=pixels, smooth=("mean", "opacity"), repair=repaired_pixels, conditioned=True,
-        bound=4e-6, gradient_bound=8e-6, exact=exact_losses.pixel_losses, exact_bound=1e-13, size=BATCH, chunk=512,
+        bound=4e-6, gradient_bound=8e-6, exact=exact_losses.pixel_losses, exact_bound=1e-13, size=BATCH, chunk=256,
         floor=1e-12, gradient_floor=1e-9, reason=BY_CONDITION + "; of colours in [0, 1] errors below 1e-6 count as that",
     ),
     Entry(
         "gradient_losses", draw=draw_gradients, call=field_gradients, smooth=("gradients",), conditioned=True, bound=4e-6,
-        gradient_bound=8e-6, exact=exact_losses.gradient_losses, exact_bound=1e-13, size=BATCH, chunk=1024, floor=0.1,
+        gradient_bound=8e-6, exact=exact_losses.gradient_losses, exact_bound=1e-13, size=BATCH, chunk=256, floor=0.1,
         gradient_floor=0.1, repair=lambda rows: {k: x.clamp(-1e6, 1e6) if k == "gradients" else x.clamp(0, 1) for k, x in rows.items()},
         reason=BY_CONDITION + "; of distances of unit vectors and of gradients of order 1 the error is absolute",
     ),
     Entry(
         "material_losses", draw=draw_metals, call=metals, smooth=("metallic",), conditioned=True, bound=2e-6,
-        gradient_bound=4e-6, exact=exact_losses.material_losses, exact_bound=1e-13, size=BATCH, chunk=512, floor=1e-25,
+        gradient_bound=4e-6, exact=exact_losses.material_losses, exact_bound=1e-13, size=BATCH, chunk=256, floor=1e-25,
         gradient_floor=1e-25, repair=repaired_shares,
         reason=BY_CONDITION + "; shares that sum to less than 1e-8 count as that, and products of them underflow",
     ),
     Entry(
         "quadratic_entropy", draw=draw_points, smooth=("x",), conditioned=True, bound=2e-6, gradient_bound=4e-6,
         call=lambda rows, shared: batches(rows, ("x",), lambda x: (ops.quadratic_entropy(x),), ("entropy",)),
-        exact=exact_losses.quadratic_entropy, exact_bound=1e-13, size=POINTS, chunk=1024, floor=1.0, gradient_floor=1e-3,
+        exact=exact_losses.quadratic_entropy, exact_bound=1e-13, size=POINTS, chunk=256, floor=1.0, gradient_floor=1e-3,
         repair=lambda rows: {"x": rows["x"].clamp(-1e6, 1e6)},
         reason="the likeness of a pair is off by 2^-22 of itself; an entropy below 1 is a logarithm close to 0",
     ),

@@ -11,7 +11,8 @@ from splitnerf.bench.stability.entry import Entry, Rows
 
 LARGEST = 3.0e38  # true values beyond it have no float32
 CHANGE = 2.0**-22  # relative, of the inputs, by which the condition is found
-FEW_PROBES, MANY_PROBES, SUSPECTS = 4, 64, 64
+MANY_PROBES = 64
+ROUNDS = ((4, 1.0), (16, 0.25), (MANY_PROBES, 0.0625))  # probes, and of which share of a chunk at most, the worst rows
 
 
 @dataclass(frozen=True)
@@ -76,10 +77,10 @@ def measure(entry: Entry, rows: Rows) -> Errors:
         parts.append(plain)
     forward, gradient = parts[0].clone(), parts[1].clone()
     if entry.conditioned:
-        for probes, most in ((FEW_PROBES, n), (MANY_PROBES, SUSPECTS)):
+        for probes, share in ROUNDS:
             high = torch.maximum(forward / entry.bound, gradient / (entry.gradient_bound or torch.inf))
             which = torch.nonzero((high > 1) & ~broken)[:, 0]
-            which = which[torch.argsort(high[which], descending=True)[:most]]
+            which = which[torch.argsort(high[which], descending=True)[: int(share * entry.chunk)]]
             if len(which):
                 few = {name: x[which] for name, x in rows.items()}
                 ours = ({k: x[which] for k, x in got.items()}, {k: x[which] for k, x in got_gradients.items()})

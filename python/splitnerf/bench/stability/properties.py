@@ -118,7 +118,9 @@ def all_blocked(draw: Draw, n: int) -> tuple[Tensor, Rows]:
 def cache() -> ops.VisibilityCache:
     vertices = torch.tensor(CORNERS) * HALF
     directions = ops.fibonacci_directions(64, torch.Generator().manual_seed(0))
-    return ops.VisibilityCache.trace(cube(), vertices, unit(vertices.double()).float(), 24 * HALF**2, directions, with_hits=True)
+    return ops.VisibilityCache.trace(
+        cube(), vertices, unit(vertices.double()).float(), 24 * HALF**2, directions, with_hits=True
+    )
 
 
 def bits_apart(draw: Draw, n: int) -> tuple[Tensor, Rows]:
@@ -151,7 +153,11 @@ def marched(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     targets = torch.round(draw.uniform(n, 3, low=-1, high=1) * side / 2) * 2 / side
     directions = draw.directions(n)
     origins = targets - directions * draw.mixed((0.0, 1e-7, 1.0, 3.0, 1e4), draw.uniform(n, 1, high=4))
-    rows = {"rays_o": origins.float(), "rays_d": directions.float(), "jitter": draw.shares(n).clamp(max=1 - 6e-8).float()}
+    rows = {
+        "rays_o": origins.float(),
+        "rays_d": directions.float(),
+        "jitter": draw.shares(n).clamp(max=1 - 6e-8).float(),
+    }
     found = ops.march_rays(rows["rays_o"], rows["rays_d"], rows["jitter"], cells, box, step, limit)
     ray, start = found.ray_indices, found.t_starts.double()
     point = rows["rays_o"].double()[ray] + rows["rays_d"].double()[ray] * (start + step / 2)[:, None]
@@ -208,7 +214,11 @@ def lobe_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
 def bsdf_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     """Unit vectors, densities finite and not below 0, above the horizon at least half of the cosine's."""
     normals = draw.directions(n)
-    rows = {"normals": normals.float(), "view_dirs": draw.at_cosine(normals).float(), "roughness": draw.roughness(n).float()}
+    rows = {
+        "normals": normals.float(),
+        "view_dirs": draw.at_cosine(normals).float(),
+        "roughness": draw.roughness(n).float(),
+    }
     found, pdf = ops.sample_bsdf(*rows.values(), 8, int(draw.uniform(1).item() * 1e9))
     sign = torch.where((rows["normals"].double() * rows["view_dirs"].double()).sum(1, keepdim=True) < 0, -1.0, 1.0)
     cosine = ((rows["normals"].double() * sign)[:, None] * found.double()).sum(-1)
@@ -220,11 +230,18 @@ def bsdf_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
 
 
 PROPERTIES = (
-    Property("trace_visibility, closed", closed_cube, "no ray into a closed cube leaks, through vertices and edges either"),
+    Property(
+        "trace_visibility, closed", closed_cube, "no ray into a closed cube leaks, through vertices and edges either"
+    ),
     Property("trace_visibility, open", open_outside, "every ray away from a face of a convex body is open"),
     Property("occlusion_factors", shares, "in [0, 1] under black, dim, bright and single lights", chunk=1024),
     Property("occlusion_factors, blocked", all_blocked, "0 where all rays are blocked, in black light too", chunk=1024),
-    Property("visibility_bits", bits_apart, "open or blocked above the horizon, neither below; a convex body blocks nothing", chunk=1024),
+    Property(
+        "visibility_bits",
+        bits_apart,
+        "open or blocked above the horizon, neither below; a convex body blocks nothing",
+        chunk=1024,
+    ),
     Property("cached_occlusion", cached, "in [0, 1], the mesh's own light too, under black and single lights"),
     Property("march_rays", marched, "in the box, ascending by the step, at most as many as asked for"),
     Property("spread_samples", spread, "shares in [0, 1]; every ray has a sample; constants stay themselves", size=8),

@@ -26,7 +26,9 @@ def fields(draw: Draw, n: int, samples: int) -> Tensor:
     """[n, samples + 1] distances times sharpness at the borders of samples: through surfaces, fog, steps of up to 1e6."""
     falling = draw.uniform(n, 1, low=-30, high=60) - draw.logarithmic(1e-3, 30, n, 1) * torch.arange(samples + 1)
     fog = draw.uniform(n, 1, low=0, high=20) + draw.logarithmic(1e-6, 1e-1, n, 1) * draw.normal(n, samples + 1)
-    wild = draw.signs(n, samples + 1) * draw.mixed((0.0, 1e-38, 1e-7, 1.0, 20.0, 88.0, 1e6), draw.logarithmic(1e-6, 1e6, n, samples + 1))
+    wild = draw.signs(n, samples + 1) * draw.mixed(
+        (0.0, 1e-38, 1e-7, 1.0, 20.0, 88.0, 1e6), draw.logarithmic(1e-6, 1e6, n, samples + 1)
+    )
     kind = draw.uniform(n, 1)
     return torch.where(kind < 0.4, falling, torch.where(kind < 0.7, fog, wild))
 
@@ -73,7 +75,7 @@ def surface(rows: Rows, shared: Rows, anneal: float) -> Rows:
 
 def repaired_surface(rows: Rows) -> Rows:
     return {
-        "sdf": rows["sdf"].clamp(-4, 4), "gradient": rows["gradient"].clamp(-1e6, 1e6), "rays_d": unit(rows["rays_d"].double()),
+        "sdf": rows["sdf"].clamp(-1, 1), "gradient": rows["gradient"].clamp(-1e6, 1e6), "rays_d": unit(rows["rays_d"].double()),
     }  # fmt: skip
 
 
@@ -84,11 +86,19 @@ def draw_composite(draw: Draw, n: int, samples: int) -> Rows:
 
 def sums(rows: Rows, shared: Rows) -> Rows:
     n, samples = rows["weights"].shape
-    return {"sums": ops.composite(rows["weights"].flatten(), rows["values"].reshape(n * samples, 3), offsets(n, samples))}
+    return {
+        "sums": ops.composite(rows["weights"].flatten(), rows["values"].reshape(n * samples, 3), offsets(n, samples))
+    }
 
 
 def neus(name: str, s: float, draw, **changes) -> Entry:
-    options = {"bound": 4e-6, "gradient_bound": 8e-6, "floor": 1e-30, "gradient_floor": 1e-30 * s, "exact": exact_rays.neus_weights}
+    options = {
+        "bound": 4e-6,
+        "gradient_bound": 8e-6,
+        "floor": 1e-30,
+        "gradient_floor": 1e-30 * s,
+        "exact": exact_rays.neus_weights,
+    }
     return Entry(
         name, draw=draw, call=weights, smooth=("f_prev", "f_next"), smooth_shared=("s",), shared={"s": torch.tensor(s)},
         conditioned=True, exact_bound=1e-13, reason=BY_DEPTH, **(options | changes),
@@ -102,14 +112,14 @@ ENTRIES = (
     Entry(
         "surface_weights", draw=draw_surface, call=partial(surface, anneal=1.0), smooth=("sdf", "gradient"),
         smooth_shared=("s",), shared={"s": torch.tensor(200.0)}, repair=repaired_surface, conditioned=True, bound=4e-5,
-        gradient_bound=4e-4, floor=1e-30, gradient_floor=1e-3, size=SAMPLES,
-        reason="both ends are rounded: |sdf| / step 2^-24 of the depth for |sdf| up to 4; gradients are bounded by s",
+        gradient_bound=4e-4, floor=1.0, gradient_floor=1.0, size=SAMPLES,
+        reason="absolute: both ends of a sample are rounded, so that a depth is off by s |sdf| 2^-24, for |sdf| up to 1",
     ),
     Entry(
         "surface_weights, annealed", draw=draw_surface, call=partial(surface, anneal=0.3), smooth=("sdf", "gradient"),
         smooth_shared=("s",), shared={"s": torch.tensor(20.0)}, repair=repaired_surface, conditioned=True, bound=4e-5,
-        gradient_bound=4e-4, floor=1e-30, gradient_floor=1e-3, size=SAMPLES,
-        reason="both ends are rounded: |sdf| / step 2^-24 of the depth for |sdf| up to 4; gradients are bounded by s",
+        gradient_bound=4e-4, floor=1.0, gradient_floor=1.0, size=SAMPLES,
+        reason="absolute: both ends of a sample are rounded, so that a depth is off by s |sdf| 2^-24, for |sdf| up to 1",
     ),
     Entry(
         "composite", draw=partial(draw_composite, samples=SAMPLES), call=sums, smooth=("weights", "values"), conditioned=True,

@@ -56,7 +56,11 @@ def number(x: float | None) -> str:
 
 
 def result_line(r: Result) -> str:
-    gradient = f"gradient {number(max(r.gradient, r.shared))} of {number(r.entry.gradient_bound)}" if has_gradient(r.entry) else ""
+    gradient = (
+        f"gradient {number(max(r.gradient, r.shared))} of {number(r.entry.gradient_bound)}"
+        if has_gradient(r.entry)
+        else ""
+    )
     end = "" if r.holds else "  BROKEN"
     return f"{r.entry.name:28s} {r.cases:9d}  forward {number(r.forward)} of {number(r.entry.bound)}  {gradient}{end}"
 
@@ -112,12 +116,30 @@ def write(results: list[Result], verdicts: list[Verdict], seed: int, folder: Pat
             writer.writerow((*row_of(r), input_text(r.worst_forward), input_text(r.worst_gradient)))
         for v in verdicts:
             blank = ["-"] * 8
-            writer.writerow((v.claim.name, v.cases, *blank, v.broken, "yes" if v.holds else "NO", v.claim.statement, input_text(v.worst), ""))
+            writer.writerow(
+                (
+                    v.claim.name,
+                    v.cases,
+                    *blank,
+                    v.broken,
+                    "yes" if v.holds else "NO",
+                    v.claim.statement,
+                    input_text(v.worst),
+                    "",
+                )
+            )
     return markdown, table
 
 
 def markdown_text(results: list[Result], verdicts: list[Verdict], head: dict[str, str]) -> str:
-    lines = ["# Worst errors of the operators", "", *(f"- {key}: {value}" for key, value in head.items()), "", INTRODUCTION, ""]
+    lines = [
+        "# Worst errors of the operators",
+        "",
+        *(f"- {key}: {value}" for key, value in head.items()),
+        "",
+        INTRODUCTION,
+        "",
+    ]
     lines += ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
     lines += ["| " + " | ".join(row_of(r)) + " |" for r in results]
     lines += ["", "| operator | cases | broken | what must hold |", "|---|---|---|---|"]
