@@ -64,9 +64,9 @@ def planted(error, bound: float = 1e-6, **changes) -> Entry:
         x = rows["x"]
         return {"y": x * x * (1 + error(x)) if x.dtype == torch.float32 else x * x}
 
-    options = {"smooth": ("x",), "gradient_bound": bound}
     draw = lambda source, n: {"x": source.uniform(n, 1, low=0.5, high=2)}  # noqa: E731
-    return Entry("planted", draw=draw, call=call, bound=bound, reason="x^2", **(options | changes))
+    options = {"draw": draw, "call": call, "smooth": ("x",), "gradient_bound": bound} | changes
+    return Entry("planted", bound=bound, reason="x^2", **options)
 
 
 def corner(size: float, low: float, high: float):
@@ -99,7 +99,8 @@ def test_an_error_in_the_gradient_alone_is_caught():
 
 def test_the_search_finds_a_spot_that_drawing_does_not():
     """An error that grows to 1e-2 at 1.2345, a hundred-thousandth wide: drawn numbers see its foot only."""
-    slope = lambda x: 1e-2 * torch.exp(-(x - 1.2345).abs() * 1e5) + 1e-4 * torch.exp(-(x - 1.2345).square() * 30)  # noqa: E731
+    apart = lambda x: (x - 1.2345).abs()  # noqa: E731
+    slope = lambda x: 1e-2 * torch.exp(-1e5 * apart(x)) + 1e-3 / (1 + 300 * apart(x))  # noqa: E731
     entry = planted(slope, bound=1e-5)
     draw, drawn, best = cases.Draw(0), search.Tally(entry), search.Worst()
     given = cast(entry.draw(draw, 500), torch.float32)

@@ -35,6 +35,8 @@ class Entry:
         reason: What the bound and the floor follow from.
         smooth: Names of rows to which there is a gradient.
         smooth_shared: The same of what the rows share.
+        shared_bound: Of these gradients: sums in float32 over all rows of a chunk, 2^-24 of the largest for each of up to
+            16384 terms at worst, the square root of that if the roundings are independent.
         shared: What all rows share: numbers of a table, a light, a network.
         floor: An output smaller than this counts as this large.
         gradient_floor: The same of a gradient.
@@ -56,6 +58,7 @@ class Entry:
     gradient_bound: float = 0.0
     smooth: tuple[str, ...] = ()
     smooth_shared: tuple[str, ...] = ()
+    shared_bound: float = 1e-4
     shared: Rows = field(default_factory=dict)
     floor: float = 1e-35
     gradient_floor: float = 1e-35

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -40,7 +41,7 @@ def cast(rows: Rows, dtype: torch.dtype) -> Rows:
 
 def cotangent(output: Tensor) -> Tensor:
     """The same numbers for every row, of both signs, in [.5, 1.5]."""
-    n = output[:1].numel() if len(output) else 1
+    n = math.prod(output.shape[1:])
     steps = torch.arange(n, dtype=torch.float64, device=output.device)
     values = (0.5 + torch.frac(0.1 + 0.6180339887498949 * steps)) * torch.where(steps % 3 == 1, -1.0, 1.0)
     return values.float().to(output.dtype).reshape(1, *output.shape[1:]).expand_as(output)

@@ -52,7 +52,8 @@ class Result:
         return (
             self.broken == 0
             and self.forward <= self.entry.bound
-            and max(self.gradient, self.shared) <= self.entry.gradient_bound
+            and self.gradient <= self.entry.gradient_bound
+            and self.shared <= self.entry.shared_bound
             and (self.exact is None or self.exact <= self.entry.exact_bound)
         )
 

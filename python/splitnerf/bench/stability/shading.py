@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import torch
 from torch import Tensor
 
 from splitnerf import ops
@@ -19,7 +20,10 @@ BY_CONDITION = "a few roundings, times how much the true value changes by a rela
 
 
 def repaired(rows: Rows) -> Rows:
-    """Directions of length 1 or 0, shares in [0, 1], light and densities not below 0."""
+    """Directions of length 1 or 0, shares in [0, 1], light and densities not below 0.
+
+    Where the normal has length 0 the query has the length chi, which vanishes towards roughness 1: below .9 there.
+    """
     out = dict(rows)
     for name, x in rows.items():
         if name in UNITS:
@@ -28,6 +32,9 @@ def repaired(rows: Rows) -> Rows:
             out[name] = x.clamp(0, 1)
         elif name != "linear":
             out[name] = x.clamp(0, 1e30)
+    if "normals" in rows:
+        nothing = (rows["normals"] == 0).all(1, keepdim=True)
+        out["roughness"] = torch.where(nothing, out["roughness"].clamp(max=0.9), out["roughness"])
     return out
 
 
@@ -36,7 +43,7 @@ def surface(draw: Draw, n: int) -> Rows:
     normals = draw.directions(n)
     view_dirs = draw.at_cosine(normals)
     normals[draw.chance(0.02, n)] = 0
-    return {"normals": normals, "view_dirs": view_dirs, "roughness": draw.roughness(n)}
+    return repaired({"normals": normals, "view_dirs": view_dirs, "roughness": draw.roughness(n)})
 
 
 def draw_material(draw: Draw, n: int) -> Rows:
@@ -145,7 +152,7 @@ ENTRIES = (
     ),
     Entry(
         "monte_carlo_light", draw=draw_lit, call=light_sums, repair=repaired, conditioned=True, bound=4e-6,
-        smooth=("normals", "roughness", "radiance"), gradient_bound=8e-6, exact=exact_shading.light_sums, exact_bound=1e-14,
+        smooth=("normals", "roughness", "radiance"), gradient_bound=8e-6, exact=exact_shading.light_sums, exact_bound=1e-14, floor=1e-10,
         size=SAMPLES, reason=BY_CONDITION,
     ),
     Entry(

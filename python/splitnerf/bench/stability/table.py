@@ -18,7 +18,7 @@ PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
 NAME = "stability"
 COLUMNS = (
     "operator", "inputs", "worst forward", "promised", "worst gradient", "promised gradient", "without condition",
-    "gradient without condition", "float64 against exact", "float32 against exact", "not finite", "holds", "reason",
+    "gradient without condition", "gradient to shared", "float64 against exact", "float32 against exact", "not finite", "holds", "reason",
 )  # fmt: skip
 
 
@@ -56,11 +56,7 @@ def number(x: float | None) -> str:
 
 
 def result_line(r: Result) -> str:
-    gradient = (
-        f"gradient {number(max(r.gradient, r.shared))} of {number(r.entry.gradient_bound)}"
-        if has_gradient(r.entry)
-        else ""
-    )
+    gradient = f"gradient {number(r.gradient)} of {number(r.entry.gradient_bound)}" if r.entry.smooth else ""
     end = "" if r.holds else "  BROKEN"
     return f"{r.entry.name:28s} {r.cases:9d}  forward {number(r.forward)} of {number(r.entry.bound)}  {gradient}{end}"
 
@@ -69,16 +65,11 @@ def verdict_line(v: Verdict) -> str:
     return f"{v.claim.name:28s} {v.cases:9d}  {v.claim.statement}{'' if v.holds else f'  BROKEN {v.broken} times'}"
 
 
-def has_gradient(entry: Entry) -> bool:
-    return bool(entry.smooth or entry.smooth_shared)
-
-
 def row_of(r: Result) -> list[str]:
-    gradients = has_gradient(r.entry)
     return [
         r.entry.name, str(r.cases), number(r.forward), number(r.entry.bound),
-        number(max(r.gradient, r.shared)) if gradients else "none", number(r.entry.gradient_bound) if gradients else "none",
-        number(r.plain_forward), number(r.plain_gradient) if gradients else "none", number(r.exact), number(r.single_exact),
+        number(r.gradient) if r.entry.smooth else "none", number(r.entry.gradient_bound) if r.entry.smooth else "none",
+        number(r.plain_forward), number(r.plain_gradient) if r.entry.smooth else "none", number(r.shared) if r.entry.smooth_shared else "none", number(r.exact), number(r.single_exact),
         str(r.broken), "yes" if r.holds else "NO", r.entry.reason,
     ]  # fmt: skip
 
@@ -97,7 +88,7 @@ def inputs_of(results: Iterable[Result], verdicts: Iterable[Verdict]) -> list[tu
     lines = []
     for r in results:
         lines.append((r.entry.name, "forward", input_text(r.worst_forward)))
-        if has_gradient(r.entry):
+        if r.entry.smooth:
             lines.append((r.entry.name, "gradient", input_text(r.worst_gradient)))
     return lines + [(v.claim.name, "broken", input_text(v.worst)) for v in verdicts if not v.holds]
 
@@ -115,7 +106,7 @@ def write(results: list[Result], verdicts: list[Verdict], seed: int, folder: Pat
         for r in results:
             writer.writerow((*row_of(r), input_text(r.worst_forward), input_text(r.worst_gradient)))
         for v in verdicts:
-            blank = ["-"] * 8
+            blank = ["-"] * 9
             writer.writerow(
                 (
                     v.claim.name,
