@@ -11,28 +11,29 @@ namespace {
 
 constexpr int64_t kGrain = 64;  // rays
 
-// The distances at both ends of a ray's samples, [0, n) of both arrays.
+// The distances at both ends of a ray's samples and their difference, [0, n) of the arrays.
 template <class T>
-void interval_ends(const SurfaceSamples<T>& in, int64_t ray, const Vec3<T>* normals, T* f_prev, T* f_next) {
+void interval_ends(const SurfaceSamples<T>& in, int64_t ray, const Vec3<T>* normals, T* f_prev, T* f_next, T* apart) {
   const Vec3<T> direction = load3(in.directions + 3 * ray);
   const int64_t first = in.offsets[ray], n = in.offsets[ray + 1] - first;
   for (int64_t i = 0; i < n; ++i) {
     const T half = T(0.5) * in.step * annealed_cosine(dot(direction, normals[i]), in.anneal).value;
     f_prev[i] = in.sdf[first + i] - half;
     f_next[i] = in.sdf[first + i] + half;
+    apart[i] = T(-2) * half;  // seen grazing it is less than the roundings of both ends
   }
 }
 
 // Work memory of one ray.
 template <class T> struct RayWork {
   std::vector<Vec3<T>> normals;
-  std::vector<T> f_prev, f_next, depths;
+  std::vector<T> f_prev, f_next, apart, depths;
 
   void load(const SurfaceSamples<T>& in, int64_t ray) {
     const int64_t first = in.offsets[ray], n = in.offsets[ray + 1] - first;
-    normals.resize(n), f_prev.resize(n), f_next.resize(n), depths.resize(n);
+    normals.resize(n), f_prev.resize(n), f_next.resize(n), apart.resize(n), depths.resize(n);
     for (int64_t i = 0; i < n; ++i) normals[i] = unit_normal(load3(in.gradient + 3 * (first + i)));
-    interval_ends(in, ray, normals.data(), f_prev.data(), f_next.data());
+    interval_ends(in, ray, normals.data(), f_prev.data(), f_next.data(), apart.data());
   }
 };
 
@@ -72,7 +73,8 @@ void neus_weights(int64_t n_rays, const int64_t* offsets, const T* f_prev, const
   parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
     for (int64_t r = begin; r < end; ++r) {
       const int64_t first = offsets[r], n = offsets[r + 1] - first;
-      opacity[r] = neus_ray_weights(f_prev + first, f_next + first, s, n, min_transmittance, weights + first);
+      opacity[r] =
+          neus_ray_weights<T>(f_prev + first, f_next + first, nullptr, s, n, min_transmittance, weights + first);
     }
   });
 }
@@ -86,8 +88,8 @@ void neus_weights_backward(int64_t n_rays, const int64_t* offsets, const T* f_pr
       const int64_t first = offsets[r], n = offsets[r + 1] - first;
       T *to_prev = grad_f_prev + first, *to_next = grad_f_next + first;
       grad_s_rays[r] = neus_ray_weights_backward(
-          f_prev + first, f_next + first, s, n, min_transmittance, weights + first, grad_weights + first,
-          grad_opacity[r], to_next,
+          f_prev + first, f_next + first, static_cast<const T*>(nullptr), s, n, min_transmittance, weights + first,
+          grad_weights + first, grad_opacity[r], to_next,
           [&](int64_t i, const OpticalDepthGrad<T>& g) { to_prev[i] = g.f_prev, to_next[i] = g.f_next; });
     }
   });
@@ -131,8 +133,8 @@ template <class T> void surface_weights(const SurfaceSamples<T>& in, T* normals,
       const int64_t first = in.offsets[r], n = in.offsets[r + 1] - first;
       work.load(in, r);
       for (int64_t i = 0; i < n; ++i) store3(normals + 3 * (first + i), work.normals[i]);
-      opacity[r] =
-          neus_ray_weights(work.f_prev.data(), work.f_next.data(), in.s, n, in.min_transmittance, weights + first);
+      opacity[r] = neus_ray_weights(work.f_prev.data(), work.f_next.data(), work.apart.data(), in.s, n,
+                                    in.min_transmittance, weights + first);
     }
   });
 }
@@ -156,9 +158,9 @@ void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, con
         store3(grad_gradient + 3 * (first + i),
                unit_normal_backward(load3(in.gradient + 3 * (first + i)), grad_normal));
       };
-      grad_s_rays[r] =
-          neus_ray_weights_backward(work.f_prev.data(), work.f_next.data(), in.s, n, in.min_transmittance,
-                                    weights + first, grad_weights + first, grad_opacity[r], work.depths.data(), keep);
+      grad_s_rays[r] = neus_ray_weights_backward(work.f_prev.data(), work.f_next.data(), work.apart.data(), in.s, n,
+                                                 in.min_transmittance, weights + first, grad_weights + first,
+                                                 grad_opacity[r], work.depths.data(), keep);
     }
   });
 }

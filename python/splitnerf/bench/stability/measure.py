@@ -47,8 +47,10 @@ def cotangent(output: Tensor) -> Tensor:
     return values.float().to(output.dtype).reshape(1, *output.shape[1:]).expand_as(output)
 
 
-def evaluate(entry: Entry, rows: Rows, dtype: torch.dtype, shared: Rows | None = None) -> tuple[Rows, Rows, Rows]:
-    """Outputs, gradients to rows, and gradients to what the rows share, by name."""
+def evaluate(
+    entry: Entry, rows: Rows, dtype: torch.dtype, shared: Rows | None = None, generator: torch.Generator | None = None
+) -> tuple[Rows, Rows, Rows]:
+    """Outputs, gradients to rows, and gradients to what the rows share, by name; with a generator for changed cotangents."""
     rows, shared = cast(rows, dtype), cast(entry.shared if shared is None else shared, dtype)
     leaves = {name: rows[name].detach().clone().requires_grad_() for name in entry.smooth}
     common = {name: shared[name].detach().clone().requires_grad_() for name in entry.smooth_shared}
@@ -57,7 +59,8 @@ def evaluate(entry: Entry, rows: Rows, dtype: torch.dtype, shared: Rows | None =
     wanted = [*leaves.values(), *common.values()]
     if not wanted:
         return outputs, {}, {}
-    gradients = torch.autograd.grad(answered, wanted, [cotangent(x) for x in answered], allow_unused=True)
+    given = [cotangent(x) if generator is None else changed(cotangent(x), generator) for x in answered]
+    gradients = torch.autograd.grad(answered, wanted, given, allow_unused=True)
     found = [torch.zeros_like(x) if g is None else g for x, g in zip(wanted, gradients)]
     outputs = {name: x.detach() for name, x in outputs.items()}
     return outputs, dict(zip(leaves, found)), dict(zip(common, found[len(leaves) :]))
@@ -123,7 +126,8 @@ def conditioned_errors(entry: Entry, rows: Rows, got: tuple[Rows, Rows], probes:
 def conditions(entry: Entry, rows: Rows, probes: int) -> tuple[tuple[Rows, Rows], tuple[Rows, Rows]]:
     """True outputs and gradients, and for each row how much they change by a relative change of what they follow from.
 
-    All numbers are changed at random by CHANGE at most; what the rows share in a few ways, the rows each in their own.
+    All numbers, the gradients to the outputs too, are changed at random by CHANGE at most; what the rows share in a few
+    ways, the rows each in their own.
     """
     true = evaluate(entry, rows, torch.float64)[:2]
     wide = tuple({name: x.new_zeros(len(x)) for name, x in part.items()} for part in true)
@@ -133,7 +137,7 @@ def conditions(entry: Entry, rows: Rows, probes: int) -> tuple[tuple[Rows, Rows]
         many = {name: x.repeat(at_once, *[1] * (x.dim() - 1)) for name, x in rows.items()}
         near = {name: changed(x, generator, name in entry.vectors) for name, x in many.items()}
         shared = {name: changed(x, generator) for name, x in entry.shared.items()}
-        for part, moved, widest in zip(true, evaluate(entry, near, torch.float64, shared)[:2], wide):
+        for part, moved, widest in zip(true, evaluate(entry, near, torch.float64, shared, generator)[:2], wide):
             for name, x in part.items():
                 step = (moved[name].reshape(at_once, n, -1) - x.reshape(1, n, -1)).abs().nan_to_num(0.0, 0.0, 0.0)
                 if step.numel():

@@ -14,7 +14,7 @@ from splitnerf.bench.stability.measure import MANY_PROBES, Errors, cast, conditi
 
 KEPT = 1000  # worst rows
 SEARCH_SHARE = 0.2  # of all cases go to the search
-STEPS = (2.0**-23, 2.0**-20, 2.0**-12, 2.0**-4, 0.5)  # relative, by which the search moves numbers
+STEPS = (2.0**-23, 2.0**-20, 2.0**-16, 2.0**-12, 2.0**-8, 2.0**-4, 0.5)  # relative, by which the search moves numbers
 
 
 @dataclass(frozen=True)

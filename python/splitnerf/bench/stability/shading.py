@@ -16,6 +16,7 @@ IN_UNIT_RANGE = ("albedo", "roughness", "metallic", "occlusion_s", "occlusion_d"
 SHADED = ("normals", "view_dirs", "albedo", "roughness", "metallic")
 TABLE = {"lut": ops.brdf_lut()}  # always float32; its numbers are as uncertain as the rest
 SAMPLES = 4  # directions a point
+NO_SHARE = 1e-36  # of components of directions: a cosine over pi should have a float32
 BY_CONDITION = "a few roundings, times how much the true value changes by a relative change of the inputs and the table"
 
 
@@ -27,7 +28,7 @@ def repaired(rows: Rows) -> Rows:
     out = dict(rows)
     for name, x in rows.items():
         if name in UNITS:
-            out[name] = unit(x.double())
+            out[name] = unit(torch.where(x.abs() < NO_SHARE, 0.0, x.double()))
         elif name in IN_UNIT_RANGE:
             out[name] = x.clamp(0, 1)
         elif name != "linear":
@@ -69,7 +70,9 @@ def draw_lit(draw: Draw, n: int) -> Rows:
     own = draw.at_cosine(rows["normals"].repeat_interleave(SAMPLES, 0)).reshape(n, SAMPLES, 3)
     wild = draw.chance(0.3, n, SAMPLES)
     return rows | {
-        "light_dirs": own.where(wild[..., None], sampled.double()),
+        "light_dirs": torch.where((own.abs() < NO_SHARE) & wild[..., None], 0.0, own).where(
+            wild[..., None], sampled.double()
+        ),
         "pdf": draw.mixed((1e-7, 0.3, 1e3), draw.uniform(n, SAMPLES)).where(wild, pdf.double()),
         "radiance": draw.radiance(n, SAMPLES, 3, top=1e20),
     }
