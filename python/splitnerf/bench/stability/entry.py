@@ -23,8 +23,9 @@ class Entry:
 
     The error of a row is the largest difference between float32 and float64 in one output (or one gradient), over the
     size of that output: its largest component in the row, plus, where ``conditioned``, how much the true value changes
-    for a relative change of the inputs, of numbers each or of a vector as a whole (the absolute condition number; Higham 2002, section 1.6), since no arithmetic on
-    rounded numbers can do better than that.
+    for a relative change of the inputs, of numbers each or of a vector as a whole (the absolute condition number; Higham
+    2002, section 1.6), since no arithmetic on rounded numbers can do better than that. The condition is only asked for
+    where the error without it is above the bound.
 
     Attributes:
         name: Of the operator.
@@ -35,8 +36,8 @@ class Entry:
         reason: What the bound and the floor follow from.
         smooth: Names of rows to which there is a gradient.
         smooth_shared: The same of what the rows share.
-        shared_bound: Of these gradients: sums in float32 over all rows of a chunk, 2^-24 of the largest for each of up to
-            16384 terms at worst, the square root of that if the roundings are independent.
+        shared_bound: Of these gradients: sums in float32 over all rows of a chunk, up to 16384 terms, each of
+            which rounds by 2^-24 of the sum.
         shared: What all rows share: numbers of a table, a light, a network.
         floor: An output smaller than this counts as this large.
         gradient_floor: The same of a gradient.

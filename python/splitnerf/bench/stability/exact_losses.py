@@ -54,9 +54,11 @@ def material_losses(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]
     total = max(mp.fsum(shares), mp.mpf("1e-8"))
     darkness = [max(1 - max(vector(albedo)) / mp.mpf("0.4"), mp.mpf(0)) for albedo in row["albedo"]]
     terms = {
-        "metal": [m * m for m in metallic], "binary": [m * (1 - m) for m in metallic],
-        "dark": [m * d for m, d in zip(metallic, darkness)], "metal, smooth L1": [m * m / 2 for m in metallic],
-    }  # fmt: skip
+        "metal": [m * m for m in metallic],
+        "binary": [m * (1 - m) for m in metallic],
+        "dark": [m * d for m, d in zip(metallic, darkness)],
+        "metal, smooth L1": [m * m / 2 for m in metallic],
+    }
     return {name: [mp.fsum(s * v for s, v in zip(shares, values)) / total] for name, values in terms.items()}
 
 

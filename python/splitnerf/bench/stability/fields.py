@@ -55,9 +55,11 @@ def draw_layer(draw: Draw, n: int) -> Rows:
 def network() -> Rows:
     draw = Draw(5)
     return {
-        "hidden": draw.normal(WIDTH, 3 + SPEC.n_outputs).float(), "hidden_bias": 0.1 * draw.normal(WIDTH).float(),
-        "out": draw.normal(OUTPUTS, WIDTH).float() / math.sqrt(WIDTH), "out_bias": draw.normal(OUTPUTS).float(),
-    }  # fmt: skip
+        "hidden": draw.normal(WIDTH, 3 + SPEC.n_outputs).float(),
+        "hidden_bias": 0.1 * draw.normal(WIDTH).float(),
+        "out": draw.normal(OUTPUTS, WIDTH).float() / math.sqrt(WIDTH),
+        "out_bias": draw.normal(OUTPUTS).float(),
+    }
 
 
 def layer(rows: Rows, shared: Rows) -> Rows:
@@ -75,21 +77,53 @@ def values(rows: Rows, shared: Rows) -> Rows:
 WEIGHTS = ("hidden", "hidden_bias", "out", "out_bias")
 ENTRIES = (
     Entry(
-        "hash_encode", draw=draw_positions, call=encoded, smooth=("positions",), smooth_shared=("table",), shared=grid(),
-        conditioned=True, bound=2e-6, gradient_bound=4e-6, exact=exact_fields.hash_encode, exact_bound=1e-14, reason=BY_CELL,
+        "hash_encode",
+        draw=draw_positions,
+        call=encoded,
+        smooth=("positions",),
+        smooth_shared=("table",),
+        shared=grid(),
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=4e-6,
+        exact=exact_fields.hash_encode,
+        exact_bound=1e-14,
+        reason=BY_CELL,
     ),
     Entry(
-        "hash_encode_jacobian", draw=draw_positions, call=with_jacobian, smooth=("positions",), smooth_shared=("table",),
-        shared=grid(), conditioned=True, bound=2e-6, gradient_bound=4e-6, reason=BY_CELL,
+        "hash_encode_jacobian",
+        draw=draw_positions,
+        call=with_jacobian,
+        smooth=("positions",),
+        smooth_shared=("table",),
+        shared=grid(),
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=4e-6,
+        reason=BY_CELL,
     ),
     Entry(
-        "sdf_layer", draw=draw_layer, call=layer, smooth=("features", "jacobian"), smooth_shared=WEIGHTS, shared=network(),
-        conditioned=True, bound=4e-6, gradient_bound=1e-5, exact=exact_fields.sdf_layer, exact_bound=1e-13,
+        "sdf_layer",
+        draw=draw_layer,
+        call=layer,
+        smooth=("features", "jacobian"),
+        smooth_shared=WEIGHTS,
+        shared=network(),
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=1e-5,
+        exact=exact_fields.sdf_layer,
+        exact_bound=1e-13,
         reason="sums of 31 products, softplus of slope up to 1 and curvature beta / 4, which the condition holds",
     ),
     Entry(
-        "sdf_values", call=values, shared=network() | grid(), conditioned=True, bound=4e-6, reason="the two above",
+        "sdf_values",
+        call=values,
+        shared=network() | grid(),
+        conditioned=True,
+        bound=4e-6,
+        reason="the two above",
         draw=lambda draw, n: {"positions": 2 * draw_positions(draw, n)["positions"].clamp(0, 1) - 1},
         repair=lambda rows: {"positions": rows["positions"].clamp(-1, 1)},
     ),
-)  # fmt: skip
+)

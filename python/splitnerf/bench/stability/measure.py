@@ -50,7 +50,7 @@ def cotangent(output: Tensor) -> Tensor:
 def evaluate(
     entry: Entry, rows: Rows, dtype: torch.dtype, shared: Rows | None = None, generator: torch.Generator | None = None
 ) -> tuple[Rows, Rows, Rows]:
-    """Outputs, gradients to rows, and gradients to what the rows share, by name; with a generator for changed cotangents."""
+    """Outputs, gradients to rows and to what they share, by name; with a generator the cotangents are changed."""
     rows, shared = cast(rows, dtype), cast(entry.shared if shared is None else shared, dtype)
     leaves = {name: rows[name].detach().clone().requires_grad_() for name in entry.smooth}
     common = {name: shared[name].detach().clone().requires_grad_() for name in entry.smooth_shared}

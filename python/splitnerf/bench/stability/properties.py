@@ -1,7 +1,7 @@
 """What operators must satisfy that have no float64 twin: they trace, draw or count.
 
-A property takes (source, n) and gives [n] float64 violations, at most 0 where it holds, NaN where something is not finite,
-and the inputs.
+A property takes (source, n) and gives [n] float64 violations, at most 0 where it holds, NaN where something is not
+finite, and the inputs.
 """
 
 from __future__ import annotations
@@ -21,9 +21,19 @@ from splitnerf.bench.stability.entry import Rows
 HALF = 0.75  # half the edge of the cube that is traced
 CORNERS = ((-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1))
 FACES = (
-    (0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (2, 3, 7), (2, 7, 6), (0, 4, 7), (0, 7, 3), (1, 2, 6),
+    (0, 2, 1),
+    (0, 3, 2),
+    (4, 5, 6),
+    (4, 6, 7),
+    (0, 1, 5),
+    (0, 5, 4),
+    (2, 3, 7),
+    (2, 7, 6),
+    (0, 4, 7),
+    (0, 7, 3),
+    (1, 2, 6),
     (1, 6, 5),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)

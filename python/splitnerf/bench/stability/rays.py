@@ -16,6 +16,7 @@ SAMPLES = 8  # of a ray
 LONG = 10_000  # samples of a long ray
 STEP = 1 / 128
 BY_DEPTH = "a rounding of s f moves a weight by s f 2^-24, which the condition holds; else a few roundings"
+BY_NORMAL = "absolute: a rounding of the normal moves a depth by s step 2^-23; gradients of up to s are differences"
 
 
 def offsets(n: int, samples: int) -> Tensor:
@@ -23,7 +24,7 @@ def offsets(n: int, samples: int) -> Tensor:
 
 
 def fields(draw: Draw, n: int, samples: int) -> Tensor:
-    """[n, samples + 1] distances times sharpness at the borders of samples: through surfaces, fog, steps of up to 1e6."""
+    """[n, samples + 1] distances times sharpness at the borders of samples: surfaces, fog, steps of up to 1e6."""
     falling = draw.uniform(n, 1, low=-30, high=60) - draw.logarithmic(1e-3, 30, n, 1) * torch.arange(samples + 1)
     fog = draw.uniform(n, 1, low=0, high=20) + draw.logarithmic(1e-6, 1e-1, n, 1) * draw.normal(n, samples + 1)
     wild = draw.signs(n, samples + 1) * draw.mixed(
@@ -60,23 +61,32 @@ def draw_surface(draw: Draw, n: int) -> Rows:
     gradient = draw.vectors(n * SAMPLES).reshape(n, SAMPLES, 3)
     near = unit(draw.normal(n, SAMPLES, 3)) * draw.uniform(n, SAMPLES, 1, low=0.8, high=1.2)
     return {
-        "sdf": sdf, "gradient": torch.where(draw.chance(0.7, n, 1, 1), near, gradient), "rays_d": draw.directions(n),
-    }  # fmt: skip
+        "sdf": sdf,
+        "gradient": torch.where(draw.chance(0.7, n, 1, 1), near, gradient),
+        "rays_d": draw.directions(n),
+    }
 
 
 def surface(rows: Rows, shared: Rows, anneal: float) -> Rows:
     n = len(rows["sdf"])
     normals, w, opacity = ops.surface_weights(
-        rows["sdf"].flatten(), rows["gradient"].reshape(-1, 3), rows["rays_d"], shared["s"], offsets(n, SAMPLES), step=STEP,
+        rows["sdf"].flatten(),
+        rows["gradient"].reshape(-1, 3),
+        rows["rays_d"],
+        shared["s"],
+        offsets(n, SAMPLES),
+        step=STEP,
         anneal=anneal,
-    )  # fmt: skip
+    )
     return {"normals": normals.reshape(n, SAMPLES, 3), "weights": w.reshape(n, SAMPLES), "opacity": opacity[:, None]}
 
 
 def repaired_surface(rows: Rows) -> Rows:
     return {
-        "sdf": rows["sdf"].clamp(-1, 1), "gradient": rows["gradient"].clamp(-1e6, 1e6), "rays_d": unit(rows["rays_d"].double()),
-    }  # fmt: skip
+        "sdf": rows["sdf"].clamp(-1, 1),
+        "gradient": rows["gradient"].clamp(-1e6, 1e6),
+        "rays_d": unit(rows["rays_d"].double()),
+    }
 
 
 def draw_composite(draw: Draw, n: int, samples: int) -> Rows:
@@ -100,9 +110,17 @@ def neus(name: str, s: float, draw, **changes) -> Entry:
         "exact": exact_rays.neus_weights,
     }
     return Entry(
-        name, draw=draw, call=weights, smooth=("f_prev", "f_next"), smooth_shared=("s",), shared={"s": torch.tensor(s)},
-        conditioned=True, exact_bound=1e-13, reason=BY_DEPTH, **(options | changes),
-    )  # fmt: skip
+        name,
+        draw=draw,
+        call=weights,
+        smooth=("f_prev", "f_next"),
+        smooth_shared=("s",),
+        shared={"s": torch.tensor(s)},
+        conditioned=True,
+        exact_bound=1e-13,
+        reason=BY_DEPTH,
+        **(options | changes),
+    )
 
 
 ENTRIES = (
@@ -110,25 +128,59 @@ ENTRIES = (
     neus("neus_weights, s = 8000", 8000.0, lambda draw, n: {k: x / 8000 for k, x in draw_neus(draw, n).items()}),
     neus("neus_weights, 10^4 samples", 64.0, draw_long, size=LONG, chunk=8, exact=None),
     Entry(
-        "surface_weights", draw=draw_surface, call=partial(surface, anneal=1.0), smooth=("sdf", "gradient"),
-        smooth_shared=("s",), shared={"s": torch.tensor(200.0)}, repair=repaired_surface, conditioned=True, bound=4e-5,
-        gradient_bound=4e-4, floor=1.0, gradient_floor=1.0, size=SAMPLES,
-        reason="absolute: both ends of a sample are rounded, so that a depth is off by s |sdf| 2^-24, for |sdf| up to 1",
+        "surface_weights",
+        draw=draw_surface,
+        call=partial(surface, anneal=1.0),
+        smooth=("sdf", "gradient"),
+        smooth_shared=("s",),
+        shared={"s": torch.tensor(200.0)},
+        repair=repaired_surface,
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=4e-4,
+        floor=1.0,
+        gradient_floor=1.0,
+        size=SAMPLES,
+        reason=BY_NORMAL,
     ),
     Entry(
-        "surface_weights, annealed", draw=draw_surface, call=partial(surface, anneal=0.3), smooth=("sdf", "gradient"),
-        smooth_shared=("s",), shared={"s": torch.tensor(20.0)}, repair=repaired_surface, conditioned=True, bound=4e-5,
-        gradient_bound=4e-4, floor=1.0, gradient_floor=1.0, size=SAMPLES,
-        reason="absolute: both ends of a sample are rounded, so that a depth is off by s |sdf| 2^-24, for |sdf| up to 1",
+        "surface_weights, annealed",
+        draw=draw_surface,
+        call=partial(surface, anneal=0.3),
+        smooth=("sdf", "gradient"),
+        smooth_shared=("s",),
+        shared={"s": torch.tensor(20.0)},
+        repair=repaired_surface,
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=4e-4,
+        floor=1.0,
+        gradient_floor=1.0,
+        size=SAMPLES,
+        reason=BY_NORMAL,
     ),
     Entry(
-        "composite", draw=partial(draw_composite, samples=SAMPLES), call=sums, smooth=("weights", "values"), conditioned=True,
-        bound=1e-6, gradient_bound=1e-6, exact=exact_rays.composite, exact_bound=1e-14,
+        "composite",
+        draw=partial(draw_composite, samples=SAMPLES),
+        call=sums,
+        smooth=("weights", "values"),
+        conditioned=True,
+        bound=1e-6,
+        gradient_bound=1e-6,
+        exact=exact_rays.composite,
+        exact_bound=1e-14,
         reason="sums in float64, rounded once; gradients are sums over the channels",
     ),
     Entry(
-        "composite, 10^4 samples", draw=partial(draw_composite, samples=LONG), call=sums, smooth=("weights", "values"),
-        conditioned=True, bound=1e-6, gradient_bound=1e-6, size=LONG, chunk=8,
+        "composite, 10^4 samples",
+        draw=partial(draw_composite, samples=LONG),
+        call=sums,
+        smooth=("weights", "values"),
+        conditioned=True,
+        bound=1e-6,
+        gradient_bound=1e-6,
+        size=LONG,
+        chunk=8,
         reason="sums in float64, rounded once; gradients are sums over the channels",
     ),
-)  # fmt: skip
+)

@@ -127,9 +127,16 @@ def run(entry: Entry, cases: int, seed: int = 0, exact_rows: int = KEPT) -> Resu
     exact, single = exact_errors(entry, tally.worst["forward"], exact_rows) if entry.exact else (None, None)
     worst = {name: {k: x[:1] for k, x in kept.rows.items()} for name, kept in tally.worst.items()}
     return Result(
-        entry, tally.rows * entry.size, **tally.largest, shared=tally.shared, broken=tally.broken, exact=exact,
-        single_exact=single, worst_forward=worst["forward"], worst_gradient=worst["gradient"],
-    )  # fmt: skip
+        entry,
+        tally.rows * entry.size,
+        **tally.largest,
+        shared=tally.shared,
+        broken=tally.broken,
+        exact=exact,
+        single_exact=single,
+        worst_forward=worst["forward"],
+        worst_gradient=worst["gradient"],
+    )
 
 
 def climb(

@@ -53,9 +53,11 @@ def draw_material(draw: Draw, n: int) -> Rows:
 
 def draw_shaded(draw: Draw, n: int) -> Rows:
     return draw_material(draw, n) | {
-        "specular": draw.radiance(n, 3), "diffuse": draw.radiance(n, 3), "occlusion_s": draw.shares(n, 3),
+        "specular": draw.radiance(n, 3),
+        "diffuse": draw.radiance(n, 3),
+        "occlusion_s": draw.shares(n, 3),
         "occlusion_d": draw.shares(n, 3),
-    }  # fmt: skip
+    }
 
 
 def draw_sums(draw: Draw, n: int) -> Rows:
@@ -122,9 +124,10 @@ def sky(n: int) -> Rows:
     radiance[n // 2 :] = 0
     radiance[-1] = 1e6
     return {
-        "directions": unit(draw.normal(n, 3)).float(), "solid_angles": draw.uniform(n).float(),
+        "directions": unit(draw.normal(n, 3)).float(),
+        "solid_angles": draw.uniform(n).float(),
         "radiance": radiance.float(),
-    }  # fmt: skip
+    }
 
 
 def draw_linear(draw: Draw, n: int) -> Rows:
@@ -139,39 +142,98 @@ def draw_srgb(draw: Draw, n: int) -> Rows:
 
 ENTRIES = (
     Entry(
-        "query_direction", draw=surface, call=directions, shared=TABLE, smooth=("normals", "view_dirs", "roughness"), repair=repaired,
-        conditioned=True, bound=2e-6, gradient_bound=4e-6, exact=exact_shading.query_direction, exact_bound=1e-14,
-        gradient_floor=1.0, reason=BY_CONDITION + "; gradients of unit vectors count as at least 1, as theirs may vanish",
+        "query_direction",
+        draw=surface,
+        call=directions,
+        shared=TABLE,
+        smooth=("normals", "view_dirs", "roughness"),
+        repair=repaired,
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=4e-6,
+        exact=exact_shading.query_direction,
+        exact_bound=1e-14,
+        gradient_floor=1.0,
+        reason=BY_CONDITION + "; gradients of unit vectors count as at least 1, as theirs may vanish",
     ),
     Entry(
-        "split_sum_shade", draw=draw_shaded, call=shade_modes, shared=TABLE, repair=repaired, conditioned=True, bound=2e-6,
+        "split_sum_shade",
+        draw=draw_shaded,
+        call=shade_modes,
+        shared=TABLE,
+        repair=repaired,
+        conditioned=True,
+        bound=2e-6,
         smooth=(*SHADED, "specular", "diffuse", "occlusion_s", "occlusion_d"),
-        gradient_bound=4e-6, exact=exact_shading.split_sum_shade, exact_bound=1e-14, reason=BY_CONDITION,
-    ),
-    Entry(
-        "shade_sums", draw=draw_sums, call=shade_from_sums, shared=TABLE, repair=repaired, conditioned=True, bound=2e-6,
-        smooth=(*SHADED, "specular", "grazing", "diffuse"),
-        gradient_bound=4e-6, exact=exact_shading.shade_sums, exact_bound=1e-14, reason=BY_CONDITION,
-    ),
-    Entry(
-        "monte_carlo_light", draw=draw_lit, call=light_sums, repair=repaired, conditioned=True, bound=4e-6,
-        smooth=("normals", "roughness", "radiance"), gradient_bound=8e-6, exact=exact_shading.light_sums, exact_bound=1e-14, floor=1e-10,
-        size=SAMPLES, reason=BY_CONDITION,
-    ),
-    Entry(
-        "summed_light", draw=draw_summed, call=summed, repair=repaired_summed, shared=sky(32), conditioned=True, bound=4e-6,
-        smooth=("normals", "roughness"), smooth_shared=("radiance",), gradient_bound=1e-5, size=32, chunk=4096,
+        gradient_bound=4e-6,
+        exact=exact_shading.split_sum_shade,
+        exact_bound=1e-14,
         reason=BY_CONDITION,
     ),
     Entry(
-        "linear_to_srgb", draw=draw_linear, smooth=("linear",), conditioned=True, exact=exact_shading.linear_to_srgb, exact_bound=1e-14,
-        call=lambda rows, shared: {"srgb": ops.linear_to_srgb(rows["linear"])}, bound=1e-5, gradient_bound=1e-5,
-        reason="x^(1/2.4): the float32 nearest to 1/2.4 is off by 4e-8, times ln x of up to 90; the slope jumps at .0031308",
+        "shade_sums",
+        draw=draw_sums,
+        call=shade_from_sums,
+        shared=TABLE,
+        repair=repaired,
+        conditioned=True,
+        bound=2e-6,
+        smooth=(*SHADED, "specular", "grazing", "diffuse"),
+        gradient_bound=4e-6,
+        exact=exact_shading.shade_sums,
+        exact_bound=1e-14,
+        reason=BY_CONDITION,
     ),
     Entry(
-        "srgb_to_linear", draw=draw_srgb, exact=exact_shading.srgb_to_linear, exact_bound=1e-14,
+        "monte_carlo_light",
+        draw=draw_lit,
+        call=light_sums,
+        repair=repaired,
+        conditioned=True,
+        bound=4e-6,
+        smooth=("normals", "roughness", "radiance"),
+        gradient_bound=8e-6,
+        exact=exact_shading.light_sums,
+        exact_bound=1e-14,
+        floor=1e-10,
+        size=SAMPLES,
+        reason=BY_CONDITION,
+    ),
+    Entry(
+        "summed_light",
+        draw=draw_summed,
+        call=summed,
+        repair=repaired_summed,
+        shared=sky(32),
+        conditioned=True,
+        bound=4e-6,
+        smooth=("normals", "roughness"),
+        smooth_shared=("radiance",),
+        gradient_bound=1e-5,
+        size=32,
+        chunk=4096,
+        reason=BY_CONDITION,
+    ),
+    Entry(
+        "linear_to_srgb",
+        draw=draw_linear,
+        smooth=("linear",),
+        conditioned=True,
+        exact=exact_shading.linear_to_srgb,
+        exact_bound=1e-14,
+        call=lambda rows, shared: {"srgb": ops.linear_to_srgb(rows["linear"])},
+        bound=1e-5,
+        gradient_bound=1e-5,
+        reason="x^(1/2.4): the float32 nearest to 1/2.4 is off by 4e-8, times ln x up to 90; the slope jumps at .0031308",
+    ),
+    Entry(
+        "srgb_to_linear",
+        draw=draw_srgb,
+        exact=exact_shading.srgb_to_linear,
+        exact_bound=1e-14,
         repair=lambda rows: {"srgb": rows["srgb"].clamp(0, 1e15)},
-        call=lambda rows, shared: {"linear": ops.srgb_to_linear(rows["srgb"])}, bound=4e-6,
+        call=lambda rows, shared: {"linear": ops.srgb_to_linear(rows["srgb"])},
+        bound=4e-6,
         reason="x^2.4: the float32 nearest to 2.4 is off by 9e-8, times ln x of up to 35, and 2.4 roundings of x",
     ),
-)  # fmt: skip
+)

@@ -17,9 +17,21 @@ ENTRIES: tuple[Entry, ...] = shading.ENTRIES + light.ENTRIES + rays.ENTRIES + fi
 PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
 NAME = "stability"
 COLUMNS = (
-    "operator", "inputs", "worst forward", "promised", "worst gradient", "promised gradient", "without condition",
-    "gradient without condition", "gradient to shared", "float64 against exact", "float32 against exact", "not finite", "holds", "reason",
-)  # fmt: skip
+    "operator",
+    "inputs",
+    "worst forward",
+    "promised",
+    "worst gradient",
+    "promised gradient",
+    "without condition",
+    "gradient without condition",
+    "gradient to shared",
+    "float64 against exact",
+    "float32 against exact",
+    "not finite",
+    "holds",
+    "reason",
+)
 
 
 def chosen(names: list[str]) -> list[Entry | Property]:
@@ -67,11 +79,21 @@ def verdict_line(v: Verdict) -> str:
 
 def row_of(r: Result) -> list[str]:
     return [
-        r.entry.name, str(r.cases), number(r.forward), number(r.entry.bound),
-        number(r.gradient) if r.entry.smooth else "none", number(r.entry.gradient_bound) if r.entry.smooth else "none",
-        number(r.plain_forward), number(r.plain_gradient) if r.entry.smooth else "none", number(r.shared) if r.entry.smooth_shared else "none", number(r.exact), number(r.single_exact),
-        str(r.broken), "yes" if r.holds else "NO", r.entry.reason,
-    ]  # fmt: skip
+        r.entry.name,
+        str(r.cases),
+        number(r.forward),
+        number(r.entry.bound),
+        number(r.gradient) if r.entry.smooth else "none",
+        number(r.entry.gradient_bound) if r.entry.smooth else "none",
+        number(r.plain_forward),
+        number(r.plain_gradient) if r.entry.smooth else "none",
+        number(r.shared) if r.entry.smooth_shared else "none",
+        number(r.exact),
+        number(r.single_exact),
+        str(r.broken),
+        "yes" if r.holds else "NO",
+        r.entry.reason,
+    ]
 
 
 def input_text(rows: Rows) -> str:
@@ -140,8 +162,9 @@ def markdown_text(results: list[Result], verdicts: list[Verdict], head: dict[str
     return "\n".join(lines) + "\n"
 
 
-INTRODUCTION = """Each operator in float32 against itself in float64 on the same adversarial numbers: extreme values crossed with ordinary ones,
-and a search around the worst. An error is the largest difference in one output or gradient of a row over the largest number
-there plus, where the condition counts, how much the true value changes by a relative change of the inputs; the columns
-"without condition" leave the latter out. The worst thousand rows were asked again in 50 digits: "against exact". "Not finite"
-counts rows with NaN or infinity where the truth has a float32. No operator takes bfloat16 or float16: they raise."""
+INTRODUCTION = """Each operator in float32 against itself in float64 on the same adversarial numbers: extreme values crossed
+with ordinary ones, and a search around the worst. An error is the largest difference in one output or gradient of a row
+over the largest number there plus, where the condition counts, how much the true value changes by a relative change of
+the inputs; the columns "without condition" leave the latter out. The condition is only asked for above what is promised:
+an error just below that is an upper bound. The worst thousand rows were asked again in 50 digits: "against exact". "Not
+finite" counts rows with NaN or infinity where the truth has a float32. No operator takes bfloat16 or float16: they raise."""
