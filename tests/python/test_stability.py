@@ -16,7 +16,7 @@ from splitnerf.bench.stability import cases, fields, light, losses, properties, 
 from splitnerf.bench.stability.entry import Entry
 from splitnerf.bench.stability.measure import cast, evaluate, measure
 
-CASES, EXACT_ROWS = 100_000, 10
+CASES, EXACT = 100_000, 50
 FEWER = {"sparse_product": 50_000}  # one call a row
 BY_NAME = {entry.name: entry for entry in table.ENTRIES}
 NAN, INF = math.nan, math.inf
@@ -29,7 +29,7 @@ def rows_of(name: str, n: int, seed: int = 0) -> dict:
 @pytest.mark.parametrize("name", BY_NAME)
 def test_errors_stay_within_the_promise(name):
     """Errors of outputs and gradients against float64, of float64 against 50 digits, and nothing not finite."""
-    found = search.run(BY_NAME[name], FEWER.get(name, CASES), exact_rows=EXACT_ROWS)
+    found = search.run(BY_NAME[name], FEWER.get(name, CASES), exact=EXACT)
     assert found.holds, f"{table.result_line(found)} exact {found.exact} not finite {found.broken}\n" + "\n".join(
         f"{which}: {text}" for _, which, text in table.inputs_of([found], [])
     )
@@ -146,7 +146,7 @@ def test_a_float64_that_is_wrong_is_caught_by_exact_arithmetic():
 
 
 def test_the_same_seed_gives_the_same_errors():
-    first, second = (search.run(BY_NAME["linear_to_srgb"], 2000, seed=5, exact_rows=1) for _ in range(2))
+    first, second = (search.run(BY_NAME["linear_to_srgb"], 2000, seed=5, exact=1) for _ in range(2))
     assert first.forward == second.forward and table.input_text(first.worst_forward) == table.input_text(
         second.worst_forward
     )

@@ -23,9 +23,9 @@ class Entry:
 
     The error of a row is the largest difference between float32 and float64 in one output (or one gradient), over the
     size of that output: its largest component in the row, plus, where ``conditioned``, how much the true value changes
-    for a relative change of the inputs, of numbers each or of a vector as a whole (the absolute condition number; Higham
-    2002, section 1.6), since no arithmetic on rounded numbers can do better than that. The condition is only asked for
-    where the error without it is above the bound.
+    for a relative change of the inputs, of numbers each or of a vector as a whole (the absolute condition number;
+    Higham 2002, section 1.6), since no arithmetic on rounded numbers can do better than that. The condition is only
+    asked for where the error without it is above the bound.
 
     Attributes:
         name: Of the operator.

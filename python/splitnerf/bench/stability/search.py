@@ -108,14 +108,14 @@ def score(entry: Entry, errors: Errors) -> Tensor:
     return torch.where(errors.broken, torch.inf, scores)
 
 
-def run(entry: Entry, cases: int, seed: int = 0, exact_rows: int = KEPT) -> Result:
+def run(entry: Entry, cases: int, seed: int = 0, exact: int = KEPT) -> Result:
     """Tries ``cases`` inputs: drawn ones, and a fifth by search around the worst.
 
     Args:
         entry: The operator.
         cases: Inputs, ``entry.size`` of them a row.
         seed: Of the inputs.
-        exact_rows: How many of the worst rows are asked again in arbitrary precision.
+        exact: How many of the worst inputs are asked again in arbitrary precision.
     """
     draw, tally, best = Draw(seed), Tally(entry), Worst()
     total = max(1, cases // entry.size)
@@ -124,7 +124,8 @@ def run(entry: Entry, cases: int, seed: int = 0, exact_rows: int = KEPT) -> Resu
         rows = cast(entry.draw(draw, n), torch.float32)
         best.add(rows, tally.add(rows))
     climb(tally.add, best, entry.repair, draw, total - tally.rows, entry.chunk)
-    exact, single = exact_errors(entry, tally.worst["forward"], exact_rows) if entry.exact else (None, None)
+    again = -(-exact // entry.size)
+    double, single = exact_errors(entry, tally.worst["forward"], again) if entry.exact else (None, None)
     worst = {name: {k: x[:1] for k, x in kept.rows.items()} for name, kept in tally.worst.items()}
     return Result(
         entry,
@@ -132,7 +133,7 @@ def run(entry: Entry, cases: int, seed: int = 0, exact_rows: int = KEPT) -> Resu
         **tally.largest,
         shared=tally.shared,
         broken=tally.broken,
-        exact=exact,
+        exact=double,
         single_exact=single,
         worst_forward=worst["forward"],
         worst_gradient=worst["gradient"],

@@ -162,9 +162,10 @@ def markdown_text(results: list[Result], verdicts: list[Verdict], head: dict[str
     return "\n".join(lines) + "\n"
 
 
-INTRODUCTION = """Each operator in float32 against itself in float64 on the same adversarial numbers: extreme values crossed
-with ordinary ones, and a search around the worst. An error is the largest difference in one output or gradient of a row
-over the largest number there plus, where the condition counts, how much the true value changes by a relative change of
-the inputs; the columns "without condition" leave the latter out. The condition is only asked for above what is promised:
-an error just below that is an upper bound. The worst thousand rows were asked again in 50 digits: "against exact". "Not
-finite" counts rows with NaN or infinity where the truth has a float32. No operator takes bfloat16 or float16: they raise."""
+INTRODUCTION = """Each operator in float32 against itself in float64 on the same adversarial numbers: extreme values
+crossed with ordinary ones, and a search around the worst. An error is the largest difference in one output or gradient
+of a row over the largest number there plus, where the condition counts, how much the true value changes by a relative
+change of the inputs; the columns "without condition" leave the latter out. The condition is only asked for above what
+is promised: an error just below that is an upper bound. The worst thousand inputs were asked again in 50 digits:
+"against exact". "Not finite" counts rows with NaN or infinity where the truth has a float32. No operator takes bfloat16 or
+float16: they raise."""
