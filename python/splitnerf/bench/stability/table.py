@@ -167,5 +167,5 @@ crossed with ordinary ones, and a search around the worst. An error is the large
 of a row over the largest number there plus, where the condition counts, how much the true value changes by a relative
 change of the inputs; the columns "without condition" leave the latter out. The condition is only asked for above what
 is promised: an error just below that is an upper bound. The worst thousand inputs were asked again in 50 digits:
-"against exact". "Not finite" counts rows with NaN or infinity where the truth has a float32. No operator takes bfloat16 or
-float16: they raise."""
+"against exact". "Not finite" counts rows with NaN or infinity where the truth has a float32. No operator takes bfloat16
+or float16: they raise."""
