@@ -11,28 +11,29 @@ namespace {
 
 constexpr int64_t kGrain = 64;  // rays
 
-// The distances at both ends of a ray's samples, [0, n) of both arrays.
+// The distances at both ends of a ray's samples and their difference, [0, n) of the arrays.
 template <class T>
-void interval_ends(const SurfaceSamples<T>& in, int64_t ray, const Vec3<T>* normals, T* f_prev, T* f_next) {
+void interval_ends(const SurfaceSamples<T>& in, int64_t ray, const Vec3<T>* normals, T* f_prev, T* f_next, T* apart) {
   const Vec3<T> direction = load3(in.directions + 3 * ray);
   const int64_t first = in.offsets[ray], n = in.offsets[ray + 1] - first;
   for (int64_t i = 0; i < n; ++i) {
     const T half = T(0.5) * in.step * annealed_cosine(dot(direction, normals[i]), in.anneal).value;
     f_prev[i] = in.sdf[first + i] - half;
     f_next[i] = in.sdf[first + i] + half;
+    apart[i] = T(-2) * half;  // seen grazing it is less than the roundings of both ends
   }
 }
 
 // Work memory of one ray.
 template <class T> struct RayWork {
   std::vector<Vec3<T>> normals;
-  std::vector<T> f_prev, f_next, grad_prev, grad_next;
+  std::vector<T> f_prev, f_next, apart, depths;
 
   void load(const SurfaceSamples<T>& in, int64_t ray) {
     const int64_t first = in.offsets[ray], n = in.offsets[ray + 1] - first;
-    normals.resize(n), f_prev.resize(n), f_next.resize(n), grad_prev.resize(n), grad_next.resize(n);
+    normals.resize(n), f_prev.resize(n), f_next.resize(n), apart.resize(n), depths.resize(n);
     for (int64_t i = 0; i < n; ++i) normals[i] = unit_normal(load3(in.gradient + 3 * (first + i)));
-    interval_ends(in, ray, normals.data(), f_prev.data(), f_next.data());
+    interval_ends(in, ray, normals.data(), f_prev.data(), f_next.data(), apart.data());
   }
 };
 
@@ -72,21 +73,24 @@ void neus_weights(int64_t n_rays, const int64_t* offsets, const T* f_prev, const
   parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
     for (int64_t r = begin; r < end; ++r) {
       const int64_t first = offsets[r], n = offsets[r + 1] - first;
-      opacity[r] = neus_ray_weights(f_prev + first, f_next + first, s, n, min_transmittance, weights + first);
+      opacity[r] =
+          neus_ray_weights<T>(f_prev + first, f_next + first, nullptr, s, n, min_transmittance, weights + first);
     }
   });
 }
 
 template <class T>
 void neus_weights_backward(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s,
-                           T min_transmittance, const T* weights, const T* opacity, const T* grad_weights,
-                           const T* grad_opacity, T* grad_f_prev, T* grad_f_next, T* grad_s_rays) {
+                           T min_transmittance, const T* weights, const T* grad_weights, const T* grad_opacity,
+                           T* grad_f_prev, T* grad_f_next, T* grad_s_rays) {
   parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
     for (int64_t r = begin; r < end; ++r) {
       const int64_t first = offsets[r], n = offsets[r + 1] - first;
-      grad_s_rays[r] = neus_ray_weights_backward(f_prev + first, f_next + first, s, n, min_transmittance,
-                                                 weights + first, opacity[r], grad_weights + first, grad_opacity[r],
-                                                 grad_f_prev + first, grad_f_next + first);
+      T *to_prev = grad_f_prev + first, *to_next = grad_f_next + first;
+      grad_s_rays[r] = neus_ray_weights_backward(
+          f_prev + first, f_next + first, static_cast<const T*>(nullptr), s, n, min_transmittance, weights + first,
+          grad_weights + first, grad_opacity[r], to_next,
+          [&](int64_t i, const OpticalDepthGrad<T>& g) { to_prev[i] = g.f_prev, to_next[i] = g.f_next; });
     }
   });
 }
@@ -94,11 +98,12 @@ void neus_weights_backward(int64_t n_rays, const int64_t* offsets, const T* f_pr
 template <class T>
 void composite(int64_t n_rays, int64_t n_channels, const int64_t* offsets, const T* weights, const T* values, T* sums) {
   parallel_for(n_rays, kGrain, [&](int64_t begin, int64_t end) {
+    std::vector<double> totals(n_channels);  // the roundings of thousands of samples would add up
     for (int64_t r = begin; r < end; ++r) {
-      T* out = sums + r * n_channels;
-      std::fill(out, out + n_channels, T(0));
+      std::fill(totals.begin(), totals.end(), 0.0);
       for (int64_t i = offsets[r]; i < offsets[r + 1]; ++i)
-        for (int64_t c = 0; c < n_channels; ++c) out[c] += weights[i] * values[i * n_channels + c];
+        for (int64_t c = 0; c < n_channels; ++c) totals[c] += double(weights[i]) * double(values[i * n_channels + c]);
+      for (int64_t c = 0; c < n_channels; ++c) sums[r * n_channels + c] = T(totals[c]);
     }
   });
 }
@@ -128,14 +133,14 @@ template <class T> void surface_weights(const SurfaceSamples<T>& in, T* normals,
       const int64_t first = in.offsets[r], n = in.offsets[r + 1] - first;
       work.load(in, r);
       for (int64_t i = 0; i < n; ++i) store3(normals + 3 * (first + i), work.normals[i]);
-      opacity[r] =
-          neus_ray_weights(work.f_prev.data(), work.f_next.data(), in.s, n, in.min_transmittance, weights + first);
+      opacity[r] = neus_ray_weights(work.f_prev.data(), work.f_next.data(), work.apart.data(), in.s, n,
+                                    in.min_transmittance, weights + first);
     }
   });
 }
 
 template <class T>
-void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, const T* opacity, const T* grad_normals,
+void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, const T* grad_normals,
                               const T* grad_weights, const T* grad_opacity, T* grad_sdf, T* grad_gradient,
                               T* grad_s_rays) {
   parallel_for(in.n_rays, kGrain, [&](int64_t begin, int64_t end) {
@@ -144,18 +149,18 @@ void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, con
       const int64_t first = in.offsets[r], n = in.offsets[r + 1] - first;
       const Vec3<T> direction = load3(in.directions + 3 * r);
       work.load(in, r);
-      grad_s_rays[r] = neus_ray_weights_backward(work.f_prev.data(), work.f_next.data(), in.s, n, in.min_transmittance,
-                                                 weights + first, opacity[r], grad_weights + first, grad_opacity[r],
-                                                 work.grad_prev.data(), work.grad_next.data());
-      for (int64_t i = 0; i < n; ++i) {
-        // f_prev, f_next = sdf -+ half,  half = step / 2 annealed(direction . normal)
+      // f_prev, f_next = sdf -+ half,  half = step / 2 annealed(direction . normal)
+      const auto keep = [&](int64_t i, const OpticalDepthGrad<T>& g) {
         const T slope = annealed_cosine(dot(direction, work.normals[i]), in.anneal).slope;
-        const T grad_cosine = (work.grad_next[i] - work.grad_prev[i]) * T(0.5) * in.step * slope;
-        grad_sdf[first + i] = work.grad_prev[i] + work.grad_next[i];
+        const T grad_cosine = (g.f_next - g.f_prev) * T(0.5) * in.step * slope;
+        grad_sdf[first + i] = g.both;
         const Vec3<T> grad_normal = load3(grad_normals + 3 * (first + i)) + direction * grad_cosine;
         store3(grad_gradient + 3 * (first + i),
                unit_normal_backward(load3(in.gradient + 3 * (first + i)), grad_normal));
-      }
+      };
+      grad_s_rays[r] = neus_ray_weights_backward(work.f_prev.data(), work.f_next.data(), work.apart.data(), in.s, n,
+                                                 in.min_transmittance, weights + first, grad_weights + first,
+                                                 grad_opacity[r], work.depths.data(), keep);
     }
   });
 }
@@ -226,12 +231,12 @@ void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_
                                    const int64_t*, int64_t*, T*, T*);                                                  \
   template void neus_weights<T>(int64_t, const int64_t*, const T*, const T*, T, T, T*, T*);                            \
   template void neus_weights_backward<T>(int64_t, const int64_t*, const T*, const T*, T, T, const T*, const T*,        \
-                                         const T*, const T*, T*, T*, T*);                                              \
+                                         const T*, T*, T*, T*);                                                        \
   template void composite<T>(int64_t, int64_t, const int64_t*, const T*, const T*, T*);                                \
   template void composite_backward<T>(int64_t, int64_t, const int64_t*, const T*, const T*, const T*, T*, T*);         \
   template void surface_weights<T>(const SurfaceSamples<T>&, T*, T*, T*);                                              \
-  template void surface_weights_backward<T>(const SurfaceSamples<T>&, const T*, const T*, const T*, const T*,          \
-                                            const T*, T*, T*, T*);                                                     \
+  template void surface_weights_backward<T>(const SurfaceSamples<T>&, const T*, const T*, const T*, const T*, T*, T*,  \
+                                            T*);                                                                       \
   template Spread spread_samples<T>(int64_t, const int64_t*, const T*, const T*, const T*, T, int, T*);                \
   template void interpolate<T>(int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);              \
   template void interpolate_backward<T>(int64_t, int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, \

@@ -65,15 +65,14 @@ std::tuple<Tensor, Tensor> neus_weights(Tensor f_prev, Tensor f_next, Tensor s, 
 }
 
 std::tuple<Tensor, Tensor, Tensor> neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets,
-                                                         double min_transmittance, Tensor weights, Tensor opacity,
-                                                         Tensor grad_weights, Tensor grad_opacity) {
+                                                         double min_transmittance, Tensor weights, Tensor grad_weights,
+                                                         Tensor grad_opacity) {
   const char* op = "neus_weights_backward";
   const ScalarType type = real_type(op, "f_prev", f_prev);
   const Tensor p = checked(op, "f_prev", f_prev, {kAny}, type), q = checked(op, "f_next", f_next, {p.size(0)}, type);
   const Tensor sharpness = checked(op, "s", s, {}, type), o = checked_offsets(op, offsets, p.size(0));
   const int64_t n_rays = o.size(0) - 1;
   const Tensor w = checked(op, "weights", weights, {p.size(0)}, type);
-  const Tensor a = checked(op, "opacity", opacity, {n_rays}, type);
   const Tensor gw = checked(op, "grad_weights", grad_weights, {p.size(0)}, type);
   const Tensor ga = checked(op, "grad_opacity", grad_opacity, {n_rays}, type);
   Tensor grad_p = empty_like_type(p, {p.size(0)}, type), grad_q = empty_like_type(p, {p.size(0)}, type);
@@ -81,8 +80,8 @@ std::tuple<Tensor, Tensor, Tensor> neus_weights_backward(Tensor f_prev, Tensor f
   dispatch_real(type, [&](auto zero) {
     using T = decltype(zero);
     cpu::neus_weights_backward(n_rays, in<int64_t>(o), in<T>(p), in<T>(q), scalar_value<T>(sharpness),
-                               T(min_transmittance), in<T>(w), in<T>(a), in<T>(gw), in<T>(ga), out<T>(grad_p),
-                               out<T>(grad_q), out<T>(grad_s));
+                               T(min_transmittance), in<T>(w), in<T>(gw), in<T>(ga), out<T>(grad_p), out<T>(grad_q),
+                               out<T>(grad_s));
   });
   return {grad_p, grad_q, grad_s};
 }
@@ -155,13 +154,13 @@ std::tuple<Tensor, Tensor, Tensor> surface_weights(Tensor sdf, Tensor gradient, 
 
 std::tuple<Tensor, Tensor, Tensor> surface_weights_backward(Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s,
                                                             Tensor offsets, double step, double anneal,
-                                                            double min_transmittance, Tensor weights, Tensor opacity,
+                                                            double min_transmittance, Tensor weights,
                                                             Tensor grad_normals, Tensor grad_weights,
                                                             Tensor grad_opacity) {
   const char* op = "surface_weights_backward";
   const Surface x(op, sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance);
   const int64_t n = x.sdf.size(0), n_rays = x.n_rays();
-  const Tensor w = checked(op, "weights", weights, {n}, x.type), a = checked(op, "opacity", opacity, {n_rays}, x.type);
+  const Tensor w = checked(op, "weights", weights, {n}, x.type);
   const Tensor gn = checked(op, "grad_normals", grad_normals, {n, 3}, x.type);
   const Tensor gw = checked(op, "grad_weights", grad_weights, {n}, x.type);
   const Tensor ga = checked(op, "grad_opacity", grad_opacity, {n_rays}, x.type);
@@ -169,7 +168,7 @@ std::tuple<Tensor, Tensor, Tensor> surface_weights_backward(Tensor sdf, Tensor g
   Tensor grad_s = empty_like_type(w, {n_rays}, x.type);
   dispatch_real(x.type, [&](auto zero) {
     using T = decltype(zero);
-    cpu::surface_weights_backward(x.view<T>(), in<T>(w), in<T>(a), in<T>(gn), in<T>(gw), in<T>(ga), out<T>(grad_sdf),
+    cpu::surface_weights_backward(x.view<T>(), in<T>(w), in<T>(gn), in<T>(gw), in<T>(ga), out<T>(grad_sdf),
                                   out<T>(grad_gradient), out<T>(grad_s));
   });
   return {grad_sdf, grad_gradient, grad_s};
@@ -259,10 +258,10 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "(Tensor, Tensor)");
   m.def(
       "neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance, "
-      "Tensor weights, Tensor opacity, Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
+      "Tensor weights, Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
   m.def("surface_weights(" SPLITNERF_SURFACE ") -> (Tensor, Tensor, Tensor)");
   m.def("surface_weights_backward(" SPLITNERF_SURFACE
-        ", Tensor weights, Tensor opacity, Tensor grad_normals, "
+        ", Tensor weights, Tensor grad_normals, "
         "Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
   m.def(
       "spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray) -> "

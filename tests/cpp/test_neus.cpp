@@ -34,7 +34,7 @@ TEST(Neus, AlphaFollowsLongDouble) {
       for (int k = 0; k <= 60; ++k) {
         const float f_next = f_prev - std::pow(10.f, float(k) / 5 - 6) / s;
         const Wide expected = reference_alpha(f_prev, f_next, s);
-        const float alpha = -std::expm1(-neus_optical_depth(f_prev, f_next, s));
+        const float alpha = -std::expm1(-neus_optical_depth(f_prev, f_next, f_prev - f_next, s));
         ASSERT_TRUE(alpha >= 0 && alpha <= 1) << f_prev << " " << f_next << " " << s;
         if (expected < kFaint) {
           EXPECT_LT(alpha, 2 * kFaint);
@@ -49,10 +49,11 @@ TEST(Neus, AlphaFollowsLongDouble) {
 }
 
 TEST(Neus, NothingWhereTheDistanceRises) {
-  EXPECT_EQ(neus_optical_depth(0.1f, 0.1f, 100.f), 0);
-  EXPECT_EQ(neus_optical_depth(-0.1f, 0.2f, 100.f), 0);
-  EXPECT_EQ(neus_optical_depth(-1e6f, 1e6f, 1e6f), 0);
-  EXPECT_TRUE(std::isnan(neus_optical_depth(std::numeric_limits<float>::quiet_NaN(), 0.f, 1.f)));
+  EXPECT_EQ(neus_optical_depth(0.1f, 0.1f, 0.f, 100.f), 0);
+  EXPECT_EQ(neus_optical_depth(-0.1f, 0.2f, -0.3f, 100.f), 0);
+  EXPECT_EQ(neus_optical_depth(-1e6f, 1e6f, -2e6f, 1e6f), 0);
+  const float kNan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_TRUE(std::isnan(neus_optical_depth(kNan, 0.f, kNan, 1.f)));
 }
 
 template <class T> struct Ray {
@@ -68,7 +69,8 @@ template <class T> Ray<T> falling_ray(double f0, double slope, int n, T s, T min
     ray.f_next.push_back(T(f0 - slope * (i + 1) / n));
   }
   ray.weights.resize(n);
-  ray.opacity = neus_ray_weights(ray.f_prev.data(), ray.f_next.data(), s, n, min_transmittance, ray.weights.data());
+  ray.opacity = neus_ray_weights<T>(ray.f_prev.data(), ray.f_next.data(), nullptr, s, n, min_transmittance,
+                                        ray.weights.data());
   return ray;
 }
 
@@ -107,7 +109,8 @@ TEST(Neus, SamplesBehindTheMinimalTransmittanceAreZero) {
 TEST(Neus, NanReachesTheCaller) {
   Ray<float> ray = falling_ray(0.1, 0.5, 10, 10.f);
   ray.f_next[4] = std::numeric_limits<float>::quiet_NaN();
-  const float opacity = neus_ray_weights(ray.f_prev.data(), ray.f_next.data(), 10.f, 10, 0.f, ray.weights.data());
+  const float opacity =
+      neus_ray_weights<float>(ray.f_prev.data(), ray.f_next.data(), nullptr, 10.f, 10, 0.f, ray.weights.data());
   EXPECT_TRUE(std::isnan(opacity));
   EXPECT_FALSE(std::isnan(ray.weights[3]));
   EXPECT_TRUE(std::isnan(ray.weights[4]));
@@ -149,7 +152,7 @@ TEST(Neus, AdjointFollowsCentralDifferences) {
       };
       f();
       cpu::neus_weights_backward(4, b.offsets.data(), &b.x[0], &b.x[b.n], b.x.back(), min_transmittance, weights.data(),
-                                 opacity.data(), gw.data(), ga.data(), &gradient[0], &gradient[b.n], grad_s.data());
+                                 gw.data(), ga.data(), &gradient[0], &gradient[b.n], grad_s.data());
       for (double g : grad_s) gradient.back() += g;
       expect_gradient(f, b.x, gradient, 1e-6, "neus", 1e-6);
     }
@@ -164,11 +167,14 @@ TEST(Neus, FloatAdjointFollowsDoubleAlongOpaqueRays) {
   std::vector<double> gw(n), weights(n), prev(n), next(n);
   std::vector<float> gw32(n), prev32(n), next32(n);
   for (int i = 0; i < n; ++i) gw32[i] = std::cos(float(i)), gw[i] = gw32[i];
-  const double opacity = neus_ray_weights(f_prev.data(), f_next.data(), 4000., n, 0., weights.data());
-  neus_ray_weights_backward(f_prev.data(), f_next.data(), 4000., n, 0., weights.data(), opacity, gw.data(), 0.,
-                            prev.data(), next.data());
-  neus_ray_weights_backward(ray.f_prev.data(), ray.f_next.data(), 4000.f, n, 0.f, ray.weights.data(), ray.opacity,
-                            gw32.data(), 0.f, prev32.data(), next32.data());
+  neus_ray_weights<double>(f_prev.data(), f_next.data(), nullptr, 4000., n, 0., weights.data());
+  neus_ray_weights_backward(
+      f_prev.data(), f_next.data(), static_cast<const double*>(nullptr), 4000., n, 0., weights.data(), gw.data(), 0.,
+      next.data(), [&](int64_t i, const OpticalDepthGrad<double>& g) { prev[i] = g.f_prev, next[i] = g.f_next; });
+  neus_ray_weights_backward(
+      ray.f_prev.data(), ray.f_next.data(), static_cast<const float*>(nullptr), 4000.f, n, 0.f, ray.weights.data(),
+      gw32.data(), 0.f, next32.data(),
+      [&](int64_t i, const OpticalDepthGrad<float>& g) { prev32[i] = g.f_prev, next32[i] = g.f_next; });
   double largest = 0;
   for (double g : next) largest = std::max(largest, std::abs(g));
   for (int i = 0; i < n; ++i) {

@@ -47,7 +47,8 @@ template <class T> struct EikonalLoss {
 };
 template <class T> SPLITNERF_HD EikonalLoss<T> eikonal_loss(Vec3<T> g) {
   const T size = length(g), excess = size - T(1);
-  return {square(excess), g * (size > T(0) ? T(2) * excess / size : T(0))};
+  if (!(size > T(0))) return {square(excess), g};
+  return {square(excess), Vec3<T>{g.x / size, g.y / size, g.z / size} * (T(2) * excess)};  // 1 / size may have no float
 }
 
 // Distance of the unit normals of two gradients, and its gradients. Beyond the square root of 2 the normals are of two sides

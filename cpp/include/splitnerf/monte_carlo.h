@@ -55,15 +55,15 @@ SPLITNERF_HD LobeWeightGrad<T> lobe_weight(Vec3<T> normal, Vec3<T> view, Vec3<T>
   const T d2 = dot(delta, delta), sin2 = d2 * (T(1) - T(0.25) * d2), q = a2 + (T(1) - a2) * sin2;
   const T root_v = std::sqrt(nv * nv * (T(1) - a2) + a2), root_l = std::sqrt(nl * nl * (T(1) - a2) + a2);
   const T x = nl * root_v + nv * root_l;
-  const T w = ggx_d(ggx_alpha, sin2) * smith_v(ggx_alpha, nv, nl) * nl;
+  const T lobe = ggx_d(ggx_alpha, sin2) * smith_v(ggx_alpha, nv, nl), w = lobe * nl;
   out.value = {w, pow5(clamp(T(1) - dot(view, h), T(0), T(1))), nl * T(1 / kPi)};
-  // ln w = 2 ln a - 2 ln q + ln nl - ln x + const
+  // ln w = 2 ln a - 2 ln q + ln nl - ln x + const; what nearly cancels in its derivatives by a and by nl is summed by hand:
+  //   2 / a - 4 a (1 - sin2) / q = 2 (sin2 (1 + a^2) - a^2) / (a q),  1 - nl (d x / d nl) / x = nv a^2 / (root_l x)
   const T d_x_alpha = ggx_alpha * (nl * (T(1) - nv * nv) / root_v + nv * (T(1) - nl * nl) / root_l);
-  out.d_ggx_alpha = w * (T(2) / ggx_alpha - T(4) * ggx_alpha * (T(1) - sin2) / q - d_x_alpha / x);
-  const T d_nl = T(1) / nl - (root_v + nv * nl * (T(1) - a2) / root_l) / x;
+  out.d_ggx_alpha = w * (T(2) * (sin2 * (T(1) + a2) - a2) / (ggx_alpha * q) - d_x_alpha / x);
   const T d_nv = nv > T(kMinNdotV) ? -(root_l + nl * nv * (T(1) - a2) / root_v) / x : T(0);
   const T d_sin2 = -T(2) * (T(1) - a2) / q;
-  out.d_normal = (light * d_nl + view * d_nv + delta * (d_sin2 * (T(2) - d2))) * w;
+  out.d_normal = light * (lobe * (nv * a2 / (root_l * x))) + (view * d_nv + delta * (d_sin2 * (T(2) - d2))) * w;
   return out;
 }
 

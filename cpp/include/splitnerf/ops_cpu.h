@@ -213,9 +213,9 @@ template <class T>
 SPLITNERF_API void surface_weights(const SurfaceSamples<T>& samples, T* normals, T* weights, T* opacity);
 // grad_sdf [n], grad_gradient [n, 3], grad_s_rays [n_rays]: each ray's share of the gradient to s.
 template <class T>
-SPLITNERF_API void surface_weights_backward(const SurfaceSamples<T>& samples, const T* weights, const T* opacity,
-                                            const T* grad_normals, const T* grad_weights, const T* grad_opacity,
-                                            T* grad_sdf, T* grad_gradient, T* grad_s_rays);
+SPLITNERF_API void surface_weights_backward(const SurfaceSamples<T>& samples, const T* weights, const T* grad_normals,
+                                            const T* grad_weights, const T* grad_opacity, T* grad_sdf, T* grad_gradient,
+                                            T* grad_s_rays);
 
 // Which samples are shaded, `per_ray` of each ray spread by weight (0: all), and where the others lie between them. What is
 // more than `gap` apart along the ray is drawn for and interpolated on its own.
@@ -247,7 +247,7 @@ SPLITNERF_API void neus_weights(int64_t n_rays, const int64_t* offsets, const T*
 // grad_s_rays [n_rays]: each ray's share of the gradient to s.
 template <class T>
 SPLITNERF_API void neus_weights_backward(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s,
-                                         T min_transmittance, const T* weights, const T* opacity, const T* grad_weights,
+                                         T min_transmittance, const T* weights, const T* grad_weights,
                                          const T* grad_opacity, T* grad_f_prev, T* grad_f_next, T* grad_s_rays);
 
 // weights [n], values [n, c] -> sums [n_rays, c].

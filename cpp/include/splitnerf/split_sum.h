@@ -101,7 +101,7 @@ SPLITNERF_HD Vec3<T> query_direction(const float* lut, bool mean, Vec3<T> normal
   const Vec3<T> w_r = reflect(n, view);
   if (!mean) return w_r;
   const T blend = smoothstep(T(kQueryBlendStart), T(kQueryBlendEnd), roughness);
-  const T k = lerp(T(1), lookup_brdf_lut(lut, dot(n, view), roughness).z, blend);
+  const T k = (T(1) - blend) + blend * lookup_brdf_lut(lut, dot(n, view), roughness).z;
   return normalize(n * (T(1) - k) + w_r * k);
 }
 
@@ -123,7 +123,7 @@ SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bo
   if (mean) {
     const T lo = T(kQueryBlendStart), hi = T(kQueryBlendEnd), blend = smoothstep(lo, hi, roughness);
     const LutSample<T> s = sample_brdf_lut(lut, nv, roughness);
-    const T k = lerp(T(1), s.value.z, blend);
+    const T k = (T(1) - blend) + blend * s.value.z;
     // d = normalize(n (1 - k) + w_r k)
     const Vec3<T> grad_a = normalize_backward(n * (T(1) - k) + w_r * k, grad);
     grad_n = grad_a * (T(1) - k);
@@ -166,16 +166,18 @@ template <class T> SPLITNERF_HD T normal_reflectance(T metallic, T albedo) {
 //   code:  Fr = F0 + (max(1 - rho, F0) - F0)(1 - n.v)^5            the released code
 template <class T> struct FresnelTerm {
   T value, d_f0, d_roughness, d_n_dot_v;
+  T rest;  // 1 - Fr, which the difference would lose where both are close to 1
 };
 template <class T> SPLITNERF_HD FresnelTerm<T> fresnel_term(FresnelMode mode, T f0, T roughness, T n_dot_v) {
-  if (mode == FresnelMode::kExact) return {f0, T(1), T(0), T(0)};
-  const T c = clamp(T(1) - n_dot_v, T(0), T(1)), c5 = pow5(c);
+  if (mode == FresnelMode::kExact) return {f0, T(1), T(0), T(0), T(1) - f0};
+  const T nv = clamp(n_dot_v, T(0), T(1)), c = T(1) - nv, c5 = pow5(c);
+  const T inner = nv * (T(1) + c * (T(1) + c * (T(1) + c * (T(1) + c))));  // 1 - c^5
   const T smooth = T(1) - roughness;
   const bool floored = mode == FresnelMode::kCode && smooth < f0;
   const T edge = (floored ? f0 : smooth) - f0;
   const bool nv_free = n_dot_v > T(0) && n_dot_v < T(1);
-  return {f0 + edge * c5, floored ? T(1) : T(1) - c5, floored ? T(0) : -c5,
-          nv_free ? T(-5) * edge * square(c * c) : T(0)};
+  return {f0 + edge * c5, floored ? T(1) : inner, floored ? T(0) : -c5, nv_free ? T(-5) * edge * square(c * c) : T(0),
+          floored ? T(1) - f0 : (T(1) - f0) * inner + roughness * c5};
 }
 
 // What multiple scattering adds to the specular lobe of one channel, a factor, and its partial derivatives:
@@ -216,10 +218,11 @@ SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, con
   Vec3<T> radiance;
   for (int c = 0; c < 3; ++c) {
     const T f0 = normal_reflectance(m, p.albedo[c]);
-    const T fr = fresnel_term(options.fresnel, f0, p.roughness, nv).value;
-    const T e = specular_albedo(fr, table.x, table.y, options.compensate).value;
-    const T k_d = (T(1) - m) * (T(1) - (options.fresnel == FresnelMode::kExact ? e : fr));
-    radiance[c] = p.occlusion_d[c] * k_d * p.albedo[c] * p.diffuse[c] + p.occlusion_s[c] * e * p.specular[c];
+    const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
+    const T e = specular_albedo(fr.value, table.x, table.y, options.compensate).value;
+    const T k_d = (T(1) - m) * (options.fresnel == FresnelMode::kExact ? T(1) - e : fr.rest);
+    // The light first: shares of it may be so small that their product has no float.
+    radiance[c] = p.diffuse[c] * k_d * p.albedo[c] * p.occlusion_d[c] + p.specular[c] * e * p.occlusion_s[c];
   }
   return radiance;
 }
@@ -239,21 +242,21 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
     const T f0 = normal_reflectance(m, albedo);
     const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
     const SpecularAlbedo<T> e = specular_albedo(fr.value, table.value.x, table.value.y, options.compensate);
-    const T kept = T(1) - (exact ? e.value : fr.value), k_d = (T(1) - m) * kept;
+    const T kept = exact ? T(1) - e.value : fr.rest, k_d = (T(1) - m) * kept;
     // radiance = o_d k_d albedo l_d + o_s e l_s
     const T g = grad[c];
-    out.occlusion_d[c] = g * k_d * albedo * l_d;
-    out.occlusion_s[c] = g * e.value * l_s;
+    out.occlusion_d[c] = l_d * k_d * albedo * g;
+    out.occlusion_s[c] = l_s * e.value * g;
     out.diffuse[c] = g * o_d * k_d * albedo;
     out.specular[c] = g * o_s * e.value;
-    const T grad_k_d = g * o_d * albedo * l_d;
+    const T grad_k_d = l_d * o_d * albedo * g;
     // k_d = (1 - m)(1 - e) or (1 - m)(1 - fr)
     const T grad_kept = grad_k_d * (T(1) - m);
-    const T grad_e = g * o_s * l_s - (exact ? grad_kept : T(0));
+    const T grad_e = l_s * o_s * g - (exact ? grad_kept : T(0));
     const T grad_fr = grad_e * e.d_fr - (exact ? T(0) : grad_kept);
     // f0 = .04 (1 - m) + m albedo
     const T grad_f0 = grad_fr * fr.d_f0;
-    out.albedo[c] = g * o_d * k_d * l_d + grad_f0 * m;
+    out.albedo[c] = l_d * o_d * k_d * g + grad_f0 * m;
     out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - grad_k_d * kept;
     out.roughness += grad_fr * fr.d_roughness;
     grad_nv += grad_fr * fr.d_n_dot_v;

@@ -15,7 +15,7 @@ template <class T> struct ValueAndSlope {
 template <class T> SPLITNERF_HD ValueAndSlope<T> srgb_from_linear(T linear) {
   if (linear <= T(0.0031308)) return {T(12.92) * max_of(linear, T(0)), linear < T(0) ? T(0) : T(12.92)};
   const T power = T(1.055) * std::pow(linear, T(1) / T(2.4));
-  return {power - T(0.055), power / (T(2.4) * linear)};
+  return {power - T(0.055), power / linear * (T(1) / T(2.4))};
 }
 
 // Of values >= 0, not clipped above 1.

@@ -44,7 +44,12 @@ template <class T> SPLITNERF_HD Vec3<T> operator/(Vec3<T> a, T s) { return a * (
 
 template <class T> SPLITNERF_HD T dot(Vec3<T> a, Vec3<T> b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 template <class T> SPLITNERF_HD T sum(Vec3<T> a) { return a.x + a.y + a.z; }
-template <class T> SPLITNERF_HD T length(Vec3<T> a) { return std::sqrt(dot(a, a)); }
+// |a| for every finite vector: the squares of small or large numbers have no float.
+template <class T> SPLITNERF_HD T length(Vec3<T> a) {
+  const T largest = max_of(std::fabs(a.x), max_of(std::fabs(a.y), std::fabs(a.z)));
+  const T scale = largest < T(1e-12) ? T(0x1p100) : largest > T(1e12) ? T(0x1p-100) : T(1);
+  return std::sqrt(dot(a * scale, a * scale)) * (T(1) / scale);
+}
 template <class T> SPLITNERF_HD Vec3<T> cross(Vec3<T> a, Vec3<T> b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }

@@ -161,14 +161,15 @@ void sdf_layer_backward(const SdfLayer<T>& layer, const SdfPoints<T>& in, const 
   add_product<T>(layer.n_outputs, n, columns, {grad_outputs, 1, layer.n_outputs}, hidden, columns, grad.out, columns);
   add_product<T>(layer.width, n, inputs_row, {weighted, 1, columns}, grad_steepness, inputs_row, grad.hidden,
                  inputs_row);
-  // weighted = slope out[0],  hidden = softplus(pre): grad_hidden becomes that of pre
+  // weighted = slope out[0],  hidden = softplus(pre): grad_hidden becomes that of pre. 1 - slope = exp(-beta hidden)
+  // keeps its digits where the slope is close to 1.
   for (int64_t p = 0; p < n; ++p) {
-    const T *s = slope + p * columns, *g = grad_weighted + p * columns;
+    const T *s = slope + p * columns, *unit = hidden + p * columns, *g = grad_weighted + p * columns;
     T* pre = grad_hidden + p * columns;
 #pragma omp simd
     for (int64_t h = 0; h < columns; ++h) {
       grad.out[h] += g[h] * s[h];
-      pre[h] = pre[h] * s[h] + g[h] * layer.out[h] * layer.beta * s[h] * (T(1) - s[h]);
+      pre[h] = pre[h] * s[h] + g[h] * layer.out[h] * layer.beta * s[h] * exp_of_minus(layer.beta * unit[h]);
       grad.hidden_bias[h] += pre[h];
     }
     for (int64_t m = 0; m < layer.n_outputs; ++m) grad.out_bias[m] += grad_outputs[p * layer.n_outputs + m];

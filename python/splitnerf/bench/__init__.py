@@ -1,1 +1,1 @@
-"""Benchmarks that a user can run: what a skip is worth."""
+"""Benchmarks that a user can run: what a skip is worth, and how exact the operators are."""

@@ -6,7 +6,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.exit_codes import DONE, FAILED
 from splitnerf.errors import InputError
 
 
@@ -29,6 +29,25 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all runs"
     )
     skip.set_defaults(execute=run_skip)
+    stability = benchmarks.add_parser(
+        "stability", help="how far each operator is from the truth on inputs made to break it",
+        description="Compares every operator in float32 with float64 on adversarial inputs, searches for the worst of them, asks "
+        "these again in 50 digits, and writes the worst errors and their inputs. Exits with 1 where one breaks its promise.",
+    )  # fmt: skip
+    stability.add_argument(
+        "--cases", type=int, default=10**7, metavar="N", help="inputs of an operator (default: 10^7)"
+    )
+    stability.add_argument(
+        "--op", action="append", default=[], metavar="NAME", help="only this operator; may be repeated"
+    )
+    stability.add_argument("--seed", type=int, default=0, metavar="S", help="of the inputs (default: 0)")
+    stability.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="folder of the tables (default: docs/benchmarks in a checkout, else here)",
+    )
+    stability.set_defaults(execute=run_stability)
 
 
 def run_skip(args: argparse.Namespace) -> int:
@@ -52,3 +71,15 @@ def run_skip(args: argparse.Namespace) -> int:
             other = lambda: run_other(args.against, args.data, args.minutes, args.downscale, out / "against")  # noqa: E731
         skip_table(full, args.minutes, training, test, out, other, lambda line: print(line, flush=True))
     return DONE
+
+
+def run_stability(args: argparse.Namespace) -> int:
+    if args.cases < 1:
+        raise InputError(f"--cases must be positive, got {args.cases}")
+    from splitnerf.bench.stability.table import chosen, run_all, write
+
+    out = args.out or (Path("docs/benchmarks") if Path("docs").is_dir() else Path())
+    results, verdicts = run_all(chosen(args.op), args.cases, args.seed, lambda line: print(line, flush=True))
+    for path in write(results, verdicts, args.seed, out):
+        print(path)
+    return DONE if all(x.holds for x in (*results, *verdicts)) else FAILED

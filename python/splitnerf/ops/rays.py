@@ -206,13 +206,13 @@ def _fake_march(rays_o, rays_d, jitter, cells, box, step, max_samples):
 
 def _keep_weights(ctx, inputs, output):
     f_prev, f_next, s, offsets, ctx.min_transmittance = inputs
-    ctx.save_for_backward(f_prev, f_next, s, offsets, *output)
+    ctx.save_for_backward(f_prev, f_next, s, offsets, output[0])
 
 
 def _weights_backward(ctx, grad_weights, grad_opacity):
-    f_prev, f_next, s, offsets, weights, opacity = ctx.saved_tensors
+    f_prev, f_next, s, offsets, weights = ctx.saved_tensors
     grad_prev, grad_next, grad_s = lib.neus_weights_backward(
-        f_prev, f_next, s, offsets, ctx.min_transmittance, weights, opacity, grad_weights, grad_opacity
+        f_prev, f_next, s, offsets, ctx.min_transmittance, weights, grad_weights, grad_opacity
     )
     return grad_prev, grad_next, grad_s.sum(), None, None
 
@@ -244,19 +244,18 @@ def _interpolation_backward(ctx, grad):
 
 def _keep_surface(ctx, inputs, output):
     *tensors, ctx.step, ctx.anneal, ctx.min_transmittance = inputs
-    ctx.save_for_backward(*tensors, *output[1:])
+    ctx.save_for_backward(*tensors, output[1])
 
 
 def _surface_backward(ctx, grad_normals, grad_weights, grad_opacity):
     refuse_gradients(ctx, "surface_weights", rays_d=2)
-    *tensors, weights, opacity = ctx.saved_tensors
+    *tensors, weights = ctx.saved_tensors
     grad_sdf, grad_gradient, grad_s = lib.surface_weights_backward(
         *tensors,
         ctx.step,
         ctx.anneal,
         ctx.min_transmittance,
         weights,
-        opacity,
         grad_normals,
         grad_weights,
         grad_opacity,
@@ -305,10 +304,10 @@ register(
 )
 register(
     "neus_weights_backward",
-    fake=lambda f_prev, f_next, s, offsets, eps, weights, opacity, *grads: (
+    fake=lambda f_prev, f_next, s, offsets, eps, weights, grad_weights, grad_opacity: (
         f_prev.new_empty(f_prev.shape),
         f_next.new_empty(f_next.shape),
-        opacity.new_empty(opacity.shape),
+        grad_opacity.new_empty(grad_opacity.shape),
     ),
 )
 register(

@@ -1,0 +1,68 @@
+"""Terms of the training loss in arbitrary precision."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from splitnerf.bench.stability.entry import Rows
+from splitnerf.bench.stability.precise import mp, vector
+
+PAIRS = 6
+
+
+def srgb(x):
+    return (
+        mp.mpf("12.92") * x
+        if x <= mp.mpf("0.0031308")
+        else mp.mpf("1.055") * x ** (1 / mp.mpf("2.4")) - mp.mpf("0.055")
+    )
+
+
+def pixel_losses(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+    saturated, colour, mask = mp.mpf(254) / 255, {True: [], False: []}, []
+    for mean, opacity, target, background in zip(*(row[n] for n in ("mean", "opacity", "target", "background"))):
+        o, (*photo, a) = mp.mpf(float(opacity)), vector(target)
+        for m, t, b in zip(vector(mean), photo, vector(background)):
+            for linear, terms in colour.items():
+                c = srgb(m) if linear else m
+                c = min(c, mp.mpf(1)) if t >= saturated else c
+                terms.append(((b + o * (c - b)) - (b + a * (t - b))) ** 2)
+        o = min(max(o, mp.mpf("1e-3")), 1 - mp.mpf("1e-3"))
+        mask.append(-(a * mp.log(o) + (1 - a) * mp.log(1 - o)))
+    mean_mask = mp.fsum(mask) / len(mask)
+    linear, encoded = (mp.fsum(terms) / len(terms) for terms in colour.values())
+    return {"colour": [linear], "mask": [mean_mask], "colour of sRGB": [encoded], "mask of sRGB": [mean_mask]}
+
+
+def gradient_losses(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+    gradients, weights = [vector(g) for g in row["gradients"]], vector(row["weights"])
+    sizes = [mp.sqrt(mp.fsum(x * x for x in g)) for g in gradients]
+    normals = [[x / mp.sqrt(s * s + mp.mpf("1e-12")) for x in g] for g, s in zip(gradients, sizes)]
+    total, apart = mp.mpf(0), mp.mpf(0)
+    for j in range(PAIRS):
+        distance = mp.sqrt(mp.fsum((a - b) ** 2 for a, b in zip(normals[j], normals[len(normals) - PAIRS + j])))
+        if distance < mp.sqrt(2):
+            total, apart = total + weights[j], apart + weights[j] * distance
+    return {
+        "eikonal": [mp.fsum((s - 1) ** 2 for s in sizes) / len(sizes)],
+        "smoothness": [apart / max(total, mp.mpf("1e-8"))],
+    }
+
+
+def material_losses(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+    metallic, shares = vector(row["metallic"]), vector(row["shares"])
+    total = max(mp.fsum(shares), mp.mpf("1e-8"))
+    darkness = [max(1 - max(vector(albedo)) / mp.mpf("0.4"), mp.mpf(0)) for albedo in row["albedo"]]
+    terms = {
+        "metal": [m * m for m in metallic],
+        "binary": [m * (1 - m) for m in metallic],
+        "dark": [m * d for m, d in zip(metallic, darkness)],
+        "metal, smooth L1": [m * m / 2 for m in metallic],
+    }
+    return {name: [mp.fsum(s * v for s, v in zip(shares, values)) / total] for name, values in terms.items()}
+
+
+def quadratic_entropy(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+    points = [vector(x) for x in row["x"]]
+    likeness = [mp.exp(-mp.fsum((a - b) ** 2 for a, b in zip(p, q)) / 4) for p in points for q in points]
+    return {"entropy": [-mp.log(mp.fsum(likeness) / len(points) ** 2)]}

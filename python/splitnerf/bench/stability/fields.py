@@ -1,0 +1,129 @@
+"""Entries of the operators of the distance field: hash grid and network."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import torch
+
+from splitnerf import ops
+from splitnerf.bench.stability import exact_fields
+from splitnerf.bench.stability.cases import Draw
+from splitnerf.bench.stability.entry import Entry, Rows
+
+SPEC = ops.HashGridSpec(n_levels=6, n_features=2, base_resolution=4, growth=2.0, log2_table_size=9)
+WIDTH, OUTPUTS, BETA, BOX = 16, 5, 100.0, 1.0
+EDGES = (0.0, 1e-45, 1e-38, 1e-7, 0.5, 1 - 6e-8, 1.0, -1e-7, -3.0, 1 + 1.2e-7, 2.0, 1e30, -1e30)
+BY_CELL = "a coordinate times the resolution is rounded, which the condition holds; else a few roundings"
+
+
+def draw_positions(draw: Draw, n: int) -> Rows:
+    """Points of the unit cube, on borders of cells of every level, beside these, and outside."""
+    resolution = draw.pick(tuple(float(level[0]) for level in SPEC.levels()), n, 3)
+    border = torch.round(draw.uniform(n, 3) * resolution) / resolution
+    ordinary = torch.where(draw.chance(0.3, n, 3), border, draw.uniform(n, 3))
+    return {"positions": draw.mixed(EDGES, ordinary, 0.3)}
+
+
+@lru_cache(maxsize=1)
+def grid() -> Rows:
+    """A table with entries from 1e-6 to 1e3 of both signs."""
+    draw = Draw(4)
+    table = draw.signs(SPEC.n_entries, SPEC.n_features) * draw.logarithmic(1e-6, 1e3, SPEC.n_entries, SPEC.n_features)
+    return {"table": table.float()}
+
+
+def encoded(rows: Rows, shared: Rows) -> Rows:
+    return {"features": ops.hash_encode(rows["positions"], shared["table"], SPEC)}
+
+
+def with_jacobian(rows: Rows, shared: Rows) -> Rows:
+    features, jacobian = ops.hash_encode_jacobian(rows["positions"], shared["table"], SPEC)
+    return {"features": features, "jacobian": jacobian}
+
+
+def draw_layer(draw: Draw, n: int) -> Rows:
+    features = draw.signs(n, SPEC.n_outputs) * draw.mixed(
+        (0.0, 1e-38, 1e-7, 1.0), draw.logarithmic(1e-6, 3, n, SPEC.n_outputs)
+    )
+    jacobian = draw.signs(n, 3, SPEC.n_outputs) * draw.logarithmic(1e-4, 1e3, n, 3, SPEC.n_outputs)
+    return {"positions": draw.uniform(n, 3, low=-1, high=1), "features": features, "jacobian": jacobian}
+
+
+@lru_cache(maxsize=1)
+def network() -> Rows:
+    draw = Draw(5)
+    return {
+        "hidden": draw.normal(WIDTH, 3 + SPEC.n_outputs).float(),
+        "hidden_bias": 0.1 * draw.normal(WIDTH).float(),
+        "out": draw.normal(OUTPUTS, WIDTH).float() / math.sqrt(WIDTH),
+        "out_bias": draw.normal(OUTPUTS).float(),
+    }
+
+
+def layer(rows: Rows, shared: Rows) -> Rows:
+    weights = [shared[name] for name in ("hidden", "hidden_bias", "out", "out_bias")]
+    outputs, gradient = ops.sdf_layer(rows["positions"], rows["features"], rows["jacobian"], *weights, BETA, BOX)
+    return {"outputs": outputs, "gradient": gradient}
+
+
+def values(rows: Rows, shared: Rows) -> Rows:
+    weights = [shared[name] for name in ("hidden", "hidden_bias", "out", "out_bias")]
+    field = ops.SdfNetwork(SPEC, SPEC.n_levels, 1e-3 * shared["table"], *weights, BETA, BOX)
+    return {"values": ops.sdf_values(rows["positions"], field)[:, None]}
+
+
+WEIGHTS = ("hidden", "hidden_bias", "out", "out_bias")
+ENTRIES = (
+    Entry(
+        "hash_encode",
+        draw=draw_positions,
+        call=encoded,
+        smooth=("positions",),
+        smooth_shared=("table",),
+        shared=grid(),
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=4e-6,
+        exact=exact_fields.hash_encode,
+        exact_bound=1e-14,
+        reason=BY_CELL,
+    ),
+    Entry(
+        "hash_encode_jacobian",
+        draw=draw_positions,
+        call=with_jacobian,
+        smooth=("positions",),
+        smooth_shared=("table",),
+        shared=grid(),
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=4e-6,
+        reason=BY_CELL,
+    ),
+    Entry(
+        "sdf_layer",
+        draw=draw_layer,
+        call=layer,
+        smooth=("features", "jacobian"),
+        smooth_shared=WEIGHTS,
+        shared=network(),
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=1e-5,
+        exact=exact_fields.sdf_layer,
+        exact_bound=1e-13,
+        reason="sums of 31 products, softplus of slope up to 1 and curvature beta / 4, which the condition holds",
+    ),
+    Entry(
+        "sdf_values",
+        call=values,
+        shared=network() | grid(),
+        conditioned=True,
+        bound=4e-6,
+        reason="the two above",
+        draw=lambda draw, n: {"positions": 2 * draw_positions(draw, n)["positions"].clamp(0, 1) - 1},
+        repair=lambda rows: {"positions": rows["positions"].clamp(-1, 1)},
+    ),
+)

@@ -1,0 +1,186 @@
+"""Entries of the operators along rays: weights of samples, and their sums."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import torch
+from torch import Tensor
+
+from splitnerf import ops
+from splitnerf.bench.stability import exact_rays
+from splitnerf.bench.stability.cases import Draw, unit
+from splitnerf.bench.stability.entry import Entry, Rows
+
+SAMPLES = 8  # of a ray
+LONG = 10_000  # samples of a long ray
+STEP = 1 / 128
+BY_DEPTH = "a rounding of s f moves a weight by s f 2^-24, which the condition holds; else a few roundings"
+BY_NORMAL = "absolute: a rounding of the normal moves a depth by s step 2^-23; gradients of up to s are differences"
+
+
+def offsets(n: int, samples: int) -> Tensor:
+    return torch.arange(n + 1) * samples
+
+
+def fields(draw: Draw, n: int, samples: int) -> Tensor:
+    """[n, samples + 1] distances times sharpness at the borders of samples: surfaces, fog, steps of up to 1e6."""
+    falling = draw.uniform(n, 1, low=-30, high=60) - draw.logarithmic(1e-3, 30, n, 1) * torch.arange(samples + 1)
+    fog = draw.uniform(n, 1, low=0, high=20) + draw.logarithmic(1e-6, 1e-1, n, 1) * draw.normal(n, samples + 1)
+    wild = draw.signs(n, samples + 1) * draw.mixed(
+        (0.0, 1e-38, 1e-7, 1.0, 20.0, 88.0, 1e6), draw.logarithmic(1e-6, 1e6, n, samples + 1)
+    )
+    kind = draw.uniform(n, 1)
+    return torch.where(kind < 0.4, falling, torch.where(kind < 0.7, fog, wild))
+
+
+def draw_neus(draw: Draw, n: int, samples: int = SAMPLES) -> Rows:
+    values = fields(draw, n, samples)
+    return {"f_prev": values[:, :-1], "f_next": values[:, 1:]}
+
+
+def draw_long(draw: Draw, n: int) -> Rows:
+    """Fog of ten thousand samples, from hardly any to opaque in a few steps."""
+    depth = draw.logarithmic(1e-9, 1e-2, n, 1).expand(n, LONG)
+    f = draw.uniform(n, 1, low=-2, high=2) + 0 * depth
+    return {"f_prev": f + depth * draw.uniform(n, LONG, low=0.9, high=1.1), "f_next": f}
+
+
+def weights(rows: Rows, shared: Rows) -> Rows:
+    """The sharpness is shared by all rays of a call: that of s f is asked with s = 1, that of s beside."""
+    n, samples = rows["f_prev"].shape
+    w, opacity = ops.neus_weights(rows["f_prev"].flatten(), rows["f_next"].flatten(), shared["s"], offsets(n, samples))
+    return {"weights": w.reshape(n, samples), "opacity": opacity[:, None]}
+
+
+def draw_surface(draw: Draw, n: int) -> Rows:
+    """Fields through a surface, steps across the box included, with gradients of length 0 to 1e6."""
+    along = draw.uniform(n, 1, low=-0.3, high=0.6) - draw.uniform(n, 1, high=2) * STEP * torch.arange(SAMPLES)
+    wild = draw.signs(n, SAMPLES) * draw.mixed((0.0, 1e-38, 1e-7, 1.0), draw.logarithmic(1e-6, 1, n, SAMPLES))
+    sdf = torch.where(draw.chance(0.7, n, 1), along, wild)
+    gradient = draw.vectors(n * SAMPLES).reshape(n, SAMPLES, 3)
+    near = unit(draw.normal(n, SAMPLES, 3)) * draw.uniform(n, SAMPLES, 1, low=0.8, high=1.2)
+    return {
+        "sdf": sdf,
+        "gradient": torch.where(draw.chance(0.7, n, 1, 1), near, gradient),
+        "rays_d": draw.directions(n),
+    }
+
+
+def surface(rows: Rows, shared: Rows, anneal: float) -> Rows:
+    n = len(rows["sdf"])
+    normals, w, opacity = ops.surface_weights(
+        rows["sdf"].flatten(),
+        rows["gradient"].reshape(-1, 3),
+        rows["rays_d"],
+        shared["s"],
+        offsets(n, SAMPLES),
+        step=STEP,
+        anneal=anneal,
+    )
+    return {"normals": normals.reshape(n, SAMPLES, 3), "weights": w.reshape(n, SAMPLES), "opacity": opacity[:, None]}
+
+
+def repaired_surface(rows: Rows) -> Rows:
+    return {
+        "sdf": rows["sdf"].clamp(-1, 1),
+        "gradient": rows["gradient"].clamp(-1e6, 1e6),
+        "rays_d": unit(rows["rays_d"].double()),
+    }
+
+
+def draw_composite(draw: Draw, n: int, samples: int) -> Rows:
+    values = draw.radiance(n, samples, 3)
+    return {"weights": draw.shares(n, samples), "values": values * draw.signs(n, 1, 1)}
+
+
+def sums(rows: Rows, shared: Rows) -> Rows:
+    n, samples = rows["weights"].shape
+    return {
+        "sums": ops.composite(rows["weights"].flatten(), rows["values"].reshape(n * samples, 3), offsets(n, samples))
+    }
+
+
+def neus(name: str, s: float, draw, **changes) -> Entry:
+    options = {
+        "bound": 4e-6,
+        "gradient_bound": 8e-6,
+        "floor": 1e-30,
+        "gradient_floor": 1e-30 * s,
+        "exact": exact_rays.neus_weights,
+    }
+    return Entry(
+        name,
+        draw=draw,
+        call=weights,
+        smooth=("f_prev", "f_next"),
+        smooth_shared=("s",),
+        shared={"s": torch.tensor(s)},
+        conditioned=True,
+        exact_bound=1e-13,
+        reason=BY_DEPTH,
+        **(options | changes),
+    )
+
+
+ENTRIES = (
+    neus("neus_weights", 1.0, draw_neus),
+    neus("neus_weights, s = 8000", 8000.0, lambda draw, n: {k: x / 8000 for k, x in draw_neus(draw, n).items()}),
+    neus("neus_weights, 10^4 samples", 64.0, draw_long, size=LONG, chunk=8, exact=None),
+    Entry(
+        "surface_weights",
+        draw=draw_surface,
+        call=partial(surface, anneal=1.0),
+        smooth=("sdf", "gradient"),
+        smooth_shared=("s",),
+        shared={"s": torch.tensor(200.0)},
+        repair=repaired_surface,
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=4e-4,
+        floor=1.0,
+        gradient_floor=1.0,
+        size=SAMPLES,
+        reason=BY_NORMAL,
+    ),
+    Entry(
+        "surface_weights, annealed",
+        draw=draw_surface,
+        call=partial(surface, anneal=0.3),
+        smooth=("sdf", "gradient"),
+        smooth_shared=("s",),
+        shared={"s": torch.tensor(20.0)},
+        repair=repaired_surface,
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=4e-4,
+        floor=1.0,
+        gradient_floor=1.0,
+        size=SAMPLES,
+        reason=BY_NORMAL,
+    ),
+    Entry(
+        "composite",
+        draw=partial(draw_composite, samples=SAMPLES),
+        call=sums,
+        smooth=("weights", "values"),
+        conditioned=True,
+        bound=1e-6,
+        gradient_bound=1e-6,
+        exact=exact_rays.composite,
+        exact_bound=1e-14,
+        reason="sums in float64, rounded once; gradients are sums over the channels",
+    ),
+    Entry(
+        "composite, 10^4 samples",
+        draw=partial(draw_composite, samples=LONG),
+        call=sums,
+        smooth=("weights", "values"),
+        conditioned=True,
+        bound=1e-6,
+        gradient_bound=1e-6,
+        size=LONG,
+        chunk=8,
+        reason="sums in float64, rounded once; gradients are sums over the channels",
+    ),
+)

@@ -1,0 +1,239 @@
+"""Entries of the operators that shade: split sum, sums over incoming light, and the curve of images."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from splitnerf import ops
+from splitnerf.bench.stability import exact_shading
+from splitnerf.bench.stability.cases import Draw, unit
+from splitnerf.bench.stability.entry import Entry, Rows
+from splitnerf.ops._library import lib
+
+UNITS = ("normals", "view_dirs", "light_dirs")
+IN_UNIT_RANGE = ("albedo", "roughness", "metallic", "occlusion_s", "occlusion_d")
+SHADED = ("normals", "view_dirs", "albedo", "roughness", "metallic")
+TABLE = {"lut": ops.brdf_lut()}  # always float32; its numbers are as uncertain as the rest
+SAMPLES = 4  # directions a point
+NO_SHARE = 1e-36  # of components of directions: a cosine over pi should have a float32
+BY_CONDITION = "a few roundings, times how much the true value changes by a relative change of the inputs and the table"
+
+
+def repaired(rows: Rows) -> Rows:
+    """Directions of length 1 or 0, shares in [0, 1], light and densities not below 0.
+
+    Where the normal has length 0 the query has the length chi, which vanishes towards roughness 1: below .9 there.
+    """
+    out = dict(rows)
+    for name, x in rows.items():
+        if name in UNITS:
+            out[name] = unit(torch.where(x.abs() < NO_SHARE, 0.0, x.double()))
+        elif name in IN_UNIT_RANGE:
+            out[name] = x.clamp(0, 1)
+        elif name != "linear":
+            out[name] = x.clamp(0, 1e30)
+    if "normals" in rows:
+        nothing = (rows["normals"] == 0).all(1, keepdim=True)
+        out["roughness"] = torch.where(nothing, out["roughness"].clamp(max=0.9), out["roughness"])
+    return out
+
+
+def surface(draw: Draw, n: int) -> Rows:
+    """Normals, one in fifty of length 0, directions to the viewer at extreme angles, and roughness."""
+    normals = draw.directions(n)
+    view_dirs = draw.at_cosine(normals)
+    normals[draw.chance(0.02, n)] = 0
+    return repaired({"normals": normals, "view_dirs": view_dirs, "roughness": draw.roughness(n)})
+
+
+def draw_material(draw: Draw, n: int) -> Rows:
+    return surface(draw, n) | {"albedo": draw.shares(n, 3), "metallic": draw.shares(n, 1)}
+
+
+def draw_shaded(draw: Draw, n: int) -> Rows:
+    return draw_material(draw, n) | {
+        "specular": draw.radiance(n, 3),
+        "diffuse": draw.radiance(n, 3),
+        "occlusion_s": draw.shares(n, 3),
+        "occlusion_d": draw.shares(n, 3),
+    }
+
+
+def draw_sums(draw: Draw, n: int) -> Rows:
+    return draw_material(draw, n) | {name: draw.radiance(n, 3) for name in ("specular", "grazing", "diffuse")}
+
+
+def draw_lit(draw: Draw, n: int) -> Rows:
+    """Points with a few directions each, those of the operator itself or extreme ones, with their densities."""
+    rows = surface(draw, n)
+    names = ("normals", "view_dirs", "roughness")
+    sampled, pdf = ops.sample_bsdf(*(rows[name].float() for name in names), SAMPLES, int(draw.uniform(1).item() * 1e9))
+    own = draw.at_cosine(rows["normals"].repeat_interleave(SAMPLES, 0)).reshape(n, SAMPLES, 3)
+    wild = draw.chance(0.3, n, SAMPLES)
+    return rows | {
+        "light_dirs": torch.where((own.abs() < NO_SHARE) & wild[..., None], 0.0, own).where(
+            wild[..., None], sampled.double()
+        ),
+        "pdf": draw.mixed((1e-7, 0.3, 1e3), draw.uniform(n, SAMPLES)).where(wild, pdf.double()),
+        "radiance": draw.radiance(n, SAMPLES, 3, top=1e20),
+    }
+
+
+def shade_modes(rows: Rows, shared: Rows) -> Rows:
+    given = [rows[name] for name in (*SHADED, "specular", "diffuse", "occlusion_s", "occlusion_d")]
+    modes = {mode: (i, False) for i, mode in enumerate(ops.FRESNEL_MODES)} | {"compensated": (0, True)}
+    return {name: lib.split_sum_shade(*given, shared["lut"].float(), *mode) for name, mode in modes.items()}
+
+
+def shade_from_sums(rows: Rows, shared: Rows) -> Rows:
+    given = [rows[name] for name in (*SHADED, "specular", "grazing", "diffuse")]
+    modes = {"single": False, "compensated": True}
+    return {name: lib.shade_sums(*given, shared["lut"].float(), mode) for name, mode in modes.items()}
+
+
+def directions(rows: Rows, shared: Rows) -> Rows:
+    given = (rows["normals"], rows["view_dirs"], rows["roughness"])
+    return {query: lib.query_direction(*given, shared["lut"].float(), query == "mean") for query in ops.QUERIES}
+
+
+def light_sums(rows: Rows, shared: Rows) -> Rows:
+    names = ("normals", "view_dirs", "roughness", "light_dirs", "pdf", "radiance")
+    return ops.monte_carlo_light(*(rows[name] for name in names))._asdict()
+
+
+def summed(rows: Rows, shared: Rows) -> Rows:
+    given = [rows[name] for name in ("normals", "view_dirs", "roughness")]
+    return ops.summed_light(
+        *given, shared["directions"], shared["solid_angles"], shared["radiance"], rows["visible"], rows["sent"]
+    )._asdict()
+
+
+def draw_summed(draw: Draw, n: int) -> Rows:
+    return surface(draw, n) | {"visible": draw.shares(n, 32), "sent": draw.radiance(n, 32, 3, top=1e20)}
+
+
+def repaired_summed(rows: Rows) -> Rows:
+    return repaired(rows) | {"visible": rows["visible"].clamp(0, 1)}
+
+
+def sky(n: int) -> Rows:
+    """Directions with the solid angle and the light of each: black but for one lamp of 1e6 and a dim half."""
+    draw = Draw(1)
+    radiance: Tensor = draw.uniform(n, 3)
+    radiance[n // 2 :] = 0
+    radiance[-1] = 1e6
+    return {
+        "directions": unit(draw.normal(n, 3)).float(),
+        "solid_angles": draw.uniform(n).float(),
+        "radiance": radiance.float(),
+    }
+
+
+def draw_linear(draw: Draw, n: int) -> Rows:
+    edges = (0.0, 1e-45, 1e-38, 0.0031308, 1.0, 1e6, 1e30, 1e38, -1e-38, -1.0)
+    return {"linear": draw.mixed(edges, draw.logarithmic(1e-8, 1e4, n))}
+
+
+def draw_srgb(draw: Draw, n: int) -> Rows:
+    edges = (0.0, 1e-45, 1e-38, 0.04045, 1.0, 1e6, 1e15)
+    return {"srgb": draw.mixed(edges, draw.logarithmic(1e-8, 1e4, n))}
+
+
+ENTRIES = (
+    Entry(
+        "query_direction",
+        draw=surface,
+        call=directions,
+        shared=TABLE,
+        smooth=("normals", "view_dirs", "roughness"),
+        repair=repaired,
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=4e-6,
+        exact=exact_shading.query_direction,
+        exact_bound=1e-14,
+        gradient_floor=1.0,
+        reason=BY_CONDITION + "; gradients of unit vectors count as at least 1, as theirs may vanish",
+    ),
+    Entry(
+        "split_sum_shade",
+        draw=draw_shaded,
+        call=shade_modes,
+        shared=TABLE,
+        repair=repaired,
+        conditioned=True,
+        bound=2e-6,
+        smooth=(*SHADED, "specular", "diffuse", "occlusion_s", "occlusion_d"),
+        gradient_bound=4e-6,
+        exact=exact_shading.split_sum_shade,
+        exact_bound=1e-14,
+        reason=BY_CONDITION,
+    ),
+    Entry(
+        "shade_sums",
+        draw=draw_sums,
+        call=shade_from_sums,
+        shared=TABLE,
+        repair=repaired,
+        conditioned=True,
+        bound=2e-6,
+        smooth=(*SHADED, "specular", "grazing", "diffuse"),
+        gradient_bound=4e-6,
+        exact=exact_shading.shade_sums,
+        exact_bound=1e-14,
+        reason=BY_CONDITION,
+    ),
+    Entry(
+        "monte_carlo_light",
+        draw=draw_lit,
+        call=light_sums,
+        repair=repaired,
+        conditioned=True,
+        bound=4e-6,
+        smooth=("normals", "roughness", "radiance"),
+        gradient_bound=8e-6,
+        exact=exact_shading.light_sums,
+        exact_bound=1e-14,
+        floor=1e-10,
+        size=SAMPLES,
+        reason=BY_CONDITION,
+    ),
+    Entry(
+        "summed_light",
+        draw=draw_summed,
+        call=summed,
+        repair=repaired_summed,
+        shared=sky(32),
+        conditioned=True,
+        bound=4e-6,
+        smooth=("normals", "roughness"),
+        smooth_shared=("radiance",),
+        gradient_bound=1e-5,
+        size=32,
+        chunk=4096,
+        reason=BY_CONDITION,
+    ),
+    Entry(
+        "linear_to_srgb",
+        draw=draw_linear,
+        smooth=("linear",),
+        conditioned=True,
+        exact=exact_shading.linear_to_srgb,
+        exact_bound=1e-14,
+        call=lambda rows, shared: {"srgb": ops.linear_to_srgb(rows["linear"])},
+        bound=1e-5,
+        gradient_bound=1e-5,
+        reason="x^(1/2.4): the float32 nearest to 1/2.4 is off by 4e-8, times ln x up to 90; its slope jumps once",
+    ),
+    Entry(
+        "srgb_to_linear",
+        draw=draw_srgb,
+        exact=exact_shading.srgb_to_linear,
+        exact_bound=1e-14,
+        repair=lambda rows: {"srgb": rows["srgb"].clamp(0, 1e15)},
+        call=lambda rows, shared: {"linear": ops.srgb_to_linear(rows["srgb"])},
+        bound=4e-6,
+        reason="x^2.4: the float32 nearest to 2.4 is off by 9e-8, times ln x of up to 35, and 2.4 roundings of x",
+    ),
+)

@@ -1,0 +1,171 @@
+"""The table of worst errors, as Markdown and CSV, and the run of all operators."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from splitnerf.bench.machine import describe_machine
+from splitnerf.bench.stability import fields, light, losses, properties, rays, shading
+from splitnerf.bench.stability.entry import Entry, Rows
+from splitnerf.bench.stability.properties import Property, Verdict, verify
+from splitnerf.bench.stability.search import Result, run
+from splitnerf.errors import InputError
+
+ENTRIES: tuple[Entry, ...] = shading.ENTRIES + light.ENTRIES + rays.ENTRIES + fields.ENTRIES + losses.ENTRIES
+PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
+NAME = "stability"
+COLUMNS = (
+    "operator",
+    "inputs",
+    "worst forward",
+    "promised",
+    "worst gradient",
+    "promised gradient",
+    "without condition",
+    "gradient without condition",
+    "gradient to shared",
+    "float64 against exact",
+    "float32 against exact",
+    "not finite",
+    "holds",
+    "reason",
+)
+
+
+def chosen(names: list[str]) -> list[Entry | Property]:
+    """The entries and properties of these operators; all without names.
+
+    Raises:
+        InputError: There is no such operator.
+    """
+    every = (*ENTRIES, *PROPERTIES)
+    known = sorted({item.name.split(",")[0] for item in every})
+    for name in names:
+        if name not in known:
+            raise InputError(f"--op {name}: there is no such operator; choose from {', '.join(known)}")
+    return [item for item in every if not names or item.name.split(",")[0] in names]
+
+
+def run_all(
+    items: list[Entry | Property], cases: int, seed: int, show: Callable[[str], None]
+) -> tuple[list[Result], list[Verdict]]:
+    """Runs entries and properties one after the other; ``show`` is called with a line for each."""
+    results, verdicts = [], []
+    for item in items:
+        if isinstance(item, Entry):
+            results.append(run(item, cases, seed))
+            show(result_line(results[-1]))
+        else:
+            verdicts.append(verify(item, cases, seed))
+            show(verdict_line(verdicts[-1]))
+    return results, verdicts
+
+
+def number(x: float | None) -> str:
+    return "-" if x is None else f"{x:.1e}"
+
+
+def result_line(r: Result) -> str:
+    gradient = f"gradient {number(r.gradient)} of {number(r.entry.gradient_bound)}" if r.entry.smooth else ""
+    end = "" if r.holds else "  BROKEN"
+    return f"{r.entry.name:28s} {r.cases:9d}  forward {number(r.forward)} of {number(r.entry.bound)}  {gradient}{end}"
+
+
+def verdict_line(v: Verdict) -> str:
+    return f"{v.claim.name:28s} {v.cases:9d}  {v.claim.statement}{'' if v.holds else f'  BROKEN {v.broken} times'}"
+
+
+def row_of(r: Result) -> list[str]:
+    return [
+        r.entry.name,
+        str(r.cases),
+        number(r.forward),
+        number(r.entry.bound),
+        number(r.gradient) if r.entry.smooth else "none",
+        number(r.entry.gradient_bound) if r.entry.smooth else "none",
+        number(r.plain_forward),
+        number(r.plain_gradient) if r.entry.smooth else "none",
+        number(r.shared) if r.entry.smooth_shared else "none",
+        number(r.exact),
+        number(r.single_exact),
+        str(r.broken),
+        "yes" if r.holds else "NO",
+        r.entry.reason,
+    ]
+
+
+def input_text(rows: Rows) -> str:
+    """The numbers of one row, as they must be typed to get the same float32."""
+    parts = []
+    for name, x in rows.items():
+        values = [f"{v:.9g}" for v in x.flatten().tolist()]
+        parts.append(f"{name} = {' '.join(values[:24])}{f' ... ({len(values)} numbers)' if len(values) > 24 else ''}")
+    return "; ".join(parts)
+
+
+def inputs_of(results: Iterable[Result], verdicts: Iterable[Verdict]) -> list[tuple[str, str, str]]:
+    """(operator, which, input) that made each worst error, and that broke a property."""
+    lines = []
+    for r in results:
+        lines.append((r.entry.name, "forward", input_text(r.worst_forward)))
+        if r.entry.smooth:
+            lines.append((r.entry.name, "gradient", input_text(r.worst_gradient)))
+    return lines + [(v.claim.name, "broken", input_text(v.worst)) for v in verdicts if not v.holds]
+
+
+def write(results: list[Result], verdicts: list[Verdict], seed: int, folder: Path) -> tuple[Path, Path]:
+    """Writes stability.md and stability.csv, with machine, versions and commit in their heads."""
+    folder.mkdir(parents=True, exist_ok=True)
+    markdown, table = folder / f"{NAME}.md", folder / f"{NAME}.csv"
+    head = describe_machine() | {"seed": str(seed)}
+    markdown.write_text(markdown_text(results, verdicts, head))
+    with table.open("w", newline="") as file:
+        file.writelines(f"# {key}: {value}\n" for key, value in head.items())
+        writer = csv.writer(file)
+        writer.writerow((*COLUMNS, "worst forward input", "worst gradient input"))
+        for r in results:
+            writer.writerow((*row_of(r), input_text(r.worst_forward), input_text(r.worst_gradient)))
+        for v in verdicts:
+            blank = ["-"] * 9
+            writer.writerow(
+                (
+                    v.claim.name,
+                    v.cases,
+                    *blank,
+                    v.broken,
+                    "yes" if v.holds else "NO",
+                    v.claim.statement,
+                    input_text(v.worst),
+                    "",
+                )
+            )
+    return markdown, table
+
+
+def markdown_text(results: list[Result], verdicts: list[Verdict], head: dict[str, str]) -> str:
+    lines = [
+        "# Worst errors of the operators",
+        "",
+        *(f"- {key}: {value}" for key, value in head.items()),
+        "",
+        INTRODUCTION,
+        "",
+    ]
+    lines += ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
+    lines += ["| " + " | ".join(row_of(r)) + " |" for r in results]
+    lines += ["", "| operator | cases | broken | what must hold |", "|---|---|---|---|"]
+    lines += [f"| {v.claim.name} | {v.cases} | {v.broken} | {v.claim.statement} |" for v in verdicts]
+    lines += ["", "## Inputs of the worst errors", "", "| operator | of | input |", "|---|---|---|"]
+    lines += [f"| {name} | {which} | {text} |" for name, which, text in inputs_of(results, verdicts)]
+    return "\n".join(lines) + "\n"
+
+
+INTRODUCTION = """Each operator in float32 against itself in float64 on the same adversarial numbers: extreme values
+crossed with ordinary ones, and a search around the worst. An error is the largest difference in one output or gradient
+of a row over the largest number there plus, where the condition counts, how much the true value changes by a relative
+change of the inputs; the columns "without condition" leave the latter out. The condition is only asked for above what
+is promised: an error just below that is an upper bound. The worst thousand inputs were asked again in 50 digits:
+"against exact". "Not finite" counts rows with NaN or infinity where the truth has a float32. No operator takes bfloat16
+or float16: they raise."""

@@ -1,0 +1,331 @@
+"""Every operator on inputs made to break it, in a hundredth of `splitnerf bench stability`, and the harness itself."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+
+import hypothesis
+import pytest
+import torch
+from hypothesis import strategies
+from splitnerf import cli, ops
+from splitnerf.bench import machine
+from splitnerf.bench.stability import cases, fields, light, losses, properties, rays, search, shading, table
+from splitnerf.bench.stability.entry import Entry
+from splitnerf.bench.stability.measure import cast, evaluate, measure
+
+CASES, EXACT = 100_000, 50
+FEWER = {"sparse_product": 50_000}  # one call a row
+BY_NAME = {entry.name: entry for entry in table.ENTRIES}
+NAN, INF = math.nan, math.inf
+
+
+def rows_of(name: str, n: int, seed: int = 0) -> dict:
+    return cast(BY_NAME[name].draw(cases.Draw(seed), n), torch.float32)
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_errors_stay_within_the_promise(name):
+    """Errors of outputs and gradients against float64, of float64 against 50 digits, and nothing not finite."""
+    found = search.run(BY_NAME[name], FEWER.get(name, CASES), exact=EXACT)
+    assert found.holds, f"{table.result_line(found)} exact {found.exact} not finite {found.broken}\n" + "\n".join(
+        f"{which}: {text}" for _, which, text in table.inputs_of([found], [])
+    )
+
+
+@pytest.mark.parametrize("claim", properties.PROPERTIES, ids=lambda claim: claim.name)
+def test_properties_hold(claim):
+    found = properties.verify(claim, CASES // 5)
+    assert found.holds, f"{table.verdict_line(found)}\n{table.input_text(found.worst)}"
+
+
+def test_every_operator_is_asked():
+    """Those that compute: maps and tables made once, and classes, are not asked."""
+    made_once = {
+        "brdf_lut", "fibonacci_directions", "growth_for", "light_averages", "light_filters", "light_sum_of_levels",
+        "sh_projection", "zonal_factors", "cached_visibility", "sample_rays",
+    }  # fmt: skip
+    functions = {name for name in ops.__all__ if name.islower()}
+    asked = {item.name.split(",")[0] for item in table.chosen([])}
+    assert functions - made_once == asked
+
+
+# ---- the harness -------------------------------------------------------------------------------
+
+
+def planted(error, bound: float = 1e-6, **changes) -> Entry:
+    """x^2 with an error in float32 where it is planted."""
+
+    def call(rows, shared):
+        x = rows["x"]
+        return {"y": x * x * (1 + error(x)) if x.dtype == torch.float32 else x * x}
+
+    draw = lambda source, n: {"x": source.uniform(n, 1, low=0.5, high=2)}  # noqa: E731
+    options = {"draw": draw, "call": call, "smooth": ("x",), "gradient_bound": bound} | changes
+    return Entry("planted", bound=bound, reason="x^2", **options)
+
+
+def corner(size: float, low: float, high: float):
+    return lambda x: torch.where((x > low) & (x < high), size, 0.0)
+
+
+def test_an_error_in_one_corner_is_caught():
+    assert search.run(planted(corner(0.0, 1, 1.1)), 2000).holds
+    found = search.run(planted(corner(1e-3, 1.0, 1.1)), 2000)
+    assert not found.holds and found.forward == pytest.approx(1e-3, rel=0.01)
+    assert 1.0 < found.worst_forward["x"].item() < 1.1
+
+
+def test_an_error_in_the_gradient_alone_is_caught():
+    class Wrong(torch.autograd.Function):
+        @staticmethod
+        def forward(ctx, x):
+            ctx.save_for_backward(x)
+            return x * x
+
+        @staticmethod
+        def backward(ctx, grad):
+            (x,) = ctx.saved_tensors
+            return grad * 2 * x * (1.001 if x.dtype == torch.float32 else 1)
+
+    entry = planted(corner(0, 1, 1), call=lambda rows, shared: {"y": Wrong.apply(rows["x"])})
+    found = search.run(entry, 100)
+    assert found.forward < 1e-6 and found.gradient == pytest.approx(1e-3, rel=0.01) and not found.holds
+
+
+def test_the_search_finds_a_spot_that_drawing_does_not():
+    """An error that grows to 1e-2 at 1.2345, a ten-thousandth wide: drawn numbers see its foot only."""
+    apart = lambda x: (x - 1.2345).abs()  # noqa: E731
+    slope = lambda x: 1e-2 * torch.exp(-1e4 * apart(x)) + 1e-3 / (1 + 300 * apart(x))  # noqa: E731
+    entry = planted(slope, bound=1e-5)
+    draw, drawn, best = cases.Draw(0), search.Tally(entry), search.Worst()
+    given = cast(entry.draw(draw, 500), torch.float32)
+    best.add(given, drawn.add(given))
+    before = drawn.largest["forward"]
+    search.climb(drawn.add, best, entry.repair, draw, 4000, 500)
+    assert before < 2e-3 and drawn.largest["forward"] > 5e-3
+
+
+def test_what_is_not_finite_is_counted():
+    entry = planted(corner(INF, 1.0, 1.1))
+    found = search.run(entry, 1000)
+    assert found.broken > 0 and not found.holds
+
+
+def test_a_truth_beyond_float32_is_not_counted():
+    entry = planted(corner(0, 1, 1), draw=lambda source, n: {"x": source.uniform(n, 1, low=1e30, high=1e31)})
+    assert search.run(entry, 100).broken == 0
+
+
+def test_the_condition_forgives_cancellation_but_no_other_error():
+    """x - y of nearly equal numbers made by rounding x + 1 first: the error is a rounding of the inputs."""
+    draw = lambda source, n: {"x": 1 + 1e-4 * source.uniform(n, 1), "y": 1 + 1e-4 * source.uniform(n, 1)}  # noqa: E731
+
+    def difference(size):
+        def call(rows, shared):
+            x, y = rows["x"], rows["y"]
+            return {"d": x * (1 + size) - y if x.dtype == torch.float32 else x - y}
+
+        return call
+
+    entry = Entry("difference", draw=draw, call=difference(6e-8), bound=1e-6, reason="", conditioned=True)
+    assert search.run(entry, 500).holds and search.run(entry, 500).plain_forward > 1e-5
+    broken = Entry("difference", draw=draw, call=difference(1e-4), bound=1e-6, reason="", conditioned=True)
+    assert not search.run(broken, 500).holds
+
+
+def test_a_float64_that_is_wrong_is_caught_by_exact_arithmetic():
+    entry = planted(
+        corner(0, 1, 1), call=lambda rows, shared: {"y": rows["x"] ** 2 * (1 + 1e-7)}, smooth=(),
+        exact=lambda row, shared: {"y": [float(row["x"][0]) ** 2]},
+    )  # fmt: skip
+    found = search.run(entry, 100)
+    assert found.forward < 1e-6 and found.exact == pytest.approx(1e-7, rel=1e-3) and not found.holds
+
+
+def test_the_same_seed_gives_the_same_errors():
+    first, second = (search.run(BY_NAME["linear_to_srgb"], 2000, seed=5, exact=1) for _ in range(2))
+    assert first.forward == second.forward and table.input_text(first.worst_forward) == table.input_text(
+        second.worst_forward
+    )
+
+
+# ---- the command -------------------------------------------------------------------------------
+
+
+def test_the_command_writes_both_tables(tmp_path, capsys):
+    names = ["--op", "srgb_to_linear", "--op", "trace_visibility"]
+    assert cli.main(["bench", "stability", "--cases", "500", "--out", str(tmp_path), *names]) == 0
+    assert "srgb_to_linear" in capsys.readouterr().out
+    text = (tmp_path / "stability.md").read_text()
+    for part in ("processor: ", "torch: ", "commit: ", "| srgb_to_linear | ", "| srgb_to_linear | forward | srgb = "):
+        assert part in text
+    lines = (tmp_path / "stability.csv").read_text().splitlines()
+    assert lines[0].startswith("# processor: ") and any(line.startswith("operator,inputs,") for line in lines)
+
+
+def test_a_broken_promise_is_exit_code_1(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(table, "ENTRIES", (planted(corner(1e-3, 1.0, 1.1)),))
+    assert cli.main(["bench", "stability", "--cases", "500", "--out", str(tmp_path), "--op", "planted"]) == 1
+    assert "BROKEN" in capsys.readouterr().out and "| NO |" in (tmp_path / "stability.md").read_text()
+
+
+@pytest.mark.parametrize("arguments, part", [(["--op", "no_such"], "no such operator"), (["--cases", "0"], "--cases")])
+def test_bad_arguments_are_refused(arguments, part, capsys):
+    assert cli.main(["bench", "stability", *arguments]) == 2
+    assert part in capsys.readouterr().err
+
+
+def test_without_mpmath_one_line_says_what_to_install():
+    script = "import sys; sys.modules['mpmath'] = None; from splitnerf.cli import main; sys.exit(main(sys.argv[1:]))"
+    done = subprocess.run([sys.executable, "-c", script, "bench", "stability"], capture_output=True, text=True)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "pip install 'splitnerf[bench]'" in done.stderr
+
+
+def test_the_machine_is_named(tmp_path):
+    file = tmp_path / "cpuinfo"
+    file.write_text("processor : 0\nmodel name\t: Some CPU @ 2 GHz\n")
+    assert machine.processor_name(file) == "Some CPU @ 2 GHz"
+    assert machine.processor_name(tmp_path / "none")
+    assert set(machine.describe_machine()) >= {"processor", "torch", "commit"}
+
+
+# ---- what cannot be answered -------------------------------------------------------------------
+
+ENTRY_OF_EACH = {name: entry for name, entry in BY_NAME.items() if "," not in name}
+ROW_BY_ROW = [
+    name
+    for name, entry in ENTRY_OF_EACH.items()
+    if entry.size == 1 or name in ("monte_carlo_light", "composite", "summed_light")
+]
+
+
+@pytest.mark.parametrize("dtype", [torch.bfloat16, torch.float16])
+@pytest.mark.parametrize("name", ENTRY_OF_EACH)
+def test_half_precision_raises(name, dtype):
+    entry = ENTRY_OF_EACH[name]
+    with pytest.raises(ValueError, match="must be"):
+        entry.call(cast(rows_of(name, 2), dtype), cast(entry.shared, dtype))
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@pytest.mark.parametrize("name", ENTRY_OF_EACH)
+def test_empty_batches_give_empty_results(name, dtype):
+    entry = ENTRY_OF_EACH[name]
+    empty = {key: x[:0] for key, x in rows_of(name, 2).items()}
+    outputs, gradients, shared = (
+        evaluate(entry, empty, dtype) if entry.size == 1 else (entry.call(empty, entry.shared), {}, {})
+    )
+    assert all(len(x) == 0 for x in (*outputs.values(), *gradients.values()))
+    assert all(bool((x == 0).all()) for x in shared.values())
+
+
+def test_losses_without_points_are_0_and_entropy_raises():
+    none = torch.empty(0, 3)
+    assert [float(x) for x in ops.pixel_losses(none, none[:, 0], torch.empty(0, 4), none)] == [0, 0]
+    assert [float(x) for x in ops.gradient_losses(none, none[:, 0], torch.empty(0, dtype=torch.int64))] == [0, 0]
+    assert [float(x) for x in ops.material_losses(none, none[:, :1], none[:, 0])] == [0, 0, 0]
+    with pytest.raises(ValueError, match="quadratic_entropy"):
+        ops.quadratic_entropy(none)
+
+
+@pytest.mark.parametrize("value", [NAN, INF, -INF])
+@pytest.mark.parametrize("name", ROW_BY_ROW)
+def test_a_number_that_is_not_finite_stays_in_its_row(name, value):
+    """The other rows are bit for bit what they were, and nothing crashes."""
+    entry, given = ENTRY_OF_EACH[name], rows_of(name, 40)
+    before = entry.call(given, entry.shared)
+    for key, x in given.items():
+        spoiled = given | {key: x.clone()}
+        spoiled[key][7].view(-1)[0] = value
+        after = entry.call(spoiled, entry.shared)
+        others = torch.arange(40) != 7
+        for output in before:
+            assert torch.equal(before[output][others], after[output][others]), (key, output)
+
+
+@pytest.mark.parametrize("name", ["hash_encode", "linear_to_srgb", "srgb_to_linear", "light_lookup", "sdf_values"])
+def test_nan_gives_nan(name):
+    entry, given = ENTRY_OF_EACH[name], rows_of(name, 20)
+    for key in given:
+        spoiled = given | {key: given[key].clone()}
+        spoiled[key][7].view(-1)[0] = NAN
+        assert all(bool(torch.isnan(x[7]).any()) for x in entry.call(spoiled, entry.shared).values()), key
+
+
+def test_a_grazing_light_of_denormal_cosine_has_finite_gradients():
+    normals = torch.tensor([[0.0, 0.0, 1.0]], requires_grad=True)
+    roughness = torch.tensor([[0.3]], requires_grad=True)
+    light_dirs, view_dirs = torch.tensor([[[1.0, 0.0, 1e-45]]]), torch.tensor([[-0.6, 0.0, 0.8]])
+    sums = ops.monte_carlo_light(normals, view_dirs, roughness, light_dirs, torch.ones(1, 1), torch.ones(1, 1, 3))
+    gradients = torch.autograd.grad(sum(x.sum() for x in sums), (normals, roughness))
+    assert all(bool(torch.isfinite(x).all()) for x in gradients)
+
+
+# ---- by hypothesis -----------------------------------------------------------------------------
+
+FLOATS = strategies.floats(width=32, allow_nan=False, allow_infinity=False)
+SHARES = strategies.floats(0, 1, width=32)
+COMPONENTS = strategies.tuples(*[strategies.floats(-1, 1, width=32)] * 3).filter(lambda v: math.hypot(*v) > 1e-3)
+
+
+def holds(name: str, given: dict) -> None:
+    entry = BY_NAME[name]
+    errors = measure(entry, cast(entry.repair({k: torch.tensor(v)[None] for k, v in given.items()}), torch.float32))
+    assert not errors.broken.any()
+    assert errors.forward.item() <= entry.bound and errors.gradient.item() <= entry.gradient_bound
+
+
+@hypothesis.given(FLOATS.filter(lambda x: x < 1e38))
+def test_srgb_by_hypothesis(x):
+    holds("linear_to_srgb", {"linear": x})
+
+
+@hypothesis.given(strategies.tuples(FLOATS, FLOATS, FLOATS))
+def test_hash_encode_by_hypothesis(position):
+    holds("hash_encode", {"positions": position})
+
+
+@hypothesis.given(COMPONENTS, COMPONENTS, SHARES)
+def test_query_direction_by_hypothesis(normal, view, roughness):
+    holds("query_direction", {"normals": normal, "view_dirs": view, "roughness": (roughness,)})
+
+
+@hypothesis.given(strategies.lists(strategies.floats(-1e6, 1e6, width=32), min_size=9, max_size=9))
+def test_neus_weights_by_hypothesis(values):
+    holds("neus_weights", {"f_prev": values[:-1], "f_next": values[1:]})
+
+
+@hypothesis.given(COMPONENTS, COMPONENTS, SHARES, SHARES, strategies.tuples(SHARES, SHARES, SHARES))
+def test_split_sum_by_hypothesis(normal, view, roughness, metallic, albedo):
+    ones = (1.0, 1.0, 1.0)
+    holds("split_sum_shade", {
+        "normals": normal, "view_dirs": view, "roughness": (roughness,), "albedo": albedo, "metallic": (metallic,),
+        "specular": ones, "diffuse": ones, "occlusion_s": ones, "occlusion_d": ones,
+    })  # fmt: skip
+
+
+# ---- inputs that the issue names ---------------------------------------------------------------
+
+
+def test_drawn_inputs_hold_the_named_extremes():
+    draw = cases.Draw(0)
+    roughness = draw.roughness(5000).float()
+    for value in (0.0, 1e-7, 1e-4, 1.0):
+        assert (roughness == torch.tensor(value)).any()
+    given = shading.surface(draw, 5000)
+    cosine = (given["normals"] * given["view_dirs"]).sum(1)
+    for value in (0.0, 1e-7, -1.0):
+        assert ((cosine - value).abs() < 1e-12).any()
+    assert (given["normals"].norm(dim=1) == 0).any()
+    radiance = draw.radiance(5000).float()
+    for value in (0.0, 1e-38, 1e30, 1e6):
+        assert (radiance == torch.tensor(value)).any()
+    assert rays.fields(draw, 2000, 8).abs().amax() >= 1e6 and light.lamps()["light"].max() == 1e6
+    positions = fields.draw_positions(draw, 5000)["positions"].float()
+    assert (positions == 1e-45).any() and positions.amax() > 1 and positions.amin() < 0
+    assert (losses.draw_gradients(draw, 100)["gradients"].norm(dim=-1) == 0).any()
+    directions = draw.directions(100)
+    torch.testing.assert_close(directions.norm(dim=1), torch.ones(100, dtype=torch.float64))
