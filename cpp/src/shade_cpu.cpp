@@ -1,3 +1,4 @@
+#include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/parallel.h"
 
@@ -5,30 +6,6 @@ namespace splitnerf::cpu {
 namespace {
 
 constexpr int64_t kGrain = 1024;
-
-// Occlusion factors come as one value for all channels or as three.
-template <class T> Vec3<T> load_factor(const T* p, int64_t i, int n_channels) {
-  return n_channels == 3 ? load3(p + 3 * i) : Vec3<T>{p[i], p[i], p[i]};
-}
-template <class T> void store_factor(T* p, int64_t i, int n_channels, Vec3<T> v) {
-  if (n_channels == 3) {
-    store3(p + 3 * i, v);
-  } else {
-    p[i] = sum(v);
-  }
-}
-
-template <class T> ShadePoint<T> load_point(const ShadeArrays<const T>& in, int64_t i, int n_channels) {
-  return {load3(in.normals + 3 * i),
-          load3(in.view_dirs + 3 * i),
-          load3(in.albedo + 3 * i),
-          in.roughness[i],
-          in.metallic[i],
-          load3(in.specular + 3 * i),
-          load3(in.diffuse + 3 * i),
-          load_factor(in.occlusion_s, i, n_channels),
-          load_factor(in.occlusion_d, i, n_channels)};
-}
 
 }  // namespace
 
@@ -61,8 +38,7 @@ template <class T>
 void split_sum_shade(const float* lut, ShadeOptions options, int64_t n, int n_channels, const ShadeArrays<const T>& in,
                      T* radiance) {
   parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i)
-      store3(radiance + 3 * i, splitnerf::split_sum_shade(lut, options, load_point(in, i, n_channels)));
+    kernels<T>().split_sum_shade(lut, options, begin, end, n_channels, in, radiance);
   });
 }
 
@@ -70,19 +46,7 @@ template <class T>
 void split_sum_shade_backward(const float* lut, ShadeOptions options, int64_t n, int n_channels,
                               const ShadeArrays<const T>& in, const T* grad_radiance, const ShadeArrays<T>& grad) {
   parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const ShadePoint<T> g = splitnerf::split_sum_shade_backward(lut, options, load_point(in, i, n_channels),
-                                                                  load3(grad_radiance + 3 * i));
-      store3(grad.normals + 3 * i, g.normal);
-      store3(grad.view_dirs + 3 * i, g.view);
-      store3(grad.albedo + 3 * i, g.albedo);
-      grad.roughness[i] = g.roughness;
-      grad.metallic[i] = g.metallic;
-      store3(grad.specular + 3 * i, g.specular);
-      store3(grad.diffuse + 3 * i, g.diffuse);
-      store_factor(grad.occlusion_s, i, n_channels, g.occlusion_s);
-      store_factor(grad.occlusion_d, i, n_channels, g.occlusion_d);
-    }
+    kernels<T>().split_sum_shade_backward(lut, options, begin, end, n_channels, in, grad_radiance, grad);
   });
 }
 

@@ -8,6 +8,7 @@
 #include "bindings_mesh.h"
 #include "bindings_scene.h"
 #include "splitnerf/environment.h"
+#include "splitnerf/gather_rate.h"
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/kernels.h"
 #include "splitnerf/losses.h"
@@ -52,6 +53,17 @@ PYBIND11_MODULE(_core, m) {
       "F1, F2 and chi over (roughness, sqrt(n.v)) as a [32, 32, 3] float32 array.");
 
   m.def(
+      "integrate_brdf",
+      [](double n_dot_v, double roughness, int n_points) {
+        if (!(n_dot_v > 0 && n_dot_v <= 1 && roughness >= 0 && roughness <= 1 && n_points > 0))
+          throw py::value_error("integrate_brdf: n_dot_v must be in (0, 1], roughness in [0, 1], n_points positive");
+        const splitnerf::Vec3<double> entry = splitnerf::integrate_brdf(n_dot_v, roughness, n_points);
+        return py::make_tuple(entry.x, entry.y, entry.z);
+      },
+      py::arg("n_dot_v"), py::arg("roughness"), py::arg("n_points"),
+      "F1, F2 and chi by quadrature over 2 n_points microfacet normals: an entry of brdf_lut before it is rounded.");
+
+  m.def(
       "fibonacci_sphere",
       [](uint32_t n) {
         py::array_t<double> points({static_cast<py::ssize_t>(n), static_cast<py::ssize_t>(3)});
@@ -79,6 +91,21 @@ PYBIND11_MODULE(_core, m) {
   m.def(
       "instruction_set", [] { return splitnerf::kernels<float>().name; },
       "The instruction set that the kernels run on: base, avx2 or avx512.");
+
+  m.def(
+      "random_gathers",
+      [](const py::array_t<float, py::array::c_style>& table, int64_t n) {
+        const py::ssize_t entries = table.ndim() == 2 && table.shape(1) == 2 ? table.shape(0) : 0;
+        int log2_entries = 0;
+        while (log2_entries < 31 && (py::ssize_t(1) << log2_entries) < entries) ++log2_entries;
+        if (log2_entries < 1 || (py::ssize_t(1) << log2_entries) != entries || n < 0)
+          throw py::value_error("random_gathers: table must be [2^k, 2], k = 1 ... 31, and n not negative");
+        py::gil_scoped_release release;
+        return splitnerf::random_gathers(table.data(), log2_entries, n);
+      },
+      py::arg("table"), py::arg("n"),
+      "Reads n entries of a [2^k, 2] float32 table in pseudo-random order and returns their sum: the machine's gather "
+      "limit.");
 
   bind_light(m);
   bind_mesh(m);

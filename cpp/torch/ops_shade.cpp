@@ -76,7 +76,7 @@ struct ShadeInputs {
     occlusion_d = checked(op, "occlusion_d", occlusion_d_in, {n, n_channels}, type);
     lut = checked_lut(op, lut_in);
   }
-  template <class T> cpu::ShadeArrays<const T> arrays() const {
+  template <class T> ShadeArrays<const T> arrays() const {
     return {in<T>(normals),  in<T>(view_dirs), in<T>(albedo),      in<T>(roughness),  in<T>(metallic),
             in<T>(specular), in<T>(diffuse),   in<T>(occlusion_s), in<T>(occlusion_d)};
   }
@@ -112,7 +112,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tenso
     using T = decltype(zero);
     cpu::split_sum_shade_backward(
         in<float>(p.lut), options, p.n, p.n_channels, p.arrays<T>(), in<T>(g),
-        cpu::ShadeArrays<T>{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
+        ShadeArrays<T>{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
                             out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};

@@ -1,4 +1,4 @@
-"""The error that stands for bad input or usage."""
+"""The errors that the command line turns into exit codes."""
 
 from __future__ import annotations
 
@@ -11,3 +11,7 @@ class InputError(Exception):
 
     def __str__(self) -> str:
         return " ".join(super().__str__().splitlines())  # a name from a file may hold line ends
+
+
+class CheckFailed(RuntimeError):
+    """A benchmark's subject gives wrong results, so that its time means nothing."""

@@ -189,7 +189,7 @@ TEST(Shading, AdjointFollowsCentralDifferences) {
         std::copy(directions.begin(), directions.end(), x.begin());
         std::vector<double> gradient(x.size()), radiance(3 * n);
         const auto arrays = [&](auto* p) {
-          return cpu::ShadeArrays<std::remove_pointer_t<decltype(p)>>{
+          return ShadeArrays<std::remove_pointer_t<decltype(p)>>{
               p + at[0], p + at[1], p + at[2], p + at[3], p + at[4], p + at[5], p + at[6], p + at[7], p + at[8]};
         };
         const auto f = [&] {

@@ -13,6 +13,15 @@
 #define SPLITNERF_HD inline
 #endif
 
+// Before a loop of few turns: written out, so that a loop around it has nothing but straight code.
+#if defined(__CUDACC__)
+#define SPLITNERF_UNROLL _Pragma("unroll")
+#elif defined(__GNUC__)
+#define SPLITNERF_UNROLL _Pragma("GCC unroll 4")
+#else
+#define SPLITNERF_UNROLL
+#endif
+
 #if defined(__GNUC__)
 #define SPLITNERF_API __attribute__((visibility("default")))
 #else

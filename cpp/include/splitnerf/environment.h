@@ -11,7 +11,8 @@ namespace splitnerf {
 // The map coordinates (u, v) in [0, 1] of a direction (of any length but zero). The angle to +z
 // comes from atan2(|xy|, z), which is acos(z) without its loss of digits at the poles.
 template <class T> SPLITNERF_HD Vec2<T> direction_to_equirect(Vec3<T> d) {
-  return {T(0.5) - std::atan2(d.y, d.x) * T(0.5 / kPi), std::atan2(std::sqrt(d.x * d.x + d.y * d.y), d.z) * T(1 / kPi)};
+  return {T(0.5) - arc_tangent(d.y, d.x) * T(0.5 / kPi),
+          arc_tangent(std::sqrt(d.x * d.x + d.y * d.y), d.z) * T(1 / kPi)};
 }
 
 // The unit direction of map coordinates; the inverse of direction_to_equirect.
@@ -41,7 +42,8 @@ template <class T> SPLITNERF_HD EquirectFootprint<T> equirect_footprint(Vec2<T> 
   const int row = min_of(static_cast<int>(y), height - 1), next_row = min_of(row + 1, height - 1);
   const T fy = y - T(row);
   // uv.x in [0, 1] makes x_floor one of -1 ... width - 1.
-  const int column = (static_cast<int>(x_floor) + width) % width, next_column = (column + 1) % width;
+  const int column = x_floor < T(0) ? width - 1 : min_of(static_cast<int>(x_floor), width - 1);
+  const int next_column = column + 1 == width ? 0 : column + 1;
   return {{int64_t(row) * width + column, int64_t(row) * width + next_column, int64_t(next_row) * width + column,
            int64_t(next_row) * width + next_column},
           {(T(1) - fx) * (T(1) - fy), fx * (T(1) - fy), (T(1) - fx) * fy, fx * fy}};

@@ -8,6 +8,7 @@
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/light_pyramid.h"
 #include "splitnerf/sdf_layer.h"
+#include "splitnerf/split_sum.h"
 
 namespace splitnerf {
 
@@ -89,6 +90,12 @@ template <class T> struct Kernels {
   // sums = {sum V L c, sum L c (three channels each), sum c; the same with lobe for c}: 14 numbers.
   void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityLobe<T>& lobes, const T* visible, T* lobe,
                           T* sums);
+  // radiance [n, 3], see splitnerf::split_sum_shade. Points [begin, end); n_channels 1 or 3 of the occlusion factors.
+  void (*split_sum_shade)(const float* lut, ShadeOptions, int64_t begin, int64_t end, int n_channels,
+                          const ShadeArrays<const T>&, T* radiance);
+  // Overwrites all of grad.
+  void (*split_sum_shade_backward)(const float* lut, ShadeOptions, int64_t begin, int64_t end, int n_channels,
+                                   const ShadeArrays<const T>&, const T* grad_radiance, const ShadeArrays<T>& grad);
 
   // products [rows, 3] = matrix . values, rows [begin, end); values are [columns, 4], the fourth unused.
   void (*sparse_product)(const SparseRows<T>&, int64_t begin, int64_t end, const T* values, T* products);

@@ -44,9 +44,6 @@ SPLITNERF_API void query_direction_backward(const float* lut, bool mean, int64_t
                                             T* grad_normals, T* grad_view_dirs, T* grad_roughness);
 
 // The fields of ShadePoint as arrays; occlusion factors are [n, n_channels] with n_channels 1 or 3.
-template <class T> struct ShadeArrays {
-  T *normals, *view_dirs, *albedo, *roughness, *metallic, *specular, *diffuse, *occlusion_s, *occlusion_d;
-};
 template <class T>
 SPLITNERF_API void split_sum_shade(const float* lut, ShadeOptions options, int64_t n, int n_channels,
                                    const ShadeArrays<const T>& in, T* radiance);

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "splitnerf/ggx.h"
+#include "splitnerf/trigonometry.h"
 #include "splitnerf/vec.h"
 
 namespace splitnerf {
@@ -29,10 +30,6 @@ template <class T> SPLITNERF_HD T unit_from_bits(uint32_t bits) { return T(bits 
 template <class T> SPLITNERF_HD T random_unit(uint32_t a, uint32_t b = 0, uint32_t c = 0) {
   return unit_from_bits<T>(hash_u32(a, b, c));
 }
-
-template <class T> struct Vec2 {
-  T x, y;
-};
 
 // (a + b) mod 1 of two numbers in [0, 1]; the result stays below 1 after rounding.
 template <class T> SPLITNERF_HD T wrap_unit(T a, T b) {
@@ -63,9 +60,9 @@ template <class T> SPLITNERF_HD Vec2<T> r2_lattice(uint32_t i, Vec2<T> shift = {
 // Unit vector with cosine c = 1 - one_minus_c to +z at azimuth 2 pi u. sin^2 = (1 - c)(1 + c)
 // keeps all digits near the pole.
 template <class T> SPLITNERF_HD Vec3<T> direction_from_cosine(T one_minus_c, T u) {
-  const T phi = T(2 * kPi) * u;
+  const Vec2<T> azimuth = cos_sin_of_turns(u);
   const T s = std::sqrt(max_of(one_minus_c * (T(2) - one_minus_c), T(0)));
-  return {s * std::cos(phi), s * std::sin(phi), T(1) - one_minus_c};
+  return {s * azimuth.x, s * azimuth.y, T(1) - one_minus_c};
 }
 
 // Uniform on the sphere: z is uniform in [-1, 1] (Archimedes). Density 1 / (4 pi).

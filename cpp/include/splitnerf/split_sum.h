@@ -42,13 +42,15 @@ template <class T> SPLITNERF_HD LutSample<T> sample_brdf_lut(const float* lut, T
   const bool nv_free = n_dot_v > T(kMinNdotV) && n_dot_v < T(1);
   const bool roughness_free = roughness >= T(0) && roughness <= T(1);
   const T dx = nv_free ? T(kLutSize - 1) * T(0.5) / root : T(0), dy = roughness_free ? T(kLutSize - 1) : T(0);
-  const float* row0 = lut + (y0 * kLutSize + x0) * 3;
-  const float* row1 = row0 + kLutSize * 3;
+  // Indices, not pointers: so a loop over points turns these reads into gathers.
+  const int at = (y0 * kLutSize + x0) * 3;
   LutSample<T> s;
-  for (int c = 0; c < 3; ++c) {
-    const T a = lerp(T(row0[c]), T(row0[c + 3]), fx), b = lerp(T(row1[c]), T(row1[c + 3]), fx);
+  SPLITNERF_UNROLL for (int c = 0; c < 3; ++c) {
+    const T v00 = T(lut[at + c]), v01 = T(lut[at + c + 3]);
+    const T v10 = T(lut[at + c + 3 * kLutSize]), v11 = T(lut[at + c + 3 * kLutSize + 3]);
+    const T a = lerp(v00, v01, fx), b = lerp(v10, v11, fx);
     s.value[c] = lerp(a, b, fy);
-    s.d_n_dot_v[c] = lerp(T(row0[c + 3]) - T(row0[c]), T(row1[c + 3]) - T(row1[c]), fy) * dx;
+    s.d_n_dot_v[c] = lerp(v01 - v00, v11 - v10, fy) * dx;
     s.d_roughness[c] = (b - a) * dy;
   }
   return s;
@@ -209,6 +211,11 @@ template <class T> struct ShadePoint {
   Vec3<T> occlusion_s, occlusion_d;  // the paper's o: 1 = open
 };
 
+// Many points: [n, 3] but for roughness and metallic [n]; occlusion factors [n, 3] or [n].
+template <class T> struct ShadeArrays {
+  T *normals, *view_dirs, *albedo, *roughness, *metallic, *specular, *diffuse, *occlusion_s, *occlusion_d;
+};
+
 // L = o_d (1 - m)(1 - E) albedo g(n, 1) + o_s E g(d, rho), with F0 = .04 (1 - m) + m albedo.
 // paper and code modes use k_d = (1 - m)(1 - Fr).        Source: SplitNeRF Eq. (6)-(10), (17).
 template <class T>
@@ -216,7 +223,7 @@ SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, con
   const T nv = dot(p.normal, p.view) * facing(p.normal, p.view), m = p.metallic;
   const Vec3<T> table = lookup_brdf_lut(lut, nv, p.roughness);
   Vec3<T> radiance;
-  for (int c = 0; c < 3; ++c) {
+  SPLITNERF_UNROLL for (int c = 0; c < 3; ++c) {
     const T f0 = normal_reflectance(m, p.albedo[c]);
     const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
     const T e = specular_albedo(fr.value, table.x, table.y, options.compensate).value;
@@ -236,7 +243,7 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
   const bool exact = options.fresnel == FresnelMode::kExact;
   ShadePoint<T> out{};
   T grad_f1 = T(0), grad_f2 = T(0), grad_nv = T(0);
-  for (int c = 0; c < 3; ++c) {
+  SPLITNERF_UNROLL for (int c = 0; c < 3; ++c) {
     const T albedo = p.albedo[c], l_d = p.diffuse[c], l_s = p.specular[c], o_d = p.occlusion_d[c],
             o_s = p.occlusion_s[c];
     const T f0 = normal_reflectance(m, albedo);

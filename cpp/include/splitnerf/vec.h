@@ -15,6 +15,10 @@ template <class T> SPLITNERF_HD T clamp(T x, T lo, T hi) { return min_of(max_of(
 template <class T> SPLITNERF_HD T square(T x) { return x * x; }
 template <class T> SPLITNERF_HD T lerp(T a, T b, T t) { return a + t * (b - a); }
 
+template <class T> struct Vec2 {
+  T x, y;
+};
+
 template <class T> struct Vec3 {
   T x, y, z;
 

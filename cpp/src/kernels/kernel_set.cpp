@@ -10,8 +10,8 @@ Kernels<float> kernels_float32() {
           hash_position_gradient<float>, sdf_values<float>,         sdf_layer<float>,
           sdf_layer_backward<float>,     pair_likeness<float>,      lobe_gather<float>,
           lobe_scatter<float>,           visibility_horizon<float>, visibility_shares<float>,
-          visibility_sums<float>,        sparse_product<float>,     light_lookup<float>,
-          light_lookup_backward<float>};
+          visibility_sums<float>,        split_sum_shade<float>,    split_sum_shade_backward<float>,
+          sparse_product<float>,         light_lookup<float>,       light_lookup_backward<float>};
 }
 
 Kernels<double> kernels_float64() {
@@ -19,8 +19,8 @@ Kernels<double> kernels_float64() {
           hash_position_gradient<double>, sdf_values<double>,         sdf_layer<double>,
           sdf_layer_backward<double>,     pair_likeness<double>,      lobe_gather<double>,
           lobe_scatter<double>,           visibility_horizon<double>, visibility_shares<double>,
-          visibility_sums<double>,        sparse_product<double>,     light_lookup<double>,
-          light_lookup_backward<double>};
+          visibility_sums<double>,        split_sum_shade<double>,    split_sum_shade_backward<double>,
+          sparse_product<double>,         light_lookup<double>,       light_lookup_backward<double>};
 }
 
 }  // namespace splitnerf::SPLITNERF_ISA

@@ -23,6 +23,11 @@ template <class T> void lobe_scatter(const LobeSide<T>&, const LobeSide<T>&, int
 template <class T> void visibility_horizon(const LobeSide<T>&, const T*, T*, uint32_t*);
 template <class T> void visibility_shares(int64_t, const VisibilityPoint<T>&, T*, T*);
 template <class T> void visibility_sums(const LobeSide<T>&, const VisibilityLobe<T>&, const T*, T*, T*);
+template <class T>
+void split_sum_shade(const float*, ShadeOptions, int64_t, int64_t, int, const ShadeArrays<const T>&, T*);
+template <class T>
+void split_sum_shade_backward(const float*, ShadeOptions, int64_t, int64_t, int, const ShadeArrays<const T>&, const T*,
+                              const ShadeArrays<T>&);
 template <class T> void sparse_product(const SparseRows<T>&, int64_t, int64_t, const T*, T*);
 template <class T> void light_lookup(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, T*);
 template <class T>

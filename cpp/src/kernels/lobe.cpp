@@ -6,15 +6,16 @@ namespace splitnerf::SPLITNERF_ISA {
 // One query against all lights; the sums live in registers, so memory is O(queries + lights).
 template <class T>
 void lobe_gather(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums) {
+  const LobeSide<T> l = lights;  // a copy: its pointers stand still while sums are written
   for (int64_t s = begin; s < end; ++s) {
     const T x = queries.x[s], y = queries.y[s], z = queries.z[s], a2 = queries.alpha_squared[s];
     T r = 0, g = 0, b = 0, total = 0;
 #pragma omp simd reduction(+ : r, g, b, total)
-    for (int64_t i = 0; i < lights.n; ++i) {
-      const T k = prefilter_weight(x - lights.x[i], y - lights.y[i], z - lights.z[i], a2);
-      r += k * lights.r[i];
-      g += k * lights.g[i];
-      b += k * lights.b[i];
+    for (int64_t i = 0; i < l.n; ++i) {
+      const T k = prefilter_weight(x - l.x[i], y - l.y[i], z - l.z[i], a2);
+      r += k * l.r[i];
+      g += k * l.g[i];
+      b += k * l.b[i];
       total += k;
     }
     T* out = sums + 4 * (s - begin);
@@ -25,15 +26,16 @@ void lobe_gather(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t 
 // The transpose: one light against all queries.
 template <class T>
 void lobe_scatter(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums) {
+  const LobeSide<T> q = queries;
   for (int64_t i = begin; i < end; ++i) {
     const T x = lights.x[i], y = lights.y[i], z = lights.z[i];
     T r = 0, g = 0, b = 0;
 #pragma omp simd reduction(+ : r, g, b)
-    for (int64_t s = 0; s < queries.n; ++s) {
-      const T k = prefilter_weight(x - queries.x[s], y - queries.y[s], z - queries.z[s], queries.alpha_squared[s]);
-      r += k * queries.r[s];
-      g += k * queries.g[s];
-      b += k * queries.b[s];
+    for (int64_t s = 0; s < q.n; ++s) {
+      const T k = prefilter_weight(x - q.x[s], y - q.y[s], z - q.z[s], q.alpha_squared[s]);
+      r += k * q.r[s];
+      g += k * q.g[s];
+      b += k * q.b[s];
     }
     T* out = sums + 3 * (i - begin);
     out[0] = r, out[1] = g, out[2] = b;

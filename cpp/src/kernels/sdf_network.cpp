@@ -63,9 +63,10 @@ template <class T> void first_layer(const SdfLayer<T>& layer, int64_t n, const T
 // steepness [n, padded K] = d sdf / d input = (slope * out[0]) hidden; weighted: slope * out[0].
 template <class T> void input_gradient(const SdfLayer<T>& layer, int64_t n, const T* slope, T* weighted, T* steepness) {
   const int64_t columns = layer.width_columns;
+  const T* const out = layer.out;
   for (int64_t p = 0; p < n; ++p)
 #pragma omp simd
-    for (int64_t h = 0; h < columns; ++h) weighted[p * columns + h] = slope[p * columns + h] * layer.out[h];
+    for (int64_t h = 0; h < columns; ++h) weighted[p * columns + h] = slope[p * columns + h] * out[h];
   clear(steepness, n * layer.input_columns);
   add_product<T>(n, layer.width, layer.input_columns, {weighted, columns, 1}, layer.hidden, layer.input_columns,
                  steepness, layer.input_columns);
@@ -85,11 +86,13 @@ template <class T> void sdf_values(const SdfNetwork<T>& net, int64_t n, const T*
   hash_encode<T>(grid, 0, n, features, nullptr);
   join_inputs(layer, n, positions, features, inputs);
   first_layer<T>(layer, n, inputs, hidden, nullptr);
+  const int64_t columns = layer.width_columns;
+  const T* const out = layer.out;
   for (int64_t p = 0; p < n; ++p) {
     T sum = layer.out_bias[0];
-    const T* row = hidden + p * layer.width_columns;
+    const T* row = hidden + p * columns;
 #pragma omp simd reduction(+ : sum)
-    for (int64_t h = 0; h < layer.width_columns; ++h) sum += row[h] * layer.out[h];
+    for (int64_t h = 0; h < columns; ++h) sum += row[h] * out[h];
     values[p] = sum;
   }
 }

@@ -4,7 +4,9 @@
 
 namespace splitnerf::SPLITNERF_ISA {
 
-template <class T> void visibility_horizon(const LobeSide<T>& directions, const T* normal, T* cosine, uint32_t* above) {
+template <class T>
+void visibility_horizon(const LobeSide<T>& all_directions, const T* normal, T* cosine, uint32_t* above) {
+  const LobeSide<T> directions = all_directions;
   const T x = normal[0], y = normal[1], z = normal[2];
 #pragma omp simd
   for (int64_t i = 0; i < directions.n; ++i) {
@@ -39,15 +41,17 @@ template <class T> void visibility_shares(int64_t n_directions, const Visibility
 }
 
 template <class T>
-void visibility_sums(const LobeSide<T>& directions, const VisibilityLobe<T>& lobes, const T* visible, T* lobe,
+void visibility_sums(const LobeSide<T>& all_directions, const VisibilityLobe<T>& lobes, const T* visible, T* lobe,
                      T* sums) {
+  const LobeSide<T> directions = all_directions;  // a copy: its pointers stand still while `lobe` is written
+  const T* const cosine = lobes.cosine;
   const T x = lobes.lobe_dir[0], y = lobes.lobe_dir[1], z = lobes.lobe_dir[2], a2 = lobes.alpha_squared;
   T open_dr = 0, open_dg = 0, open_db = 0, all_dr = 0, all_dg = 0, all_db = 0, total_d = 0;
   T open_sr = 0, open_sg = 0, open_sb = 0, all_sr = 0, all_sg = 0, all_sb = 0, total_s = 0;
 #pragma omp simd reduction(+ : open_dr, open_dg, open_db, all_dr, all_dg, all_db, total_d, open_sr, open_sg, open_sb, \
                                all_sr, all_sg, all_sb, total_s)
   for (int64_t i = 0; i < directions.n; ++i) {
-    const T d = lobes.cosine[i], v = visible[i], r = directions.r[i], g = directions.g[i], b = directions.b[i];
+    const T d = cosine[i], v = visible[i], r = directions.r[i], g = directions.g[i], b = directions.b[i];
     const T weight = prefilter_weight(x - directions.x[i], y - directions.y[i], z - directions.z[i], a2);
     const T s = d > T(0) ? weight : T(0);
     lobe[i] = s;

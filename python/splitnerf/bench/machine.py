@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 
 import splitnerf
+from splitnerf import _core
 
 
 def processor_name(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
@@ -22,19 +23,22 @@ def processor_name(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
 
 
 def commit() -> str:
-    """Of the checkout that this package stands in; "unknown" outside of one."""
+    """Of the checkout that this package stands in, with a + where that has changes; "unknown" outside of one."""
+    commands = (["git", "rev-parse", "--short", "HEAD"], ["git", "status", "--porcelain", "--untracked-files=no"])
     try:
-        done = subprocess.run(
-            ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10
-        )  # fmt: skip
+        number, changes = (
+            subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10)
+            for command in commands
+        )
     except (OSError, subprocess.TimeoutExpired):
         return "unknown"
-    return done.stdout.strip() if done.returncode == 0 else "unknown"
+    return number.stdout.strip() + ("+" if changes.stdout.strip() else "") if number.returncode == 0 else "unknown"
 
 
 def describe_machine() -> dict[str, str]:
     """Processor, versions and commit, for the head of a table."""
     return {
-        "processor": processor_name(), "threads": str(torch.get_num_threads()), "splitnerf": splitnerf.__version__,
+        "processor": processor_name(), "threads": str(torch.get_num_threads()), "kernels": _core.instruction_set(),
+        "Embree": _core.embree_version() or "none", "splitnerf": splitnerf.__version__,
         "torch": torch.__version__, "python": platform.python_version(), "commit": commit(),
     }  # fmt: skip

@@ -9,10 +9,37 @@ from pathlib import Path
 from splitnerf.cli.exit_codes import DONE, FAILED
 from splitnerf.errors import InputError
 
+BENCHMARKS = (
+    "prefilter",
+    "split_sum",
+    "hash_grid",
+    "shading",
+    "occlusion",
+)  # modules of splitnerf.bench, each with run(quick, rounds)
+
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("bench", help="measure run time against error")
-    benchmarks = parser.add_subparsers(dest="benchmark", required=True, metavar="BENCHMARK")
+    parser = commands.add_parser(
+        "bench", help="measure run time against error",
+        description="Without BENCHMARK: checks the operators, times them beside plain torch and whatever peers are installed "
+        "(drjit, open3d, mitsuba), and writes a table, a CSV file and a picture each. Measured maps and meshes are taken from "
+        "the folder SPLITNERF_DATA, else procedural ones.",
+    )  # fmt: skip
+    parser.add_argument(
+        "--quick", action="store_true", help="small inputs: a few minutes, to run before and after a change"
+    )
+    parser.add_argument(
+        "--only", action="append", default=[], metavar="NAME", choices=BENCHMARKS,
+        help=f"only this one of {', '.join(BENCHMARKS)}; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="folder of the files (default: docs/benchmarks in a checkout, else here)",
+    )
+    parser.set_defaults(execute=run_operators)
+    benchmarks = parser.add_subparsers(dest="benchmark", metavar="BENCHMARK")
     skip = benchmarks.add_parser(
         "skip", help="what it is worth to leave out what a scene does not need",
         description="Trains on DATA without any skip, with one at a time, and with all, for M minutes and for as many steps as "
@@ -50,6 +77,22 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     stability.set_defaults(execute=run_stability)
 
 
+def default_folder() -> Path:
+    return Path("docs/benchmarks") if Path("docs").is_dir() else Path()
+
+
+def run_operators(args: argparse.Namespace) -> int:
+    from splitnerf.bench.operators import run_benchmarks
+
+    for path in run_benchmarks(args.only or BENCHMARKS, args.quick, args.out or default_folder(), print_now):
+        print(path)
+    return DONE
+
+
+def print_now(line: str) -> None:
+    print(line, flush=True)
+
+
 def run_skip(args: argparse.Namespace) -> int:
     from splitnerf.bench.skip import run_other, skip_table
     from splitnerf.config import parse_setting, preset
@@ -69,7 +112,7 @@ def run_skip(args: argparse.Namespace) -> int:
         other = None
         if args.against is not None:
             other = lambda: run_other(args.against, args.data, args.minutes, args.downscale, out / "against")  # noqa: E731
-        skip_table(full, args.minutes, training, test, out, other, lambda line: print(line, flush=True))
+        skip_table(full, args.minutes, training, test, out, other, print_now)
     return DONE
 
 
@@ -78,8 +121,8 @@ def run_stability(args: argparse.Namespace) -> int:
         raise InputError(f"--cases must be positive, got {args.cases}")
     from splitnerf.bench.stability.table import chosen, run_all, write
 
-    out = args.out or (Path("docs/benchmarks") if Path("docs").is_dir() else Path())
-    results, verdicts = run_all(chosen(args.op), args.cases, args.seed, lambda line: print(line, flush=True))
+    out = args.out or default_folder()
+    results, verdicts = run_all(chosen(args.op), args.cases, args.seed, print_now)
     for path in write(results, verdicts, args.seed, out):
         print(path)
     return DONE if all(x.holds for x in (*results, *verdicts)) else FAILED

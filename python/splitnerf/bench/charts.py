@@ -1,0 +1,194 @@
+"""Charts of cost against error: their points, the Pareto front, and the files that they become."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from splitnerf.bench.machine import describe_machine
+from splitnerf.data.images import atomic_path
+from splitnerf.errors import InputError
+
+COLUMNS = 3  # charts in a row of a picture
+COLOURS = ("#1f6fb4", "#d9822b", "#3f9d63", "#b5539a", "#6f5fc0", "#c2524a", "#1f9c9c", "#8a7a2a", "#555555", "#a0522d")
+
+
+@dataclass(frozen=True)
+class Point:
+    """One way of doing the work.
+
+    Attributes:
+        series: The method, or whose it is.
+        variant: Its setting, such as ``n = 64``; may be empty.
+        cost: Of the chart's unit.
+        error: Of the chart's unit.
+        low, high: Quartiles of the cost; equal to it where it is exact.
+        default: Whether it is what the library does unless told otherwise.
+    """
+
+    series: str
+    variant: str
+    cost: float
+    error: float
+    low: float
+    high: float
+    default: bool = False
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Points that do the same work.
+
+    Attributes:
+        title: What is measured, and on what.
+        cost: Name and unit of the horizontal axis.
+        error: Name and unit of the vertical axis.
+        points: In the order of the table.
+    """
+
+    title: str
+    cost: str
+    error: str
+    points: list[Point]
+
+    def front(self) -> list[Point]:
+        """The points that no other beats in both cost and error, by cost."""
+        best, front = math.inf, []
+        for point in sorted(self.points, key=lambda p: (p.cost, p.error)):
+            if point.error < best:
+                best = point.error
+                front.append(point)
+        return front
+
+
+@dataclass(frozen=True)
+class Result:
+    """What one benchmark found.
+
+    Attributes:
+        name: Of its files.
+        title: Its heading.
+        findings: Sentences with ratios, the first things to read.
+        charts: Cost against error.
+        tables: Further tables: title, heads, rows.
+    """
+
+    name: str
+    title: str
+    findings: list[str]
+    charts: list[Chart] = field(default_factory=list)
+    tables: list[tuple[str, Sequence[str], Sequence[Sequence[object]]]] = field(default_factory=list)
+
+
+def write_result(result: Result, out: Path) -> list[Path]:
+    """Writes NAME.md, and where there are charts NAME.csv and NAME.png.
+
+    Returns:
+        The files.
+
+    Raises:
+        InputError: matplotlib is missing.
+    """
+    files = [out / f"{result.name}.md"]
+    if result.charts:
+        files += [out / f"{result.name}.csv", out / f"{result.name}.png"]
+        write_csv(result, files[1])
+        draw(result, files[2])
+    with atomic_path(files[0]) as temporary:
+        temporary.write_text(markdown(result))
+    return files
+
+
+def write_csv(result: Result, path: Path) -> None:
+    with atomic_path(path) as temporary, open(temporary, "w", newline="") as file:
+        for key, value in describe_machine().items():
+            file.write(f"# {key}: {value}\n")
+        writer = csv.writer(file)
+        writer.writerow(["chart", "series", "variant", "cost", "low", "high", "cost_unit", "error", "error_unit",
+                         "on_front", "default"])  # fmt: skip
+        for chart in result.charts:
+            front = chart.front()
+            for p in chart.points:
+                numbers = [f"{v:.6g}" for v in (p.cost, p.low, p.high)]
+                writer.writerow([chart.title, p.series, p.variant, *numbers, chart.cost, f"{p.error:.6g}", chart.error,
+                                 int(p in front), int(p.default)])  # fmt: skip
+
+
+def markdown(result: Result) -> str:
+    """The result as text: findings, then a table for each chart; * marks the front, and the default is bold."""
+    lines = [
+        f"# {result.title}",
+        "",
+        "; ".join(f"{key} {value}" for key, value in describe_machine().items()) + ".",
+        "",
+    ]
+    lines += [f"- {finding}" for finding in result.findings]
+    if result.charts:
+        lines += ["", f"![{result.title}]({result.name}.png)"]
+        lines += ["", "`*`: no other is both faster and more accurate. **Bold**: the default."]
+    for chart in result.charts:
+        front = chart.front()
+        rows = []
+        for p in chart.points:
+            mark = "**" if p.default else ""
+            spread = "" if p.low == p.high else f" ({p.low:.3g} to {p.high:.3g})"
+            name = f"{mark}{p.series}{mark}{' *' if p in front else ''}"
+            rows.append([name, p.variant, f"{p.cost:.3g}{spread}", f"{p.error:.3g}"])
+        lines += ["", f"## {chart.title}", "", *table(["", "", chart.cost, chart.error], rows)]
+    for title, heads, rows in result.tables:
+        lines += ["", f"## {title}", "", *table(heads, rows)]
+    return "\n".join(lines) + "\n"
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:
+    """Lines of a Markdown table."""
+    lines = [list(map(str, row)) for row in (heads, ["---"] * len(heads), *rows)]
+    return ["| " + " | ".join(line) + " |" for line in lines]
+
+
+def draw(result: Result, path: Path) -> None:
+    """All charts in one picture, both axes logarithmic; a star marks the default, a line the front.
+
+    Raises:
+        InputError: matplotlib is missing.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise InputError("the charts need matplotlib: pip install 'splitnerf[bench]'") from error
+    columns = min(COLUMNS, len(result.charts))
+    rows = -(-len(result.charts) // columns)
+    figure = Figure(figsize=(5.6 * columns, 4.4 * rows + 0.9), dpi=80, layout="constrained")
+    names = list(dict.fromkeys(p.series for chart in result.charts for p in chart.points))
+    handles: dict[str, object] = {}
+    for i, chart in enumerate(result.charts):
+        axes = figure.add_subplot(rows, columns, i + 1)
+        for name in dict.fromkeys(p.series for p in chart.points):
+            points = sorted((p for p in chart.points if p.series == name), key=lambda p: p.cost)
+            colour, costs = COLOURS[names.index(name) % len(COLOURS)], [p.cost for p in points]
+            spread = [[p.cost - p.low for p in points], [p.high - p.cost for p in points]]
+            handles[name] = axes.errorbar(costs, [p.error for p in points], xerr=spread, marker="o", markersize=4,
+                                          linewidth=1, color=colour)  # fmt: skip
+        front = chart.front()
+        axes.step(
+            [p.cost for p in front], [p.error for p in front], where="post", color="#bbbbbb", linewidth=5, zorder=0
+        )
+        for p in (p for p in chart.points if p.default):
+            colour = COLOURS[names.index(p.series) % len(COLOURS)]
+            handles["default"] = axes.scatter(
+                [p.cost], [p.error], marker="*", s=220, color=colour, edgecolor="black", zorder=5
+            )
+        axes.set_xscale("log")
+        if all(p.error > 0 for p in chart.points):
+            axes.set_yscale("log")
+        axes.set_title(chart.title, fontsize=9)
+        axes.set_xlabel(chart.cost, fontsize=8)
+        axes.set_ylabel(chart.error, fontsize=8)
+        axes.tick_params(labelsize=7, which="both")
+        axes.grid(True, which="major", linewidth=0.3)
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5, fontsize=8)
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png")

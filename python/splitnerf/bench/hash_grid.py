@@ -1,0 +1,101 @@
+"""The hash grid encoding: throughput forward and backward, beside plain torch and Dr.Jit, and the machine's gathers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from splitnerf import _core
+from splitnerf.bench import eager
+from splitnerf.bench.charts import Chart, Point, Result
+from splitnerf.bench.peers import DrJitHashGrid, drjit_ready
+from splitnerf.bench.timing import interleaved
+from splitnerf.errors import CheckFailed
+from splitnerf.ops import HashGridSpec, hash_encode
+
+SPEC = HashGridSpec(n_levels=16, n_features=2, base_resolution=32, growth=1.3195079, log2_table_size=19)
+TOLERANCE = 1e-3  # between ours and plain torch, of the largest value
+CORNERS = 8
+
+
+def run(quick: bool, rounds: int) -> Result:
+    """Forward and backward of 16 levels x 2 features, 2^19 entries a level, on random points.
+
+    Args:
+        quick: Fewer points, and no Dr.Jit, which takes a minute to compile.
+        rounds: Of timing.
+    """
+    torch.manual_seed(0)
+    n = 1 << (15 if quick else 17)
+    x, cotangent = torch.rand(n, 3), torch.randn(n, SPEC.n_outputs)
+    table = 0.1 * torch.randn(SPEC.n_entries, SPEC.n_features)
+    arguments = SPEC.arguments(SPEC.n_levels)
+
+    def ours(x: Tensor, table: Tensor) -> Tensor:
+        return hash_encode(x, table, SPEC)
+
+    def plain(x: Tensor, table: Tensor) -> Tensor:
+        return eager.hash_encode(x, table, *arguments)
+
+    true = both(ours, x.double(), table.double(), cotangent.double())()
+    calls: dict[tuple[str, str], Callable[[], object]] = {
+        ("splitnerf", "float32"): both(ours, x, table, cotangent),
+        ("splitnerf", "float64"): both(ours, x.double(), table.double(), cotangent.double()),
+        ("torch eager", "float32"): both(plain, x, table, cotangent),
+    }
+    errors = {("splitnerf", "float64"): [1e-16, 1e-16]}
+    for key in (("splitnerf", "float32"), ("torch eager", "float32")):
+        errors[key] = [relative(a, b) for a, b in zip(calls[key](), true)]
+        if max(errors[key]) > TOLERANCE:
+            raise CheckFailed(f"hash grid: {' '.join(key)} is {max(errors[key]):.1e} from float64")
+    if not quick and drjit_ready():
+        peers = {storage: DrJitHashGrid(SPEC, storage, x, cotangent) for storage in ("Float32", "Float16")}
+        calls |= {("Dr.Jit", storage.lower()): peer.forward_backward for storage, peer in peers.items()}
+    entries = 1 << SPEC.log2_table_size
+    one_level, gathers = np.zeros((entries, 2), np.float32), n * SPEC.n_levels * CORNERS
+    limit = ("gathers", "one level")
+    times = interleaved(calls | {limit: lambda: _core.random_gathers(one_level, gathers)}, rounds)
+
+    first, peer = ("splitnerf", "float32"), ("torch eager", "float32")
+    rate = gathers / times[limit].seconds
+    findings = [
+        f"forward and backward of {n} points: {times.ratio(peer, first)} as fast as torch eager",
+        f"the machine's gathers on one level: {rate / 1e6:.0f} M a second; forward and backward, counted as two gathers for each "
+        f"corner and level, reach {2 * times[limit].seconds / times[first].seconds:.0%} of it",
+    ]
+    findings += [f"{times.ratio(key, first)} as fast as Dr.Jit with {key[1]}" for key in calls if key[0] == "Dr.Jit"]
+    points = [
+        Point(
+            *key, 1e3 * times[key].seconds, max(errors[key]), 1e3 * times[key].low, 1e3 * times[key].high, key == first
+        )
+        for key in errors
+    ]
+    chart = Chart(
+        f"{n} points, 16 levels x 2, 2^19 entries",
+        "ms forward and backward",
+        "largest error, of the largest value",
+        points,
+    )
+    return Result("hash_grid", "Hash grid encoding: time against error", findings, [chart])
+
+
+def both(
+    encode: Callable[[Tensor, Tensor], Tensor], x: Tensor, table: Tensor, cotangent: Tensor
+) -> Callable[[], tuple]:
+    """Features and the table's gradient of one call."""
+    leaf = table.clone().requires_grad_()
+
+    def call() -> tuple[Tensor, Tensor]:
+        features = encode(x, leaf)
+        (grad,) = torch.autograd.grad(features, leaf, cotangent)
+        return features.detach(), grad
+
+    return call
+
+
+def relative(a: Tensor, true: Tensor) -> float:
+    """Largest difference, of the largest true value."""
+    return float((a.double() - true).abs().max() / true.abs().max())

@@ -1,0 +1,108 @@
+"""Environment maps to measure under, and the same light in the forms that estimators take."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from splitnerf.data.environment import read_environment
+from splitnerf.fields import LightPyramid
+
+# Their brightest ten-thousandth of the sphere sends less than 1 %, 3 % and 57 % of the light.
+MEASURED = {"soft": "blender_courtyard.exr", "medium": "blender_studio.exr", "hard sun": "blender_sunrise.exr"}
+SUBDIVISION = 4  # samples along the edge of a texel that its mean is taken from
+
+
+def data_folder() -> Path:
+    """Where measured maps and meshes lie: SPLITNERF_DATA, or ../shared/data."""
+    return Path(os.environ.get("SPLITNERF_DATA", "../shared/data"))
+
+
+def lights() -> dict[str, np.ndarray]:
+    """[h, 2h, 3] maps by name: measured ones where the data folder has them, else a procedural sky without and with a sun."""
+    files = {name: data_folder() / "hdri" / file for name, file in MEASURED.items()}
+    if all(path.is_file() for path in files.values()):
+        return {name: read_environment(path) for name, path in files.items()}
+    return {"procedural sky": procedural_sky(256, 0.0), "procedural sun": procedural_sky(256, 300.0)}
+
+
+def procedural_sky(height: int, sun: float) -> np.ndarray:
+    """A gradient of blue over brown ground, two soft boxes, and a sun of 2 degrees and so many times the zenith."""
+    polar = (np.arange(height) + 0.5) / height * np.pi
+    azimuth = np.pi - (np.arange(2 * height) + 0.5) / height * np.pi
+    d = np.stack(np.broadcast_arrays(
+        np.sin(polar)[:, None] * np.cos(azimuth), np.sin(polar)[:, None] * np.sin(azimuth), np.cos(polar)[:, None]
+    ), axis=-1)  # fmt: skip
+    up = d[..., 2:]
+    sky = np.where(up > 0, [0.4, 0.6, 1.0] * (0.5 + up), np.array([0.3, 0.25, 0.2]) * (1 + 0.5 * up))
+    for axis, width, level in (([1, 0, 0.3], 0.25, 6.0), ([-0.5, -0.8, 0.4], 0.15, 12.0)):
+        cosine = d @ (np.array(axis) / np.linalg.norm(axis))
+        sky += level / (1.0 + np.exp((np.arccos(np.clip(cosine, -1, 1)) - width) / 0.02))[..., None]
+    towards = np.array([0.3, 0.7, 0.65]) / np.linalg.norm([0.3, 0.7, 0.65])
+    sky[d @ towards > math.cos(math.radians(1.0))] += sun
+    return sky.astype(np.float32)
+
+
+class MapLight:
+    """Radiance of an equirectangular map from any direction: bilinear, with the map's means beneath for a filtered lookup."""
+
+    def __init__(self, radiance: np.ndarray):
+        self.levels = [torch.from_numpy(np.ascontiguousarray(radiance))]
+        while len(self.levels[-1]) > 4:
+            self.levels.append(self.levels[-1].unflatten(0, (-1, 2)).unflatten(2, (-1, 2)).mean((1, 3)))
+        self.padded = [
+            torch.cat([level[:, -1:], level, level[:, :1]], 1).permute(2, 0, 1)[None].contiguous()
+            for level in self.levels
+        ]
+
+    def __call__(self, directions: Tensor, level: int = 0) -> Tensor:
+        """directions [n, 3] -> radiance [n, 3]."""
+        image = self.padded[level]
+        width = image.shape[3] - 2
+        x, y, z = directions.unbind(1)
+        u = 0.5 - torch.atan2(y, x) / (2 * math.pi)
+        v = torch.acos(z.clamp(-1, 1)) / math.pi
+        grid = torch.stack([(u * width + 1) / (width + 2) * 2 - 1, v * 2 - 1], -1)[None, None]
+        return F.grid_sample(image, grid, padding_mode="border", align_corners=False)[0, :, 0].T
+
+    def filtered(self, directions: Tensor, solid_angles: Tensor) -> Tensor:
+        """As above, averaged over about these solid angles [n]: linear between the two levels whose texels they are."""
+        texel = 4 * math.pi / self.levels[0][..., 0].numel()
+        lod = (0.5 * torch.log2(solid_angles / texel)).clamp(0, len(self.levels) - 1.001)
+        below, share = lod.floor().long(), lod.frac()[:, None]
+        out = torch.empty_like(directions)
+        for level in below.unique().tolist():
+            here = below == level
+            fine, coarse = (self(directions[here], level + k) for k in (0, 1))
+            out[here] = torch.lerp(fine, coarse, share[here])
+        return out
+
+
+def octahedral_directions(n: int) -> np.ndarray:
+    """[n^2, 3] unit directions of an octahedral map's texel centres, row by row.
+
+    Source: Praun and Hoppe 2003.
+    """
+    centre = (2 * np.arange(n) + 1) / n - 1
+    v, u = np.meshgrid(centre, centre, indexing="ij")
+    z = 1 - np.abs(u) - np.abs(v)
+    fold = np.maximum(-z, 0)
+    points = np.stack([u - np.where(u < 0, -1, 1) * fold, v - np.where(v < 0, -1, 1) * fold, z], -1).reshape(-1, 3)
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def pyramid_of(light: MapLight, resolution: int) -> LightPyramid:
+    """The pyramid whose texels hold the means of a light over them."""
+    fine = torch.from_numpy(octahedral_directions(resolution * SUBDIVISION)).float()
+    cells = light(fine).view(resolution, SUBDIVISION, resolution, SUBDIVISION, 3).mean((1, 3)).reshape(-1, 3)
+    pyramid = LightPyramid(resolution)
+    with torch.no_grad():
+        pyramid.texels.zero_()
+        pyramid.texels[-(resolution**2) :] = torch.log(cells.clamp(min=1e-5))
+    return pyramid

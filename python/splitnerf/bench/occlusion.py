@@ -1,0 +1,242 @@
+"""Occlusion factors: rays or bits against error, and rays a second beside other tracers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+import trimesh
+from torch import Tensor
+from torch.nn import functional as F
+
+from splitnerf.bench.charts import Chart, Point, Result
+from splitnerf.bench.lights import MapLight, data_folder, lights
+from splitnerf.bench.peers import bumpy_sphere, drjit_ready, peer
+from splitnerf.bench.timing import interleaved
+from splitnerf.errors import CheckFailed
+from splitnerf.fields.occlusion import OcclusionQuery
+from splitnerf.fields.visibility import VisibilityBits
+from splitnerf.ops import MeshScene, occlusion_factors, sample_ggx_lobe, trace_visibility
+
+OFFSET = 0.0125
+ROUGHNESS = 0.3
+ENVIRONMENT_HEIGHT = 128
+DISAGREEMENT = 1e-3  # share of rays that two tracers may answer differently: they graze a triangle
+LARGE = 500  # columns and rows of the mesh of 500k triangles
+
+
+class Points:
+    """Vertices of a mesh with their normals, mirror directions about random views, and the light over them."""
+
+    def __init__(self, mesh: trimesh.Trimesh, n: int, environment: np.ndarray):
+        self.vertices = torch.from_numpy(mesh.vertices.astype(np.float32))
+        self.faces = torch.from_numpy(mesh.faces.astype(np.int64))
+        self.scene = MeshScene(self.vertices.numpy(), mesh.faces)
+        chosen = torch.randperm(len(self.vertices))[:n]
+        self.positions = self.vertices[chosen]
+        self.normals = torch.from_numpy(np.array(mesh.vertex_normals, np.float32))[chosen]
+        views = F.normalize(self.normals + 0.7 * F.normalize(torch.randn(n, 3), dim=1), dim=1)
+        self.axes = 2 * (views * self.normals).sum(1, keepdim=True) * self.normals - views
+        self.roughness = torch.full((n, 1), ROUGHNESS)
+        self.light = MapLight(environment)
+        level = next(x for x in self.light.levels if len(x) <= ENVIRONMENT_HEIGHT)
+        self.environment = level.contiguous()
+
+    def traced(self, n_diffuse: int, n_specular: int, seed: int = 0) -> tuple[Tensor, Tensor]:
+        return occlusion_factors(
+            self.scene, self.positions, self.normals, self.axes, self.roughness, self.environment, n_diffuse_rays=n_diffuse,
+            n_specular_rays=n_specular, offset=OFFSET, seed=seed, n_channels=3,
+        )  # fmt: skip
+
+
+def run(quick: bool, rounds: int) -> Result:
+    """Error of the factors against time, then rays a second, on one mesh of 100k and one of 500k triangles.
+
+    Args:
+        quick: One light, fewer points, and no other tracer but Open3D.
+        rounds: Of timing.
+    """
+    torch.manual_seed(0)
+    mesh = armadillo()
+    environments = lights()
+    charts = []
+    for name in list(environments)[-1:] if quick else environments:
+        charts += error_charts(name, Points(mesh, 500 if quick else 2000, environments[name]), quick, rounds)
+    environment = environments[next(iter(environments))]
+    findings, rows = [], []
+    meshes = {f"{len(mesh.faces)} triangles": mesh}
+    if not quick:
+        vertices, faces = bumpy_sphere(LARGE)
+        meshes[f"{len(faces)} triangles"] = trimesh.Trimesh(vertices, faces, process=False)
+    for name, shape in meshes.items():
+        found, more = ray_rates(name, Points(shape, 4000 if quick else 20000, environment), quick, rounds)
+        findings += found
+        rows += more
+    table = ("Rays a second", ["mesh", "tracer", "Mrays/s", "what is timed"], rows)
+    return Result("occlusion", "Occlusion: time against error", findings, charts, [table])
+
+
+def armadillo() -> trimesh.Trimesh:
+    """The scan of the data folder in the unit sphere, or a bumpy sphere of as many triangles."""
+    path = data_folder() / "meshes" / "armadillo_ingp.obj"
+    if not path.is_file():
+        return trimesh.Trimesh(*bumpy_sphere(224), process=False)
+    mesh = trimesh.load(path, process=False)
+    mesh.apply_translation(-mesh.bounds.mean(0))
+    mesh.apply_scale(1 / np.linalg.norm(mesh.vertices, axis=1).max())
+    return mesh
+
+
+def error_charts(light_name: str, points: Points, quick: bool, rounds: int) -> list[Chart]:
+    """o_d and o_s of rays and of bits against many rays."""
+    n_true = 1024 if quick else 4096
+    true = [torch.stack([points.traced(n_true, n_true, seed)[k] for seed in range(2)]).mean(0) for k in (0, 1)]
+    calls: dict[tuple[str, str], Callable[[], tuple[Tensor, Tensor]]] = {}
+    for n in (16, 64) if quick else (4, 16, 64, 256):
+        calls["lattice rays", f"n = {n}"] = lambda n=n: points.traced(n, n, seed=7)
+        calls["independent rays", f"n = {n}"] = lambda n=n: independent(points, n)
+    for n in (256,) if quick else (64, 128, 256, 512, 1024):
+        bits = VisibilityBits(n, OFFSET, 3, indirect=False)
+        bits.trace(points.scene, points.vertices, points.faces)
+        bits.set_light(EnvironmentOf(points.light))
+        calls["bits", f"k = {n}"] = lambda bits=bits: bits(
+            OcclusionQuery(None, points.positions, points.normals, points.axes, points.roughness)
+        )[:2]
+    with torch.no_grad():
+        errors = {key: [rms(a - b) for a, b in zip(call(), true)] for key, call in calls.items()}
+        times = interleaved(calls, rounds)
+    charts = []
+    for k, factor in enumerate(("o_d", f"o_s at roughness {ROUGHNESS:g}")):
+        dots = [
+            Point(*key, 1e3 * times[key].seconds, errors[key][k], 1e3 * times[key].low, 1e3 * times[key].high,
+                  key == ("bits", "k = 256"))
+            for key in calls
+        ]  # fmt: skip
+        charts.append(
+            Chart(
+                f"{factor}, {light_name} light",
+                f"ms for {len(points.positions)} points, both factors",
+                "RMS error",
+                dots,
+            )
+        )
+    return charts
+
+
+class EnvironmentOf:
+    """A map as the light that the bits are weighed with."""
+
+    def __init__(self, light: MapLight):
+        self.light = light
+
+    def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
+        alpha2 = roughness[:, 0] ** 4
+        return self.light.filtered(directions, 4 * np.pi * alpha2)
+
+    def stands(self, token: object) -> bool:
+        return False
+
+
+def independent(points: Points, n: int) -> tuple[Tensor, Tensor]:
+    """Independent cosine-weighted and lobe-weighted rays, traced and summed step by step."""
+    count = len(points.positions)
+    normals = points.normals[:, None]
+    cosine = F.normalize(normals + F.normalize(torch.randn(count, n, 3), dim=-1), dim=-1)
+    lobe = sample_ggx_lobe(points.axes, points.roughness, n, int(torch.randint(1 << 30, ())))
+    origins = (points.positions + OFFSET * points.normals)[:, None].expand(count, n, 3).reshape(-1, 3)
+    factors = []
+    for directions in (cosine, lobe):
+        flat = directions.reshape(-1, 3)
+        radiance = points.light(flat).view(count, n, 3) * ((directions * normals).sum(-1, keepdim=True) > 0)
+        seen = trace_visibility(points.scene, origins, flat).view(count, n, 1)
+        factors.append((radiance * seen).sum(1) / radiance.sum(1).clamp(min=1e-12))
+    return factors[0], factors[1]
+
+
+def rms(x: Tensor) -> float:
+    return float(x.square().mean().sqrt())
+
+
+def ray_rates(name: str, points: Points, quick: bool, rounds: int) -> tuple[list[str], list[list[object]]]:
+    """Mrays/s of our factors, rays made and summed included, beside tracers that are handed their rays."""
+    n_rays = 64
+    n = len(points.positions)
+    directions = F.normalize(points.normals[:, None] + F.normalize(torch.randn(n, n_rays, 3), dim=-1), dim=-1).reshape(
+        -1, 3
+    )
+    origins = (points.positions + OFFSET * points.normals)[:, None].expand(n, n_rays, 3).reshape(-1, 3).contiguous()
+    seen = trace_visibility(points.scene, origins, directions)
+    tracers = {"Open3D test_occlusions": open3d_tracer} | (
+        {} if quick else {"trimesh + embreex": embreex_tracer, "mitsuba ray_test": mitsuba_tracer}
+    )
+    calls: dict[str, Callable[[], object]] = {
+        "splitnerf occlusion_factors": lambda: points.traced(n_rays - 1, 1),
+        "splitnerf trace_visibility": lambda: trace_visibility(points.scene, origins, directions),
+    }
+    for tracer, make in tracers.items():
+        call = make(points, origins, directions)
+        if call is None:
+            continue
+        differing = float((torch.from_numpy(np.asarray(call(), bool)) == seen).float().mean())
+        if differing > DISAGREEMENT:
+            raise CheckFailed(f"{tracer} and trace_visibility disagree on {differing:.2%} of the rays")
+        calls[tracer] = call
+    times = interleaved(calls, rounds)
+    ours = "splitnerf occlusion_factors"
+    what = {ours: "rays made, traced, weighed and summed"}
+    rows = [
+        [name, call, f"{len(origins) / times[call].seconds / 1e6:.1f}", what.get(call, "tracing of given rays")]
+        for call in calls
+    ]
+    findings = [
+        f"{name}: {times.ratio(call, ours)} as many rays a second as {call}"
+        for call in calls
+        if "splitnerf" not in call
+    ]
+    return findings, rows
+
+
+def open3d_tracer(points: Points, origins: Tensor, directions: Tensor) -> Callable[[], np.ndarray] | None:
+    open3d = peer("open3d", "its tracer")
+    if open3d is None:
+        return None
+    scene = open3d.t.geometry.RaycastingScene(nthreads=torch.get_num_threads())
+    scene.add_triangles(points.vertices.numpy(), points.faces.numpy().astype(np.uint32))
+    rays = open3d.core.Tensor(torch.cat([origins, directions], 1).numpy())
+    return lambda: scene.test_occlusions(rays, nthreads=torch.get_num_threads()).numpy()
+
+
+def embreex_tracer(points: Points, origins: Tensor, directions: Tensor) -> Callable[[], np.ndarray] | None:
+    if peer("embreex", "trimesh's tracer") is None:
+        return None
+    mesh = trimesh.Trimesh(points.vertices.numpy(), points.faces.numpy(), process=False)
+    o, d = origins.numpy(), directions.numpy()
+    return lambda: mesh.ray.intersects_any(o, d)
+
+
+def mitsuba_tracer(points: Points, origins: Tensor, directions: Tensor) -> Callable[[], np.ndarray] | None:
+    mitsuba = peer("mitsuba", "its tracer")
+    if mitsuba is None or not drjit_ready():
+        return None
+    import drjit
+
+    mitsuba.set_variant("llvm_ad_rgb")
+    drjit.set_thread_count(torch.get_num_threads())
+    mesh = mitsuba.Mesh("mesh", len(points.vertices), len(points.faces))
+    params = mitsuba.traverse(mesh)
+    params["vertex_positions"] = points.vertices.numpy().ravel()
+    params["faces"] = points.faces.numpy().astype(np.uint32).ravel()
+    params.update()
+    scene = mitsuba.load_dict({"type": "scene", "mesh": mesh})
+    o, d = (mitsuba.Point3f(*(x[:, k].numpy() for k in range(3))) for x in (origins, directions))
+    ray = mitsuba.Ray3f(o, mitsuba.Vector3f(d))
+    drjit.eval(ray)
+
+    def call() -> np.ndarray:
+        hit = scene.ray_test(ray)
+        drjit.eval(hit)
+        drjit.sync_thread()
+        return hit.numpy()
+
+    return call

@@ -1,0 +1,91 @@
+"""Other libraries at the same work. Each is optional: what is not installed is left out, and said to be."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from pathlib import Path
+
+import numpy as np
+from torch import Tensor
+
+from splitnerf.notes import note
+from splitnerf.ops import HashGridSpec
+
+
+def peer(name: str, why: str) -> object | None:
+    """A library, or None with a line on stderr that says what is missing without it."""
+    try:
+        return importlib.import_module(name)
+    except (ImportError, OSError) as error:
+        note(f"{name} is not installed ({str(error).splitlines()[0]}): {why} is left out")
+        return None
+
+
+def drjit_ready() -> bool:
+    """Whether Dr.Jit can compile for this processor; it needs an LLVM library, which DRJIT_LIBLLVM_PATH may name."""
+    if peer("drjit", "Dr.Jit's hash grid") is None:
+        return False
+    if "DRJIT_LIBLLVM_PATH" not in os.environ:
+        found = sorted(Path("/usr/lib").glob("*/libLLVM-1[6-9].so")) + sorted(Path("/usr/lib").glob("*/libLLVM.so.1*"))
+        if found:
+            os.environ["DRJIT_LIBLLVM_PATH"] = str(found[-1])
+    import drjit
+
+    if drjit.has_backend(drjit.JitBackend.LLVM):
+        return True
+    note("Dr.Jit finds no LLVM library; set DRJIT_LIBLLVM_PATH: what needs it is left out")
+    return False
+
+
+class DrJitHashGrid:
+    """Dr.Jit's encoding of a grid of the same shape, with a random table of its own.
+
+    It places nodes half a cell aside, so that its features are not ours and only its time compares.
+
+    Args:
+        spec: Shape of the grid.
+        storage: ``Float16`` or ``Float32``: of the table and the features.
+        positions: [n, 3].
+        cotangent: [n, C], what the features' gradient is.
+    """
+
+    def __init__(self, spec: HashGridSpec, storage: str, positions: Tensor, cotangent: Tensor):
+        import drjit
+        from drjit.llvm import ad
+        from drjit.nn import HashGridEncoding
+
+        self.drjit, kind = drjit, getattr(ad, storage)
+        self.grid = HashGridEncoding(
+            kind, 3, n_levels=spec.n_levels, n_features_per_level=spec.n_features, hashmap_size=2**spec.log2_table_size,
+            base_resolution=spec.base_resolution, per_level_scale=spec.growth, init_scale=0.1,
+        )  # fmt: skip
+        self.positions = ad.ArrayXf(positions.T.contiguous().numpy())
+        self.cotangent = [kind(column.numpy()) for column in cotangent.T.contiguous()]
+        drjit.eval(self.positions, self.cotangent, self.grid.data)
+
+    def forward_backward(self) -> None:
+        """Features, and the gradient to the table."""
+        dr = self.drjit
+        dr.enable_grad(self.grid.data)
+        dr.set_grad(self.grid.data, 0)
+        features = self.grid(self.positions)
+        dr.backward(dr.sum(sum(f * g for f, g in zip(features, self.cotangent))))
+        dr.eval(dr.grad(self.grid.data))
+        dr.sync_thread()
+        dr.disable_grad(self.grid.data)
+
+
+def bumpy_sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """A sphere with bumps of about 2 n^2 triangles: vertices [v, 3] float32, faces [f, 3] int32."""
+    polar, azimuth = np.meshgrid(
+        np.linspace(0.01, np.pi - 0.01, n + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij"
+    )
+    radius = 1 + 0.15 * np.sin(9 * polar) * np.cos(11 * azimuth)
+    vertices = radius[..., None] * np.stack(
+        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1
+    )
+    index = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    return vertices.reshape(-1, 3).astype(np.float32), faces.astype(np.int32)

@@ -1,0 +1,189 @@
+"""The pre-integrated light gbar(w, rho): time against error of every way to estimate it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from splitnerf import _core
+from splitnerf.bench.charts import Chart, Point, Result
+from splitnerf.bench.lights import MapLight, lights, pyramid_of
+from splitnerf.bench.timing import interleaved
+from splitnerf.config import preset
+from splitnerf.ops import fibonacci_directions, prefilter_light, sample_ggx_lobe
+
+BANDS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
+QUICK_BANDS = (0.1, 0.3, 0.7)
+PUBLISHED = 8129  # light directions of the paper
+TRUTH_CHUNK = 1 << 22
+QUADRATURE_FROM = 0.1  # roughness
+
+Estimate = Callable[[Tensor, Tensor], Tensor]
+
+
+class Truth:
+    """gbar of a light, from a quadrature over the sphere or, where its nodes would miss the lobe, from many samples of it.
+
+    Args:
+        light: The light.
+        height: Rows of the quadrature, twice as many columns.
+        n: Samples of a lobe.
+    """
+
+    def __init__(self, light: MapLight, height: int, n: int):
+        self.light, self.n = light, n
+        polar = (torch.arange(height, dtype=torch.float64) + 0.5) / height * math.pi
+        self.directions = torch.from_numpy(_core.equirect_directions(height, 2 * height)).reshape(-1, 3).float()
+        self.areas = torch.sin(polar).repeat_interleave(2 * height)[:, None].float()
+        self.lit = self.light(self.directions) * self.areas
+
+    def __call__(self, axes: Tensor, rho: float) -> Tensor:
+        """[s, 3]."""
+        roughness = torch.full((len(axes), 1), rho)
+        if rho >= QUADRATURE_FROM:
+            areas = self.areas.expand(-1, 3).contiguous()
+            lit, whole = (prefilter_light(axes, roughness, self.directions, part) for part in (self.lit, areas))
+            return lit / whole
+        means = []
+        for i, part in enumerate(axes.split(max(1, TRUTH_CHUNK // self.n))):
+            directions = sample_ggx_lobe(part, roughness[: len(part)], self.n, seed=i)
+            means.append(self.light(directions.reshape(-1, 3)).view(len(part), self.n, 3).double().mean(1))
+        return torch.cat(means).float()
+
+
+def uniform(light: MapLight, n: int, with_queries: bool) -> Estimate:
+    """Independent directions, as published; as in its code, the queries are directions too."""
+
+    def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
+        directions = F.normalize(torch.randn(n, 3), dim=1)
+        directions = torch.cat([directions, axes]) if with_queries else directions
+        return prefilter_light(axes, roughness, directions, light(directions))
+
+    return estimate
+
+
+def fibonacci(light: MapLight, n: int) -> Estimate:
+    def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
+        directions = fibonacci_directions(n)
+        return prefilter_light(axes, roughness, directions, light(directions))
+
+    return estimate
+
+
+def own_lobe(light: MapLight, n: int) -> Estimate:
+    def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
+        directions = sample_ggx_lobe(axes, roughness, n, int(torch.randint(1 << 30, ())))
+        return light(directions.reshape(-1, 3)).view(len(axes), n, 3).mean(1)
+
+    return estimate
+
+
+def filtered_importance(light: MapLight, n: int) -> Estimate:
+    """Each sample of the lobe stands for the solid angle 1 / (n pdf) around it (Krivanek and Colbert 2008)."""
+
+    def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
+        directions = sample_ggx_lobe(axes, roughness, n, int(torch.randint(1 << 30, ())))
+        alpha2 = roughness[:, :, None] ** 4
+        sin2 = (directions - axes[:, None]).square().sum(-1, keepdim=True) / 4  # of half the angle to the axis
+        d = alpha2 / (math.pi * (alpha2 + (1 - alpha2) * sin2).square())
+        total = lobe_integral(roughness)[:, :, None]
+        pdf = d * (1 - 2 * sin2).clamp(min=1e-3) / total
+        return light.filtered(directions.reshape(-1, 3), (1 / (n * pdf)).reshape(-1)).view(len(axes), n, 3).mean(1)
+
+    return estimate
+
+
+def lobe_integral(roughness: Tensor) -> Tensor:
+    """Integral of D (w.axis)+ over the sphere, D of the angle's half: 2 a^2 / B^2 (y - ln(1 + y)), y = B / a^2,
+    B = (1 - a^2) / 2; 1 where a = 1."""
+    a2 = roughness.double() ** 4
+    b = (1 - a2) / 2
+    y = b / a2
+    return torch.where(b > 1e-4, 2 * a2 / b.clamp(min=1e-9) ** 2 * (y - torch.log1p(y)), torch.ones_like(a2)).float()
+
+
+def pyramid(light: MapLight, resolution: int) -> Estimate:
+    """The maps computed anew, as after each step of the light, and a lookup for each query."""
+    field = pyramid_of(light, resolution)
+
+    def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
+        field.collect(False)
+        return field(axes, roughness)
+
+    return estimate
+
+
+def estimators(light: MapLight, quick: bool) -> dict[tuple[str, str], Estimate]:
+    """By (method, setting)."""
+    found: dict[tuple[str, str], Estimate] = {
+        ("uniform (paper)", f"n = {PUBLISHED}"): uniform(light, PUBLISHED, False),
+        ("uniform and queries (code)", f"n = {PUBLISHED}"): uniform(light, PUBLISHED, True),
+    }
+    found |= {
+        ("Fibonacci", f"n = {n}"): fibonacci(light, n) for n in ((2048, 8192) if quick else (512, 2048, 8192, 32768))
+    }
+    found |= {("own lobe", f"n = {n}"): own_lobe(light, n) for n in ((16, 64) if quick else (4, 16, 64, 256))}
+    found |= {
+        ("filtered importance", f"n = {n}"): filtered_importance(light, n) for n in ((32,) if quick else (8, 32, 128))
+    }
+    found |= {("pyramid", f"{n} x {n}"): pyramid(light, n) for n in ((128,) if quick else (64, 128, 256))}
+    return found
+
+
+def run(quick: bool, rounds: int) -> Result:
+    """Error against time for batches of queries of one roughness, light by light.
+
+    Args:
+        quick: Few bands, one light and coarser truth.
+        rounds: Of timing.
+    """
+    torch.manual_seed(0)
+    shipped = preset("cpu")
+    n_queries, height, n_truth = (256, 512, 1 << 14) if quick else (512, 1024, 1 << 16)
+    charts, findings = [], []
+    maps = lights()
+    for name in list(maps)[-1:] if quick else maps:
+        light = MapLight(maps[name])
+        truth, methods = Truth(light, height, n_truth), estimators(light, quick)
+        for rho in QUICK_BANDS if quick else BANDS:
+            axes = F.normalize(torch.randn(n_queries, 3), dim=1)
+            roughness = torch.full((n_queries, 1), rho)
+            true = truth(axes, rho)
+            calls = {key: lambda e=e: e(axes, roughness) for key, e in methods.items()}
+            with torch.no_grad():
+                errors = {key: relative_rms([call() for _ in range(3)], true) for key, call in calls.items()}
+                times = interleaved(calls, rounds)
+            points = [
+                Point(*key, 1e3 * times[key].seconds, 100 * errors[key], 1e3 * times[key].low, 1e3 * times[key].high,
+                      key == ("pyramid", f"{shipped.light_resolution} x {shipped.light_resolution}"))
+                for key in calls
+            ]  # fmt: skip
+            chart = Chart(
+                f"{name} light, roughness {rho:g}", f"ms for {n_queries} queries", "relative error, % RMS", points
+            )
+            charts.append(chart)
+            findings.append(finding(chart))
+    return Result("prefilter", "The pre-integrated light: time against error", findings, charts)
+
+
+def relative_rms(estimates: list[Tensor], true: Tensor) -> float:
+    """Root of the mean squared error over that of the truth."""
+    squared = torch.stack([(e - true).square().mean() for e in estimates]).mean()
+    return float((squared / true.square().mean()).sqrt())
+
+
+def finding(chart: Chart) -> str:
+    """The default beside the best of those that take no longer, and the published one."""
+    default = next(p for p in chart.points if p.default)
+    rivals = [p for p in chart.points if p.series != default.series and p.cost <= default.high]
+    best = min(rivals, key=lambda p: p.error, default=None)
+    published = chart.points[0]
+    beside = f"; best of the others in that time: {best.series} {best.variant} {best.error:.2g} %" if best else ""
+    return (
+        f"{chart.title}: {default.series} {default.error:.2g} % in {default.cost:.2g} ms{beside}; "
+        f"as published {published.error:.2g} % in {published.cost:.2g} ms"
+    )

@@ -1,0 +1,143 @@
+"""Split-sum shading and the pre-integration operator beside torch eager and torch.compile, and the memory's bandwidth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from splitnerf.bench import eager
+from splitnerf.bench.charts import Chart, Point, Result
+from splitnerf.bench.timing import Times, interleaved
+from splitnerf.errors import CheckFailed
+from splitnerf.notes import note
+from splitnerf.ops import brdf_lut, fibonacci_directions, prefilter_light, split_sum_shade
+
+TOLERANCE = 1e-3  # of results and gradients, of the largest value
+FLOATS_A_POINT = 23 + 3  # read forward and written
+
+
+def run(quick: bool, rounds: int) -> Result:
+    """Times forward and backward, after holding results and gradients against float64.
+
+    Args:
+        quick: Fewer points, and no torch.compile.
+        rounds: Of timing.
+    """
+    torch.manual_seed(0)
+    charts, findings = [], []
+    n = 1 << (15 if quick else 18)
+    shading = shading_calls(n, compiled=not quick)
+    lit = prefilter_calls(512, 2048 if quick else 8192)
+    for title, (calls, errors) in (
+        (f"split-sum shading, {n} points", shading),
+        (f"gbar with gradient, 512 queries, {2048 if quick else 8192} light directions", lit),
+    ):
+        extra = {"copy": copy_of(n * FLOATS_A_POINT)} if "shading" in title else {}
+        times = interleaved(calls | extra, rounds)
+        charts.append(chart_of(title, times, errors))
+        findings += [
+            f"{title}: {times.ratio(name, 'splitnerf')} as fast as {name}" for name in calls if name != "splitnerf"
+        ]
+        if extra:
+            moved = 3 * n * FLOATS_A_POINT * 4  # forward once; backward reads it again and writes gradients
+            rate, copy_rate = moved / times["splitnerf"].seconds, 2 * n * FLOATS_A_POINT * 4 / times["copy"].seconds
+            findings.append(
+                f"{title}: {rate / 1e9:.1f} GB/s of inputs, results and gradients, {rate / copy_rate:.0%} of what a copy moves"
+            )
+    return Result("shading", "Shading and pre-integration: time against error", findings, charts)
+
+
+def shading_calls(n: int, compiled: bool) -> tuple[dict[str, Callable[[], object]], dict[str, float]]:
+    inputs = shading_inputs(n)
+    lut = brdf_lut()
+
+    def plain(*leaves: Tensor) -> Tensor:
+        return eager.split_sum_shade(*leaves, lut.to(leaves[0].dtype), 0, True)
+
+    def ours(*leaves: Tensor) -> Tensor:
+        return split_sum_shade(*leaves, compensate=True)
+
+    ways = {"splitnerf": ours, "torch eager": plain}
+    if compiled:
+        fast = torch.compile(plain)
+        try:
+            fast(*inputs)
+            ways["torch.compile"] = fast
+        except Exception as error:  # whatever its compiler says
+            note(f"torch.compile does not work here ({str(error).splitlines()[0]}): it is left out")
+    return checked(ways, plain, inputs)
+
+
+def prefilter_calls(n_queries: int, n_lights: int) -> tuple[dict[str, Callable[[], object]], dict[str, float]]:
+    queries = F.normalize(torch.randn(n_queries, 3), dim=1)
+    roughness = 0.2 + 0.8 * torch.rand(n_queries, 1)
+    directions = fibonacci_directions(n_lights)
+    light = (torch.rand(n_lights, 3),)
+
+    def plain(light: Tensor) -> Tensor:
+        return eager.prefilter_light(*(t.to(light.dtype) for t in (queries, roughness, directions)), light)
+
+    def ours(light: Tensor) -> Tensor:
+        return prefilter_light(queries, roughness, directions, light)
+
+    return checked({"splitnerf": ours, "torch eager": plain}, plain, light)
+
+
+def shading_inputs(n: int) -> tuple[Tensor, ...]:
+    normals, views = (F.normalize(torch.randn(n, 3), dim=1) for _ in range(2))
+    return (normals, views, torch.rand(n, 3), torch.rand(n, 1), torch.rand(n, 1), torch.rand(n, 3), torch.rand(n, 3),
+            torch.rand(n, 3), torch.rand(n, 3))  # fmt: skip
+
+
+def checked(
+    ways: dict[str, Callable[..., Tensor]], true: Callable[..., Tensor], inputs: tuple[Tensor, ...]
+) -> tuple[dict[str, Callable[[], object]], dict[str, float]]:
+    """Calls with gradients to all inputs, and their root mean square error against `true` in float64.
+
+    Raises:
+        CheckFailed: One of them is wrong.
+    """
+    cotangent = torch.randn_like(true(*inputs))
+    exact = with_gradients(true, tuple(x.double() for x in inputs), cotangent.double())()
+    calls, errors = {}, {}
+    for name, way in ways.items():
+        calls[name] = with_gradients(way, inputs, cotangent)
+        apart = [(a - b).square().mean().sqrt() / b.square().mean().sqrt() for a, b in zip(calls[name](), exact)]
+        errors[name] = float(max(apart))
+        if not errors[name] < TOLERANCE:
+            raise CheckFailed(f"{name} is {errors[name]:.1e} from float64")
+    return calls, errors
+
+
+def with_gradients(way: Callable[..., Tensor], inputs: tuple[Tensor, ...], cotangent: Tensor) -> Callable[[], tuple]:
+    leaves = tuple(x.clone().requires_grad_() for x in inputs)
+
+    def call() -> tuple[Tensor, ...]:
+        out = way(*leaves)
+        return out.detach(), *torch.autograd.grad(out, leaves, cotangent)
+
+    return call
+
+
+def copy_of(n_floats: int) -> Callable[[], object]:
+    source, target = torch.rand(n_floats), torch.empty(n_floats)
+    return lambda: target.copy_(source)
+
+
+def chart_of(title: str, times: Times, errors: dict[str, float]) -> Chart:
+    points = [
+        Point(
+            name,
+            "",
+            1e3 * times[name].seconds,
+            errors[name],
+            1e3 * times[name].low,
+            1e3 * times[name].high,
+            name == "splitnerf",
+        )
+        for name in errors
+    ]
+    return Chart(title, "ms forward and backward", "largest relative RMS error", points)

@@ -1,0 +1,148 @@
+"""The benchmarks' own arithmetic: fronts, files, lights, and that a wrong subject is refused before it is timed."""
+
+from __future__ import annotations
+
+import csv
+import math
+
+import numpy as np
+import pytest
+import torch
+from torch.nn import functional as F
+
+from splitnerf.bench import eager, shading, split_sum
+from splitnerf.bench.charts import Chart, Point, Result, markdown, write_csv, write_result
+from splitnerf.bench.hash_grid import SPEC
+from splitnerf.bench.lights import MapLight, octahedral_directions, procedural_sky, pyramid_of
+from splitnerf.bench.prefilter import Truth, filtered_importance, lobe_integral
+from splitnerf.bench.timing import interleaved
+from splitnerf.cli import DONE, main
+from splitnerf.errors import CheckFailed
+from splitnerf.ops import hash_encode, prefilter_light
+
+
+def point(name: str, cost: float, error: float, default: bool = False) -> Point:
+    return Point(name, "", cost, error, cost, cost, default)
+
+
+CHART = Chart("work", "ms", "error", [point("a", 1, 3), point("b", 2, 1), point("c", 3, 2), point("d", 4, 0.5, True)])
+
+
+def test_the_front_holds_what_nothing_beats():
+    assert [p.series for p in CHART.front()] == ["a", "b", "d"]
+
+
+def test_files_mark_the_front_and_the_default(tmp_path):
+    result = Result("work", "Work", ["b is twice as fast"], [CHART], [("More", ["x"], [[1]])])
+    text = markdown(result)
+    assert "| **d** * |" in text and "| c |" in text and "- b is twice as fast" in text and "## More" in text
+    write_csv(result, tmp_path / "work.csv")
+    lines = (tmp_path / "work.csv").read_text().splitlines()
+    heads = [line for line in lines if line.startswith("#")]
+    assert any("processor" in line for line in heads) and any("commit" in line for line in heads)
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert [row["on_front"] for row in rows] == ["1", "1", "0", "1"] and rows[3]["default"] == "1"
+
+
+def test_a_result_becomes_a_picture(tmp_path):
+    pytest.importorskip("matplotlib")
+    files = write_result(Result("work", "Work", [], [CHART]), tmp_path)
+    assert [path.name for path in files] == ["work.md", "work.csv", "work.png"]
+    assert (tmp_path / "work.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_calls_are_timed_in_turns_and_compared_round_by_round():
+    order: list[str] = []
+    times = interleaved({"a": lambda: order.append("a"), "b": lambda: order.append("b")}, rounds=3)
+    assert len(times.seconds["a"]) == len(times.seconds["b"]) == 3
+    last_a, last_b = len(order) - 1 - order[::-1].index("a"), len(order) - 1 - order[::-1].index("b")
+    assert last_a < last_b and "b" in order[:last_a]
+    times.seconds = {"a": [2.0, 4.0, 9.0], "b": [1.0, 2.0, 3.0]}
+    assert times.ratio("a", "b").value == 2.0 and times["a"].seconds == 4.0
+
+
+def test_the_plain_hash_grid_is_the_operator():
+    x = torch.rand(200, 3, dtype=torch.float64)
+    table = torch.randn(SPEC.n_entries, SPEC.n_features, dtype=torch.float64)
+    plain = eager.hash_encode(x, table, *SPEC.arguments(SPEC.n_levels))
+    torch.testing.assert_close(plain, hash_encode(x, table, SPEC), rtol=1e-9, atol=1e-12)
+
+
+def test_the_plain_prefilter_is_the_operator():
+    queries, lights = (F.normalize(torch.randn(n, 3, dtype=torch.float64), dim=1) for n in (20, 300))
+    roughness, light = 0.2 + 0.8 * torch.rand(20, 1, dtype=torch.float64), torch.rand(300, 3, dtype=torch.float64)
+    plain = eager.prefilter_light(queries, roughness, lights, light)
+    torch.testing.assert_close(plain, prefilter_light(queries, roughness, lights, light), rtol=1e-8, atol=1e-10)
+
+
+def test_a_wrong_subject_is_refused():
+    inputs = torch.rand(64, 3), torch.rand(64, 3)
+    right, wrong = (lambda a, b: a * b), (lambda a, b: a * b * 1.01)
+    calls, errors = shading.checked({"right": right}, right, inputs)
+    assert errors["right"] < 1e-6 and len(calls["right"]()) == 3
+    with pytest.raises(CheckFailed, match="wrong"):
+        shading.checked({"wrong": wrong}, right, inputs)
+
+
+class TestLights:
+    def test_a_map_is_read_where_it_was_written(self):
+        """Texel (row, column) of an equirectangular map lies in the direction that synthesis gives it."""
+        sky = procedural_sky(64, 0.0)
+        light = MapLight(sky)
+        polar, azimuth = 20.5 / 64 * math.pi, math.pi - 40.5 / 64 * math.pi
+        w = [math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)]
+        np.testing.assert_allclose(light(torch.tensor([w], dtype=torch.float32))[0].numpy(), sky[20, 40], rtol=1e-4)
+
+    def test_a_constant_light_is_itself_in_every_form(self):
+        light = MapLight(np.full((32, 64, 3), 2.0, np.float32))
+        axes = F.normalize(torch.randn(30, 3), dim=1)
+        for rho in (0.05, 0.3, 1.0):
+            roughness = torch.full((30, 1), rho)
+            for estimate in (Truth(light, 64, 64)(axes, rho), filtered_importance(light, 8)(axes, roughness)):
+                torch.testing.assert_close(estimate, torch.full((30, 3), 2.0), rtol=1e-3, atol=0)
+        assert torch.allclose(pyramid_of(light, 16)(axes, roughness), torch.full((30, 3), 2.0), rtol=1e-3)
+
+    def test_octahedral_texels_are_unit_and_their_centre_is_the_pole(self):
+        d = octahedral_directions(9)
+        np.testing.assert_allclose(np.linalg.norm(d, axis=1), 1.0)
+        np.testing.assert_allclose(d[4 * 9 + 4], [0, 0, 1], atol=1e-12)
+
+    def test_the_lobes_integral(self):
+        """By quadrature over the cosine."""
+        c = (torch.arange(200000, dtype=torch.float64) + 0.5) / 200000
+        for rho in (0.2, 0.5, 0.9, 1.0):
+            a2 = rho**4
+            d = a2 / (math.pi * (a2 + (1 - a2) * (1 - c) / 2) ** 2)
+            expected = float((d * c).mean() * 2 * math.pi)
+            assert lobe_integral(torch.tensor([[rho]])).item() == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_command_writes_tables_and_pictures(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("matplotlib")
+    monkeypatch.setenv("SPLITNERF_DATA", str(tmp_path / "none"))
+    assert main(["bench", "--quick", "--only", "shading", "--out", str(tmp_path / "out")]) == DONE
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"shading.md", "shading.csv", "shading.png"}
+    assert "as fast as torch eager" in capsys.readouterr().out
+
+
+class TestSplitSum:
+    def test_a_table_is_met_at_its_nodes_and_linear_between(self):
+        table = np.random.default_rng(0).random((5, 5, 2))
+        nodes = np.linspace(0, 1, 5)
+        np.testing.assert_allclose(split_sum.bilinear(table, nodes, nodes), table, atol=1e-12)
+        middle = split_sum.bilinear(table, nodes[:1], np.array([0.125]))
+        np.testing.assert_allclose(middle[0, 0], (table[0, 0] + table[0, 1]) / 2)
+
+    def test_finer_tables_are_better_and_the_fit_is_rough(self):
+        chart = split_sum.table_chart((8, 32))
+        errors = {(p.series, p.variant): p.error for p in chart.points}
+        fine, coarse = errors["table over sqrt(n.v)", "32 x 32"], errors["table over sqrt(n.v)", "8 x 8"]
+        assert fine < coarse < errors["Karis 2014, fit", "8 numbers"] < 0.2
+        assert [p.variant for p in chart.points if p.default] == ["32 x 32"]
+
+    def test_constant_light_splits_without_error(self):
+        """All lobes see the same light: what is left is the noise of the sums and the table."""
+        torch.manual_seed(0)
+        light = MapLight(np.full((32, 64, 3), 2.0, np.float32))
+        errors = split_sum.split_errors(light, Truth(light, 64, 64), 0.5, 0.5, 1.0, 1.0, 4096)
+        assert max(errors.values()) < 0.02
