@@ -11,6 +11,7 @@ reader sees them.
 
 from __future__ import annotations
 
+import abc
 import contextlib
 import gc
 import io
@@ -71,17 +72,19 @@ def write_scene(folder: Path) -> dict:
     return {"camera_angle_x": 0.7, "frames": frames}
 
 
-class Reader:
+class Reader(abc.ABC):
     """What a reader is fed: `corpus` are its seeds, `read` takes one input that lies in `self.folder`."""
 
     def __init__(self, folder: Path):
         self.folder = folder
 
+    @abc.abstractmethod
     def corpus(self) -> list[bytes]:
-        raise NotImplementedError
+        """Small valid files."""
 
+    @abc.abstractmethod
     def read(self, data: bytes) -> None:
-        raise NotImplementedError
+        """Reads one input."""
 
     def file(self, name: str, data: bytes) -> Path:
         path = self.folder / name

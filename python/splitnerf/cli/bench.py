@@ -9,13 +9,8 @@ from pathlib import Path
 from splitnerf.cli.exit_codes import DONE, FAILED
 from splitnerf.errors import InputError
 
-BENCHMARKS = (
-    "prefilter",
-    "split_sum",
-    "hash_grid",
-    "shading",
-    "occlusion",
-)  # modules of splitnerf.bench, each with run(quick, rounds)
+# Modules of splitnerf.bench, each with run(quick, rounds).
+BENCHMARKS = ("prefilter", "split_sum", "hash_grid", "shading", "occlusion")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
