@@ -13,7 +13,7 @@ from torch.nn import functional as F
 from splitnerf.bench import eager, shading, split_sum
 from splitnerf.bench.charts import Chart, Point, Result, markdown, write_csv, write_result
 from splitnerf.bench.hash_grid import SPEC
-from splitnerf.bench.lights import MapLight, octahedral_directions, procedural_sky, pyramid_of
+from splitnerf.bench.lights import MapLight, octahedral_directions, pyramid_of
 from splitnerf.bench.prefilter import Truth, filtered_importance, lobe_integral
 from splitnerf.bench.timing import interleaved
 from splitnerf.cli import DONE, main
@@ -87,11 +87,11 @@ def test_a_wrong_subject_is_refused():
 class TestLights:
     def test_a_map_is_read_where_it_was_written(self):
         """Texel (row, column) of an equirectangular map lies in the direction that synthesis gives it."""
-        sky = procedural_sky(64, 0.0)
+        sky = np.random.default_rng(0).random((64, 128, 3), np.float32)
         light = MapLight(sky)
         polar, azimuth = 20.5 / 64 * math.pi, math.pi - 40.5 / 64 * math.pi
         w = [math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)]
-        np.testing.assert_allclose(light(torch.tensor([w], dtype=torch.float32))[0].numpy(), sky[20, 40], rtol=1e-4)
+        np.testing.assert_allclose(light(torch.tensor([w], dtype=torch.float32))[0].numpy(), sky[20, 40], rtol=1e-3)
 
     def test_a_constant_light_is_itself_in_every_form(self):
         light = MapLight(np.full((32, 64, 3), 2.0, np.float32))
