@@ -31,8 +31,7 @@ void light_lookup(const LightPyramid<T>& pyramid, int64_t n, const T* directions
 template <class T>
 void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t n, const T* directions, const T* roughness,
                            const T* grad_radiance, T* grad_directions, T* grad_roughness, T* grad_levels, T* grad_sh) {
-  const int last = pyramid.n_levels - 1, side = pyramid.resolution[last];
-  const int64_t n_levels = 3 * (pyramid.offset[last] + int64_t(side) * side), n_sh = 3 * kShCoefficients;
+  const int64_t n_levels = 3 * light_texels(pyramid), n_sh = 3 * kShCoefficients;
   const int64_t n_chunks = std::clamp<int64_t>((n + kChunkPoints - 1) / kChunkPoints, 1, kLightChunks);
   const int64_t stride = n_levels + n_sh;
   std::vector<T> copies((n_chunks - 1) * stride);  // the first chunk writes to the result

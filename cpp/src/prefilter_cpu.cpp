@@ -1,11 +1,12 @@
 #include <vector>
 
+#include "for_each.h"
 #include "planes.h"
+#include "splitnerf/bodies/monte_carlo.h"
 #include "splitnerf/ggx.h"
 #include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/parallel.h"
-#include "splitnerf/sampling.h"
 
 namespace splitnerf::cpu {
 namespace {
@@ -65,19 +66,7 @@ void prefilter_light_backward(int64_t n_queries, const T* query_dirs, const T* r
 
 template <class T>
 void sample_ggx_lobe(int64_t n, const T* axes, const T* roughness, int n_samples, uint32_t seed, T* directions) {
-  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const Frame<T> frame(load3(axes + 3 * i));
-      const auto counter = static_cast<uint32_t>(i);
-      const Vec2<T> shift{random_unit<T>(seed, counter, 0), random_unit<T>(seed, counter, 1)};
-      const T ggx_alpha = ggx_alpha_from_roughness(roughness[i]);
-      for (int k = 0; k < n_samples; ++k) {
-        const Vec2<T> u = fibonacci_lattice<T>(k, n_samples, shift);
-        const Vec3<T> w = frame.to_world(splitnerf::sample_ggx_lobe(u.x, u.y, ggx_alpha));
-        store3(directions + 3 * (i * n_samples + k), w);
-      }
-    }
-  });
+  for_each_alone(n, kGrain, SampleLobeBody<T>{axes, roughness, n_samples, seed, directions});
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                                                     \

@@ -107,9 +107,11 @@ void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, const T* positi
 template <class T>
 void sample_rays(const SdfField<T>& field, const MarchOptions& march, const OccupancyView& grid,
                  const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter,
-                 SampledRay<T>* sampled) {
+                 int64_t* offsets, int64_t* n_evaluated, const SampleAllocator<T>& allocate) {
   const Kernels<T>& k = kernels<T>();
   const PreparedField<T> prepared(field);
+  std::vector<std::vector<T>> kept(n_rays);  // where the samples of each ray start, front to back
+  std::fill(n_evaluated, n_evaluated + n_rays, 0);
   parallel_for(n_rays, kSdfBlock, [&](int64_t begin, int64_t end) {
     std::vector<T> work(sdf_work_size(prepared.network.layer)), positions(3 * kSdfBlock), values(kSdfBlock);
     std::vector<Walk<T>> walks;
@@ -122,13 +124,25 @@ void sample_rays(const SdfField<T>& field, const MarchOptions& march, const Occu
       for (int64_t i = 0; i < n; ++i) store3(positions.data() + 3 * i, walks[i].lattice.middle(walks[i].next));
       k.sdf_values(prepared.network, n, positions.data(), work.data(), values.data());
       for (int64_t i = 0; i < n; ++i) {
-        SampledRay<T>& ray = sampled[walks[i].ray];
-        advance(walks[i], values[i], grid, march, rules, [&](T start) { ray.starts.push_back(start); });
-        ray.n_evaluated = walks[i].n_evaluated;
+        std::vector<T>& starts = kept[walks[i].ray];
+        advance(walks[i], values[i], grid, march, rules, [&](T start) { starts.push_back(start); });
+        n_evaluated[walks[i].ray] = walks[i].n_evaluated;
       }
       walks.erase(std::remove_if(walks.begin(), walks.end(), [](const Walk<T>& w) { return w.next < 0; }), walks.end());
     }
   });
+  offsets[0] = 0;
+  for (int64_t r = 0; r < n_rays; ++r) offsets[r + 1] = offsets[r] + static_cast<int64_t>(kept[r].size());
+  const PackedSamples<T> to = allocate(offsets[n_rays]);
+  for (int64_t r = 0; r < n_rays; ++r) {
+    int64_t i = offsets[r];
+    for (const T start : kept[r]) {
+      to.ray_indices[i] = r;
+      to.t_starts[i] = start;
+      to.t_ends[i] = start + T(march.step);
+      ++i;
+    }
+  }
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                                                       \
@@ -137,7 +151,7 @@ void sample_rays(const SdfField<T>& field, const MarchOptions& march, const Occu
   template void sdf_layer_backward<T>(const SdfWeights<T>&, int64_t, const T*, const T*, const T*, const T*, const T*, \
                                       T*, T*, T*, T*, T*, T*);                                                         \
   template void sample_rays<T>(const SdfField<T>&, const MarchOptions&, const OccupancyView&, const SampleRules<T>&,   \
-                               int64_t, const T*, const T*, const T*, SampledRay<T>*);
+                               int64_t, const T*, const T*, const T*, int64_t*, int64_t*, const SampleAllocator<T>&);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

@@ -1,3 +1,5 @@
+#include "for_each.h"
+#include "splitnerf/bodies/shading.h"
 #include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/parallel.h"
@@ -12,26 +14,16 @@ constexpr int64_t kGrain = 1024;
 template <class T>
 void query_direction(const float* lut, bool mean, int64_t n, const T* normals, const T* view_dirs, const T* roughness,
                      T* directions) {
-  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i)
-      store3(directions + 3 * i,
-             splitnerf::query_direction(lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i]));
-  });
+  for_each(n, kGrain, QueryDirectionBody<T>{lut, mean, normals, view_dirs, roughness, directions});
 }
 
 template <class T>
 void query_direction_backward(const float* lut, bool mean, int64_t n, const T* normals, const T* view_dirs,
                               const T* roughness, const T* grad_directions, T* grad_normals, T* grad_view_dirs,
                               T* grad_roughness) {
-  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const QueryDirectionGrad<T> g = splitnerf::query_direction_backward(
-          lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i], load3(grad_directions + 3 * i));
-      store3(grad_normals + 3 * i, g.normal);
-      store3(grad_view_dirs + 3 * i, g.view);
-      grad_roughness[i] = g.roughness;
-    }
-  });
+  for_each(n, kGrain,
+           QueryDirectionBackwardBody<T>{lut, mean, normals, view_dirs, roughness, grad_directions, grad_normals,
+                                         grad_view_dirs, grad_roughness});
 }
 
 template <class T>

@@ -1,7 +1,6 @@
-#include "splitnerf/srgb.h"
-
+#include "for_each.h"
+#include "splitnerf/bodies/elementwise.h"
 #include "splitnerf/ops_cpu.h"
-#include "splitnerf/parallel.h"
 
 namespace splitnerf::cpu {
 namespace {
@@ -11,21 +10,15 @@ constexpr int64_t kGrain = 4096;
 }  // namespace
 
 template <class T> void linear_to_srgb(int64_t n, const T* linear, T* srgb) {
-  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) srgb[i] = srgb_from_linear(linear[i]).value;
-  });
+  for_each(n, kGrain, LinearToSrgbBody<T>{linear, srgb});
 }
 
 template <class T> void linear_to_srgb_backward(int64_t n, const T* linear, const T* grad_srgb, T* grad_linear) {
-  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) grad_linear[i] = grad_srgb[i] * srgb_from_linear(linear[i]).slope;
-  });
+  for_each(n, kGrain, LinearToSrgbBackwardBody<T>{linear, grad_srgb, grad_linear});
 }
 
 template <class T> void srgb_to_linear(int64_t n, const T* srgb, T* linear) {
-  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) linear[i] = linear_from_srgb(srgb[i]);
-  });
+  for_each(n, kGrain, SrgbToLinearBody<T>{srgb, linear});
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                             \

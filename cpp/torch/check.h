@@ -2,6 +2,7 @@
 //   hash_encode: positions must be [n, 3] float32, got [8, 2] float64
 #pragma once
 
+#include <torch/csrc/stable/device.h>
 #include <torch/csrc/stable/library.h>
 #include <torch/csrc/stable/ops.h>
 #include <torch/csrc/stable/tensor.h>
@@ -13,7 +14,9 @@
 
 namespace splitnerf::glue {
 
+using torch::headeronly::DeviceType;
 using torch::headeronly::ScalarType;
+using torch::stable::Device;
 using torch::stable::Tensor;
 
 inline std::string describe(ScalarType type) {
@@ -37,10 +40,29 @@ inline std::string describe(ScalarType type) {
 
 inline constexpr int64_t kAny = -1;  // a dimension that may have any size
 
-// The tensor as a contiguous one of the given shape and dtype, or std::invalid_argument.
+// What an operator computes in: a dtype on one device, those of its first tensor.
+struct Kind {
+  ScalarType type;
+  Device device{DeviceType::CPU};
+
+  Kind(ScalarType type) : type(type) {}  // on the CPU
+  Kind(ScalarType type, Device device) : type(type), device(device) {}
+  operator ScalarType() const { return type; }
+  Kind with(ScalarType other) const { return {other, device}; }
+  bool on_cpu() const { return device.type() == DeviceType::CPU; }
+};
+
+inline std::string describe(const Device& device) {
+  if (device.type() == DeviceType::CPU) return "the CPU";
+  return (device.type() == DeviceType::CUDA ? "CUDA device " : "device ") + std::to_string(device.index());
+}
+
+// The tensor as a contiguous one of the given shape, dtype and device, or std::invalid_argument.
 inline Tensor checked(const char* op, const char* name, const Tensor& t, std::initializer_list<int64_t> shape,
-                      ScalarType type) {
-  bool fits = t.scalar_type() == type && t.dim() == static_cast<int64_t>(shape.size()) && t.is_cpu();
+                      Kind kind) {
+  const Device device = t.device();
+  const bool here = device.type() == kind.device.type() && (kind.on_cpu() || device.index() == kind.device.index());
+  bool fits = t.scalar_type() == kind.type && t.dim() == static_cast<int64_t>(shape.size()) && here;
   int64_t axis = 0;
   for (int64_t size : shape) {
     if (!fits) break;
@@ -51,19 +73,22 @@ inline Tensor checked(const char* op, const char* name, const Tensor& t, std::in
     std::string wanted, got;
     for (int64_t size : shape) wanted += (wanted.empty() ? "" : ", ") + (size == kAny ? "n" : std::to_string(size));
     for (int64_t i = 0; i < t.dim(); ++i) got += (got.empty() ? "" : ", ") + std::to_string(t.size(i));
-    throw std::invalid_argument(std::string(op) + ": " + name + " must be [" + wanted + "] " + describe(type) +
-                                " on the CPU, got [" + got + "] " + describe(t.scalar_type()) +
-                                (t.is_cpu() ? "" : " on another device"));
+    throw std::invalid_argument(std::string(op) + ": " + name + " must be [" + wanted + "] " + describe(kind.type) +
+                                " on " + describe(kind.device) + ", got [" + got + "] " + describe(t.scalar_type()) +
+                                (here ? "" : " on " + describe(device)));
   }
-  return torch::stable::contiguous(t);
+  const Tensor dense = torch::stable::contiguous(t);
+  // The kernels read several values at once, where a view may begin between two such groups.
+  const bool aligned = kind.on_cpu() || reinterpret_cast<uintptr_t>(dense.const_data_ptr()) % 16 == 0;
+  return aligned ? dense : torch::stable::clone(dense);
 }
 
-// The floating dtype that an operator computes in: that of its first tensor.
-inline ScalarType real_type(const char* op, const char* name, const Tensor& t) {
+// The floating dtype and the device that an operator computes in: those of its first tensor.
+inline Kind real_kind(const char* op, const char* name, const Tensor& t) {
   const ScalarType type = t.scalar_type();
   if (type != ScalarType::Float && type != ScalarType::Double)
     throw std::invalid_argument(std::string(op) + ": " + name + " must be float32 or float64, got " + describe(type));
-  return type;
+  return {type, t.device()};
 }
 
 inline void require(bool condition, const char* op, const std::string& what) {

@@ -2,7 +2,7 @@
 #include <tuple>
 
 #include "check_hash.h"
-#include "splitnerf/ops_cpu.h"
+#include "device.h"
 
 namespace splitnerf::glue {
 namespace {
@@ -13,17 +13,17 @@ struct Encoding {
 
 Encoding encode(const char* op, bool with_jacobian, const Tensor& positions, const Tensor& table, int64_t n_levels,
                 int64_t base_resolution, double growth, int64_t log2_table_size, int64_t n_active) {
-  const ScalarType type = real_type(op, "table", table);
+  const Kind type = real_kind(op, "table", table);
   require(table.dim() == 2, op, "table must be [n_entries, n_features]");
   const auto shape = checked_shape(op, n_levels, base_resolution, growth, log2_table_size, table.size(1), n_active);
   const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
   const Tensor t = checked(op, "table", table, {n_entries(shape), shape.n_features}, type);
   const int64_t n = x.size(0), columns = n_levels * shape.n_features;
   Encoding e{empty_like_type(x, {n, columns}, type), empty_like_type(x, {with_jacobian ? n : 0, 3, columns}, type)};
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::hash_encode(shape, static_cast<int>(n_active), n, in<T>(x), in<T>(t), out<T>(e.features),
-                     with_jacobian ? out<T>(e.jacobian) : nullptr);
+    device.hash_encode(shape, static_cast<int>(n_active), n, in<T>(x), in<T>(t), out<T>(e.features),
+                       with_jacobian ? out<T>(e.jacobian) : nullptr);
   });
   return e;
 }
@@ -44,7 +44,7 @@ std::tuple<Tensor, Tensor> hash_encode_jacobian(Tensor positions, Tensor table, 
 
 Tensor scatter(const char* op, const Tensor& positions, const Tensor& grad_features, const Tensor* grad_jacobian,
                int64_t n_levels, int64_t base_resolution, double growth, int64_t log2_table_size, int64_t n_active) {
-  const ScalarType type = real_type(op, "positions", positions);
+  const Kind type = real_kind(op, "positions", positions);
   require(grad_features.dim() == 2 && n_levels > 0 && grad_features.size(1) % n_levels == 0, op,
           "grad_features must be [n, n_levels * n_features]");
   const int64_t columns = grad_features.size(1);
@@ -54,10 +54,10 @@ Tensor scatter(const char* op, const Tensor& positions, const Tensor& grad_featu
   const Tensor g = checked(op, "grad_features", grad_features, {x.size(0), columns}, type);
   const Tensor gj = grad_jacobian ? checked(op, "grad_jacobian", *grad_jacobian, {x.size(0), 3, columns}, type) : g;
   Tensor grad_table = empty_like_type(x, {n_entries(shape), shape.n_features}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::hash_encode_backward(shape, static_cast<int>(n_active), x.size(0), in<T>(x), in<T>(g),
-                              grad_jacobian ? in<T>(gj) : nullptr, out<T>(grad_table));
+    device.hash_encode_backward(shape, static_cast<int>(n_active), x.size(0), in<T>(x), in<T>(g),
+                                grad_jacobian ? in<T>(gj) : nullptr, out<T>(grad_table));
   });
   return grad_table;
 }
@@ -79,7 +79,7 @@ Tensor hash_encode_jacobian_backward_positions(Tensor positions, Tensor table, T
                                                Tensor grad_jacobian, int64_t n_levels, int64_t base_resolution,
                                                double growth, int64_t log2_table_size, int64_t n_active) {
   const char* op = "hash_encode_jacobian_backward_positions";
-  const ScalarType type = real_type(op, "table", table);
+  const Kind type = real_kind(op, "table", table);
   require(table.dim() == 2, op, "table must be [n_entries, n_features]");
   const auto shape = checked_shape(op, n_levels, base_resolution, growth, log2_table_size, table.size(1), n_active);
   const int64_t columns = n_levels * shape.n_features;
@@ -88,10 +88,10 @@ Tensor hash_encode_jacobian_backward_positions(Tensor positions, Tensor table, T
   const Tensor g = checked(op, "grad_features", grad_features, {x.size(0), columns}, type);
   const Tensor gj = checked(op, "grad_jacobian", grad_jacobian, {x.size(0), 3, columns}, type);
   Tensor grad_positions = empty_like_type(x, {x.size(0), 3}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::hash_encode_backward_positions(shape, static_cast<int>(n_active), x.size(0), in<T>(x), in<T>(t), in<T>(g),
-                                        in<T>(gj), out<T>(grad_positions));
+    device.hash_encode_backward_positions(shape, static_cast<int>(n_active), x.size(0), in<T>(x), in<T>(t), in<T>(g),
+                                          in<T>(gj), out<T>(grad_positions));
   });
   return grad_positions;
 }
@@ -110,7 +110,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "Tensor grad_jacobian, " SPLITNERF_GRID ") -> Tensor");
 }
 
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+SPLITNERF_IMPLEMENT(m) {
   m.impl("hash_encode", TORCH_BOX(&hash_encode));
   m.impl("hash_encode_backward", TORCH_BOX(&hash_encode_backward));
   m.impl("hash_encode_jacobian", TORCH_BOX(&hash_encode_jacobian));

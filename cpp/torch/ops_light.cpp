@@ -1,24 +1,23 @@
 // prefilter_light, sample_ggx_lobe, trace_visibility and occlusion_factors as torch operators.
 #include <tuple>
 
-#include "check.h"
-#include "splitnerf/ops_cpu.h"
+#include "device.h"
 
 namespace splitnerf::glue {
 namespace {
 
 std::tuple<Tensor, Tensor> prefilter_light(Tensor query_dirs, Tensor roughness, Tensor light_dirs, Tensor light) {
   const char* op = "prefilter_light";
-  const ScalarType type = real_type(op, "light", light);
+  const Kind type = real_kind(op, "light", light);
   const Tensor q = checked(op, "query_dirs", query_dirs, {kAny, 3}, type);
   const Tensor rho = checked(op, "roughness", roughness, {q.size(0), 1}, type);
   const Tensor d = checked(op, "light_dirs", light_dirs, {kAny, 3}, type);
   const Tensor l = checked(op, "light", light, {d.size(0), 3}, type);
   require(d.size(0) > 0 || q.size(0) == 0, op, "light_dirs must hold at least one direction");
   Tensor gbar = empty_like_type(q, {q.size(0), 3}, type), total = empty_like_type(q, {q.size(0)}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::prefilter_light(q.size(0), in<T>(q), in<T>(rho), d.size(0), in<T>(d), in<T>(l), out<T>(gbar), out<T>(total));
+    device.prefilter_light(q.size(0), in<T>(q), in<T>(rho), d.size(0), in<T>(d), in<T>(l), out<T>(gbar), out<T>(total));
   });
   return {gbar, total};
 }
@@ -26,17 +25,17 @@ std::tuple<Tensor, Tensor> prefilter_light(Tensor query_dirs, Tensor roughness, 
 Tensor prefilter_light_backward(Tensor query_dirs, Tensor roughness, Tensor total, Tensor grad_gbar,
                                 Tensor light_dirs) {
   const char* op = "prefilter_light_backward";
-  const ScalarType type = real_type(op, "grad_gbar", grad_gbar);
+  const Kind type = real_kind(op, "grad_gbar", grad_gbar);
   const Tensor q = checked(op, "query_dirs", query_dirs, {kAny, 3}, type);
   const Tensor rho = checked(op, "roughness", roughness, {q.size(0), 1}, type);
   const Tensor w = checked(op, "total", total, {q.size(0)}, type);
   const Tensor g = checked(op, "grad_gbar", grad_gbar, {q.size(0), 3}, type);
   const Tensor d = checked(op, "light_dirs", light_dirs, {kAny, 3}, type);
   Tensor grad_light = empty_like_type(q, {d.size(0), 3}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::prefilter_light_backward(q.size(0), in<T>(q), in<T>(rho), in<T>(w), in<T>(g), d.size(0), in<T>(d),
-                                  out<T>(grad_light));
+    device.prefilter_light_backward(q.size(0), in<T>(q), in<T>(rho), in<T>(w), in<T>(g), d.size(0), in<T>(d),
+                                    out<T>(grad_light));
   });
   return grad_light;
 }
@@ -55,7 +54,7 @@ std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Te
                                              Tensor roughness, Tensor environment, int64_t n_diffuse_rays,
                                              int64_t n_specular_rays, double offset, bool along_ray, int64_t seed) {
   const char* op = "occlusion_factors";
-  const ScalarType type = real_type(op, "positions", positions);
+  const Kind type = real_kind(op, "positions", positions);
   const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
   const Tensor n = checked(op, "normals", normals, {x.size(0), 3}, type);
   const Tensor d = checked(op, "lobe_dirs", lobe_dirs, {x.size(0), 3}, type);
@@ -79,15 +78,15 @@ std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Te
 
 Tensor sample_ggx_lobe(Tensor axes, Tensor roughness, int64_t n_samples, int64_t seed) {
   const char* op = "sample_ggx_lobe";
-  const ScalarType type = real_type(op, "axes", axes);
+  const Kind type = real_kind(op, "axes", axes);
   const Tensor a = checked(op, "axes", axes, {kAny, 3}, type);
   const Tensor rho = checked(op, "roughness", roughness, {a.size(0), 1}, type);
   require(n_samples > 0 && n_samples <= 1 << 20, op, "n_samples must be in [1, 2^20]");
   Tensor directions = empty_like_type(a, {a.size(0), n_samples, 3}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::sample_ggx_lobe(a.size(0), in<T>(a), in<T>(rho), static_cast<int>(n_samples), static_cast<uint32_t>(seed),
-                         out<T>(directions));
+    device.sample_ggx_lobe(a.size(0), in<T>(a), in<T>(rho), static_cast<int>(n_samples), static_cast<uint32_t>(seed),
+                           out<T>(directions));
   });
   return directions;
 }
@@ -107,10 +106,14 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "(Tensor, Tensor)");
 }
 
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+SPLITNERF_IMPLEMENT(m) {
   m.impl("prefilter_light", TORCH_BOX(&prefilter_light));
   m.impl("prefilter_light_backward", TORCH_BOX(&prefilter_light_backward));
   m.impl("sample_ggx_lobe", TORCH_BOX(&sample_ggx_lobe));
+}
+
+// Rays are traced on the CPU.
+STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
   m.impl("trace_visibility", TORCH_BOX(&trace_visibility));
   m.impl("occlusion_factors", TORCH_BOX(&occlusion_factors));
 }

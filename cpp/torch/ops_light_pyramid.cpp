@@ -1,8 +1,7 @@
 // sparse_product and light_lookup as torch operators.
 #include <tuple>
 
-#include "check.h"
-#include "splitnerf/ops_cpu.h"
+#include "device.h"
 
 namespace splitnerf::glue {
 namespace {
@@ -10,29 +9,30 @@ namespace {
 Tensor sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor transposed_offsets,
                       Tensor transposed_columns, Tensor transposed_weights, Tensor values) {
   const char* op = "sparse_product";
-  const ScalarType type = real_type(op, "values", values);
-  const Tensor o = checked(op, "offsets", offsets, {kAny}, ScalarType::Long);
-  const Tensor c = checked(op, "columns", columns, {kAny}, ScalarType::Int);
+  const Kind type = real_kind(op, "values", values);
+  const Tensor o = checked(op, "offsets", offsets, {kAny}, type.with(ScalarType::Long));
+  const Tensor c = checked(op, "columns", columns, {kAny}, type.with(ScalarType::Int));
   const Tensor w = checked(op, "weights", weights, {c.size(0)}, type);
   const Tensor x = checked(op, "values", values, {kAny, 3}, type);
-  checked(op, "transposed_offsets", transposed_offsets, {x.size(0) + 1}, ScalarType::Long);
-  checked(op, "transposed_columns", transposed_columns, {c.size(0)}, ScalarType::Int);
+  checked(op, "transposed_offsets", transposed_offsets, {x.size(0) + 1}, type.with(ScalarType::Long));
+  checked(op, "transposed_columns", transposed_columns, {c.size(0)}, type.with(ScalarType::Int));
   checked(op, "transposed_weights", transposed_weights, {c.size(0)}, type);
   require(o.size(0) > 0, op, "offsets must hold at least one number");
   Tensor products = empty_like_type(x, {o.size(0) - 1, 3}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     const SparseRows<T> matrix{in<int64_t>(o), in<int32_t>(c), in<T>(w)};
-    cpu::sparse_product(matrix, o.size(0) - 1, x.size(0), in<T>(x), out<T>(products));
+    device.sparse_product(matrix, o.size(0) - 1, x.size(0), in<T>(x), out<T>(products));
   });
   return products;
 }
 
-// The arguments that describe the pyramid, checked and contiguous.
+// The arguments that describe the pyramid, checked and contiguous. resolutions and nodes are on the CPU, whatever the device of
+// the others: with them the kernels are called.
 struct Parts {
   Tensor levels, sh, resolutions, nodes, zonal;
 
-  Parts(const char* op, ScalarType type, const Tensor& levels_in, const Tensor& sh_in, const Tensor& resolutions_in,
+  Parts(const char* op, Kind type, const Tensor& levels_in, const Tensor& sh_in, const Tensor& resolutions_in,
         const Tensor& nodes_in, const Tensor& zonal_in)
       : levels(checked(op, "levels", levels_in, {kAny, 3}, type)),
         sh(checked(op, "sh", sh_in, {kShCoefficients, 3}, type)),
@@ -73,14 +73,14 @@ struct Parts {
 Tensor light_lookup(Tensor directions, Tensor roughness, Tensor levels, Tensor sh, Tensor resolutions, Tensor nodes,
                     Tensor zonal) {
   const char* op = "light_lookup";
-  const ScalarType type = real_type(op, "levels", levels);
+  const Kind type = real_kind(op, "levels", levels);
   const Tensor d = checked(op, "directions", directions, {kAny, 3}, type);
   const Tensor rho = checked(op, "roughness", roughness, {d.size(0), 1}, type);
   const Parts parts(op, type, levels, sh, resolutions, nodes, zonal);
   Tensor radiance = empty_like_type(d, {d.size(0), 3}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::light_lookup(parts.view<T>(), d.size(0), in<T>(d), in<T>(rho), out<T>(radiance));
+    device.light_lookup(parts.view<T>(), d.size(0), in<T>(d), in<T>(rho), out<T>(radiance));
   });
   return radiance;
 }
@@ -89,7 +89,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> light_lookup_backward(Tensor directio
                                                                  Tensor sh, Tensor resolutions, Tensor nodes,
                                                                  Tensor zonal, Tensor grad_radiance) {
   const char* op = "light_lookup_backward";
-  const ScalarType type = real_type(op, "levels", levels);
+  const Kind type = real_kind(op, "levels", levels);
   const Tensor d = checked(op, "directions", directions, {kAny, 3}, type);
   const Tensor rho = checked(op, "roughness", roughness, {d.size(0), 1}, type);
   const Tensor g = checked(op, "grad_radiance", grad_radiance, {d.size(0), 3}, type);
@@ -97,10 +97,10 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> light_lookup_backward(Tensor directio
   Tensor grad_d = empty_like_type(d, {d.size(0), 3}, type), grad_rho = empty_like_type(d, {d.size(0), 1}, type);
   Tensor grad_levels = empty_like_type(d, {parts.levels.size(0), 3}, type);
   Tensor grad_sh = empty_like_type(d, {kShCoefficients, 3}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::light_lookup_backward(parts.view<T>(), d.size(0), in<T>(d), in<T>(rho), in<T>(g), out<T>(grad_d),
-                               out<T>(grad_rho), out<T>(grad_levels), out<T>(grad_sh));
+    device.light_lookup_backward(parts.view<T>(), d.size(0), in<T>(d), in<T>(rho), in<T>(g), out<T>(grad_d),
+                                 out<T>(grad_rho), out<T>(grad_levels), out<T>(grad_sh));
   });
   return {grad_d, grad_rho, grad_levels, grad_sh};
 }
@@ -119,7 +119,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "Tensor nodes, Tensor zonal, Tensor grad_radiance) -> (Tensor, Tensor, Tensor, Tensor)");
 }
 
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+SPLITNERF_IMPLEMENT(m) {
   m.impl("sparse_product", TORCH_BOX(&sparse_product));
   m.impl("light_lookup", TORCH_BOX(&light_lookup));
   m.impl("light_lookup_backward", TORCH_BOX(&light_lookup_backward));

@@ -2,8 +2,7 @@
 // their gradients, found in the same pass.
 #include <tuple>
 
-#include "check.h"
-#include "splitnerf/ops_cpu.h"
+#include "device.h"
 
 namespace splitnerf::glue {
 namespace {
@@ -11,64 +10,65 @@ namespace {
 std::tuple<Tensor, Tensor, Tensor, Tensor> pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background,
                                                         bool linear) {
   const char* op = "pixel_losses";
-  const ScalarType type = real_type(op, "mean", mean);
+  const Kind type = real_kind(op, "mean", mean);
   const Tensor m = checked(op, "mean", mean, {kAny, 3}, type);
   const int64_t n = m.size(0);
   const Tensor o = checked(op, "opacity", opacity, {n}, type), t = checked(op, "target", target, {n, 4}, type);
   const Tensor b = checked(op, "background", background, {n, 3}, type);
   Tensor losses = empty_like_type(m, {2}, type), colour_by_mean = torch::stable::empty_like(m);
   Tensor colour_by_opacity = empty_like_type(m, {n}, type), mask_by_opacity = empty_like_type(m, {n}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::pixel_losses(n, in<T>(m), in<T>(o), in<T>(t), in<T>(b), linear, out<T>(losses), out<T>(colour_by_mean),
-                      out<T>(colour_by_opacity), out<T>(mask_by_opacity));
+    device.pixel_losses(n, in<T>(m), in<T>(o), in<T>(t), in<T>(b), linear, out<T>(losses), out<T>(colour_by_mean),
+                        out<T>(colour_by_opacity), out<T>(mask_by_opacity));
   });
   return {losses, colour_by_mean, colour_by_opacity, mask_by_opacity};
 }
 
 std::tuple<Tensor, Tensor, Tensor> gradient_losses(Tensor gradients, Tensor weights, Tensor beside) {
   const char* op = "gradient_losses";
-  const ScalarType type = real_type(op, "gradients", gradients);
+  const Kind type = real_kind(op, "gradients", gradients);
   const Tensor g = checked(op, "gradients", gradients, {kAny, 3}, type),
                w = checked(op, "weights", weights, {kAny}, type);
-  const Tensor b = checked(op, "beside", beside, {kAny}, ScalarType::Long);
+  const Tensor b = checked(op, "beside", beside, {kAny}, type.with(ScalarType::Long));
   const int64_t n = g.size(0), m = b.size(0), n_weights = w.size(0);
   require(n_weights + m <= n, op, "gradients must hold the samples and their neighbours");
-  for (int64_t j = 0; j < m; ++j)
+  require(m == 0 || n_weights > 0, op, "beside must hold indices of weights");
+  for (int64_t j = 0; type.on_cpu() && j < m; ++j)
     require(in<int64_t>(b)[j] >= 0 && in<int64_t>(b)[j] < n_weights, op, "beside must hold indices of weights");
   Tensor losses = empty_like_type(g, {2}, type), eikonal_by = torch::stable::empty_like(g),
          smoothness_by = torch::stable::empty_like(g);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::gradient_losses(n, m, in<T>(g), in<T>(w), in<int64_t>(b), out<T>(losses), out<T>(eikonal_by),
-                         out<T>(smoothness_by));
+    device.gradient_losses(n, n_weights, m, in<T>(g), in<T>(w), in<int64_t>(b), out<T>(losses), out<T>(eikonal_by),
+                           out<T>(smoothness_by));
   });
   return {losses, eikonal_by, smoothness_by};
 }
 
 std::tuple<Tensor, Tensor> material_losses(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1) {
   const char* op = "material_losses";
-  const ScalarType type = real_type(op, "metallic", metallic);
+  const Kind type = real_kind(op, "metallic", metallic);
   const Tensor m = checked(op, "metallic", metallic, {kAny, 1}, type);
   const Tensor a = checked(op, "albedo", albedo, {m.size(0), 3}, type),
                s = checked(op, "shares", shares, {m.size(0)}, type);
   Tensor losses = empty_like_type(m, {3}, type), by_metallic = empty_like_type(m, {3, m.size(0)}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::material_losses(m.size(0), in<T>(a), in<T>(m), in<T>(s), smooth_l1, out<T>(losses), out<T>(by_metallic));
+    device.material_losses(m.size(0), in<T>(a), in<T>(m), in<T>(s), smooth_l1, out<T>(losses), out<T>(by_metallic));
   });
   return {losses, by_metallic};
 }
 
 std::tuple<Tensor, Tensor> quadratic_entropy(Tensor x) {
   const char* op = "quadratic_entropy";
-  const ScalarType type = real_type(op, "x", x);
+  const Kind type = real_kind(op, "x", x);
   const Tensor points = checked(op, "x", x, {kAny, kAny}, type);
   require(points.size(0) > 0, op, "x must hold at least one point");
   Tensor entropy = empty_like_type(points, {}, type), gradient = torch::stable::empty_like(points);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::quadratic_entropy(points.size(0), points.size(1), in<T>(points), out<T>(entropy), out<T>(gradient));
+    device.quadratic_entropy(points.size(0), points.size(1), in<T>(points), out<T>(entropy), out<T>(gradient));
   });
   return {entropy, gradient};
 }
@@ -84,7 +84,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("quadratic_entropy(Tensor x) -> (Tensor, Tensor)");
 }
 
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+SPLITNERF_IMPLEMENT(m) {
   m.impl("pixel_losses", TORCH_BOX(&pixel_losses));
   m.impl("gradient_losses", TORCH_BOX(&gradient_losses));
   m.impl("material_losses", TORCH_BOX(&material_losses));

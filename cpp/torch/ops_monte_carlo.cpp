@@ -1,8 +1,7 @@
 // sample_bsdf, monte_carlo_light, summed_light and shade_sums as torch operators.
 #include <tuple>
 
-#include "check.h"
-#include "splitnerf/ops_cpu.h"
+#include "device.h"
 
 namespace splitnerf::glue {
 namespace {
@@ -10,29 +9,29 @@ namespace {
 std::tuple<Tensor, Tensor> sample_bsdf(Tensor normals, Tensor view_dirs, Tensor roughness, int64_t n_samples,
                                        int64_t seed) {
   const char* op = "sample_bsdf";
-  const ScalarType type = real_type(op, "normals", normals);
+  const Kind type = real_kind(op, "normals", normals);
   const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
   const Tensor v = checked(op, "view_dirs", view_dirs, {n.size(0), 3}, type);
   const Tensor rho = checked(op, "roughness", roughness, {n.size(0), 1}, type);
   require(n_samples > 0 && n_samples <= 1 << 20, op, "n_samples must be in [1, 2^20]");
   Tensor directions = empty_like_type(n, {n.size(0), n_samples, 3}, type);
   Tensor pdf = empty_like_type(n, {n.size(0), n_samples}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::sample_bsdf(n.size(0), in<T>(n), in<T>(v), in<T>(rho), static_cast<int>(n_samples),
-                     static_cast<uint32_t>(seed), out<T>(directions), out<T>(pdf));
+    device.sample_bsdf(n.size(0), in<T>(n), in<T>(v), in<T>(rho), static_cast<int>(n_samples),
+                       static_cast<uint32_t>(seed), out<T>(directions), out<T>(pdf));
   });
   return {directions, pdf};
 }
 
 // What both directions of monte_carlo_light read.
 struct Inputs {
-  ScalarType type;
+  Kind type;
   Tensor normals, view_dirs, roughness, light_dirs, pdf, radiance;
 
   Inputs(const char* op, const Tensor& n, const Tensor& v, const Tensor& rho, const Tensor& l, const Tensor& p,
          const Tensor& r)
-      : type(real_type(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
+      : type(real_kind(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
         view_dirs(checked(op, "view_dirs", v, {normals.size(0), 3}, type)),
         roughness(checked(op, "roughness", rho, {normals.size(0), 1}, type)),
         light_dirs(checked(op, "light_dirs", l, {normals.size(0), kAny, 3}, type)),
@@ -48,10 +47,10 @@ Tensor monte_carlo_light(Tensor normals, Tensor view_dirs, Tensor roughness, Ten
                          Tensor radiance) {
   const Inputs i("monte_carlo_light", normals, view_dirs, roughness, light_dirs, pdf, radiance);
   Tensor sums = empty_like_type(i.normals, {i.n_points(), 3, 3}, i.type);
-  dispatch_real(i.type, [&](auto zero) {
+  on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::monte_carlo_light(i.n_points(), i.n_samples(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness),
-                           in<T>(i.light_dirs), in<T>(i.pdf), in<T>(i.radiance), out<T>(sums));
+    device.monte_carlo_light(i.n_points(), i.n_samples(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness),
+                             in<T>(i.light_dirs), in<T>(i.pdf), in<T>(i.radiance), out<T>(sums));
   });
   return sums;
 }
@@ -65,24 +64,23 @@ std::tuple<Tensor, Tensor, Tensor> monte_carlo_light_backward(Tensor normals, Te
   Tensor grad_normals = empty_like_type(g, {i.n_points(), 3}, i.type);
   Tensor grad_roughness = empty_like_type(g, {i.n_points(), 1}, i.type);
   Tensor grad_radiance = empty_like_type(g, {i.n_points(), i.n_samples(), 3}, i.type);
-  dispatch_real(i.type, [&](auto zero) {
+  on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::monte_carlo_light_backward(i.n_points(), i.n_samples(), in<T>(i.normals), in<T>(i.view_dirs),
-                                    in<T>(i.roughness), in<T>(i.light_dirs), in<T>(i.pdf), in<T>(i.radiance), in<T>(g),
-                                    out<T>(grad_normals), out<T>(grad_roughness), out<T>(grad_radiance));
+    device.monte_carlo_light_backward(i.n_points(), i.n_samples(), in<T>(i.normals), in<T>(i.view_dirs),
+                                      in<T>(i.roughness), in<T>(i.light_dirs), in<T>(i.pdf), in<T>(i.radiance),
+                                      in<T>(g), out<T>(grad_normals), out<T>(grad_roughness), out<T>(grad_radiance));
   });
   return {grad_normals, grad_roughness, grad_radiance};
 }
 
-// What both directions of shade_sums read: the fields of SummedPoint and the table.
 // What both directions of summed_light read.
 struct SharedInputs {
-  ScalarType type;
+  Kind type;
   Tensor normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent;
 
   SharedInputs(const char* op, const Tensor& n, const Tensor& v, const Tensor& rho, const Tensor& d, const Tensor& a,
                const Tensor& r, const Tensor& open, const Tensor& s)
-      : type(real_type(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
+      : type(real_kind(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
         view_dirs(checked(op, "view_dirs", v, {n_points(), 3}, type)),
         roughness(checked(op, "roughness", rho, {n_points(), 1}, type)),
         directions(checked(op, "directions", d, {kAny, 3}, type)),
@@ -93,7 +91,7 @@ struct SharedInputs {
     require(sent.size(0) == 0 || sent.size(0) == n_points(), op, "sent must hold as many points as normals, or none");
   }
   int64_t n_points() const { return normals.size(0); }
-  template <class T> cpu::SharedLight<T> light() const {
+  template <class T> SharedLight<T> light() const {
     return {
         static_cast<int>(directions.size(0)), in<T>(directions), in<T>(solid_angles), in<T>(radiance), in<T>(visible),
         sent.size(0) ? in<T>(sent) : nullptr};
@@ -105,10 +103,10 @@ Tensor summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor d
   const SharedInputs i("summed_light", normals, view_dirs, roughness, directions, solid_angles, radiance, visible,
                        sent);
   Tensor sums = empty_like_type(i.normals, {i.n_points(), 3, 3}, i.type);
-  dispatch_real(i.type, [&](auto zero) {
+  on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::summed_light(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(),
-                      out<T>(sums));
+    device.summed_light(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(),
+                        out<T>(sums));
   });
   return sums;
 }
@@ -121,21 +119,22 @@ std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor 
   const Tensor g = checked(op, "grad_sums", grad_sums, {i.n_points(), 3, 3}, i.type);
   const auto like = [&](const Tensor& t) { return torch::stable::empty_like(t); };
   Tensor grad_normals = like(i.normals), grad_roughness = like(i.roughness), grad_light = like(i.radiance);
-  dispatch_real(i.type, [&](auto zero) {
+  on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::summed_light_backward(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(),
-                               in<T>(g), out<T>(grad_normals), out<T>(grad_roughness), out<T>(grad_light));
+    device.summed_light_backward(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(),
+                                 in<T>(g), out<T>(grad_normals), out<T>(grad_roughness), out<T>(grad_light));
   });
   return {grad_normals, grad_roughness, grad_light};
 }
 
+// What both directions of shade_sums read: the fields of SummedPoint and the table.
 struct SummedInputs {
-  ScalarType type;
+  Kind type;
   Tensor normals, view_dirs, albedo, roughness, metallic, all, grazing, diffuse, lut;
 
   SummedInputs(const char* op, const Tensor& n, const Tensor& v, const Tensor& a, const Tensor& rho, const Tensor& m,
                const Tensor& specular, const Tensor& g, const Tensor& d, const Tensor& table)
-      : type(real_type(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
+      : type(real_kind(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
         view_dirs(checked(op, "view_dirs", v, {n_points(), 3}, type)),
         albedo(checked(op, "albedo", a, {n_points(), 3}, type)),
         roughness(checked(op, "roughness", rho, {n_points(), 1}, type)),
@@ -143,9 +142,9 @@ struct SummedInputs {
         all(checked(op, "specular", specular, {n_points(), 3}, type)),
         grazing(checked(op, "grazing", g, {n_points(), 3}, type)),
         diffuse(checked(op, "diffuse", d, {n_points(), 3}, type)),
-        lut(checked(op, "lut", table, {kLutSize, kLutSize, 3}, ScalarType::Float)) {}
+        lut(checked(op, "lut", table, {kLutSize, kLutSize, 3}, type.with(ScalarType::Float))) {}
   int64_t n_points() const { return normals.size(0); }
-  template <class T> cpu::SummedArrays<const T> arrays() const {
+  template <class T> SummedArrays<const T> arrays() const {
     return {in<T>(normals),  in<T>(view_dirs), in<T>(albedo),  in<T>(roughness),
             in<T>(metallic), in<T>(all),       in<T>(grazing), in<T>(diffuse)};
   }
@@ -155,9 +154,9 @@ Tensor shade_sums(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughn
                   Tensor grazing, Tensor diffuse, Tensor lut, bool compensate) {
   const SummedInputs i("shade_sums", normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, lut);
   Tensor radiance = empty_like_type(i.normals, {i.n_points(), 3}, i.type);
-  dispatch_real(i.type, [&](auto zero) {
+  on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::shade_sums(in<float>(i.lut), compensate, i.n_points(), i.arrays<T>(), out<T>(radiance));
+    device.shade_sums(in<float>(i.lut), compensate, i.n_points(), i.arrays<T>(), out<T>(radiance));
   });
   return radiance;
 }
@@ -170,11 +169,11 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade
   const Tensor g = checked(op, "grad_radiance", grad_radiance, {i.n_points(), 3}, i.type);
   const auto make = [&](int64_t columns) { return empty_like_type(g, {i.n_points(), columns}, i.type); };
   Tensor grad[8] = {make(3), make(3), make(3), make(1), make(1), make(3), make(3), make(3)};
-  dispatch_real(i.type, [&](auto zero) {
+  on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::shade_sums_backward(in<float>(i.lut), compensate, i.n_points(), i.arrays<T>(), in<T>(g),
-                             cpu::SummedArrays<T>{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]),
-                                                  out<T>(grad[4]), out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7])});
+    device.shade_sums_backward(in<float>(i.lut), compensate, i.n_points(), i.arrays<T>(), in<T>(g),
+                               SummedArrays<T>{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]),
+                                               out<T>(grad[4]), out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7])});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7]};
 }
@@ -205,7 +204,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
         "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+SPLITNERF_IMPLEMENT(m) {
   m.impl("sample_bsdf", TORCH_BOX(&sample_bsdf));
   m.impl("summed_light", TORCH_BOX(&summed_light));
   m.impl("summed_light_backward", TORCH_BOX(&summed_light_backward));

@@ -4,47 +4,20 @@
 #include <vector>
 
 #include "check_hash.h"
-#include "splitnerf/ops_cpu.h"
+#include "device.h"
 
 namespace splitnerf::glue {
 namespace {
 
-// Kept samples of all rays in one array, ray after ray.
-template <class T>
-std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> packed(const Tensor& like, ScalarType type, T step,
-                                                          const std::vector<cpu::SampledRay<T>>& rays) {
-  const int64_t n_rays = static_cast<int64_t>(rays.size());
-  Tensor offsets = empty_like_type(like, {n_rays + 1}, ScalarType::Long),
-         evaluated = empty_like_type(like, {n_rays}, ScalarType::Long);
-  int64_t n = 0;
-  for (int64_t r = 0; r < n_rays; ++r) {
-    out<int64_t>(offsets)[r] = n;
-    out<int64_t>(evaluated)[r] = rays[r].n_evaluated;
-    n += static_cast<int64_t>(rays[r].starts.size());
-  }
-  out<int64_t>(offsets)[n_rays] = n;
-  Tensor ray_indices = empty_like_type(like, {n}, ScalarType::Long);
-  Tensor t_starts = empty_like_type(like, {n}, type), t_ends = empty_like_type(like, {n}, type);
-  for (int64_t r = 0, i = 0; r < n_rays; ++r) {
-    for (const T start : rays[r].starts) {
-      out<int64_t>(ray_indices)[i] = r;
-      out<T>(t_starts)[i] = start;
-      out<T>(t_ends)[i] = start + step;
-      ++i;
-    }
-  }
-  return {ray_indices, t_starts, t_ends, offsets, evaluated};
-}
-
 // The weights of the layer, checked and contiguous.
 struct Weights {
-  ScalarType type;
+  Kind type;
   Tensor hidden, hidden_bias, out, out_bias;
   double beta, box;
 
   Weights(const char* op, int64_t n_features, const Tensor& hidden_in, const Tensor& hidden_bias_in,
           const Tensor& out_in, const Tensor& out_bias_in, double beta, double box)
-      : type(real_type(op, "hidden", hidden_in)),
+      : type(real_kind(op, "hidden", hidden_in)),
         hidden(checked(op, "hidden", hidden_in, {kAny, 3 + n_features}, type)),
         hidden_bias(checked(op, "hidden_bias", hidden_bias_in, {hidden.size(0)}, type)),
         out(checked(op, "out", out_in, {kAny, hidden.size(0)}, type)),
@@ -69,7 +42,7 @@ struct Weights {
 struct Field {
   HashGridShape shape;
   Weights weights;
-  ScalarType type;
+  Kind type;
   Tensor table;
   int n_active;
 
@@ -80,7 +53,7 @@ struct Field {
         weights(op, n_levels * shape.n_features, hidden, hidden_bias, out, out_bias, beta, box), type(weights.type),
         table(checked(op, "table", table_in, {n_entries(shape), shape.n_features}, type)),
         n_active(static_cast<int>(n_active)) {}
-  template <class T> cpu::SdfField<T> view() const { return {shape, n_active, in<T>(table), weights.view<T>()}; }
+  template <class T> SdfField<T> view() const { return {shape, n_active, in<T>(table), weights.view<T>()}; }
 
  private:
   static HashGridShape checked_table_shape(const char* op, const Tensor& table, int64_t n_levels,
@@ -96,10 +69,11 @@ struct Points {
   Tensor positions, features, jacobian;
 
   Points(const char* op, const Tensor& positions_in, const Tensor& features_in, const Tensor& jacobian_in)
-      : positions(checked(op, "positions", positions_in, {kAny, 3}, real_type(op, "positions", positions_in))),
-        features(checked(op, "features", features_in, {n(), kAny}, positions.scalar_type())),
-        jacobian(checked(op, "jacobian", jacobian_in, {n(), 3, features.size(1)}, positions.scalar_type())) {}
+      : positions(checked(op, "positions", positions_in, {kAny, 3}, real_kind(op, "positions", positions_in))),
+        features(checked(op, "features", features_in, {n(), kAny}, kind())),
+        jacobian(checked(op, "jacobian", jacobian_in, {n(), 3, features.size(1)}, kind())) {}
   int64_t n() const { return positions.size(0); }
+  Kind kind() const { return {positions.scalar_type(), positions.device()}; }
 };
 
 std::tuple<Tensor, Tensor> sdf_layer(Tensor positions, Tensor features, Tensor jacobian, Tensor hidden,
@@ -107,13 +81,14 @@ std::tuple<Tensor, Tensor> sdf_layer(Tensor positions, Tensor features, Tensor j
   const char* op = "sdf_layer";
   const Points x(op, positions, features, jacobian);
   const Weights w(op, x.features.size(1), hidden, hidden_bias, out_weights, out_bias, beta, box);
-  require(w.type == x.positions.scalar_type(), op, "positions and hidden must have one dtype");
+  require(w.type == x.kind().type && w.type.device == x.kind().device, op,
+          "positions and hidden must have one dtype and device");
   Tensor outputs = empty_like_type(x.positions, {x.n(), w.out.size(0)}, w.type);
   Tensor gradient = empty_like_type(x.positions, {x.n(), 3}, w.type);
-  dispatch_real(w.type, [&](auto zero) {
+  on_device(w.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::sdf_layer(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), out<T>(outputs),
-                   out<T>(gradient));
+    device.sdf_layer(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), out<T>(outputs),
+                     out<T>(gradient));
   });
   return {outputs, gradient};
 }
@@ -124,17 +99,18 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> sdf_layer_backward(
   const char* op = "sdf_layer_backward";
   const Points x(op, positions, features, jacobian);
   const Weights w(op, x.features.size(1), hidden, hidden_bias, out_weights, out_bias, beta, box);
-  require(w.type == x.positions.scalar_type(), op, "positions and hidden must have one dtype");
+  require(w.type == x.kind().type && w.type.device == x.kind().device, op,
+          "positions and hidden must have one dtype and device");
   const Tensor go = checked(op, "grad_outputs", grad_outputs, {x.n(), w.out.size(0)}, w.type);
   const Tensor gg = checked(op, "grad_gradient", grad_gradient, {x.n(), 3}, w.type);
   const auto like = [&](const Tensor& t) { return torch::stable::empty_like(t); };
   Tensor grad_features = like(x.features), grad_jacobian = like(x.jacobian), grad_hidden = like(w.hidden);
   Tensor grad_hidden_bias = like(w.hidden_bias), grad_out = like(w.out), grad_out_bias = like(w.out_bias);
-  dispatch_real(w.type, [&](auto zero) {
+  on_device(w.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::sdf_layer_backward(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), in<T>(go),
-                            in<T>(gg), out<T>(grad_features), out<T>(grad_jacobian), out<T>(grad_hidden),
-                            out<T>(grad_hidden_bias), out<T>(grad_out), out<T>(grad_out_bias));
+    device.sdf_layer_backward(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), in<T>(go),
+                              in<T>(gg), out<T>(grad_features), out<T>(grad_jacobian), out<T>(grad_hidden),
+                              out<T>(grad_hidden_bias), out<T>(grad_out), out<T>(grad_out_bias));
   });
   return {grad_features, grad_jacobian, grad_hidden, grad_hidden_bias, grad_out, grad_out_bias};
 }
@@ -147,9 +123,9 @@ Tensor sdf_values(Tensor positions, Tensor table, Tensor hidden, Tensor hidden_b
                     log2_table_size, n_active, box);
   const Tensor x = checked(op, "positions", positions, {kAny, 3}, field.type);
   Tensor values = empty_like_type(x, {x.size(0)}, field.type);
-  dispatch_real(field.type, [&](auto zero) {
+  on_device(field.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::sdf_values(field.view<T>(), x.size(0), in<T>(x), out<T>(values));
+    device.sdf_values(field.view<T>(), x.size(0), in<T>(x), out<T>(values));
   });
   return values;
 }
@@ -168,24 +144,33 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
                u = checked(op, "jitter", jitter, {n_rays}, field.type);
   require(cells.dim() == 3 && cells.size(0) > 0, op, "cells must be [r, r, r] uint8 with r > 0");
   const int64_t resolution = cells.size(0);
-  const Tensor grid = checked(op, "cells", cells, {resolution, resolution, resolution}, ScalarType::Byte);
+  const Tensor grid =
+      checked(op, "cells", cells, {resolution, resolution, resolution}, field.type.with(ScalarType::Byte));
   require(step > 0 && s > 0 && lipschitz > 0, op, "step, s and lipschitz must be positive");
   require(min_transmittance >= 0 && min_transmittance < 1 && min_weight >= 0 && min_weight < 1, op,
           "min_weight and min_transmittance must be in [0, 1)");
   require(reach >= 0 && anneal >= 0 && anneal <= 1, op, "reach must not be negative, anneal must be in [0, 1]");
   const MarchOptions march{static_cast<float>(box), static_cast<float>(step), max_samples};
-  const OccupancyCells occupancy(in<uint8_t>(grid), static_cast<int>(resolution));
-  std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> result;
-  dispatch_real(field.type, [&](auto zero) {
+  const int64_t n_blocks = blocks_along(static_cast<int>(resolution));
+  Tensor blocks = empty_like_type(o, {n_blocks, n_blocks, n_blocks}, ScalarType::Byte);
+  const OccupancyView occupancy{in<uint8_t>(grid), out<uint8_t>(blocks), static_cast<int>(resolution),
+                                static_cast<int>(n_blocks)};
+  Tensor offsets = empty_like_type(o, {n_rays + 1}, ScalarType::Long);
+  Tensor evaluated = empty_like_type(o, {n_rays}, ScalarType::Long), ray_indices, t_starts, t_ends;
+  on_device(field.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     const SampleRules<T> rules{T(s),     T(anneal),   T(min_weight), T(-std::log(min_weight)), T(min_transmittance),
                                T(reach), T(lipschitz)};
-    std::vector<cpu::SampledRay<T>> rays(n_rays);
-    cpu::sample_rays(field.view<T>(), march, occupancy.view(), rules, n_rays, in<T>(o), in<T>(d), in<T>(u),
-                     rays.data());
-    result = packed(o, field.type, T(march.step), rays);
+    const SampleAllocator<T> allocate = [&](int64_t n) {
+      ray_indices = empty_like_type(o, {n}, ScalarType::Long);
+      t_starts = empty_like_type(o, {n}, field.type), t_ends = empty_like_type(o, {n}, field.type);
+      return PackedSamples<T>{out<int64_t>(ray_indices), out<T>(t_starts), out<T>(t_ends)};
+    };
+    device.occupied_blocks(in<uint8_t>(grid), static_cast<int>(resolution), out<uint8_t>(blocks));
+    device.sample_rays(field.view<T>(), march, occupancy, rules, n_rays, in<T>(o), in<T>(d), in<T>(u),
+                       out<int64_t>(offsets), out<int64_t>(evaluated), allocate);
   });
-  return result;
+  return {ray_indices, t_starts, t_ends, offsets, evaluated};
 }
 
 }  // namespace
@@ -207,7 +192,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
         "float reach, float lipschitz) -> (Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+SPLITNERF_IMPLEMENT(m) {
   m.impl("sdf_layer", TORCH_BOX(&sdf_layer));
   m.impl("sdf_layer_backward", TORCH_BOX(&sdf_layer_backward));
   m.impl("sdf_values", TORCH_BOX(&sdf_values));

@@ -1,27 +1,26 @@
 // query_direction and split_sum_shade as torch operators.
 #include <tuple>
 
-#include "check.h"
-#include "splitnerf/ops_cpu.h"
+#include "device.h"
 
 namespace splitnerf::glue {
 namespace {
 
-Tensor checked_lut(const char* op, const Tensor& lut) {
-  return checked(op, "lut", lut, {kLutSize, kLutSize, 3}, ScalarType::Float);
+Tensor checked_lut(const char* op, const Tensor& lut, Kind kind) {
+  return checked(op, "lut", lut, {kLutSize, kLutSize, 3}, kind.with(ScalarType::Float));
 }
 
 Tensor query_direction(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) {
   const char* op = "query_direction";
-  const ScalarType type = real_type(op, "normals", normals);
+  const Kind type = real_kind(op, "normals", normals);
   const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
   const Tensor v = checked(op, "view_dirs", view_dirs, {n.size(0), 3}, type);
   const Tensor rho = checked(op, "roughness", roughness, {n.size(0), 1}, type);
-  const Tensor table = checked_lut(op, lut);
+  const Tensor table = checked_lut(op, lut, type);
   Tensor directions = empty_like_type(n, {n.size(0), 3}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::query_direction(in<float>(table), mean, n.size(0), in<T>(n), in<T>(v), in<T>(rho), out<T>(directions));
+    device.query_direction(in<float>(table), mean, n.size(0), in<T>(n), in<T>(v), in<T>(rho), out<T>(directions));
   });
   return directions;
 }
@@ -29,18 +28,18 @@ Tensor query_direction(Tensor normals, Tensor view_dirs, Tensor roughness, Tenso
 std::tuple<Tensor, Tensor, Tensor> query_direction_backward(Tensor normals, Tensor view_dirs, Tensor roughness,
                                                             Tensor lut, bool mean, Tensor grad_directions) {
   const char* op = "query_direction_backward";
-  const ScalarType type = real_type(op, "normals", normals);
+  const Kind type = real_kind(op, "normals", normals);
   const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
   const Tensor v = checked(op, "view_dirs", view_dirs, {n.size(0), 3}, type);
   const Tensor rho = checked(op, "roughness", roughness, {n.size(0), 1}, type);
-  const Tensor table = checked_lut(op, lut);
+  const Tensor table = checked_lut(op, lut, type);
   const Tensor g = checked(op, "grad_directions", grad_directions, {n.size(0), 3}, type);
   Tensor grad_n = empty_like_type(n, {n.size(0), 3}, type), grad_v = empty_like_type(n, {n.size(0), 3}, type);
   Tensor grad_rho = empty_like_type(n, {n.size(0), 1}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::query_direction_backward(in<float>(table), mean, n.size(0), in<T>(n), in<T>(v), in<T>(rho), in<T>(g),
-                                  out<T>(grad_n), out<T>(grad_v), out<T>(grad_rho));
+    device.query_direction_backward(in<float>(table), mean, n.size(0), in<T>(n), in<T>(v), in<T>(rho), in<T>(g),
+                                    out<T>(grad_n), out<T>(grad_v), out<T>(grad_rho));
   });
   return {grad_n, grad_v, grad_rho};
 }
@@ -54,7 +53,7 @@ ShadeOptions checked_options(const char* op, int64_t fresnel_mode, bool compensa
 // The nine per-point inputs, checked and contiguous.
 struct ShadeInputs {
   Tensor normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d, lut;
-  ScalarType type;
+  Kind type;
   int64_t n;
   int n_channels;
 
@@ -62,7 +61,7 @@ struct ShadeInputs {
               const Tensor& roughness_in, const Tensor& metallic_in, const Tensor& specular_in,
               const Tensor& diffuse_in, const Tensor& occlusion_s_in, const Tensor& occlusion_d_in,
               const Tensor& lut_in)
-      : type(real_type(op, "normals", normals_in)) {
+      : type(real_kind(op, "normals", normals_in)) {
     normals = checked(op, "normals", normals_in, {kAny, 3}, type);
     n = normals.size(0);
     n_channels = occlusion_s_in.dim() == 2 && occlusion_s_in.size(1) == 1 ? 1 : 3;
@@ -74,7 +73,7 @@ struct ShadeInputs {
     diffuse = checked(op, "diffuse", diffuse_in, {n, 3}, type);
     occlusion_s = checked(op, "occlusion_s", occlusion_s_in, {n, n_channels}, type);
     occlusion_d = checked(op, "occlusion_d", occlusion_d_in, {n, n_channels}, type);
-    lut = checked_lut(op, lut_in);
+    lut = checked_lut(op, lut_in, type);
   }
   template <class T> ShadeArrays<const T> arrays() const {
     return {in<T>(normals),  in<T>(view_dirs), in<T>(albedo),      in<T>(roughness),  in<T>(metallic),
@@ -90,9 +89,9 @@ Tensor split_sum_shade(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor r
                       lut);
   const ShadeOptions options = checked_options(op, fresnel_mode, compensate);
   Tensor radiance = empty_like_type(p.normals, {p.n, 3}, p.type);
-  dispatch_real(p.type, [&](auto zero) {
+  on_device(p.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::split_sum_shade(in<float>(p.lut), options, p.n, p.n_channels, p.arrays<T>(), out<T>(radiance));
+    device.split_sum_shade(in<float>(p.lut), options, p.n, p.n_channels, p.arrays<T>(), out<T>(radiance));
   });
   return radiance;
 }
@@ -108,12 +107,12 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tenso
   const auto make = [&](int64_t columns) { return empty_like_type(p.normals, {p.n, columns}, p.type); };
   Tensor grad[9] = {make(3),           make(3), make(3), make(1), make(1), make(3), make(3), make(p.n_channels),
                     make(p.n_channels)};
-  dispatch_real(p.type, [&](auto zero) {
+  on_device(p.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::split_sum_shade_backward(
+    device.split_sum_shade_backward(
         in<float>(p.lut), options, p.n, p.n_channels, p.arrays<T>(), in<T>(g),
         ShadeArrays<T>{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
-                            out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])});
+                       out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};
 }
@@ -134,7 +133,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
         "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+SPLITNERF_IMPLEMENT(m) {
   m.impl("query_direction", TORCH_BOX(&query_direction));
   m.impl("query_direction_backward", TORCH_BOX(&query_direction_backward));
   m.impl("split_sum_shade", TORCH_BOX(&split_sum_shade));

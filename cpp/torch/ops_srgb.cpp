@@ -1,42 +1,41 @@
 // linear_to_srgb and srgb_to_linear as torch operators, of tensors of any shape.
-#include "check.h"
-#include "splitnerf/ops_cpu.h"
+#include "device.h"
 
 namespace splitnerf::glue {
 namespace {
 
-// Calls body(tensor, result, T{}) with the tensor contiguous and an empty one like it.
+// Calls body(tensor, result, T{}, device) with the tensor contiguous and an empty one like it.
 template <class Body> Tensor elementwise(const char* op, const char* name, const Tensor& values, Body&& body) {
-  const ScalarType type = real_type(op, name, values);
-  require(values.is_cpu(), op, std::string(name) + " must be on the CPU");
+  const Kind type = real_kind(op, name, values);
   const Tensor x = torch::stable::contiguous(values);
   Tensor result = torch::stable::empty_like(x);
-  dispatch_real(type, [&](auto zero) { body(x, result, zero); });
+  on_device(type, [&](auto zero, const auto& device) { body(x, result, zero, device); });
   return result;
 }
 
 Tensor linear_to_srgb(Tensor linear) {
-  return elementwise("linear_to_srgb", "linear", linear, [](const Tensor& x, Tensor& y, auto zero) {
+  return elementwise("linear_to_srgb", "linear", linear, [](const Tensor& x, Tensor& y, auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::linear_to_srgb(x.numel(), in<T>(x), out<T>(y));
+    device.linear_to_srgb(x.numel(), in<T>(x), out<T>(y));
   });
 }
 
 Tensor linear_to_srgb_backward(Tensor linear, Tensor grad_srgb) {
   const char* op = "linear_to_srgb_backward";
-  require(grad_srgb.scalar_type() == linear.scalar_type() && grad_srgb.numel() == linear.numel() && grad_srgb.is_cpu(),
+  require(grad_srgb.scalar_type() == linear.scalar_type() && grad_srgb.numel() == linear.numel() &&
+              grad_srgb.device() == linear.device(),
           op, "grad_srgb must be like linear");
   const Tensor g = torch::stable::contiguous(grad_srgb);
-  return elementwise(op, "linear", linear, [&](const Tensor& x, Tensor& y, auto zero) {
+  return elementwise(op, "linear", linear, [&](const Tensor& x, Tensor& y, auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::linear_to_srgb_backward(x.numel(), in<T>(x), in<T>(g), out<T>(y));
+    device.linear_to_srgb_backward(x.numel(), in<T>(x), in<T>(g), out<T>(y));
   });
 }
 
 Tensor srgb_to_linear(Tensor srgb) {
-  return elementwise("srgb_to_linear", "srgb", srgb, [](const Tensor& x, Tensor& y, auto zero) {
+  return elementwise("srgb_to_linear", "srgb", srgb, [](const Tensor& x, Tensor& y, auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::srgb_to_linear(x.numel(), in<T>(x), out<T>(y));
+    device.srgb_to_linear(x.numel(), in<T>(x), out<T>(y));
   });
 }
 
@@ -48,7 +47,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("srgb_to_linear(Tensor srgb) -> Tensor");
 }
 
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
+SPLITNERF_IMPLEMENT(m) {
   m.impl("linear_to_srgb", TORCH_BOX(&linear_to_srgb));
   m.impl("linear_to_srgb_backward", TORCH_BOX(&linear_to_srgb_backward));
   m.impl("srgb_to_linear", TORCH_BOX(&srgb_to_linear));

@@ -1,8 +1,7 @@
 // visibility_bits, vertex_grids and cached_occlusion as torch operators.
 #include <tuple>
 
-#include "check.h"
-#include "splitnerf/ops_cpu.h"
+#include "device.h"
 
 namespace splitnerf::glue {
 namespace {
@@ -30,7 +29,7 @@ std::tuple<Tensor, Tensor> visibility_bits(int64_t scene, Tensor positions, Tens
 
 std::tuple<Tensor, Tensor> vertex_grids(Tensor vertices, double radius, int64_t n_levels) {
   const char* op = "vertex_grids";
-  const ScalarType type = real_type(op, "vertices", vertices);
+  const Kind type = real_kind(op, "vertices", vertices);
   const Tensor v = checked(op, "vertices", vertices, {kAny, 3}, type);
   require(radius > 0 && n_levels > 0 && n_levels <= 16, op, "radius must be positive and n_levels in [1, 16]");
   require(v.size(0) < int64_t(1) << 30, op, "at most 2^30 vertices");
@@ -57,25 +56,26 @@ void check_indices(const char* op, const char* name, const Tensor& t, int64_t hi
 
 // The cache as both readers take it.
 struct Cache {
-  ScalarType type;
+  Kind type;
   Tensor vertices, normals, starts, order, bits, hits, radiance, directions;
   double radius;
 
-  Cache(const char* op, ScalarType type, const Tensor& v, const Tensor& vn, const Tensor& s, const Tensor& o, double r,
+  Cache(const char* op, Kind type, const Tensor& v, const Tensor& vn, const Tensor& s, const Tensor& o, double r,
         const Tensor& b, const Tensor& h, const Tensor& c, const Tensor& w)
       : type(type), vertices(checked(op, "vertices", v, {kAny, 3}, type)),
         normals(checked(op, "vertex_normals", vn, {vertices.size(0), 3}, type)),
-        starts(checked(op, "starts", s, {kAny, kAny}, ScalarType::Int)),
-        order(checked(op, "order", o, {starts.size(0), vertices.size(0)}, ScalarType::Int)),
-        bits(checked(op, "bits", b, {vertices.size(0), 2, kAny}, ScalarType::Int)),
-        hits(checked(op, "hits", h, {vertices.size(0), kAny}, ScalarType::Int)),
+        starts(checked(op, "starts", s, {kAny, kAny}, type.with(ScalarType::Int))),
+        order(checked(op, "order", o, {starts.size(0), vertices.size(0)}, type.with(ScalarType::Int))),
+        bits(checked(op, "bits", b, {vertices.size(0), 2, kAny}, type.with(ScalarType::Int))),
+        hits(checked(op, "hits", h, {vertices.size(0), kAny}, type.with(ScalarType::Int))),
         radiance(checked(op, "radiance", c, {indirect() ? vertices.size(0) : 0, 3}, type)),
         directions(checked(op, "directions", w, {kAny, 3}, type)), radius(r) {
     check_directions(op, n_directions());
-    checked(op, "bits", bits, {vertices.size(0), 2, n_directions() / kBitsPerWord}, ScalarType::Int);
-    if (indirect()) checked(op, "hits", hits, {vertices.size(0), n_directions()}, ScalarType::Int);
+    checked(op, "bits", bits, {vertices.size(0), 2, n_directions() / kBitsPerWord}, type.with(ScalarType::Int));
+    if (indirect()) checked(op, "hits", hits, {vertices.size(0), n_directions()}, type.with(ScalarType::Int));
     require(n_buckets() > 0 && (n_buckets() & (n_buckets() - 1)) == 0 && radius > 0, op,
             "starts must be [levels, 2^k + 1] and radius positive");
+    if (!type.on_cpu()) return;  // to look at the numbers would mean waiting for the GPU
     check_indices(op, "starts", starts, vertices.size(0) + 1);
     check_indices(op, "order", order, vertices.size(0));
   }
@@ -84,7 +84,7 @@ struct Cache {
   int64_t n_directions() const { return directions.size(0); }
   int64_t n_buckets() const { return starts.size(1) - 1; }
 
-  template <class T> cpu::VisibilityCache<T> get(const T* light) const {
+  template <class T> VisibilityCache<T> get(const T* light) const {
     return {{in<T>(vertices), in<T>(normals), in<int32_t>(starts), in<int32_t>(order), vertices.size(0), n_buckets(),
              static_cast<int>(starts.size(0)), T(radius)},
             in<uint32_t>(bits),
@@ -102,7 +102,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> cached_occlusion(Tensor positions, Te
                                                             Tensor hits, Tensor radiance, Tensor directions,
                                                             Tensor light) {
   const char* op = "cached_occlusion";
-  const ScalarType type = real_type(op, "positions", positions);
+  const Kind type = real_kind(op, "positions", positions);
   const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
   const Tensor n = checked(op, "normals", normals, {x.size(0), 3}, type);
   const Tensor d = checked(op, "lobe_dirs", lobe_dirs, {x.size(0), 3}, type);
@@ -112,10 +112,10 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> cached_occlusion(Tensor positions, Te
   Tensor o_d = empty_like_type(x, {x.size(0), 3}, type), o_s = empty_like_type(x, {x.size(0), 3}, type);
   Tensor i_d = empty_like_type(x, {cache.indirect() ? x.size(0) : 0, 3}, type);
   Tensor i_s = empty_like_type(x, {cache.indirect() ? x.size(0) : 0, 3}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::cached_occlusion(cache.get(in<T>(l)), x.size(0), in<T>(x), in<T>(n), in<T>(d), in<T>(rho), out<T>(o_d),
-                          out<T>(o_s), out<T>(i_d), out<T>(i_s));
+    device.cached_occlusion(cache.get(in<T>(l)), x.size(0), in<T>(x), in<T>(n), in<T>(d), in<T>(rho), out<T>(o_d),
+                            out<T>(o_s), out<T>(i_d), out<T>(i_s));
   });
   return {o_d, o_s, i_d, i_s};
 }
@@ -124,15 +124,15 @@ std::tuple<Tensor, Tensor> cached_visibility(Tensor positions, Tensor normals, T
                                              Tensor starts, Tensor order, double radius, Tensor bits, Tensor hits,
                                              Tensor radiance, Tensor directions) {
   const char* op = "cached_visibility";
-  const ScalarType type = real_type(op, "positions", positions);
+  const Kind type = real_kind(op, "positions", positions);
   const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
   const Tensor n = checked(op, "normals", normals, {x.size(0), 3}, type);
   const Cache cache(op, type, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions);
   Tensor visible = empty_like_type(x, {x.size(0), cache.n_directions()}, type);
   Tensor arriving = empty_like_type(x, {cache.indirect() ? x.size(0) : 0, cache.n_directions(), 3}, type);
-  dispatch_real(type, [&](auto zero) {
+  on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    cpu::cached_visibility(cache.get<T>(nullptr), x.size(0), in<T>(x), in<T>(n), out<T>(visible), out<T>(arriving));
+    device.cached_visibility(cache.get<T>(nullptr), x.size(0), in<T>(x), in<T>(n), out<T>(visible), out<T>(arriving));
   });
   return {visible, arriving};
 }
@@ -157,6 +157,9 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
   m.impl("visibility_bits", TORCH_BOX(&visibility_bits));
   m.impl("vertex_grids", TORCH_BOX(&vertex_grids));
+}
+
+SPLITNERF_IMPLEMENT(m) {
   m.impl("cached_occlusion", TORCH_BOX(&cached_occlusion));
   m.impl("cached_visibility", TORCH_BOX(&cached_visibility));
 }

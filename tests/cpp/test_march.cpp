@@ -23,10 +23,12 @@ struct Grid {
 std::vector<double> march(const Grid& grid, Vec3<double> o, Vec3<double> d, double jitter = 0) {
   std::vector<double> starts;
   const OccupancyCells cells(grid.cells.data(), grid.resolution);
-  const int64_t n = march_ray(o, d, jitter, cells.view(), grid.options, [&](double t_start, double t_end) {
-    EXPECT_NEAR(t_end - t_start, grid.options.step, 1e-12);
-    starts.push_back(t_start);
-  });
+  const int64_t n =
+      march_ray(OneThread{}, o, d, jitter, cells.view(), grid.options, [&](int64_t i, double t_start, double t_end) {
+        EXPECT_EQ(i, int64_t(starts.size()));
+        EXPECT_NEAR(t_end - t_start, grid.options.step, 1e-12);
+        starts.push_back(t_start);
+      });
   EXPECT_EQ(n, int64_t(starts.size()));
   return starts;
 }

@@ -59,6 +59,8 @@ TEST(Neus, NothingWhereTheDistanceRises) {
 template <class T> struct Ray {
   std::vector<T> f_prev, f_next, weights;
   T opacity;
+
+  NeusEnds<T> ends() const { return {f_prev.data(), f_next.data(), nullptr}; }
 };
 
 // n samples of a ray along which the distance falls from f0 by `slope` in all.
@@ -69,8 +71,7 @@ template <class T> Ray<T> falling_ray(double f0, double slope, int n, T s, T min
     ray.f_next.push_back(T(f0 - slope * (i + 1) / n));
   }
   ray.weights.resize(n);
-  ray.opacity = neus_ray_weights<T>(ray.f_prev.data(), ray.f_next.data(), nullptr, s, n, min_transmittance,
-                                        ray.weights.data());
+  ray.opacity = neus_ray_weights(OneThread{}, ray.ends(), s, n, min_transmittance, ray.weights.data());
   return ray;
 }
 
@@ -109,8 +110,7 @@ TEST(Neus, SamplesBehindTheMinimalTransmittanceAreZero) {
 TEST(Neus, NanReachesTheCaller) {
   Ray<float> ray = falling_ray(0.1, 0.5, 10, 10.f);
   ray.f_next[4] = std::numeric_limits<float>::quiet_NaN();
-  const float opacity =
-      neus_ray_weights<float>(ray.f_prev.data(), ray.f_next.data(), nullptr, 10.f, 10, 0.f, ray.weights.data());
+  const float opacity = neus_ray_weights(OneThread{}, ray.ends(), 10.f, 10, 0.f, ray.weights.data());
   EXPECT_TRUE(std::isnan(opacity));
   EXPECT_FALSE(std::isnan(ray.weights[3]));
   EXPECT_TRUE(std::isnan(ray.weights[4]));
@@ -122,6 +122,8 @@ struct Batch {
   std::vector<int64_t> offsets{0};
   std::vector<double> x;  // f_prev, f_next, s
   int64_t n = 0;
+
+  PackedRays rays() const { return {int64_t(offsets.size()) - 1, n, offsets.data()}; }
 };
 
 // Rays that cross the surface, with a sample in each that rises; one ray is empty.
@@ -146,12 +148,11 @@ TEST(Neus, AdjointFollowsCentralDifferences) {
       const std::vector<double> gw = random.uniforms(size_t(b.n), -1), ga = random.uniforms(4, -1);
       std::vector<double> weights(b.n), opacity(4), gradient(b.x.size()), grad_s(4);
       const auto f = [&] {
-        cpu::neus_weights(4, b.offsets.data(), &b.x[0], &b.x[b.n], b.x.back(), min_transmittance, weights.data(),
-                          opacity.data());
+        cpu::neus_weights(b.rays(), &b.x[0], &b.x[b.n], &b.x.back(), min_transmittance, weights.data(), opacity.data());
         return inner(gw, weights) + inner(ga, opacity);
       };
       f();
-      cpu::neus_weights_backward(4, b.offsets.data(), &b.x[0], &b.x[b.n], b.x.back(), min_transmittance, weights.data(),
+      cpu::neus_weights_backward(b.rays(), &b.x[0], &b.x[b.n], &b.x.back(), min_transmittance, weights.data(),
                                  gw.data(), ga.data(), &gradient[0], &gradient[b.n], grad_s.data());
       for (double g : grad_s) gradient.back() += g;
       expect_gradient(f, b.x, gradient, 1e-6, "neus", 1e-6);
@@ -167,13 +168,13 @@ TEST(Neus, FloatAdjointFollowsDoubleAlongOpaqueRays) {
   std::vector<double> gw(n), weights(n), prev(n), next(n);
   std::vector<float> gw32(n), prev32(n), next32(n);
   for (int i = 0; i < n; ++i) gw32[i] = std::cos(float(i)), gw[i] = gw32[i];
-  neus_ray_weights<double>(f_prev.data(), f_next.data(), nullptr, 4000., n, 0., weights.data());
+  const NeusEnds<double> ends{f_prev.data(), f_next.data(), nullptr};
+  neus_ray_weights(OneThread{}, ends, 4000., n, 0., weights.data());
   neus_ray_weights_backward(
-      f_prev.data(), f_next.data(), static_cast<const double*>(nullptr), 4000., n, 0., weights.data(), gw.data(), 0.,
-      next.data(), [&](int64_t i, const OpticalDepthGrad<double>& g) { prev[i] = g.f_prev, next[i] = g.f_next; });
+      OneThread{}, ends, 4000., n, 0., weights.data(), gw.data(), 0., next.data(),
+      [&](int64_t i, const OpticalDepthGrad<double>& g) { prev[i] = g.f_prev, next[i] = g.f_next; });
   neus_ray_weights_backward(
-      ray.f_prev.data(), ray.f_next.data(), static_cast<const float*>(nullptr), 4000.f, n, 0.f, ray.weights.data(),
-      gw32.data(), 0.f, next32.data(),
+      OneThread{}, ray.ends(), 4000.f, n, 0.f, ray.weights.data(), gw32.data(), 0.f, next32.data(),
       [&](int64_t i, const OpticalDepthGrad<float>& g) { prev32[i] = g.f_prev, next32[i] = g.f_next; });
   double largest = 0;
   for (double g : next) largest = std::max(largest, std::abs(g));
@@ -198,11 +199,11 @@ TEST(AnnealedCosine, GoesFromSoftToSharp) {
 TEST(Composite, SumsEachRayAndItsAdjointIsExact) {
   const std::vector<int64_t> offsets{0, 2, 2, 3};
   std::vector<double> w{1, 2, 3}, v{1, 10, 2, 20, 3, 30}, sums(6, -7);
-  cpu::composite(3, 2, offsets.data(), w.data(), v.data(), sums.data());
+  cpu::composite({3, offsets.back(), offsets.data()}, 2, w.data(), v.data(), sums.data());
   EXPECT_EQ(sums, (std::vector<double>{5, 50, 0, 0, 9, 90}));
   const std::vector<double> g{1, 2, 3, 4, 5, 6};
   std::vector<double> gw(3), gv(6);
-  cpu::composite_backward(3, 2, offsets.data(), w.data(), v.data(), g.data(), gw.data(), gv.data());
+  cpu::composite_backward({3, offsets.back(), offsets.data()}, 2, w.data(), v.data(), g.data(), gw.data(), gv.data());
   EXPECT_EQ(gw, (std::vector<double>{21, 42, 195}));
   EXPECT_EQ(gv, (std::vector<double>{1, 2, 2, 4, 15, 18}));
 }

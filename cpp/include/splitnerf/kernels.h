@@ -36,13 +36,6 @@ template <class T> struct LobeSide {
   int64_t n;
 };
 
-// Rows of a sparse matrix: those of row r are [offsets[r], offsets[r + 1]).
-template <class T> struct SparseRows {
-  const int64_t* offsets;
-  const int32_t* columns;
-  const T* weights;
-};
-
 // A point that reads visibility bits from nearby vertices.
 template <class T> struct VisibilityPoint {
   const uint32_t* const* bits;  // [n_neighbours] each neighbour's words, open then blocked, see visibility_bits

@@ -2,6 +2,7 @@
 // one unfiltered, and spherical harmonics from there on. Read bilinear in direction, linear in roughness.
 #pragma once
 
+#include "splitnerf/accumulate.h"
 #include "splitnerf/octahedral.h"
 #include "splitnerf/spherical_harmonics.h"
 
@@ -19,6 +20,12 @@ template <class T> struct LightPyramid {
   T node[kMaxLightLevels + 1];      // ascending roughness of the levels; the last one: of the harmonics
   const ShRecurrence<T>* recurrence;
 };
+
+// Of all maps together.
+template <class T> SPLITNERF_HD int64_t light_texels(const LightPyramid<T>& p) {
+  const int last = p.n_levels - 1;
+  return p.offset[last] + int64_t(p.resolution[last]) * p.resolution[last];
+}
 
 // What a roughness mixes: level and its successor, the harmonics being the successor of the last level.
 template <class T> struct LightMix {
@@ -48,12 +55,55 @@ SPLITNERF_HD Vec2<T> read_level_backward(const T* map, int n, const OctahedralFo
   T along[4];
   for (int k = 0; k < 4; ++k) {
     along[k] = dot(load3(map + 3 * f.texel[k]), grad);
-    T* g = grad_map + 3 * f.texel[k];
-    store3(g, load3(g) + grad * f.weight(k));
+    add3_to(grad_map + 3 * f.texel[k], grad * f.weight(k));
   }
   const T half = T(0.5) * T(n);
   return {half * lerp(along[1] - along[0], along[3] - along[2], f.fy),
           half * lerp(along[2] - along[0], along[3] - along[1], f.fx)};
+}
+
+// What the maps hold of the radiance from w; the harmonics add their share.
+template <class T> SPLITNERF_HD Vec3<T> read_maps(const LightPyramid<T>& p, const LightMix<T>& mix, Vec3<T> w) {
+  if (mix.share == T(1)) return {T(0), T(0), T(0)};
+  const Vec2<T> uv = octahedral_encode(w);
+  const int k = mix.level, n = p.resolution[k];
+  Vec3<T> value = read_level(p.levels + 3 * p.offset[k], octahedral_footprint(n, uv)) * (T(1) - mix.share);
+  if (k + 1 < p.n_levels && mix.share > T(0)) {
+    const int m = p.resolution[k + 1];
+    value += read_level(p.levels + 3 * p.offset[k + 1], octahedral_footprint(m, uv)) * mix.share;
+  }
+  return value;
+}
+
+template <class T> struct LightArgumentsGrad {
+  Vec3<T> direction;
+  T roughness;
+};
+// Adds to grad_levels.
+template <class T>
+SPLITNERF_HD LightArgumentsGrad<T> read_maps_backward(const LightPyramid<T>& p, const LightMix<T>& mix, Vec3<T> w,
+                                                      Vec3<T> grad, T* grad_levels) {
+  LightArgumentsGrad<T> out{{T(0), T(0), T(0)}, T(0)};
+  if (mix.share == T(1)) return out;
+  const Vec2<T> uv = octahedral_encode(w);
+  Vec2<T> grad_uv{T(0), T(0)};
+  for (int above = 0; above < 2 && mix.level + above < p.n_levels; ++above) {
+    const T share = above ? mix.share : T(1) - mix.share, slope = above ? mix.slope : -mix.slope;
+    if (share == T(0) && slope == T(0)) continue;
+    const int k = mix.level + above, n = p.resolution[k];
+    const T* map = p.levels + 3 * p.offset[k];
+    const OctahedralFootprint<T> f = octahedral_footprint(n, uv);
+    const Vec2<T> g = read_level_backward(map, n, f, grad * share, grad_levels + 3 * p.offset[k]);
+    grad_uv.x += g.x, grad_uv.y += g.y;
+    if (slope != T(0)) out.roughness += slope * dot(read_level(map, f), grad);
+  }
+  out.direction = octahedral_encode_backward(w, grad_uv);
+  return out;
+}
+
+// Whether the harmonics have a share, or one whose derivative is not 0.
+template <class T> SPLITNERF_HD bool reads_harmonics(const LightPyramid<T>& p, const LightMix<T>& mix) {
+  return mix.level + 1 == p.n_levels && (mix.share != T(0) || mix.slope != T(0));
 }
 
 // Harmonics ring around strong lamps. Below a thousandth e of the mean light their sum x is bent to
@@ -83,5 +133,12 @@ template <class T> SPLITNERF_HD ZonalPlace<T> zonal_place(const LightPyramid<T>&
   const int row = min_of(static_cast<int>(bounded), p.n_zonal - 2);
   return {p.zonal + row * kShBands, x == x ? bounded - T(row) : x, inside ? scale : T(0)};
 }
+
+// Rows of a sparse matrix: those of row r are [offsets[r], offsets[r + 1]).
+template <class T> struct SparseRows {
+  const int64_t* offsets;
+  const int32_t* columns;
+  const T* weights;
+};
 
 }  // namespace splitnerf

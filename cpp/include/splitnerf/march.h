@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "splitnerf/group.h"
 #include "splitnerf/vec.h"
 
 namespace splitnerf {
@@ -27,23 +28,32 @@ struct OccupancyView {
   }
 };
 
-// Finds the blocks of a grid, which it does not own.
+inline int blocks_along(int resolution) { return (resolution + kBlockCells - 1) / kBlockCells; }
+
+// Finds the blocks [blocks_along^3] of a grid.
+inline void find_occupied_blocks(const uint8_t* cells, int resolution, uint8_t* blocks) {
+  const int n_blocks = blocks_along(resolution), padded = n_blocks * kBlockCells;
+  // Of the cells along z in each block of x and y.
+  std::vector<uint8_t> columns(size_t(n_blocks) * n_blocks * padded);
+  for (int x = 0; x < resolution; ++x) {
+    for (int y = 0; y < resolution; ++y) {
+      const uint8_t* row = cells + OccupancyView::at(x, y, 0, resolution);
+      uint8_t* column = &columns[OccupancyView::at(x / kBlockCells, y / kBlockCells, 0, n_blocks) * kBlockCells];
+      for (int z = 0; z < resolution; ++z) column[z] |= row[z];
+    }
+  }
+  for (size_t i = 0; i < columns.size() / kBlockCells; ++i) blocks[i] = 0;
+  for (size_t i = 0; i < columns.size(); ++i) blocks[i / kBlockCells] |= columns[i];
+}
+
+// A grid, which it does not own, with its blocks.
 class OccupancyCells {
  public:
-  OccupancyCells(const uint8_t* cells, int resolution) : n_blocks_((resolution + kBlockCells - 1) / kBlockCells) {
-    const int padded = n_blocks_ * kBlockCells;
-    // Of the cells along z in each block of x and y.
-    std::vector<uint8_t> columns(size_t(n_blocks_) * n_blocks_ * padded);
-    for (int x = 0; x < resolution; ++x) {
-      for (int y = 0; y < resolution; ++y) {
-        const uint8_t* row = cells + OccupancyView::at(x, y, 0, resolution);
-        uint8_t* column = &columns[OccupancyView::at(x / kBlockCells, y / kBlockCells, 0, n_blocks_) * kBlockCells];
-        for (int z = 0; z < resolution; ++z) column[z] |= row[z];
-      }
-    }
-    blocks_.resize(columns.size() / kBlockCells);
-    for (size_t i = 0; i < columns.size(); ++i) blocks_[i / kBlockCells] |= columns[i];
-    view_ = {cells, blocks_.data(), resolution, n_blocks_};
+  OccupancyCells(const uint8_t* cells, int resolution) {
+    const int n_blocks = blocks_along(resolution);
+    blocks_.resize(size_t(n_blocks) * n_blocks * n_blocks);
+    find_occupied_blocks(cells, resolution, blocks_.data());
+    view_ = {cells, blocks_.data(), resolution, n_blocks};
   }
   OccupancyCells(const OccupancyCells&) = delete;
   OccupancyCells& operator=(const OccupancyCells&) = delete;
@@ -51,7 +61,6 @@ class OccupancyCells {
   const OccupancyView& view() const { return view_; }
 
  private:
-  int n_blocks_;
   std::vector<uint8_t> blocks_;
   OccupancyView view_;
 };
@@ -93,51 +102,73 @@ template <class T> struct RayLattice {
   SPLITNERF_HD Vec3<T> middle(int64_t k) const { return origin + direction * (start(k) + T(0.5) * step); }
 };
 
-// The first sample from k on whose midpoint stands in an occupied cell; -1 where the ray ends before. Empty blocks and
-// cells are crossed in one go: k advances to the first midpoint behind the exit.
+// What stands at the midpoint of one sample: an occupied cell, nothing, or the ray's end. Where it is nothing, empty blocks
+// and cells are crossed in one go: `next` is the first midpoint behind the exit.
+struct MarchStep {
+  Cell cell;  // kOpaque: the ray ends before this sample
+  int64_t next;
+};
 template <class T>
-SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView& grid, const MarchOptions& options,
-                                   int64_t k) {
+SPLITNERF_HD MarchStep march_step(const RayLattice<T>& ray, const OccupancyView& grid, const MarchOptions& options,
+                                  int64_t k) {
   const T box = T(options.box), cell_size = T(2) * box / T(grid.resolution),
           cells_per_unit = T(0.5) * T(grid.resolution) / box;
   const Vec3<T>&o = ray.origin, &d = ray.direction;
-  while (k < ray.n_steps) {
-    const T t_mid = ray.start(k) + T(0.5) * ray.step;
-    if (t_mid <= ray.t_near) {
-      ++k;
-      continue;
-    }
-    if (t_mid >= ray.t_far) return -1;
-    int cell[3];
-    for (int axis = 0; axis < 3; ++axis)
-      cell[axis] = clamp(static_cast<int>((o[axis] + t_mid * d[axis] + box) * cells_per_unit), 0, grid.resolution - 1);
-    int size = kBlockCells;  // of what is crossed
-    if (!grid.empty_block(cell)) {
-      const Cell state = grid.cell(cell);
-      if (state == Cell::kOpaque) return -1;
-      if (state == Cell::kOccupied) return k;
-      size = 1;
-    }
-    T t_exit = ray.t_far;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (d[axis] == T(0)) continue;
-      const int face = cell[axis] / size * size + (d[axis] > T(0) ? size : 0);
-      t_exit = min_of(t_exit, (T(face) * cell_size - box - o[axis]) * ray.inverse_direction[axis]);
-    }
-    k = max_of(k + 1, static_cast<int64_t>(std::ceil((t_exit - ray.lattice) * ray.inverse_step - T(0.5))));
+  if (k >= ray.n_steps) return {Cell::kOpaque, k};
+  const T t_mid = ray.start(k) + T(0.5) * ray.step;
+  if (t_mid <= ray.t_near) return {Cell::kEmpty, k + 1};
+  if (t_mid >= ray.t_far) return {Cell::kOpaque, k};
+  int cell[3];
+  for (int axis = 0; axis < 3; ++axis)
+    cell[axis] = clamp(static_cast<int>((o[axis] + t_mid * d[axis] + box) * cells_per_unit), 0, grid.resolution - 1);
+  int size = kBlockCells;  // of what is crossed
+  if (!grid.empty_block(cell)) {
+    const Cell state = grid.cell(cell);
+    if (state == Cell::kOpaque || state == Cell::kOccupied) return {state, k + 1};
+    size = 1;
   }
-  return -1;
+  T t_exit = ray.t_far;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (d[axis] == T(0)) continue;
+    const int face = cell[axis] / size * size + (d[axis] > T(0) ? size : 0);
+    t_exit = min_of(t_exit, (T(face) * cell_size - box - o[axis]) * ray.inverse_direction[axis]);
+  }
+  return {Cell::kEmpty,
+          max_of(k + 1, static_cast<int64_t>(std::ceil((t_exit - ray.lattice) * ray.inverse_step - T(0.5))))};
 }
 
-// Calls emit(t_start, t_end) for each sample in an occupied cell, front to back; returns their number.
-template <class T, class Emit>
-SPLITNERF_HD int64_t march_ray(Vec3<T> o, Vec3<T> d, T jitter, const OccupancyView& grid, MarchOptions options,
-                               Emit emit) {
+// The first sample from k on whose midpoint stands in an occupied cell; -1 where the ray ends before.
+template <class T>
+SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView& grid, const MarchOptions& options,
+                                   int64_t k) {
+  for (;;) {
+    const MarchStep step = march_step(ray, grid, options, k);
+    if (step.cell == Cell::kOccupied) return k;
+    if (step.cell == Cell::kOpaque) return -1;
+    k = step.next;
+  }
+}
+
+// Calls emit(i, t_start, t_end) for each sample in an occupied cell, i its number, front to back; returns how many there
+// are. Each thread of the group looks at one sample of as many neighbours; those that count are packed by their order.
+template <class T, class Group, class Emit>
+SPLITNERF_HD int64_t march_ray(const Group& group, Vec3<T> o, Vec3<T> d, T jitter, const OccupancyView& grid,
+                               const MarchOptions& options, Emit emit) {
   const RayLattice<T> ray(o, d, jitter, options);
   int64_t n = 0;
-  for (int64_t k = next_occupied(ray, grid, options, 0); k >= 0 && n < options.max_samples;
-       k = next_occupied(ray, grid, options, k + 1), ++n)
-    emit(ray.start(k), ray.start(k) + ray.step);
+  for (int64_t first = 0; first < ray.n_steps && n < options.max_samples;) {
+    const int64_t k = first + group.lane();
+    const MarchStep step = march_step(ray, grid, options, k);
+    const uint32_t ended = group.ballot(step.cell == Cell::kOpaque);
+    const uint32_t in_front = ended ? (ended & -ended) - 1 : ~0u;  // bits below the lowest
+    const uint32_t occupied = group.ballot(step.cell == Cell::kOccupied) & in_front;
+    const uint32_t mine = 1u << group.lane();
+    const int64_t i = n + count_bits(occupied & (mine - 1));
+    if (occupied & mine && i < options.max_samples) emit(i, ray.start(k), ray.start(k) + ray.step);
+    n = min_of(n + count_bits(occupied), options.max_samples);
+    if (ended) break;
+    first = group.last(step.next);
+  }
   return n;
 }
 

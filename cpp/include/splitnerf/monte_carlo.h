@@ -2,6 +2,7 @@
 // that stand where the split sum has L_s and L_d, and the radiance that follows, each with its adjoint.
 #pragma once
 
+#include "splitnerf/group.h"
 #include "splitnerf/sampling.h"
 #include "splitnerf/split_sum.h"
 
@@ -75,19 +76,20 @@ template <class T> struct LightSums {
   Vec3<T> all, grazing, diffuse;
 };
 
-//
 // incoming(i) says where light comes from, 1 / (n p_i), or the solid angle of a fixed set of directions, and L_i.
 template <class T> struct IncomingLight {
   Vec3<T> direction;
   T measure;  // 0: does not count
   Vec3<T> radiance;
 };
-template <class T, class Incoming>
-SPLITNERF_HD LightSums<T> sum_light(Vec3<T> normal, Vec3<T> view, T roughness, int n, Incoming incoming) {
+// The threads of the group share the directions; all of them get the sums.
+template <class T, class Group, class Incoming>
+SPLITNERF_HD LightSums<T> sum_light(const Group& group, Vec3<T> normal, Vec3<T> view, T roughness, int n,
+                                    Incoming incoming) {
   const Vec3<T> facing_normal = normal * facing(normal, view);
   const T ggx_alpha = sampled_alpha(roughness);
   LightSums<T> sums{{T(0), T(0), T(0)}, {T(0), T(0), T(0)}, {T(0), T(0), T(0)}};
-  for (int i = 0; i < n; ++i) {
+  for (int i = group.lane(); i < n; i += Group::size) {
     const IncomingLight<T> light = incoming(i);
     if (!(light.measure > T(0))) continue;
     const LobeWeight<T> w = lobe_weight(facing_normal, view, light.direction, ggx_alpha).value;
@@ -96,7 +98,7 @@ SPLITNERF_HD LightSums<T> sum_light(Vec3<T> normal, Vec3<T> view, T roughness, i
     sums.grazing += share * (w.specular * w.schlick);
     sums.diffuse += share * w.cosine;
   }
-  return sums;
+  return {sum3(group, sums.all), sum3(group, sums.grazing), sum3(group, sums.diffuse)};
 }
 
 template <class T> struct LightSumsGrad {
@@ -106,14 +108,14 @@ template <class T> struct LightSumsGrad {
 
 // Gradients to normal and roughness; receive(i, gradient) takes that to L_i. Directions and measures are taken as given:
 // the integral does not depend on them.
-template <class T, class Incoming, class Receive>
-SPLITNERF_HD LightSumsGrad<T> sum_light_backward(Vec3<T> normal, Vec3<T> view, T roughness, int n, Incoming incoming,
-                                                 const LightSums<T>& grad, Receive receive) {
+template <class T, class Group, class Incoming, class Receive>
+SPLITNERF_HD LightSumsGrad<T> sum_light_backward(const Group& group, Vec3<T> normal, Vec3<T> view, T roughness, int n,
+                                                 Incoming incoming, const LightSums<T>& grad, Receive receive) {
   const T sign = facing(normal, view), ggx_alpha = sampled_alpha(roughness);
   const Vec3<T> facing_normal = normal * sign;
   LightSumsGrad<T> out{{T(0), T(0), T(0)}, T(0)};
   T grad_alpha = T(0);
-  for (int i = 0; i < n; ++i) {
+  for (int i = group.lane(); i < n; i += Group::size) {
     Vec3<T> grad_share{T(0), T(0), T(0)};
     const IncomingLight<T> light = incoming(i);
     if (light.measure > T(0)) {
@@ -128,12 +130,19 @@ SPLITNERF_HD LightSumsGrad<T> sum_light_backward(Vec3<T> normal, Vec3<T> view, T
     }
     receive(i, grad_share);
   }
-  out.normal = out.normal * sign;
+  out.normal = sum3(group, out.normal) * sign;
+  grad_alpha = group.sum(grad_alpha);
   // ggx_alpha = roughness^2 above its floor
   out.roughness = roughness * roughness > T(kMinSampledAlpha) ? grad_alpha * T(2) * roughness : T(0);
   return out;
 }
 
+// Light from n directions that all points share, and what of it arrives at each.
+template <class T> struct SharedLight {
+  int n;
+  const T *directions, *solid_angles, *radiance;  // [n, 3], [n], [n, 3]
+  const T *visible, *sent;                        // [points, n]; [points, n, 3] what arrives beside it, or null
+};
 template <class T> struct SummedPoint {
   Vec3<T> normal, view, albedo;
   T roughness, metallic;
@@ -188,5 +197,10 @@ SPLITNERF_HD SummedPoint<T> shade_sums_backward(const float* lut, bool compensat
   out.view = p.normal * (sign * grad_nv);
   return out;
 }
+
+// The fields of SummedPoint as arrays, 3 values each but for roughness and metallic.
+template <class T> struct SummedArrays {
+  T *normals, *view_dirs, *albedo, *roughness, *metallic, *all, *grazing, *diffuse;
+};
 
 }  // namespace splitnerf

@@ -1,6 +1,7 @@
 // NeuS volume rendering of a signed distance function, in log space.
 #pragma once
 
+#include "splitnerf/group.h"
 #include "splitnerf/vec.h"
 
 namespace splitnerf {
@@ -38,27 +39,46 @@ SPLITNERF_HD OpticalDepthGrad<T> neus_optical_depth_backward(T f_prev, T f_next,
   return {grad_tau * s * p, -grad_tau * s * n, grad_tau * (apart * p - f_next * rise), -grad_tau * s * rise};
 }
 
-// What an interval falls by: apart[i], or without it the difference of its ends.
-template <class T> SPLITNERF_HD T fall(const T* f_prev, const T* f_next, const T* apart, int64_t i) {
-  return apart ? apart[i] : f_prev[i] - f_next[i];
+// One sample of a ray: the distances at its ends, and what it falls by.
+template <class T> struct NeusInterval {
+  T f_prev, f_next, apart;
+};
+template <class T> SPLITNERF_HD T neus_optical_depth(const NeusInterval<T>& interval, T s) {
+  return neus_optical_depth(interval.f_prev, interval.f_next, interval.apart, s);
 }
 
-// Weights w_i = T_i alpha_i of the samples of one ray and its opacity A = sum w = -expm1(-sum tau).
+// Samples given by the distances at their ends; apart may be null.
+template <class T> struct NeusEnds {
+  const T *f_prev, *f_next, *apart;
+
+  SPLITNERF_HD NeusInterval<T> operator()(int64_t i) const {
+    return {f_prev[i], f_next[i], apart ? apart[i] : f_prev[i] - f_next[i]};
+  }
+};
+
+// Optical depth behind which a sample counts for nothing.
+template <class T> SPLITNERF_HD T neus_depth_limit(T min_transmittance) {
+  return min_transmittance > T(0) ? -std::log(min_transmittance) : T(INFINITY);
+}
+
+// Weights w_i = T_i alpha_i of the n samples of one ray and its opacity A = sum w = -expm1(-sum tau). at(i) is a NeusInterval.
 // Samples behind transmittance < min_transmittance get weight 0. Depths add up in double: thousands of equal ones in float
 // would be rounded the same way each time.
-template <class T>
-SPLITNERF_HD T neus_ray_weights(const T* f_prev, const T* f_next, const T* apart, T s, int64_t n, T min_transmittance,
-                                T* weights) {
-  double depth = 0;
-  const T depth_limit = min_transmittance > T(0) ? -std::log(min_transmittance) : T(INFINITY);
-  for (int64_t i = 0; i < n; ++i) {
+template <class T, class Group, class At>
+SPLITNERF_HD T neus_ray_weights(const Group& group, const At& at, T s, int64_t n, T min_transmittance, T* weights) {
+  const T depth_limit = neus_depth_limit(min_transmittance);
+  double depth = 0;  // in front of the group's samples
+  for (int64_t first = 0; first < n; first += Group::size) {
+    const int64_t i = first + group.lane();
     if (depth > depth_limit) {
-      weights[i] = T(0);
+      if (i < n) weights[i] = T(0);
       continue;
     }
-    const T tau = neus_optical_depth(f_prev[i], f_next[i], fall(f_prev, f_next, apart, i), s);
-    weights[i] = std::exp(-T(depth)) * -std::expm1(-tau);
-    depth += double(tau);
+    const T tau = i < n ? neus_optical_depth(at(i), s) : T(0);
+    const double before = depth + group.sum_before(double(tau));
+    const bool live = !(before > depth_limit);
+    if (i < n) weights[i] = live ? std::exp(-T(before)) * -std::expm1(-tau) : T(0);
+    depth += group.sum(live ? double(tau) : 0.0);
   }
   return -std::expm1(-T(depth));
 }
@@ -68,29 +88,41 @@ SPLITNERF_HD T neus_ray_weights(const T* f_prev, const T* f_next, const T* apart
 // behind each sample waits in depths [n] until then: subtracting tau again would lose the small depths in
 // front of a deep one. Calls keep(i, OpticalDepthGrad) for each sample, after the last use of depths[i]; returns the
 // gradient to s.
-template <class T, class Keep>
-SPLITNERF_HD T neus_ray_weights_backward(const T* f_prev, const T* f_next, const T* apart, T s, int64_t n,
-                                         T min_transmittance, const T* weights, const T* grad_weights, T grad_opacity,
-                                         T* depths, Keep keep) {
-  const T depth_limit = min_transmittance > T(0) ? -std::log(min_transmittance) : T(INFINITY);
+template <class T, class Group, class At, class Keep>
+SPLITNERF_HD T neus_ray_weights_backward(const Group& group, const At& at, T s, int64_t n, T min_transmittance,
+                                         const T* weights, const T* grad_weights, T grad_opacity, T* depths,
+                                         Keep keep) {
+  const T depth_limit = neus_depth_limit(min_transmittance);
   double depth = 0;
   int64_t n_live = 0;  // samples that the forward pass looked at
-  for (; n_live < n && !(depth > depth_limit); ++n_live)
-    depths[n_live] =
-        T(depth += double(neus_optical_depth(f_prev[n_live], f_next[n_live], fall(f_prev, f_next, apart, n_live), s)));
-  for (int64_t i = n_live; i < n; ++i) keep(i, OpticalDepthGrad<T>{T(0), T(0), T(0), T(0)});
+  for (int64_t first = 0; first < n && !(depth > depth_limit); first += Group::size) {
+    const int64_t i = first + group.lane();
+    const double tau = i < n ? double(neus_optical_depth(at(i), s)) : 0.0;
+    const double before = depth + group.sum_before(tau);
+    const bool live = i < n && !(before > depth_limit);
+    if (live) depths[i] = T(before + tau);
+    depth += group.sum(live ? tau : 0.0);
+    n_live += group.sum(live ? 1 : 0);
+  }
+  for (int64_t i = n_live + group.lane(); i < n; i += Group::size) keep(i, OpticalDepthGrad<T>{T(0), T(0), T(0), T(0)});
+  group.sync();
   const T grad_passing = grad_opacity * std::exp(-T(depth));
   double behind = 0, grad_s = 0;
-  for (int64_t i = n_live - 1; i >= 0; --i) {
+  for (int64_t last = n_live - 1; last >= 0; last -= Group::size) {
+    const int64_t i = last - group.lane();
+    const double pulled = i >= 0 ? double(grad_weights[i]) * double(weights[i]) : 0.0;
+    const double pulled_behind = behind + group.sum_before(pulled);
+    behind += group.sum(pulled);
+    if (i < 0) continue;
     const T transmittance_after = std::exp(-depths[i]);
-    const T grad_tau = grad_weights[i] * transmittance_after - T(behind) + grad_passing;
-    behind += double(grad_weights[i]) * double(weights[i]);
+    const T grad_tau = grad_weights[i] * transmittance_after - T(pulled_behind) + grad_passing;
+    const NeusInterval<T> interval = at(i);
     const OpticalDepthGrad<T> g =
-        neus_optical_depth_backward(f_prev[i], f_next[i], fall(f_prev, f_next, apart, i), s, grad_tau);
+        neus_optical_depth_backward(interval.f_prev, interval.f_next, interval.apart, s, grad_tau);
     keep(i, g);
     grad_s += double(g.s);
   }
-  return T(grad_s);
+  return T(group.sum(grad_s));
 }
 
 // ---- from the field at a sample to its normal and its interval --------------------------------
@@ -115,6 +147,41 @@ template <class T> SPLITNERF_HD AnnealedCosine<T> annealed_cosine(T cosine, T t)
   const T soft = T(0.5) - T(0.5) * cosine;  // a NaN goes on to the caller
   return {-((soft < T(0) ? T(0) : soft) * (T(1) - t) + (cosine > T(0) ? T(0) : -cosine) * t),
           (soft > T(0) ? T(0.5) : T(0)) * (T(1) - t) + (cosine < T(0) ? t : T(0))};
+}
+
+struct SampleRange {
+  int64_t first, n;
+};
+// Samples of many rays in one array, ray after ray. On the GPU nobody has looked at the offsets, which would mean waiting for
+// it: whatever they are, no sample outside the n_samples there are is touched.
+struct PackedRays {
+  int64_t n_rays, n_samples;
+  const int64_t* offsets;  // [n_rays + 1]
+
+  SPLITNERF_HD SampleRange samples_of(int64_t ray) const {
+    const int64_t first = clamp<int64_t>(offsets[ray], 0, n_samples);
+    return {first, clamp<int64_t>(offsets[ray + 1], first, n_samples) - first};
+  }
+};
+
+// Samples of a surface: distance and gradient in their middles, for which the distance is taken as linear over a
+// sample's length `step`, seen under the annealed cosine.
+template <class T> struct SurfaceSamples {
+  PackedRays rays;
+  const T *sdf, *gradient, *directions;  // [n], [n, 3], [n_rays, 3] unit
+  const T* s;                            // one number
+  T step, anneal, min_transmittance;
+};
+
+// The distances at both ends of a sample and what it falls by; seen grazing that is less than the roundings of both ends.
+template <class T> SPLITNERF_HD NeusInterval<T> surface_interval(T sdf, T cosine, T step, T anneal) {
+  const T half = T(0.5) * step * annealed_cosine(cosine, anneal).value;
+  return {sdf - half, sdf + half, T(-2) * half};
+}
+// Gradient to the cosine: f_prev, f_next = sdf -+ half,  half = step / 2 annealed(cosine).
+template <class T>
+SPLITNERF_HD T surface_interval_backward(const OpticalDepthGrad<T>& grad, T cosine, T step, T anneal) {
+  return (grad.f_next - grad.f_prev) * T(0.5) * step * annealed_cosine(cosine, anneal).slope;
 }
 
 }  // namespace splitnerf

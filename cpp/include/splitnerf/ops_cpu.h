@@ -3,16 +3,18 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/kernels.h"
 #include "splitnerf/light_pyramid.h"
 #include "splitnerf/march.h"
+#include "splitnerf/monte_carlo.h"
 #include "splitnerf/occlusion.h"
 #include "splitnerf/ray_walk.h"
 #include "splitnerf/scene.h"
+#include "splitnerf/sdf_layer.h"
 #include "splitnerf/split_sum.h"
+#include "splitnerf/varying_outputs.h"
 #include "splitnerf/visibility_cache.h"
 
 namespace splitnerf::cpu {
@@ -101,12 +103,6 @@ SPLITNERF_API void monte_carlo_light_backward(int64_t n, int n_samples, const T*
                                               const T* roughness, const T* light_dirs, const T* pdf, const T* radiance,
                                               const T* grad_sums, T* grad_normals, T* grad_roughness, T* grad_radiance);
 
-// Light from n directions that all points share, and what of it arrives at each.
-template <class T> struct SharedLight {
-  int n;
-  const T *directions, *solid_angles, *radiance;  // [n, 3], [n], [n, 3]
-  const T *visible, *sent;                        // [points, n]; [points, n, 3] what arrives beside it, or null
-};
 template <class T>
 SPLITNERF_API void summed_light(int64_t n, const T* normals, const T* view_dirs, const T* roughness,
                                 const SharedLight<T>& light, T* sums);
@@ -115,10 +111,6 @@ SPLITNERF_API void summed_light_backward(int64_t n, const T* normals, const T* v
                                          const SharedLight<T>& light, const T* grad_sums, T* grad_normals,
                                          T* grad_roughness, T* grad_light);
 
-// The fields of SummedPoint as arrays, 3 values each but for roughness and metallic.
-template <class T> struct SummedArrays {
-  T *normals, *view_dirs, *albedo, *roughness, *metallic, *all, *grazing, *diffuse;
-};
 template <class T>
 SPLITNERF_API void shade_sums(const float* lut, bool compensate, int64_t n, const SummedArrays<const T>& in,
                               T* radiance);
@@ -138,11 +130,11 @@ template <class T> SPLITNERF_API void srgb_to_linear(int64_t n, const T* srgb, T
 template <class T>
 SPLITNERF_API void pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, const T* background,
                                 bool linear, T* losses, T* colour_by_mean, T* colour_by_opacity, T* mask_by_opacity);
-// gradients [n, 3], the last m of which stand beside those at beside [m], weights of the first ones -> losses [2]: eikonal,
+// gradients [n, 3], the last m of which stand beside those at beside [m], weights [n_weights] of the first ones -> losses [2]: eikonal,
 // smoothness; their gradients [n, 3] each.
 template <class T>
-SPLITNERF_API void gradient_losses(int64_t n, int64_t m, const T* gradients, const T* weights, const int64_t* beside,
-                                   T* losses, T* eikonal_by, T* smoothness_by);
+SPLITNERF_API void gradient_losses(int64_t n, int64_t n_weights, int64_t m, const T* gradients, const T* weights,
+                                   const int64_t* beside, T* losses, T* eikonal_by, T* smoothness_by);
 // albedo [n, 3], metallic, shares [n] -> losses [3]: metal, binary, dark, means by the shares; by_metallic [3, n].
 template <class T>
 SPLITNERF_API void material_losses(int64_t n, const T* albedo, const T* metallic, const T* shares, bool smooth_l1,
@@ -154,6 +146,8 @@ SPLITNERF_API void quadratic_entropy(int64_t n, int64_t n_channels, const T* x, 
 
 // ---- rays ----
 
+// blocks [blocks_along(resolution)^3]: those of the cells [resolution^3] that hold one that is not empty.
+SPLITNERF_API void occupied_blocks(const uint8_t* cells, int resolution, uint8_t* blocks);
 // jitter [n_rays] in [0, 1). offsets [n_rays + 1] is filled with the exclusive sum of the counts.
 template <class T>
 SPLITNERF_API void march_rays_count(const MarchOptions& options, const OccupancyView& grid, int64_t n_rays,
@@ -162,14 +156,6 @@ template <class T>
 SPLITNERF_API void march_rays_fill(const MarchOptions& options, const OccupancyView& grid, int64_t n_rays,
                                    const T* rays_o, const T* rays_d, const T* jitter, const int64_t* offsets,
                                    int64_t* ray_indices, T* t_starts, T* t_ends);
-
-// The distance field as it comes.
-template <class T> struct SdfField {
-  HashGridShape shape;
-  int n_active;
-  const T* table;
-  SdfWeights<T> weights;
-};
 
 // positions [n, 3] -> values [n], scene units.
 template <class T> SPLITNERF_API void sdf_values(const SdfField<T>& field, int64_t n, const T* positions, T* values);
@@ -185,26 +171,14 @@ SPLITNERF_API void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, c
                                       T* grad_features, T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias,
                                       T* grad_out, T* grad_out_bias);
 
-// What is kept of a ray: where its samples start, front to back.
-template <class T> struct SampledRay {
-  std::vector<T> starts;
-  int64_t n_evaluated = 0;  // points at which the distance was asked for
-};
-
-// Follows each ray through the occupied cells and asks for the distance on the way, see ray_walk.h. sampled [n_rays].
+// Follows each ray through the occupied cells and asks for the distance on the way, see ray_walk.h. offsets [n_rays + 1];
+// n_evaluated [n_rays]: points at which the distance was asked for; allocate(n) makes room for the n samples that are kept.
 template <class T>
 SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& march, const OccupancyView& grid,
                                const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d,
-                               const T* jitter, SampledRay<T>* sampled);
+                               const T* jitter, int64_t* offsets, int64_t* n_evaluated,
+                               const SampleAllocator<T>& allocate);
 
-// Samples of a surface: distance and gradient in their middles, for which the distance is taken as linear over a
-// sample's length `step`, seen under the annealed cosine.
-template <class T> struct SurfaceSamples {
-  int64_t n_rays;
-  const int64_t* offsets;                // [n_rays + 1]
-  const T *sdf, *gradient, *directions;  // [n], [n, 3], [n_rays, 3] unit
-  T s, step, anneal, min_transmittance;
-};
 // normals [n, 3], weights [n], opacity [n_rays].
 template <class T>
 SPLITNERF_API void surface_weights(const SurfaceSamples<T>& samples, T* normals, T* weights, T* opacity);
@@ -216,20 +190,14 @@ SPLITNERF_API void surface_weights_backward(const SurfaceSamples<T>& samples, co
 
 // Which samples are shaded, `per_ray` of each ray spread by weight (0: all), and where the others lie between them. What is
 // more than `gap` apart along the ray is drawn for and interpolated on its own.
-struct Spread {
-  std::vector<int64_t> shaded;         // [m] samples, ascending
-  std::vector<int64_t> first, second;  // [n] positions in `shaded`: the neighbours of each sample in its ray
-  std::vector<int64_t> heaviest;       // [rays with samples] positions in `shaded`: the largest weight of those
-  std::vector<int64_t> leaders;        // [stretches] positions in `shaded`: the largest weight of each
-  std::vector<int64_t> stretch;        // [m] the stretch of each of `shaded`
-};
-// weights [n], t [n] along the ray, phase [n_rays] -> share [n] of the second neighbour.
+// weights [n], t [n] along the ray, phase [n_rays] -> first, second, share [n] and what allocate() makes room for, see Spread.
 template <class T>
-SPLITNERF_API Spread spread_samples(int64_t n_rays, const int64_t* offsets, const T* weights, const T* t,
-                                    const T* phase, T gap, int per_ray, T* share);
+SPLITNERF_API void spread_samples(const PackedRays& rays, const T* weights, const T* t, const T* phase, T gap,
+                                  int per_ray, int64_t* first, int64_t* second, T* share,
+                                  const SpreadAllocator& allocate);
 // values [m, c] -> [n, c], between the first and the second neighbour.
 template <class T>
-SPLITNERF_API void interpolate(int64_t n, int64_t n_channels, const int64_t* first, const int64_t* second,
+SPLITNERF_API void interpolate(int64_t n, int64_t m, int64_t n_channels, const int64_t* first, const int64_t* second,
                                const T* share, const T* values, T* interpolated);
 // grad_interpolated [n, c] -> grad_values [m, c], overwritten.
 template <class T>
@@ -237,23 +205,22 @@ SPLITNERF_API void interpolate_backward(int64_t n, int64_t m, int64_t n_channels
                                         const int64_t* second, const T* share, const T* grad_interpolated,
                                         T* grad_values);
 
-// f_prev, f_next [n], offsets [n_rays + 1] -> weights [n], opacity [n_rays].
+// f_prev, f_next [n], s one number -> weights [n], opacity [n_rays].
 template <class T>
-SPLITNERF_API void neus_weights(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s,
+SPLITNERF_API void neus_weights(const PackedRays& rays, const T* f_prev, const T* f_next, const T* s,
                                 T min_transmittance, T* weights, T* opacity);
 // grad_s_rays [n_rays]: each ray's share of the gradient to s.
 template <class T>
-SPLITNERF_API void neus_weights_backward(int64_t n_rays, const int64_t* offsets, const T* f_prev, const T* f_next, T s,
+SPLITNERF_API void neus_weights_backward(const PackedRays& rays, const T* f_prev, const T* f_next, const T* s,
                                          T min_transmittance, const T* weights, const T* grad_weights,
                                          const T* grad_opacity, T* grad_f_prev, T* grad_f_next, T* grad_s_rays);
 
 // weights [n], values [n, c] -> sums [n_rays, c].
 template <class T>
-SPLITNERF_API void composite(int64_t n_rays, int64_t n_channels, const int64_t* offsets, const T* weights,
-                             const T* values, T* sums);
+SPLITNERF_API void composite(const PackedRays& rays, int64_t n_channels, const T* weights, const T* values, T* sums);
 template <class T>
-SPLITNERF_API void composite_backward(int64_t n_rays, int64_t n_channels, const int64_t* offsets, const T* weights,
-                                      const T* values, const T* grad_sums, T* grad_weights, T* grad_values);
+SPLITNERF_API void composite_backward(const PackedRays& rays, int64_t n_channels, const T* weights, const T* values,
+                                      const T* grad_sums, T* grad_weights, T* grad_values);
 
 // ---- occlusion ----
 
@@ -279,15 +246,6 @@ SPLITNERF_API void visibility_bits(const Scene& scene, int64_t n, const float* p
 template <class T>
 SPLITNERF_API void build_vertex_grids(int64_t n_vertices, const T* vertices, T radius, int n_levels, int64_t n_buckets,
                                       int32_t* starts, int32_t* order);
-
-template <class T> struct VisibilityCache {
-  VertexGrids<T> grids;
-  const uint32_t* bits;  // [n_vertices, 2, n_directions / 32], see visibility_bits
-  const int32_t* hits;   // [n_vertices, n_directions], or null: no indirect light
-  const T* radiance;     // [n_vertices, 3] that the vertices send out, with hits
-  int64_t n_directions;
-  const T *directions, *light;  // [n_directions, 3]; the light's mean over each direction's cell
-};
 
 // positions, normals, lobe_dirs [n, 3], roughness [n] -> occlusion_d, occlusion_s, and with hits indirect_d and
 // indirect_s, [n, 3] each. Numbers that are not finite make NaN.

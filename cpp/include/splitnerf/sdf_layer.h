@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "splitnerf/hash_grid.h"
+
 namespace splitnerf {
 
 // outputs = out softplus_beta(hidden [position, features] + hidden_bias) + out_bias; the first output is the distance.
@@ -16,7 +18,15 @@ template <class T> struct SdfWeights {
   T box;  // half size of the cube that the grid covers: d unit position / d position = 1 / (2 box)
 };
 
-// The same with rows padded to whole vectors, and transposed, as products over blocks of points need them.
+// The distance field as it comes.
+template <class T> struct SdfField {
+  HashGridShape shape;
+  int n_active;
+  const T* table;
+  SdfWeights<T> weights;
+};
+
+// The same weights with rows padded to whole vectors, and transposed, as products over blocks of points need them.
 template <class T> struct SdfLayer {
   int64_t n_inputs, width, n_outputs;
   int64_t input_columns, width_columns, output_columns;  // padded

@@ -46,10 +46,19 @@ SPLITNERF_HD void sh_evaluate(const ShRecurrence<T>& r, const T* sh, const V* zo
   }
 }
 
-// Adjoint of sh_evaluate for grad[3]: adds to grad_sh[l, m, c], overwrites the others.
-template <class V, class T>
+// Receives the gradient to the coefficients: coefficient i gets basis grad[k] in channel k.
+template <class V> struct ShGradSum {
+  V* sums;  // [kShCoefficients, 3]
+
+  SPLITNERF_HD void add(int i, const V& basis, const V* grad) const {
+    for (int k = 0; k < 3; ++k) sums[3 * i + k] += basis * grad[k];
+  }
+};
+
+// Adjoint of sh_evaluate for grad[3]: hands the gradient to sh to `to_sh`, overwrites the others.
+template <class V, class T, class Receiver>
 SPLITNERF_HD void sh_evaluate_backward(const ShRecurrence<T>& r, const T* sh, const V* zonal, const V& x, const V& y,
-                                       const V& z, const V* grad, V* grad_sh, V* grad_zonal, V* grad_xyz) {
+                                       const V& z, const V* grad, const Receiver& to_sh, V* grad_zonal, V* grad_xyz) {
   V c = V{} + T(1), s = V{}, c_before = V{}, s_before = V{};
   for (int l = 0; l <= kShDegree; ++l) grad_zonal[l] = V{};
   for (int k = 0; k < 3; ++k) grad_xyz[k] = V{};
@@ -58,14 +67,12 @@ SPLITNERF_HD void sh_evaluate_backward(const ShRecurrence<T>& r, const T* sh, co
     for (int l = m; l <= kShDegree; ++l) {
       const T *pc = sh + 3 * sh_index(l, m), *ps = sh + 3 * sh_index(l, -m);
       const V w = p * zonal[l], wc = w * c, ws = w * s;
-      V *gc = grad_sh + 3 * sh_index(l, m), *gs = grad_sh + 3 * sh_index(l, -m);
+      to_sh.add(sh_index(l, m), wc, grad);
+      if (m > 0) to_sh.add(sh_index(l, -m), ws, grad);
       V to_c = V{}, to_s = V{};
       for (int k = 0; k < 3; ++k) {
-        gc[k] += wc * grad[k];
         to_c += grad[k] * pc[k];
-        if (m == 0) continue;
-        gs[k] += ws * grad[k];
-        to_s += grad[k] * ps[k];
+        if (m > 0) to_s += grad[k] * ps[k];
       }
       grad_c += w * to_c, grad_s += w * to_s;
       const V both = c * to_c + s * to_s;

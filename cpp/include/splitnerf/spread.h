@@ -40,4 +40,48 @@ template <class T> SPLITNERF_HD T share_between(T t, T t_first, T t_second) {
   return t_second > t_first ? clamp((t - t_first) / (t_second - t_first), T(0), T(1)) : T(0);
 }
 
+// A ray's samples [begin, end) of all, and which of them are shaded: positions [at, at + drawn) in `shaded`, drawn > 0.
+template <class T> struct SpreadRay {
+  const T *weights, *t;
+  int64_t begin, end;
+  const int64_t* shaded;
+  int64_t at, drawn;
+};
+
+// The position in `shaded` of the largest weight of the ray.
+template <class T> SPLITNERF_HD int64_t heaviest_drawn(const SpreadRay<T>& ray) {
+  int64_t heaviest = ray.at;
+  for (int64_t k = ray.at; k < ray.at + ray.drawn; ++k)
+    if (ray.weights[ray.shaded[k]] > ray.weights[ray.shaded[heaviest]]) heaviest = k;
+  return heaviest;
+}
+
+// Places the ray's samples between those that are shaded: fills first, second and share of the samples, stretch of the drawn
+// ones, counted from n_before, and the leader of each stretch. Returns how many stretches there are, at most as many as are drawn.
+template <class T>
+SPLITNERF_HD int64_t arrange_spread(const SpreadRay<T>& ray, T gap, int64_t n_before, int64_t* first, int64_t* second,
+                                    T* share, int64_t* leaders, int64_t* stretch) {
+  const int64_t last = ray.at + ray.drawn - 1;
+  int64_t at = ray.at, n_stretches = 0, stretch_end = ray.begin;
+  for (int64_t i = ray.begin, first_drawn = at; i < ray.end; ++i) {
+    if (i == stretch_end) {  // a new stretch: its neighbours are drawn samples of its own
+      for (stretch_end = i + 1; stretch_end < ray.end && !(ray.t[stretch_end] - ray.t[stretch_end - 1] > gap);)
+        ++stretch_end;
+      while (ray.shaded[first_drawn] < i) ++first_drawn;
+      at = first_drawn;
+      int64_t leader = at, after = at;
+      for (; after <= last && ray.shaded[after] < stretch_end; ++after) {
+        if (ray.weights[ray.shaded[after]] > ray.weights[ray.shaded[leader]]) leader = after;
+        stretch[after] = n_before + n_stretches;
+      }
+      leaders[n_stretches++] = leader;
+    }
+    while (at < last && ray.shaded[at + 1] <= i) ++at;
+    const bool more = at < last && ray.shaded[at + 1] < stretch_end;
+    first[i] = at, second[i] = ray.shaded[at] < i && more ? at + 1 : at;
+    share[i] = share_between(ray.t[i], ray.t[ray.shaded[first[i]]], ray.t[ray.shaded[second[i]]]);
+  }
+  return n_stretches;
+}
+
 }  // namespace splitnerf

@@ -1,6 +1,7 @@
 #include <cstring>
 
 #include "kernel_set.h"
+#include "splitnerf/bodies/hash_encode.h"
 
 namespace splitnerf::SPLITNERF_ISA {
 namespace {
@@ -121,23 +122,11 @@ void scatter_level(const HashEncodeArgs<T>& args, int l, const T* grad_features,
 template <class T, int F>
 void position_gradient(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, const T* grad_features,
                        const T* grad_jacobian, T* grad_positions) {
-  const int64_t n_columns = int64_t(args.n_levels) * F;
   for (int64_t p = begin; p < end; ++p) {
     Vec3<T> grad{T(0), T(0), T(0)};
-    for (int l = 0; l < args.n_active; ++l) {
-      const HashCell<T> cell = hash_cell(args.levels[l], load3(args.positions + 3 * p));
-      for (int i = 0; i < 8; ++i) {
-        const CornerWeight<T> w = corner_weight_derivatives(cell, i);
-        const T* entry = args.table + cell.index[i] * F;
-        for (int f = 0; f < F; ++f) {
-          if (grad_features) grad += w.d * (entry[f] * grad_features[p * n_columns + l * F + f]);
-          if (!grad_jacobian) continue;
-          const T* gj = grad_jacobian + p * 3 * n_columns + l * F + f;
-          const T gx = gj[0], gy = gj[n_columns], gz = gj[2 * n_columns];
-          grad += Vec3<T>{w.dxy * gy + w.dxz * gz, w.dxy * gx + w.dyz * gz, w.dxz * gx + w.dyz * gy} * entry[f];
-        }
-      }
-    }
+    for (int l = 0; l < args.n_active; ++l)
+      add_position_gradient<F>(args.levels[l], l, args.n_levels, p, args.positions, args.table, grad_features,
+                               grad_jacobian, grad);
     store3(grad_positions + 3 * p, grad);
   }
 }

@@ -77,8 +77,8 @@ void flush_backward(const LightPyramid<T>& p, Waiting<T>& waiting, const T* grad
       grad_sh[c][k] += waiting.share[k] * g * floored.d_e * T(kShFloor * kShConstant);
     }
   }
-  sh_evaluate_backward(*p.recurrence, p.sh, waiting.zonal, waiting.x, waiting.y, waiting.z, grad, grad_sh, grad_zonal,
-                       grad_xyz);
+  sh_evaluate_backward(*p.recurrence, p.sh, waiting.zonal, waiting.x, waiting.y, waiting.z, grad, ShGradSum<V>{grad_sh},
+                       grad_zonal, grad_xyz);
   for (int l = 0; l < kShBands; ++l) to_roughness += grad_zonal[l] * waiting.zonal_slope[l];
   for (int k = 0; k < waiting.n; ++k) {
     const int64_t i = waiting.point[k];
@@ -115,18 +115,8 @@ void light_lookup(const LightPyramid<T>& p, int64_t begin, int64_t end, const T*
   for (int64_t i = begin; i < end; ++i) {
     const Vec3<T> w = load3(directions + 3 * i);
     const LightMix<T> mix = light_mix(p, roughness[i]);
-    Vec3<T> value{T(0), T(0), T(0)};
-    if (mix.share != T(1)) {
-      const Vec2<T> uv = octahedral_encode(w);
-      const int k = mix.level, n = p.resolution[k];
-      value = read_level(p.levels + 3 * p.offset[k], octahedral_footprint(n, uv)) * (T(1) - mix.share);
-      if (k + 1 < p.n_levels && mix.share > T(0)) {
-        const int m = p.resolution[k + 1];
-        value += read_level(p.levels + 3 * p.offset[k + 1], octahedral_footprint(m, uv)) * mix.share;
-      }
-    }
-    store3(radiance + 3 * i, value);
-    if (mix.level + 1 < p.n_levels || mix.share == T(0)) continue;
+    store3(radiance + 3 * i, read_maps(p, mix, w));
+    if (mix.share == T(0) || !reads_harmonics(p, mix)) continue;
     waiting.add(p, mix, i, w, roughness[i]);
     if (waiting.full()) flush(p, waiting, radiance);
   }
@@ -143,26 +133,10 @@ void light_lookup_backward(const LightPyramid<T>& p, int64_t begin, int64_t end,
   for (int64_t i = begin; i < end; ++i) {
     const Vec3<T> w = load3(directions + 3 * i), grad = load3(grad_radiance + 3 * i);
     const LightMix<T> mix = light_mix(p, roughness[i]);
-    Vec3<T> grad_w{T(0), T(0), T(0)};
-    T along_rho = T(0);
-    if (mix.share != T(1)) {
-      const Vec2<T> uv = octahedral_encode(w);
-      Vec2<T> grad_uv{T(0), T(0)};
-      for (int above = 0; above < 2 && mix.level + above < p.n_levels; ++above) {
-        const T share = above ? mix.share : T(1) - mix.share, slope = above ? mix.slope : -mix.slope;
-        if (share == T(0) && slope == T(0)) continue;
-        const int k = mix.level + above, n = p.resolution[k];
-        const T* map = p.levels + 3 * p.offset[k];
-        const OctahedralFootprint<T> f = octahedral_footprint(n, uv);
-        const Vec2<T> g = read_level_backward(map, n, f, grad * share, grad_levels + 3 * p.offset[k]);
-        grad_uv.x += g.x, grad_uv.y += g.y;
-        if (slope != T(0)) along_rho += slope * dot(read_level(map, f), grad);
-      }
-      grad_w = octahedral_encode_backward(w, grad_uv);
-    }
-    store3(grad_directions + 3 * i, grad_w);
-    grad_roughness[i] = along_rho;
-    if (mix.level + 1 < p.n_levels || (mix.share == T(0) && mix.slope == T(0))) continue;
+    const LightArgumentsGrad<T> to = read_maps_backward(p, mix, w, grad, grad_levels);
+    store3(grad_directions + 3 * i, to.direction);
+    grad_roughness[i] = to.roughness;
+    if (!reads_harmonics(p, mix)) continue;
     waiting.add(p, mix, i, w, roughness[i]);
     if (waiting.full()) flush_backward(p, waiting, grad_radiance, grad_directions, grad_roughness, lanes_sh);
   }

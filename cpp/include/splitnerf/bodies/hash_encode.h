@@ -1,0 +1,126 @@
+// The hash grid, one thread a point and level.
+#pragma once
+
+#include "splitnerf/accumulate.h"
+#include "splitnerf/hash_grid.h"
+
+namespace splitnerf {
+
+template <class T> struct HashGridView {
+  HashLevel levels[kMaxLevels];
+  int n_levels, n_active;
+  const T* positions;  // [n, 3] in the unit cube
+  const T* table;      // [n_entries, F]
+};
+
+// The features of one level at a point, and their derivatives by its position.
+template <class T, int F> struct LevelFeatures {
+  Pack<T, F> value{}, dx{}, dy{}, dz{};
+};
+template <int F, class T>
+SPLITNERF_HD LevelFeatures<T, F> level_features(const HashLevel& level, const T* table, Vec3<T> position) {
+  const HashCell<T> cell = hash_cell(level, position);
+  Pack<T, F> corner[8];
+  for (int i = 0; i < 8; ++i) corner[i] = load_pack<F>(table + cell.index[i] * F);
+  LevelFeatures<T, F> out;
+  for (int f = 0; f < F; ++f) {
+    const Trilinear<T> t = trilinear(corner[0][f], corner[1][f], corner[2][f], corner[3][f], corner[4][f], corner[5][f],
+                                     corner[6][f], corner[7][f], cell.f.x, cell.f.y, cell.f.z);
+    out.value[f] = t.value;
+    out.dx[f] = t.dx * cell.scale.x, out.dy[f] = t.dy * cell.scale.y, out.dz[f] = t.dz * cell.scale.z;
+  }
+  return out;
+}
+
+// features [n, C] and jacobian [n, 3, C], C = n_levels F; closed levels are written as 0.
+template <class T, int F, bool WithJacobian> struct HashEncodeBody {
+  HashGridView<T> grid;
+  T *features, *jacobian;
+
+  SPLITNERF_HD void operator()(int64_t p, int l) const {
+    LevelFeatures<T, F> at;
+    if (l < grid.n_active) at = level_features<F>(grid.levels[l], grid.table, load3(grid.positions + 3 * p));
+    const int64_t columns = int64_t(grid.n_levels) * F;
+    store_pack(features + p * columns + l * F, at.value);
+    if constexpr (WithJacobian) {
+      T* row = jacobian + 3 * p * columns + l * F;
+      store_pack(row, at.dx);
+      store_pack(row + columns, at.dy);
+      store_pack(row + 2 * columns, at.dz);
+    }
+  }
+};
+
+// Adds to grad_table the gradients of open level l; grad_jacobian may be null.
+template <class T, int F> struct HashScatterBody {
+  HashGridView<T> grid;
+  const T *grad_features, *grad_jacobian;
+  T* grad_table;
+
+  SPLITNERF_HD void operator()(int64_t p, int l) const {
+    const HashCell<T> cell = hash_cell(grid.levels[l], load3(grid.positions + 3 * p));
+    const int64_t columns = int64_t(grid.n_levels) * F;
+    const Pack<T, F> value = load_pack<F>(grad_features + p * columns + l * F);
+    Pack<T, F> dx{}, dy{}, dz{};
+    if (grad_jacobian) {
+      const T* row = grad_jacobian + 3 * p * columns + l * F;
+      dx = load_pack<F>(row), dy = load_pack<F>(row + columns), dz = load_pack<F>(row + 2 * columns);
+    }
+    add_corner<0>(cell, value, dx, dy, dz);
+    add_corner<1>(cell, value, dx, dy, dz);
+    add_corner<2>(cell, value, dx, dy, dz);
+    add_corner<3>(cell, value, dx, dy, dz);
+    add_corner<4>(cell, value, dx, dy, dz);
+    add_corner<5>(cell, value, dx, dy, dz);
+    add_corner<6>(cell, value, dx, dy, dz);
+    add_corner<7>(cell, value, dx, dy, dz);
+  }
+
+ private:
+  template <int I>
+  SPLITNERF_HD void add_corner(const HashCell<T>& cell, const Pack<T, F>& value, const Pack<T, F>& dx,
+                               const Pack<T, F>& dy, const Pack<T, F>& dz) const {
+    Pack<T, F> grad;
+    for (int f = 0; f < F; ++f) {
+      const Trilinear<T> t{value[f], dx[f] * cell.scale.x, dy[f] * cell.scale.y, dz[f] * cell.scale.z};
+      grad[f] = trilinear_backward<I>(t, cell.f.x, cell.f.y, cell.f.z);
+    }
+    add_pack(grad_table + cell.index[I] * F, grad);
+  }
+};
+
+// Adds one level's part of the gradient to the position of point p; grad_features and grad_jacobian may be null.
+template <int F, class T>
+SPLITNERF_HD void add_position_gradient(const HashLevel& level, int l, int n_levels, int64_t p, const T* positions,
+                                        const T* table, const T* grad_features, const T* grad_jacobian, Vec3<T>& grad) {
+  const int64_t columns = int64_t(n_levels) * F;
+  const HashCell<T> cell = hash_cell(level, load3(positions + 3 * p));
+  for (int i = 0; i < 8; ++i) {
+    const CornerWeight<T> w = corner_weight_derivatives(cell, i);
+    const T* entry = table + cell.index[i] * F;
+    for (int f = 0; f < F; ++f) {
+      if (grad_features) grad += w.d * (entry[f] * grad_features[p * columns + l * F + f]);
+      if (!grad_jacobian) continue;
+      const T* gj = grad_jacobian + p * 3 * columns + l * F + f;
+      const T gx = gj[0], gy = gj[columns], gz = gj[2 * columns];
+      grad += Vec3<T>{w.dxy * gy + w.dxz * gz, w.dxy * gx + w.dyz * gz, w.dxz * gx + w.dyz * gy} * entry[f];
+    }
+  }
+}
+
+// grad_positions [n, 3], one thread a point.
+template <class T, int F> struct HashPositionsBody {
+  HashGridView<T> grid;
+  const T *grad_features, *grad_jacobian;
+  T* grad_positions;
+
+  SPLITNERF_HD void operator()(int64_t p) const {
+    Vec3<T> grad{T(0), T(0), T(0)};
+    for (int l = 0; l < grid.n_active; ++l)
+      add_position_gradient<F>(grid.levels[l], l, grid.n_levels, p, grid.positions, grid.table, grad_features,
+                               grad_jacobian, grad);
+    store3(grad_positions + 3 * p, grad);
+  }
+};
+
+}  // namespace splitnerf

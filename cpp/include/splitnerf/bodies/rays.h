@@ -1,0 +1,281 @@
+// Packed samples along rays, a group of threads a ray.
+#pragma once
+
+#include "splitnerf/accumulate.h"
+#include "splitnerf/march.h"
+#include "splitnerf/neus.h"
+#include "splitnerf/spread.h"
+#include "splitnerf/varying_outputs.h"
+
+namespace splitnerf {
+
+// counts [n_rays]
+template <class T> struct MarchCountBody {
+  MarchOptions options;
+  OccupancyView grid;
+  const T *rays_o, *rays_d, *jitter;
+  int64_t* counts;
+
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
+    const int64_t n =
+        march_ray(group, load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], grid, options, [](int64_t, T, T) {});
+    if (group.lane() == 0) counts[r] = n;
+  }
+};
+
+template <class T> struct MarchFillBody {
+  MarchOptions options;
+  OccupancyView grid;
+  const T *rays_o, *rays_d, *jitter;
+  const int64_t* offsets;
+  int64_t* ray_indices;
+  T *t_starts, *t_ends;
+
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
+    const int64_t first = offsets[r];
+    march_ray(group, load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], grid, options,
+              [&](int64_t i, T t_start, T t_end) {
+                ray_indices[first + i] = r;
+                t_starts[first + i] = t_start;
+                t_ends[first + i] = t_end;
+              });
+  }
+};
+
+// blocks [n_blocks^3]: whether a block of kBlockCells^3 cells holds one that is not empty; a group of threads a block.
+struct OccupiedBlocksBody {
+  const uint8_t* cells;
+  int resolution, n_blocks;
+  uint8_t* blocks;
+
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t b) const {
+    const int first[3] = {static_cast<int>(b / (int64_t(n_blocks) * n_blocks)) * kBlockCells,
+                          static_cast<int>(b / n_blocks % n_blocks) * kBlockCells,
+                          static_cast<int>(b % n_blocks) * kBlockCells};
+    bool found = false;
+    for (int i = group.lane(); i < kBlockCells * kBlockCells * kBlockCells; i += Group::size) {
+      const int x = first[0] + i / (kBlockCells * kBlockCells), y = first[1] + i / kBlockCells % kBlockCells,
+                z = first[2] + i % kBlockCells;
+      if (x < resolution && y < resolution && z < resolution)
+        found = found || cells[OccupancyView::at(x, y, z, resolution)] != 0;
+    }
+    const bool any = group.ballot(found) != 0;
+    if (group.lane() == 0) blocks[b] = any;
+  }
+};
+
+// weights [n], opacity [n_rays]
+template <class T> struct NeusWeightsBody {
+  PackedRays rays;
+  const T *f_prev, *f_next, *s;
+  T min_transmittance;
+  T *weights, *opacity;
+
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
+    const SampleRange ray = rays.samples_of(r);
+    const NeusEnds<T> ends{f_prev + ray.first, f_next + ray.first, nullptr};
+    const T sum = neus_ray_weights(group, ends, *s, ray.n, min_transmittance, weights + ray.first);
+    if (group.lane() == 0) opacity[r] = sum;
+  }
+};
+
+template <class T> struct NeusWeightsBackwardBody {
+  PackedRays rays;
+  const T *f_prev, *f_next, *s;
+  T min_transmittance;
+  const T *weights, *grad_weights, *grad_opacity;
+  T *grad_f_prev, *grad_f_next, *grad_s_rays;
+
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
+    const SampleRange ray = rays.samples_of(r);
+    const NeusEnds<T> ends{f_prev + ray.first, f_next + ray.first, nullptr};
+    T *to_prev = grad_f_prev + ray.first, *to_next = grad_f_next + ray.first;
+    const T grad_s = neus_ray_weights_backward(
+        group, ends, *s, ray.n, min_transmittance, weights + ray.first, grad_weights + ray.first, grad_opacity[r],
+        to_next, [&](int64_t i, const OpticalDepthGrad<T>& g) { to_prev[i] = g.f_prev, to_next[i] = g.f_next; });
+    if (group.lane() == 0) grad_s_rays[r] = grad_s;
+  }
+};
+
+// The samples of one ray of a surface, their intervals worked out when they are asked for.
+template <class T> struct SurfaceIntervals {
+  const SurfaceSamples<T>& in;
+  int64_t first;
+  Vec3<T> direction;
+
+  SPLITNERF_HD T cosine(int64_t i) const { return dot(direction, unit_normal(load3(in.gradient + 3 * (first + i)))); }
+  SPLITNERF_HD NeusInterval<T> operator()(int64_t i) const {
+    return surface_interval(in.sdf[first + i], cosine(i), in.step, in.anneal);
+  }
+};
+
+// normals [n, 3], weights [n], opacity [n_rays]
+template <class T> struct SurfaceWeightsBody {
+  SurfaceSamples<T> in;
+  T *normals, *weights, *opacity;
+
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
+    const SampleRange ray = in.rays.samples_of(r);
+    for (int64_t i = ray.first + group.lane(); i < ray.first + ray.n; i += Group::size)
+      store3(normals + 3 * i, unit_normal(load3(in.gradient + 3 * i)));
+    const SurfaceIntervals<T> intervals{in, ray.first, load3(in.directions + 3 * r)};
+    const T sum = neus_ray_weights(group, intervals, *in.s, ray.n, in.min_transmittance, weights + ray.first);
+    if (group.lane() == 0) opacity[r] = sum;
+  }
+};
+
+// grad_sdf [n] holds the depths meanwhile.
+template <class T> struct SurfaceWeightsBackwardBody {
+  SurfaceSamples<T> in;
+  const T *weights, *grad_normals, *grad_weights, *grad_opacity;
+  T *grad_sdf, *grad_gradient, *grad_s_rays;
+
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
+    const SampleRange ray = in.rays.samples_of(r);
+    const int64_t first = ray.first;
+    const SurfaceIntervals<T> intervals{in, first, load3(in.directions + 3 * r)};
+    const T grad_s = neus_ray_weights_backward(
+        group, intervals, *in.s, ray.n, in.min_transmittance, weights + first, grad_weights + first, grad_opacity[r],
+        grad_sdf + first, [&](int64_t i, const OpticalDepthGrad<T>& g) {
+          const T grad_cosine = surface_interval_backward(g, intervals.cosine(i), in.step, in.anneal);
+          grad_sdf[first + i] = g.both;
+          store3(grad_gradient + 3 * (first + i),
+                 unit_normal_backward(load3(in.gradient + 3 * (first + i)),
+                                      load3(grad_normals + 3 * (first + i)) + intervals.direction * grad_cosine));
+        });
+    if (group.lane() == 0) grad_s_rays[r] = grad_s;
+  }
+};
+
+// sums [n_rays, n_channels] of weights [n] times values [n, n_channels], added in double.
+template <class T> struct CompositeBody {
+  PackedRays rays;
+  int64_t n_channels;
+  const T *weights, *values;
+  T* sums;
+
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
+    const SampleRange ray = rays.samples_of(r);
+    for (int64_t c = 0; c < n_channels; ++c) {
+      double total = 0;
+      for (int64_t i = ray.first + group.lane(); i < ray.first + ray.n; i += Group::size)
+        total += double(weights[i]) * double(values[i * n_channels + c]);
+      total = group.sum(total);
+      if (group.lane() == 0) sums[r * n_channels + c] = T(total);
+    }
+  }
+};
+
+template <class T> struct CompositeBackwardBody {
+  PackedRays rays;
+  int64_t n_channels;
+  const T *weights, *values, *grad_sums;
+  T *grad_weights, *grad_values;
+
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
+    const SampleRange ray = rays.samples_of(r);
+    const T* g = grad_sums + r * n_channels;
+    for (int64_t i = ray.first + group.lane(); i < ray.first + ray.n; i += Group::size) {
+      T grad_weight = T(0);
+      for (int64_t c = 0; c < n_channels; ++c) {
+        grad_weight += g[c] * values[i * n_channels + c];
+        grad_values[i * n_channels + c] = g[c] * weights[i];
+      }
+      grad_weights[i] = grad_weight;
+    }
+  }
+};
+
+// counts of a ray's shaded samples, of its stretches and of itself, if it has samples; one call a ray.
+template <class T> struct SpreadCountBody {
+  PackedRays rays;
+  const T *weights, *t, *phase;
+  T gap;
+  int per_ray;
+  int64_t *drawn, *stretches, *filled;
+
+  SPLITNERF_HD void operator()(int64_t r) const {
+    const SampleRange ray = rays.samples_of(r);
+    int64_t n_drawn = 0, n_stretches = 0;
+    spread_by_weight(weights + ray.first, t + ray.first, ray.n, gap, per_ray, double(phase[r]),
+                     [&](int64_t) { ++n_drawn; });
+    for (int64_t i = ray.first; i < ray.first + ray.n; ++i)
+      if (i == ray.first || t[i] - t[i - 1] > gap) ++n_stretches;
+    drawn[r] = n_drawn, stretches[r] = n_drawn > 0 ? n_stretches : 0, filled[r] = n_drawn > 0 ? 1 : 0;
+  }
+};
+
+// The sums of those counts [n_rays + 1] -> what Spread holds, and first, second, share [n].
+template <class T> struct SpreadFillBody {
+  PackedRays rays;
+  const T *weights, *t, *phase;
+  T gap;
+  int per_ray;
+  const int64_t *drawn, *stretches, *filled;
+  Spread to;
+  int64_t *first, *second;
+  T* share;
+
+  SPLITNERF_HD void operator()(int64_t r) const {
+    const SampleRange samples = rays.samples_of(r);
+    const int64_t begin = samples.first, at = drawn[r], n_drawn = drawn[r + 1] - at;
+    if (n_drawn == 0) return;
+    int64_t k = at;
+    spread_by_weight(weights + begin, t + begin, samples.n, gap, per_ray, double(phase[r]),
+                     [&](int64_t i) { to.shaded[k++] = begin + i; });
+    const SpreadRay<T> ray{weights, t, begin, begin + samples.n, to.shaded, at, n_drawn};
+    to.heaviest[filled[r]] = heaviest_drawn(ray);
+    arrange_spread(ray, gap, stretches[r], first, second, share, to.leaders + stretches[r], to.stretch);
+  }
+};
+
+// The starts [n_rays, most] of the samples of each ray, one ray after the other; a group of threads a ray.
+template <class T> struct PackSamplesBody {
+  int64_t most;
+  T step;
+  const T* starts;
+  const int64_t* offsets;
+  PackedSamples<T> to;
+
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
+    const int64_t first = offsets[r];
+    for (int64_t i = group.lane(); i < offsets[r + 1] - first; i += Group::size) {
+      const T start = starts[r * most + i];
+      to.ray_indices[first + i] = r;
+      to.t_starts[first + i] = start;
+      to.t_ends[first + i] = start + step;
+    }
+  }
+};
+
+// interpolated [n, n_channels]; one call a value. Positions outside [0, m) count as the nearest inside, see PackedRays.
+template <class T> struct InterpolateBody {
+  int64_t m, n_channels;
+  const int64_t *first, *second;
+  const T *share, *values;
+  T* interpolated;
+
+  SPLITNERF_HD void operator()(int64_t at) const {
+    const int64_t i = at / n_channels, c = at % n_channels;
+    const int64_t a = clamp<int64_t>(first[i], 0, m - 1), b = clamp<int64_t>(second[i], 0, m - 1);
+    interpolated[at] = lerp(values[a * n_channels + c], values[b * n_channels + c], share[i]);
+  }
+};
+
+// Adds to grad_values [m, n_channels].
+template <class T> struct InterpolateBackwardBody {
+  int64_t m, n_channels;
+  const int64_t *first, *second;
+  const T *share, *grad_interpolated;
+  T* grad_values;
+
+  SPLITNERF_HD void operator()(int64_t at) const {
+    const int64_t i = at / n_channels, c = at % n_channels;
+    const int64_t a = clamp<int64_t>(first[i], 0, m - 1), b = clamp<int64_t>(second[i], 0, m - 1);
+    const T g = grad_interpolated[at];
+    add_to(grad_values + a * n_channels + c, g * (T(1) - share[i]));
+    add_to(grad_values + b * n_channels + c, g * share[i]);
+  }
+};
+
+}  // namespace splitnerf

@@ -1,0 +1,224 @@
+// The distance field's network on a tile of points, a point a thread and kSdfUnits hidden units at a time: a tile's numbers
+// stand in memory that its threads share, the weights are the same for all of them.
+//
+// x: inputs; h = softplus(W x + b); outputs = V h + c; steepness = W^T (slope v_0), v_0 the distance's row of V.
+#pragma once
+
+#include "splitnerf/bodies/hash_encode.h"
+#include "splitnerf/ray_walk.h"
+#include "splitnerf/sdf_layer.h"
+#include "splitnerf/vector_math.h"
+
+namespace splitnerf {
+
+inline constexpr int kSdfUnits = 8;
+
+// Rows of numbers, one for each point, in the order of the functions below.
+template <class T> struct SdfTile {
+  T* numbers;
+  int stride;  // from row to row, at least the number of points
+  int n_inputs, n_outputs;
+
+  SPLITNERF_HD static int forward_rows(int n_inputs, int n_outputs) { return 2 * n_inputs + n_outputs; }
+  SPLITNERF_HD static int backward_rows(int n_inputs, int n_outputs) {
+    return 3 * n_inputs + n_outputs + 4 * kSdfUnits;
+  }
+  SPLITNERF_HD T& at(int row, int p) const { return numbers[row * stride + p]; }
+  SPLITNERF_HD T& input(int k, int p) const { return at(k, p); }
+  SPLITNERF_HD T& steepness(int k, int p) const { return at(n_inputs + k, p); }   // later the gradient to the inputs
+  SPLITNERF_HD T& output(int m, int p) const { return at(2 * n_inputs + m, p); }  // or the gradient to it
+  SPLITNERF_HD T& grad_steepness(int k, int p) const { return at(2 * n_inputs + n_outputs + k, p); }
+  // Of the units that are worked on: slope v_0, the gradient to W x + b, h, and what slope v_0 adds to v_0's gradient.
+  SPLITNERF_HD T& unit(int what, int u, int p) const { return at(3 * n_inputs + n_outputs + what * kSdfUnits + u, p); }
+};
+enum SdfUnit { kWeighted, kGradSum, kHidden, kGradFirstRow };
+
+template <class T> struct SdfUnits {
+  Pack<T, kSdfUnits> value, slope;
+};
+// Units [first, first + kSdfUnits) at a point.
+template <class T>
+SPLITNERF_HD SdfUnits<T> sdf_units(const SdfLayer<T>& layer, const SdfTile<T>& tile, int first, int p) {
+  SdfUnits<T> units;
+  units.value = load_pack<kSdfUnits>(layer.hidden_bias + first);
+  for (int k = 0; k < tile.n_inputs; ++k) {
+    const Pack<T, kSdfUnits> w = load_pack<kSdfUnits>(layer.hidden_transposed + k * layer.width_columns + first);
+    const T x = tile.input(k, p);
+    for (int u = 0; u < kSdfUnits; ++u) units.value[u] += w[u] * x;
+  }
+  for (int u = 0; u < kSdfUnits; ++u) {
+    const Softplus<T> s = softplus_and_slope(units.value[u], layer.beta);
+    units.value[u] = s.value, units.slope[u] = s.slope;
+  }
+  return units;
+}
+
+template <class T> SPLITNERF_HD T dot_units(const Pack<T, kSdfUnits>& a, const Pack<T, kSdfUnits>& b) {
+  T sum = T(0);
+  for (int u = 0; u < kSdfUnits; ++u) sum += a[u] * b[u];
+  return sum;
+}
+
+// The distance alone.
+template <class T> SPLITNERF_HD T sdf_value(const SdfLayer<T>& layer, const SdfTile<T>& tile, int p) {
+  T sum = layer.out_bias[0];
+  for (int first = 0; first < layer.width_columns; first += kSdfUnits)
+    sum += dot_units(sdf_units(layer, tile, first, p).value, load_pack<kSdfUnits>(layer.out + first));
+  return sum;
+}
+
+// Adds what kSdfUnits numbers `of` count for over the rows of W^T.
+template <class T>
+SPLITNERF_HD void add_to_inputs(const SdfLayer<T>& layer, const SdfTile<T>& tile, int first, int p,
+                                const Pack<T, kSdfUnits>& of) {
+  for (int k = 0; k < tile.n_inputs; ++k)
+    tile.steepness(k, p) +=
+        dot_units(of, load_pack<kSdfUnits>(layer.hidden_transposed + k * layer.width_columns + first));
+}
+
+// slope v_0 of some units.
+template <class T>
+SPLITNERF_HD Pack<T, kSdfUnits> weighted_units(const SdfLayer<T>& layer, const SdfUnits<T>& units, int first) {
+  Pack<T, kSdfUnits> weighted = load_pack<kSdfUnits>(layer.out + first);
+  for (int u = 0; u < kSdfUnits; ++u) weighted[u] *= units.slope[u];
+  return weighted;
+}
+
+// From the inputs to the outputs, where they are wanted, and the steepness.
+template <bool WithOutputs, class T>
+SPLITNERF_HD void sdf_forward(const SdfLayer<T>& layer, const SdfTile<T>& tile, int p) {
+  if constexpr (WithOutputs)
+    for (int m = 0; m < tile.n_outputs; ++m) tile.output(m, p) = layer.out_bias[m];
+  for (int k = 0; k < tile.n_inputs; ++k) tile.steepness(k, p) = T(0);
+  for (int first = 0; first < layer.width_columns; first += kSdfUnits) {
+    const SdfUnits<T> units = sdf_units(layer, tile, first, p);
+    if constexpr (WithOutputs)
+      for (int m = 0; m < tile.n_outputs; ++m)
+        tile.output(m, p) += dot_units(units.value, load_pack<kSdfUnits>(layer.out + m * layer.width_columns + first));
+    add_to_inputs(layer, tile, first, p, weighted_units(layer, units, first));
+  }
+}
+
+// gradient[axis] = steepness[axis] + scale jacobian[axis] . steepness[3:], jacobian [3, n_features].
+template <class T>
+SPLITNERF_HD Vec3<T> sdf_gradient(const SdfLayer<T>& layer, const SdfTile<T>& tile, int p, const T* jacobian) {
+  const int n_features = tile.n_inputs - 3;
+  Vec3<T> gradient;
+  for (int axis = 0; axis < 3; ++axis) {
+    T sum = T(0);
+    for (int c = 0; c < n_features; ++c) sum += jacobian[axis * n_features + c] * tile.steepness(3 + c, p);
+    gradient[axis] = tile.steepness(axis, p) + layer.scale * sum;
+  }
+  return gradient;
+}
+
+// Its adjoint: fills grad_jacobian [3, n_features] and the tile's grad_steepness. The steepness has been worked out.
+template <class T>
+SPLITNERF_HD void sdf_gradient_backward(const SdfLayer<T>& layer, const SdfTile<T>& tile, int p, const T* jacobian,
+                                        Vec3<T> grad, T* grad_jacobian) {
+  const int n_features = tile.n_inputs - 3;
+  for (int axis = 0; axis < 3; ++axis) tile.grad_steepness(axis, p) = grad[axis];
+  for (int c = 0; c < n_features; ++c) {
+    T sum = T(0);
+    for (int axis = 0; axis < 3; ++axis) {
+      const T scaled = grad[axis] * layer.scale;
+      grad_jacobian[axis * n_features + c] = scaled * tile.steepness(3 + c, p);
+      sum += scaled * jacobian[axis * n_features + c];
+    }
+    tile.grad_steepness(3 + c, p) = sum;
+  }
+}
+
+// Units [first, first + kSdfUnits): adds to the gradient to the inputs and leaves in the tile what the weights' gradients ask for.
+template <class T>
+SPLITNERF_HD void sdf_units_backward(const SdfLayer<T>& layer, const SdfTile<T>& tile, int first, int p) {
+  const SdfUnits<T> units = sdf_units(layer, tile, first, p);
+  const Pack<T, kSdfUnits> v0 = load_pack<kSdfUnits>(layer.out + first), weighted = weighted_units(layer, units, first);
+  // steepness = W^T weighted,  outputs = V h + c
+  Pack<T, kSdfUnits> grad_weighted{}, grad_value{}, grad_sum;
+  for (int k = 0; k < tile.n_inputs; ++k) {
+    const Pack<T, kSdfUnits> w = load_pack<kSdfUnits>(layer.hidden_transposed + k * layer.width_columns + first);
+    const T g = tile.grad_steepness(k, p);
+    for (int u = 0; u < kSdfUnits; ++u) grad_weighted[u] += w[u] * g;
+  }
+  for (int m = 0; m < tile.n_outputs; ++m) {
+    const Pack<T, kSdfUnits> v = load_pack<kSdfUnits>(layer.out + m * layer.width_columns + first);
+    const T g = tile.output(m, p);
+    for (int u = 0; u < kSdfUnits; ++u) grad_value[u] += v[u] * g;
+  }
+  // weighted = slope v_0,  h = softplus; 1 - slope = exp(-beta h) keeps its digits where the slope is close to 1.
+  for (int u = 0; u < kSdfUnits; ++u) {
+    grad_sum[u] = grad_value[u] * units.slope[u] +
+                  grad_weighted[u] * v0[u] * layer.beta * units.slope[u] * exp_of_minus(layer.beta * units.value[u]);
+    tile.unit(kWeighted, u, p) = weighted[u];
+    tile.unit(kGradSum, u, p) = grad_sum[u];
+    tile.unit(kHidden, u, p) = units.value[u];
+    tile.unit(kGradFirstRow, u, p) = grad_weighted[u] * units.slope[u];
+  }
+  add_to_inputs(layer, tile, first, p, grad_sum);
+}
+
+// Gradients of the weights as one list: W [n_inputs, width], b [width], V [n_outputs, width], c [n_outputs], width padded.
+template <class T> SPLITNERF_HD int64_t sdf_weight_count(const SdfLayer<T>& layer) {
+  return (layer.n_inputs + 1 + layer.n_outputs) * layer.width_columns + layer.n_outputs;
+}
+// Row of the list that holds the gradients to what feeds from, or into, the units; and how many there are.
+template <class T> SPLITNERF_HD int sdf_weight_rows(const SdfLayer<T>& layer) {
+  return static_cast<int>(layer.n_inputs + 1 + layer.n_outputs);
+}
+// The tile's sum for unit u in one row of the list.
+template <class T> SPLITNERF_HD T sdf_weight_sum(const SdfTile<T>& tile, int n_points, int row, int u) {
+  T sum = T(0);
+  const int m = row - tile.n_inputs - 1;
+  for (int p = 0; p < n_points; ++p) {
+    if (row < tile.n_inputs) {
+      sum += tile.unit(kWeighted, u, p) * tile.grad_steepness(row, p) + tile.unit(kGradSum, u, p) * tile.input(row, p);
+    } else if (m < 0) {
+      sum += tile.unit(kGradSum, u, p);
+    } else {
+      sum += tile.output(m, p) * tile.unit(kHidden, u, p);
+      if (m == 0) sum += tile.unit(kGradFirstRow, u, p);
+    }
+  }
+  return sum;
+}
+template <class T> SPLITNERF_HD T sdf_bias_sum(const SdfTile<T>& tile, int n_points, int m) {
+  T sum = T(0);
+  for (int p = 0; p < n_points; ++p) sum += tile.output(m, p);
+  return sum;
+}
+
+// The inputs of a point of the field itself: its position and the hash grid's features.
+template <int F, class T>
+SPLITNERF_HD void load_field_inputs(const HashGridView<T>& grid, T scale, Vec3<T> position, const SdfTile<T>& tile,
+                                    int p) {
+  for (int axis = 0; axis < 3; ++axis) tile.input(axis, p) = position[axis];
+  const Vec3<T> unit{position.x * scale + T(0.5), position.y * scale + T(0.5), position.z * scale + T(0.5)};
+  for (int l = 0; l < grid.n_levels; ++l) {
+    LevelFeatures<T, F> at;
+    if (l < grid.n_active) at = level_features<F>(grid.levels[l], grid.table, unit);
+    for (int f = 0; f < F; ++f) tile.input(3 + l * F + f, p) = at.value[f];
+  }
+}
+
+// Follows a ray through the field to its end; keep(t_start) takes the samples to be kept. Returns how often the distance was
+// asked for.
+template <int F, class T, class Keep>
+SPLITNERF_HD int64_t walk_ray(const HashGridView<T>& grid, const SdfLayer<T>& layer, const SdfTile<T>& tile, int p,
+                              const RayLattice<T>& lattice, const OccupancyView& cells, const MarchOptions& march,
+                              const SampleRules<T>& rules, Keep keep) {
+  Walk<T> walk(lattice, 0, march, cells);
+  while (walk.next >= 0) {
+    load_field_inputs<F>(grid, layer.scale, walk.lattice.middle(walk.next), tile, p);
+    advance(walk, sdf_value(layer, tile, p), cells, march, rules, keep);
+  }
+  return walk.n_evaluated;
+}
+
+// At most so many samples are kept of a ray: no more than steps fit into the box.
+template <class T> int64_t most_samples(const MarchOptions& march) {
+  const double steps = std::ceil(2 * 1.7320508 * double(march.box) / double(march.step)) + 3;
+  return max_of<int64_t>(static_cast<int64_t>(min_of(steps, double(march.max_samples))), 1);
+}
+
+}  // namespace splitnerf

@@ -1,0 +1,134 @@
+// Shading, one point a call. lut: brdf_lut()'s layout.
+#pragma once
+
+#include "splitnerf/monte_carlo.h"
+#include "splitnerf/split_sum.h"
+
+namespace splitnerf {
+
+template <class T> struct QueryDirectionBody {
+  const float* lut;
+  bool mean;
+  const T *normals, *view_dirs, *roughness;
+  T* directions;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    store3(directions + 3 * i,
+           query_direction(lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i]));
+  }
+};
+
+template <class T> struct QueryDirectionBackwardBody {
+  const float* lut;
+  bool mean;
+  const T *normals, *view_dirs, *roughness, *grad_directions;
+  T *grad_normals, *grad_view_dirs, *grad_roughness;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const QueryDirectionGrad<T> g = query_direction_backward(
+        lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i], load3(grad_directions + 3 * i));
+    store3(grad_normals + 3 * i, g.normal);
+    store3(grad_view_dirs + 3 * i, g.view);
+    grad_roughness[i] = g.roughness;
+  }
+};
+
+// Occlusion factors come as one value for all channels or as three; the gradient of the one is the sum of theirs.
+template <class T> SPLITNERF_HD Vec3<T> load_factors(const T* factors, int64_t i, int n_channels) {
+  return n_channels == 3 ? load3(factors + 3 * i) : Vec3<T>{factors[i], factors[i], factors[i]};
+}
+template <class T> SPLITNERF_HD void store_factors(T* factors, int64_t i, int n_channels, Vec3<T> grad) {
+  if (n_channels == 3) return store3(factors + 3 * i, grad);
+  factors[i] = sum(grad);
+}
+
+template <class T>
+SPLITNERF_HD ShadePoint<T> load_shade_point(const ShadeArrays<const T>& in, int64_t i, int n_channels) {
+  return {load3(in.normals + 3 * i),
+          load3(in.view_dirs + 3 * i),
+          load3(in.albedo + 3 * i),
+          in.roughness[i],
+          in.metallic[i],
+          load3(in.specular + 3 * i),
+          load3(in.diffuse + 3 * i),
+          load_factors(in.occlusion_s, i, n_channels),
+          load_factors(in.occlusion_d, i, n_channels)};
+}
+
+template <class T> struct ShadeBody {
+  const float* lut;
+  ShadeOptions options;
+  int n_channels;
+  ShadeArrays<const T> in;
+  T* radiance;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    store3(radiance + 3 * i, split_sum_shade(lut, options, load_shade_point(in, i, n_channels)));
+  }
+};
+
+template <class T> struct ShadeBackwardBody {
+  const float* lut;
+  ShadeOptions options;
+  int n_channels;
+  ShadeArrays<const T> in;
+  const T* grad_radiance;
+  ShadeArrays<T> grad;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const ShadePoint<T> g =
+        split_sum_shade_backward(lut, options, load_shade_point(in, i, n_channels), load3(grad_radiance + 3 * i));
+    store3(grad.normals + 3 * i, g.normal);
+    store3(grad.view_dirs + 3 * i, g.view);
+    store3(grad.albedo + 3 * i, g.albedo);
+    grad.roughness[i] = g.roughness;
+    grad.metallic[i] = g.metallic;
+    store3(grad.specular + 3 * i, g.specular);
+    store3(grad.diffuse + 3 * i, g.diffuse);
+    store_factors(grad.occlusion_s, i, n_channels, g.occlusion_s);
+    store_factors(grad.occlusion_d, i, n_channels, g.occlusion_d);
+  }
+};
+
+template <class T> SPLITNERF_HD SummedPoint<T> load_summed_point(const SummedArrays<const T>& in, int64_t i) {
+  return {load3(in.normals + 3 * i),
+          load3(in.view_dirs + 3 * i),
+          load3(in.albedo + 3 * i),
+          in.roughness[i],
+          in.metallic[i],
+          {load3(in.all + 3 * i), load3(in.grazing + 3 * i), load3(in.diffuse + 3 * i)}};
+}
+
+template <class T> struct ShadeSumsBody {
+  const float* lut;
+  bool compensate;
+  SummedArrays<const T> in;
+  T* radiance;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    store3(radiance + 3 * i, shade_sums(lut, compensate, load_summed_point(in, i)));
+  }
+};
+
+template <class T> struct ShadeSumsBackwardBody {
+  const float* lut;
+  bool compensate;
+  SummedArrays<const T> in;
+  const T* grad_radiance;
+  SummedArrays<T> grad;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const SummedPoint<T> g =
+        shade_sums_backward(lut, compensate, load_summed_point(in, i), load3(grad_radiance + 3 * i));
+    store3(grad.normals + 3 * i, g.normal);
+    store3(grad.view_dirs + 3 * i, g.view);
+    store3(grad.albedo + 3 * i, g.albedo);
+    grad.roughness[i] = g.roughness;
+    grad.metallic[i] = g.metallic;
+    store3(grad.all + 3 * i, g.light.all);
+    store3(grad.grazing + 3 * i, g.light.grazing);
+    store3(grad.diffuse + 3 * i, g.light.diffuse);
+  }
+};
+
+}  // namespace splitnerf

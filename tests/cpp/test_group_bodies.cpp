@@ -1,0 +1,352 @@
+// The bodies that a warp runs on the GPU, run by as many threads here, against the operators of the CPU.
+#include "check.h"
+#include "lanes.h"
+#include "splitnerf/bodies/light_pyramid.h"
+#include "splitnerf/bodies/losses.h"
+#include "splitnerf/bodies/monte_carlo.h"
+#include "splitnerf/bodies/rays.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf {
+namespace {
+
+template <class T> void expect_near(const std::vector<T>& got, const std::vector<T>& expected, double tolerance) {
+  ASSERT_EQ(got.size(), expected.size());
+  double largest = 1e-30;
+  for (T x : expected) largest = std::max(largest, std::abs(double(x)));
+  for (size_t i = 0; i < got.size(); ++i) EXPECT_NEAR(got[i], expected[i], tolerance * largest) << i;
+}
+
+// Rays of many lengths, among them none, one and just a group's; distances that fall from .1 to below 0, with rises between.
+struct Rays {
+  std::vector<int64_t> offsets{0};
+  std::vector<double> f_prev, f_next, sdf, gradient, directions;
+  double s = 40;
+
+  Rays() {
+    Random random(3);
+    for (const int length : {0, 1, 8, 9, 50, 0, 16, 7, 33}) {
+      const Vec3<double> d = random.direction();
+      directions.insert(directions.end(), {d.x, d.y, d.z});
+      for (int i = 0; i < length; ++i) {
+        const double f = 0.1 - 0.15 * i / length + 0.01 * random.uniform(-1);
+        f_prev.push_back(f), f_next.push_back(f - 0.15 / length * random.uniform(-0.3, 2));
+        sdf.push_back(f);
+        const Vec3<double> g = random.direction() * random.uniform(0.3, 1.5) - d;
+        gradient.insert(gradient.end(), {g.x, g.y, g.z});
+      }
+      offsets.push_back(int64_t(f_prev.size()));
+    }
+  }
+  int64_t n() const { return int64_t(f_prev.size()); }
+  PackedRays packed() const { return {int64_t(offsets.size()) - 1, n(), offsets.data()}; }
+  SurfaceSamples<double> surface() const {
+    return {packed(), sdf.data(), gradient.data(), directions.data(), &s, 0.02, 0.7, 0.01};
+  }
+};
+
+TEST(GroupBodies, NeusWeightsAndTheirGradients) {
+  const Rays r;
+  const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
+  Random random(1);
+  const auto gw = random.uniforms(n, -1), go = random.uniforms(n_rays, -1);
+  for (const double least : {0., 0.3}) {
+    std::vector<double> w(n), o(n_rays), prev(n), next(n), s(n_rays), w8(n), o8(n_rays), prev8(n), next8(n), s8(n_rays);
+    cpu::neus_weights(r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(), o.data());
+    cpu::neus_weights_backward(r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(), gw.data(),
+                               go.data(), prev.data(), next.data(), s.data());
+    for_each_by_lanes<8>(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
+                                                                    least, w8.data(), o8.data()});
+    for_each_by_lanes<8>(r.packed().n_rays, NeusWeightsBackwardBody<double>{
+                                                r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(),
+                                                gw.data(), go.data(), prev8.data(), next8.data(), s8.data()});
+    expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
+    expect_near(prev8, prev, 1e-13), expect_near(next8, next, 1e-13), expect_near(s8, s, 1e-13);
+  }
+}
+
+// A warp's width, and a NaN, which every sample behind it must see.
+TEST(GroupBodies, NeusWeightsByThirtyTwoLanesPassANanOn) {
+  Rays r;
+  r.f_next[size_t(r.offsets[4]) + 5] = std::nan("");
+  const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
+  std::vector<double> w(n), o(n_rays), w32(n), o32(n_rays);
+  cpu::neus_weights(r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, 0., w.data(), o.data());
+  for_each_by_lanes<32>(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
+                                                                   0., w32.data(), o32.data()});
+  for (size_t i = 0; i < n; ++i) {
+    EXPECT_EQ(std::isnan(w32[i]), std::isnan(w[i])) << i;
+    if (!std::isnan(w[i])) { EXPECT_NEAR(w32[i], w[i], 1e-14) << i; }
+  }
+  EXPECT_TRUE(std::isnan(o32[4]));
+}
+
+TEST(GroupBodies, SurfaceWeightsAndTheirGradients) {
+  const Rays r;
+  const SurfaceSamples<double> in = r.surface();
+  const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
+  Random random(2);
+  const auto gn = random.uniforms(3 * n, -1), gw = random.uniforms(n, -1), go = random.uniforms(n_rays, -1);
+  std::vector<double> normals(3 * n), w(n), o(n_rays), to_sdf(n), to_gradient(3 * n), to_s(n_rays);
+  cpu::surface_weights(in, normals.data(), w.data(), o.data());
+  cpu::surface_weights_backward(in, w.data(), gn.data(), gw.data(), go.data(), to_sdf.data(), to_gradient.data(),
+                                to_s.data());
+  std::vector<double> normals8(3 * n), w8(n), o8(n_rays), to_sdf8(n), to_gradient8(3 * n), to_s8(n_rays);
+  for_each_by_lanes<8>(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals8.data(), w8.data(), o8.data()});
+  for_each_by_lanes<8>(in.rays.n_rays,
+                       SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(), to_sdf8.data(),
+                                                          to_gradient8.data(), to_s8.data()});
+  expect_near(normals8, normals, 0), expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
+  expect_near(to_sdf8, to_sdf, 1e-13), expect_near(to_gradient8, to_gradient, 1e-13), expect_near(to_s8, to_s, 1e-13);
+}
+
+TEST(GroupBodies, CompositeAndItsGradients) {
+  const Rays r;
+  const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays), channels = 5;
+  Random random(4);
+  const auto w = random.uniforms(n), v = random.uniforms(n * channels, -1), g = random.uniforms(n_rays * channels, -1);
+  std::vector<double> sums(n_rays * channels), to_w(n), to_v(n * channels), sums8(n_rays * channels), to_w8(n),
+      to_v8(n * channels);
+  cpu::composite(r.packed(), channels, w.data(), v.data(), sums.data());
+  cpu::composite_backward(r.packed(), channels, w.data(), v.data(), g.data(), to_w.data(), to_v.data());
+  for_each_by_lanes<8>(r.packed().n_rays,
+                       CompositeBody<double>{r.packed(), channels, w.data(), v.data(), sums8.data()});
+  for_each_by_lanes<8>(r.packed().n_rays, CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(),
+                                                                        g.data(), to_w8.data(), to_v8.data()});
+  expect_near(sums8, sums, 1e-14), expect_near(to_w8, to_w, 0), expect_near(to_v8, to_v, 0);
+}
+
+// The counts of all rays, their sums, then what each ray fills, against the one pass of the CPU.
+TEST(GroupBodies, SpreadSamples) {
+  const Rays r;
+  const int64_t n = r.n(), n_rays = r.packed().n_rays;
+  Random random(12);
+  const auto w = random.uniforms(size_t(n)), phase = random.uniforms(size_t(n_rays));
+  std::vector<double> t(n);
+  for (int64_t i = 0; i < n; ++i) t[i] = (i ? t[i - 1] : 0) + random.uniform(0.01, 0.2);
+  for (const int per_ray : {0, 1, 4})
+    for (const double gap : {0.15, double(INFINITY)}) {
+      using Indices = std::vector<int64_t>;
+      struct Result {
+        Indices first, second, shaded, heaviest, leaders, stretch;
+        std::vector<double> share;
+        Spread allocate(const SpreadSizes& sizes) {
+          shaded.resize(sizes.shaded), heaviest.resize(sizes.heaviest), leaders.resize(sizes.leaders);
+          stretch.resize(sizes.shaded);
+          return {shaded.data(), heaviest.data(), leaders.data(), stretch.data()};
+        }
+      };
+      Result one{Indices(n), Indices(n), {}, {}, {}, {}, std::vector<double>(n)}, two = one;
+      cpu::spread_samples(r.packed(), w.data(), t.data(), phase.data(), gap, per_ray, one.first.data(),
+                          one.second.data(), one.share.data(), [&](const SpreadSizes& s) { return one.allocate(s); });
+      Indices drawn(n_rays + 1), stretches(n_rays + 1), filled(n_rays + 1);
+      const SpreadCountBody<double> count{
+          r.packed(),           w.data(),         t.data(), phase.data(), gap, per_ray, drawn.data() + 1,
+          stretches.data() + 1, filled.data() + 1};
+      for (int64_t i = 0; i < n_rays; ++i) {
+        count(i);
+        for (Indices* sums : {&drawn, &stretches, &filled}) (*sums)[i + 1] += (*sums)[i];
+      }
+      const Spread to = two.allocate({drawn.back(), filled.back(), stretches.back()});
+      const SpreadFillBody<double> fill{r.packed(),       w.data(),          t.data(),         phase.data(),  gap,
+                                        per_ray,          drawn.data(),      stretches.data(), filled.data(), to,
+                                        two.first.data(), two.second.data(), two.share.data()};
+      for (int64_t i = n_rays; i-- > 0;) fill(i);
+      EXPECT_EQ(two.shaded, one.shaded);
+      EXPECT_EQ(two.first, one.first);
+      EXPECT_EQ(two.second, one.second);
+      EXPECT_EQ(two.heaviest, one.heaviest);
+      EXPECT_EQ(two.leaders, one.leaders);
+      EXPECT_EQ(two.stretch, one.stretch);
+      EXPECT_EQ(two.share, one.share);
+    }
+}
+
+// Offsets that nobody has checked: nothing outside the arrays is touched.
+TEST(GroupBodies, OffsetsOutOfRangeAreKeptInside) {
+  const std::vector<int64_t> offsets{-5, 3, 1, 99};
+  const PackedRays rays{3, 4, offsets.data()};
+  const int64_t first[3] = {0, 3, 1}, count[3] = {3, 0, 3};
+  for (int64_t r = 0; r < 3; ++r) {
+    EXPECT_EQ(rays.samples_of(r).first, first[r]);
+    EXPECT_EQ(rays.samples_of(r).n, count[r]);
+  }
+}
+
+// ---- marching ----
+
+struct March {
+  int resolution = 20;  // no multiple of a block's cells
+  std::vector<uint8_t> cells;
+  MarchOptions options{1.5f, 0.013f, 1024};
+  std::vector<float> o, d, jitter;
+
+  explicit March(double filled) : cells(size_t(resolution) * resolution * resolution) {
+    Random random(7);
+    for (uint8_t& cell : cells) cell = random.uniform() < filled ? (random.uniform() < 0.02 ? 2 : 1) : 0;
+    d = random.directions<float>(40), jitter = random.uniforms<float>(40);
+    for (int i = 0; i < 40; ++i)
+      for (int axis = 0; axis < 3; ++axis) o.push_back(-3.f * d[3 * i + axis] + float(random.uniform(-1, 1)));
+    d[0] = 0, d[1] = 1, d[2] = 0;
+    std::fill_n(&o[3], 3, 0.1f), std::fill_n(&o[6], 3, 50.f), o[9] = INFINITY;
+  }
+  int64_t n() const { return int64_t(jitter.size()); }
+};
+
+struct Marched {
+  std::vector<int64_t> offsets, ray_indices;
+  std::vector<float> t_starts, t_ends;
+
+  explicit Marched(int64_t n_rays) : offsets(n_rays + 1) {}
+  void allocate() {
+    ray_indices.resize(offsets.back()), t_starts.resize(offsets.back()), t_ends.resize(offsets.back());
+  }
+};
+
+TEST(GroupBodies, MarchingTakesTheSamplesOfTheCpuInItsOrder) {
+  for (const double filled : {0.0, 0.02, 0.4}) {
+    for (const int64_t most : {1024, 5}) {
+      March m(filled);
+      m.options.max_samples = most;
+      const OccupancyCells grid(m.cells.data(), m.resolution);
+      Marched one(m.n()), lanes(m.n());
+      cpu::march_rays_count(m.options, grid.view(), m.n(), m.o.data(), m.d.data(), m.jitter.data(), one.offsets.data());
+      for_each_by_lanes<8>(m.n(), MarchCountBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
+                                                        lanes.offsets.data() + 1});
+      for (int64_t r = 0; r < m.n(); ++r) lanes.offsets[r + 1] += lanes.offsets[r];
+      ASSERT_EQ(lanes.offsets, one.offsets);
+      EXPECT_EQ(one.offsets.back() > 0, filled > 0);
+      one.allocate(), lanes.allocate();
+      cpu::march_rays_fill(m.options, grid.view(), m.n(), m.o.data(), m.d.data(), m.jitter.data(), one.offsets.data(),
+                           one.ray_indices.data(), one.t_starts.data(), one.t_ends.data());
+      for_each_by_lanes<8>(m.n(), MarchFillBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
+                                                       lanes.offsets.data(), lanes.ray_indices.data(),
+                                                       lanes.t_starts.data(), lanes.t_ends.data()});
+      EXPECT_EQ(lanes.ray_indices, one.ray_indices);
+      EXPECT_EQ(lanes.t_starts, one.t_starts);
+      EXPECT_EQ(lanes.t_ends, one.t_ends);
+    }
+  }
+}
+
+TEST(GroupBodies, OccupiedBlocks) {
+  const March m(0.001);
+  const int n = blocks_along(m.resolution);
+  std::vector<uint8_t> one(size_t(n) * n * n), lanes(one.size(), 9);
+  cpu::occupied_blocks(m.cells.data(), m.resolution, one.data());
+  for_each_by_lanes<8>(int64_t(one.size()), OccupiedBlocksBody{m.cells.data(), m.resolution, n, lanes.data()});
+  for (size_t i = 0; i < one.size(); ++i) EXPECT_EQ(lanes[i] != 0, one[i] != 0) << i;
+  EXPECT_TRUE(std::count(one.begin(), one.end(), 0) > 0 && std::count(one.begin(), one.end(), 0) < int64_t(one.size()));
+}
+
+// ---- light ----
+
+TEST(GroupBodies, MonteCarloSumsAndTheirGradients) {
+  const int64_t n = 5;
+  const int k = 21;
+  Random random(9);
+  const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n, 0.05, 1);
+  std::vector<double> dirs(3 * n * k), pdf(n * k), dirs8(dirs.size()), pdf8(pdf.size());
+  cpu::sample_bsdf(n, normals.data(), views.data(), rho.data(), k, 3u, dirs.data(), pdf.data());
+  for_each_by_lanes<8>(
+      n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), k, 3u, dirs8.data(), pdf8.data()});
+  expect_near(dirs8, dirs, 0), expect_near(pdf8, pdf, 0);
+  cpu::sample_ggx_lobe(n, normals.data(), rho.data(), k, 5u, dirs.data());
+  for_each_by_lanes<8>(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs8.data()});
+  expect_near(dirs8, dirs, 0);
+
+  const auto radiance = random.uniforms(3 * n * k), g = random.uniforms(9 * n, -1);
+  std::vector<double> sums(9 * n), to_n(3 * n), to_rho(n), to_light(3 * n * k), sums8(9 * n), to_n8(3 * n), to_rho8(n),
+      to_light8(3 * n * k);
+  cpu::monte_carlo_light(n, k, normals.data(), views.data(), rho.data(), dirs.data(), pdf.data(), radiance.data(),
+                         sums.data());
+  cpu::monte_carlo_light_backward(n, k, normals.data(), views.data(), rho.data(), dirs.data(), pdf.data(),
+                                  radiance.data(), g.data(), to_n.data(), to_rho.data(), to_light.data());
+  const DrawnLight<double> light{k, dirs.data(), pdf.data(), radiance.data()};
+  for_each_by_lanes<8>(
+      n, SumLightBody<double, DrawnLight<double>>{k, normals.data(), views.data(), rho.data(), light, sums8.data()});
+  for_each_by_lanes<8>(n,
+                       SumLightBackwardBody<double, DrawnLight<double>, ToDrawnLight<double>>{k,
+                                                                                              normals.data(),
+                                                                                              views.data(),
+                                                                                              rho.data(),
+                                                                                              light,
+                                                                                              g.data(),
+                                                                                              to_n8.data(),
+                                                                                              to_rho8.data(),
+                                                                                              {k, to_light8.data()}});
+  expect_near(sums8, sums, 1e-13), expect_near(to_n8, to_n, 1e-13), expect_near(to_rho8, to_rho, 1e-13);
+  expect_near(to_light8, to_light, 0);
+}
+
+TEST(GroupBodies, SummedLightAndItsGradients) {
+  const int64_t n = 40;
+  const int k = 19;
+  Random random(11);
+  const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n, 0.05, 1);
+  const auto dirs = random.directions(k), angles = random.uniforms(k), radiance = random.uniforms(3 * k);
+  const auto visible = random.uniforms(n * k), sent = random.uniforms(3 * n * k), g = random.uniforms(9 * n, -1);
+  for (const bool with_sent : {false, true}) {
+    const SharedLight<double> light{
+        k, dirs.data(), angles.data(), radiance.data(), visible.data(), with_sent ? sent.data() : nullptr};
+    std::vector<double> sums(9 * n), to_n(3 * n), to_rho(n), to_light(3 * k), sums8(9 * n), to_n8(3 * n), to_rho8(n),
+        to_light8(3 * k);
+    cpu::summed_light(n, normals.data(), views.data(), rho.data(), light, sums.data());
+    cpu::summed_light_backward(n, normals.data(), views.data(), rho.data(), light, g.data(), to_n.data(), to_rho.data(),
+                               to_light.data());
+    for_each_by_lanes<8>(n, SumLightBody<double, ArrivingLight<double>>{
+                                k, normals.data(), views.data(), rho.data(), {light}, sums8.data()});
+    for_each_by_lanes<8>(n, SumLightBackwardBody<double, ArrivingLight<double>, ToSharedLight<double>>{
+                                k,
+                                normals.data(),
+                                views.data(),
+                                rho.data(),
+                                {light},
+                                g.data(),
+                                to_n8.data(),
+                                to_rho8.data(),
+                                {k, visible.data(), to_light8.data()}});
+    expect_near(sums8, sums, 1e-13), expect_near(to_n8, to_n, 1e-13), expect_near(to_rho8, to_rho, 1e-13);
+    expect_near(to_light8, to_light, 1e-13);
+  }
+}
+
+TEST(GroupBodies, QuadraticEntropy) {
+  Random random(17);
+  const int64_t n = 21;
+  for (const int64_t channels : {1, 8, 11}) {
+    const auto x = random.uniforms(n * channels, -1);
+    double entropy, entropy1, total;
+    std::vector<double> gradient(n * channels), gradient1(n * channels), rows(n * (channels + 1));
+    cpu::quadratic_entropy(n, channels, x.data(), &entropy, gradient.data());
+    for_each_by_lanes<8>(n, PairLikenessBody<double>{n, channels, x.data(), rows.data()});
+    const EntropyBody<double> body{n, channels, rows.data(), &entropy1, &total};
+    double sums[1] = {};
+    for (int64_t i = 0; i < n; ++i) body(i, sums);
+    body.finish(sums);
+    const EntropyGradientBody<double> to_x{channels, rows.data(), &total, gradient1.data()};
+    for (int64_t at = 0; at < n * channels; ++at) to_x(at);
+    EXPECT_NEAR(entropy1, entropy, 1e-13);
+    expect_near(gradient1, gradient, 1e-12);
+  }
+}
+
+TEST(GroupBodies, SparseProduct) {
+  Random random(13);
+  const int64_t n_rows = 6, n_columns = 30;
+  std::vector<int64_t> offsets{0};
+  std::vector<int32_t> columns;
+  for (const int length : {0, 1, 8, 9, 25, 3}) {
+    for (int i = 0; i < length; ++i) columns.push_back(random.below(n_columns));
+    offsets.push_back(int64_t(columns.size()));
+  }
+  const auto weights = random.uniforms(columns.size(), -1), values = random.uniforms(3 * n_columns);
+  const SparseRows<double> matrix{offsets.data(), columns.data(), weights.data()};
+  std::vector<double> one(3 * n_rows), lanes(3 * n_rows);
+  cpu::sparse_product(matrix, n_rows, n_columns, values.data(), one.data());
+  for_each_by_lanes<8>(n_rows, SparseProductBody<double>{matrix, values.data(), lanes.data()});
+  expect_near(lanes, one, 1e-14);
+}
+
+}  // namespace
+}  // namespace splitnerf
