@@ -93,6 +93,10 @@ PYBIND11_MODULE(_core, m) {
       "The instruction set that the kernels run on: base, avx2 or avx512.");
 
   m.def(
+      "cuda_architectures", [] { return SPLITNERF_CUDA_ARCHITECTURES; },
+      "The GPU architectures that the operators were built for; empty for a build without CUDA.");
+
+  m.def(
       "random_gathers",
       [](const py::array_t<float, py::array::c_style>& table, int64_t n) {
         const py::ssize_t entries = table.ndim() == 2 && table.shape(1) == 2 ? table.shape(0) : 0;

@@ -31,6 +31,8 @@ def run(args: argparse.Namespace) -> int:
     print(f"splitnerf {splitnerf.__version__}")
     print(f"torch {torch.__version__}, {torch.get_num_threads()} threads")
     print(f"kernels: {_core.instruction_set()}")
+    architectures = _core.cuda_architectures()
+    print(f"CUDA kernels: {architectures or 'none (build without CUDA)'}")
     print(
         f"ray tracing: {'Embree ' + _core.embree_version() if _core.embree_version() else 'embreex (build without Embree)'}"
     )

@@ -1,0 +1,23 @@
+// The number of features of a level as a constant.
+#pragma once
+
+namespace splitnerf::cuda {
+
+template <int F> struct Features {
+  static constexpr int n = F;
+};
+// Calls body(Features<n_features>{}).
+template <class Body> void with_features(int n_features, Body&& body) {
+  switch (n_features) {
+    case 1:
+      return body(Features<1>{});
+    case 2:
+      return body(Features<2>{});
+    case 4:
+      return body(Features<4>{});
+    case 8:
+      return body(Features<8>{});
+  }
+}
+
+}  // namespace splitnerf::cuda

@@ -1,0 +1,67 @@
+#include "features.cuh"
+#include "launch.cuh"
+#include "splitnerf/bodies/hash_encode.h"
+
+namespace splitnerf::cuda {
+namespace {
+
+template <class T>
+HashGridView<T> make_view(const HashGridShape& shape, int n_active, const T* positions, const T* table) {
+  HashGridView<T> view{};
+  hash_levels(shape, view.levels);
+  view.n_levels = shape.n_levels, view.n_active = n_active, view.positions = positions, view.table = table;
+  return view;
+}
+
+}  // namespace
+
+// Level after level, so that a level's part of the table stays in the L2 cache while all points read it.
+template <class T>
+void hash_encode(const Queue& queue, const HashGridShape& shape, int n_active, int64_t n, const T* positions,
+                 const T* table, T* features, T* jacobian) {
+  const auto grid = make_view(shape, n_active, positions, table);
+  with_features(shape.n_features, [&](auto count) {
+    constexpr int F = decltype(count)::n;
+    if (jacobian) {
+      for_each_pair(queue, "hash_encode_jacobian", n, shape.n_levels,
+                    HashEncodeBody<T, F, true>{grid, features, jacobian});
+    } else {
+      for_each_pair(queue, "hash_encode", n, shape.n_levels, HashEncodeBody<T, F, false>{grid, features, nullptr});
+    }
+  });
+}
+
+template <class T>
+void hash_encode_backward(const Queue& queue, const HashGridShape& shape, int n_active, int64_t n, const T* positions,
+                          const T* grad_features, const T* grad_jacobian, T* grad_table) {
+  const auto grid = make_view<T>(shape, n_active, positions, nullptr);
+  const HashLevel& last = grid.levels[shape.n_levels - 1];
+  clear(queue, "hash_encode_backward", grad_table, (last.offset + last.n_entries) * shape.n_features);
+  with_features(shape.n_features, [&](auto count) {
+    for_each_pair(queue, "hash_encode_backward", n, n_active,
+                  HashScatterBody<T, decltype(count)::n>{grid, grad_features, grad_jacobian, grad_table});
+  });
+}
+
+template <class T>
+void hash_encode_backward_positions(const Queue& queue, const HashGridShape& shape, int n_active, int64_t n,
+                                    const T* positions, const T* table, const T* grad_features, const T* grad_jacobian,
+                                    T* grad_positions) {
+  const auto grid = make_view(shape, n_active, positions, table);
+  with_features(shape.n_features, [&](auto count) {
+    for_each(queue, "hash_encode_backward_positions", n,
+             HashPositionsBody<T, decltype(count)::n>{grid, grad_features, grad_jacobian, grad_positions});
+  });
+}
+
+#define SPLITNERF_INSTANTIATE(T)                                                                              \
+  template void hash_encode<T>(const Queue&, const HashGridShape&, int, int64_t, const T*, const T*, T*, T*); \
+  template void hash_encode_backward<T>(const Queue&, const HashGridShape&, int, int64_t, const T*, const T*, \
+                                        const T*, T*);                                                        \
+  template void hash_encode_backward_positions<T>(const Queue&, const HashGridShape&, int, int64_t, const T*, \
+                                                  const T*, const T*, const T*, T*);
+SPLITNERF_INSTANTIATE(float)
+SPLITNERF_INSTANTIATE(double)
+#undef SPLITNERF_INSTANTIATE
+
+}  // namespace splitnerf::cuda

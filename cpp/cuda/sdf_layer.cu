@@ -1,0 +1,284 @@
+#include "splitnerf/bodies/sdf_layer.h"
+
+#include <algorithm>
+
+#include "features.cuh"
+#include "scan.cuh"
+#include "splitnerf/bodies/rays.h"
+#include "warp.cuh"
+
+namespace splitnerf::cuda {
+namespace {
+
+constexpr int kPadding = 16;               // units are padded to a multiple of this
+constexpr int kMostSums = 256;             // copies of the weights' gradients, one a block
+constexpr int kPointChoices[] = {64, 32};  // threads of a block, one a point of its tile
+
+// ---- the weights as the tiles read them ----
+
+template <class T> struct PrepareBody {
+  SdfWeights<T> weights;
+  SdfLayer<T> layer;
+  T *hidden_transposed, *hidden_bias, *out;
+
+  // One call for each of the padded units.
+  SPLITNERF_HD void operator()(int64_t h) const {
+    const bool real = h < weights.width;
+    for (int k = 0; k < weights.n_inputs; ++k)
+      hidden_transposed[k * layer.width_columns + h] = real ? weights.hidden[h * weights.n_inputs + k] : T(0);
+    for (int m = 0; m < weights.n_outputs; ++m)
+      out[m * layer.width_columns + h] = real ? weights.out[m * weights.width + h] : T(0);
+    hidden_bias[h] = real ? weights.hidden_bias[h] : T(0);
+  }
+};
+
+template <class T> SdfLayer<T> prepare(const Queue& queue, const char* op, const SdfWeights<T>& w) {
+  SdfLayer<T> layer{};
+  layer.n_inputs = w.n_inputs, layer.width = w.width, layer.n_outputs = w.n_outputs;
+  layer.width_columns = (w.width + kPadding - 1) / kPadding * kPadding;
+  layer.beta = w.beta, layer.scale = T(0.5) / w.box;
+  T* hidden = queue.scratch<T>(layer.n_inputs * layer.width_columns);
+  T *bias = queue.scratch<T>(layer.width_columns), *out = queue.scratch<T>(layer.n_outputs * layer.width_columns);
+  layer.hidden_transposed = hidden, layer.hidden_bias = bias, layer.out = out, layer.out_bias = w.out_bias;
+  for_each(queue, op, layer.width_columns, PrepareBody<T>{w, layer, hidden, bias, out});
+  return layer;
+}
+
+// ---- tiles ----
+
+template <class T> __device__ SdfTile<T> shared_tile(const SdfLayer<T>& layer) {
+  extern __shared__ __align__(16) unsigned char memory[];
+  // A column more, so that neither rows nor columns meet in one bank.
+  return {reinterpret_cast<T*>(memory), static_cast<int>(blockDim.x) + 1, static_cast<int>(layer.n_inputs),
+          static_cast<int>(layer.n_outputs)};
+}
+
+// Rows [first, first + n) of [points, columns] to numbers of the tile, zeros behind them; neighbours read neighbours.
+template <class T, class To> __device__ void load_rows(const T* rows, int64_t first, int n, int columns, const To& to) {
+  for (int i = threadIdx.x; i < static_cast<int>(blockDim.x) * columns; i += blockDim.x) {
+    const int p = i / columns, c = i % columns;
+    to(p, c) = p < n ? rows[first * columns + i] : T(0);
+  }
+}
+template <class T>
+__device__ void load_inputs(const SdfTile<T>& tile, const T* positions, const T* features, int64_t first, int n) {
+  load_rows(positions, first, n, 3, [&](int p, int c) -> T& { return tile.input(c, p); });
+  load_rows(features, first, n, tile.n_inputs - 3, [&](int p, int c) -> T& { return tile.input(3 + c, p); });
+}
+
+template <class T, int F>
+__global__ void values_kernel(int64_t n, const HashGridView<T> grid, const SdfLayer<T> layer, const T* positions,
+                              T* values) {
+  const SdfTile<T> tile = shared_tile(layer);
+  const int64_t i = int64_t(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i >= n) return;
+  load_field_inputs<F>(grid, layer.scale, load3(positions + 3 * i), tile, threadIdx.x);
+  values[i] = sdf_value(layer, tile, threadIdx.x);
+}
+
+// A ray a thread: starts [n_rays, most], counts and evaluated [n_rays].
+template <class T, int F>
+__global__ void walk_kernel(int64_t n_rays, const HashGridView<T> grid, const SdfLayer<T> layer,
+                            const MarchOptions march, const OccupancyView cells, const SampleRules<T> rules,
+                            const T* rays_o, const T* rays_d, const T* jitter, int64_t most, T* starts, int64_t* counts,
+                            int64_t* evaluated) {
+  const SdfTile<T> tile = shared_tile(layer);
+  const int64_t r = int64_t(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (r >= n_rays) return;
+  const RayLattice<T> lattice(load3(rays_o + 3 * r), load3(rays_d + 3 * r), jitter[r], march);
+  int64_t n = 0;
+  evaluated[r] = walk_ray<F>(grid, layer, tile, threadIdx.x, lattice, cells, march, rules, [&](T start) {
+    if (n < most) starts[r * most + n++] = start;
+  });
+  counts[r] = n;
+}
+
+template <class T>
+__global__ void layer_kernel(int64_t n, const SdfLayer<T> layer, const T* positions, const T* features,
+                             const T* jacobian, T* outputs, T* gradient) {
+  const SdfTile<T> tile = shared_tile(layer);
+  const int64_t first = int64_t(blockIdx.x) * blockDim.x, i = first + threadIdx.x;
+  const int here = static_cast<int>(min_of<int64_t>(blockDim.x, n - first)), p = threadIdx.x;
+  load_inputs(tile, positions, features, first, here);
+  __syncthreads();
+  sdf_forward<true>(layer, tile, p);
+  if (i < n) store3(gradient + 3 * i, sdf_gradient(layer, tile, p, jacobian + 3 * i * (tile.n_inputs - 3)));
+  __syncthreads();
+  for (int k = threadIdx.x; k < here * tile.n_outputs; k += blockDim.x)
+    outputs[first * tile.n_outputs + k] = tile.output(k % tile.n_outputs, k / tile.n_outputs);
+}
+
+// sums [blocks, sdf_weight_count]: each block's sums over its tiles.
+template <class T>
+__global__ void layer_backward_kernel(int64_t n, const SdfLayer<T> layer, const T* positions, const T* features,
+                                      const T* jacobian, const T* grad_outputs, const T* grad_gradient,
+                                      T* grad_features, T* grad_jacobian, T* sums) {
+  const SdfTile<T> tile = shared_tile(layer);
+  const int p = threadIdx.x, points = blockDim.x, n_features = tile.n_inputs - 3;
+  const int rows = sdf_weight_rows(layer), width = static_cast<int>(layer.width_columns);
+  T* mine = sums + blockIdx.x * sdf_weight_count(layer);
+  for (int64_t first = int64_t(blockIdx.x) * points; first < n; first += int64_t(gridDim.x) * points) {
+    const int64_t i = first + p;
+    const int here = static_cast<int>(min_of<int64_t>(points, n - first));
+    load_inputs(tile, positions, features, first, here);
+    __syncthreads();
+    sdf_forward<false>(layer, tile, p);
+    load_rows(grad_outputs, first, here, tile.n_outputs, [&](int q, int m) -> T& { return tile.output(m, q); });
+    if (i < n) {
+      sdf_gradient_backward(layer, tile, p, jacobian + 3 * i * n_features, load3(grad_gradient + 3 * i),
+                            grad_jacobian + 3 * i * n_features);
+    } else {
+      for (int k = 0; k < tile.n_inputs; ++k) tile.grad_steepness(k, p) = T(0);
+    }
+    for (int k = 0; k < tile.n_inputs; ++k) tile.steepness(k, p) = T(0);
+    __syncthreads();
+    for (int unit = 0; unit < width; unit += kSdfUnits) {
+      sdf_units_backward(layer, tile, unit, p);
+      __syncthreads();
+      for (int k = threadIdx.x; k < rows * kSdfUnits; k += points)
+        mine[(k / kSdfUnits) * width + unit + k % kSdfUnits] +=
+            sdf_weight_sum(tile, here, k / kSdfUnits, k % kSdfUnits);
+      __syncthreads();
+    }
+    for (int m = threadIdx.x; m < tile.n_outputs; m += points) mine[rows * width + m] += sdf_bias_sum(tile, here, m);
+    for (int k = threadIdx.x; k < here * n_features; k += points)
+      grad_features[first * n_features + k] = tile.steepness(3 + k % n_features, k / n_features);
+    __syncthreads();
+  }
+}
+
+// The blocks' sums, added in order, to the gradients in the weights' own shapes; one call for each number of the list.
+template <class T> struct FinishBody {
+  SdfLayer<T> layer;
+  int n_sums;
+  const T* sums;
+  T *grad_hidden, *grad_hidden_bias, *grad_out, *grad_out_bias;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const int64_t row = i / layer.width_columns, h = i % layer.width_columns, m = row - layer.n_inputs - 1;
+    const int64_t bias = i - sdf_weight_rows(layer) * layer.width_columns;
+    if (bias < 0 && h >= layer.width) return;
+    T total = T(0);
+    for (int k = 0; k < n_sums; ++k) total += sums[k * sdf_weight_count(layer) + i];
+    if (bias >= 0) {
+      grad_out_bias[bias] = total;
+    } else if (row < layer.n_inputs) {
+      grad_hidden[h * layer.n_inputs + row] = total;
+    } else if (m < 0) {
+      grad_hidden_bias[h] = total;
+    } else {
+      grad_out[m * layer.width + h] = total;
+    }
+  }
+};
+
+template <class T> HashGridView<T> field_grid(const SdfField<T>& field) {
+  HashGridView<T> grid{};
+  hash_levels(field.shape, grid.levels);
+  grid.n_levels = field.shape.n_levels, grid.n_active = field.n_active, grid.table = field.table;
+  return grid;
+}
+
+// Points of a tile of so many rows, and the shared memory that it takes; the kernel is told to allow it.
+struct TileSize {
+  int points, bytes;
+};
+template <class T, class Kernel> TileSize tile_size(const char* op, int rows, Kernel kernel) {
+  int device = 0, most = 0;
+  check(cudaGetDevice(&device), op);
+  check(cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, device), op);
+  for (const int points : kPointChoices) {
+    const int64_t bytes = int64_t{rows} * (points + 1) * int64_t{sizeof(T)};
+    if (bytes > most) continue;
+    check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)), op);
+    return {points, static_cast<int>(bytes)};
+  }
+  throw std::invalid_argument(std::string(op) + ": features and outputs are too many for this GPU's shared memory");
+}
+
+}  // namespace
+
+template <class T>
+void sdf_values(const Queue& queue, const SdfField<T>& field, int64_t n, const T* positions, T* values) {
+  const char* op = "sdf_values";
+  if (n == 0) return;
+  const SdfLayer<T> layer = prepare(queue, op, field.weights);
+  const HashGridView<T> grid = field_grid(field);
+  with_features(field.shape.n_features, [&](auto count) {
+    const auto kernel = values_kernel<T, decltype(count)::n>;
+    const TileSize tile = tile_size<T>(op, field.weights.n_inputs, kernel);
+    kernel<<<blocks_for(n, tile.points), tile.points, tile.bytes, queue.stream>>>(n, grid, layer, positions, values);
+  });
+  check(cudaGetLastError(), op);
+}
+
+template <class T>
+void sample_rays(const Queue& queue, const SdfField<T>& field, const MarchOptions& march, const OccupancyView& cells,
+                 const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter,
+                 int64_t* offsets, int64_t* n_evaluated, const SampleAllocator<T>& allocate) {
+  const char* op = "sample_rays";
+  const SdfLayer<T> layer = prepare(queue, op, field.weights);
+  const HashGridView<T> grid = field_grid(field);
+  const int64_t most = most_samples<T>(march);
+  T* starts = queue.scratch<T>(n_rays * most);
+  if (n_rays > 0) {
+    with_features(field.shape.n_features, [&](auto count) {
+      const auto kernel = walk_kernel<T, decltype(count)::n>;
+      const TileSize tile = tile_size<T>(op, field.weights.n_inputs, kernel);
+      kernel<<<blocks_for(n_rays, tile.points), tile.points, tile.bytes, queue.stream>>>(
+          n_rays, grid, layer, march, cells, rules, rays_o, rays_d, jitter, most, starts, offsets + 1, n_evaluated);
+    });
+    check(cudaGetLastError(), op);
+  }
+  sum_counts(queue, op, n_rays, offsets);
+  const PackedSamples<T> to = allocate(read_number(queue, offsets + n_rays));
+  for_each_group(queue, op, n_rays, PackSamplesBody<T>{most, T(march.step), starts, offsets, to});
+}
+
+template <class T>
+void sdf_layer(const Queue& queue, const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features,
+               const T* jacobian, T* outputs, T* gradient) {
+  const char* op = "sdf_layer";
+  if (n == 0) return;
+  const SdfLayer<T> layer = prepare(queue, op, weights);
+  const auto kernel = layer_kernel<T>;
+  const TileSize tile = tile_size<T>(op, SdfTile<T>::forward_rows(weights.n_inputs, weights.n_outputs), kernel);
+  kernel<<<blocks_for(n, tile.points), tile.points, tile.bytes, queue.stream>>>(n, layer, positions, features, jacobian,
+                                                                                outputs, gradient);
+  check(cudaGetLastError(), op);
+}
+
+template <class T>
+void sdf_layer_backward(const Queue& queue, const SdfWeights<T>& weights, int64_t n, const T* positions,
+                        const T* features, const T* jacobian, const T* grad_outputs, const T* grad_gradient,
+                        T* grad_features, T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias, T* grad_out,
+                        T* grad_out_bias) {
+  const char* op = "sdf_layer_backward";
+  const SdfLayer<T> layer = prepare(queue, op, weights);
+  const auto kernel = layer_backward_kernel<T>;
+  const TileSize tile = tile_size<T>(op, SdfTile<T>::backward_rows(weights.n_inputs, weights.n_outputs), kernel);
+  const int n_sums = static_cast<int>(std::min<int64_t>((n + tile.points - 1) / tile.points, kMostSums));
+  T* sums = queue.scratch<T>(std::max(n_sums, 1) * sdf_weight_count(layer));
+  clear(queue, op, sums, n_sums * sdf_weight_count(layer));
+  if (n_sums > 0) {
+    kernel<<<n_sums, tile.points, tile.bytes, queue.stream>>>(n, layer, positions, features, jacobian, grad_outputs,
+                                                              grad_gradient, grad_features, grad_jacobian, sums);
+    check(cudaGetLastError(), op);
+  }
+  for_each(queue, op, sdf_weight_count(layer),
+           FinishBody<T>{layer, n_sums, sums, grad_hidden, grad_hidden_bias, grad_out, grad_out_bias});
+}
+
+#define SPLITNERF_INSTANTIATE(T)                                                                                 \
+  template void sdf_values<T>(const Queue&, const SdfField<T>&, int64_t, const T*, T*);                          \
+  template void sample_rays<T>(const Queue&, const SdfField<T>&, const MarchOptions&, const OccupancyView&,      \
+                               const SampleRules<T>&, int64_t, const T*, const T*, const T*, int64_t*, int64_t*, \
+                               const SampleAllocator<T>&);                                                       \
+  template void sdf_layer<T>(const Queue&, const SdfWeights<T>&, int64_t, const T*, const T*, const T*, T*, T*); \
+  template void sdf_layer_backward<T>(const Queue&, const SdfWeights<T>&, int64_t, const T*, const T*, const T*, \
+                                      const T*, const T*, T*, T*, T*, T*, T*, T*);
+SPLITNERF_INSTANTIATE(float)
+SPLITNERF_INSTANTIATE(double)
+#undef SPLITNERF_INSTANTIATE
+
+}  // namespace splitnerf::cuda
