@@ -10,18 +10,21 @@ from splitnerf import ops  # noqa: F401  (loads torch.ops.splitnerf)
 lib = torch.ops.splitnerf
 
 
-def _cuda_skip_reason() -> str | None:
+def has_cuda_kernel(op: str) -> bool:
+    return torch._C._dispatch_has_kernel_for_dispatch_key(f"splitnerf::{op}", "CUDA")
+
+
+def devices(op: str) -> list:
+    """The devices that a test of this operator is to run on; "cuda" is skipped, and says why, where it cannot."""
+    reason = None
     if not torch.cuda.is_available():
-        return "no CUDA device"
-    if not torch._C._dispatch_has_kernel_for_dispatch_key("splitnerf::hash_encode", "CUDA"):
-        return "the operators were built without CUDA kernels"
-    return None
+        reason = "no CUDA device"
+    elif not has_cuda_kernel(op):
+        reason = f"{op} has no CUDA kernel in this build"
+    return ["cpu", pytest.param("cuda", marks=pytest.mark.skipif(reason is not None, reason=str(reason)))]
 
 
-DEVICES = [
-    "cpu",
-    pytest.param("cuda", marks=pytest.mark.skipif(_cuda_skip_reason() is not None, reason=str(_cuda_skip_reason()))),
-]
+DEVICES = devices("hash_encode")
 
 
 def generator(seed: int = 0) -> torch.Generator:

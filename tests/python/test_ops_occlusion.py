@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, lib, unit
+from op_checks import check_error, check_no_gradient, check_op, devices, generator, lib, unit
 
 from splitnerf.ops import MeshScene, occlusion_factors, trace_visibility
+
+DEVICES = devices("trace_visibility")
 
 
 def make_mesh() -> trimesh.Trimesh:

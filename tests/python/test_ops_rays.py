@@ -181,9 +181,11 @@ def test_neus_errors(device):
     check_error(lambda: neus_weights(f_prev, f_next[1:], s, offsets), "neus_weights", "f_next", "[24] float32", "[23]")
     check_error(lambda: neus_weights(f_prev, f_next, s[None], offsets), "neus_weights", "s must be [] float32", "[1]")
     check_error(lambda: neus_weights(f_prev, f_next, s, offsets.int()), "neus_weights", "offsets", "int64")
+    check_error(lambda: neus_weights(f_prev, f_next, s, offsets[:0]), "offsets")
+    if device == "cuda":
+        return  # to look at the offsets would mean waiting for the GPU
     check_error(lambda: neus_weights(f_prev, f_next, s, offsets + 1), "neus_weights", "offsets must rise from 0", "24")
     check_error(lambda: neus_weights(f_prev, f_next, s, offsets[[0, 2, 3, 1, 4]]), "offsets must rise")
-    check_error(lambda: neus_weights(f_prev, f_next, s, offsets[:0]), "offsets")
 
 
 # ---- surface_weights ----
@@ -383,4 +385,5 @@ def test_composite_empty_and_errors(device):
     weights, values, offsets = composite_inputs(device, torch.float32)
     check_error(lambda: composite(weights, values[1:], offsets), "composite", "values", "[24, n] float32", "[23, 4]")
     check_error(lambda: composite(weights, values.double(), offsets), "composite", "values", "float32", "float64")
-    check_error(lambda: composite(weights, values, offsets[:-1]), "composite", "offsets must rise")
+    if device == "cpu":
+        check_error(lambda: composite(weights, values, offsets[:-1]), "composite", "offsets must rise")

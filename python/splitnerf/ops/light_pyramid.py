@@ -118,8 +118,8 @@ def light_lookup(
         roughness: [n, 1] perceptual; above 1 as 1.
         levels: [sum of r_k^2, 3] radiance, the maps one after the other.
         sh: [169, 3], coefficient l^2 + l + m of radiance.
-        resolutions: [K] int64, r_k.
-        nodes: [K + 1] float64 ascending: the maps' roughness, then the harmonics'.
+        resolutions: [K] int64, r_k. On the CPU, whatever the device of the others.
+        nodes: [K + 1] float64 ascending: the maps' roughness, then the harmonics'. On the CPU.
         zonal: [rows, 13] factors at roughness nodes[K] to 1.
 
     Returns:
