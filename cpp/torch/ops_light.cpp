@@ -62,6 +62,7 @@ std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Te
   const Tensor rho = checked(op, "roughness", roughness, {x.size(0), 1}, type);
   const Tensor env = checked(op, "environment", environment, {kAny, kAny, 3}, type);
   require(env.size(0) > 0 && env.size(1) > 0, op, "environment must hold at least one texel");
+  require(env.numel() <= INT32_MAX, op, "environment must hold less than 2^31 numbers");
   require(n_diffuse_rays > 0 && n_specular_rays > 0 && n_diffuse_rays <= 1 << 20 && n_specular_rays <= 1 << 20, op,
           "n_diffuse_rays and n_specular_rays must be in [1, 2^20]");
   const OcclusionOptions options{static_cast<int>(n_diffuse_rays), static_cast<int>(n_specular_rays),

@@ -139,6 +139,15 @@ TEST(Sampling, InversionSolvesItsEquation) {
   EXPECT_EQ(invert_y_minus_log1p(0.), 0);
 }
 
+// Against the library's, over all magnitudes.
+TEST(Sampling, LogarithmOfOnePlus) {
+  for (double y = 1e-12; y < 1e30; y *= 1.37) {
+    EXPECT_NEAR(log1p_of_positive(y) / std::log1p(y), 1, 5e-16) << y;
+    EXPECT_NEAR(log1p_of_positive(float(y)) / std::log1p(double(float(y))), 1, 2.5e-7) << y;
+  }
+  EXPECT_EQ(log1p_of_positive(0.), 0);
+}
+
 TEST(Sampling, SeriesMeetsTheLogarithm) {
   for (double y : {0.0999999, 0.1}) { EXPECT_NEAR(y_minus_log1p(y) / (y - std::log1p(y)), 1, 1e-12) << y; }
 }

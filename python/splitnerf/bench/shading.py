@@ -23,19 +23,16 @@ def run(quick: bool, rounds: int) -> Result:
     """Times forward and backward, after holding results and gradients against float64.
 
     Args:
-        quick: Fewer points, and no torch.compile.
+        quick: Fewer points and directions, and no torch.compile.
         rounds: Of timing.
     """
     torch.manual_seed(0)
     charts, findings = [], []
-    n = 1 << (15 if quick else 18)
-    shading = shading_calls(n, compiled=not quick)
-    lit = prefilter_calls(512, 2048 if quick else 8192)
-    for title, (calls, errors) in (
-        (f"split-sum shading, {n} points", shading),
-        (f"gbar with gradient, 512 queries, {2048 if quick else 8192} light directions", lit),
-    ):
-        extra = {"copy": copy_of(n * FLOATS_A_POINT)} if "shading" in title else {}
+    sizes, n_lights = ((1 << 13, 1 << 15), 2048) if quick else ((1 << 13, 1 << 18), 8192)
+    subjects = {f"split-sum shading, {n} points": (n, shading_calls(n, compiled=not quick)) for n in sizes}
+    subjects[f"gbar with gradient, 512 queries, {n_lights} light directions"] = (0, prefilter_calls(512, n_lights))
+    for title, (n, (calls, errors)) in subjects.items():
+        extra = {"copy": copy_of(n * FLOATS_A_POINT)} if n else {}
         times = interleaved(calls | extra, rounds)
         charts.append(chart_of(title, times, errors))
         findings += [
