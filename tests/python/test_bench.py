@@ -187,6 +187,14 @@ class TestNormals:
         coarse, fine = (normals.angle(normals.finite_differences(field, x, eps), true) for eps in (1.0, 1e-4))
         assert fine < 1e-2 * coarse
 
+    def test_they_are_measured(self):
+        """The analytic gradient is the field's own; one cell's differences are smoother than what was fitted."""
+        field, _, training, _ = normals.run(quick=True, rounds=2).charts
+        errors = {(p.series, p.variant): p.error for p in field.points}
+        assert errors["analytic", ""] < 1e-2 < errors["finite differences", "eps = 0.01 cells"] < 1
+        assert errors["finite differences", "eps = 1 cells"] > 1
+        assert [p.series for p in training.points if p.default] == ["analytic"]
+
     def test_both_ways_have_gradients(self):
         field = SdfField(normals.SPEC, normals.BOX)
         x = torch.rand(20, 3) - 0.5

@@ -77,7 +77,7 @@ def surface(x: Tensor) -> Tensor:
 
 
 def surface_gradient(x: Tensor) -> Tensor:
-    leaf = x.double().requires_grad_()
+    leaf = x.detach().double().requires_grad_()
     with torch.enable_grad():
         (gradient,) = torch.autograd.grad(surface(leaf).sum(), leaf)
     return gradient
