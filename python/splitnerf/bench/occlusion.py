@@ -14,6 +14,7 @@ from splitnerf.bench.charts import Chart, Point, Result
 from splitnerf.bench.lights import MapLight, data_folder, lights
 from splitnerf.bench.peers import bumpy_sphere, drjit_ready, peer
 from splitnerf.bench.timing import interleaved
+from splitnerf.config import preset
 from splitnerf.errors import CheckFailed
 from splitnerf.fields.occlusion import OcclusionQuery
 from splitnerf.fields.visibility import VisibilityBits
@@ -159,19 +160,19 @@ def rms(x: Tensor) -> float:
 
 
 def ray_rates(name: str, points: Points, quick: bool, rounds: int) -> tuple[list[str], list[list[object]]]:
-    """Mrays/s of our factors, rays made and summed included, beside tracers that are handed their rays."""
-    n_rays = 64
-    n = len(points.positions)
-    directions = F.normalize(points.normals[:, None] + F.normalize(torch.randn(n, n_rays, 3), dim=-1), dim=-1).reshape(
-        -1, 3
-    )
-    origins = (points.positions + OFFSET * points.normals)[:, None].expand(n, n_rays, 3).reshape(-1, 3).contiguous()
+    """Mrays/s of our factors, rays made and summed included, beside tracers that are handed rays of the same lobes."""
+    n, half = len(points.positions), preset("cpu").occlusion_rays
+    cosine = F.normalize(points.normals[:, None] + F.normalize(torch.randn(n, half, 3), dim=-1), dim=-1)
+    lobes = sample_ggx_lobe(points.axes, points.roughness, half, seed=0)
+    directions = torch.cat([cosine, lobes], dim=1).reshape(-1, 3)
+    starts = points.positions + OFFSET * points.normals
+    origins = starts[:, None].expand(n, 2 * half, 3).reshape(-1, 3).contiguous()
     seen = trace_visibility(points.scene, origins, directions)
     tracers = {"Open3D test_occlusions": open3d_tracer} | (
         {} if quick else {"trimesh + embreex": embreex_tracer, "mitsuba ray_test": mitsuba_tracer}
     )
     calls: dict[str, Callable[[], object]] = {
-        "splitnerf occlusion_factors": lambda: points.traced(n_rays - 1, 1),
+        "splitnerf occlusion_factors": lambda: points.traced(half, half),
         "splitnerf trace_visibility": lambda: trace_visibility(points.scene, origins, directions),
     }
     for tracer, make in tracers.items():
