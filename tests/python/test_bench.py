@@ -15,7 +15,7 @@ from splitnerf.bench import charts, eager, normals, path_tracer, shading, split_
 from splitnerf.bench.charts import Chart, Point, Result, markdown, write_csv, write_result
 from splitnerf.bench.hash_grid import SPEC
 from splitnerf.bench.lights import MapLight, octahedral_directions, pyramid_of
-from splitnerf.bench.prefilter import Truth, filtered_importance, lobe_integral
+from splitnerf.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
 from splitnerf.bench.timing import interleaved
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.demo.scene import write_demo_dataset
@@ -107,7 +107,8 @@ class TestLights:
         axes = F.normalize(torch.randn(30, 3), dim=1)
         for rho in (0.05, 0.3, 1.0):
             roughness = torch.full((30, 1), rho)
-            for estimate in (Truth(light, 64, 64)(axes, rho), filtered_importance(light, 8)(axes, roughness)):
+            ways = [filtered_importance(light, 8)] + [harmonics(light)] * (rho >= 0.1)
+            for estimate in (Truth(light, 64, 64)(axes, rho), *(way(axes, roughness) for way in ways)):
                 torch.testing.assert_close(estimate, torch.full((30, 3), 2.0), rtol=1e-3, atol=0)
         assert torch.allclose(pyramid_of(light, 16)(axes, roughness), torch.full((30, 3), 2.0), rtol=1e-3)
 
@@ -143,18 +144,46 @@ class TestSplitSum:
         np.testing.assert_allclose(middle[0, 0], (table[0, 0] + table[0, 1]) / 2)
 
     def test_finer_tables_are_better_and_the_fit_is_rough(self):
-        chart = split_sum.table_chart((8, 32))
+        chart, chi = split_sum.table_charts((8, 32))
         errors = {(p.series, p.variant): p.error for p in chart.points}
         fine, coarse = errors["table over sqrt(n.v)", "32 x 32"], errors["table over sqrt(n.v)", "8 x 8"]
         assert fine < coarse < errors["Karis 2014, fit", "8 numbers"] < 0.2
         assert [p.variant for p in chart.points if p.default] == ["32 x 32"]
+        errors = {(p.series, p.variant): p.error for p in chi.points}
+        assert errors["table over sqrt(n.v)", "32 x 32"] < errors["table over sqrt(n.v)", "8 x 8"] < 0.1
 
     def test_constant_light_splits_without_error(self):
         """All lobes see the same light: what is left is the noise of the sums and the table."""
         torch.manual_seed(0)
-        light = MapLight(np.full((32, 64, 3), 2.0, np.float32))
-        errors = split_sum.split_errors(light, Truth(light, 64, 64), 0.5, 0.5, 1.0, 1.0, 4096)
+        light = split_sum.SplitLight(np.full((32, 64, 3), 2.0, np.float32))
+        errors = split_sum.split_errors(light, Truth(light.whole, 64, 64), *self.looks(), 0.5, 1.0, 1.0, 1024)
         assert max(errors.values()) < 0.02
+
+    @staticmethod
+    def looks():
+        normals, across = (F.normalize(torch.randn(16, 3), dim=1) for _ in range(2))
+        views = split_sum.views_at(normals, across, 0.5)
+        torch.testing.assert_close((normals * views).sum(1), torch.full((16,), 0.5))
+        return normals, views
+
+    def test_lamps_and_the_rest_are_the_light(self):
+        sky = np.random.default_rng(0).random((32, 64, 3), np.float32)
+        sky[9, 20:22] = 500.0
+        light, w = split_sum.SplitLight(sky), F.normalize(torch.randn(500, 3), dim=1)
+        torch.testing.assert_close(light.lamps(w) + light.rest(w), light.whole(w), rtol=1e-4, atol=1e-4)
+        sun = torch.tensor(sky[9, 20:22] - light.rest.levels[0][9, 20:22].numpy()).sum(0)
+        texel = 2 * math.pi**2 / (32 * 64) * math.sin(9.5 / 32 * math.pi)
+        found = (light.lamps(light.directions) * light.solid_angles[:, None]).sum(0)
+        torch.testing.assert_close(found, sun * texel, rtol=0.02, atol=0)
+
+    def test_the_truth_of_a_small_lamp_has_little_noise(self):
+        """Samples of a wide lobe alone would miss it."""
+        sky = np.full((64, 128, 3), 0.1, np.float32)
+        sky[20, 40] = 1e4
+        torch.manual_seed(0)
+        light = split_sum.SplitLight(sky)
+        errors = split_sum.split_errors(light, Truth(light.whole, 64, 64), *self.looks(), 0.9, 1.0, 1.0, 256)
+        assert errors[split_sum.NOISE] < 0.01
 
 
 def test_an_axis_of_errors_spans_a_decade():
@@ -250,7 +279,7 @@ class TestWhole:
         made = (run / "checkpoint.pt").stat().st_mtime_ns
         assert main([*command, "--minutes", "0.02,0.03"]) == DONE
         assert (run / "checkpoint.pt").stat().st_mtime_ns == made
-        assert "0.03 min" in (tmp_path / "whole.md").read_text()
+        assert "0.03 min" in (tmp_path / "whole_tiny.md").read_text()
 
     @pytest.mark.parametrize(
         "words, complaint",

@@ -36,12 +36,16 @@ template <class T> struct EquirectCell {
 };
 
 template <class T> SPLITNERF_HD EquirectCell<T> equirect_cell(Vec2<T> uv, int height, int width) {
-  const T x = uv.x * T(width) - T(0.5), y = clamp(uv.y * T(height) - T(0.5), T(0), T(height - 1));
+  // A NaN goes on to the caller by fx or fy, with a cell that exists.
+  const T x = uv.x * T(width) - T(0.5), raised = uv.y * T(height) - T(0.5);
+  const T y = raised > T(0) ? min_of(raised, T(height - 1)) : T(0);
   const T x_floor = std::floor(x);
   const int row = min_of(static_cast<int>(y), height - 1);
   // uv.x in [0, 1] makes x_floor one of -1 ... width - 1.
-  const int column = x_floor < T(0) ? width - 1 : min_of(static_cast<int>(x_floor), width - 1);
-  return {row, min_of(row + 1, height - 1), column, column + 1 == width ? 0 : column + 1, x - x_floor, y - T(row)};
+  const int column =
+      x_floor < T(0) ? width - 1 : static_cast<int>(x_floor > T(0) ? min_of(x_floor, T(width - 1)) : T(0));
+  return {row,         min_of(row + 1, height - 1),   column, column + 1 == width ? 0 : column + 1,
+          x - x_floor, y - T(row) + (raised - raised)};
 }
 
 // The same as four texels and their bilinear weights.

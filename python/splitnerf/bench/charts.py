@@ -175,7 +175,7 @@ def draw(result: Result, path: Path) -> None:
     for i, chart in enumerate(result.charts):
         axes = figure.add_subplot(rows, columns, i + 1)
         for name in dict.fromkeys(p.series for p in chart.points):
-            points = sorted((p for p in chart.points if p.series == name), key=lambda p: p.cost)
+            points = [p for p in chart.points if p.series == name]
             colour, costs = COLOURS[names.index(name) % len(COLOURS)], [p.cost for p in points]
             spread = [[p.cost - p.low for p in points], [p.high - p.cost for p in points]]
             handles[name] = axes.errorbar(costs, [p.error for p in points], xerr=spread, marker="o", markersize=4,

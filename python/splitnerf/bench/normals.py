@@ -21,7 +21,7 @@ from splitnerf.ops import HashGridSpec
 BOX = 1.5
 SPEC = HashGridSpec(n_levels=9, n_features=2, base_resolution=16, growth=1.4697344922755988, log2_table_size=16)
 CELLS = (0.01, 0.1, 0.25, 0.5, 1.0, 2.0)  # eps of the differences, in finest cells
-SHIPPED_CELLS = 1.0  # of normals = finite_difference
+METHOD_CELLS = 1.0  # of normals = finite_difference
 TOLERANCE = 0.5  # degrees in the mean, between the analytic gradient in float32 and in float64
 AMPLITUDE, FREQUENCY = 0.04, 9.0  # of the bumps on the sphere
 
@@ -35,6 +35,9 @@ def run(quick: bool, rounds: int) -> Result:
     Args:
         quick: Fewer points and a rougher fit.
         rounds: Of timing.
+
+    Raises:
+        CheckFailed: The analytic gradient is wrong.
     """
     torch.manual_seed(0)
     n, steps = (4096, 300) if quick else (16384, 1500)
@@ -50,7 +53,7 @@ def run(quick: bool, rounds: int) -> Result:
         found = {key: way(field, positions) for key, way in ways.items()}
     from_field = {key: angle(normals, exact) for key, normals in found.items()}
     from_surface = {key: angle(normals, true_surface) for key, normals in found.items()}
-    first, shipped = ("analytic", ""), ("finite differences", f"eps = {SHIPPED_CELLS:g} cells")
+    first, shipped = ("analytic", ""), ("finite differences", f"eps = {METHOD_CELLS:g} cells")
     if not from_field[first] < TOLERANCE:
         raise CheckFailed(f"normals: the analytic gradient is {from_field[first]:.2f} degrees from its own in float64")
     charts, findings = [], []

@@ -8,6 +8,7 @@ details differ, so that each is held against its own converged image; how far th
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -15,8 +16,10 @@ import torch
 from splitnerf import _core
 from splitnerf.bench.charts import Chart, Point, Result
 from splitnerf.bench.lights import data_folder, lights
-from splitnerf.bench.peers import bumpy_sphere, drjit_ready, peer
-from splitnerf.bench.timing import interleaved
+from splitnerf.bench.measures import rms
+from splitnerf.bench.meshes import bumpy_sphere
+from splitnerf.bench.peers import drjit_ready, peer
+from splitnerf.bench.timing import Timing, interleaved
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.gltf import read_asset
 from splitnerf.errors import CheckFailed
@@ -39,6 +42,9 @@ def run(quick: bool, rounds: int) -> Result:
     Args:
         quick: A smaller image, fewer samples, and Mitsuba left out.
         rounds: Of timing.
+
+    Raises:
+        CheckFailed: Two renderers converge to different images.
     """
     size, samples, converged = (64, (4, 16, 64), 512) if quick else (128, (4, 16, 64, 256), 2048)
     asset = subject()
@@ -61,9 +67,11 @@ def run(quick: bool, rounds: int) -> Result:
         (way, n): float(np.mean([error_of(render(n, seed), means[way]) for seed in range(SEEDS)]))
         for way, render in renderers.items() for n in samples
     }  # fmt: skip
-    times = interleaved(
-        {(way, n): lambda way=way, n=n: renderers[way](n, SEEDS) for way, n in errors}, max(3, rounds // 3)
-    )
+    # One renderer after the other: Mitsuba's variants are switched for the whole process, which takes time.
+    times: dict[tuple[str, int], Timing] = {}
+    for way, render in renderers.items():
+        found = interleaved({n: lambda n=n, r=render: r(n, SEEDS) for n in samples}, max(3, rounds // 3))
+        times |= {(way, n): found[n] for n in samples}
     most = samples[-1]
     for way in (w for w in renderers if w != "splitnerf"):
         ours, theirs = ([(times[w, n].seconds, errors[w, n]) for n in samples] for w in ("splitnerf", way))
@@ -81,24 +89,20 @@ def run(quick: bool, rounds: int) -> Result:
 
 
 def time_to(curve: list[tuple[float, float]], error: float) -> float:
-    """When a renderer with these times and errors reaches an error: by the straight line of their logarithms."""
-    slope, level = np.polyfit(*np.log([[e, t] for t, e in curve]).T, 1)
-    return float(np.exp(level + slope * np.log(error)))
+    """When a renderer with these times and errors reaches an error: by the power law of its last two points."""
+    (t0, e0), (t1, e1) = curve[-2:]
+    return t1 * (error / e1) ** (np.log(t1 / t0) / np.log(e1 / e0))
 
 
 def error_of(image: tuple[np.ndarray, np.ndarray], mean: tuple[np.ndarray, np.ndarray]) -> float:
     return rms((np.clip(image[0], 0, 1) - np.clip(mean[0], 0, 1))[mean[1] > INSIDE])
 
 
-def rms(x: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(x * x)))
-
-
 def subject() -> Asset:
     """The boombox of the data folder without its normal map, or a bumpy sphere with textures."""
     path = data_folder() / "scenes" / "boombox" / "asset.glb"
     if path.is_file():
-        asset = read_asset(path)
+        asset = replace(read_asset(path), name="boombox")
         for material in asset.materials:
             material.normal_texture = None
         return asset
@@ -155,7 +159,8 @@ def mitsuba_renderer(variant: str, asset: Asset, light: np.ndarray, size: int) -
     })  # fmt: skip
 
     def render(spp: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        mi.set_variant(variant)
+        if mi.variant() != variant:
+            mi.set_variant(variant)
         image = np.array(mi.render(scene, spp=spp, seed=seed))
         return image[..., :3], image[..., 3]
 

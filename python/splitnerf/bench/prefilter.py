@@ -11,16 +11,26 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.bench.charts import Chart, Point, Result
-from splitnerf.bench.lights import MapLight, lights, pyramid_of
+from splitnerf.bench.lights import MapLight, lights, octahedral_directions, pyramid_of
 from splitnerf.bench.timing import interleaved
 from splitnerf.config import Config, preset
-from splitnerf.ops import fibonacci_directions, prefilter_light, sample_ggx_lobe
+from splitnerf.ops import (
+    fibonacci_directions,
+    light_lookup,
+    prefilter_light,
+    sample_ggx_lobe,
+    sh_projection,
+    zonal_factors,
+)
 
 BANDS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 QUICK_BANDS = (0.1, 0.3, 0.7)
 PUBLISHED = 8129  # light directions of the paper
 TRUTH_CHUNK = 1 << 22
 QUADRATURE_FROM = 0.1  # roughness
+HARMONIC_RESOLUTION, ZONAL_ROWS = 128, 129
+HARMONICS = "spherical harmonics"
+NARROWEST = 0.1  # roughness that the harmonics are asked for
 
 Estimate = Callable[[Tensor, Tensor], Tensor]
 
@@ -117,6 +127,19 @@ def pyramid(light: MapLight, resolution: int) -> Estimate:
     return estimate
 
 
+def harmonics(light: MapLight) -> Estimate:
+    """Spherical harmonics of degree 12 from the light's averages, for roughness from `NARROWEST` on."""
+    texels = light(torch.from_numpy(octahedral_directions(HARMONIC_RESOLUTION)).float())
+    projection, zonal = sh_projection(HARMONIC_RESOLUTION, cells=True), zonal_factors(NARROWEST, ZONAL_ROWS)
+    nodes = torch.tensor([NARROWEST / 2, NARROWEST], dtype=torch.float64)
+
+    def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
+        resolutions = torch.tensor([HARMONIC_RESOLUTION])
+        return light_lookup(axes, roughness, texels, projection @ texels, resolutions, nodes, zonal)
+
+    return estimate
+
+
 def estimators(light: MapLight, quick: bool) -> dict[tuple[str, str], Estimate]:
     """By (method, setting)."""
     found: dict[tuple[str, str], Estimate] = {
@@ -130,6 +153,7 @@ def estimators(light: MapLight, quick: bool) -> dict[tuple[str, str], Estimate]:
     found |= {
         ("filtered importance", f"n = {n}"): filtered_importance(light, n) for n in ((32,) if quick else (8, 32, 128))
     }
+    found[HARMONICS, "degree 12"] = harmonics(light)
     found |= {("pyramid", f"{n} x {n}"): pyramid(light, n) for n in ((128,) if quick else (64, 128, 256))}
     return found
 
@@ -153,7 +177,8 @@ def run(quick: bool, rounds: int) -> Result:
             axes = F.normalize(torch.randn(n_queries, 3), dim=1)
             roughness = torch.full((n_queries, 1), rho)
             true = truth(axes, rho)
-            calls = {key: lambda e=e: e(axes, roughness) for key, e in methods.items()}
+            able = {key: e for key, e in methods.items() if key[0] != HARMONICS or rho >= NARROWEST}
+            calls = {key: lambda e=e: e(axes, roughness) for key, e in able.items()}
             with torch.no_grad():
                 errors = {key: relative_rms([call() for _ in range(3)], true) for key, call in calls.items()}
                 times = interleaved(calls, rounds)

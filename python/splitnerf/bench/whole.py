@@ -58,7 +58,9 @@ def whole(
                 values = (f"{MEASURES[key]} {score['psnr']:.2f} dB" for key in MEASURES if (score := found.get(key)))
                 show(f"{scene.name}: {row.name}: {', '.join(values)}")
         charts += [chart for key in MEASURES if (chart := chart_of(scene, key, scores)).points]
-    return Result("whole", "The whole program: wall time against error", findings(charts), charts)
+    names = [scene.name for scene in scenes]
+    title = f"The whole program on {' and '.join(names)}: wall time against error"
+    return Result("_".join(["whole", *names]), title, findings(charts), charts)
 
 
 def configurations(names: Sequence[str], settings: dict[str, object]) -> dict[str, Config]:
