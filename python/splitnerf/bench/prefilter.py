@@ -11,7 +11,7 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.bench.charts import Chart, Point, Result
-from splitnerf.bench.lights import MapLight, lights, octahedral_directions, pyramid_of
+from splitnerf.bench.lights import MapLight, cell_means, lights, pyramid_of
 from splitnerf.bench.timing import interleaved
 from splitnerf.config import Config, preset
 from splitnerf.ops import (
@@ -28,7 +28,7 @@ QUICK_BANDS = (0.1, 0.3, 0.7)
 PUBLISHED = 8129  # light directions of the paper
 TRUTH_CHUNK = 1 << 22
 QUADRATURE_FROM = 0.1  # roughness
-HARMONIC_RESOLUTION, ZONAL_ROWS = 128, 129
+HARMONIC_RESOLUTION, ZONAL_ROWS = 64, 129
 HARMONICS = "spherical harmonics"
 NARROWEST = 0.1  # roughness that the harmonics are asked for
 
@@ -129,7 +129,7 @@ def pyramid(light: MapLight, resolution: int) -> Estimate:
 
 def harmonics(light: MapLight) -> Estimate:
     """Spherical harmonics of degree 12 from the light's averages, for roughness from `NARROWEST` on."""
-    texels = light(torch.from_numpy(octahedral_directions(HARMONIC_RESOLUTION)).float())
+    texels = cell_means(light, HARMONIC_RESOLUTION)
     projection, zonal = sh_projection(HARMONIC_RESOLUTION, cells=True), zonal_factors(NARROWEST, ZONAL_ROWS)
     nodes = torch.tensor([NARROWEST / 2, NARROWEST], dtype=torch.float64)
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 SHORTEST = 0.005  # seconds of one measurement; faster calls are repeated within it
-SETTLING = 0.02  # seconds before each: what ran before has threads that go on looking for work
+SETTLING = 0.004  # seconds before each: what ran before has threads that go on looking for work
 
 
 @dataclass(frozen=True)
