@@ -134,8 +134,8 @@ def split_errors(
         normals, views, roughness, light.directions, light.solid_angles, light.lamps(light.directions), seen
     )
     groups = []
-    for _ in range(GROUPS):
-        directions, pdf = sample_bsdf(normals, views, roughness, n)
+    for seed in range(GROUPS):
+        directions, pdf = sample_bsdf(normals, views, roughness, n, seed)
         radiance = light.rest(directions.reshape(-1, 3)).view(count, n, 3)
         rest = monte_carlo_light(normals, views, roughness, directions, pdf, radiance)
         sums = LightSums(rest.specular + lamps.specular, rest.grazing + lamps.grazing, diffuse)
