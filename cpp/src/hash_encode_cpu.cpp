@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 
+#include "huge_pages.h"
 #include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/parallel.h"
@@ -47,6 +48,8 @@ void hash_encode_backward(const HashGridShape& shape, int n_active, int64_t n, c
   hash_levels(shape, levels.data());
   const auto args = make_args<T>(shape, levels.data(), n_active, n, positions, nullptr);
   const Kernels<T>& k = kernels<T>();
+  const HashLevel& last = levels[shape.n_levels - 1];
+  prefer_huge_pages(grad_table, (last.offset + last.n_entries) * shape.n_features * sizeof(T));
   parallel_for(shape.n_levels, 1, [&](int64_t begin, int64_t end) {
     for (int64_t l = begin; l < end; ++l) {
       T* first = grad_table + levels[l].offset * shape.n_features;

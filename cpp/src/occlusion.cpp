@@ -5,7 +5,7 @@
 #include <numeric>
 #include <vector>
 
-#include "splitnerf/environment.h"
+#include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/parallel.h"
 #include "splitnerf/sampling.h"
@@ -15,58 +15,54 @@ namespace {
 
 constexpr int64_t kGrain = 32;  // points
 
-// Indices of an n-point lattice on the square, 16 that lie together in a row: their rays make a coherent packet, also under
-// a shift but where that wraps around.
-void order_by_place(int n, std::vector<int>& order) {
-  const int bands = max_of(1, static_cast<int>(std::sqrt(n / 32.0) + 0.5)), sectors = max_of(1, n / (16 * bands));
-  const auto cell = [&](int i) {
-    const Vec2<double> u = fibonacci_lattice<double>(i, n);
-    const int band = static_cast<int>(u.x * bands), sector = static_cast<int>(u.y * sectors);
-    return band * sectors + (band % 2 ? sectors - 1 - sector : sector);
-  };
-  order.resize(n);
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return cell(a) < cell(b); });
-}
+// An n-point lattice on the square, 16 points that lie together in a row: their rays make a coherent packet, also under a
+// shift but where that wraps around.
+template <class T> struct OrderedLattice {
+  int64_t n;
+  std::vector<T> u, v;  // [padded_fan(n)]
 
-// The rays of one point, traced together so that Embree's packets are coherent.
-template <class T> class RayFan {
+  explicit OrderedLattice(int count) : n(count), u(padded_fan(count)), v(padded_fan(count)) {
+    const int bands = max_of(1, static_cast<int>(std::sqrt(n / 32.0) + 0.5)), sectors = max_of(1, count / (16 * bands));
+    const auto cell = [&](int i) {
+      const Vec2<double> at = fibonacci_lattice<double>(i, count);
+      const int band = static_cast<int>(at.x * bands), sector = static_cast<int>(at.y * sectors);
+      return band * sectors + (band % 2 ? sectors - 1 - sector : sector);
+    };
+    std::vector<int> order(count);
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return cell(a) < cell(b); });
+    for (int i = 0; i < count; ++i) {
+      const Vec2<T> at = fibonacci_lattice<T>(order[i], count);
+      u[i] = at.x, v[i] = at.y;
+    }
+  }
+};
+
+// Traces one fan after the other; holds what a fan needs meanwhile.
+template <class T> class FanTracer {
  public:
-  RayFan(const Scene& scene, int height, int width, const T* environment)
-      : scene_(scene), height_(height), width_(width), environment_(environment) {}
+  FanTracer(const Scene& scene, int height, int width, const T* environment, int64_t most_rays)
+      : scene_(scene), height_(height), width_(width), environment_(environment), x_(padded_fan(most_rays)),
+        y_(x_.size()), z_(x_.size()), active_(x_.size()), visible_(x_.size()) {}
 
-  // Factor over the directions w = frame.to_world(sample(u1, u2)) above the horizon of `normal`, (u1, u2) a lattice of as
-  // many points as `order` has; the rays start at origin + ahead w.
-  template <class Sampler>
-  Vec3<T> factor(Vec3<T> origin, T ahead, Vec3<T> normal, const Frame<T>& frame, Vec2<T> shift,
-                 const std::vector<int>& order, Sampler sample) {
-    const int n_rays = static_cast<int>(order.size());
-    origins_.resize(3 * n_rays), directions_.resize(3 * n_rays), active_.resize(n_rays), visible_.resize(n_rays);
-    for (int i = 0; i < n_rays; ++i) {
-      const Vec2<T> u = fibonacci_lattice<T>(order[i], n_rays, shift);
-      const Vec3<T> w = frame.to_world(sample(u.x, u.y));
-      active_[i] = dot(w, normal) > T(0);
-      for (int c = 0; c < 3; ++c) {
-        origins_[3 * i + c] = static_cast<float>(origin[c] + ahead * w[c]);
-        directions_[3 * i + c] = static_cast<float>(w[c]);
-      }
-    }
-    scene_.trace_visibility(origins_.data(), directions_.data(), n_rays, INFINITY, active_.data(), visible_.data());
-    OcclusionSum<T> total;
-    for (int i = 0; i < n_rays; ++i) {
-      if (!active_[i]) continue;
-      const Vec3<float> w = load3(&directions_[3 * i]);
-      total.add(lookup_environment(environment_, height_, width_, Vec3<T>{T(w.x), T(w.y), T(w.z)}), visible_[i]);
-    }
-    return total.factor();
+  Vec3<T> factor(Vec3<T> origin, T ahead, const RayFan<T>& fan) {
+    const int64_t n = padded_fan(fan.n);
+    kernels<T>().fan_directions(fan, x_.data(), y_.data(), z_.data(), active_.data());
+    const Vec3<float> start{static_cast<float>(origin.x), static_cast<float>(origin.y), static_cast<float>(origin.z)};
+    scene_.trace_fan(start, x_.data(), y_.data(), z_.data(), n, static_cast<float>(ahead), active_.data(),
+                     visible_.data());
+    T sums[6];
+    kernels<T>().fan_light(environment_, height_, width_, n, x_.data(), y_.data(), z_.data(), active_.data(),
+                           visible_.data(), sums);
+    return occlusion_factor(load3(sums), load3(sums + 3));
   }
 
  private:
   const Scene& scene_;
   int height_, width_;
   const T* environment_;
-  std::vector<float> origins_, directions_;
-  std::vector<uint8_t> active_, visible_;
+  std::vector<float> x_, y_, z_;
+  std::vector<int32_t> active_, visible_;
 };
 
 }  // namespace
@@ -75,11 +71,10 @@ template <class T>
 void occlusion_factors(const Scene& scene, const OcclusionOptions& options, int64_t n, const T* positions,
                        const T* normals, const T* lobe_dirs, const T* roughness, int height, int width,
                        const T* environment, T* occlusion_d, T* occlusion_s) {
-  std::vector<int> diffuse_order, specular_order;
-  order_by_place(options.n_diffuse_rays, diffuse_order);
-  order_by_place(options.n_specular_rays, specular_order);
+  const OrderedLattice<T> diffuse(options.n_diffuse_rays), specular(options.n_specular_rays);
+  const int64_t most = max_of(diffuse.n, specular.n);
   parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    RayFan<T> fan(scene, height, width, environment);
+    FanTracer<T> tracer(scene, height, width, environment, most);
     for (int64_t i = begin; i < end; ++i) {
       const auto counter = static_cast<uint32_t>(i);
       const auto shift = [&](uint32_t dimension) {
@@ -89,12 +84,13 @@ void occlusion_factors(const Scene& scene, const OcclusionOptions& options, int6
       const Vec3<T> normal = load3(normals + 3 * i), axis = load3(lobe_dirs + 3 * i);
       const T ahead = options.along_ray ? T(options.offset) : T(0), up = T(options.offset) - ahead;
       const Vec3<T> origin = load3(positions + 3 * i) + normal * up;
-      const T ggx_alpha = ggx_alpha_from_roughness(roughness[i]);
-      store3(occlusion_d + 3 * i, fan.factor(origin, ahead, normal, Frame<T>(normal), shift(0), diffuse_order,
-                                             [](T u1, T u2) { return sample_cosine_hemisphere(u1, u2); }));
-      store3(occlusion_s + 3 * i,
-             fan.factor(origin, ahead, normal, Frame<T>(axis), shift(2), specular_order,
-                        [&](T u1, T u2) { return splitnerf::sample_ggx_lobe(u1, u2, ggx_alpha); }));
+      const auto fan = [&](const OrderedLattice<T>& lattice, uint32_t dimension, Vec3<T> about, T edge) {
+        return RayFan<T>{
+            lattice.u.data(), lattice.v.data(), lattice.n, shift(dimension), Frame<T>(about), edge, normal};
+      };
+      const T edge = ggx_lobe_edge(ggx_alpha_from_roughness(roughness[i]));
+      store3(occlusion_d + 3 * i, tracer.factor(origin, ahead, fan(diffuse, 0, normal, T(0))));
+      store3(occlusion_s + 3 * i, tracer.factor(origin, ahead, fan(specular, 2, axis, edge)));
     }
   });
 }

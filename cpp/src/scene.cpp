@@ -1,6 +1,7 @@
 // Scene on Embree.
 #include "splitnerf/scene.h"
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -128,6 +129,25 @@ void Scene::trace_visibility(const float* origins, const float* directions, int6
       for (int k = 0; k < count; ++k) visible[first + k] = valid[k] == 0 || !(rays.tfar[k] < 0.f);
     }
   });
+}
+
+void Scene::trace_fan(Vec3<float> origin, const float* x, const float* y, const float* z, int64_t n, float t_near,
+                      const int32_t* active, int32_t* visible) const {
+  const RTCScene scene = embree_scene(impl_->tracer);
+  alignas(64) RTCRay16 rays{};
+  alignas(64) int valid[kPacket];
+  for (int k = 0; k < kPacket; ++k) {
+    rays.org_x[k] = origin.x, rays.org_y[k] = origin.y, rays.org_z[k] = origin.z;
+    rays.tnear[k] = t_near, rays.mask[k] = ~0u;
+  }
+  for (int64_t first = 0; first < n; first += kPacket) {
+    for (int k = 0; k < kPacket; ++k) {
+      rays.dir_x[k] = x[first + k], rays.dir_y[k] = y[first + k], rays.dir_z[k] = z[first + k];
+      rays.tfar[k] = INFINITY, valid[k] = active[first + k];
+    }
+    embree::occluded16(valid, scene, &rays);
+    for (int k = 0; k < kPacket; ++k) visible[first + k] = rays.tfar[k] < 0.f ? 0 : -1;
+  }
 }
 
 void Scene::trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far, Hit* hits) const {

@@ -1,4 +1,5 @@
 // Scene in a build without Embree: rays go to the callback that the Python module registers.
+#include <cmath>
 #include <stdexcept>
 #include <vector>
 
@@ -23,6 +24,19 @@ void Scene::trace_visibility(const float* origins, const float* directions, int6
   std::vector<Hit> hits(n_rays);
   trace_closest(origins, directions, n_rays, t_far, hits.data());
   for (int64_t i = 0; i < n_rays; ++i) visible[i] = (active && !active[i]) || hits[i].t < 0.f;
+}
+
+void Scene::trace_fan(Vec3<float> origin, const float* x, const float* y, const float* z, int64_t n, float t_near,
+                      const int32_t* active, int32_t* visible) const {
+  std::vector<float> origins(3 * n), directions(3 * n);
+  std::vector<uint8_t> open(n);
+  for (int64_t i = 0; i < n; ++i) {
+    const Vec3<float> w{x[i], y[i], z[i]};
+    store3(&origins[3 * i], origin + w * t_near);
+    store3(&directions[3 * i], w);
+  }
+  trace_visibility(origins.data(), directions.data(), n, INFINITY, nullptr, open.data());
+  for (int64_t i = 0; i < n; ++i) visible[i] = active[i] && !open[i] ? 0 : -1;
 }
 
 Hit Scene::trace_closest(Vec3<float> origin, Vec3<float> direction, float t_far) const {

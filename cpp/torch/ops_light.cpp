@@ -1,10 +1,21 @@
 // prefilter_light, sample_ggx_lobe, trace_visibility and occlusion_factors as torch operators.
+#include <cmath>
 #include <tuple>
 
 #include "device.h"
 
 namespace splitnerf::glue {
 namespace {
+
+bool all_finite(const Tensor& values, ScalarType type) {
+  bool finite = true;
+  dispatch_real(type, [&](auto zero) {
+    using T = decltype(zero);
+    const T* value = in<T>(values);
+    for (int64_t i = 0; i < values.numel(); ++i) finite &= std::isfinite(value[i]);
+  });
+  return finite;
+}
 
 std::tuple<Tensor, Tensor> prefilter_light(Tensor query_dirs, Tensor roughness, Tensor light_dirs, Tensor light) {
   const char* op = "prefilter_light";
@@ -61,6 +72,8 @@ std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Te
   const Tensor rho = checked(op, "roughness", roughness, {x.size(0), 1}, type);
   const Tensor env = checked(op, "environment", environment, {kAny, kAny, 3}, type);
   require(env.size(0) > 0 && env.size(1) > 0, op, "environment must hold at least one texel");
+  require(env.numel() <= INT32_MAX, op, "environment must hold less than 2^31 numbers");
+  require(all_finite(env, type), op, "environment must be finite");
   require(n_diffuse_rays > 0 && n_specular_rays > 0 && n_diffuse_rays <= 1 << 20 && n_specular_rays <= 1 << 20, op,
           "n_diffuse_rays and n_specular_rays must be in [1, 2^20]");
   const OcclusionOptions options{static_cast<int>(n_diffuse_rays), static_cast<int>(n_specular_rays),

@@ -43,7 +43,7 @@ def load_checkpoint(path: Path) -> dict:
     """Reads a checkpoint with torch's restricted unpickler, whoever wrote it.
 
     Before, the container is looked at: nothing in it is compressed, and its pickle names nothing but tensors. So a file
-    takes no more memory than it is long. After, every value has the type, shape and range that the trainer writes.
+    takes about as much memory as it is long. After, every value has the type, shape and range that the trainer writes.
 
     Raises:
         InputError: The file is missing, truncated, of another format, holds anything but what the trainer writes, or

@@ -136,7 +136,7 @@ class Config:
     light_queries: int = 512
     light_every: int = 1
     light_step_every: int = 4  # steps that share one pass through the pyramid's maps and one step of its texels
-    light_lobe_below: float = 0.25  # narrower lobes are sampled exactly
+    light_lobe_below: float = 0.15  # narrower lobes are sampled exactly
     light_lobe_samples: int = 16
     eikonal_points: int = 256  # uniform in the box, beside the rays' samples
 

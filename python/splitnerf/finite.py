@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 
 import torch
 from torch import Tensor
+from torch.nn.utils import get_total_norm
 
 from splitnerf.batches import Batch
 from splitnerf.data.dataset import Dataset
@@ -15,7 +16,7 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
 
 MOST_SKIPPED = 10  # steps in a row
-LARGEST_SUM = 1e18  # of a gradient; the optimiser squares its values, in single precision
+LARGEST = 1e18  # value of a gradient; the optimiser squares it, in single precision
 
 
 class Diverged(RuntimeError):
@@ -51,8 +52,8 @@ class GradientWatch:
         Raises:
             Diverged: They were not in ten steps in a row.
         """
-        sums = [p.grad.sum() for p in self.parameters if p.grad is not None]
-        if not sums or abs(torch.stack(sums).sum().item()) < LARGEST_SUM:
+        largest = get_total_norm([p.grad for p in self.parameters if p.grad is not None], torch.inf)
+        if largest.item() < LARGEST:
             self._in_a_row = 0
             return True
         self.skipped, self._in_a_row = self.skipped + 1, self._in_a_row + 1

@@ -152,5 +152,15 @@ TEST(EnvironmentSampler, BlackMapSaysSo) {
   EXPECT_TRUE(EnvironmentSampler(map.data(), 4, 8).black());
 }
 
+TEST(Environment, NaNStaysAndReadsNothingElse) {
+  constexpr int kHeight = 6, kWidth = 10;
+  const std::vector<float> map(3 * kHeight * kWidth, 1.f);
+  for (const Vec3<float> d : {Vec3<float>{NAN, 0, 1}, Vec3<float>{0, NAN, 1}, Vec3<float>{1, 0, NAN}}) {
+    const auto cell = equirect_cell(direction_to_equirect(d), kHeight, kWidth);
+    EXPECT_TRUE(cell.row >= 0 && cell.next_row < kHeight && cell.column >= 0 && cell.next_column < kWidth);
+    EXPECT_TRUE(std::isnan(lookup_environment(map.data(), kHeight, kWidth, d).x));
+  }
+}
+
 }  // namespace
 }  // namespace splitnerf

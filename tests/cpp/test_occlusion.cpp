@@ -4,6 +4,7 @@
 #include "check.h"
 #include "meshes.h"
 #include "splitnerf/environment.h"
+#include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
 
 namespace splitnerf {
@@ -52,6 +53,62 @@ class Occlusion : public testing::Test {
     if (!*embree_version()) GTEST_SKIP() << "this build has no Embree";
   }
 };
+
+// Every instruction set's fans against the formulas, one ray at a time.
+template <class T> void expect_fans_match(double tolerance) {
+  Random random(5);
+  constexpr int64_t kRays = 37;
+  const int64_t n_padded = padded_fan(kRays);
+  std::vector<T> u = random.uniforms<T>(n_padded), v = random.uniforms<T>(n_padded), map(3 * kHeight * kWidth);
+  for (T& texel : map) texel = T(random.uniform());
+  for (const Kernels<T>& set : usable_kernels<T>()) {
+    for (const double alpha : {0.01, 0.3, 0.999, 1.0}) {
+      const Vec3<T> axis = random.direction<T>(), normal = random.direction<T>();
+      const RayFan<T> fan{u.data(), v.data(), kRays, {T(0.3), T(0.6)}, Frame<T>(axis), ggx_lobe_edge(T(alpha)), normal};
+      std::vector<float> x(n_padded), y(n_padded), z(n_padded);
+      std::vector<int32_t> active(n_padded), visible(n_padded);
+      set.fan_directions(fan, x.data(), y.data(), z.data(), active.data());
+      Vec3<T> open{0, 0, 0}, all{0, 0, 0};
+      for (int i = 0; i < n_padded; ++i) {
+        visible[i] = i % 3 ? -1 : 0;
+        const Vec3<T> w =
+            fan.frame.to_world(sample_ggx_lobe(wrap_unit(u[i], T(0.3)), wrap_unit(v[i], T(0.6)), T(alpha)));
+        if (std::abs(dot(w, normal)) > 1e-4) { ASSERT_EQ(active[i] != 0, i < kRays && dot(w, normal) > 0) << i; }
+        if (!active[i]) continue;
+        const double apart = length(w - Vec3<T>{T(x[i]), T(y[i]), T(z[i])});
+        ASSERT_LT(apart, 4e-6) << set.name << " " << alpha << " " << i;
+        const Vec3<T> light = lookup_environment(map.data(), kHeight, kWidth, Vec3<T>{T(x[i]), T(y[i]), T(z[i])});
+        all += light + Vec3<T>{T(kBlackLight), T(kBlackLight), T(kBlackLight)};
+        if (visible[i]) open += light + Vec3<T>{T(kBlackLight), T(kBlackLight), T(kBlackLight)};
+      }
+      T sums[6];
+      set.fan_light(map.data(), kHeight, kWidth, n_padded, x.data(), y.data(), z.data(), active.data(), visible.data(),
+                    sums);
+      for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(sums[c], open[c], tolerance * open[c]) << set.name << " " << alpha;
+        EXPECT_NEAR(sums[3 + c], all[c], tolerance * all[c]) << set.name << " " << alpha;
+      }
+    }
+  }
+}
+TEST(RayFans, MatchTheFormulas) {
+  expect_fans_match<float>(1e-4);
+  expect_fans_match<double>(1e-12);
+}
+
+TEST(RayFans, WhatIsNotFiniteDoesNotCount) {
+  const float lattice[16] = {}, nan = NAN;
+  const RayFan<float> fan{lattice, lattice, 16, {0, 0}, Frame<float>({nan, 0, 1}), 0, {0, 0, 1}};
+  float x[16], y[16], z[16];
+  int32_t active[16];
+  for (const Kernels<float>& set : usable_kernels<float>()) {
+    set.fan_directions(fan, x, y, z, active);
+    for (int i = 0; i < 16; ++i) {
+      EXPECT_EQ(active[i], 0) << set.name;
+      EXPECT_TRUE(x[i] == 0 && y[i] == 0 && z[i] == 1) << set.name;
+    }
+  }
+}
 
 TEST_F(Occlusion, ALoneConvexBodyIsOpenEverywhere) {
   const TestMesh mesh = sphere_mesh(32, 64);

@@ -139,6 +139,41 @@ TEST(Sampling, InversionSolvesItsEquation) {
   EXPECT_EQ(invert_y_minus_log1p(0.), 0);
 }
 
+TEST(Trigonometry, CosineAndSineOfTurns) {
+  for (double u = -3; u < 3; u += 0.00123) {
+    const Vec2<float> at = cos_sin_of_turns(float(u));
+    EXPECT_NEAR(at.x, std::cos(2 * kPi * double(float(u))), 3e-7) << u;
+    EXPECT_NEAR(at.y, std::sin(2 * kPi * double(float(u))), 3e-7) << u;
+  }
+  const Vec2<float> far = cos_sin_of_turns(999999.25f);
+  EXPECT_NEAR(far.x, 0, 1e-6);
+  EXPECT_NEAR(far.y, 1, 1e-6);
+}
+
+TEST(Trigonometry, ArcTangent) {
+  for (int i = 0; i < 4000; ++i) {
+    const double angle = (i - 2000) * kPi / 2000, length = std::pow(10., i % 60 - 30);
+    const float y = float(length * std::sin(angle)), x = float(length * std::cos(angle));
+    const double exact = std::atan2(double(y), double(x));
+    EXPECT_NEAR(arc_tangent(y, x), exact, 2.5e-7 * std::abs(exact)) << y << " " << x;
+  }
+  EXPECT_EQ(arc_tangent(0.f, 0.f), 0.f);
+  EXPECT_EQ(arc_tangent(0.f, 1.f), 0.f);
+  EXPECT_FLOAT_EQ(arc_tangent(0.f, -1.f), float(kPi));
+  EXPECT_TRUE(std::isnan(arc_tangent(NAN, 1.f)));
+  EXPECT_TRUE(std::isnan(arc_tangent(1.f, NAN)));
+  EXPECT_TRUE(std::isnan(arc_tangent(NAN, NAN)));
+}
+
+// Against the library's, over all magnitudes.
+TEST(Sampling, LogarithmOfOnePlus) {
+  for (double y = 1e-12; y < 1e30; y *= 1.37) {
+    EXPECT_NEAR(log1p_of_positive(y) / std::log1p(y), 1, 5e-16) << y;
+    EXPECT_NEAR(log1p_of_positive(float(y)) / std::log1p(double(float(y))), 1, 2.5e-7) << y;
+  }
+  EXPECT_EQ(log1p_of_positive(0.), 0);
+}
+
 TEST(Sampling, SeriesMeetsTheLogarithm) {
   for (double y : {0.0999999, 0.1}) { EXPECT_NEAR(y_minus_log1p(y) / (y - std::log1p(y)), 1, 1e-12) << y; }
 }

@@ -4,21 +4,30 @@ from __future__ import annotations
 
 import csv
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 from torch.nn import functional as F
 
-from splitnerf.bench import eager, shading, split_sum
+from splitnerf.bench import charts, eager, normals, path_tracer, shading, split_sum, whole
 from splitnerf.bench.charts import Chart, Point, Result, markdown, write_csv, write_result
 from splitnerf.bench.hash_grid import SPEC
 from splitnerf.bench.lights import MapLight, octahedral_directions, pyramid_of
-from splitnerf.bench.prefilter import Truth, filtered_importance, lobe_integral
+from splitnerf.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
 from splitnerf.bench.timing import interleaved
-from splitnerf.cli import DONE, main
+from splitnerf.cli import BAD_INPUT, DONE, main
+from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.errors import CheckFailed
+from splitnerf.fields import SdfField
 from splitnerf.ops import hash_encode, prefilter_light
+
+SMALL = [
+    "n_levels=2", "log2_table_size=8", "initial_rays=32", "grid_resolution=16", "light_resolution=16", "light_queries=8",
+    "eikonal_points=16", "mesh_resolution=16", "export_resolution=16", "export_environment_height=16", "export_faces=200",
+    "export_texture_size=32",
+]  # fmt: skip
 
 
 def point(name: str, cost: float, error: float, default: bool = False) -> Point:
@@ -98,7 +107,8 @@ class TestLights:
         axes = F.normalize(torch.randn(30, 3), dim=1)
         for rho in (0.05, 0.3, 1.0):
             roughness = torch.full((30, 1), rho)
-            for estimate in (Truth(light, 64, 64)(axes, rho), filtered_importance(light, 8)(axes, roughness)):
+            ways = [filtered_importance(light, 8)] + [harmonics(light)] * (rho >= 0.1)
+            for estimate in (Truth(light, 64, 64)(axes, rho), *(way(axes, roughness) for way in ways)):
                 torch.testing.assert_close(estimate, torch.full((30, 3), 2.0), rtol=1e-3, atol=0)
         assert torch.allclose(pyramid_of(light, 16)(axes, roughness), torch.full((30, 3), 2.0), rtol=1e-3)
 
@@ -134,15 +144,147 @@ class TestSplitSum:
         np.testing.assert_allclose(middle[0, 0], (table[0, 0] + table[0, 1]) / 2)
 
     def test_finer_tables_are_better_and_the_fit_is_rough(self):
-        chart = split_sum.table_chart((8, 32))
+        chart, chi = split_sum.table_charts((8, 32))
         errors = {(p.series, p.variant): p.error for p in chart.points}
         fine, coarse = errors["table over sqrt(n.v)", "32 x 32"], errors["table over sqrt(n.v)", "8 x 8"]
         assert fine < coarse < errors["Karis 2014, fit", "8 numbers"] < 0.2
         assert [p.variant for p in chart.points if p.default] == ["32 x 32"]
+        errors = {(p.series, p.variant): p.error for p in chi.points}
+        assert errors["table over sqrt(n.v)", "32 x 32"] < errors["table over sqrt(n.v)", "8 x 8"] < 0.1
 
     def test_constant_light_splits_without_error(self):
         """All lobes see the same light: what is left is the noise of the sums and the table."""
         torch.manual_seed(0)
-        light = MapLight(np.full((32, 64, 3), 2.0, np.float32))
-        errors = split_sum.split_errors(light, Truth(light, 64, 64), 0.5, 0.5, 1.0, 1.0, 4096)
+        light = split_sum.SplitLight(np.full((32, 64, 3), 2.0, np.float32))
+        errors = split_sum.split_errors(light, Truth(light.whole, 64, 64), *self.looks(), 0.5, 1.0, 1.0, 1024)
         assert max(errors.values()) < 0.02
+
+    @staticmethod
+    def looks():
+        normals, across = (F.normalize(torch.randn(16, 3), dim=1) for _ in range(2))
+        views = split_sum.views_at(normals, across, 0.5)
+        torch.testing.assert_close((normals * views).sum(1), torch.full((16,), 0.5))
+        return normals, views
+
+    def test_lamps_and_the_rest_are_the_light(self):
+        sky = np.random.default_rng(0).random((32, 64, 3), np.float32)
+        sky[9, 20:22] = 500.0
+        light, w = split_sum.SplitLight(sky), F.normalize(torch.randn(500, 3), dim=1)
+        torch.testing.assert_close(light.lamps(w) + light.rest(w), light.whole(w), rtol=1e-4, atol=1e-4)
+        sun = torch.tensor(sky[9, 20:22] - light.rest.levels[0][9, 20:22].numpy()).sum(0)
+        texel = 2 * math.pi**2 / (32 * 64) * math.sin(9.5 / 32 * math.pi)
+        found = (light.lamps(light.directions) * light.solid_angles[:, None]).sum(0)
+        torch.testing.assert_close(found, sun * texel, rtol=0.02, atol=0)
+
+    def test_the_truth_of_a_small_lamp_has_little_noise(self):
+        """Samples of a wide lobe alone would miss it."""
+        sky = np.full((64, 128, 3), 0.1, np.float32)
+        sky[20, 40] = 1e4
+        torch.manual_seed(0)
+        light = split_sum.SplitLight(sky)
+        errors = split_sum.split_errors(light, Truth(light.whole, 64, 64), *self.looks(), 0.9, 1.0, 1.0, 256)
+        assert 0 < errors[split_sum.NOISE] < 0.01
+
+
+def test_an_axis_of_errors_spans_a_decade():
+    low, high = charts.error_range(Chart("equal", "ms", "error", [point("a", 1, 2e-7), point("b", 2, 2.2e-7)]))
+    assert high / low == pytest.approx(10) and low < 2e-7 and high > 2.2e-7
+    low, high = charts.error_range(Chart("apart", "ms", "error", [point("a", 1, 1e-7), point("b", 2, 1e-2)]))
+    assert low < 1e-7 and high > 1e-2
+
+
+class TestNormals:
+    def test_points_lie_on_the_surface(self):
+        x = normals.on_surface(200)
+        assert normals.surface(x.double()).abs().max() < 1e-6
+        step = 1e-5 * F.normalize(normals.surface_gradient(x), dim=1)
+        assert (normals.surface(x.double() + step) > normals.surface(x.double())).all()
+
+    def test_angles_are_in_degrees(self):
+        a = torch.tensor([[1.0, 0, 0], [0, 0, 2.0]])
+        b = torch.tensor([[0, 3.0, 0], [0, 0, 1.0]])
+        assert normals.angle(a, b) == pytest.approx(45)
+        tiny = torch.tensor([[1.0, 1e-9, 0]], dtype=torch.float64)
+        assert normals.angle(torch.tensor([[1.0, 0, 0]]), tiny) == pytest.approx(math.degrees(1e-9), rel=1e-3)
+
+    def test_differences_come_closer_as_they_shrink(self):
+        """On a field of one level, twice differentiable in a cell but for the softplus: the error falls with eps."""
+        torch.manual_seed(0)
+        field = SdfField(normals.SPEC, normals.BOX).double()
+        x = torch.rand(100, 3, dtype=torch.float64) - 0.5
+        true = normals.analytic(field, x)
+        coarse, fine = (normals.angle(normals.finite_differences(field, x, eps), true) for eps in (1.0, 1e-4))
+        assert fine < 1e-2 * coarse
+
+    def test_they_are_measured(self):
+        """The analytic gradient is the field's own; one cell's differences are smoother than what was fitted."""
+        field, _, training, _ = normals.run(quick=True, rounds=2).charts
+        errors = {(p.series, p.variant): p.error for p in field.points}
+        assert errors["analytic", ""] < 1e-2 < errors["finite differences", "eps = 0.01 cells"] < 1
+        assert errors["finite differences", "eps = 1 cells"] > 1
+        assert [p.series for p in training.points if p.default] == ["analytic"]
+
+    def test_both_ways_have_gradients(self):
+        field = SdfField(normals.SPEC, normals.BOX)
+        x = torch.rand(20, 3) - 0.5
+        for way in (normals.analytic, lambda f, p: normals.finite_differences(f, p, 1.0)):
+            assert normals.timed(way, field, x, training=False)().shape == (20, 3)
+            assert any(g is not None and g.abs().max() > 0 for g in normals.timed(way, field, x, training=True)())
+
+
+def test_the_path_tracer_converges(tmp_path, monkeypatch):
+    """At least with the root of its samples; a lattice of them does better."""
+    monkeypatch.setenv("SPLITNERF_DATA", str(tmp_path / "none"))
+    result = path_tracer.run(quick=True, rounds=3)
+    errors = {p.variant: p.error for p in result.charts[0].points}
+    assert errors["4 spp"] / errors["64 spp"] > 3.5
+    assert [p.variant for p in result.charts[0].points if p.default] == ["64 spp"]
+
+
+def test_time_to_an_error_follows_the_curve():
+    assert path_tracer.time_to([(1.0, 0.1), (4.0, 0.05), (16.0, 0.025)], 0.0125) == pytest.approx(64)
+
+
+class TestWhole:
+    def test_runs_become_charts_of_time_against_error(self):
+        scores = {
+            ("preset cpu", 1.0): {"novel_view": {"psnr": 20.0}, "albedo": None, "seconds": 60.0},
+            ("fast one", 1.0): {"novel_view": {"psnr": 40.0}, "albedo": None, "seconds": 90.0},
+        }
+        chart = whole.chart_of(Path("chair"), "novel_view", scores)
+        assert [(p.series, p.cost, p.default) for p in chart.points] == [
+            ("preset cpu", 1, True),
+            ("fast one", 1.5, False),
+        ]
+        assert [p.error for p in chart.points] == pytest.approx([0.1, 0.01])
+        assert whole.chart_of(Path("chair"), "albedo", scores).points == []
+        assert whole.findings([chart]) == [
+            "chair: novel views: after 1 min fast one is best; on the front: preset cpu, fast one"
+        ]
+
+    def test_every_configuration_is_possible(self):
+        configs = whole.configurations(whole.NAMES, {"seed": 3})
+        assert len({c.preset + repr(c) for c in configs.values()}) == len(configs) == 1 + len(whole.NAMES)
+        assert all(c.seed == 3 for c in configs.values())
+
+    def test_the_command_trains_once_and_goes_on(self, tmp_path, capsys):
+        pytest.importorskip("matplotlib")
+        data = write_demo_dataset(tmp_path / "tiny", size=16, n_train=4, n_test=1, spp=2)
+        (data / "mesh.ply").unlink()
+        command = ["bench", "whole", "--data", str(data), "--runs", str(tmp_path / "runs"), "--out", str(tmp_path)]
+        command += ["--spp", "1", "--only", "half the samples", *(w for s in SMALL for w in ("--set", s))]
+        assert main([*command, "--minutes", "0.02"]) == DONE
+        assert "tiny: half the samples, 0.02 minutes" in capsys.readouterr().out
+        run = tmp_path / "runs" / "tiny" / "half_the_samples__0_02_minutes"
+        made = (run / "checkpoint.pt").stat().st_mtime_ns
+        assert main([*command, "--minutes", "0.02,0.03"]) == DONE
+        assert (run / "checkpoint.pt").stat().st_mtime_ns == made
+        assert "0.03 min" in (tmp_path / "whole_tiny.md").read_text()
+
+    @pytest.mark.parametrize(
+        "words, complaint",
+        [(["--minutes", "1,-2"], "--minutes takes positive numbers"), (["--only", "nothing"], "'nothing'")],
+    )
+    def test_what_cannot_be_run_is_named(self, words, complaint, tmp_path, capsys):
+        assert main(["bench", "whole", "--data", str(tmp_path), *words]) == BAD_INPUT
+        assert complaint in capsys.readouterr().err

@@ -141,6 +141,17 @@ def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path,
     assert capsys.readouterr().err.count("step is skipped") == 3
 
 
+def test_large_gradients_that_cancel_are_seen():
+    parameters = [torch.zeros(3, requires_grad=True) for _ in range(2)]
+    watch = trainer.GradientWatch(parameters)
+    for parameter, value in zip(parameters, (1e30, -1e30)):
+        parameter.grad = torch.full((3,), value)
+    assert not watch.allows(0) and watch.skipped == 1
+    for parameter in parameters:
+        parameter.grad = torch.full((3,), -1e17)
+    assert watch.allows(1)
+
+
 def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch):  # noqa: F811
     run, before = begun
     original = trainer.GradientWatch.allows

@@ -71,6 +71,15 @@ def corner(size: float, low: float, high: float):
     return lambda x: torch.where((x > low) & (x < high), size, 0.0)
 
 
+def test_not_a_number_in_both_precisions_is_caught():
+    def call(rows, shared):
+        x = rows["x"]
+        return {"y": torch.where((x > 1.0) & (x < 1.1), x * torch.nan, x * x)}
+
+    found = search.run(planted(corner(0.0, 1, 1.1), call=call), 2000)
+    assert found.broken > 0 and not found.holds
+
+
 def test_an_error_in_one_corner_is_caught():
     assert search.run(planted(corner(0.0, 1, 1.1)), 2000).holds
     found = search.run(planted(corner(1e-3, 1.0, 1.1)), 2000)

@@ -29,24 +29,36 @@ template <class T> SPLITNERF_HD T texel_solid_angle(int row, int height, int wid
   return T(4 * kPi) / T(width) * std::sin(half * T(2 * row + 1)) * std::sin(half);
 }
 
-// The four texels around a point of the map and their bilinear weights.
+// The rows and columns of texel centres between which a point of the map lies, and how far it is between them.
+template <class T> struct EquirectCell {
+  int row, next_row, column, next_column;
+  T fx, fy;
+};
+
+template <class T> SPLITNERF_HD EquirectCell<T> equirect_cell(Vec2<T> uv, int height, int width) {
+  // A NaN goes on to the caller by fx or fy, with a cell that exists.
+  const T x = uv.x * T(width) - T(0.5), raised = uv.y * T(height) - T(0.5);
+  const T y = raised > T(0) ? min_of(raised, T(height - 1)) : T(0);
+  const T x_floor = std::floor(x);
+  const int row = min_of(static_cast<int>(y), height - 1);
+  // uv.x in [0, 1] makes x_floor one of -1 ... width - 1.
+  const int column =
+      x_floor < T(0) ? width - 1 : static_cast<int>(x_floor > T(0) ? min_of(x_floor, T(width - 1)) : T(0));
+  return {row,         min_of(row + 1, height - 1),   column, column + 1 == width ? 0 : column + 1,
+          x - x_floor, y - T(row) + (raised - raised)};
+}
+
+// The same as four texels and their bilinear weights.
 template <class T> struct EquirectFootprint {
   int64_t texel[4];  // row * width + column
   T weight[4];
 };
 
 template <class T> SPLITNERF_HD EquirectFootprint<T> equirect_footprint(Vec2<T> uv, int height, int width) {
-  const T x = uv.x * T(width) - T(0.5), y = clamp(uv.y * T(height) - T(0.5), T(0), T(height - 1));
-  const T x_floor = std::floor(x);
-  const T fx = x - x_floor;
-  const int row = min_of(static_cast<int>(y), height - 1), next_row = min_of(row + 1, height - 1);
-  const T fy = y - T(row);
-  // uv.x in [0, 1] makes x_floor one of -1 ... width - 1.
-  const int column = x_floor < T(0) ? width - 1 : min_of(static_cast<int>(x_floor), width - 1);
-  const int next_column = column + 1 == width ? 0 : column + 1;
-  return {{int64_t(row) * width + column, int64_t(row) * width + next_column, int64_t(next_row) * width + column,
-           int64_t(next_row) * width + next_column},
-          {(T(1) - fx) * (T(1) - fy), fx * (T(1) - fy), (T(1) - fx) * fy, fx * fy}};
+  const EquirectCell<T> c = equirect_cell(uv, height, width);
+  const int64_t top = int64_t(c.row) * width, bottom = int64_t(c.next_row) * width;
+  return {{top + c.column, top + c.next_column, bottom + c.column, bottom + c.next_column},
+          {(T(1) - c.fx) * (T(1) - c.fy), c.fx * (T(1) - c.fy), (T(1) - c.fx) * c.fy, c.fx * c.fy}};
 }
 
 // Bilinear radiance of the map in a direction.

@@ -7,6 +7,7 @@
 #include "splitnerf/config.h"
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/light_pyramid.h"
+#include "splitnerf/occlusion.h"
 #include "splitnerf/sdf_layer.h"
 #include "splitnerf/split_sum.h"
 
@@ -83,6 +84,12 @@ template <class T> struct Kernels {
   // sums = {sum V L c, sum L c (three channels each), sum c; the same with lobe for c}: 14 numbers.
   void (*visibility_sums)(const LobeSide<T>& directions, const VisibilityLobe<T>& lobes, const T* visible, T* lobe,
                           T* sums);
+  // Directions [padded_fan(n)] of a fan's rays, and -1 for those that count, 0 for others.
+  void (*fan_directions)(const RayFan<T>&, float* x, float* y, float* z, int32_t* active);
+  // sums = {sum V (L + eps), sum (L + eps)}, three channels each, over the active ones of n directions, a multiple of 16;
+  // map [height, width, 3], less than 2^31 numbers; visible is 0 where something is in the way, else -1.
+  void (*fan_light)(const T* map, int height, int width, int64_t n, const float* x, const float* y, const float* z,
+                    const int32_t* active, const int32_t* visible, T* sums);
   // radiance [n, 3], see splitnerf::split_sum_shade. Points [begin, end); n_channels 1 or 3 of the occlusion factors.
   void (*split_sum_shade)(const float* lut, ShadeOptions, int64_t begin, int64_t end, int n_channels,
                           const ShadeArrays<const T>&, T* radiance);

@@ -7,6 +7,7 @@
 #include "splitnerf/ggx.h"
 #include "splitnerf/trigonometry.h"
 #include "splitnerf/vec.h"
+#include "splitnerf/vector_math.h"
 
 namespace splitnerf {
 
@@ -110,23 +111,29 @@ inline constexpr double kCosineLobeLimit = 1e-3;
 
 // y - log(1 + y) for y >= 0; the difference cancels for small y, where the series
 // y^2/2 - y^3/3 + y^4/4 - ... serves instead (twelve terms leave 1e-13 at y = .1).
+template <int K, class T> SPLITNERF_HD T log1p_tail(T y) {
+  if constexpr (K == 13) {
+    return T(1) / T(K);
+  } else {
+    return T(1) / T(K) - y * log1p_tail<K + 1>(y);
+  }
+}
 template <class T> SPLITNERF_HD T y_minus_log1p(T y) {
-  if (y >= T(0.1)) return y - std::log1p(y);
-  T series = T(0);
-  for (int k = 13; k >= 2; --k) series = T(1) / T(k) - y * series;
-  return y * y * series;
+  return y < T(0.1) ? y * y * log1p_tail<2>(y) : y - log1p_of_positive(y);
 }
 
 // Solves y - log(1 + y) = t for y >= 0. sqrt(2 t) + t is an upper bound of the solution
 // (Chatzigeorgiou 2013, Eq. (1), with y = -W_{-1}(-e^{-1-t}) - 1); the function is convex and
 // increasing, so Newton's steps (y - h(y) ...) (1 + y)/y fall monotonically onto it.
 template <class T> SPLITNERF_HD T invert_y_minus_log1p(T t) {
-  T y = std::sqrt(T(2) * t) + t;
-  if (y < T(1e-12)) return y;
-  for (int step = 0; step < (sizeof(T) > 4 ? 6 : 4); ++step) {
-    y = max_of(y - (y_minus_log1p(y) - t) * (T(1) + y) / y, T(1e-12));
+  const T bound = std::sqrt(T(2) * t) + t;
+  T y = max_of(bound, T(1e-12));
+  SPLITNERF_UNROLL
+  for (int step = 0; step < 4; ++step) y = max_of(y - (y_minus_log1p(y) - t) * (T(1) + y) / y, T(1e-12));
+  if constexpr (sizeof(T) > sizeof(float)) {
+    for (int step = 0; step < 2; ++step) y = max_of(y - (y_minus_log1p(y) - t) * (T(1) + y) / y, T(1e-12));
   }
-  return y;
+  return bound < T(1e-12) ? bound : y;
 }
 
 // int D (w.z)+ dw over the hemisphere, the lobe's normalisation.
@@ -136,12 +143,18 @@ template <class T> SPLITNERF_HD T ggx_lobe_integral(T ggx_alpha) {
   return T(2) * a2 / (b * b) * y_minus_log1p(b / a2);
 }
 
-template <class T> SPLITNERF_HD Vec3<T> sample_ggx_lobe(T u1, T u2, T ggx_alpha) {
+// y1 of a lobe, or 0 where it is taken as the cosine lobe.
+template <class T> SPLITNERF_HD T ggx_lobe_edge(T ggx_alpha) {
   const T a2 = ggx_alpha * ggx_alpha, b = T(0.5) * (T(1) - a2);
-  if (b < T(kCosineLobeLimit)) return sample_cosine_hemisphere(u1, u2);
-  const T y1 = b / a2;
+  return b < T(kCosineLobeLimit) ? T(0) : b / a2;
+}
+template <class T> SPLITNERF_HD Vec3<T> sample_ggx_lobe_of_edge(T u1, T u2, T y1) {
   const T y = min_of(invert_y_minus_log1p((T(1) - u1) * y_minus_log1p(y1)), y1);
   return direction_from_cosine((y1 - y) / (y1 * (T(1) + y)), u2);
+}
+template <class T> SPLITNERF_HD Vec3<T> sample_ggx_lobe(T u1, T u2, T ggx_alpha) {
+  const T y1 = ggx_lobe_edge(ggx_alpha);
+  return y1 > T(0) ? sample_ggx_lobe_of_edge(u1, u2, y1) : sample_cosine_hemisphere(u1, u2);
 }
 
 // Density of sample_ggx_lobe at the unit vector w; zero below the horizon.

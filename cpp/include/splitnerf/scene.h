@@ -31,6 +31,11 @@ class SPLITNERF_API Scene {
   void trace_visibility(const float* origins, const float* directions, int64_t n_rays, float t_far,
                         const uint8_t* active, uint8_t* visible) const;
 
+  // The same for rays from one point, directions one array a component; n is a multiple of 16. active[i] is -1, or 0 for a
+  // ray that is masked out; visible[i] is 0 where something is in the way in (t_near, infinity), else -1.
+  void trace_fan(Vec3<float> origin, const float* x, const float* y, const float* z, int64_t n, float t_near,
+                 const int32_t* active, int32_t* visible) const;
+
   // The nearest hit of each ray with t in (0, t_far); packets of 16 here too.
   void trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far, Hit* hits) const;
 

@@ -1,4 +1,4 @@
-// exp and log1p on half lines, without branches or calls: loops over them become vector code.
+// exp and logarithms on half lines, without branches or calls: loops over them become vector code.
 #pragma once
 
 #include <cstdint>
@@ -61,6 +61,24 @@ template <class T> SPLITNERF_HD T exp_of_minus(T x) {
 template <class T> SPLITNERF_HD T log1p_of_unit(T u) {
   const T s = u / (T(2) + u), q = s * s;
   return T(2) * s * artanh_series<1>(q);
+}
+
+// log(1 + y) for y >= 0 and finite. With u = 1 + y rounded, log1p(y) = log(u) + (y - (u - 1)) / u gives back what the rounding
+// took; u = m 2^k, m in [sqrt(1/2), sqrt(2)), and log(m) = 2 artanh((m - 1) / (m + 1)).
+template <class T> SPLITNERF_HD T log1p_of_positive(T y) {
+  using Format = FloatFormat<T>;
+  using Bits = typename Format::Bits;
+  constexpr Bits kMantissa = (Bits(1) << Format::kMantissaBits) - 1, kOne = Format::kBias << Format::kMantissaBits;
+  const T u = T(1) + y;
+  Bits bits;
+  std::memcpy(&bits, &u, sizeof bits);
+  const Bits unit = (bits & kMantissa) | kOne;
+  T m;
+  std::memcpy(&m, &unit, sizeof m);
+  const T upper = m > T(1.4142135623730951) ? T(1) : T(0), reduced = m - T(0.5) * upper * m;
+  const T k = T(static_cast<int32_t>((bits >> Format::kMantissaBits) - Format::kBias)) + upper;
+  const T s = (reduced - T(1)) / (reduced + T(1));
+  return k * Format::kLn2High + (T(2) * s * artanh_series<1>(s * s) + k * Format::kLn2Low + (y - (u - T(1))) / u);
 }
 
 // log(1 + exp(beta x)) / beta, beta > 0, and its derivative.

@@ -6,7 +6,8 @@
 namespace splitnerf::SPLITNERF_ISA {
 namespace {
 
-constexpr int64_t kPoints = 64;  // worked out together
+constexpr int64_t kPoints = 64;            // worked out together
+constexpr int64_t kCachedBytes = 8 << 20;  // of tables that stay in the cache
 
 // Where points stand in one level, structure of arrays. A lane is one feature of one point, so that the features of
 // an entry lie side by side: lane p F + f.
@@ -131,20 +132,34 @@ void position_gradient(const HashEncodeArgs<T>& args, int64_t begin, int64_t end
   }
 }
 
+// The end of the levels from `first` on whose entries fit into the cache together: points go through these before the next.
+template <class T> int cached_together(const HashEncodeArgs<T>& args, int first, int64_t bytes_an_entry) {
+  int64_t bytes = args.levels[first].n_entries * bytes_an_entry;
+  int last = first + 1;
+  for (; last < args.n_active; ++last) {
+    bytes += args.levels[last].n_entries * bytes_an_entry;
+    if (bytes > kCachedBytes) break;
+  }
+  return last;
+}
+
 template <class T, int F>
 void encode_all(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, T* features, T* jacobian) {
   const int64_t n_columns = int64_t(args.n_levels) * F;
   Lanes<T, F> at;
   Cells<T, F> cells;
-  for (int64_t b = begin; b < end; b += kPoints) {
-    const int64_t n = min_of(kPoints, end - b);
-    at.load(n, args.positions + 3 * b);
-    for (int l = 0; l < args.n_active; ++l) {
-      locate(args.levels[l], n, at, cells);
-      if (jacobian) {
-        encode_level<true>(args, l, n, cells, features + b * n_columns, jacobian + 3 * b * n_columns);
-      } else {
-        encode_level<false, T, F>(args, l, n, cells, features + b * n_columns, nullptr);
+  for (int first = 0, last = 0; first < args.n_active; first = last) {
+    last = cached_together(args, first, F * sizeof(T));
+    for (int64_t b = begin; b < end; b += kPoints) {
+      const int64_t n = min_of(kPoints, end - b);
+      at.load(n, args.positions + 3 * b);
+      for (int l = first; l < last; ++l) {
+        locate(args.levels[l], n, at, cells);
+        if (jacobian) {
+          encode_level<true>(args, l, n, cells, features + b * n_columns, jacobian + 3 * b * n_columns);
+        } else {
+          encode_level<false, T, F>(args, l, n, cells, features + b * n_columns, nullptr);
+        }
       }
     }
   }

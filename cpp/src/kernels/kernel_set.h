@@ -23,6 +23,10 @@ template <class T> void lobe_scatter(const LobeSide<T>&, const LobeSide<T>&, int
 template <class T> void visibility_horizon(const LobeSide<T>&, const T*, T*, uint32_t*);
 template <class T> void visibility_shares(int64_t, const VisibilityPoint<T>&, T*, T*);
 template <class T> void visibility_sums(const LobeSide<T>&, const VisibilityLobe<T>&, const T*, T*, T*);
+template <class T> void fan_directions(const RayFan<T>&, float*, float*, float*, int32_t*);
+template <class T>
+void fan_light(const T*, int, int, int64_t, const float*, const float*, const float*, const int32_t*, const int32_t*,
+               T*);
 template <class T>
 void split_sum_shade(const float*, ShadeOptions, int64_t, int64_t, int, const ShadeArrays<const T>&, T*);
 template <class T>

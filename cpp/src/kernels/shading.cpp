@@ -12,14 +12,31 @@ template <class T> struct ShadeBlock {
   T specular[3 * kLanes], diffuse[3 * kLanes], occlusion_s[3 * kLanes], occlusion_d[3 * kLanes];
 };
 
-// Rows [first, first + n) of [points, kColumns] to one array a column, zeros behind them, and back.
+// Rows [first, first + n) of [points, kColumns] to one array a column, zeros behind them, and back. A whole block has a
+// loop of its own, whose lengths are constants: that one becomes shuffles of vectors.
 template <int kColumns, class T> void load_rows(const T* rows, int64_t first, int n, T* columns) {
   rows += first * kColumns;
+  if (n == kLanes) {
+#pragma omp simd
+    for (int i = 0; i < kLanes; ++i) {
+      SPLITNERF_UNROLL
+      for (int c = 0; c < kColumns; ++c) columns[c * kLanes + i] = rows[i * kColumns + c];
+    }
+    return;
+  }
   for (int i = 0; i < kLanes; ++i)
     for (int c = 0; c < kColumns; ++c) columns[c * kLanes + i] = i < n ? rows[i * kColumns + c] : T(0);
 }
 template <int kColumns, class T> void store_rows(const T* columns, int64_t first, int n, T* rows) {
   rows += first * kColumns;
+  if (n == kLanes) {
+#pragma omp simd
+    for (int i = 0; i < kLanes; ++i) {
+      SPLITNERF_UNROLL
+      for (int c = 0; c < kColumns; ++c) rows[i * kColumns + c] = columns[c * kLanes + i];
+    }
+    return;
+  }
   for (int i = 0; i < n; ++i)
     for (int c = 0; c < kColumns; ++c) rows[i * kColumns + c] = columns[c * kLanes + i];
 }

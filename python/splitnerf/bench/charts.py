@@ -13,6 +13,7 @@ from splitnerf.data.images import atomic_path
 from splitnerf.errors import InputError
 
 COLUMNS = 3  # charts in a row of a picture
+MARGIN = 1.3  # of the axis of errors beyond its points, a factor
 COLOURS = ("#1f6fb4", "#d9822b", "#3f9d63", "#b5539a", "#6f5fc0", "#c2524a", "#1f9c9c", "#8a7a2a", "#555555", "#a0522d")
 
 
@@ -149,6 +150,13 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:
     return ["| " + " | ".join(line) + " |" for line in lines]
 
 
+def error_range(chart: Chart) -> tuple[float, float]:
+    """Of the axis: at least a decade, so that equal errors look equal."""
+    low, high = min(p.error for p in chart.points), max(p.error for p in chart.points)
+    middle, half = math.sqrt(low * high), max(math.sqrt(high / low) * MARGIN, math.sqrt(10))
+    return middle / half, middle * half
+
+
 def draw(result: Result, path: Path) -> None:
     """All charts in one picture, both axes logarithmic; a star marks the default, a line the front.
 
@@ -167,7 +175,7 @@ def draw(result: Result, path: Path) -> None:
     for i, chart in enumerate(result.charts):
         axes = figure.add_subplot(rows, columns, i + 1)
         for name in dict.fromkeys(p.series for p in chart.points):
-            points = sorted((p for p in chart.points if p.series == name), key=lambda p: p.cost)
+            points = [p for p in chart.points if p.series == name]
             colour, costs = COLOURS[names.index(name) % len(COLOURS)], [p.cost for p in points]
             spread = [[p.cost - p.low for p in points], [p.high - p.cost for p in points]]
             handles[name] = axes.errorbar(costs, [p.error for p in points], xerr=spread, marker="o", markersize=4,
@@ -184,6 +192,7 @@ def draw(result: Result, path: Path) -> None:
         axes.set_xscale("log")
         if all(p.error > 0 for p in chart.points):
             axes.set_yscale("log")
+            axes.set_ylim(*error_range(chart))
         axes.set_title(chart.title, fontsize=9)
         axes.set_xlabel(chart.cost, fontsize=8)
         axes.set_ylabel(chart.error, fontsize=8)

@@ -16,27 +16,31 @@ PRIMES = (1, 2654435761, 805459861)
 def hash_encode(
     x: Tensor, table: Tensor, n_levels: int, base: int, growth: float, log2_size: int, n_active: int
 ) -> Tensor:
+    """All levels and corners at once: one gather, and so one gradient of the table's size.
+
+    Args:
+        x: [n, 3] in the unit cube.
+        table: [n_entries, F].
+        n_levels, base, growth, log2_size, n_active: As of :func:`splitnerf.ops.hash_encode`.
+
+    Returns:
+        [n, n_levels F].
+    """
     spec = HashGridSpec(n_levels, table.shape[1], base, growth, log2_size)
-    columns = []
-    for level, (resolution, offset, n_entries, dense) in enumerate(spec.levels()):
-        if level >= n_active:
-            columns.append(torch.zeros(len(x), table.shape[1]))
-            continue
-        scaled = x.clamp(0, 1) * resolution
-        node = scaled.detach().floor().clamp(max=resolution - 1)
-        f = scaled - node
-        value = 0.0
-        for corner in range(8):
-            bits = torch.tensor([corner & 1, corner >> 1 & 1, corner >> 2])
-            n = node.long() + bits
-            if dense:
-                index = (n[:, 0] * (resolution + 1) + n[:, 1]) * (resolution + 1) + n[:, 2]
-            else:
-                index = (n[:, 0] ^ n[:, 1] * PRIMES[1] ^ n[:, 2] * PRIMES[2]) % n_entries
-            weight = torch.where(bits.bool(), f, 1 - f).prod(1, keepdim=True)
-            value = value + weight * table[offset + index]
-        columns.append(value)
-    return torch.cat(columns, 1)
+    levels = spec.levels()[:n_active]
+    resolution, offset, size = (torch.tensor([level[k] for level in levels]) for k in range(3))
+    dense = torch.tensor([bool(level[3]) for level in levels])
+    scaled = x.clamp(0, 1)[:, None, :] * resolution[None, :, None].to(x.dtype)
+    node = torch.minimum(scaled.detach().floor().long(), resolution[None, :, None] - 1)
+    corners = torch.tensor([[c & 1, c >> 1 & 1, c >> 2] for c in range(8)])
+    f = (scaled - node)[:, :, None, :]
+    weight = torch.where(corners.bool(), f, 1 - f).prod(-1, keepdim=True)  # [n, levels, 8, 1]
+    i, j, k = (node[:, :, None, :] + corners).unbind(-1)
+    side = (resolution + 1)[:, None]
+    row_major, hashed = (i * side + j) * side + k, (i ^ j * PRIMES[1] ^ k * PRIMES[2]) % size[:, None]
+    index = offset[:, None] + torch.where(dense[:, None], row_major, hashed)
+    features = (weight * F.embedding(index, table)).sum(2).flatten(1)
+    return F.pad(features, (0, (n_levels - n_active) * table.shape[1]))
 
 
 def brdf_table(lut: Tensor, n_dot_v: Tensor, roughness: Tensor) -> Tensor:

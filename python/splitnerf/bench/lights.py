@@ -16,7 +16,7 @@ from splitnerf.fields import LightPyramid
 
 # Their brightest ten-thousandth of the sphere sends less than 1 %, 3 % and 57 % of the light.
 MEASURED = {"soft": "blender_courtyard.exr", "medium": "blender_studio.exr", "hard sun": "blender_sunrise.exr"}
-SUBDIVISION = 4  # samples along the edge of a texel that its mean is taken from
+SUBDIVISION, FINEST = 4, 512  # samples along the edge of a texel that its mean is taken from, and of the map, at least
 
 
 def data_folder() -> Path:
@@ -97,10 +97,16 @@ def octahedral_directions(n: int) -> np.ndarray:
     return points / np.linalg.norm(points, axis=1, keepdims=True)
 
 
+def cell_means(light: MapLight, resolution: int) -> Tensor:
+    """[resolution^2, 3] means of a light over an octahedral map's texels."""
+    parts = max(SUBDIVISION, FINEST // resolution)
+    fine = torch.from_numpy(octahedral_directions(resolution * parts)).float()
+    return light(fine).view(resolution, parts, resolution, parts, 3).mean((1, 3)).reshape(-1, 3)
+
+
 def pyramid_of(light: MapLight, resolution: int) -> LightPyramid:
     """The pyramid whose texels hold the means of a light over them."""
-    fine = torch.from_numpy(octahedral_directions(resolution * SUBDIVISION)).float()
-    cells = light(fine).view(resolution, SUBDIVISION, resolution, SUBDIVISION, 3).mean((1, 3)).reshape(-1, 3)
+    cells = cell_means(light, resolution)
     pyramid = LightPyramid(resolution)
     with torch.no_grad():
         pyramid.texels.zero_()

@@ -6,7 +6,6 @@ import importlib
 import os
 from pathlib import Path
 
-import numpy as np
 from torch import Tensor
 
 from splitnerf.notes import note
@@ -71,21 +70,6 @@ class DrJitHashGrid:
         dr.set_grad(self.grid.data, 0)
         features = self.grid(self.positions)
         dr.backward(dr.sum(sum(f * g for f, g in zip(features, self.cotangent))))
-        dr.eval(dr.grad(self.grid.data))
+        dr.eval(*features, dr.grad(self.grid.data))
         dr.sync_thread()
         dr.disable_grad(self.grid.data)
-
-
-def bumpy_sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """A sphere with bumps of about 2 n^2 triangles: vertices [v, 3] float32, faces [f, 3] int32."""
-    polar, azimuth = np.meshgrid(
-        np.linspace(0.01, np.pi - 0.01, n + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij"
-    )
-    radius = 1 + 0.15 * np.sin(9 * polar) * np.cos(11 * azimuth)
-    vertices = radius[..., None] * np.stack(
-        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1
-    )
-    index = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    return vertices.reshape(-1, 3).astype(np.float32), faces.astype(np.int32)

@@ -17,32 +17,33 @@ from splitnerf.ops import brdf_lut, fibonacci_directions, prefilter_light, split
 
 TOLERANCE = 1e-3  # of results and gradients, of the largest value
 FLOATS_A_POINT = 23 + 3  # read forward and written
+FLOATS_BACK = 26 + 23  # read backward and written
 
 
 def run(quick: bool, rounds: int) -> Result:
     """Times forward and backward, after holding results and gradients against float64.
 
     Args:
-        quick: Fewer points, and no torch.compile.
+        quick: Fewer points and directions, and no torch.compile.
         rounds: Of timing.
+
+    Raises:
+        CheckFailed: One of them is wrong.
     """
     torch.manual_seed(0)
     charts, findings = [], []
-    n = 1 << (15 if quick else 18)
-    shading = shading_calls(n, compiled=not quick)
-    lit = prefilter_calls(512, 2048 if quick else 8192)
-    for title, (calls, errors) in (
-        (f"split-sum shading, {n} points", shading),
-        (f"gbar with gradient, 512 queries, {2048 if quick else 8192} light directions", lit),
-    ):
-        extra = {"copy": copy_of(n * FLOATS_A_POINT)} if "shading" in title else {}
+    sizes, n_lights = ((1 << 13, 1 << 15), 2048) if quick else ((1 << 13, 1 << 18), 8192)
+    subjects = {f"split-sum shading, {n} points": (n, shading_calls(n, compiled=not quick)) for n in sizes}
+    subjects[f"gbar with gradient, 512 queries, {n_lights} light directions"] = (0, prefilter_calls(512, n_lights))
+    for title, (n, (calls, errors)) in subjects.items():
+        extra = {"copy": copy_of(n * FLOATS_A_POINT)} if n else {}
         times = interleaved(calls | extra, rounds)
         charts.append(chart_of(title, times, errors))
         findings += [
             f"{title}: {times.ratio(name, 'splitnerf')} as fast as {name}" for name in calls if name != "splitnerf"
         ]
         if extra:
-            moved = 3 * n * FLOATS_A_POINT * 4  # forward once; backward reads it again and writes gradients
+            moved = n * (FLOATS_A_POINT + FLOATS_BACK) * 4
             rate, copy_rate = moved / times["splitnerf"].seconds, 2 * n * FLOATS_A_POINT * 4 / times["copy"].seconds
             findings.append(
                 f"{title}: {rate / 1e9:.1f} GB/s of inputs, results and gradients, {rate / copy_rate:.0%} of what a copy moves"
@@ -62,9 +63,10 @@ def shading_calls(n: int, compiled: bool) -> tuple[dict[str, Callable[[], object
 
     ways = {"splitnerf": ours, "torch eager": plain}
     if compiled:
-        fast = torch.compile(plain)
+        torch.compiler.reset()
+        fast = torch.compile(plain, dynamic=False)
         try:
-            fast(*inputs)
+            with_gradients(fast, inputs, torch.ones(n, 3))()
             ways["torch.compile"] = fast
         except Exception as error:  # whatever its compiler says
             note(f"torch.compile does not work here ({str(error).splitlines()[0]}): it is left out")

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 SHORTEST = 0.005  # seconds of one measurement; faster calls are repeated within it
+SETTLING = 0.004  # seconds before each: what ran before has threads that go on looking for work
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ def interleaved(calls: Mapping[str, Callable[[], object]], rounds: int) -> Times
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     for _ in range(rounds):
         for name, call in calls.items():
+            time.sleep(SETTLING)
             started = time.perf_counter()
             for _ in range(repeats[name]):
                 call()

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import math
 import tempfile
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE, FAILED
+from splitnerf.cli.exit_codes import DONE, FAILED, INTERRUPTED
 from splitnerf.errors import InputError
 
 # Modules of splitnerf.bench, each with run(quick, rounds).
-BENCHMARKS = ("prefilter", "split_sum", "hash_grid", "shading", "occlusion")
+BENCHMARKS = ("prefilter", "split_sum", "hash_grid", "normals", "shading", "occlusion", "path_tracer")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -27,12 +28,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--only", action="append", default=[], metavar="NAME", choices=BENCHMARKS,
         help=f"only this one of {', '.join(BENCHMARKS)}; may be repeated",
     )  # fmt: skip
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="folder of the files (default: docs/benchmarks in a checkout, else here)",
-    )
+    add_out(parser)
     parser.set_defaults(execute=run_operators)
     benchmarks = parser.add_subparsers(dest="benchmark", metavar="BENCHMARK")
     skip = benchmarks.add_parser(
@@ -51,6 +47,24 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all runs"
     )
     skip.set_defaults(execute=run_skip)
+    whole = benchmarks.add_parser(
+        "whole", help="error of novel views, albedo and relit views against wall time",
+        description="Trains on each DATA for each of the times, with the preset cpu, with the preset paper, and with one setting "
+        "changed at a time that buys time with error or error with time, and draws what each reaches. Repeat the command with the "
+        "same --runs to go on or to add times.",
+    )  # fmt: skip
+    whole.add_argument("--data", type=Path, action="append", required=True, metavar="DATA", help="may be repeated")
+    whole.add_argument("--minutes", default="0.5,2", metavar="LIST", help="training times, by commas (default: 0.5,2)")
+    whole.add_argument("--only", metavar="LIST", help="names of configurations, by semicolons (default: all)")
+    whole.add_argument("--runs", type=Path, default=Path("runs/whole"), metavar="RUNS", help="default: runs/whole")
+    whole.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
+    whole.add_argument("--views", type=int, metavar="N", help="test views to score (default: all)")
+    whole.add_argument("--spp", type=int, default=32, metavar="N", help="paths a pixel of relit views (default: 32)")
+    whole.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all runs"
+    )
+    add_out(whole)
+    whole.set_defaults(execute=run_whole)
     stability = benchmarks.add_parser(
         "stability", help="how far each operator is from the truth on inputs made to break it",
         description="Compares every operator in float32 with float64 on adversarial inputs, searches for the worst of them, asks "
@@ -63,13 +77,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--op", action="append", default=[], metavar="NAME", help="only this operator; may be repeated"
     )
     stability.add_argument("--seed", type=int, default=0, metavar="S", help="of the inputs (default: 0)")
-    stability.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="folder of the tables (default: docs/benchmarks in a checkout, else here)",
-    )
+    add_out(stability)
     stability.set_defaults(execute=run_stability)
+
+
+def add_out(parser: argparse.ArgumentParser) -> None:
+    where = "folder of the files (default: docs/benchmarks in a checkout, else here)"
+    parser.add_argument("--out", type=Path, metavar="DIR", help=where)
 
 
 def default_folder() -> Path:
@@ -108,6 +122,40 @@ def run_skip(args: argparse.Namespace) -> int:
         if args.against is not None:
             other = lambda: run_other(args.against, args.data, args.minutes, args.downscale, out / "against")  # noqa: E731
         skip_table(full, args.minutes, training, test, out, other, print_now)
+    return DONE
+
+
+def run_whole(args: argparse.Namespace) -> int:
+    from splitnerf.ablate.job import Interrupted
+    from splitnerf.bench.charts import write_result
+    from splitnerf.bench.whole import NAMES, configurations, whole
+    from splitnerf.config import parse_setting
+    from splitnerf.evaluate.jobs import Protocol
+
+    try:
+        minutes = [float(text) for text in args.minutes.split(",")]
+    except ValueError:
+        minutes = []
+    if not minutes or not all(0 < value < math.inf for value in minutes):
+        raise InputError(f"--minutes takes positive numbers with commas between them, got {args.minutes!r}")
+    names = NAMES if args.only is None else [name.strip() for name in args.only.split(";") if name.strip()]
+    unknown = [name for name in names if name not in NAMES]
+    if unknown:
+        raise InputError(f"--only: no configuration is called {unknown[0]!r}; there are: {'; '.join(NAMES)}")
+    scenes = list(dict.fromkeys(path.resolve() for path in args.data))
+    if len({scene.name for scene in scenes}) < len(scenes):
+        raise InputError("two DATA folders have the same name; measure them into different --runs")
+    configs = configurations(names, dict(parse_setting(text) for text in args.settings))
+    protocol = Protocol(args.downscale, args.views, args.spp)
+    try:
+        result = whole(scenes, configs, minutes, protocol, args.runs, print_now)
+    except Interrupted:
+        print(f"stopped; the state is in {args.runs}. To go on, repeat the command.")
+        return INTERRUPTED
+    out = args.out or default_folder()
+    out.mkdir(parents=True, exist_ok=True)
+    for path in write_result(result, out):
+        print(path)
     return DONE
 
 

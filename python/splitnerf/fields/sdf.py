@@ -115,13 +115,17 @@ class SdfField(nn.Module):
         )
         return SdfSample(outputs, features, gradient)
 
-    def sample_finite_difference(self, positions: Tensor) -> SdfSample:
-        """As :meth:`sample` with the gradient by six taps, eps = the finest open level's cell.
+    def sample_finite_difference(self, positions: Tensor, cells: float = 1.0) -> SdfSample:
+        """As :meth:`sample` with the gradient by six taps.
+
+        Args:
+            positions: [n, 3], scene units.
+            cells: eps of the differences, in cells of the finest open level.
 
         Source: SplitNeRF, section 4.1 (Neuralangelo's numerical gradients).
         """
         resolution = self.grid.spec.levels()[max(0, self.grid.n_active - 1)][0]
-        eps = 2.0 * self.box / resolution
+        eps = cells * 2.0 * self.box / resolution
         steps = eps * torch.cat([torch.eye(3), -torch.eye(3)]).to(positions)
         taps = self.sdf((positions[:, None, :] + steps).reshape(-1, 3)).view(-1, 2, 3)
         features = self.grid(self._to_unit(positions))

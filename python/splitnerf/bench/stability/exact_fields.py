@@ -14,15 +14,42 @@ LEVELS, BASE, TABLE_SIZE = 6, 4, 2**9  # resolutions double
 
 
 def hash_encode(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    table, found, offset = shared["table"].numpy(), [], 0
-    position = [min(max(x, mp.mpf(0)), mp.mpf(1)) for x in vector(row["positions"])]
+    return {"features": hash_encode_jacobian(row, shared)["features"]}
+
+
+def hash_encode_jacobian(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+    """Features and their derivatives by position, which are 0 by a coordinate outside the cube."""
+    given = vector(row["positions"])
+    position = [min(max(x, mp.mpf(0)), mp.mpf(1)) for x in given]
+    moving = [p == x for p, x in zip(position, given)]
+    features, jacobian = [], [[], [], []]
+    for resolution, place, cell, entries in cells(position, shared["table"].numpy()):
+        width = len(entries[0, 0, 0])
+        value, slope = [mp.mpf(0)] * width, [[mp.mpf(0)] * width for _ in range(3)]
+        for corner, entry in entries.items():
+            along = [x - c if k else 1 - x + c for x, c, k in zip(place, cell, corner)]
+            entry = vector(entry)
+            weight = along[0] * along[1] * along[2]
+            value = [v + weight * t for v, t in zip(value, entry)]
+            for axis in (axis for axis in range(3) if moving[axis]):
+                others = along[(axis + 1) % 3] * along[(axis + 2) % 3] * (resolution if corner[axis] else -resolution)
+                slope[axis] = [v + others * t for v, t in zip(slope[axis], entry)]
+        features += value
+        for axis in range(3):
+            jacobian[axis] += slope[axis]
+    return {"features": features, "jacobian": [x for axis in jacobian for x in axis]}
+
+
+def cells(position: list, table: np.ndarray):
+    """For each level its resolution, the position in cells, the cell, and the table's rows at its corners."""
+    offset = 0
     for level in range(LEVELS):
         resolution = BASE * 2**level
         nodes = resolution + 1
         dense = nodes**3 <= TABLE_SIZE
         place = [x * resolution for x in position]
         cell = [min(int(x), resolution - 1) for x in place]
-        sums = [mp.mpf(0)] * table.shape[1]
+        entries = {}
         for corner in itertools.product((0, 1), repeat=3):
             node = [c + k for c, k in zip(cell, corner)]
             index = (node[0] * nodes + node[1]) * nodes + node[2]
@@ -31,18 +58,22 @@ def hash_encode(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
                 for n, prime in zip(node, PRIMES):
                     index ^= n * prime % 2**32
                 index %= TABLE_SIZE
-            weight = mp.mpf(1)
-            for x, c, k in zip(place, cell, corner):
-                weight *= x - c if k else 1 - x + c
-            sums = [s + weight * mp.mpf(float(t)) for s, t in zip(sums, table[offset + index])]
-        found += sums
+            entries[corner] = table[offset + index]
+        yield resolution, place, cell, entries
         offset += nodes**3 if dense else TABLE_SIZE
-    return {"features": found}
+
+
+def sdf_values(row: dict[str, np.ndarray], shared: Rows, box: int = 1) -> dict[str, list]:
+    """The layer over the grid's features, of the table scaled by 1e-3 in float64."""
+    unit = {"positions": np.asarray(row["positions"], np.float64) / (2 * box) + 0.5}
+    features = hash_encode(unit, shared | {"table": 1e-3 * shared["table"]})["features"]
+    inputs = {"positions": row["positions"], "features": features, "jacobian": np.zeros((3, len(features)))}
+    return {"values": sdf_layer(inputs, shared)["outputs"][:1]}
 
 
 def sdf_layer(row: dict[str, np.ndarray], shared: Rows, beta: int = 100, box: int = 1) -> dict[str, list]:
     """outputs = out softplus(a) + out_bias and d outputs[0] / d position by the chain rule."""
-    inputs = vector(row["positions"]) + vector(row["features"])
+    inputs = vector(row["positions"]) + [mp.mpf(x) for x in row["features"]]
     hidden, bias, out = (shared[name].numpy() for name in ("hidden", "hidden_bias", "out"))
     outputs = vector(shared["out_bias"].numpy())
     by_input = [mp.mpf(0)] * len(inputs)

@@ -74,34 +74,27 @@ def values(rows: Rows, shared: Rows) -> Rows:
     return {"values": ops.sdf_values(rows["positions"], field)[:, None]}
 
 
-WEIGHTS = ("hidden", "hidden_bias", "out", "out_bias")
-ENTRIES = (
-    Entry(
-        "hash_encode",
+def grid_entry(name: str, call, exact) -> Entry:
+    return Entry(
+        name,
         draw=draw_positions,
-        call=encoded,
+        call=call,
         smooth=("positions",),
         smooth_shared=("table",),
         shared=grid(),
         conditioned=True,
         bound=2e-6,
         gradient_bound=4e-6,
-        exact=exact_fields.hash_encode,
+        exact=exact,
         exact_bound=1e-14,
         reason=BY_CELL,
-    ),
-    Entry(
-        "hash_encode_jacobian",
-        draw=draw_positions,
-        call=with_jacobian,
-        smooth=("positions",),
-        smooth_shared=("table",),
-        shared=grid(),
-        conditioned=True,
-        bound=2e-6,
-        gradient_bound=4e-6,
-        reason=BY_CELL,
-    ),
+    )
+
+
+WEIGHTS = ("hidden", "hidden_bias", "out", "out_bias")
+ENTRIES = (
+    grid_entry("hash_encode", encoded, exact_fields.hash_encode),
+    grid_entry("hash_encode_jacobian", with_jacobian, exact_fields.hash_encode_jacobian),
     Entry(
         "sdf_layer",
         draw=draw_layer,
@@ -122,6 +115,8 @@ ENTRIES = (
         shared=network() | grid(),
         conditioned=True,
         bound=4e-6,
+        exact=exact_fields.sdf_values,
+        exact_bound=1e-11,
         reason="the two above",
         draw=lambda draw, n: {"positions": 2 * draw_positions(draw, n)["positions"].clamp(0, 1) - 1},
         repair=lambda rows: {"positions": rows["positions"].clamp(-1, 1)},

@@ -79,7 +79,7 @@ def measure(entry: Entry, rows: Rows) -> Errors:
             error, bad = row_error(ours[name], truth[name], floor)
             plain, broken = torch.maximum(plain, error), broken | bad
         parts.append(plain)
-    forward, gradient = parts[0].clone(), parts[1].clone()
+    forward, gradient, spoilt = parts[0].clone(), parts[1].clone(), False
     if entry.conditioned:
         for probes, share in ROUNDS:
             high = torch.maximum(forward / entry.bound, gradient / (entry.gradient_bound or torch.inf))
@@ -90,10 +90,11 @@ def measure(entry: Entry, rows: Rows) -> Errors:
                 ours = ({k: x[which] for k, x in got.items()}, {k: x[which] for k, x in got_gradients.items()})
                 forward[which], gradient[which] = conditioned_errors(entry, few, ours, probes)
         calm = (parts[0] <= entry.bound) & (parts[1] <= entry.gradient_bound) & ~broken
+        spoilt = any(bool(row_error(got_shared[k][None], x[None], 0.0)[1]) for k, x in true_shared.items())
         if true_shared and not bool(calm.all()):
             few = {name: x[calm] for name, x in rows.items()}
             got_shared, true_shared = (evaluate(entry, few, dtype)[2] for dtype in (torch.float32, torch.float64))
-    worst_shared = 0.0
+    worst_shared = math.inf if spoilt else 0.0
     for name, truth in true_shared.items():
         error, bad = row_error(got_shared[name][None], truth[None], entry.gradient_floor)
         worst_shared = max(worst_shared, float("inf") if bool(bad) else float(error))
@@ -101,12 +102,13 @@ def measure(entry: Entry, rows: Rows) -> Errors:
 
 
 def row_error(got: Tensor, true: Tensor, floor: float, scale: Tensor | float = 0.0) -> tuple[Tensor, Tensor]:
-    """[n] errors over each row's size, and whether a number of the row is not finite though the truth is."""
+    """[n] errors over each row's size, and whether a number of the row is not finite though the truth is, or the truth is
+    NaN: the inputs are numbers, and every entry is drawn from where its operator is defined."""
     got, true = got.double().reshape(len(true), -1), true.double().reshape(len(true), -1)
     if true.shape[1] == 0:
         return true.new_zeros(len(true)), torch.zeros(len(true), dtype=torch.bool)
     tame = torch.isfinite(true) & (true.abs() <= LARGEST)
-    bad = (tame & ~torch.isfinite(got)).any(1)
+    bad = ((tame & ~torch.isfinite(got)) | torch.isnan(true)).any(1)
     size = torch.where(tame, true.abs(), 0.0).amax(1)
     difference = torch.where(tame & torch.isfinite(got), (got - true).abs(), 0.0).amax(1)
     return difference / (size + scale).clamp(min=floor), bad

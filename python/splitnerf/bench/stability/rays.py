@@ -123,42 +123,33 @@ def neus(name: str, s: float, draw, **changes) -> Entry:
     )
 
 
+def surface_entry(name: str, s: float, anneal: float) -> Entry:
+    return Entry(
+        name,
+        draw=draw_surface,
+        call=partial(surface, anneal=anneal),
+        exact=partial(exact_rays.surface_weights, step=STEP, anneal=anneal),
+        exact_bound=1e-12,
+        smooth=("sdf", "gradient"),
+        smooth_shared=("s",),
+        shared={"s": torch.tensor(s)},
+        repair=repaired_surface,
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=4e-4,
+        floor=1.0,
+        gradient_floor=1.0,
+        size=SAMPLES,
+        reason=BY_NORMAL,
+    )
+
+
 ENTRIES = (
     neus("neus_weights", 1.0, draw_neus),
     neus("neus_weights, s = 8000", 8000.0, lambda draw, n: {k: x / 8000 for k, x in draw_neus(draw, n).items()}),
     neus("neus_weights, 10^4 samples", 64.0, draw_long, size=LONG, chunk=8, exact=None),
-    Entry(
-        "surface_weights",
-        draw=draw_surface,
-        call=partial(surface, anneal=1.0),
-        smooth=("sdf", "gradient"),
-        smooth_shared=("s",),
-        shared={"s": torch.tensor(200.0)},
-        repair=repaired_surface,
-        conditioned=True,
-        bound=4e-6,
-        gradient_bound=4e-4,
-        floor=1.0,
-        gradient_floor=1.0,
-        size=SAMPLES,
-        reason=BY_NORMAL,
-    ),
-    Entry(
-        "surface_weights, annealed",
-        draw=draw_surface,
-        call=partial(surface, anneal=0.3),
-        smooth=("sdf", "gradient"),
-        smooth_shared=("s",),
-        shared={"s": torch.tensor(20.0)},
-        repair=repaired_surface,
-        conditioned=True,
-        bound=4e-6,
-        gradient_bound=4e-4,
-        floor=1.0,
-        gradient_floor=1.0,
-        size=SAMPLES,
-        reason=BY_NORMAL,
-    ),
+    surface_entry("surface_weights", 200.0, 1.0),
+    surface_entry("surface_weights, annealed", 20.0, 0.3),
     Entry(
         "composite",
         draw=partial(draw_composite, samples=SAMPLES),

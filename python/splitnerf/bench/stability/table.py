@@ -166,6 +166,7 @@ INTRODUCTION = """Each operator in float32 against itself in float64 on the same
 crossed with ordinary ones, and a search around the worst. An error is the largest difference in one output or gradient
 of a row over the largest number there plus, where the condition counts, how much the true value changes by a relative
 change of the inputs; the columns "without condition" leave the latter out. The condition is only asked for above what
-is promised: an error just below that is an upper bound. The worst thousand inputs were asked again in 50 digits:
-"against exact". "Not finite" counts rows with NaN or infinity where the truth has a float32. No operator takes bfloat16
+is promised: an error just below that is an upper bound. The outputs of the worst thousand inputs were asked again in
+50 digits where the operator has such a formula: "against exact". Gradients are held against float64 alone. "Not finite" counts
+rows with NaN or infinity where the truth has a float32, or whose truth is NaN. No operator takes bfloat16
 or float16: they raise."""

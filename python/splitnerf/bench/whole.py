@@ -1,0 +1,97 @@
+"""The whole program: error of what it recovers against wall time, for the presets and for switches that trade the two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from splitnerf.ablate.job import Plan, run_row
+from splitnerf.ablate.rows import SPLIT, Row
+from splitnerf.bench.charts import Chart, Point, Result
+from splitnerf.config import Config, preset
+from splitnerf.evaluate.jobs import Protocol
+
+BASE, PUBLISHED = "preset cpu", "preset paper"
+# Settings that buy time with error, or error with time.
+SWITCHES: dict[str, dict[str, object]] = {
+    "half the samples": {"target_samples": 2304},
+    "twice the samples": {"target_samples": 9216},
+    "all samples shaded": {"shades_per_ray": 0},
+    "light moved each step": {"light_step_every": 1},
+    "light moved every 2 steps": {"light_step_every": 2},
+    "512 occlusion bits": {"occlusion_directions": 512},
+    "finer hash grid": {"log2_table_size": 18, "n_levels": 11},
+    "MLP light": {"light": "mlp"},
+    "light by the split sum": SPLIT,
+    "normals by finite differences": {"normals": "finite_difference"},
+}
+NAMES = (PUBLISHED, *SWITCHES)
+MEASURES = {"novel_view": "novel views", "albedo": "albedo", "relight": "relit views"}
+
+
+def whole(
+    scenes: Sequence[Path], configs: dict[str, Config], minutes: Sequence[float], protocol: Protocol, runs: Path,
+    show: Callable[[str], None],
+) -> Result:  # fmt: skip
+    """Trains each configuration on each scene for each time, or takes the runs that stand already.
+
+    Args:
+        scenes: Datasets.
+        configs: By name, from :func:`configurations`.
+        minutes: Of training; each is a run of its own, for schedules depend on their length.
+        protocol: How runs are scored.
+        runs: Their folder.
+        show: Called with a line for each run.
+
+    Raises:
+        InputError: The data or a run's folder cannot be used.
+        Interrupted: To be continued by the same call.
+    """
+    plan = Plan(list(scenes), [], 1, protocol, runs)
+    charts = []
+    for scene in scenes:
+        scores: dict[tuple[str, float], dict] = {}
+        for length in sorted(minutes):
+            for name, config in configs.items():
+                row = Row(f"{name}, {length:g} minutes", config.replace({"max_minutes": length}))
+                scores[name, length] = found = run_row(plan, scene, row, config.seed)
+                values = (f"{MEASURES[key]} {score['psnr']:.2f} dB" for key in MEASURES if (score := found.get(key)))
+                show(f"{scene.name}: {row.name}: {', '.join(values)}")
+        charts += [chart for key in MEASURES if (chart := chart_of(scene, key, scores)).points]
+    names = [scene.name for scene in scenes]
+    title = f"The whole program on {' and '.join(names)}: wall time against error"
+    return Result("_".join(["whole", *names]), title, findings(charts), charts)
+
+
+def configurations(names: Sequence[str], settings: dict[str, object]) -> dict[str, Config]:
+    """The preset ``cpu``, and what is called by the names (of `NAMES`).
+
+    Args:
+        names: Which.
+        settings: Changes to all of them.
+    """
+    base = preset("cpu").replace(settings)
+    return {BASE: base} | {
+        name: preset("paper").replace(settings) if name == PUBLISHED else base.replace(SWITCHES[name]) for name in names
+    }
+
+
+def chart_of(scene: Path, measure: str, scores: dict[tuple[str, float], dict]) -> Chart:
+    """One measure on one scene; no points where the data hold no truth of it."""
+    points = []
+    for (name, length), found in scores.items():
+        if found.get(measure) and found.get("seconds"):
+            minutes, error = found["seconds"] / 60, 10 ** (-found[measure]["psnr"] / 20)
+            points.append(Point(name, f"{length:g} min", minutes, error, minutes, minutes, name == BASE))
+    return Chart(f"{scene.resolve().name}: {MEASURES[measure]}", "minutes of training", "RMS error (peak 1)", points)
+
+
+def findings(charts: Sequence[Chart]) -> list[str]:
+    """For each chart, the best of the longest runs, and what is on the front."""
+    lines = []
+    for chart in charts:
+        longest = chart.points[-1].variant
+        last = sorted((p for p in chart.points if p.variant == longest), key=lambda p: p.error)
+        front = dict.fromkeys(p.series for p in chart.front())
+        lines.append(f"{chart.title}: after {longest} {last[0].series} is best; on the front: {', '.join(front)}")
+    return lines
