@@ -158,9 +158,10 @@ template <class T> SPLITNERF_HD Vec3<T> shade_sums(const float* lut, bool compen
   for (int c = 0; c < 3; ++c) {
     const T f0 = normal_reflectance(m, p.albedo[c]);
     const T gain = scattering_gain(f0, table.x, table.y, compensate).value;
-    const T k_d = (T(1) - m) * (T(1) - specular_albedo(f0, table.x, table.y, compensate).value);
+    const T kept = T(1) - specular_albedo(f0, table.x, table.y, compensate).value;
+    // The light first: shares of it may be so small that their product has no float.
     radiance[c] = gain * (f0 * (p.light.all[c] - p.light.grazing[c]) + p.light.grazing[c]) +
-                  k_d * p.albedo[c] * p.light.diffuse[c];
+                  p.light.diffuse[c] * kept * (T(1) - m) * p.albedo[c];
   }
   return radiance;
 }
@@ -183,10 +184,10 @@ SPLITNERF_HD SummedPoint<T> shade_sums_backward(const float* lut, bool compensat
     out.light.all[c] = g * gain.value * f0;
     out.light.grazing[c] = g * gain.value * (T(1) - f0);
     out.light.diffuse[c] = g * (T(1) - m) * kept * albedo;
-    const T grad_gain = g * reflected, grad_e = -g * (T(1) - m) * albedo * diffuse;
+    const T grad_gain = g * reflected, grad_e = -g * diffuse * albedo * (T(1) - m);
     const T grad_f0 = g * gain.value * spread + grad_gain * gain.d_fr + grad_e * e.d_fr;
-    out.albedo[c] = g * (T(1) - m) * kept * diffuse + grad_f0 * m;
-    out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - g * kept * albedo * diffuse;
+    out.albedo[c] = g * diffuse * kept * (T(1) - m) + grad_f0 * m;
+    out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - g * diffuse * kept * albedo;
     grad_f1 += grad_gain * gain.d_f + grad_e * e.d_f1;
     grad_f2 += grad_gain * gain.d_f + grad_e * e.d_f2;
   }

@@ -30,6 +30,7 @@ template <class T> struct LutSample {
   Vec3<T> value;        // F1, F2, chi
   Vec3<T> d_n_dot_v;    // d value / d n.v, zero where n.v is clamped
   Vec3<T> d_roughness;  // d value / d roughness, zero outside [0, 1]
+  T rest;               // 1 - chi, which the difference would lose where chi is close to 1
 };
 
 // Bilinear in (sqrt(n.v), roughness).
@@ -52,6 +53,7 @@ template <class T> SPLITNERF_HD LutSample<T> sample_brdf_lut(const float* lut, T
     s.value[c] = lerp(a, b, fy);
     s.d_n_dot_v[c] = lerp(v01 - v00, v11 - v10, fy) * dx;
     s.d_roughness[c] = (b - a) * dy;
+    if (c == 2) s.rest = lerp(lerp(T(1) - v00, T(1) - v01, fx), lerp(T(1) - v10, T(1) - v11, fx), fy);
   }
   return s;
 }
@@ -103,8 +105,8 @@ SPLITNERF_HD Vec3<T> query_direction(const float* lut, bool mean, Vec3<T> normal
   const Vec3<T> w_r = reflect(n, view);
   if (!mean) return w_r;
   const T blend = smoothstep(T(kQueryBlendStart), T(kQueryBlendEnd), roughness);
-  const T k = (T(1) - blend) + blend * lookup_brdf_lut(lut, dot(n, view), roughness).z;
-  return normalize(n * (T(1) - k) + w_r * k);
+  const T rest = blend * sample_brdf_lut(lut, dot(n, view), roughness).rest;  // 1 - k
+  return normalize(n * rest + w_r * (T(1) - rest));
 }
 
 template <class T> struct QueryDirectionGrad {
@@ -125,15 +127,15 @@ SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bo
   if (mean) {
     const T lo = T(kQueryBlendStart), hi = T(kQueryBlendEnd), blend = smoothstep(lo, hi, roughness);
     const LutSample<T> s = sample_brdf_lut(lut, nv, roughness);
-    const T k = (T(1) - blend) + blend * s.value.z;
+    const T rest = blend * s.rest, k = T(1) - rest;
     // d = normalize(n (1 - k) + w_r k)
-    const Vec3<T> grad_a = normalize_backward(n * (T(1) - k) + w_r * k, grad);
-    grad_n = grad_a * (T(1) - k);
+    const Vec3<T> grad_a = normalize_backward(n * rest + w_r * k, grad);
+    grad_n = grad_a * rest;
     grad_w_r = grad_a * k;
     // k = 1 + blend (chi - 1)
     const T grad_k = dot(grad_a, w_r - n);
     grad_nv = grad_k * blend * s.d_n_dot_v.z;
-    out.roughness = grad_k * (smoothstep_derivative(lo, hi, roughness) * (s.value.z - T(1)) + blend * s.d_roughness.z);
+    out.roughness = grad_k * (blend * s.d_roughness.z - smoothstep_derivative(lo, hi, roughness) * s.rest);
   }
   // w_r = 2 nv n - view,  nv = n . view
   grad_n += grad_w_r * (T(2) * nv);
@@ -227,9 +229,10 @@ SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, con
     const T f0 = normal_reflectance(m, p.albedo[c]);
     const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
     const T e = specular_albedo(fr.value, table.x, table.y, options.compensate).value;
-    const T k_d = (T(1) - m) * (options.fresnel == FresnelMode::kExact ? T(1) - e : fr.rest);
+    const T kept = options.fresnel == FresnelMode::kExact ? T(1) - e : fr.rest;
     // The light first: shares of it may be so small that their product has no float.
-    radiance[c] = p.diffuse[c] * k_d * p.albedo[c] * p.occlusion_d[c] + p.specular[c] * e * p.occlusion_s[c];
+    radiance[c] =
+        p.diffuse[c] * kept * (T(1) - m) * p.albedo[c] * p.occlusion_d[c] + p.specular[c] * e * p.occlusion_s[c];
   }
   return radiance;
 }
@@ -249,21 +252,21 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
     const T f0 = normal_reflectance(m, albedo);
     const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
     const SpecularAlbedo<T> e = specular_albedo(fr.value, table.value.x, table.value.y, options.compensate);
-    const T kept = exact ? T(1) - e.value : fr.rest, k_d = (T(1) - m) * kept;
-    // radiance = o_d k_d albedo l_d + o_s e l_s
+    const T kept = exact ? T(1) - e.value : fr.rest, sent = l_d * kept * (T(1) - m);
+    // radiance = o_d kept (1 - m) albedo l_d + o_s e l_s
     const T g = grad[c];
-    out.occlusion_d[c] = l_d * k_d * albedo * g;
+    out.occlusion_d[c] = sent * albedo * g;
     out.occlusion_s[c] = l_s * e.value * g;
-    out.diffuse[c] = g * o_d * k_d * albedo;
+    out.diffuse[c] = g * o_d * kept * (T(1) - m) * albedo;
     out.specular[c] = g * o_s * e.value;
     const T grad_k_d = l_d * o_d * albedo * g;
-    // k_d = (1 - m)(1 - e) or (1 - m)(1 - fr)
+    // kept = 1 - e or 1 - fr
     const T grad_kept = grad_k_d * (T(1) - m);
     const T grad_e = l_s * o_s * g - (exact ? grad_kept : T(0));
     const T grad_fr = grad_e * e.d_fr - (exact ? T(0) : grad_kept);
     // f0 = .04 (1 - m) + m albedo
     const T grad_f0 = grad_fr * fr.d_f0;
-    out.albedo[c] = l_d * o_d * k_d * g + grad_f0 * m;
+    out.albedo[c] = sent * o_d * g + grad_f0 * m;
     out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - grad_k_d * kept;
     out.roughness += grad_fr * fr.d_roughness;
     grad_nv += grad_fr * fr.d_n_dot_v;

@@ -197,7 +197,8 @@ ENTRIES = (
         exact_bound=1e-14,
         floor=1e-10,
         size=SAMPLES,
-        reason=BY_CONDITION,
+        gradient_floor=1e-30,
+        reason=BY_CONDITION + "; gradients below 1e-30 come from light that has no normal float",
     ),
     Entry(
         "summed_light",
