@@ -61,7 +61,13 @@ def draw_shaded(draw: Draw, n: int) -> Rows:
 
 
 def draw_sums(draw: Draw, n: int) -> Rows:
-    return draw_material(draw, n) | {name: draw.radiance(n, 3) for name in ("specular", "grazing", "diffuse")}
+    light = {name: draw.radiance(n, 3) for name in ("specular", "grazing", "diffuse")}
+    return within_the_light(draw_material(draw, n) | light)
+
+
+def within_the_light(rows: Rows) -> Rows:
+    """The light at grazing angles is a share of all of it, (1 - v.h)^5 of each direction's."""
+    return rows | {"grazing": torch.minimum(rows["grazing"], rows["specular"])}
 
 
 def draw_lit(draw: Draw, n: int) -> Rows:
@@ -175,7 +181,7 @@ ENTRIES = (
         draw=draw_sums,
         call=shade_from_sums,
         shared=TABLE,
-        repair=repaired,
+        repair=lambda rows: within_the_light(repaired(rows)),
         conditioned=True,
         bound=2e-6,
         smooth=(*SHADED, "specular", "grazing", "diffuse"),
