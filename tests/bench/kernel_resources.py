@@ -64,7 +64,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--arch", default="sm_90")
     arguments = parser.parse_args()
-    print("| file | kernel | registers | stack, bytes | spilled, bytes (stores / loads) | static shared memory, bytes |")
+    print(
+        "| file | kernel | registers | stack, bytes | spilled, bytes (stores / loads) | static shared memory, bytes |"
+    )
     print("|---|---|---|---|---|---|")
     for source in sorted((ROOT / "cpp/cuda").glob("*.cu")):
         flags = ["-fmad=false"] if source.name == "rays.cu" else []
