@@ -100,6 +100,36 @@ def test_neighbours_on_the_other_side_do_not_count():
     assert gradient_losses(gradients[:2], weights, beside[:1])[1].item() == 0.0
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_neighbours_at_a_right_angle_count_whatever_their_rounding(dtype):
+    angles = 0.01 * torch.arange(100, dtype=dtype)
+    here = torch.stack([angles.cos(), torch.zeros_like(angles), angles.sin()], 1)
+    up = torch.tensor([[0.0, 1, 0]], dtype=dtype).expand(100, 3)
+    _, smoothness = gradient_losses(torch.cat([here, up]), torch.ones(100, dtype=dtype), torch.arange(100))
+    assert smoothness.item() == pytest.approx(math.sqrt(2), rel=1e-6)
+
+
+def test_normals_a_rounding_apart_know_in_which_direction():
+    """The difference of such normals is rounding along themselves; its gradient must not see that."""
+    gradients = torch.tensor(
+        [[-2.1564362e-10, -2.3488480e-10, 1.51317392e-3], [-6.111313e-10, -7.259329e-10, 4.662408e-3]]
+    )
+    found = []
+    for dtype in (torch.float32, torch.float64):
+        g = gradients.to(dtype).requires_grad_()
+        smoothness = gradient_losses(g, torch.ones(1, dtype=dtype), torch.tensor([0]))[1]
+        found.append(torch.autograd.grad(smoothness, g)[0].double())
+    assert found[1].norm(dim=1).tolist() == pytest.approx([1 / 1.51317392e-3, 1 / 4.662408e-3], rel=1e-6)
+    torch.testing.assert_close(found[0], found[1], rtol=1e-5, atol=1e-3)
+
+
+def test_neighbours_without_a_direction_do_not_count():
+    gradients = torch.tensor([[0.0, 0, 1], [0, 0, 1e-5], [0, 1, 0], [0.6, 0, 0.8]])
+    pair, alone = torch.tensor([0, 1]), torch.tensor([1])
+    assert gradient_losses(gradients, torch.ones(2), pair)[1].item() == pytest.approx(math.sqrt(2), rel=1e-6)
+    assert gradient_losses(gradients, torch.ones(2), alone)[1].item() == 0.0
+
+
 def test_a_gradient_of_length_zero_has_a_finite_one():
     g = torch.zeros(3, 3, requires_grad=True)
     eikonal, smoothness = gradient_losses(g, torch.ones(1), torch.tensor([0, 0]))

@@ -186,3 +186,19 @@ def test_errors_name_what_is_wrong(device):
         lambda: split_sum_shade(*inputs[:9], fresnel_mode="fast"), "split_sum_shade", "fresnel_mode", "exact", "fast"
     )
     check_error(lambda: lib.split_sum_shade(*inputs[:10], 3, False), "split_sum_shade", "fresnel_mode", "3")
+
+
+@pytest.mark.parametrize("compensate", [False, True])
+def test_smooth_surfaces_keep_the_digits_of_their_gradient(compensate):
+    """F1 + F2 is 1 but for a millionth there, and the gradient to roughness is the change of that millionth."""
+    normals, view_dirs = (unit(torch.tensor([x])) for x in ([0.887, -0.036, -0.460], [-0.849, 0.157, 0.504]))
+    rest = [
+        torch.tensor([x]) for x in ([0.8, 0.5, 0.2], [0.0], [0.95], [0.5, 0.4, 0.45], [1.0, 1.0, 0.5], [1.0], [0.8])
+    ]
+    found = []
+    for dtype in (torch.float32, torch.float64):
+        inputs = [x.to(dtype) for x in (normals, view_dirs, *rest)]
+        roughness = inputs[3].requires_grad_()
+        out = lib.split_sum_shade(*inputs, brdf_lut(), 0, compensate)
+        found.append([torch.autograd.grad(x, roughness, retain_graph=True)[0].item() for x in out[0]])
+    assert found[0] == pytest.approx(found[1], rel=1e-5)

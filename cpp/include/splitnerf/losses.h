@@ -51,18 +51,25 @@ template <class T> SPLITNERF_HD EikonalLoss<T> eikonal_loss(Vec3<T> g) {
   return {square(excess), Vec3<T>{g.x / size, g.y / size, g.z / size} * (T(2) * excess)};  // 1 / size may have no float
 }
 
-// Distance of the unit normals of two gradients, and its gradients. Beyond the square root of 2 the normals are of two sides
-// of a thin part, and the pair does not count.
-inline constexpr double kOtherSide = 1.4142135623730951;
+// Distance of the unit normals of two gradients, and its gradients. The pair does not count where one of them has no
+// direction, nor where the normals are more than a right angle apart: those are of two sides of a thin part.
+//   |m - n| = 2 sin(t / 2) = |n x m| / cos(t / 2);  by n: -cos(t / 2) along (n x m) x n, so that close normals, whose
+// difference is rounding, keep the direction in which they differ.
 template <class T> struct NormalDistance {
+  bool counts;
   T value;
   Vec3<T> by_here, by_there;
 };
 template <class T> SPLITNERF_HD NormalDistance<T> normal_distance(Vec3<T> here, Vec3<T> there) {
-  const Vec3<T> step = unit_normal(there) - unit_normal(here);
-  const T size = length(step);
-  const Vec3<T> direction = step * (size > T(0) ? T(1) / size : T(0));
-  return {size, unit_normal_backward(here, -direction), unit_normal_backward(there, direction)};
+  const T here2 = dot(here, here), there2 = dot(there, there);
+  if (here2 < T(kMinGradientSquared) || there2 < T(kMinGradientSquared)) return {};
+  const T per_here = T(1) / std::sqrt(here2), per_there = T(1) / std::sqrt(there2);
+  const Vec3<T> n = here * per_here, m = there * per_there, axis = cross(n, m);
+  const T cosine = dot(n, m), sine = length(axis);
+  if (cosine < T(0)) return {};
+  const T cos_half = std::sqrt(T(0.5) * (T(1) + cosine));  // a NaN goes on to the caller
+  const T scale = sine > T(0) ? cos_half / sine : T(0);
+  return {true, sine / cos_half, cross(n, axis) * (scale * per_here), cross(axis, m) * (scale * per_there)};
 }
 
 // ---- materials -------------------------------------------------------------------------------

@@ -153,12 +153,12 @@ template <class T> struct SummedPoint {
 // gain and E as in the split sum with FresnelMode::kExact.        Source: SplitNeRF Eq. (4)-(6).
 template <class T> SPLITNERF_HD Vec3<T> shade_sums(const float* lut, bool compensate, const SummedPoint<T>& p) {
   const T nv = dot(p.normal, p.view) * facing(p.normal, p.view), m = p.metallic;
-  const Vec3<T> table = lookup_brdf_lut(lut, nv, p.roughness);
+  const LutSample<T> table = sample_brdf_lut(lut, nv, p.roughness);
   Vec3<T> radiance;
   for (int c = 0; c < 3; ++c) {
     const T f0 = normal_reflectance(m, p.albedo[c]);
-    const T gain = scattering_gain(f0, table.x, table.y, compensate).value;
-    const T kept = T(1) - specular_albedo(f0, table.x, table.y, compensate).value;
+    const T gain = scattering_gain(f0, table.lost, compensate).value;
+    const T kept = specular_albedo(f0, T(1) - f0, table, compensate).rest;
     // The light first: shares of it may be so small that their product has no float.
     radiance[c] = gain * (f0 * (p.light.all[c] - p.light.grazing[c]) + p.light.grazing[c]) +
                   p.light.diffuse[c] * kept * (T(1) - m) * p.albedo[c];
@@ -173,13 +173,13 @@ SPLITNERF_HD SummedPoint<T> shade_sums_backward(const float* lut, bool compensat
   const T sign = facing(p.normal, p.view), nv = dot(p.normal, p.view) * sign, m = p.metallic;
   const LutSample<T> table = sample_brdf_lut(lut, nv, p.roughness);
   SummedPoint<T> out{};
-  T grad_f1 = T(0), grad_f2 = T(0);
+  T grad_f2 = T(0), grad_lost = T(0);
   for (int c = 0; c < 3; ++c) {
     const T albedo = p.albedo[c], diffuse = p.light.diffuse[c], spread = p.light.all[c] - p.light.grazing[c];
     const T f0 = normal_reflectance(m, albedo), reflected = f0 * spread + p.light.grazing[c];
-    const ScatteringGain<T> gain = scattering_gain(f0, table.value.x, table.value.y, compensate);
-    const SpecularAlbedo<T> e = specular_albedo(f0, table.value.x, table.value.y, compensate);
-    const T kept = T(1) - e.value, g = grad[c];
+    const ScatteringGain<T> gain = scattering_gain(f0, table.lost, compensate);
+    const SpecularAlbedo<T> e = specular_albedo(f0, T(1) - f0, table, compensate);
+    const T kept = e.rest, g = grad[c];
     // radiance = gain reflected + (1 - m) kept albedo diffuse
     out.light.all[c] = g * gain.value * f0;
     out.light.grazing[c] = g * gain.value * (T(1) - f0);
@@ -188,12 +188,12 @@ SPLITNERF_HD SummedPoint<T> shade_sums_backward(const float* lut, bool compensat
     const T grad_f0 = g * gain.value * spread + grad_gain * gain.d_fr + grad_e * e.d_fr;
     out.albedo[c] = g * diffuse * kept * (T(1) - m) + grad_f0 * m;
     out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - g * diffuse * kept * albedo;
-    grad_f1 += grad_gain * gain.d_f + grad_e * e.d_f1;
-    grad_f2 += grad_gain * gain.d_f + grad_e * e.d_f2;
+    grad_f2 += grad_e * e.d_f2;
+    grad_lost += grad_gain * gain.d_lost + grad_e * e.d_lost;
   }
-  // F1, F2 = table(n.v, roughness)
-  out.roughness = grad_f1 * table.d_roughness.x + grad_f2 * table.d_roughness.y;
-  const T grad_nv = grad_f1 * table.d_n_dot_v.x + grad_f2 * table.d_n_dot_v.y;
+  // F2, lost = table(n.v, roughness)
+  out.roughness = grad_f2 * table.d_roughness.y + grad_lost * table.lost_by_roughness;
+  const T grad_nv = grad_f2 * table.d_n_dot_v.y + grad_lost * table.lost_by_n_dot_v;
   out.normal = p.view * (sign * grad_nv);
   out.view = p.normal * (sign * grad_nv);
   return out;

@@ -31,7 +31,13 @@ template <class T> struct LutSample {
   Vec3<T> d_n_dot_v;    // d value / d n.v, zero where n.v is clamped
   Vec3<T> d_roughness;  // d value / d roughness, zero outside [0, 1]
   T rest;               // 1 - chi, which the difference would lose where chi is close to 1
+  // 1 - F1 - F2, what a lobe that reflects all light loses by single scattering, and its derivatives: on smooth surfaces
+  // close to 0, where those of F1 and F2 cancel
+  T lost, lost_by_n_dot_v, lost_by_roughness;
 };
+
+// 1 - a - b of shares, the larger one first: that difference has no rounding.
+template <class T> SPLITNERF_HD T rest_of_shares(T a, T b) { return (T(1) - max_of(a, b)) - min_of(a, b); }
 
 // Bilinear in (sqrt(n.v), roughness).
 template <class T> SPLITNERF_HD LutSample<T> sample_brdf_lut(const float* lut, T n_dot_v, T roughness) {
@@ -55,6 +61,12 @@ template <class T> SPLITNERF_HD LutSample<T> sample_brdf_lut(const float* lut, T
     s.d_roughness[c] = (b - a) * dy;
     if (c == 2) s.rest = lerp(lerp(T(1) - v00, T(1) - v01, fx), lerp(T(1) - v10, T(1) - v11, fx), fy);
   }
+  const auto lost = [&](int node) { return rest_of_shares(T(lut[node]), T(lut[node + 1])); };
+  const T l00 = lost(at), l01 = lost(at + 3), l10 = lost(at + 3 * kLutSize), l11 = lost(at + 3 * kLutSize + 3);
+  const T a = lerp(l00, l01, fx), b = lerp(l10, l11, fx);
+  s.lost = lerp(a, b, fy);
+  s.lost_by_n_dot_v = lerp(l01 - l00, l11 - l10, fy) * dx;
+  s.lost_by_roughness = (b - a) * dy;
   return s;
 }
 
@@ -185,25 +197,31 @@ template <class T> SPLITNERF_HD FresnelTerm<T> fresnel_term(FresnelMode mode, T 
 }
 
 // What multiple scattering adds to the specular lobe of one channel, a factor, and its partial derivatives:
-// 1 or, compensated, 1 + Fr (1 / (F1 + F2) - 1).
+// 1 or, compensated, 1 + Fr (1 / (F1 + F2) - 1) = 1 + Fr lost / (1 - lost).
 template <class T> struct ScatteringGain {
-  T value, d_fr, d_f;  // d_f: the same for F1 and F2
+  T value, d_fr, d_lost;
 };
-template <class T> SPLITNERF_HD ScatteringGain<T> scattering_gain(T fr, T f1, T f2, bool compensate) {
+template <class T> SPLITNERF_HD ScatteringGain<T> scattering_gain(T fr, T lost, bool compensate) {
   if (!compensate) return {T(1), T(0), T(0)};
-  const T inv_s = T(1) / (f1 + f2);
-  return {T(1) + fr * (inv_s - T(1)), inv_s - T(1), -fr * inv_s * inv_s};
+  const T inv_s = T(1) / (T(1) - lost);
+  return {T(1) + fr * lost * inv_s, lost * inv_s, fr * inv_s * inv_s};
 }
 
-// Directional albedo E = (Fr F1 + F2) gain of the specular lobe for one channel, and its partial derivatives.
+// Directional albedo E = (Fr F1 + F2) gain of the specular lobe for one channel, and its partial derivatives. With
+// F1 = 1 - F2 - lost no term of E = gain (Fr (1 - lost) + (1 - Fr) F2) is negative, and none of the derivatives by F2 and
+// lost cancels another: on smooth surfaces those by F1 and F2 would.
 template <class T> struct SpecularAlbedo {
-  T value, d_fr, d_f1, d_f2;
+  T value, d_fr, d_f2, d_lost;
+  T rest;  // 1 - E
 };
-template <class T> SPLITNERF_HD SpecularAlbedo<T> specular_albedo(T fr, T f1, T f2, bool compensate) {
-  const T single = fr * f1 + f2;
-  const ScatteringGain<T> gain = scattering_gain(fr, f1, f2, compensate);
-  return {single * gain.value, f1 * gain.value + single * gain.d_fr, fr * gain.value + single * gain.d_f,
-          gain.value + single * gain.d_f};
+template <class T>
+SPLITNERF_HD SpecularAlbedo<T> specular_albedo(T fr, T rest_of_fr, const LutSample<T>& table, bool compensate) {
+  const T f1 = table.value.x, f2 = table.value.y, single = fr * (T(1) - table.lost) + rest_of_fr * f2;
+  if (!compensate) return {single, f1, rest_of_fr, -fr, table.lost + rest_of_fr * f1};
+  const ScatteringGain<T> gain = scattering_gain(fr, table.lost, compensate);
+  const T inv_s = T(1) / (T(1) - table.lost);
+  return {single * gain.value, f1 * gain.value + single * gain.d_fr, rest_of_fr * gain.value,
+          rest_of_fr * fr * (f2 * inv_s * inv_s - T(1)), rest_of_fr * (table.lost + f1 * gain.value)};
 }
 
 template <class T> struct ShadePoint {
@@ -223,16 +241,16 @@ template <class T> struct ShadeArrays {
 template <class T>
 SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, const ShadePoint<T>& p) {
   const T nv = dot(p.normal, p.view) * facing(p.normal, p.view), m = p.metallic;
-  const Vec3<T> table = lookup_brdf_lut(lut, nv, p.roughness);
+  const LutSample<T> table = sample_brdf_lut(lut, nv, p.roughness);
   Vec3<T> radiance;
   SPLITNERF_UNROLL for (int c = 0; c < 3; ++c) {
     const T f0 = normal_reflectance(m, p.albedo[c]);
     const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
-    const T e = specular_albedo(fr.value, table.x, table.y, options.compensate).value;
-    const T kept = options.fresnel == FresnelMode::kExact ? T(1) - e : fr.rest;
+    const SpecularAlbedo<T> e = specular_albedo(fr.value, fr.rest, table, options.compensate);
+    const T kept = options.fresnel == FresnelMode::kExact ? e.rest : fr.rest;
     // The light first: shares of it may be so small that their product has no float.
     radiance[c] =
-        p.diffuse[c] * kept * (T(1) - m) * p.albedo[c] * p.occlusion_d[c] + p.specular[c] * e * p.occlusion_s[c];
+        p.diffuse[c] * kept * (T(1) - m) * p.albedo[c] * p.occlusion_d[c] + p.specular[c] * e.value * p.occlusion_s[c];
   }
   return radiance;
 }
@@ -245,14 +263,14 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
   const LutSample<T> table = sample_brdf_lut(lut, nv, p.roughness);
   const bool exact = options.fresnel == FresnelMode::kExact;
   ShadePoint<T> out{};
-  T grad_f1 = T(0), grad_f2 = T(0), grad_nv = T(0);
+  T grad_f2 = T(0), grad_lost = T(0), grad_nv = T(0);
   SPLITNERF_UNROLL for (int c = 0; c < 3; ++c) {
     const T albedo = p.albedo[c], l_d = p.diffuse[c], l_s = p.specular[c], o_d = p.occlusion_d[c],
             o_s = p.occlusion_s[c];
     const T f0 = normal_reflectance(m, albedo);
     const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
-    const SpecularAlbedo<T> e = specular_albedo(fr.value, table.value.x, table.value.y, options.compensate);
-    const T kept = exact ? T(1) - e.value : fr.rest, sent = l_d * kept * (T(1) - m);
+    const SpecularAlbedo<T> e = specular_albedo(fr.value, fr.rest, table, options.compensate);
+    const T kept = exact ? e.rest : fr.rest, sent = l_d * kept * (T(1) - m);
     // radiance = o_d kept (1 - m) albedo l_d + o_s e l_s
     const T g = grad[c];
     out.occlusion_d[c] = sent * albedo * g;
@@ -270,12 +288,12 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
     out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - grad_k_d * kept;
     out.roughness += grad_fr * fr.d_roughness;
     grad_nv += grad_fr * fr.d_n_dot_v;
-    grad_f1 += grad_e * e.d_f1;
     grad_f2 += grad_e * e.d_f2;
+    grad_lost += grad_e * e.d_lost;
   }
-  // F1, F2 = table(n.v, roughness)
-  out.roughness += grad_f1 * table.d_roughness.x + grad_f2 * table.d_roughness.y;
-  grad_nv += grad_f1 * table.d_n_dot_v.x + grad_f2 * table.d_n_dot_v.y;
+  // F2, lost = table(n.v, roughness)
+  out.roughness += grad_f2 * table.d_roughness.y + grad_lost * table.lost_by_roughness;
+  grad_nv += grad_f2 * table.d_n_dot_v.y + grad_lost * table.lost_by_n_dot_v;
   out.normal = p.view * (sign * grad_nv);
   out.view = p.normal * (sign * grad_nv);
   return out;

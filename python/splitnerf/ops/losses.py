@@ -43,7 +43,7 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple
 
     Of the surfaces that explain the images the second prefers the one that wavers least: the distance of the unit normals
     adds up to the same along a smooth bend and along a sharp edge, so that edges stay. Neighbours on the other side of a
-    thin part, whose normals are more than 90 degrees off, do not count.
+    thin part, whose normals are more than 90 degrees off, do not count, nor gradients shorter than 1e-3.
 
     Args:
         gradients: [n, 3], those of k samples first and those of m neighbours last.

@@ -75,7 +75,7 @@ template <class T> struct NormalPairsBody {
     const int64_t here = clamp<int64_t>(beside[j], 0, n_weights - 1), there = n - m + j;
     const T weight = weights[here];
     const auto pair = normal_distance(load3(gradients + 3 * here), load3(gradients + 3 * there));
-    if (pair.value >= T(kOtherSide)) return;
+    if (!pair.counts) return;
     sums[0] += double(weight * pair.value), sums[1] += double(weight);
     add3_to(smoothness_by + 3 * here, pair.by_here * weight);
     add3_to(smoothness_by + 3 * there, pair.by_there * weight);

@@ -37,11 +37,14 @@ def pixel_losses(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
 def gradient_losses(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
     gradients, weights = [vector(g) for g in row["gradients"]], vector(row["weights"])
     sizes = [mp.sqrt(mp.fsum(x * x for x in g)) for g in gradients]
-    normals = [[x / mp.sqrt(s * s + mp.mpf("1e-12")) for x in g] for g, s in zip(gradients, sizes)]
     total, apart = mp.mpf(0), mp.mpf(0)
     for j in range(PAIRS):
-        distance = mp.sqrt(mp.fsum((a - b) ** 2 for a, b in zip(normals[j], normals[len(normals) - PAIRS + j])))
-        if distance < mp.sqrt(2):
+        k = len(gradients) - PAIRS + j
+        if min(sizes[j], sizes[k]) < mp.mpf("1e-3"):
+            continue
+        here, there = ([x / sizes[i] for x in gradients[i]] for i in (j, k))
+        if mp.fsum(a * b for a, b in zip(here, there)) >= 0:
+            distance = mp.sqrt(mp.fsum((a - b) ** 2 for a, b in zip(here, there)))
             total, apart = total + weights[j], apart + weights[j] * distance
     return {
         "eikonal": [mp.fsum((s - 1) ** 2 for s in sizes) / len(sizes)],
