@@ -143,6 +143,7 @@ class Config:
     # Occlusion by tracing the mesh.
     mesh_every: float = 0.1
     mesh_resolution: int = 96
+    background_meshes: bool = False  # made by a thread of their own; the training goes on with the old one meanwhile
     occlusion_share: float = 0.1  # of the shaded samples
     occlusion_rays: int = 32
     occlusion_ray_start: str = "normal"  # occlusion_offset along the normal | ray (the released code: along the ray)

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from splitnerf.batches import Batch, draw_batch
+from splitnerf.devices import wait_for
 from splitnerf.fields import VisibilityBits
 from splitnerf.ops import CELL_OCCUPIED, MeshScene
 from splitnerf.render.model import SceneModel
@@ -69,7 +70,7 @@ def measure_skips(
         n_steps: Of the whole run.
     """
     c = model.config
-    generator = torch.Generator().manual_seed(0)
+    generator = torch.Generator(model.device).manual_seed(0)
     batch = draw_batch(source, n_rays, c)
 
     def work(batch: Batch, cells: Tensor = grid.cells, **settings: object) -> Work:
@@ -128,6 +129,7 @@ def timed_work(
                 sum(terms.values()).backward()
                 if light_moves(c, step):
                     model.light.deliver()
+            wait_for(model.device)
             seconds.append((time.perf_counter() - started) / period)
     finally:
         model.light.collect(False)

@@ -6,6 +6,7 @@ import json
 import math
 import sys
 import time
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,8 +26,8 @@ from splitnerf.checkpoint import (
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
 from splitnerf.errors import InputError
-from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.finite import GradientWatch, check_state, explain_loss
+from splitnerf.meshes import SurfaceMesh
 from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
 from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
@@ -54,7 +55,9 @@ class TrainedScene:
     finished: bool
 
 
-def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) -> TrainedScene:
+def train(
+    dataset: Dataset, config: Config, run: Path, *, device: torch.device | str = "cpu", resume: bool = False
+) -> TrainedScene:
     """Trains a scene and keeps a checkpoint, a log and previews in the run's folder.
 
     The schedule (learning rate, levels, annealing, meshes) follows the progress: the share of steps
@@ -65,7 +68,8 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         dataset: The train split.
         config: Settings; with ``resume`` those of the checkpoint are meant to be passed.
         run: The run's folder, which exists.
-        resume: Continue from ``run/checkpoint.pt``.
+        device: Where images, fields and samples are; meshes are made and traced on the CPU.
+        resume: Continue from ``run/checkpoint.pt``, whatever device wrote it.
 
     Raises:
         InputError: The checkpoint belongs to another scene or cannot be read.
@@ -74,18 +78,16 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
     """
     c = config
     torch.manual_seed(c.seed)
-    generator = torch.Generator().manual_seed(c.seed)
+    generator = torch.Generator(device).manual_seed(c.seed)
     fingerprint = dataset_fingerprint(dataset)
     source = PixelSource(dataset, c.foreground_share, generator)
-    model = SceneModel(c)
+    model = SceneModel(c).to(device)
     optimiser = make_optimiser(model, c)
     hull = None
     if c.hull_until > 0:
-        hull = visual_hull(
-            c.grid_resolution, c.box, torch.from_numpy(dataset.images[..., 3]), source.poses, source.intrinsics
-        )
-    grid = make_grid(c, hull)
-    scene: MeshScene | None = None
+        hull = visual_hull(c.grid_resolution, c.box, source.masks, source.poses, source.intrinsics)
+    grid = make_grid(c, hull, device)
+    mesh = SurfaceMesh(model, background=c.background_meshes)
     environment: Tensor | None = None
     step, seconds, n_rays, meshed_at, previewed_at = 0, 0.0, c.initial_rays, 0.0, 0.0
 
@@ -99,9 +101,6 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         grid.values = restored_occupancy(grid.values, content, path)
         step, seconds, n_rays = content["step"], content["seconds"], content["n_rays"]
         meshed_at, previewed_at = content["meshed_at"], content["previewed_at"]
-    mesh: tuple[Tensor, Tensor] | tuple[None, None] = (
-        (content["mesh_vertices"], content["mesh_faces"]) if resume else (None, None)
-    )
 
     def save() -> None:
         check_state(step, model, optimiser)
@@ -111,10 +110,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             fingerprint=fingerprint,
             state=dict(
                 step=step, seconds=seconds, n_rays=n_rays, meshed_at=meshed_at, previewed_at=previewed_at,
-                model=model.state_dict(), optimiser=optimiser.state_dict(), generator=generator.get_state(),
-                torch_generator=torch.get_rng_state(), occupancy=grid.values,
-                box_from_world=torch.from_numpy(dataset.box_from_world),
-                mesh_vertices=mesh[0], mesh_faces=mesh[1],
+                model=model.state_dict(), optimiser=optimiser.state_dict(), device=generator.device.type,
+                generator=generator.get_state(), torch_generator=torch.get_rng_state(), occupancy=grid.values,
+                box_from_world=torch.from_numpy(dataset.box_from_world), **mesh.state(),
             ),
         )  # fmt: skip
 
@@ -124,14 +122,14 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
 
     if resume:
         model.open_levels(progress_now())
-        scene = restore_mesh(model, content)
+        mesh.restore(content)
     model.light.collect()
     light_steps = light_period(c)
     started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True
     psnr_mean = samples_mean = None
     watch = GradientWatch(model.parameters())
     log = open(run / "metrics.jsonl", "a")
-    with log, Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic):
+    with log, closing(mesh), Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic):
         while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % light_steps == 0):
             model.open_levels(progress)
             set_learning_rate(optimiser, c, step, progress)
@@ -142,7 +140,9 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             if (model.occlusion is not None or c.finetune_from < 1) and progress - meshed_at >= c.mesh_every:
                 meshed_at = progress
                 check_state(step, model, optimiser)
-                scene, mesh = remesh(model, c, scene, mesh)
+                mesh.renew()
+            mesh.arrive(wait=c.deterministic)
+            scene = mesh.scene
             traces = scene is not None and c.occlusion == "mlp" and c.occlusion_weight > 0
             if traces and (environment is None or step % ENVIRONMENT_EVERY == 0):
                 environment = model.light.panorama(c.environment_height)
@@ -193,11 +193,13 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         check_state(step, model, optimiser)
         finished = progress_now() >= 1.0
         if finished and c.occlusion == "bits":  # what is rendered from here on sees the final surface
-            scene, mesh = remesh(model, c, scene, mesh)
+            mesh.arrive(wait=True)
+            mesh.renew()
+            mesh.arrive(wait=True)
         model.light.collect(False)
         grid.update(model.sdf_field.sdf, model.s_value)
         save()
-    return TrainedScene(model, grid, scene, n_rays, step, seconds, finished)
+    return TrainedScene(model, grid, mesh.scene, n_rays, step, seconds, finished)
 
 
 def batch_losses(
@@ -294,27 +296,6 @@ def next_ray_count(n_rays: int, n_samples: int, config: Config) -> int:
     """As many rays as fill the budget of samples, moving by at most a factor of 1.25 a step."""
     wanted = n_rays * config.target_samples / max(1, n_samples)
     return int(min(config.max_rays, max(64, min(1.25 * n_rays, max(0.8 * n_rays, wanted)))))
-
-
-def remesh(model: SceneModel, config: Config, scene: MeshScene | None, mesh: tuple) -> tuple[MeshScene | None, tuple]:
-    """The current surface as a scene to trace; the old one stays while the field has no surface."""
-    try:
-        vertices, faces = extract_mesh(model.sdf_field.sdf, config.box, config.mesh_resolution)
-    except EmptyMesh:
-        return scene, mesh
-    scene, mesh = MeshScene(vertices, faces), (torch.from_numpy(vertices), torch.from_numpy(faces))
-    model.use_mesh(scene, *mesh)
-    return scene, mesh
-
-
-def restore_mesh(model: SceneModel, content: dict) -> MeshScene | None:
-    """The mesh of a checkpoint, in use by the model; None where the run had none yet."""
-    if content["mesh_vertices"] is None:
-        return None
-    mesh = content["mesh_vertices"], content["mesh_faces"]
-    scene = MeshScene(*(part.numpy() for part in mesh))
-    model.use_mesh(scene, *mesh)
-    return scene
 
 
 def check_same_scene(content: dict, fingerprint: str, run: Path) -> None:

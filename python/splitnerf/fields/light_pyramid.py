@@ -52,6 +52,20 @@ class PyramidMaps(NamedTuple):
     nodes: Tensor
     zonal: Tensor
 
+    def to(self, device: torch.device) -> PyramidMaps:
+        """Copies on a device; resolutions and nodes stay on the CPU, where the lookup wants them."""
+        sparse = (SparseMap(*(part.to(device) for part in matrix)) for matrix in self[:3])
+        return PyramidMaps(
+            *sparse, self.projection.to(device), self.projected, self.resolutions, self.nodes, self.zonal.to(device)
+        )
+
+
+@functools.lru_cache(maxsize=4)
+def maps_on(resolution: int, device: torch.device) -> PyramidMaps:
+    """:func:`pyramid_maps` on a device, copied once."""
+    with torch.inference_mode(False):
+        return pyramid_maps(resolution).to(device)
+
 
 @functools.lru_cache(maxsize=2)
 def pyramid_maps(resolution: int) -> PyramidMaps:
@@ -114,8 +128,7 @@ class LightPyramid(Light):
     def __init__(self, resolution: int = 64, start: float = 0.5):
         super().__init__()
         self.resolution = resolution
-        self.maps = pyramid_maps(resolution)
-        self.texels = nn.Parameter(torch.zeros(len(self.maps.sum_of_levels.transposed_offsets) - 1, 3))
+        self.texels = nn.Parameter(torch.zeros(len(pyramid_maps(resolution).sum_of_levels.transposed_offsets) - 1, 3))
         with torch.no_grad():
             self.texels[: 4 * 4] = math.log(start)
         self._cached: tuple | None = None
@@ -131,6 +144,11 @@ class LightPyramid(Light):
             "_held": None,
             "_stand_ins": [],
         }  # copies start anew
+
+    @property
+    def maps(self) -> PyramidMaps:
+        """The linear maps, where the texels are."""
+        return maps_on(self.resolution, self.texels.device)
 
     def radiance(self) -> Tensor:
         """[n^2, 3] radiance of the texels."""

@@ -40,6 +40,10 @@ class SdfNetwork(NamedTuple):
     beta: float
     box: float
 
+    def snapshot(self) -> SdfNetwork:
+        """A copy that later steps of a training do not change."""
+        return SdfNetwork(*(x.clone() if isinstance(x, Tensor) else x for x in self))
+
     def arguments(self) -> tuple:
         """As the operators take them."""
         return (

@@ -151,7 +151,7 @@ def find_samples(
         n_evaluated = int(evaluated.sum())
     directions = rays_d[packed.ray_indices]
     positions = rays_o[packed.ray_indices] + directions * packed.middles[:, None]
-    beside = torch.empty(0, dtype=torch.int64)
+    beside = torch.empty(0, dtype=torch.int64, device=positions.device)
     if probes is not None:
         beside = (probes.chosen * len(positions)).long() if len(positions) else beside
         neighbours = positions[beside] + probes.shifts[: len(beside)]
@@ -229,14 +229,14 @@ def render_view(
     rays_o, rays_d = image_rays(pose, intrinsics, height, width)
     rows = []
     for o, d in zip(rays_o.split(chunk), rays_d.split(chunk)):
-        ray = render_rays(model, find_samples(model, cells, o, d, torch.full((len(o),), 0.5)))
+        ray = render_rays(model, find_samples(model, cells, o, d, torch.full_like(o[:, 0], 0.5)))
         p = ray.points
         maps = torch.cat(
             [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), ray.normals],
             1,
         )
-        weighed = ray.shares[:, None] * torch.cat([maps, torch.ones(len(maps), 1)], 1)
-        sums = torch.zeros(len(o), weighed.shape[1]).index_add(0, ray.samples.ray_indices[ray.shaded], weighed)
+        weighed = ray.shares[:, None] * torch.cat([maps, torch.ones_like(maps[:, :1])], 1)
+        sums = weighed.new_zeros(len(o), weighed.shape[1]).index_add(0, ray.samples.ray_indices[ray.shaded], weighed)
         mean = sums[:, :-1] / sums[:, -1:].clamp(min=MIN_OPACITY)
         rows.append(torch.cat([ray.colour.clamp(0, 1), ray.opacity[:, None], mean], 1))
     image = torch.cat(rows).view(height, width, -1)
