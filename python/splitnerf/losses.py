@@ -70,13 +70,8 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     queries = F.normalize(torch.randn(c.light_queries, 3, **draw), dim=1)
     directions = torch.cat([light_directions(c, n // n_sets, queries, generator) for _ in range(n_sets)])
     roughness = torch.ones_like(queries[:, :1])
-    roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, **draw)
-    narrow = roughness[:, 0] < c.light_lobe_below
-    queries, roughness = (
-        torch.cat([queries[narrow], queries[~narrow]]),
-        torch.cat([roughness[narrow], roughness[~narrow]]),
-    )
-    n_narrow = int(narrow.sum())
+    roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, **draw).sort(0).values  # narrow lobes first
+    n_narrow = int((roughness < c.light_lobe_below).sum()) if c.light_lobe_below > 0 else 0
     own = sample_ggx_lobe(queries[:n_narrow], roughness[:n_narrow], c.light_lobe_samples, seed).reshape(-1, 3)
     asked = torch.cat([directions, own, queries])
     g = light(asked, torch.cat([roughness.new_zeros(len(directions) + len(own), 1), roughness]))

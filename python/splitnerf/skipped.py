@@ -134,4 +134,4 @@ def timed_work(
     finally:
         model.light.collect(False)
         model.zero_grad(set_to_none=True)
-    return Work(statistics.median(seconds[WARM_UP:]), len(ray.weights), ray.n_evaluated, len(ray.shaded))
+    return Work(statistics.median(seconds[WARM_UP:]), len(ray.weights), int(ray.evaluated.sum()), len(ray.shaded))

@@ -157,29 +157,31 @@ def train(
                 model, batch, found, scene, environment if traces else None, generator, step, progress
             )
             loss = sum(terms.values())
-            if not math.isfinite(loss.item()):
-                raise explain_loss(step, terms, dataset, batch, model, ray)
             optimiser.zero_grad(set_to_none=True)
             loss.backward()
             if light_moves(c, step):
                 model.light.deliver()
-            if watch.allows(step):
+            numbers = loss, terms["colour"], watch.largest(), ray.evaluated.sum()
+            loss_now, colour, largest, n_evaluated = torch.stack([x.detach().double() for x in numbers]).tolist()
+            if not math.isfinite(loss_now):
+                raise explain_loss(step, terms, dataset, batch, model, ray)
+            if watch.allows(step, largest):
                 optimiser.step()
 
             n_samples = len(ray.weights)
             n_rays = next_ray_count(n_rays, n_samples, c)
             step, first, seconds = step + 1, False, time.monotonic() - started
-            psnr = -10.0 * math.log10(max(terms["colour"].item() / max(c.colour_weight, 1e-12), 1e-10))
+            psnr = -10.0 * math.log10(max(colour / max(c.colour_weight, 1e-12), 1e-10))
             psnr_mean = psnr if psnr_mean is None else 0.95 * psnr_mean + 0.05 * psnr
-            samples_mean = ray.n_evaluated / len(batch.target)
+            samples_mean = n_evaluated / len(batch.target)
             bar.show(progress_now(), step, psnr_mean, samples_mean)
             if step % LOG_EVERY == 0 or step <= LOG_EVERY or progress_now() >= 1.0:
                 check_state(step, model, optimiser)
                 log.write(json.dumps({
-                    "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss.item(),
+                    "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss_now,
                     **{f"loss_{name}": term.item() for name, term in terms.items()}, "psnr": psnr_mean,
                     "rays": len(batch.target), "samples_per_ray": samples_mean,
-                    "kept": n_samples / max(1, ray.n_evaluated), "shaded": len(ray.shaded) / max(1, ray.n_evaluated),
+                    "kept": n_samples / max(1, n_evaluated), "shaded": len(ray.shaded) / max(1, n_evaluated),
                     "s": model.s_value, "sees_all": getattr(model.occlusion, "sees_all", False),
                     "skipped": watch.skipped,
                 }) + "\n")  # fmt: skip

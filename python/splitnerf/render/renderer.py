@@ -53,7 +53,7 @@ class FoundSamples(NamedTuple):
         beside: [m] the samples whose neighbours the last m are.
         step: Length of a sample, scene units.
         anneal: Of the cosine by which they were chosen.
-        n_evaluated: Points at which the distance was asked for to find them.
+        evaluated: [n_rays] int64, points at which the distance was asked for to find them.
     """
 
     packed: PackedSamples
@@ -64,7 +64,7 @@ class FoundSamples(NamedTuple):
     beside: Tensor
     step: float
     anneal: float
-    n_evaluated: int
+    evaluated: Tensor
 
 
 @dataclass
@@ -76,7 +76,7 @@ class RenderedRays:
         linear: Whether that is linear, or sRGB.
         opacity: [n_rays].
         samples: The packed samples.
-        n_evaluated: Points at which the distance was asked for.
+        evaluated: [n_rays] int64, points at which the distance was asked for.
         weights: [n].
         values: [n, 3] what is composited: radiance of the split sum, linear or sRGB as `compositing` says. With `shading =
             summed` the colour has, beside their composite, what the sum adds at each ray's heaviest sample.
@@ -94,7 +94,7 @@ class RenderedRays:
     linear: bool
     opacity: Tensor
     samples: PackedSamples
-    n_evaluated: int
+    evaluated: Tensor
     weights: Tensor
     values: Tensor
     gradients: Tensor
@@ -141,14 +141,13 @@ def find_samples(
     step = sample_step(c, s)
     if c.sample_above == 0:
         packed = march_rays(rays_o, rays_d, jitter, cells, c.box, step, c.max_samples_per_ray)
-        n_evaluated = len(packed.ray_indices)
+        evaluated = packed.offsets.diff()
     else:
         packed, evaluated = sample_rays(
             rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=s, anneal=anneal,
             min_weight=c.sample_above, min_transmittance=c.min_transmittance, reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
             max_samples=c.max_samples_per_ray,
         )  # fmt: skip
-        n_evaluated = int(evaluated.sum())
     directions = rays_d[packed.ray_indices]
     positions = rays_o[packed.ray_indices] + directions * packed.middles[:, None]
     beside = torch.empty(0, dtype=torch.int64, device=positions.device)
@@ -157,7 +156,7 @@ def find_samples(
         neighbours = positions[beside] + probes.shifts[: len(beside)]
         positions = torch.cat([positions, probes.anywhere, neighbours])
     phase = (PHASES * jitter) % 1.0  # where samples stand shall not decide which are shaded
-    return FoundSamples(packed, rays_d, phase, positions, directions, beside, step, anneal, n_evaluated)
+    return FoundSamples(packed, rays_d, phase, positions, directions, beside, step, anneal, evaluated)
 
 
 def render_rays(
@@ -211,7 +210,7 @@ def render_rays(
         )
         mean = mean.index_add(0, samples.ray_indices[shaded[at]], gained)
     return RenderedRays(
-        mean, c.compositing == "linear", opacity, samples, found.n_evaluated, weights, values, field.gradient, found.beside,
+        mean, c.compositing == "linear", opacity, samples, found.evaluated, weights, values, field.gradient, found.beside,
         shaded, shares, positions, normals, sdf, points,
     )  # fmt: skip
 
