@@ -1,0 +1,68 @@
+"""The surface of a training as a mesh, made at once or beside the training."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+import torch
+
+from splitnerf import meshes
+from splitnerf.config import preset
+from splitnerf.meshes import SurfaceMesh
+from splitnerf.render.model import SceneModel
+
+SMALL = {"n_levels": 2, "start_levels": 2, "log2_table_size": 8, "mesh_resolution": 24, "light_resolution": 16}
+
+
+@pytest.fixture
+def model() -> SceneModel:
+    torch.manual_seed(0)
+    return SceneModel(preset("cpu").replace(SMALL))
+
+
+def test_a_mesh_made_beside_is_that_of_the_moment_it_was_asked_for(model, monkeypatch):
+    at_once = SurfaceMesh(model)
+    at_once.renew()
+    begun, make = threading.Event(), meshes.make_mesh
+    monkeypatch.setattr(meshes, "make_mesh", lambda *args: (begun.wait(10), make(*args))[1])
+    beside = SurfaceMesh(model, background=True)
+    beside.renew()
+    with torch.no_grad():
+        model.sdf_field.out_bias[0] += 0.3  # the surface moves on
+        model.sdf_field.grid.table += 0.1
+    beside.renew()  # one is being made
+    beside.arrive()
+    assert beside.current is None
+    begun.set()
+    beside.arrive(wait=True)
+    beside.close()
+    for ours, theirs in zip(beside.current[1:3], at_once.current[1:3]):
+        assert torch.equal(ours, theirs)
+    assert torch.equal(beside.current.bits.cache.bits, at_once.current.bits.cache.bits)
+    assert model.occlusion_ready and torch.equal(model.occlusion.cache.vertices, beside.current.vertices)
+
+
+@pytest.mark.parametrize("background", [False, True])
+def test_without_a_surface_the_old_mesh_stays(model, background):
+    mesh = SurfaceMesh(model, background=background)
+    mesh.renew()
+    mesh.arrive(wait=True)
+    before = mesh.current
+    with torch.no_grad():
+        model.sdf_field.out_bias[0] = 10.0
+    mesh.renew()
+    mesh.arrive(wait=True)
+    mesh.close()
+    assert before is not None and mesh.current is before
+
+
+def test_what_goes_wrong_beside_is_told(model):
+    with torch.no_grad():
+        model.sdf_field.out_bias[0] = torch.nan
+    mesh = SurfaceMesh(model, background=True)
+    mesh.renew()
+    with pytest.raises(RuntimeError, match="not finite"):
+        mesh.arrive(wait=True)
+    mesh.close()
+    assert mesh.current is None
