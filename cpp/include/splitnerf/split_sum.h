@@ -145,7 +145,9 @@ SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bo
     grad_n = grad_a * rest;
     grad_w_r = grad_a * k;
     // k = 1 + blend (chi - 1)
-    const T grad_k = dot(grad_a, w_r - n);
+    // grad_a stands on n rest + w_r k, so its product with w_r - n follows from the shorter of the two alone.
+    const bool mirrors = square(k) > square(rest) * dot(n, n);
+    const T grad_k = mirrors ? -dot(grad_a, n) / k : dot(grad_a, w_r) / rest;
     grad_nv = grad_k * blend * s.d_n_dot_v.z;
     out.roughness = grad_k * (blend * s.d_roughness.z - smoothstep_derivative(lo, hi, roughness) * s.rest);
   }
