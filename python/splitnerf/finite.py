@@ -95,7 +95,7 @@ def check_state(step: int, model: SceneModel, optimiser: torch.optim.Optimizer) 
 
 
 def explain_loss(
-    step: int, terms: dict[str, Tensor], dataset: Dataset, batch: Batch, model: SceneModel, ray: RenderedRays
+    step: int, terms: dict[str, float], dataset: Dataset, batch: Batch, model: SceneModel, ray: RenderedRays
 ) -> Diverged:
     """The error for a loss that is not finite: its terms, and the first in the order of the data flow that is not.
 
@@ -106,7 +106,7 @@ def explain_loss(
         batch, ray: The rays of the step, and as they were rendered.
         model: The scene.
     """
-    bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term.item()))
+    bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term))
     found = first_not_finite(_data_flow(dataset, batch, model, ray)) or "none of what it comes from"
     return Diverged(
         f"step {step}: the loss is not finite ({bad}); first not finite: {found}; "

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 from torch.nn import functional as F
@@ -20,6 +23,33 @@ from splitnerf.ops import (
 from splitnerf.render.renderer import RenderedRays
 
 ALBEDO_FLOOR = 0.01  # below it albedos count as one black
+
+
+class Term(NamedTuple):
+    """One term of the loss.
+
+    Attributes:
+        weight: Of it.
+        value: [] the term without.
+    """
+
+    weight: float
+    value: Tensor
+
+
+@functools.lru_cache(maxsize=1024)
+def _seed(weight: float, device: torch.device) -> Tensor:
+    with torch.inference_mode(False):
+        return torch.tensor(weight, device=device)
+
+
+def backward(terms: dict[str, Term]) -> None:
+    """Takes the gradient of the weighted sum of the terms to all that they come from. The weights are where the backward
+    pass begins, so that no product or sum of them is computed."""
+    values = [
+        (term.value, _seed(term.weight, term.value.device)) for term in terms.values() if term.value.requires_grad
+    ]
+    torch.autograd.backward(*map(list, zip(*values)))
 
 
 def penalty(error: Tensor, form: str) -> Tensor:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from splitnerf import losses
 from splitnerf.batches import Batch, draw_batch
 from splitnerf.devices import wait_for
 from splitnerf.fields import VisibilityBits
@@ -126,7 +127,7 @@ def timed_work(
             for step in range(period):
                 found = find_samples(model, cells, *batch.rays, probes=batch.probes)
                 ray, terms = batch_losses(model, batch, found, scene, None, generator, step, 1.0)
-                sum(terms.values()).backward()
+                losses.backward(terms)
                 if light_moves(c, step):
                     model.light.deliver()
             wait_for(model.device)

@@ -27,6 +27,7 @@ from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
 from splitnerf.errors import InputError
 from splitnerf.finite import GradientWatch, check_state, explain_loss
+from splitnerf.losses import Term
 from splitnerf.meshes import SurfaceMesh
 from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
 from splitnerf.outputs import write_preview
@@ -156,30 +157,31 @@ def train(
             ray, terms = batch_losses(
                 model, batch, found, scene, environment if traces else None, generator, step, progress
             )
-            loss = sum(terms.values())
             optimiser.zero_grad(set_to_none=True)
-            loss.backward()
+            losses.backward(terms)
             if light_moves(c, step):
                 model.light.deliver()
-            numbers = loss, terms["colour"], watch.largest(), ray.evaluated.sum()
-            loss_now, colour, largest, n_evaluated = torch.stack([x.detach().double() for x in numbers]).tolist()
-            if not math.isfinite(loss_now):
-                raise explain_loss(step, terms, dataset, batch, model, ray)
+            numbers = *(term.value.detach() for term in terms.values()), watch.largest(), ray.evaluated.sum().float()
+            *values, largest, n_evaluated = torch.stack(numbers).tolist()  # waits for the device
+            loss = sum(term.weight * value for term, value in zip(terms.values(), values))
+            if not math.isfinite(loss):
+                raise explain_loss(step, dict(zip(terms, values)), dataset, batch, model, ray)
             if watch.allows(step, largest):
                 optimiser.step()
 
             n_samples = len(ray.weights)
             n_rays = next_ray_count(n_rays, n_samples, c)
             step, first, seconds = step + 1, False, time.monotonic() - started
-            psnr = -10.0 * math.log10(max(colour / max(c.colour_weight, 1e-12), 1e-10))
+            psnr = -10.0 * math.log10(max(values[0], 1e-10))
             psnr_mean = psnr if psnr_mean is None else 0.95 * psnr_mean + 0.05 * psnr
             samples_mean = n_evaluated / len(batch.target)
             bar.show(progress_now(), step, psnr_mean, samples_mean)
             if step % LOG_EVERY == 0 or step <= LOG_EVERY or progress_now() >= 1.0:
                 check_state(step, model, optimiser)
                 log.write(json.dumps({
-                    "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss_now,
-                    **{f"loss_{name}": term.item() for name, term in terms.items()}, "psnr": psnr_mean,
+                    "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss,
+                    **{f"loss_{name}": term.weight * value for (name, term), value in zip(terms.items(), values)},
+                    "psnr": psnr_mean,
                     "rays": len(batch.target), "samples_per_ray": samples_mean,
                     "kept": n_samples / max(1, n_evaluated), "shaded": len(ray.shaded) / max(1, n_evaluated),
                     "s": model.s_value, "sees_all": getattr(model.occlusion, "sees_all", False),
@@ -207,8 +209,8 @@ def train(
 def batch_losses(
     model: SceneModel, batch: Batch, found: FoundSamples, scene: MeshScene | None, environment: Tensor | None,
     generator: torch.Generator, step: int, progress: float,
-) -> tuple[RenderedRays, dict[str, Tensor]]:  # fmt: skip
-    """The rays as they are rendered now, and the weighted terms of the loss by name.
+) -> tuple[RenderedRays, dict[str, losses.Term]]:  # fmt: skip
+    """The rays as they are rendered now, and the terms of the loss by name, the colour's first.
 
     Args:
         model: The scene.
@@ -227,31 +229,32 @@ def batch_losses(
     metal, binary_metal, dark_metal = material_losses(
         ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.metal_loss_form == "smooth_l1"
     )
-    terms = {"colour": c.colour_weight * colour, "eikonal": c.eikonal_weight * eikonal}
+    terms = {"colour": Term(c.colour_weight, colour), "eikonal": Term(c.eikonal_weight, eikonal)}
     if finetune:
         colours = monte_carlo_colours(model, scene, ray, -batch.rays_d, generator)
-        terms["finetune"] = c.colour_weight * losses.monte_carlo_colour_loss(
-            colours, ray, batch.target, batch.background
-        )
+        error = losses.monte_carlo_colour_loss(colours, ray, batch.target, batch.background)
+        terms["finetune"] = Term(c.colour_weight, error)
     if c.mask_weight:
-        terms["mask"] = c.mask_weight * mask
+        terms["mask"] = Term(c.mask_weight, mask)
     if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
-        terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
+        terms["light"] = Term(c.light_weight, losses.light_loss(model.light, c, generator, step))
     if c.neutral_weight and light_moves(c, step):  # for all steps since it moved
         since = step % light_period(c) + 1
-        terms["neutral"] = c.neutral_weight * since * losses.neutral_light_loss(model.light, c, generator)
+        terms["neutral"] = Term(c.neutral_weight * since, losses.neutral_light_loss(model.light, c, generator))
     if c.normal_smoothness:
-        terms["smoothness"] = c.normal_smoothness * smoothness
+        terms["smoothness"] = Term(c.normal_smoothness, smoothness)
     if c.entropy_weight and progress >= c.priors_from:
-        terms["entropy"] = c.entropy_weight * losses.material_entropy_loss(ray, c, generator)
+        terms["entropy"] = Term(c.entropy_weight, losses.material_entropy_loss(ray, c, generator))
     if c.metal_regulariser:
-        terms["metal"] = c.metal_weight * metal
+        terms["metal"] = Term(c.metal_weight, metal)
     if c.binary_metal_weight and progress >= c.priors_from:
-        terms["binary_metal"] = c.binary_metal_weight * binary_metal
+        terms["binary_metal"] = Term(c.binary_metal_weight, binary_metal)
     if c.dark_metal_weight:
-        terms["dark_metal"] = c.dark_metal_weight * dark_metal
+        terms["dark_metal"] = Term(c.dark_metal_weight, dark_metal)
     if environment is not None:
-        terms["occlusion"] = c.occlusion_weight * losses.occlusion_loss(ray, scene, environment, c, generator, step)
+        terms["occlusion"] = Term(
+            c.occlusion_weight, losses.occlusion_loss(ray, scene, environment, c, generator, step)
+        )
     return ray, terms
 
 
