@@ -82,8 +82,11 @@ def run(args: argparse.Namespace) -> int:
         base = config_of(load_checkpoint(run / "checkpoint.pt"))
     else:
         base = preset(args.preset or ("cpu" if device.type == "cpu" else "fast"))
+    config = base.replace(settings)
+    if config.deterministic and device.type != "cpu":
+        raise InputError("--deterministic needs --device cpu: a GPU adds in any order")
     trained, evaluation = reconstruct(
-        args.data, run, base.replace(settings), downscale=args.downscale, device=device, resume=args.resume,
+        args.data, run, config, downscale=args.downscale, device=device, resume=args.resume,
         overwrite=args.overwrite,
     )  # fmt: skip
     if evaluation is None:
