@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import torch
 
 from splitnerf import _core
@@ -23,6 +26,18 @@ def choose_device(name: str) -> torch.device:
     if not torch.cuda.is_available():
         raise InputError(f"--device {name}: torch finds no GPU; install a torch built for CUDA and its driver")
     return torch.device("cuda", torch.cuda.current_device())
+
+
+@contextmanager
+def tensor_cores(on: bool) -> Iterator[None]:
+    """Has a GPU's products of float32 matrices go through its tensor cores within the block, where ``on``: factors are
+    rounded to 10 bits (TF32), sums are float32. The CPU's are what they were."""
+    before = torch.backends.cuda.matmul.allow_tf32
+    torch.backends.cuda.matmul.allow_tf32 = on
+    try:
+        yield
+    finally:
+        torch.backends.cuda.matmul.allow_tf32 = before
 
 
 def wait_for(device: torch.device) -> None:

@@ -25,6 +25,7 @@ from splitnerf.checkpoint import (
 )
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
+from splitnerf.devices import tensor_cores
 from splitnerf.errors import InputError
 from splitnerf.finite import GradientWatch, check_state, explain_loss
 from splitnerf.losses import Term
@@ -130,7 +131,10 @@ def train(
     psnr_mean = samples_mean = None
     watch = GradientWatch(model.parameters())
     log = open(run / "metrics.jsonl", "a")
-    with log, closing(mesh), Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic):
+    with (
+        log, closing(mesh), Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic),
+        tensor_cores(c.tensor_cores),
+    ):  # fmt: skip
         while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % light_steps == 0):
             model.open_levels(progress)
             set_learning_rate(optimiser, c, step, progress)
