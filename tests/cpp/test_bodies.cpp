@@ -19,20 +19,34 @@ template <class T> void expect_near(const std::vector<T>& got, const std::vector
 
 // ---- hash grid ----
 
-template <class T, int F> void check_hash_grid(double tolerance) {
+// Numbers in [-1, 1] as a table stores them; of 16 bits any that are finite and not above 1.
+template <class S> std::vector<S> drawn_entries(Random& random, size_t n) {
+  if constexpr (std::is_floating_point_v<S>) {
+    return random.uniforms<S>(n, -1);
+  } else {
+    const int one = std::is_same_v<S, Half> ? 0x3c00 : 0x3f80;
+    std::vector<S> out(n);
+    for (S& x : out) x.bits = static_cast<uint16_t>(random.below(one + 1) | random.below(2) << 15);
+    return out;
+  }
+}
+
+// S: what the table stores.
+template <class T, int F, class S = T> void check_hash_grid(double tolerance) {
   const HashGridShape shape{4, F, 4, 1.7, 8};  // two dense levels, two hashed ones
   const int n_active = 3, n_levels = shape.n_levels;
-  HashGridView<T> grid{};
+  HashGridView<T, S> grid{};
   const int64_t n_entries = hash_levels(shape, grid.levels), n = 67, columns = n_levels * F;
   Random random(F);
-  const auto positions = random.uniforms<T>(3 * n, -0.1, 1.1), table = random.uniforms<T>(n_entries * F, -1);
+  const auto positions = random.uniforms<T>(3 * n, -0.1, 1.1);
+  const auto table = drawn_entries<S>(random, n_entries * F);
   const auto g = random.uniforms<T>(n * columns, -1), gj = random.uniforms<T>(3 * n * columns, -1);
   grid.n_levels = n_levels, grid.n_active = n_active, grid.positions = positions.data(), grid.table = table.data();
   using Values = std::vector<T>;
 
   Values features(n * columns), jacobian(3 * n * columns), features1(n * columns, 7), jacobian1(3 * n * columns, 7);
   cpu::hash_encode(shape, n_active, n, positions.data(), table.data(), features.data(), jacobian.data());
-  const HashEncodeBody<T, F, true> encode{grid, features1.data(), jacobian1.data()};
+  const HashEncodeBody<T, F, true, S> encode{grid, features1.data(), jacobian1.data()};
   for (int l = 0; l < n_levels; ++l)
     for (int64_t p = 0; p < n; ++p) encode(p, l);
   expect_near(features1, features, tolerance), expect_near(jacobian1, jacobian, tolerance);
@@ -41,7 +55,10 @@ template <class T, int F> void check_hash_grid(double tolerance) {
     const T* to_jacobian = with_jacobian ? gj.data() : nullptr;
     Values to_table(n_entries * F), to_table1(n_entries * F);
     cpu::hash_encode_backward(shape, n_active, n, positions.data(), g.data(), to_jacobian, to_table.data());
-    const HashScatterBody<T, F> scatter{grid, g.data(), to_jacobian, to_table1.data()};
+    HashGridView<T> points{};
+    std::copy_n(grid.levels, n_levels, points.levels);
+    points.n_levels = n_levels, points.n_active = n_active, points.positions = positions.data();
+    const HashScatterBody<T, F> scatter{points, g.data(), to_jacobian, to_table1.data()};
     for (int l = 0; l < n_active; ++l)
       for (int64_t p = 0; p < n; ++p) scatter(p, l);
     expect_near(to_table1, to_table, tolerance);
@@ -50,7 +67,7 @@ template <class T, int F> void check_hash_grid(double tolerance) {
   Values to_positions(3 * n), to_positions1(3 * n);
   cpu::hash_encode_backward_positions(shape, n_active, n, positions.data(), table.data(), g.data(), gj.data(),
                                       to_positions.data());
-  const HashPositionsBody<T, F> positions_body{grid, g.data(), gj.data(), to_positions1.data()};
+  const HashPositionsBody<T, F, S> positions_body{grid, g.data(), gj.data(), to_positions1.data()};
   for (int64_t p = 0; p < n; ++p) positions_body(p);
   expect_near(to_positions1, to_positions, tolerance);
 }
@@ -60,13 +77,18 @@ TEST(Bodies, HashGrid) {
   check_hash_grid<double, 4>(1e-14), check_hash_grid<double, 8>(1e-14);
   check_hash_grid<float, 2>(1e-5), check_hash_grid<float, 8>(1e-5);
 }
+TEST(Bodies, HashGridOf16Bits) {
+  check_hash_grid<float, 1, Half>(1e-5), check_hash_grid<float, 2, Half>(1e-5), check_hash_grid<float, 8, Half>(1e-5);
+  check_hash_grid<float, 2, Bfloat16>(1e-5), check_hash_grid<float, 4, Bfloat16>(1e-5);
+}
 
 // What a thread reads and writes at once is never wider than 16 bytes, nor than the values' own alignment in their rows.
 TEST(Bodies, PacksAreAlignedToWhatTheirRowsAre) {
   const size_t alignments[] = {alignof(Pack<float, 1>), alignof(Pack<float, 2>),  alignof(Pack<float, 4>),
-                               alignof(Pack<float, 8>), alignof(Pack<double, 1>), alignof(Pack<double, 8>)};
-  const size_t expected[] = {4, 8, 16, 16, 8, 16};
-  for (int i = 0; i < 6; ++i) EXPECT_EQ(alignments[i], expected[i]) << i;
+                               alignof(Pack<float, 8>), alignof(Pack<double, 1>), alignof(Pack<double, 8>),
+                               alignof(Pack<Half, 1>),  alignof(Pack<Half, 2>),   alignof(Pack<Bfloat16, 8>)};
+  const size_t expected[] = {4, 8, 16, 16, 8, 16, 2, 4, 16};
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(alignments[i], expected[i]) << i;
   EXPECT_EQ(sizeof(Pack<float, 8>), 32u);
   EXPECT_EQ(sizeof(Pack<double, 1>), 8u);
 }

@@ -20,7 +20,7 @@ template <class T> struct HashEncodeArgs {
   int n_active;    // levels [0, n_active) are open
   int64_t n_points;
   const T* positions;  // [n, 3] in the unit cube
-  const T* table;      // [n_entries, n_features]
+  HashTable table;     // [n_entries, n_features]
 };
 
 // The distance field: hash-grid features and a layer over them.
