@@ -1,5 +1,6 @@
 // The bodies that single threads run on the GPU, where the CPU has code of its own: one against the other.
 #include "check.h"
+#include "splitnerf/bodies/adamw.h"
 #include "splitnerf/bodies/hash_encode.h"
 #include "splitnerf/bodies/light_pyramid.h"
 #include "splitnerf/bodies/prefilter.h"
@@ -80,6 +81,47 @@ TEST(Bodies, HashGrid) {
 TEST(Bodies, HashGridOf16Bits) {
   check_hash_grid<float, 1, Half>(1e-5), check_hash_grid<float, 2, Half>(1e-5), check_hash_grid<float, 8, Half>(1e-5);
   check_hash_grid<float, 2, Bfloat16>(1e-5), check_hash_grid<float, 4, Bfloat16>(1e-5);
+}
+
+// ---- the optimiser ----
+
+// Rows of which each second one has no gradient.
+template <class T> void check_adamw(double tolerance, int64_t columns, bool sparse) {
+  const int64_t n = 61 * columns;
+  Random random(static_cast<uint32_t>(columns));
+  const AdamwRule<T> rule(0.1, 0.9, 0.99, 1e-8, 0.2, 3);
+  auto grad = random.uniforms<T>(n, -1);
+  for (int64_t i = 0; i < n; ++i)
+    if (i / columns % 2 == 0 || random.below(3) == 0) grad[i] = T(0);
+  const auto param = random.uniforms<T>(n, -1), m = random.uniforms<T>(n, -1), v = random.uniforms<T>(n);
+  auto param1 = param, m1 = m, v1 = v, param2 = param, m2 = m, v2 = v;
+  std::vector<Half> half1(n), half2(n);
+  std::vector<Bfloat16> bfloat1(n), bfloat2(n);
+  for (int64_t i = 0; i < n; ++i) {
+    half1[i] = half2[i] = narrow<Half>(float(param[i]));
+    bfloat1[i] = bfloat2[i] = narrow<Bfloat16>(float(param[i]));
+  }
+  cpu::adamw_step<T>(
+      rule, {n, columns, sparse, param1.data(), grad.data(), m1.data(), v1.data(), half1.data(), bfloat1.data()});
+  const AdamwBody<T> body{
+      rule, {n, columns, sparse, param2.data(), grad.data(), m2.data(), v2.data(), half2.data(), bfloat2.data()}};
+  for (int64_t i = 0; i < n; ++i) body(i);
+  expect_near(param2, param1, tolerance), expect_near(m2, m1, tolerance), expect_near(v2, v1, tolerance);
+  for (int64_t i = 0; i < n; ++i) {
+    for (const Half x : {half1[i], half2[i]}) EXPECT_NEAR(widen(x), param1[i], 1e-3 * (1 + std::abs(param1[i]))) << i;
+    for (const Bfloat16 x : {bfloat1[i], bfloat2[i]})
+      EXPECT_NEAR(widen(x), param1[i], 8e-3 * (1 + std::abs(param1[i]))) << i;
+    if (sparse && i / columns % 2 == 0) { EXPECT_TRUE(param1[i] == param[i] && m1[i] == m[i] && v1[i] == v[i]) << i; }
+  }
+}
+
+TEST(Bodies, Adamw) {
+  for (const int64_t columns : {1, 2, 3, 8, 700}) {
+    for (const bool sparse : {false, true}) {
+      check_adamw<double>(1e-14, columns, sparse);
+      check_adamw<float>(1e-6, columns, sparse);
+    }
+  }
 }
 
 // What a thread reads and writes at once is never wider than 16 bytes, nor than the values' own alignment in their rows.

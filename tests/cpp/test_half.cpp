@@ -32,6 +32,31 @@ TEST(HalfNumbers, EveryNumberIsReadExactly) {
   every_number_is_read_exactly<Bfloat16>(8);
 }
 
+// narrow takes the nearest, of two the even one, as far as the largest reaches.
+template <class S> void every_number_is_rounded_to_nearest(int exponent_bits) {
+  const uint32_t infinite = ((1u << exponent_bits) - 1) << (15 - exponent_bits);
+  for (uint32_t bits = 0; bits + 1 < infinite; ++bits)
+    for (const uint32_t sign : {0u, 0x8000u}) {
+      const auto below = static_cast<uint16_t>(sign | bits), above = static_cast<uint16_t>(sign | (bits + 1));
+      const float a = widen(S{below}), b = widen(S{above}), middle = a + (b - a) / 2;
+      ASSERT_EQ(narrow<S>(a).bits, below);
+      ASSERT_EQ(narrow<S>(middle).bits, bits & 1 ? above : below) << bits;
+      if (std::nextafter(a, b) == b || middle == a) continue;  // no float32 beside the middle
+      ASSERT_EQ(narrow<S>(std::nextafter(middle, a)).bits, below) << bits;
+      ASSERT_EQ(narrow<S>(std::nextafter(middle, b)).bits, above) << bits;
+    }
+  const auto largest = static_cast<uint16_t>(infinite - 1);
+  for (const float x : {widen(S{largest}), 3.402823e38f, INFINITY}) {
+    EXPECT_EQ(narrow<S>(x).bits, largest) << x;
+    EXPECT_EQ(narrow<S>(-x).bits, 0x8000u | largest) << x;
+  }
+  EXPECT_TRUE(std::isnan(widen(narrow<S>(NAN))) && std::isnan(widen(narrow<S>(-NAN))));
+}
+TEST(HalfNumbers, EveryNumberIsRoundedToNearest) {
+  every_number_is_rounded_to_nearest<Half>(5);
+  every_number_is_rounded_to_nearest<Bfloat16>(8);
+}
+
 // A table of 16 bits and one of the float32 numbers that it stands for give the same features, to the bit.
 template <class S> void check_kernels() {
   Random random(3);

@@ -260,4 +260,8 @@ template <class T>
 SPLITNERF_API void cached_visibility(const VisibilityCache<T>& cache, int64_t n, const T* positions, const T* normals,
                                      T* visible, T* arriving);
 
+// ---- the optimiser ----
+
+template <class T> SPLITNERF_API void adamw_step(const AdamwRule<T>& rule, const AdamwArrays<T>& x);
+
 }  // namespace splitnerf::cpu

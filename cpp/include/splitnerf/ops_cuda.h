@@ -191,4 +191,8 @@ void sample_rays(const Queue& queue, const SdfField<T>& field, const MarchOption
                  const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter,
                  int64_t* offsets, int64_t* n_evaluated, const SampleAllocator<T>& allocate);
 
+// ---- the optimiser ----
+
+template <class T> void adamw_step(const Queue& queue, const AdamwRule<T>& rule, const AdamwArrays<T>& x);
+
 }  // namespace splitnerf::cuda

@@ -130,8 +130,9 @@ _optimiser_steps = [0]  # of this process
 
 
 @register_optimizer_step_post_hook
-def _count_step(*_) -> None:
-    _optimiser_steps[0] += 1
+def _count_step(optimiser, *_) -> None:
+    if not getattr(optimiser, "counts_versions", False):
+        _optimiser_steps[0] += 1
 
 
 class TableCopy:
@@ -156,10 +157,17 @@ class TableCopy:
 
     def of(self, table: Tensor) -> Tensor:
         """The copy, of the table as it stands; in its shape and on its device."""
-        state = (table._version, _optimiser_steps[0], table.data_ptr(), table.device, table.shape)
-        if state != self._of:
-            self._values, self._of = rounded(table, self.dtype), state
+        if self._state(table) != self._of:
+            self._values, self._of = rounded(table, self.dtype), self._state(table)
         return self._values
+
+    def was_written(self, table: Tensor) -> None:
+        """Tells that the values of :meth:`of` have been changed as the table has."""
+        self._of = self._state(table)
+
+    @staticmethod
+    def _state(table: Tensor) -> tuple:
+        return table._version, _optimiser_steps[0], table.data_ptr(), table.device, table.shape
 
 
 class HashGrid(nn.Module):
