@@ -44,14 +44,18 @@ class SdfField(nn.Module):
         width: Hidden units.
         n_outputs: Outputs, the distance included.
         radius: The field starts as a sphere of this radius, scene units.
+        table_dtype: Of :class:`splitnerf.ops.HashGrid`.
 
     Source: SplitNeRF, section 4.1; sphere initialisation: Atzmon and Lipman 2020.
     """
 
-    def __init__(self, spec: HashGridSpec, box: float, width: int = 64, n_outputs: int = 13, radius: float = 0.5):
+    def __init__(
+        self, spec: HashGridSpec, box: float, width: int = 64, n_outputs: int = 13, radius: float = 0.5,
+        table_dtype: torch.dtype | None = None,
+    ):  # fmt: skip
         super().__init__()
         self.box = box
-        self.grid = HashGrid(spec)
+        self.grid = HashGrid(spec, table_dtype=table_dtype)
         hidden = torch.zeros(width, 3 + spec.n_outputs)
         hidden[:, :3] = torch.randn(width, 3) * math.sqrt(2.0 / width)
         out = torch.randn(n_outputs, width) * math.sqrt(1.0 / width)
@@ -98,7 +102,8 @@ class SdfField(nn.Module):
     def network(self) -> SdfNetwork:
         """The field's numbers as they stand, for operators that ask for distances on their own."""
         hidden, out = self._weights()
-        table, biases = self.grid.table.detach(), (self.hidden_bias.detach(), self.out_bias.detach())
+        stored, biases = self.grid.stored(), (self.hidden_bias.detach(), self.out_bias.detach())
+        table = self.grid.table.detach() if stored is None else stored
         return SdfNetwork(
             self.grid.spec, self.grid.n_active, table, hidden, biases[0], out, biases[1], SOFTPLUS_BETA, self.box
         )

@@ -23,7 +23,7 @@ class SdfNetwork(NamedTuple):
     Attributes:
         spec: Shape of the hash grid that gives the features.
         n_active: Its open levels.
-        table: [spec.n_entries, spec.n_features].
+        table: [spec.n_entries, spec.n_features], of the dtype of the others; or float16 or bfloat16 beside float32.
         hidden, hidden_bias: [width, 3 + spec.n_outputs], [width].
         out, out_bias: [m, width], [m].
         beta: softplus(y) = log(1 + exp(beta y)) / beta.
