@@ -26,7 +26,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import torch
-from torch import Tensor
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "python")]
 from gpu_cases import TINY, Case, Sizes, World, all_cases, bytes_moved, lib  # noqa: E402
@@ -104,7 +103,7 @@ def ceilings(clock: Clock, device: str, tiny: bool) -> list[list[str]]:
         return [name, dtype, *numbers, *[""] * 6]
 
     rows.append(line("copy", "float32", clock(lambda: target.copy_(source), False), moved_bytes, 0))
-    del source, target
+    source = target = None
     n = 128 if tiny else 8192
     for name, dtype, precision in (
         ("float32", torch.float32, "highest"), ("tf32", torch.float32, "high"), ("bfloat16", torch.bfloat16, "highest"),
@@ -222,7 +221,10 @@ def markdown(lines: list[list[str]], device: str) -> str:
     by_name = [dict(zip(COLUMNS, line)) for line in lines]
     head = [row for row in by_name if row["case"] in CEILINGS]
     out = [f"# Operators on {device}", ""]
-    out += [f"- {row['case']}: {row['GB_s'] + ' GB/s' if row['case'] == 'copy' else row['GFLOP_s'] + ' GFLOP/s'}" for row in head]
+    out += [
+        f"- {row['case']}: {row['GB_s'] + ' GB/s' if row['case'] == 'copy' else row['GFLOP_s'] + ' GFLOP/s'}"
+        for row in head
+    ]
     out += ["", "Cold: the L2 cache filled with something else before each call. Share: of the slower of the two limits, bytes at the rate of",
             "the copy and operations at that of the float32 product. Error: |difference| / |truth|, truth on the CPU in float64.", "",
             "| operator | dtype | ms, cold (quartiles) | ms, warm | GB/s | GFLOP/s | limit | share | error | x eager | |",
@@ -270,7 +272,13 @@ def main() -> int:
         if worker.returncode and len(lines_of(path)) == len(lines):
             if len(lines) < len(CEILINGS):
                 break
-            append(path, failed(*rows[len(lines) - len(CEILINGS)], "failed: " + (worker.stderr.strip().splitlines() or ["killed"])[-1][:200]))
+            append(
+                path,
+                failed(
+                    *rows[len(lines) - len(CEILINGS)],
+                    "failed: " + (worker.stderr.strip().splitlines() or ["killed"])[-1][:200],
+                ),
+            )
     lines = lines_of(path)
     (args.out / "ops.md").write_text(markdown(lines, device_name(args.device)))
     n_failed = sum(line[-1].startswith("failed") for line in lines)
