@@ -48,6 +48,11 @@ row() { # part, result, seconds, what it says
   table >"$out/table.md"
 }
 
+said() { # log, exit code: its last line, but of a compiler that failed the first error
+  [ "$2" = 0 ] || [ "$1" != "$work/build.log" ] || grep -m 1 -E 'CMake Error|error:' "$1" && return
+  tr '\r' '\n' <"$1" | grep -v '^ *$' | tail -n 1
+}
+
 # Runs a command under a time limit, keeps its log, and adds the last line of that to the table.
 part() { # name, seconds, command
   local name=$1 limit=$(($2 * slower)) left=$((deadline - SECONDS)) log=$work/$1.log begin=$SECONDS result=done code
@@ -60,7 +65,7 @@ part() { # name, seconds, command
   [ "$code" = 0 ] || result="failed ($code)"
   { [ "$code" = 124 ] || [ "$code" = 137 ]; } && result="stopped after $limit s"
   { echo "==== $name: $result, $((SECONDS - begin)) s"; tr '\r' '\n' <"$log" | tail -c 300000; } >>"$out/log.txt"
-  row "$name" "$result" "$((SECONDS - begin))" "$(tr '\r' '\n' <"$log" | grep -v '^ *$' | tail -n 1 | cut -c 1-240)"
+  row "$name" "$result" "$((SECONDS - begin))" "$(said "$log" "$code" | cut -c 1-240)"
   [ "$code" = 0 ]
 }
 

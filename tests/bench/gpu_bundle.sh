@@ -32,10 +32,11 @@ python3 -m pip --disable-pip-version-check download --quiet --no-deps --only-bin
 
 packages=$(mktemp -d)
 trap 'rm -rf "$packages"' EXIT
-library=$(apt-cache depends libembree-dev | sed -n 's/.*Depends: \(libembree[0-9-]*\)$/\1/p' | head -n 1)
-tbb=$(apt-cache depends libtbb-dev | sed -n 's/.*Depends: \(libtbb[0-9a-z-]*\)$/\1/p')
+needs="--recurse --no-recommends --no-suggests --no-conflicts --no-breaks --no-replaces --no-enhances"
+# shellcheck disable=SC2086  # lists of words
+embree=$(apt-cache depends $needs libembree-dev | grep -xE 'lib(embree|tbb)[a-z0-9-]*' | sort -u)
 # shellcheck disable=SC2086
-(cd "$packages" && apt-get download -qq libembree-dev "$library" libtbb-dev $tbb 2>"$packages/said") ||
+(cd "$packages" && apt-get download -qq $embree 2>"$packages/said") ||
   { cat "$packages/said" >&2; exit 1; }
 for package in "$packages"/*.deb; do dpkg -x "$package" "$packages/unpacked"; done
 rm -rf "$packages/unpacked/usr/share" "$packages/unpacked/usr/bin"
