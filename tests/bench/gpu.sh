@@ -49,7 +49,7 @@ row() { # part, result, seconds, what it says
 }
 
 said() { # log, exit code: its last line, but of a compiler that failed the first error
-  [ "$2" = 0 ] || [ "$1" != "$work/build.log" ] || grep -m 1 -E 'CMake Error|error:' "$1" && return
+  if [ "$2" != 0 ] && [ "$1" = "$work/build.log" ] && grep -m 1 -E 'CMake Error|error:' "$1"; then return; fi
   tr '\r' '\n' <"$1" | grep -v '^ *$' | tail -n 1
 }
 
@@ -94,7 +94,8 @@ write_demo_dataset(Path('$work/writing'), $picture)" && mv "$work/writing" "$wor
 }
 
 relight() { # of the run, where the data have lights to compare with
-  splitnerf evaluate "$work/runs/fast" --data "$1" --views 4 --spp 32
+  splitnerf evaluate "$work/runs/fast" --data "$1" --views 4 --spp 32 &&
+    "$run_python" -c 'import json, sys; print("relit views %.2f dB" % json.load(open(sys.argv[1]))["relight"]["psnr"])' "$work/runs/fast/evaluation.json"
 }
 export python run_python work bundle picture SPLITNERF_DATA="${SPLITNERF_DATA:-}"
 

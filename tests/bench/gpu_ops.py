@@ -17,6 +17,7 @@ import argparse
 import csv
 import faulthandler
 import math
+import signal
 import statistics
 import subprocess
 import sys
@@ -32,7 +33,6 @@ from gpu_cases import TINY, Case, Sizes, World, all_cases, bytes_moved, lib  # n
 from op_checks import as_tuple, has_cuda_kernel  # noqa: E402
 from test_ops_cuda import ROUNDED_ALIKE, moved, truth  # noqa: E402
 
-STALLED = 90  # seconds after which a case is given up and the process ends
 STORED = {"float32": torch.float32, "float16": torch.float16, "bfloat16": torch.bfloat16}
 CEILINGS = ("copy", "product float32", "product tf32", "product bfloat16")
 COLUMNS = ("case", "dtype", "cold_ms", "low_ms", "high_ms", "warm_ms", "calls", "bytes", "operations", "GB_s", "GFLOP_s",
@@ -199,7 +199,7 @@ def work(args: argparse.Namespace, path: Path) -> None:
     rates = float(known["copy"][9]) * 1e9, float(known["product float32"][10]) * 1e9
     world = World(TINY if args.tiny else Sizes())
     for case, dtype in wanted(args.only)[len(lines) - len(CEILINGS) :]:
-        faulthandler.dump_traceback_later(STALLED, exit=True)
+        faulthandler.dump_traceback_later(args.stalled, exit=True)
         if time.time() > args.until:
             line = failed(case.name, dtype, "left out: no time")
         elif args.device == "cuda" and not has_cuda_kernel(case.op):
@@ -247,6 +247,20 @@ def device_name(device: str) -> str:
     return torch.cuda.get_device_name() if device == "cuda" else "the CPU"
 
 
+def watch(path: Path, rows: list[tuple[str, str]], until: float) -> None:
+    """Keeps a process at work on the lines that are missing; one that ends without a line has failed at it."""
+    while len(lines := lines_of(path)) < len(CEILINGS) + len(rows):
+        worker = subprocess.run([sys.executable, *sys.argv, "--until", str(until)], stderr=subprocess.PIPE, text=True)
+        sys.stderr.write(worker.stderr)
+        if len(lines_of(path)) > len(lines):
+            continue
+        if len(lines) < len(CEILINGS):
+            return
+        said = worker.stderr.strip().splitlines() or [f"ended with {worker.returncode}"]
+        why = "took too long" if said[0].startswith("Timeout (") else said[-1][:200]
+        append(path, failed(*rows[len(lines) - len(CEILINGS)], f"failed: {why}"))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--out", type=Path, required=True, metavar="DIR")
@@ -255,6 +269,9 @@ def main() -> int:
     parser.add_argument("--tiny", action="store_true", help="small inputs")
     parser.add_argument("--seconds", type=float, default=0.2, help="of one measurement (default: .2)")
     parser.add_argument("--minutes", type=float, default=5.0, help="after which what is left is left out (default: 5)")
+    parser.add_argument(
+        "--stalled", type=float, default=45.0, help="seconds after which a line is given up (default: 45)"
+    )
     parser.add_argument("--until", type=float, help=argparse.SUPPRESS)  # a process that works, not one that watches
     args = parser.parse_args()
     path = args.out / "ops.csv"
@@ -264,23 +281,13 @@ def main() -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     path.unlink(missing_ok=True)
     append(path, list(COLUMNS))
-    until = time.time() + 60 * args.minutes
     rows = [(case.name, dtype) for case, dtype in wanted(args.only)]
-    while len(lines := lines_of(path)) < len(CEILINGS) + len(rows):
-        worker = subprocess.run([sys.executable, *sys.argv, "--until", str(until)], stderr=subprocess.PIPE, text=True)
-        sys.stderr.write(worker.stderr)
-        if worker.returncode and len(lines_of(path)) == len(lines):
-            if len(lines) < len(CEILINGS):
-                break
-            append(
-                path,
-                failed(
-                    *rows[len(lines) - len(CEILINGS)],
-                    "failed: " + (worker.stderr.strip().splitlines() or ["killed"])[-1][:200],
-                ),
-            )
-    lines = lines_of(path)
-    (args.out / "ops.md").write_text(markdown(lines, device_name(args.device)))
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # what is there becomes a page all the same
+    try:
+        watch(path, rows, time.time() + 60 * args.minutes)
+    finally:
+        lines = lines_of(path)
+        (args.out / "ops.md").write_text(markdown(lines, device_name(args.device)))
     n_failed = sum(line[-1].startswith("failed") for line in lines)
     print(f"{len(lines) - len(CEILINGS)} of {len(rows)} lines, {n_failed} failed, in {args.out / 'ops.md'}")
     return 1 if n_failed or len(lines) < len(CEILINGS) + len(rows) else 0

@@ -62,7 +62,10 @@ class StepProfiler:
     def markdown(self) -> str:
         """Kernels (on the CPU: operators) by their own time, in milliseconds a step."""
         on_device = self.device == "cuda"
-        events = [x for x in self.profile.key_averages() if (x.device_type == DeviceType.CUDA) == on_device]
+        events = [
+            x for x in self.profile.key_averages()
+            if (x.device_type == DeviceType.CUDA) == on_device and not getattr(x, "is_user_annotation", False)
+        ]  # fmt: skip
         times = {x.key: (x.self_device_time_total if on_device else x.self_cpu_time_total) for x in events}
         counts, busy = {x.key: x.count for x in events}, sum(times.values()) / 1e3 / PROFILED
         wall = 1e3 * self.seconds / PROFILED

@@ -17,11 +17,11 @@ BENCH = Path(__file__).parents[1] / "bench"
 SMALL = dict(target_samples=256, max_rays=64, grid_resolution=16, mesh_resolution=24, light_resolution=16)
 
 
-def run(script: str, *arguments: object) -> str:
+def run(script: str, *arguments: object, code: int = 0) -> str:
     done = subprocess.run(
         [sys.executable, str(BENCH / script), *map(str, arguments)], capture_output=True, text=True, timeout=600
     )
-    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.returncode == code, done.stderr[-2000:]
     return done.stdout
 
 
@@ -40,6 +40,12 @@ def test_every_operator_has_its_line(tmp_path):
         assert math.isnan(float(line["operations"])) or float(line["operations"]) > 0
         assert 0 < float(line["share"]) < 10, line
     assert "0 failed" in said and "| hash_encode | float32 |" in (tmp_path / "ops.md").read_text()
+
+
+def test_a_line_that_takes_too_long_fails_alone(tmp_path):
+    arguments = ("--out", tmp_path, "--device", "cpu", "--tiny", "--only", "pixel_losses", "--stalled", 1e-4)
+    assert "1 of 1 lines, 1 failed" in run("gpu_ops.py", *arguments, code=1)
+    assert "failed: took too long" in (tmp_path / "ops.md").read_text()
 
 
 @pytest.fixture(scope="module")
