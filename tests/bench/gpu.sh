@@ -23,7 +23,7 @@ export PATH="$work/venv/bin:$PATH:/usr/local/cuda/bin" PYTHONPYCACHEPREFIX="$wor
 export LD_LIBRARY_PATH="$work/embree/usr/lib/$(uname -m)-linux-gnu${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 run_python=$work/venv/bin/python
 
-device=cuda cuda=ON fast_minutes=2.4 paper_minutes=1.2 profile_steps=600 paper_steps=2000 slower=1
+device=cuda cuda=ON fast_minutes=2.2 paper_minutes=1.2 profile_steps=600 paper_steps=2000 slower=1
 picture="size=200" ops="--minutes 1.3" small=() paper=(--set export_resolution=256)
 if [ -n "$dry" ]; then
   device=cpu cuda=OFF profile_steps=60 paper_steps=20 slower=10
@@ -113,7 +113,7 @@ if part info 30 bash -c 'set -o pipefail; splitnerf info | paste -sd ";" | sed "
     splitnerf info --settings fast >"$work/settings" 2>&1 || { preset=cpu; splitnerf info --settings cpu >"$work/settings"; }
     steps=$(sed -n 's/^steps = //p' "$work/settings")
     [ -z "$dry" ] || steps=60
-    part "$preset" 200 "${train[@]}" "$scene" --out "$work/runs/fast" --preset $preset --device $device --steps "$steps" \
+    part "$preset" 220 "${train[@]}" "$scene" --out "$work/runs/fast" --preset $preset --device $device --steps "$steps" \
       --max-minutes $fast_minutes "${small[@]}"
     part profile 60 "${train[@]}" "$scene" --out "$work/runs/profile" --preset $preset --device $device --steps $profile_steps \
       --profile "$out/profile.md" "${small[@]}"

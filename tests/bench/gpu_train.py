@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 import time
 from pathlib import Path
@@ -120,6 +121,20 @@ def sentence(result: dict) -> str:
     return ", ".join(parts)
 
 
+def tell(run: Path, device: str, seconds: float) -> None:
+    """Writes training.json and prints its sentence, as far as the run came."""
+    if not (run / "metrics.jsonl").is_file() or not (run / "metrics.jsonl").stat().st_size:
+        return
+    result: dict[str, object] = {**rate_of(run), "whole_seconds": seconds}
+    if device == "cuda":
+        result["peak_allocated_MiB"] = torch.cuda.max_memory_allocated() >> 20
+        result["peak_reserved_MiB"] = torch.cuda.max_memory_reserved() >> 20
+    if (run / "evaluation.json").is_file():
+        result["scores"] = leaves(json.loads((run / "evaluation.json").read_text()))
+    (run / "training.json").write_text(json.dumps(result, indent=1) + "\n")
+    print(sentence(result), flush=True)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("data", type=Path)
@@ -147,21 +162,12 @@ def main() -> int:
             file=sys.stderr,
         )
         return code or 1
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # what is known of the run by then is told all the same
     started = time.monotonic()
-    code = splitnerf(command)
-    if not (args.out / "metrics.jsonl").is_file():
-        return code or 1
-    result: dict[str, object] = {**rate_of(args.out), "whole_seconds": round(time.monotonic() - started, 1)}
-    if args.device == "cuda":
-        result |= {
-            "peak_allocated_MiB": torch.cuda.max_memory_allocated() >> 20,
-            "peak_reserved_MiB": torch.cuda.max_memory_reserved() >> 20,
-        }
-    if (args.out / "evaluation.json").is_file():
-        result["scores"] = leaves(json.loads((args.out / "evaluation.json").read_text()))
-    (args.out / "training.json").write_text(json.dumps(result, indent=1) + "\n")
-    print(sentence(result))
-    return code
+    try:
+        return splitnerf(command)
+    finally:
+        tell(args.out, args.device, round(time.monotonic() - started, 1))
 
 
 if __name__ == "__main__":
