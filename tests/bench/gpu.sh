@@ -77,7 +77,7 @@ setup() { # an environment in which that of $python stays visible, be it a virtu
 for path in sys.path:
     if path.endswith(("site-packages", "dist-packages")): print(f"import site; site.addsitedir({path!r})")' >"$site/shared.pth"
   if [ -n "$bundle" ]; then
-    "$run_python" "$(echo "$bundle"/wheels/pip-*.whl)/pip" --disable-pip-version-check install --quiet --no-index --no-deps --ignore-installed "$bundle"/wheels/*.whl
+    "$run_python" "$(echo "$bundle"/wheels/pip-*.whl)/pip" --disable-pip-version-check install --quiet --no-index --no-deps --no-compile --ignore-installed "$bundle"/wheels/*.whl
     [ -d "$work/embree" ] || "$run_python" -m tarfile -e "$bundle/embree.tar.xz" "$work/embree"
   fi
   "$run_python" -c 'import platform, torch; print("python", platform.python_version(), "torch", torch.__version__, "CUDA", torch.version.cuda, "with", torch.cuda.device_count(), "GPU")'
@@ -100,7 +100,7 @@ relight() { # of the run, where the data have lights to compare with
 export python run_python work bundle picture SPLITNERF_DATA="${SPLITNERF_DATA:-}"
 
 cd "$root" || exit 2
-part setup 60 bash -c setup
+part setup 90 bash -c setup
 CMAKE_PREFIX_PATH="$work/embree/usr" part build 200 "$run_python" -m pip --disable-pip-version-check install --no-index --no-deps \
   --no-build-isolation --no-cache-dir --force-reinstall "$root" -C build-dir="$work/build" -C cmake.define.SPLITNERF_CUDA=$cuda -v
 if part info 30 bash -c 'set -o pipefail; splitnerf info | paste -sd ";" | sed "s/;/; /g"'; then
