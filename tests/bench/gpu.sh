@@ -6,10 +6,11 @@
 #   PYTHON=python3          has torch
 #   GPU_WORK=DIR            keeps environment, build, data and runs, and goes on from them (default: removed at the end)
 #   GPU_SECONDS=530         of the whole; parts that find no time left are left out
+#   GPU_PARTS="fast paper"  of tests, operators, fast, profile, paper and relight only these (default: all)
 #   SPLITNERF_DATA=DIR      a data set to train on, or a folder of some (default: the demo scene, 200 x 200)
 #   GPU_DRY=1               the same on the CPU with small sizes: tries the script, measures nothing
 set -u
-[ $# -ge 1 ] || { sed -n '2,11p' "$0"; exit 2; }
+[ $# -ge 1 ] || { sed -n '2,12p' "$0"; exit 2; }
 root=$(cd "$(dirname "$0")/../.." && pwd)
 mkdir -p "$1" && out=$(cd "$1" && pwd) || exit 2
 bundle=${2:+$(cd "$2" && pwd)} || exit 2
@@ -24,7 +25,7 @@ export LD_LIBRARY_PATH="$work/embree/usr/lib/$(uname -m)-linux-gnu${LD_LIBRARY_P
 run_python=$work/venv/bin/python
 
 device=cuda cuda=ON fast_minutes=2.2 paper_minutes=1.2 profile_steps=600 paper_steps=2000 slower=1
-picture="size=200" ops="--minutes 1.3" small=() paper=(--set export_resolution=256)
+picture="size=200" ops="--seconds .1 --minutes 1.6" small=() paper=(--set export_resolution=256)
 if [ -n "$dry" ]; then
   device=cpu cuda=OFF profile_steps=60 paper_steps=20 slower=10
   picture="size=24, n_train=6, n_test=2, spp=4" ops="--tiny --seconds .002 --minutes 9"
@@ -56,6 +57,7 @@ said() { # log, exit code: its last line, but of a compiler that failed the firs
 # Runs a command under a time limit, keeps its log, and adds the last line of that to the table.
 part() { # name, seconds, command
   local name=$1 limit=$(($2 * slower)) left=$((deadline - SECONDS)) log=$work/$1.log begin=$SECONDS result=done code
+  case " setup build info data ${GPU_PARTS:-$1} " in *" $1 "*) ;; *) return 1 ;; esac
   shift 2
   if [ "$left" -lt 5 ]; then row "$name" "left out" 0 "no time left"; return 1; fi
   [ "$limit" -le "$left" ] || limit=$left
@@ -107,7 +109,7 @@ if part info 30 bash -c 'set -o pipefail; splitnerf info | paste -sd ";" | sed "
   # shellcheck disable=SC2046  # file names; other files may need packages that are not here
   part tests 110 "$run_python" -m pytest $(grep -lE 'DEVICES|devices\(|"cuda"' tests/python/test_*.py) -q -k cuda -p no:cacheprovider -o faulthandler_timeout=60 -r fE
   # shellcheck disable=SC2086  # words
-  part operators 110 "$run_python" tests/bench/gpu_ops.py --out "$out" --device $device $ops
+  part operators 125 "$run_python" tests/bench/gpu_ops.py --out "$out" --device $device $ops
   if part data 60 bash -c data; then
     scene=$(tail -n 1 "$work/data.log") preset=fast train=("$run_python" tests/bench/gpu_train.py)
     splitnerf info --settings fast >"$work/settings" 2>&1 || { preset=cpu; splitnerf info --settings cpu >"$work/settings"; }
