@@ -111,13 +111,12 @@ if part info 30 bash -c 'set -o pipefail; splitnerf info | paste -sd ";" | sed "
   # shellcheck disable=SC2086  # words
   part operators 125 "$run_python" tests/bench/gpu_ops.py --out "$out" --device $device $ops
   if part data 60 bash -c data; then
-    scene=$(tail -n 1 "$work/data.log") preset=fast train=("$run_python" tests/bench/gpu_train.py)
-    splitnerf info --settings fast >"$work/settings" 2>&1 || { preset=cpu; splitnerf info --settings cpu >"$work/settings"; }
-    steps=$(sed -n 's/^steps = //p' "$work/settings")
+    scene=$(tail -n 1 "$work/data.log") train=("$run_python" tests/bench/gpu_train.py)
+    steps=$(splitnerf info --settings fast 2>/dev/null | sed -n 's/^steps = //p')
     [ -z "$dry" ] || steps=60
-    part "$preset" 220 "${train[@]}" "$scene" --out "$work/runs/fast" --preset $preset --device $device --steps "$steps" \
+    part fast 220 "${train[@]}" "$scene" --out "$work/runs/fast" --preset fast --device $device --steps "${steps:-20000}" \
       --max-minutes $fast_minutes "${small[@]}"
-    part profile 60 "${train[@]}" "$scene" --out "$work/runs/profile" --preset $preset --device $device --steps $profile_steps \
+    part profile 60 "${train[@]}" "$scene" --out "$work/runs/profile" --preset fast --device $device --steps $profile_steps \
       --profile "$out/profile.md" "${small[@]}"
     part paper 120 "${train[@]}" "$scene" --out "$work/runs/paper" --preset paper --device $device --steps $paper_steps \
       --max-minutes $paper_minutes "${paper[@]}"
