@@ -65,7 +65,7 @@ part() { # name, seconds, command
   (export -f setup data relight; timeout --kill-after=10 "$limit" "$@") >"$log" 2>&1 </dev/null
   code=$?
   [ "$code" = 0 ] || result="failed ($code)"
-  { [ "$code" = 124 ] || [ "$code" = 137 ]; } && result="stopped after $limit s"
+  [ "$code" = 0 ] || [ $((SECONDS - begin)) -lt "$limit" ] || result="stopped at $limit s"
   { echo "==== $name: $result, $((SECONDS - begin)) s"; tr '\r' '\n' <"$log" | tail -c 300000; } >>"$out/log.txt"
   row "$name" "$result" "$((SECONDS - begin))" "$(said "$log" "$code" | cut -c 1-240)"
   [ "$code" = 0 ]
