@@ -25,13 +25,13 @@ export LD_LIBRARY_PATH="$work/embree/usr/lib/$(uname -m)-linux-gnu${LD_LIBRARY_P
 run_python=$work/venv/bin/python
 
 device=cuda cuda=ON fast_minutes=2.2 paper_minutes=1.2 profile_steps=600 paper_steps=2000 slower=1
-picture="size=200" ops="--seconds .1 --minutes 1.6" small=() paper=(--set export_resolution=256)
+picture="size=200" ops="--seconds .1 --minutes 1.6" small=() paper=(--set export_resolution=256 --set preview_every=1.0)
 if [ -n "$dry" ]; then
   device=cpu cuda=OFF profile_steps=60 paper_steps=20 slower=10
   picture="size=24, n_train=6, n_test=2, spp=4" ops="--tiny --seconds .002 --minutes 9"
   small=(--set target_samples=256 --set max_rays=64 --set log2_table_size=10 --set grid_resolution=16 --set mesh_resolution=24
     --set export_resolution=32 --set export_texture_size=64 --set export_faces=500 --set light_resolution=16)
-  paper=("${small[@]}" --set initial_rays=64 --set light_samples=64 --set light_queries=64 --set environment_height=16 --set occlusion_rays=4)
+  paper=("${small[@]}" --set preview_every=1.0 --set initial_rays=64 --set light_samples=64 --set light_queries=64 --set environment_height=16 --set occlusion_rays=4)
 fi
 deadline=$((${GPU_SECONDS:-530} * slower)) # SECONDS counts from the start of this shell
 rows=() failures=0
