@@ -347,10 +347,6 @@ def bytes_moved(case: Case, sizes: Sizes, inputs: tuple, outputs: tuple) -> floa
     return float(total)
 
 
-def eager_hash(at: Tensor, table: Tensor, *numbers) -> Tensor:
-    return eager.hash_encode(at, table, *numbers)
-
-
 def gather(operations_of_a_sample: Callable[[Sizes], float]) -> Callable[[Sizes, tuple], float]:
     return lambda s, out: s.samples * operations_of_a_sample(s)
 
@@ -364,21 +360,26 @@ def a_sample(n: float) -> Callable[[Sizes, tuple], float]:
 
 
 # 2 features; with the Jacobian 4 numbers of each (the value and three derivatives) are summed over the corners.
-HASH = Case("hash_encode", World.grid, gather(lambda s: s.encode(2)), eager_hash, 1)
+HASH = Case("hash_encode", World.grid, gather(lambda s: s.encode(2)), eager.hash_encode, 1)
 SCATTERED = Case(
-    "hash_encode", lambda w: w.grid(True), gather(lambda s: s.encode(2)), eager_hash, 1, variant="scattered points"
+    "hash_encode",
+    lambda w: w.grid(True),
+    gather(lambda s: s.encode(2)),
+    eager.hash_encode,
+    1,
+    variant="scattered points",
 )
 # The layer's forward: the hidden units, the outputs, the distance's gradient by the units and the Jacobian.
 LAYER = Case(
     "sdf_layer", World.layer,
     gather(lambda s: 2 * s.layer + 2 * s.outputs * s.width + 6 * s.features + 4 * s.width),
 )  # fmt: skip
-QUERY = Case("query_direction", World.query, a_point(45), lambda *x: eager.query_direction(*x))
-SPLIT = Case("split_sum_shade", World.split_sum, a_point(70), lambda *x: eager.split_sum_shade(*x))
+QUERY = Case("query_direction", World.query, a_point(45), eager.query_direction)
+SPLIT = Case("split_sum_shade", World.split_sum, a_point(70), eager.split_sum_shade)
 SUMS = Case("shade_sums", lambda w: (*w.shading(), *w.threes(3), brdf_lut(), True), a_point(75))
 PREFILTER = Case(  # of a pair: a cosine 5, the lobe 10, three sums and their total 7
     "prefilter_light", World.prefiltering, lambda s, out: 22 * s.queries * s.lights,
-    lambda *x: eager.prefilter_light(*x),
+    eager.prefilter_light,
 )  # fmt: skip
 # Half of the points are rough: 169 basis functions of 4 each, and their sums with three colours, 6 each.
 LOOKUP = Case("light_lookup", World.pyramid, a_point(60 + 0.5 * 169 * 10))
