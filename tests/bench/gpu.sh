@@ -82,7 +82,13 @@ for path in sys.path:
     "$run_python" "$(echo "$bundle"/wheels/pip-*.whl)/pip" --disable-pip-version-check install --quiet --no-index --no-deps --no-compile --ignore-installed "$bundle"/wheels/*.whl
     [ -d "$work/embree" ] || "$run_python" -m tarfile -e "$bundle/embree.tar.xz" "$work/embree"
   fi
-  "$run_python" -c 'import platform, torch; print("python", platform.python_version(), "torch", torch.__version__, "CUDA", torch.version.cuda, "with", torch.cuda.device_count(), "GPU")'
+  "$run_python" -c 'import importlib.util, os, platform, shutil, sysconfig, torch
+needed = "numpy scipy PIL OpenImageIO trimesh xatlas fast_simplification tqdm jinja2 tomli_w pytest scikit_build_core pybind11".split()
+missing = [name for name in needed if importlib.util.find_spec(name) is None]
+missing += [name for name in ("c++", "cmake", "ninja", "nvcc") if shutil.which(name) is None]
+missing += [] if os.path.exists(os.path.join(sysconfig.get_paths()["include"], "Python.h")) else ["Python.h"]
+versions = f"python {platform.python_version()}, torch {torch.__version__}, CUDA {torch.version.cuda}, {torch.cuda.device_count()} GPU"
+print(versions + "; missing: " * bool(missing) + ", ".join(missing))'
 }
 
 data() { # prints the folder of a data set, last
