@@ -54,6 +54,9 @@ class Config:
     base_resolution: int = 16
     growth: float = 1.4697344922755988  # 16 to 348 cells along an edge
     log2_table_size: int = 16
+    table_dtype: str = (
+        "float32"  # float32 | float16 | bfloat16: what the hash table is read as; it is trained in float32
+    )
     start_levels: int = 4
     levels_open_by: float = 0.4  # the finest level opens at this fraction
     sdf_width: int = 64
@@ -164,6 +167,7 @@ class Config:
     warmup_steps: int = 100
     final_learning_rate: float = 0.02  # factor at the end
     weight_decay: float = 0.01
+    sparse_steps: bool = False  # entries of the hash table that got no gradient are left alone, moments and decay too
 
     # Output.
     export_resolution: int = 192
@@ -176,6 +180,7 @@ class Config:
     def __post_init__(self) -> None:
         choices = {
             "n_features": (1, 2, 4, 8),
+            "table_dtype": ("float32", "float16", "bfloat16"),
             "normals": ("analytic", "finite_difference"),
             "head_inputs": ("outputs", "grid"),
             "occlusion": ("mlp", "bits", "off"),

@@ -118,7 +118,8 @@ def _state(model: SceneModel, optimiser: torch.optim.Optimizer) -> Iterator[tupl
     for name, parameter in model.named_parameters():
         yield f"parameter {name}", parameter
         for key, value in optimiser.state.get(parameter, {}).items():
-            yield f"{key} of {name}", value
+            if key != "step":
+                yield f"{key} of {name}", value
 
 
 def _data_flow(dataset: Dataset, batch: Batch, model: SceneModel, ray: RenderedRays) -> Iterator[tuple[str, Tensor]]:

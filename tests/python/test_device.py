@@ -70,9 +70,10 @@ def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeyp
     assert each <= {"cpu": 3, "fast": 3, "paper": 8}[name]  # paper: five tensors go to the CPU to be traced
 
 
-def test_runs_go_on_on_the_other_device_and_back(data, tmp_path, monkeypatch):  # noqa: F811
+@pytest.mark.parametrize("settings", [{}, {"sparse_steps": True, "table_dtype": "float16"}])
+def test_runs_go_on_on_the_other_device_and_back(data, tmp_path, monkeypatch, settings):  # noqa: F811
     dataset = load_dataset(data)
-    config = tiny("cpu", occlusion_directions=256, open_below=0.0)
+    config = tiny("cpu", occlusion_directions=256, open_below=0.0, **settings)
     trainer.train(dataset, config.replace({"steps": 12}), tmp_path)
     with pretend_gpu(monkeypatch):
         there = trainer.train(dataset, config.replace({"steps": 24}), tmp_path, device="cuda", resume=True)

@@ -92,7 +92,8 @@ class SceneModel(nn.Module):
         spec = HashGridSpec(
             config.n_levels, config.n_features, config.base_resolution, config.growth, config.log2_table_size
         )
-        self.sdf_field = SdfField(spec, config.box, config.sdf_width, config.sdf_outputs, config.sphere_radius)
+        dtype = None if config.table_dtype == "float32" else getattr(torch, config.table_dtype)
+        self.sdf_field = SdfField(spec, config.box, config.sdf_width, config.sdf_outputs, config.sphere_radius, dtype)
         n_inputs = config.sdf_outputs + (3 + spec.n_outputs if config.head_inputs == "grid" else 0)
         self.material = MaterialHead(
             n_inputs, config.material_width, config.material_layers, config.initial_roughness, config.min_roughness
