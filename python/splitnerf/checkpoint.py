@@ -110,7 +110,7 @@ def restore_optimiser(optimiser: torch.optim.Optimizer, content: dict, path: Pat
 
 def restore_generator(generator: torch.Generator, content: dict, path: Path) -> None:
     """Puts the states of the run's random generator and of torch's own back. A run that goes on on another device cannot:
-    its generator begins anew, from the seed and the step.
+    its generator begins anew, from the seed and the step. The numbers that the occupancy grid draws on a GPU do so there too.
 
     Raises:
         InputError: They are no states of generators.

@@ -45,7 +45,7 @@ class Config:
     steps: int = 6000
     max_minutes: float = 0.0  # training time; 0: only the steps count
     deterministic: bool = False  # two runs give the same bits, on one machine with one number of threads
-    tensor_cores: bool = True  # of a GPU, for its products of matrices: TF32, factors of 10 bits
+    tensor_cores: bool = True  # of a GPU, for products of matrices: TF32, factors of 10 bits; not where digits cancel
     box: float = 1.5
 
     # Surface: hash grid, progressive levels, one hidden layer.

@@ -32,12 +32,13 @@ def choose_device(name: str) -> torch.device:
 def tensor_cores(on: bool) -> Iterator[None]:
     """Has a GPU's products of float32 matrices go through its tensor cores within the block, where ``on``: factors are
     rounded to 10 bits (TF32), sums are float32. The CPU's are what they were."""
-    before = torch.backends.cuda.matmul.allow_tf32
-    torch.backends.cuda.matmul.allow_tf32 = on
+    products = torch.backends.cuda.matmul
+    before = products.fp32_precision
+    products.fp32_precision = "tf32" if on else "ieee"
     try:
         yield
     finally:
-        torch.backends.cuda.matmul.allow_tf32 = before
+        products.fp32_precision = before
 
 
 def wait_for(device: torch.device) -> None:

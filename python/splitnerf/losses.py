@@ -149,7 +149,8 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
     weights = ray.shares
     if len(weights) == 0:
         return weights.new_zeros(())
-    chosen = torch.multinomial(weights + 1e-12, c.entropy_points, replacement=True, generator=generator)
+    weights = weights.nan_to_num(0.0, 0.0, 0.0) + 1e-12  # the loss tells of what is not finite
+    chosen = torch.multinomial(weights, c.entropy_points, replacement=True, generator=generator)
     gloss = torch.cat([points.roughness[chosen], points.metallic[chosen]], dim=1)
     x = torch.cat([torch.log(points.albedo[chosen] + ALBEDO_FLOOR) / c.albedo_width, gloss / c.gloss_width], dim=1)
     return quadratic_entropy(x)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
+from splitnerf.devices import wait_for
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.fields import VisibilityBits
 from splitnerf.fields.visibility import TracedBits
@@ -37,15 +39,17 @@ class SurfaceMesh:
     Args:
         model: Uses each mesh as soon as it is there.
         background: Meshes are made by a thread of their own while the caller goes on: it reads a copy of the field, traces on
-            the processor's cores, and :meth:`arrive` hands the mesh over.
+            the processor's cores, and :meth:`arrive` hands the mesh over. It ends with the program, done or not.
 
     Attributes:
         current: The mesh in use; None before the first.
+        made_at: The progress of the training whose surface that is.
+        asked_at: The same of the newest that was asked for.
     """
 
     def __init__(self, model: SceneModel, *, background: bool = False):
-        self.model, self.current = model, None
-        self._pool = ThreadPoolExecutor(1, "mesh") if background else None
+        self.model, self.background, self.current = model, background, None
+        self.made_at = self.asked_at = 0.0
         self._made: Future[TracedMesh | None] | None = None
 
     @property
@@ -53,17 +57,23 @@ class SurfaceMesh:
         """What rays are traced through."""
         return self.current.scene if self.current else None
 
-    def renew(self) -> None:
+    def renew(self, progress: float) -> None:
         """Makes a mesh of the surface as it is now; beside the caller's work where that was asked for, unless one is
         being made. The old one stays while the field has no surface.
 
         Raises:
             RuntimeError: The field is not finite.
         """
-        if self._pool is None:
-            self._use(make_mesh(self.model, self.model.sdf_field.network()))
-        elif self._made is None:
-            self._made = self._pool.submit(make_mesh, self.model, self.model.sdf_field.network().snapshot())
+        if self._made is not None:
+            return
+        self.asked_at, network = progress, self.model.sdf_field.network()
+        if not self.background:
+            self._use(make_mesh(self.model, network))
+            return
+        network = network.snapshot()
+        wait_for(self.model.device)  # the thread's work has a queue of its own
+        self._made = Future()
+        threading.Thread(target=fulfil, args=(self._made, make_mesh, self.model, network), daemon=True).start()
 
     def arrive(self, wait: bool = False) -> None:
         """Uses a mesh that was made beside the caller's work, if it is done, or waits for it.
@@ -77,23 +87,28 @@ class SurfaceMesh:
 
     def restore(self, content: dict) -> None:
         """Uses the mesh of a checkpoint, if it has one."""
-        if content["mesh_vertices"] is not None:
-            self._use(traced(self.model, content["mesh_vertices"], content["mesh_faces"]))
+        self.asked_at = content["meshed_at"]
+        stored = content["mesh_vertices"], content["mesh_faces"]
+        self._use(None if stored[0] is None else traced(self.model, *stored))
 
-    def state(self) -> dict[str, Tensor | None]:
+    def state(self) -> dict[str, Tensor | float | None]:
         """What a checkpoint keeps of it."""
         _, vertices, faces, _ = self.current or (None,) * 4
-        return {"mesh_vertices": vertices, "mesh_faces": faces}
-
-    def close(self) -> None:
-        """Ends the thread; a mesh that is being made is lost."""
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
+        return {"mesh_vertices": vertices, "mesh_faces": faces, "meshed_at": self.made_at}
 
     def _use(self, mesh: TracedMesh | None) -> None:
+        self.made_at = self.asked_at
         if mesh is not None:
             self.current = mesh
             self.model.use_mesh(*mesh)
+
+
+def fulfil(future: Future, function: Callable, *args: object) -> None:
+    """Calls a function for somebody who waits for what it returns or raises."""
+    try:
+        future.set_result(function(*args))
+    except BaseException as error:  # is raised where it is waited for
+        future.set_exception(error)
 
 
 def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:

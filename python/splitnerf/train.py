@@ -6,7 +6,6 @@ import json
 import math
 import sys
 import time
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,11 +73,12 @@ def train(
         resume: Continue from ``run/checkpoint.pt``, whatever device wrote it.
 
     Raises:
-        InputError: The checkpoint belongs to another scene or cannot be read.
+        InputError: The checkpoint belongs to another scene or cannot be read, or the device cannot repeat its bits.
         splitnerf.finite.Diverged: Numbers are no longer finite, by the rule that stands there; the last checkpoint stands.
         OSError: The disk is full; the last checkpoint stands.
     """
     c = config
+    check_repeatable(c, device)
     torch.manual_seed(c.seed)
     generator = torch.Generator(device).manual_seed(c.seed)
     fingerprint = dataset_fingerprint(dataset)
@@ -91,7 +91,7 @@ def train(
     grid = make_grid(c, hull, device)
     mesh = SurfaceMesh(model, background=c.background_meshes)
     environment: Tensor | None = None
-    step, seconds, n_rays, meshed_at, previewed_at = 0, 0.0, c.initial_rays, 0.0, 0.0
+    step, seconds, n_rays, previewed_at = 0, 0.0, c.initial_rays, 0.0
 
     if resume:
         path = run / "checkpoint.pt"
@@ -101,8 +101,7 @@ def train(
         restore_optimiser(optimiser, content, path)
         restore_generator(generator, content, path)
         grid.values = restored_occupancy(grid.values, content, path)
-        step, seconds, n_rays = content["step"], content["seconds"], content["n_rays"]
-        meshed_at, previewed_at = content["meshed_at"], content["previewed_at"]
+        step, seconds, n_rays, previewed_at = (content[key] for key in ("step", "seconds", "n_rays", "previewed_at"))
 
     def save() -> None:
         check_state(step, model, optimiser)
@@ -111,7 +110,7 @@ def train(
             config=c,
             fingerprint=fingerprint,
             state=dict(
-                step=step, seconds=seconds, n_rays=n_rays, meshed_at=meshed_at, previewed_at=previewed_at,
+                step=step, seconds=seconds, n_rays=n_rays, previewed_at=previewed_at,
                 model=model.state_dict(), optimiser=optimiser.state_dict(), device=generator.device.type,
                 generator=generator.get_state(), torch_generator=torch.get_rng_state(), occupancy=grid.values,
                 box_from_world=torch.from_numpy(dataset.box_from_world), **mesh.state(),
@@ -132,7 +131,7 @@ def train(
     watch = GradientWatch(model.parameters())
     log = open(run / "metrics.jsonl", "a")
     with (
-        log, closing(mesh), Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic),
+        log, Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic),
         tensor_cores(c.tensor_cores),
     ):  # fmt: skip
         while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % light_steps == 0):
@@ -142,10 +141,9 @@ def train(
                 grid.update(
                     model.sdf_field.sdf, model.s_value, first=first, step=step, use_hull=progress < c.hull_until
                 )
-            if (model.occlusion is not None or c.finetune_from < 1) and progress - meshed_at >= c.mesh_every:
-                meshed_at = progress
+            if (model.occlusion is not None or c.finetune_from < 1) and progress - mesh.asked_at >= c.mesh_every:
                 check_state(step, model, optimiser)
-                mesh.renew()
+                mesh.renew(progress)
             mesh.arrive(wait=c.deterministic)
             scene = mesh.scene
             traces = scene is not None and c.occlusion == "mlp" and c.occlusion_weight > 0
@@ -200,9 +198,9 @@ def train(
                 saved_at = time.monotonic()
         check_state(step, model, optimiser)
         finished = progress_now() >= 1.0
+        mesh.arrive(wait=finished)
         if finished and c.occlusion == "bits":  # what is rendered from here on sees the final surface
-            mesh.arrive(wait=True)
-            mesh.renew()
+            mesh.renew(1.0)
             mesh.arrive(wait=True)
         model.light.collect(False)
         grid.update(model.sdf_field.sdf, model.s_value)
@@ -312,6 +310,12 @@ def next_ray_count(n_rays: int, n_samples: int, config: Config) -> int:
     """As many rays as fill the budget of samples, moving by at most a factor of 1.25 a step."""
     wanted = n_rays * config.target_samples / max(1, n_samples)
     return int(min(config.max_rays, max(64, min(1.25 * n_rays, max(0.8 * n_rays, wanted)))))
+
+
+def check_repeatable(config: Config, device: torch.device | str) -> None:
+    """Raises InputError where a run shall have the same bits on a device that adds in any order."""
+    if config.deterministic and torch.device(device).type != "cpu":
+        raise InputError("a deterministic run needs the CPU, as a GPU adds in any order; leave out --device")
 
 
 def check_same_scene(content: dict, fingerprint: str, run: Path) -> None:

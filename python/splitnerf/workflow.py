@@ -31,7 +31,7 @@ from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.render.rays import PixelSource
 from splitnerf.report.html import write_report
 from splitnerf.skipped import measure_skips
-from splitnerf.train import TrainedScene, check_same_scene, train
+from splitnerf.train import TrainedScene, check_repeatable, check_same_scene, train
 
 RUN_FILES = (
     "config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
@@ -87,6 +87,7 @@ def reconstruct(
         InputError: The data, the settings or the run's folder cannot be used; nothing was written.
         Diverged, EmptyMesh, OSError: See :func:`splitnerf.train.train`.
     """
+    check_repeatable(config, device)
     dataset, test = load_splits(data, downscale)
     prepare_run(run, resume=resume, overwrite=overwrite)
     config.write(run / "config.toml")

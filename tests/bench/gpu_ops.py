@@ -157,7 +157,7 @@ def measure(case: Case, dtype: str, world: World, clock: Clock, device: str, rat
     return [
         case.name, dtype, *milliseconds(cold), f"{1e3 * warm.median:.5f}", str(cold.calls), f"{n_bytes:.0f}",
         f"{operations:.0f}", f"{n_bytes / cold.median / 1e9:.1f}", f"{operations / cold.median / 1e9:.1f}",
-        f"{1e3 * floor:.5f}", "bytes" if by_bytes >= by_operations else "operations", f"{floor / cold.median:.3f}",
+        f"{1e3 * floor:.5f}", "bytes" if by_bytes >= by_operations else "operations", f"{floor / cold.median:.3g}",
         f"{error:.1e}", eager_ms, "; ".join(notes),
     ]  # fmt: skip
 

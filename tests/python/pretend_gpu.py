@@ -2,7 +2,7 @@
 
 It finds what a machine without a GPU otherwise cannot: tensors of two devices in one call, factories that forget the
 device, generators of another device, ``numpy()`` of what is not on the CPU; and it counts what would wait for the GPU.
-What happens inside a backward pass is not looked at.
+What happens inside a backward pass, or in another thread, is not looked at.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ from splitnerf.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.config import Config, parse_setting, preset
 from splitnerf.data.dataset import load_dataset
+from splitnerf.errors import InputError
 from splitnerf.render.renderer import find_samples
 from splitnerf.workflow import reconstruct
 
@@ -93,6 +94,15 @@ def test_all_files_are_written_from_there(data, tmp_path, monkeypatch):  # noqa:
     assert evaluation["novel_view"]["psnr"] > 5
     for name in ("mesh.ply", "mesh.glb", "environment.exr", "skipped.json", "report.html"):
         assert (tmp_path / "run" / name).stat().st_size > 0, name
+
+
+def test_a_gpu_is_refused_where_bits_shall_repeat(data, tmp_path, monkeypatch):  # noqa: F811
+    config = tiny("cpu", deterministic=True)
+    with pretend_gpu(monkeypatch), pytest.raises(InputError, match="deterministic"):
+        reconstruct(data, tmp_path / "run", config, device="cuda")
+    assert not (tmp_path / "run").exists()
+    with pretend_gpu(monkeypatch), pytest.raises(InputError, match="deterministic"):
+        trainer.train(load_dataset(data), config, tmp_path, device="cuda")
 
 
 def test_without_a_gpu_the_device_is_refused(data, tmp_path, capsys):  # noqa: F811

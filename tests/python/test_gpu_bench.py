@@ -38,7 +38,7 @@ def test_every_operator_has_its_line(tmp_path):
         assert float(line["error"]) < limit, line
         assert float(line["cold_ms"]) > 0 and float(line["bytes"]) > 0
         assert math.isnan(float(line["operations"])) or float(line["operations"]) > 0
-        assert float(line["share"]) > 0, line
+        assert float(line["floor_ms"]) > 0, line
     assert "0 failed" in said and "| hash_encode | float32 |" in (tmp_path / "ops.md").read_text()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 
 import pytest
@@ -222,8 +223,8 @@ def arguments(device="cpu", copy=None) -> list:
 
 @each_device
 def test_opcheck(device):
-    for copy in (None, torch.zeros(6, 2, dtype=torch.float16, device=device)):
-        torch.library.opcheck(lib.adamw_step_, tuple(arguments(device, copy)))
+    for stored in (None, torch.zeros(6, 2, dtype=torch.float16, device=device)):
+        torch.library.opcheck(lib.adamw_step_, tuple(arguments(device, stored)))
 
 
 @each_device
@@ -259,3 +260,24 @@ def test_errors_name_what_is_wrong():
     wrong(9, 0, "step", "at least 1", "0")
     wrong(11, good.clone(), "copy", "float16 or bfloat16", "float32")
     wrong(11, good[:5].half(), "copy", "[6, 2] float16", "[5, 2]")
+
+
+def test_a_copy_of_an_optimiser_goes_on():
+    weight = torch.nn.Parameter(torch.ones(3, 2))
+    optimiser = AdamW([weight], lr=0.1)
+    weight.grad = torch.ones(3, 2)
+    optimiser.step()
+    twin = copy.deepcopy(optimiser)
+    twin.param_groups[0]["params"][0].grad = torch.ones(3, 2)
+    twin.step()
+    assert twin.param_groups[0]["params"][0][0, 0] < weight[0, 0]
+
+
+def test_states_that_cannot_be_gone_on_from_are_refused():
+    weight = torch.nn.Parameter(torch.ones(3, 2))
+    ours = AdamW([{"params": [weight], "sparse": True}], lr=0.1)
+    for wrong in ("maximize", "amsgrad"):
+        with pytest.raises(ValueError, match=wrong):
+            ours.load_state_dict(torch.optim.AdamW([weight], lr=0.1, **{wrong: True}).state_dict())
+    ours.load_state_dict(torch.optim.AdamW([weight], lr=0.2).state_dict())
+    assert ours.param_groups[0]["sparse"] and ours.param_groups[0]["lr"] == 0.2

@@ -9,7 +9,7 @@ from op_checks import DEVICES, check_error, check_op, generator, lib
 from test_ops_hash_grid import SPEC, gradients_like, sample_inputs
 
 from splitnerf.fields.sdf import SdfField
-from splitnerf.ops import HashGrid, hash_encode, hash_encode_jacobian
+from splitnerf.ops import HashGrid, HashGridSpec, hash_encode, hash_encode_jacobian
 
 DTYPES = [torch.float16, torch.bfloat16]
 ROUNDING = {torch.float16: 2.0**-11, torch.bfloat16: 2.0**-8}  # half a unit in the last place, relative
@@ -223,3 +223,12 @@ def test_the_field_opchecks(dtype):
     check_op(lib.sdf_values, (x, network[0].to(dtype), *network[1:]))
     doubles = [t.double() if isinstance(t, torch.Tensor) else t for t in network[1:]]
     check_error(lambda: lib.sdf_values(x.double(), network[0].to(dtype), *doubles), "sdf_values", "table", "float64")
+
+
+def test_a_copy_made_without_autograd_serves_a_backward_pass():
+    grid = HashGrid(HashGridSpec(n_levels=2, log2_table_size=8), table_dtype=torch.float16)
+    x = torch.rand(5, 3)
+    with torch.inference_mode():
+        grid(x)
+    grid(x).sum().backward()
+    assert grid.table.grad.abs().sum() > 0

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
+from splitnerf.devices import tensor_cores
 from splitnerf.fields.light import Light
 from splitnerf.ops import (
     SparseMap,
@@ -183,7 +184,9 @@ class LightPyramid(Light):
         averages = sparse_product(self.maps.averages, radiance)
         levels = torch.cat([radiance, sparse_product(self.maps.filters, averages)])
         # Three rows times a matrix, forward and backward: several times faster than the matrix times three columns.
-        return levels, (averages[self.maps.projected].T.contiguous() @ self.maps.projection.T).T.contiguous()
+        with tensor_cores(False):
+            sh = averages[self.maps.projected].T.contiguous() @ self.maps.projection.T
+        return levels, sh.T.contiguous()
 
     def collect(self, on: bool = True) -> None:
         """From now on the gradients of backward passes stop at the maps and add up there; off: they no longer do."""

@@ -85,8 +85,22 @@ class AdamW(torch.optim.Optimizer):
         super().__init__(params, {"lr": lr, "betas": betas, "eps": eps, "weight_decay": weight_decay, "sparse": sparse})
         self._copies = dict(copies or {})
 
+    def load_state_dict(self, state_dict: dict) -> None:
+        """Takes over the moments and settings of this class or of torch.optim.AdamW, whose groups keep their ``sparse``.
+
+        Raises:
+            ValueError: The other one maximises or is AMSGrad.
+        """
+        if any(group.get("maximize") or group.get("amsgrad") for group in state_dict["param_groups"]):
+            raise ValueError("AdamW: a state with maximize or amsgrad cannot be gone on from")
+        ours = [group["sparse"] for group in self.param_groups]
+        super().load_state_dict(state_dict)
+        for group, theirs, sparse in zip(self.param_groups, state_dict["param_groups"], ours):
+            group["sparse"] = theirs.get("sparse", sparse)
+
     def __setstate__(self, state: dict) -> None:
         super().__setstate__(state)
+        self.__dict__.setdefault("_copies", {})
         for group in self.param_groups:
             group.setdefault("sparse", self.defaults["sparse"])
         for moments in self.state.values():

@@ -139,7 +139,7 @@ class TableCopy:
     """A 16-bit copy of a float32 table, renewed by :func:`rounded` once the table may have been written to.
 
     That is noticed by torch's version counter and, since torch's fused optimisers leave the counter as it is, by any optimiser's
-    step. What goes through ``table.data`` is not seen.
+    step. What goes through ``table.data``, or through an optimiser's function without its class, is not seen.
 
     Args:
         dtype: torch.float16 or torch.bfloat16.
@@ -158,7 +158,8 @@ class TableCopy:
     def of(self, table: Tensor) -> Tensor:
         """The copy, of the table as it stands; in its shape and on its device."""
         if self._state(table) != self._of:
-            self._values, self._of = rounded(table, self.dtype), self._state(table)
+            with torch.inference_mode(False):  # whoever asks first, autograd may keep it later
+                self._values, self._of = rounded(table, self.dtype), self._state(table)
         return self._values
 
     def was_written(self, table: Tensor) -> None:

@@ -44,7 +44,8 @@ def fibonacci_directions(n: int, generator: torch.Generator | None = None, dtype
     device = torch.device("cpu") if generator is None else generator.device
     lattice = torch.from_numpy(_core.fibonacci_sphere(n)).to(device=device, dtype=dtype)
     q, r = torch.linalg.qr(torch.randn(3, 3, dtype=dtype, generator=generator, device=device))
-    return lattice @ (q * torch.sign(torch.diagonal(r)))
+    rotation = q * torch.sign(torch.diagonal(r))
+    return (lattice[:, :, None] * rotation).sum(1)
 
 
 def sample_ggx_lobe(axes: Tensor, roughness: Tensor, n_samples: int, seed: int = 0) -> Tensor:

@@ -7,6 +7,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.data.dataset import Dataset
+from splitnerf.devices import tensor_cores
 
 
 def pixel_rays(pose: Tensor, intrinsics: Tensor, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
@@ -29,13 +30,14 @@ def pixel_matrix(pose: Tensor, intrinsics: Tensor) -> Tensor:
     fx, fy, cx, cy = intrinsics.unbind(-1)
     zero, one = torch.zeros_like(fx), torch.ones_like(fx)
     rows = [1 / fx, zero, -cx / fx, zero, -1 / fy, cy / fy, zero, zero, -one]
-    return pose[..., :3, :3] @ torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
+    with tensor_cores(False):
+        return pose[..., :3, :3] @ torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
 
 
 def through_pixels(matrix: Tensor, x: Tensor, y: Tensor) -> Tensor:
     """[n, 3] unit directions through image points x, y [n], by matrices [n, 3, 3] or [3, 3]."""
     points = torch.stack([x, y, torch.ones_like(x)], dim=-1)
-    return F.normalize((matrix @ points[..., None]).squeeze(-1), dim=-1)
+    return F.normalize((matrix * points[..., None, :]).sum(-1), dim=-1)
 
 
 def image_rays(pose: Tensor, intrinsics: Tensor, height: int, width: int) -> tuple[Tensor, Tensor]:
