@@ -55,7 +55,7 @@ class Config:
     growth: float = 1.4697344922755988  # 16 to 348 cells along an edge
     log2_table_size: int = 16
     table_dtype: str = (
-        "float32"  # float32 | float16 | bfloat16: what the hash table is read as; it is trained in float32
+        "float32"  # float32 | float16 | bfloat16: as what the hash table is read; it is trained in float32
     )
     start_levels: int = 4
     levels_open_by: float = 0.4  # the finest level opens at this fraction
@@ -322,7 +322,7 @@ FAST = dict(
     preset="fast", steps=20000, n_levels=16, growth=1.3195079, log2_table_size=19,  # 16 to 1024 cells along an edge
     initial_rays=4096, max_rays=16384, target_samples=32768, grid_resolution=128, eikonal_points=2048,
     smoothness_points=4096, neutral_queries=1024, entropy_points=1024, mesh_resolution=192, background_meshes=True,
-    warmup_steps=200, export_resolution=384, export_faces=50000, export_texture_size=2048,
+    table_dtype="float16", sparse_steps=True, warmup_steps=200, export_resolution=384, export_faces=50000, export_texture_size=2048,
 )  # fmt: skip
 
 PRESETS: dict[str, dict] = {"cpu": {}, "fast": FAST, "paper": PAPER}
