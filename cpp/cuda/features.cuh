@@ -1,5 +1,7 @@
-// The number of features of a level as a constant.
+// The number of features of a level, and what a table stores, as constants.
 #pragma once
+
+#include <type_traits>
 
 namespace splitnerf::cuda {
 
@@ -19,5 +21,8 @@ template <class Body> void with_features(int n_features, Body&& body) {
       return body(Features<8>{});
   }
 }
+
+// What a pointer points to.
+template <class Pointer> using Pointee = std::remove_const_t<std::remove_pointer_t<Pointer>>;
 
 }  // namespace splitnerf::cuda

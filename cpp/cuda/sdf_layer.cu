@@ -66,8 +66,8 @@ __device__ void load_inputs(const SdfTile<T>& tile, const T* positions, const T*
   load_rows(features, first, n, tile.n_inputs - 3, [&](int p, int c) -> T& { return tile.input(3 + c, p); });
 }
 
-template <class T, int F>
-__global__ void values_kernel(int64_t n, const HashGridView<T> grid, const SdfLayer<T> layer, const T* positions,
+template <class T, int F, class S>
+__global__ void values_kernel(int64_t n, const HashGridView<T, S> grid, const SdfLayer<T> layer, const T* positions,
                               T* values) {
   const SdfTile<T> tile = shared_tile(layer);
   const int64_t i = int64_t(blockIdx.x) * blockDim.x + threadIdx.x;
@@ -77,8 +77,8 @@ __global__ void values_kernel(int64_t n, const HashGridView<T> grid, const SdfLa
 }
 
 // A ray a thread: starts [n_rays, most], counts and evaluated [n_rays].
-template <class T, int F>
-__global__ void walk_kernel(int64_t n_rays, const HashGridView<T> grid, const SdfLayer<T> layer,
+template <class T, int F, class S>
+__global__ void walk_kernel(int64_t n_rays, const HashGridView<T, S> grid, const SdfLayer<T> layer,
                             const MarchOptions march, const OccupancyView cells, const SampleRules<T> rules,
                             const T* rays_o, const T* rays_d, const T* jitter, int64_t most, T* starts, int64_t* counts,
                             int64_t* evaluated) {
@@ -172,10 +172,10 @@ template <class T> struct FinishBody {
   }
 };
 
-template <class T> HashGridView<T> field_grid(const SdfField<T>& field) {
-  HashGridView<T> grid{};
+template <class T, class S> HashGridView<T, S> field_grid(const SdfField<T>& field, const S* table) {
+  HashGridView<T, S> grid{};
   hash_levels(field.shape, grid.levels);
-  grid.n_levels = field.shape.n_levels, grid.n_active = field.n_active, grid.table = field.table;
+  grid.n_levels = field.shape.n_levels, grid.n_active = field.n_active, grid.table = table;
   return grid;
 }
 
@@ -203,11 +203,13 @@ void sdf_values(const Queue& queue, const SdfField<T>& field, int64_t n, const T
   const char* op = "sdf_values";
   if (n == 0) return;
   const SdfLayer<T> layer = prepare(queue, op, field.weights);
-  const HashGridView<T> grid = field_grid(field);
   with_features(field.shape.n_features, [&](auto count) {
-    const auto kernel = values_kernel<T, decltype(count)::n>;
-    const TileSize tile = tile_size<T>(op, field.weights.n_inputs, kernel);
-    kernel<<<blocks_for(n, tile.points), tile.points, tile.bytes, queue.stream>>>(n, grid, layer, positions, values);
+    field.table.template read_as<T>([&](auto* table) {
+      const auto kernel = values_kernel<T, decltype(count)::n, Pointee<decltype(table)>>;
+      const TileSize tile = tile_size<T>(op, field.weights.n_inputs, kernel);
+      kernel<<<blocks_for(n, tile.points), tile.points, tile.bytes, queue.stream>>>(n, field_grid(field, table), layer,
+                                                                                    positions, values);
+    });
   });
   check(cudaGetLastError(), op);
 }
@@ -218,15 +220,17 @@ void sample_rays(const Queue& queue, const SdfField<T>& field, const MarchOption
                  int64_t* offsets, int64_t* n_evaluated, const SampleAllocator<T>& allocate) {
   const char* op = "sample_rays";
   const SdfLayer<T> layer = prepare(queue, op, field.weights);
-  const HashGridView<T> grid = field_grid(field);
   const int64_t most = most_samples<T>(march);
   T* starts = queue.scratch<T>(n_rays * most);
   if (n_rays > 0) {
     with_features(field.shape.n_features, [&](auto count) {
-      const auto kernel = walk_kernel<T, decltype(count)::n>;
-      const TileSize tile = tile_size<T>(op, field.weights.n_inputs, kernel);
-      kernel<<<blocks_for(n_rays, tile.points), tile.points, tile.bytes, queue.stream>>>(
-          n_rays, grid, layer, march, cells, rules, rays_o, rays_d, jitter, most, starts, offsets + 1, n_evaluated);
+      field.table.template read_as<T>([&](auto* table) {
+        const auto kernel = walk_kernel<T, decltype(count)::n, Pointee<decltype(table)>>;
+        const TileSize tile = tile_size<T>(op, field.weights.n_inputs, kernel);
+        kernel<<<blocks_for(n_rays, tile.points), tile.points, tile.bytes, queue.stream>>>(
+            n_rays, field_grid(field, table), layer, march, cells, rules, rays_o, rays_d, jitter, most, starts,
+            offsets + 1, n_evaluated);
+      });
     });
     check(cudaGetLastError(), op);
   }

@@ -13,7 +13,7 @@ constexpr int64_t kGrain = 512;
 
 template <class T>
 HashEncodeArgs<T> make_args(const HashGridShape& shape, HashLevel* levels, int n_active, int64_t n, const T* positions,
-                            const T* table) {
+                            HashTable table) {
   return {levels, shape.n_features, shape.n_levels, n_active, n, positions, table};
 }
 
@@ -27,7 +27,7 @@ template <class T> void clear_columns(T* rows_begin, int64_t rows, int64_t n_col
 }  // namespace
 
 template <class T>
-void hash_encode(const HashGridShape& shape, int n_active, int64_t n, const T* positions, const T* table, T* features,
+void hash_encode(const HashGridShape& shape, int n_active, int64_t n, const T* positions, HashTable table, T* features,
                  T* jacobian) {
   std::array<HashLevel, kMaxLevels> levels;
   hash_levels(shape, levels.data());
@@ -61,7 +61,8 @@ void hash_encode_backward(const HashGridShape& shape, int n_active, int64_t n, c
 
 template <class T>
 void hash_encode_backward_positions(const HashGridShape& shape, int n_active, int64_t n, const T* positions,
-                                    const T* table, const T* grad_features, const T* grad_jacobian, T* grad_positions) {
+                                    HashTable table, const T* grad_features, const T* grad_jacobian,
+                                    T* grad_positions) {
   std::array<HashLevel, kMaxLevels> levels;
   hash_levels(shape, levels.data());
   const auto args = make_args(shape, levels.data(), n_active, n, positions, table);
@@ -71,10 +72,10 @@ void hash_encode_backward_positions(const HashGridShape& shape, int n_active, in
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                    \
-  template void hash_encode<T>(const HashGridShape&, int, int64_t, const T*, const T*, T*, T*);                     \
-  template void hash_encode_backward<T>(const HashGridShape&, int, int64_t, const T*, const T*, const T*, T*);      \
-  template void hash_encode_backward_positions<T>(const HashGridShape&, int, int64_t, const T*, const T*, const T*, \
+#define SPLITNERF_INSTANTIATE(T)                                                                                     \
+  template void hash_encode<T>(const HashGridShape&, int, int64_t, const T*, HashTable, T*, T*);                     \
+  template void hash_encode_backward<T>(const HashGridShape&, int, int64_t, const T*, const T*, const T*, T*);       \
+  template void hash_encode_backward_positions<T>(const HashGridShape&, int, int64_t, const T*, HashTable, const T*, \
                                                   const T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

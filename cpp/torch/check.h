@@ -25,6 +25,10 @@ inline std::string describe(ScalarType type) {
       return "float32";
     case ScalarType::Double:
       return "float64";
+    case ScalarType::Half:
+      return "float16";
+    case ScalarType::BFloat16:
+      return "bfloat16";
     case ScalarType::Long:
       return "int64";
     case ScalarType::Int:

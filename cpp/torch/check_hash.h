@@ -23,4 +23,57 @@ inline int64_t n_entries(const HashGridShape& shape) {
   return hash_levels(shape, levels.data());
 }
 
+inline bool is_16_bit(const Tensor& t) {
+  return t.scalar_type() == ScalarType::Half || t.scalar_type() == ScalarType::BFloat16;
+}
+
+// A hash grid's table, and what is computed with: for one of 16 bits float32.
+struct Table {
+  HashGridShape shape;
+  Kind type;
+  Tensor entries;
+  int n_active;
+
+  Table(const char* op, const Tensor& table, int64_t n_levels, int64_t base_resolution, double growth,
+        int64_t log2_table_size, int64_t n_active)
+      : shape(checked_shape(op, n_levels, base_resolution, growth, log2_table_size, features(op, table), n_active)),
+        type(compute_kind(op, table)),
+        entries(checked(op, "table", table, {n_entries(shape), shape.n_features}, type.with(table.scalar_type()))),
+        n_active(static_cast<int>(n_active)) {}
+
+  // Reads another tensor of the same shape in place of the table.
+  void read(const char* op, const Tensor& stored) {
+    require(type == ScalarType::Float && is_16_bit(stored), op,
+            "stored must be float16 or bfloat16 beside a float32 table, got " + describe(stored.scalar_type()) +
+                " beside " + describe(type));
+    entries = checked(op, "stored", stored, {n_entries(shape), shape.n_features}, type.with(stored.scalar_type()));
+  }
+
+  HashTable view() const {
+    switch (entries.scalar_type()) {
+      case ScalarType::Half:
+        return in<Half>(entries);
+      case ScalarType::BFloat16:
+        return in<Bfloat16>(entries);
+      case ScalarType::Float:
+        return in<float>(entries);
+      default:
+        return in<double>(entries);
+    }
+  }
+
+ private:
+  static int64_t features(const char* op, const Tensor& table) {
+    require(table.dim() == 2, op, "table must be [n_entries, n_features]");
+    return table.size(1);
+  }
+  static Kind compute_kind(const char* op, const Tensor& table) {
+    if (is_16_bit(table)) return {ScalarType::Float, table.device()};
+    const ScalarType type = table.scalar_type();
+    require(type == ScalarType::Float || type == ScalarType::Double, op,
+            "table must be float32, float64, float16 or bfloat16, got " + describe(type));
+    return {type, table.device()};
+  }
+};
+
 }  // namespace splitnerf::glue

@@ -25,7 +25,8 @@ namespace splitnerf::glue {
   X(pixel_losses) X(gradient_losses) X(material_losses) X(quadratic_entropy) X(occupied_blocks)              \
   X(march_rays_count) X(march_rays_fill) X(neus_weights) X(neus_weights_backward) X(surface_weights)         \
   X(surface_weights_backward) X(composite) X(composite_backward) X(spread_samples) X(interpolate) X(interpolate_backward)      \
-  X(sdf_values) X(sdf_layer) X(sdf_layer_backward) X(cached_occlusion) X(cached_visibility) X(sample_rays)
+  X(sdf_values) X(sdf_layer) X(sdf_layer_backward) X(cached_occlusion) X(cached_visibility) X(sample_rays)   \
+  X(adamw_step)
 // clang-format on
 
 // device.hash_encode(...) is cpu::hash_encode(...) or cuda::hash_encode(queue, ...).

@@ -40,28 +40,22 @@ struct Weights {
 
 // A distance field: hash grid and layer.
 struct Field {
-  HashGridShape shape;
+  Table table;
   Weights weights;
   Kind type;
-  Tensor table;
-  int n_active;
 
   Field(const char* op, const Tensor& table_in, const Tensor& hidden, const Tensor& hidden_bias, const Tensor& out,
         const Tensor& out_bias, double beta, int64_t n_levels, int64_t base_resolution, double growth,
         int64_t log2_table_size, int64_t n_active, double box)
-      : shape(checked_table_shape(op, table_in, n_levels, base_resolution, growth, log2_table_size, n_active)),
-        weights(op, n_levels * shape.n_features, hidden, hidden_bias, out, out_bias, beta, box), type(weights.type),
-        table(checked(op, "table", table_in, {n_entries(shape), shape.n_features}, type)),
-        n_active(static_cast<int>(n_active)) {}
-  template <class T> SdfField<T> view() const { return {shape, n_active, in<T>(table), weights.view<T>()}; }
-
- private:
-  static HashGridShape checked_table_shape(const char* op, const Tensor& table, int64_t n_levels,
-                                           int64_t base_resolution, double growth, int64_t log2_table_size,
-                                           int64_t n_active) {
-    require(table.dim() == 2, op, "table must be [n_entries, n_features]");
-    return checked_shape(op, n_levels, base_resolution, growth, log2_table_size, table.size(1), n_active);
+      : table(op, table_in, n_levels, base_resolution, growth, log2_table_size, n_active),
+        weights(op, n_levels * table.shape.n_features, hidden, hidden_bias, out, out_bias, beta, box),
+        type(weights.type) {
+    require(table.type.type == type.type && table.type.device == type.device, op,
+            "table must be " + describe(type) + (type == ScalarType::Float ? ", float16 or bfloat16" : "") + " on " +
+                describe(type.device) + " as hidden is, got " + describe(table.entries.scalar_type()) + " on " +
+                describe(table.type.device));
   }
+  template <class T> SdfField<T> view() const { return {table.shape, table.n_active, table.view(), weights.view<T>()}; }
 };
 
 // Points with their hash-grid features.

@@ -40,7 +40,7 @@ def draw_batch(source: PixelSource, n_rays: int, config: Config) -> Batch:
     """Rays through random pixels, by the source's generator."""
     g = source.generator
     rays_o, rays_d, target = source.draw(n_rays)
-    background, jitter = torch.rand(n_rays, 3, generator=g), torch.rand(n_rays, generator=g)
+    background, jitter = (torch.rand(*shape, generator=g, device=g.device) for shape in ((n_rays, 3), (n_rays,)))
     return Batch(rays_o, rays_d, target, background, jitter, draw_probes(config, g))
 
 
@@ -48,8 +48,9 @@ def draw_probes(config: Config, generator: torch.Generator) -> ProbePoints:
     """Where the eikonal loss and that of the normals' smoothness look beside the samples."""
     c = config
     n_beside = c.smoothness_points if c.normal_smoothness else 0
+    draw = {"generator": generator, "device": generator.device}
     return ProbePoints(
-        (torch.rand(c.eikonal_points, 3, generator=generator) * 2 - 1) * c.box,
-        torch.rand(n_beside, generator=generator),
-        c.smoothness_radius * torch.randn(n_beside, 3, generator=generator),
+        (torch.rand(c.eikonal_points, 3, **draw) * 2 - 1) * c.box,
+        torch.rand(n_beside, **draw),
+        c.smoothness_radius * torch.randn(n_beside, 3, **draw),
     )

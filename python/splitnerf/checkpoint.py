@@ -32,11 +32,19 @@ def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict
     """
     with atomic_path(path) as temporary:
         try:
-            torch.save(
-                {"format": FORMAT, "config": dataclasses.asdict(config), "fingerprint": fingerprint, **state}, temporary
-            )
+            content = {"format": FORMAT, "config": dataclasses.asdict(config), "fingerprint": fingerprint, **state}
+            torch.save(on_cpu(content), temporary)
         except RuntimeError as error:  # torch reports a full disk so
             raise OSError(f"{path}: the checkpoint could not be written ({error})") from error
+
+
+def on_cpu(content: object) -> object:
+    """The same dictionaries and lists with all tensors on the CPU, so that any machine can read them."""
+    if isinstance(content, Tensor):
+        return content.cpu()
+    if isinstance(content, dict):
+        return type(content)((key, on_cpu(value)) for key, value in content.items())
+    return [on_cpu(value) for value in content] if isinstance(content, list) else content
 
 
 def load_checkpoint(path: Path) -> dict:
@@ -101,13 +109,17 @@ def restore_optimiser(optimiser: torch.optim.Optimizer, content: dict, path: Pat
 
 
 def restore_generator(generator: torch.Generator, content: dict, path: Path) -> None:
-    """Puts the states of the run's random generator and of torch's own back.
+    """Puts the states of the run's random generator and of torch's own back. A run that goes on on another device cannot:
+    its generator begins anew, from the seed and the step. The numbers that the occupancy grid draws on a GPU do so there too.
 
     Raises:
         InputError: They are no states of generators.
     """
     try:
-        generator.set_state(content["generator"])
+        if content.get("device", "cpu") == generator.device.type:
+            generator.set_state(content["generator"])
+        else:
+            generator.manual_seed(config_of(content).seed + content["step"])
         torch.set_rng_state(content["torch_generator"])
     except RuntimeError as error:
         raise InputError(f"{path}: its random generators cannot be restored ({error}); train anew") from None
@@ -121,7 +133,7 @@ def restored_occupancy(values: Tensor, content: dict, path: Path) -> Tensor:
     """
     if content["occupancy"].shape != values.shape:
         raise InputError(f"{path}: its occupancy grid does not fit the settings; leave grid_resolution as it was")
-    return content["occupancy"]
+    return content["occupancy"].to(values.device)
 
 
 def _check_container(path: Path) -> None:
@@ -170,6 +182,8 @@ def _check_content(content: dict) -> None:
         _check_tensor("the optimiser's step", moments.get("step"), (), torch.float32)
         for name in MOMENTS:
             _check_tensor(f"the optimiser's {name}", moments.get(name), None, torch.float32)
+    if content.get("device", "cpu") not in ("cpu", "cuda"):
+        raise ValueError(f"device is {content['device']!r}")
     for key in ("generator", "torch_generator"):
         _check_tensor(key, content.get(key), (-1,), torch.uint8)
     _check_tensor("occupancy", content.get("occupancy"), (config.grid_resolution**3,), torch.float32)

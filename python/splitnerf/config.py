@@ -45,6 +45,7 @@ class Config:
     steps: int = 6000
     max_minutes: float = 0.0  # training time; 0: only the steps count
     deterministic: bool = False  # two runs give the same bits, on one machine with one number of threads
+    tensor_cores: bool = True  # of a GPU, for products of matrices: TF32, factors of 10 bits; not where digits cancel
     box: float = 1.5
 
     # Surface: hash grid, progressive levels, one hidden layer.
@@ -53,6 +54,9 @@ class Config:
     base_resolution: int = 16
     growth: float = 1.4697344922755988  # 16 to 348 cells along an edge
     log2_table_size: int = 16
+    table_dtype: str = (
+        "float32"  # float32 | float16 | bfloat16: as what the hash table is read; it is trained in float32
+    )
     start_levels: int = 4
     levels_open_by: float = 0.4  # the finest level opens at this fraction
     sdf_width: int = 64
@@ -143,6 +147,7 @@ class Config:
     # Occlusion by tracing the mesh.
     mesh_every: float = 0.1
     mesh_resolution: int = 96
+    background_meshes: bool = False  # made by a thread of their own; the training goes on with the old one meanwhile
     occlusion_share: float = 0.1  # of the shaded samples
     occlusion_rays: int = 32
     occlusion_ray_start: str = "normal"  # occlusion_offset along the normal | ray (the released code: along the ray)
@@ -162,6 +167,7 @@ class Config:
     warmup_steps: int = 100
     final_learning_rate: float = 0.02  # factor at the end
     weight_decay: float = 0.01
+    sparse_steps: bool = False  # entries of the hash table that got no gradient are left alone, moments and decay too
 
     # Output.
     export_resolution: int = 192
@@ -174,6 +180,7 @@ class Config:
     def __post_init__(self) -> None:
         choices = {
             "n_features": (1, 2, 4, 8),
+            "table_dtype": ("float32", "float16", "bfloat16"),
             "normals": ("analytic", "finite_difference"),
             "head_inputs": ("outputs", "grid"),
             "occlusion": ("mlp", "bits", "off"),
@@ -310,7 +317,15 @@ PAPER = dict(
     final_learning_rate=0.1, export_resolution=512,
 )  # fmt: skip
 
-PRESETS: dict[str, dict] = {"cpu": {}, "paper": PAPER}
+# The CPU's method with the samples, the levels and the meshes of a GPU.
+FAST = dict(
+    preset="fast", steps=20000, n_levels=16, growth=1.3195079, log2_table_size=19,  # 16 to 1024 cells along an edge
+    initial_rays=4096, max_rays=16384, target_samples=32768, grid_resolution=128, eikonal_points=2048,
+    smoothness_points=4096, neutral_queries=1024, entropy_points=1024, mesh_resolution=192, background_meshes=True,
+    table_dtype="float16", sparse_steps=True, warmup_steps=200, export_resolution=384, export_faces=50000, export_texture_size=2048,
+)  # fmt: skip
+
+PRESETS: dict[str, dict] = {"cpu": {}, "fast": FAST, "paper": PAPER}
 
 
 def preset(name: str) -> Config:

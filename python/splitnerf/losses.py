@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 from torch.nn import functional as F
@@ -20,6 +23,33 @@ from splitnerf.ops import (
 from splitnerf.render.renderer import RenderedRays
 
 ALBEDO_FLOOR = 0.01  # below it albedos count as one black
+
+
+class Term(NamedTuple):
+    """One term of the loss.
+
+    Attributes:
+        weight: Of it.
+        value: [] the term without.
+    """
+
+    weight: float
+    value: Tensor
+
+
+@functools.lru_cache(maxsize=1024)
+def _seed(weight: float, device: torch.device) -> Tensor:
+    with torch.inference_mode(False):
+        return torch.tensor(weight, device=device)
+
+
+def backward(terms: dict[str, Term]) -> None:
+    """Takes the gradient of the weighted sum of the terms to all that they come from. The weights are where the backward
+    pass begins, so that no product or sum of them is computed."""
+    values = [
+        (term.value, _seed(term.weight, term.value.device)) for term in terms.values() if term.value.requires_grad
+    ]
+    torch.autograd.backward(*map(list, zip(*values)))
 
 
 def penalty(error: Tensor, form: str) -> Tensor:
@@ -66,19 +96,15 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     n_sets, n = (
         (2, light.loss_samples.count(c.light_noise, c.light_samples)) if c.light_noise > 0 else (1, c.light_samples)
     )
-    queries = F.normalize(torch.randn(c.light_queries, 3, generator=generator), dim=1)
+    draw = {"generator": generator, "device": generator.device}
+    queries = F.normalize(torch.randn(c.light_queries, 3, **draw), dim=1)
     directions = torch.cat([light_directions(c, n // n_sets, queries, generator) for _ in range(n_sets)])
-    roughness = torch.ones(c.light_queries, 1)
-    roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, generator=generator)
-    narrow = roughness[:, 0] < c.light_lobe_below
-    queries, roughness = (
-        torch.cat([queries[narrow], queries[~narrow]]),
-        torch.cat([roughness[narrow], roughness[~narrow]]),
-    )
-    n_narrow = int(narrow.sum())
+    roughness = torch.ones_like(queries[:, :1])
+    roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, **draw).sort(0).values  # narrow lobes first
+    n_narrow = int((roughness < c.light_lobe_below).sum()) if c.light_lobe_below > 0 else 0
     own = sample_ggx_lobe(queries[:n_narrow], roughness[:n_narrow], c.light_lobe_samples, seed).reshape(-1, 3)
     asked = torch.cat([directions, own, queries])
-    g = light(asked, torch.cat([torch.zeros(len(directions) + len(own), 1), roughness]))
+    g = light(asked, torch.cat([roughness.new_zeros(len(directions) + len(own), 1), roughness]))
     shared, lobes, prefiltered = g.split([len(directions), len(own), len(queries)])
     sums = torch.stack([
         prefilter_light(queries[n_narrow:], roughness[n_narrow:], *part)
@@ -95,7 +121,7 @@ def light_directions(config: Config, n: int, queries: Tensor, generator: torch.G
     """The n directions [n, 3] that the light loss integrates over, with ``uniform_and_queries`` more."""
     if config.light_set == "fibonacci":
         return fibonacci_directions(n, generator)
-    uniform = F.normalize(torch.randn(n, 3, generator=generator), dim=1)
+    uniform = F.normalize(torch.randn(n, 3, generator=generator, device=generator.device), dim=1)
     return torch.cat([uniform, queries]) if config.light_set == "uniform_and_queries" else uniform
 
 
@@ -105,8 +131,8 @@ def neutral_light_loss(light: Light, config: Config, generator: torch.Generator)
     Images of a diffuse object leave it open whether a colour is the object's or the light's. This prefers a
     light without colour where nothing speaks against it.
     """
-    normals = F.normalize(torch.randn(config.neutral_queries, 3, generator=generator), dim=1)
-    log_light = torch.log(light(normals, torch.ones(len(normals), 1)) + 1e-6)
+    normals = F.normalize(torch.randn(config.neutral_queries, 3, generator=generator, device=generator.device), dim=1)
+    log_light = torch.log(light(normals, torch.ones_like(normals[:, :1])) + 1e-6)
     return (log_light - log_light.mean(1, keepdim=True)).square().mean()
 
 
@@ -122,8 +148,9 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
     c, points = config, ray.points
     weights = ray.shares
     if len(weights) == 0:
-        return torch.zeros(())
-    chosen = torch.multinomial(weights + 1e-12, c.entropy_points, replacement=True, generator=generator)
+        return weights.new_zeros(())
+    weights = weights.nan_to_num(0.0, 0.0, 0.0) + 1e-12  # the loss tells of what is not finite
+    chosen = torch.multinomial(weights, c.entropy_points, replacement=True, generator=generator)
     gloss = torch.cat([points.roughness[chosen], points.metallic[chosen]], dim=1)
     x = torch.cat([torch.log(points.albedo[chosen] + ALBEDO_FLOOR) / c.albedo_width, gloss / c.gloss_width], dim=1)
     return quadratic_entropy(x)
@@ -140,9 +167,10 @@ def occlusion_loss(
     Source: SplitNeRF Eq. (12)-(16).
     """
     c = config
-    chosen = (torch.rand(len(ray.shaded), generator=generator) < c.occlusion_share).nonzero().squeeze(1)
+    random = torch.rand(len(ray.shaded), generator=generator, device=generator.device)
+    chosen = (random < c.occlusion_share).nonzero().squeeze(1)
     if len(chosen) == 0:
-        return torch.zeros(())
+        return ray.shares.new_zeros(())
     with torch.no_grad():
         normals = ray.normals[chosen]
         on_surface = ray.positions[chosen] - normals * ray.sdf[chosen, None]

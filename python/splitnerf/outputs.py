@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,11 +38,9 @@ REPORT_ROUGHNESS = (0.0, 0.25, 0.5, 1.0)
 
 def render_maps(model: SceneModel, grid: OccupancyGrid, dataset: Dataset, index: int) -> dict[str, np.ndarray]:
     """All maps of one view as float32 arrays, see :func:`splitnerf.render.renderer.render_view`."""
-    maps = render_view(
-        model, grid.cells, torch.from_numpy(dataset.poses[index]), torch.from_numpy(dataset.intrinsics[index]),
-        dataset.height, dataset.width,
-    )  # fmt: skip
-    return {name: value.numpy() for name, value in maps.items()}
+    pose, intrinsics = (torch.from_numpy(x[index]).to(model.device) for x in (dataset.poses, dataset.intrinsics))
+    maps = render_view(model, grid.cells, pose, intrinsics, dataset.height, dataset.width)
+    return {name: value.cpu().numpy() for name, value in maps.items()}
 
 
 def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Dataset, step: int) -> None:
@@ -125,12 +123,19 @@ def write_assets(
         if "usdz" in formats:
             write_usdz(out / "mesh.usdz", asset, textured.occlusion)
         exported = Exported(mesh, len(asset.triangles), textured.watertight, n_dropped)
-    write_environment(out, model.light.panorama(c.export_environment_height).numpy())
+    write_environment(out, model.light.panorama(c.export_environment_height).cpu().numpy())
     return exported
 
 
 def surface_of(model: SceneModel) -> Surface:
-    """The scene's fields as functions of points in the internal frame."""
+    """The scene's fields as functions of points in the internal frame, on the CPU; they are asked where the model is."""
+
+    def from_cpu(field: Callable[[Tensor], Tensor | tuple]) -> Callable[[Tensor], Tensor | tuple]:
+        def asked(points: Tensor) -> Tensor | tuple:
+            values = field(points.to(model.device))
+            return values.cpu() if isinstance(values, Tensor) else tuple(value.cpu() for value in values)
+
+        return asked
 
     def gradient(points: Tensor) -> tuple[Tensor, Tensor]:
         field = model.surface(points)
@@ -141,7 +146,7 @@ def surface_of(model: SceneModel) -> Surface:
         material = model.material(model.head_inputs(points, field.outputs, field.features))
         return (*material, torch.nn.functional.normalize(field.gradient, dim=1))
 
-    return Surface(model.sdf_field.sdf, gradient, materials)
+    return Surface(*map(from_cpu, (model.sdf_field.sdf, gradient, materials)))
 
 
 @torch.no_grad()
@@ -149,16 +154,16 @@ def light_panels(model: SceneModel, height: int = 64, n_samples: int = 8192) -> 
     """g(w, rho) beside its Monte Carlo estimate from g(w, 0), as [height, 2 height, 3] maps."""
     from splitnerf.fields.light import panorama_directions
 
-    sources = fibonacci_directions(n_samples, torch.Generator().manual_seed(0))
-    light = torch.cat([model.light(d, torch.zeros(len(d), 1)) for d in sources.split(1 << 15)])
-    queries = panorama_directions(height).reshape(-1, 3)
+    sources = fibonacci_directions(n_samples, torch.Generator(model.device).manual_seed(0))
+    light = torch.cat([model.light(d, torch.zeros_like(d[:, :1])) for d in sources.split(1 << 15)])
+    queries = panorama_directions(height, model.device).reshape(-1, 3)
     panels = []
     for roughness in REPORT_ROUGHNESS:
         g = model.light.panorama(height, roughness)
         g_bar = g
         if roughness > 0:
-            g_bar = prefilter_light(queries, torch.full((len(queries), 1), roughness), sources, light).view_as(g)
-        panels.append({"roughness": roughness, "g": g.numpy(), "g_bar": g_bar.numpy()})
+            g_bar = prefilter_light(queries, torch.full_like(queries[:, :1], roughness), sources, light).view_as(g)
+        panels.append({"roughness": roughness, "g": g.cpu().numpy(), "g_bar": g_bar.cpu().numpy()})
     return panels
 
 
@@ -178,7 +183,7 @@ def evaluate_scene(
     """
     predictions = [render_maps(model, grid, test, i) for i in range(len(test))]
     truth = load_scene_truth(test.root)
-    light = model.light.panorama(model.config.export_environment_height).numpy()
+    light = model.light.panorama(model.config.export_environment_height).cpu().numpy()
     result = evaluate_maps(
         predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1),
         relight=relight, distance=distance,

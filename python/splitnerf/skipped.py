@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from splitnerf import losses
 from splitnerf.batches import Batch, draw_batch
+from splitnerf.devices import wait_for
 from splitnerf.fields import VisibilityBits
 from splitnerf.ops import CELL_OCCUPIED, MeshScene
 from splitnerf.render.model import SceneModel
@@ -69,7 +71,7 @@ def measure_skips(
         n_steps: Of the whole run.
     """
     c = model.config
-    generator = torch.Generator().manual_seed(0)
+    generator = torch.Generator(model.device).manual_seed(0)
     batch = draw_batch(source, n_rays, c)
 
     def work(batch: Batch, cells: Tensor = grid.cells, **settings: object) -> Work:
@@ -125,11 +127,12 @@ def timed_work(
             for step in range(period):
                 found = find_samples(model, cells, *batch.rays, probes=batch.probes)
                 ray, terms = batch_losses(model, batch, found, scene, None, generator, step, 1.0)
-                sum(terms.values()).backward()
+                losses.backward(terms)
                 if light_moves(c, step):
                     model.light.deliver()
+            wait_for(model.device)
             seconds.append((time.perf_counter() - started) / period)
     finally:
         model.light.collect(False)
         model.zero_grad(set_to_none=True)
-    return Work(statistics.median(seconds[WARM_UP:]), len(ray.weights), ray.n_evaluated, len(ray.shaded))
+    return Work(statistics.median(seconds[WARM_UP:]), len(ray.weights), int(ray.evaluated.sum()), len(ray.shaded))

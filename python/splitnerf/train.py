@@ -24,10 +24,12 @@ from splitnerf.checkpoint import (
 )
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
+from splitnerf.devices import tensor_cores
 from splitnerf.errors import InputError
-from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.finite import GradientWatch, check_state, explain_loss
-from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
+from splitnerf.losses import Term
+from splitnerf.meshes import SurfaceMesh
+from splitnerf.ops import AdamW, MeshScene, gradient_losses, material_losses, pixel_losses
 from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.render.model import SceneModel
@@ -54,7 +56,9 @@ class TrainedScene:
     finished: bool
 
 
-def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) -> TrainedScene:
+def train(
+    dataset: Dataset, config: Config, run: Path, *, device: torch.device | str = "cpu", resume: bool = False
+) -> TrainedScene:
     """Trains a scene and keeps a checkpoint, a log and previews in the run's folder.
 
     The schedule (learning rate, levels, annealing, meshes) follows the progress: the share of steps
@@ -65,29 +69,29 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         dataset: The train split.
         config: Settings; with ``resume`` those of the checkpoint are meant to be passed.
         run: The run's folder, which exists.
-        resume: Continue from ``run/checkpoint.pt``.
+        device: Where images, fields and samples are; meshes are made and traced on the CPU.
+        resume: Continue from ``run/checkpoint.pt``, whatever device wrote it.
 
     Raises:
-        InputError: The checkpoint belongs to another scene or cannot be read.
+        InputError: The checkpoint belongs to another scene or cannot be read, or the device cannot repeat its bits.
         splitnerf.finite.Diverged: Numbers are no longer finite, by the rule that stands there; the last checkpoint stands.
         OSError: The disk is full; the last checkpoint stands.
     """
     c = config
+    check_repeatable(c, device)
     torch.manual_seed(c.seed)
-    generator = torch.Generator().manual_seed(c.seed)
+    generator = torch.Generator(device).manual_seed(c.seed)
     fingerprint = dataset_fingerprint(dataset)
     source = PixelSource(dataset, c.foreground_share, generator)
-    model = SceneModel(c)
+    model = SceneModel(c).to(device)
     optimiser = make_optimiser(model, c)
     hull = None
     if c.hull_until > 0:
-        hull = visual_hull(
-            c.grid_resolution, c.box, torch.from_numpy(dataset.images[..., 3]), source.poses, source.intrinsics
-        )
-    grid = make_grid(c, hull)
-    scene: MeshScene | None = None
+        hull = visual_hull(c.grid_resolution, c.box, source.masks, source.poses, source.intrinsics)
+    grid = make_grid(c, hull, device)
+    mesh = SurfaceMesh(model, background=c.background_meshes)
     environment: Tensor | None = None
-    step, seconds, n_rays, meshed_at, previewed_at = 0, 0.0, c.initial_rays, 0.0, 0.0
+    step, seconds, n_rays, previewed_at = 0, 0.0, c.initial_rays, 0.0
 
     if resume:
         path = run / "checkpoint.pt"
@@ -97,11 +101,7 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
         restore_optimiser(optimiser, content, path)
         restore_generator(generator, content, path)
         grid.values = restored_occupancy(grid.values, content, path)
-        step, seconds, n_rays = content["step"], content["seconds"], content["n_rays"]
-        meshed_at, previewed_at = content["meshed_at"], content["previewed_at"]
-    mesh: tuple[Tensor, Tensor] | tuple[None, None] = (
-        (content["mesh_vertices"], content["mesh_faces"]) if resume else (None, None)
-    )
+        step, seconds, n_rays, previewed_at = (content[key] for key in ("step", "seconds", "n_rays", "previewed_at"))
 
     def save() -> None:
         check_state(step, model, optimiser)
@@ -110,11 +110,10 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             config=c,
             fingerprint=fingerprint,
             state=dict(
-                step=step, seconds=seconds, n_rays=n_rays, meshed_at=meshed_at, previewed_at=previewed_at,
-                model=model.state_dict(), optimiser=optimiser.state_dict(), generator=generator.get_state(),
-                torch_generator=torch.get_rng_state(), occupancy=grid.values,
-                box_from_world=torch.from_numpy(dataset.box_from_world),
-                mesh_vertices=mesh[0], mesh_faces=mesh[1],
+                step=step, seconds=seconds, n_rays=n_rays, previewed_at=previewed_at,
+                model=model.state_dict(), optimiser=optimiser.state_dict(), device=generator.device.type,
+                generator=generator.get_state(), torch_generator=torch.get_rng_state(), occupancy=grid.values,
+                box_from_world=torch.from_numpy(dataset.box_from_world), **mesh.state(),
             ),
         )  # fmt: skip
 
@@ -124,14 +123,17 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
 
     if resume:
         model.open_levels(progress_now())
-        scene = restore_mesh(model, content)
+        mesh.restore(content)
     model.light.collect()
     light_steps = light_period(c)
     started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True
     psnr_mean = samples_mean = None
     watch = GradientWatch(model.parameters())
     log = open(run / "metrics.jsonl", "a")
-    with log, Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic):
+    with (
+        log, Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic),
+        tensor_cores(c.tensor_cores),
+    ):  # fmt: skip
         while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % light_steps == 0):
             model.open_levels(progress)
             set_learning_rate(optimiser, c, step, progress)
@@ -139,10 +141,11 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 grid.update(
                     model.sdf_field.sdf, model.s_value, first=first, step=step, use_hull=progress < c.hull_until
                 )
-            if (model.occlusion is not None or c.finetune_from < 1) and progress - meshed_at >= c.mesh_every:
-                meshed_at = progress
+            if (model.occlusion is not None or c.finetune_from < 1) and progress - mesh.asked_at >= c.mesh_every:
                 check_state(step, model, optimiser)
-                scene, mesh = remesh(model, c, scene, mesh)
+                mesh.renew(progress)
+            mesh.arrive(wait=c.deterministic)
+            scene = mesh.scene
             traces = scene is not None and c.occlusion == "mlp" and c.occlusion_weight > 0
             if traces and (environment is None or step % ENVIRONMENT_EVERY == 0):
                 environment = model.light.panorama(c.environment_height)
@@ -156,30 +159,33 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
             ray, terms = batch_losses(
                 model, batch, found, scene, environment if traces else None, generator, step, progress
             )
-            loss = sum(terms.values())
-            if not math.isfinite(loss.item()):
-                raise explain_loss(step, terms, dataset, batch, model, ray)
             optimiser.zero_grad(set_to_none=True)
-            loss.backward()
+            losses.backward(terms)
             if light_moves(c, step):
                 model.light.deliver()
-            if watch.allows(step):
+            numbers = *(term.value.detach() for term in terms.values()), watch.largest(), ray.evaluated.sum().float()
+            *values, largest, n_evaluated = torch.stack(numbers).tolist()  # waits for the device
+            loss = sum(term.weight * value for term, value in zip(terms.values(), values))
+            if not math.isfinite(loss):
+                raise explain_loss(step, dict(zip(terms, values)), dataset, batch, model, ray)
+            if watch.allows(step, largest):
                 optimiser.step()
 
             n_samples = len(ray.weights)
             n_rays = next_ray_count(n_rays, n_samples, c)
             step, first, seconds = step + 1, False, time.monotonic() - started
-            psnr = -10.0 * math.log10(max(terms["colour"].item() / max(c.colour_weight, 1e-12), 1e-10))
+            psnr = -10.0 * math.log10(max(values[0], 1e-10))
             psnr_mean = psnr if psnr_mean is None else 0.95 * psnr_mean + 0.05 * psnr
-            samples_mean = ray.n_evaluated / len(batch.target)
+            samples_mean = n_evaluated / len(batch.target)
             bar.show(progress_now(), step, psnr_mean, samples_mean)
             if step % LOG_EVERY == 0 or step <= LOG_EVERY or progress_now() >= 1.0:
                 check_state(step, model, optimiser)
                 log.write(json.dumps({
-                    "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss.item(),
-                    **{f"loss_{name}": term.item() for name, term in terms.items()}, "psnr": psnr_mean,
+                    "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss,
+                    **{f"loss_{name}": term.weight * value for (name, term), value in zip(terms.items(), values)},
+                    "psnr": psnr_mean,
                     "rays": len(batch.target), "samples_per_ray": samples_mean,
-                    "kept": n_samples / max(1, ray.n_evaluated), "shaded": len(ray.shaded) / max(1, ray.n_evaluated),
+                    "kept": n_samples / max(1, n_evaluated), "shaded": len(ray.shaded) / max(1, n_evaluated),
                     "s": model.s_value, "sees_all": getattr(model.occlusion, "sees_all", False),
                     "skipped": watch.skipped,
                 }) + "\n")  # fmt: skip
@@ -192,19 +198,21 @@ def train(dataset: Dataset, config: Config, run: Path, *, resume: bool = False) 
                 saved_at = time.monotonic()
         check_state(step, model, optimiser)
         finished = progress_now() >= 1.0
+        mesh.arrive(wait=finished)
         if finished and c.occlusion == "bits":  # what is rendered from here on sees the final surface
-            scene, mesh = remesh(model, c, scene, mesh)
+            mesh.renew(1.0)
+            mesh.arrive(wait=True)
         model.light.collect(False)
         grid.update(model.sdf_field.sdf, model.s_value)
         save()
-    return TrainedScene(model, grid, scene, n_rays, step, seconds, finished)
+    return TrainedScene(model, grid, mesh.scene, n_rays, step, seconds, finished)
 
 
 def batch_losses(
     model: SceneModel, batch: Batch, found: FoundSamples, scene: MeshScene | None, environment: Tensor | None,
     generator: torch.Generator, step: int, progress: float,
-) -> tuple[RenderedRays, dict[str, Tensor]]:  # fmt: skip
-    """The rays as they are rendered now, and the weighted terms of the loss by name.
+) -> tuple[RenderedRays, dict[str, losses.Term]]:  # fmt: skip
+    """The rays as they are rendered now, and the terms of the loss by name, the colour's first.
 
     Args:
         model: The scene.
@@ -223,31 +231,32 @@ def batch_losses(
     metal, binary_metal, dark_metal = material_losses(
         ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.metal_loss_form == "smooth_l1"
     )
-    terms = {"colour": c.colour_weight * colour, "eikonal": c.eikonal_weight * eikonal}
+    terms = {"colour": Term(c.colour_weight, colour), "eikonal": Term(c.eikonal_weight, eikonal)}
     if finetune:
         colours = monte_carlo_colours(model, scene, ray, -batch.rays_d, generator)
-        terms["finetune"] = c.colour_weight * losses.monte_carlo_colour_loss(
-            colours, ray, batch.target, batch.background
-        )
+        error = losses.monte_carlo_colour_loss(colours, ray, batch.target, batch.background)
+        terms["finetune"] = Term(c.colour_weight, error)
     if c.mask_weight:
-        terms["mask"] = c.mask_weight * mask
+        terms["mask"] = Term(c.mask_weight, mask)
     if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
-        terms["light"] = c.light_weight * losses.light_loss(model.light, c, generator, step)
+        terms["light"] = Term(c.light_weight, losses.light_loss(model.light, c, generator, step))
     if c.neutral_weight and light_moves(c, step):  # for all steps since it moved
         since = step % light_period(c) + 1
-        terms["neutral"] = c.neutral_weight * since * losses.neutral_light_loss(model.light, c, generator)
+        terms["neutral"] = Term(c.neutral_weight * since, losses.neutral_light_loss(model.light, c, generator))
     if c.normal_smoothness:
-        terms["smoothness"] = c.normal_smoothness * smoothness
+        terms["smoothness"] = Term(c.normal_smoothness, smoothness)
     if c.entropy_weight and progress >= c.priors_from:
-        terms["entropy"] = c.entropy_weight * losses.material_entropy_loss(ray, c, generator)
+        terms["entropy"] = Term(c.entropy_weight, losses.material_entropy_loss(ray, c, generator))
     if c.metal_regulariser:
-        terms["metal"] = c.metal_weight * metal
+        terms["metal"] = Term(c.metal_weight, metal)
     if c.binary_metal_weight and progress >= c.priors_from:
-        terms["binary_metal"] = c.binary_metal_weight * binary_metal
+        terms["binary_metal"] = Term(c.binary_metal_weight, binary_metal)
     if c.dark_metal_weight:
-        terms["dark_metal"] = c.dark_metal_weight * dark_metal
+        terms["dark_metal"] = Term(c.dark_metal_weight, dark_metal)
     if environment is not None:
-        terms["occlusion"] = c.occlusion_weight * losses.occlusion_loss(ray, scene, environment, c, generator, step)
+        terms["occlusion"] = Term(
+            c.occlusion_weight, losses.occlusion_loss(ray, scene, environment, c, generator, step)
+        )
     return ray, terms
 
 
@@ -266,18 +275,26 @@ def light_moves(config: Config, step: int) -> bool:
     return (step + 1) % light_period(config) == 0 or step + 1 == config.steps
 
 
-def make_optimiser(model: SceneModel, config: Config) -> torch.optim.AdamW:
+def make_optimiser(model: SceneModel, config: Config) -> torch.optim.Optimizer:
     """AdamW with the paper's settings; the sharpness and the texels of a light have rates of their own and no decay."""
-    texels = [model.light.texels] if config.light == "pyramid" else []
-    apart = {id(p) for p in [model.variance, *texels]}
-    others = [p for p in model.parameters() if id(p) not in apart]
+    c, grid = config, model.sdf_field.grid
+    texels = [model.light.texels] if c.light == "pyramid" else []
+    table = [grid.table] if c.sparse_steps else []
+    apart = {id(p) for p in [model.variance, *texels, *table]}
     groups = [
-        {"params": others, "lr": config.learning_rate, "weight_decay": config.weight_decay},
-        {"params": [model.variance], "lr": config.variance_learning_rate, "weight_decay": 0.0},
+        ([p for p in model.parameters() if id(p) not in apart], c.learning_rate, c.weight_decay),
+        ([model.variance], c.variance_learning_rate, 0.0), (texels, c.light_learning_rate, 0.0),
+        (table, c.learning_rate, c.weight_decay),
+    ]  # fmt: skip
+    groups = [
+        {"params": params, "rate": rate, "lr": rate, "weight_decay": decay, "sparse": params is table}
+        for params, rate, decay in groups
+        if params
     ]
-    if texels:
-        groups.append({"params": texels, "lr": config.light_learning_rate, "weight_decay": 0.0})
-    return torch.optim.AdamW(groups, betas=(0.9, 0.99), eps=1e-15, fused=True)
+    settings = {"betas": (0.9, 0.99), "eps": 1e-15}
+    if c.sparse_steps:
+        return AdamW(groups, **settings, copies={grid.table: grid.copy} if grid.copy else None)
+    return torch.optim.AdamW(groups, **settings, fused=True)
 
 
 def set_learning_rate(optimiser: torch.optim.Optimizer, config: Config, step: int, progress: float) -> None:
@@ -285,9 +302,8 @@ def set_learning_rate(optimiser: torch.optim.Optimizer, config: Config, step: in
     warmup = min(config.warmup_steps / config.steps, 0.5)
     decayed = max(0.0, (progress - warmup) / (1.0 - warmup))
     factor = min(1.0, (step + 1) / max(1, config.warmup_steps)) * config.final_learning_rate**decayed
-    rates = (config.learning_rate, config.variance_learning_rate, config.light_learning_rate)
-    for group, rate in zip(optimiser.param_groups, rates):
-        group["lr"] = rate * factor
+    for group in optimiser.param_groups:
+        group["lr"] = group["rate"] * factor
 
 
 def next_ray_count(n_rays: int, n_samples: int, config: Config) -> int:
@@ -296,25 +312,10 @@ def next_ray_count(n_rays: int, n_samples: int, config: Config) -> int:
     return int(min(config.max_rays, max(64, min(1.25 * n_rays, max(0.8 * n_rays, wanted)))))
 
 
-def remesh(model: SceneModel, config: Config, scene: MeshScene | None, mesh: tuple) -> tuple[MeshScene | None, tuple]:
-    """The current surface as a scene to trace; the old one stays while the field has no surface."""
-    try:
-        vertices, faces = extract_mesh(model.sdf_field.sdf, config.box, config.mesh_resolution)
-    except EmptyMesh:
-        return scene, mesh
-    scene, mesh = MeshScene(vertices, faces), (torch.from_numpy(vertices), torch.from_numpy(faces))
-    model.use_mesh(scene, *mesh)
-    return scene, mesh
-
-
-def restore_mesh(model: SceneModel, content: dict) -> MeshScene | None:
-    """The mesh of a checkpoint, in use by the model; None where the run had none yet."""
-    if content["mesh_vertices"] is None:
-        return None
-    mesh = content["mesh_vertices"], content["mesh_faces"]
-    scene = MeshScene(*(part.numpy() for part in mesh))
-    model.use_mesh(scene, *mesh)
-    return scene
+def check_repeatable(config: Config, device: torch.device | str) -> None:
+    """Raises InputError where a run shall have the same bits on a device that adds in any order."""
+    if config.deterministic and torch.device(device).type != "cpu":
+        raise InputError("a deterministic run needs the CPU, as a GPU adds in any order; leave out --device")
 
 
 def check_same_scene(content: dict, fingerprint: str, run: Path) -> None:

@@ -23,6 +23,7 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Evaluated, Protocol, asset_mesh, choose_views, evaluation_path, relit_scores
 from splitnerf.evaluate.lpips import load_distance
 from splitnerf.export.meshing import EmptyMesh
+from splitnerf.meshes import SurfaceMesh
 from splitnerf.outputs import Exported, evaluate_scene, light_panels, write_assets
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
@@ -30,7 +31,7 @@ from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.render.rays import PixelSource
 from splitnerf.report.html import write_report
 from splitnerf.skipped import measure_skips
-from splitnerf.train import TrainedScene, check_same_scene, restore_mesh, train
+from splitnerf.train import TrainedScene, check_repeatable, check_same_scene, train
 
 RUN_FILES = (
     "config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
@@ -71,7 +72,14 @@ def prepare_run(run: Path, *, resume: bool, overwrite: bool) -> None:
 
 
 def reconstruct(
-    data: Path, run: Path, config: Config, *, downscale: int = 1, resume: bool = False, overwrite: bool = False
+    data: Path,
+    run: Path,
+    config: Config,
+    *,
+    downscale: int = 1,
+    device: torch.device | str = "cpu",
+    resume: bool = False,
+    overwrite: bool = False,
 ) -> tuple[TrainedScene, dict | None]:
     """Trains on a dataset and fills the run's folder. Returns the scene and, when finished, its evaluation.
 
@@ -79,13 +87,14 @@ def reconstruct(
         InputError: The data, the settings or the run's folder cannot be used; nothing was written.
         Diverged, EmptyMesh, OSError: See :func:`splitnerf.train.train`.
     """
+    check_repeatable(config, device)
     dataset, test = load_splits(data, downscale)
     prepare_run(run, resume=resume, overwrite=overwrite)
     config.write(run / "config.toml")
-    trained = train(dataset, config, run, resume=resume)
+    trained = train(dataset, config, run, device=device, resume=resume)
     if not trained.finished:
         return trained, None
-    source = PixelSource(dataset, config.foreground_share, torch.Generator().manual_seed(0))
+    source = PixelSource(dataset, config.foreground_share, torch.Generator(device).manual_seed(0))
     skips = measure_skips(trained.model, trained.grid, trained.scene, source, trained.n_rays, trained.step)
     write_json(run / "skipped.json", {skip.name: skip.text() for skip in skips})
     return trained, finish(trained.model, trained.grid, dataset, test, run, {"training": trained.seconds})
@@ -175,7 +184,7 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     model = SceneModel(config)
     restore_model(model, content, run / "checkpoint.pt")
     model.open_levels(1.0)
-    restore_mesh(model, content)
+    SurfaceMesh(model).restore(content)
     grid = make_grid(config)
     if config.occupancy == "average":  # a mean over time, unlike the distance
         grid.values = restored_occupancy(grid.values, content, run / "checkpoint.pt")

@@ -43,7 +43,7 @@ from splitnerf.ops import shading as shading_module
 from splitnerf.ops import visibility as visibility_module
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples, render_rays
-from splitnerf.train import restore_mesh
+from splitnerf.meshes import SurfaceMesh
 from splitnerf.workflow import load_run, load_splits
 
 # ---- field ----
@@ -341,7 +341,7 @@ def colours(data: Path, source: Path) -> Tensor:
     """Of 300 rays by the model of a run, nothing skipped."""
     model, grid, content = load_run(source)
     model.config = model.config.replace(UNSKIPPED)
-    restore_mesh(model, content)
+    SurfaceMesh(model).restore(content)
     rays = PixelSource(load_splits(data, DOWNSCALE)[0], 0.85, torch.Generator().manual_seed(0)).draw(300)[:2]
     rays = *rays, torch.full((300,), 0.5)
     with torch.no_grad():

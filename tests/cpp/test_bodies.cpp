@@ -1,5 +1,6 @@
 // The bodies that single threads run on the GPU, where the CPU has code of its own: one against the other.
 #include "check.h"
+#include "splitnerf/bodies/adamw.h"
 #include "splitnerf/bodies/hash_encode.h"
 #include "splitnerf/bodies/light_pyramid.h"
 #include "splitnerf/bodies/prefilter.h"
@@ -19,20 +20,34 @@ template <class T> void expect_near(const std::vector<T>& got, const std::vector
 
 // ---- hash grid ----
 
-template <class T, int F> void check_hash_grid(double tolerance) {
+// Numbers in [-1, 1] as a table stores them; of 16 bits any that are finite and not above 1.
+template <class S> std::vector<S> drawn_entries(Random& random, size_t n) {
+  if constexpr (std::is_floating_point_v<S>) {
+    return random.uniforms<S>(n, -1);
+  } else {
+    const int one = std::is_same_v<S, Half> ? 0x3c00 : 0x3f80;
+    std::vector<S> out(n);
+    for (S& x : out) x.bits = static_cast<uint16_t>(random.below(one + 1) | random.below(2) << 15);
+    return out;
+  }
+}
+
+// S: what the table stores.
+template <class T, int F, class S = T> void check_hash_grid(double tolerance) {
   const HashGridShape shape{4, F, 4, 1.7, 8};  // two dense levels, two hashed ones
   const int n_active = 3, n_levels = shape.n_levels;
-  HashGridView<T> grid{};
+  HashGridView<T, S> grid{};
   const int64_t n_entries = hash_levels(shape, grid.levels), n = 67, columns = n_levels * F;
   Random random(F);
-  const auto positions = random.uniforms<T>(3 * n, -0.1, 1.1), table = random.uniforms<T>(n_entries * F, -1);
+  const auto positions = random.uniforms<T>(3 * n, -0.1, 1.1);
+  const auto table = drawn_entries<S>(random, n_entries * F);
   const auto g = random.uniforms<T>(n * columns, -1), gj = random.uniforms<T>(3 * n * columns, -1);
   grid.n_levels = n_levels, grid.n_active = n_active, grid.positions = positions.data(), grid.table = table.data();
   using Values = std::vector<T>;
 
   Values features(n * columns), jacobian(3 * n * columns), features1(n * columns, 7), jacobian1(3 * n * columns, 7);
   cpu::hash_encode(shape, n_active, n, positions.data(), table.data(), features.data(), jacobian.data());
-  const HashEncodeBody<T, F, true> encode{grid, features1.data(), jacobian1.data()};
+  const HashEncodeBody<T, F, true, S> encode{grid, features1.data(), jacobian1.data()};
   for (int l = 0; l < n_levels; ++l)
     for (int64_t p = 0; p < n; ++p) encode(p, l);
   expect_near(features1, features, tolerance), expect_near(jacobian1, jacobian, tolerance);
@@ -41,7 +56,10 @@ template <class T, int F> void check_hash_grid(double tolerance) {
     const T* to_jacobian = with_jacobian ? gj.data() : nullptr;
     Values to_table(n_entries * F), to_table1(n_entries * F);
     cpu::hash_encode_backward(shape, n_active, n, positions.data(), g.data(), to_jacobian, to_table.data());
-    const HashScatterBody<T, F> scatter{grid, g.data(), to_jacobian, to_table1.data()};
+    HashGridView<T> points{};
+    std::copy_n(grid.levels, n_levels, points.levels);
+    points.n_levels = n_levels, points.n_active = n_active, points.positions = positions.data();
+    const HashScatterBody<T, F> scatter{points, g.data(), to_jacobian, to_table1.data()};
     for (int l = 0; l < n_active; ++l)
       for (int64_t p = 0; p < n; ++p) scatter(p, l);
     expect_near(to_table1, to_table, tolerance);
@@ -50,7 +68,7 @@ template <class T, int F> void check_hash_grid(double tolerance) {
   Values to_positions(3 * n), to_positions1(3 * n);
   cpu::hash_encode_backward_positions(shape, n_active, n, positions.data(), table.data(), g.data(), gj.data(),
                                       to_positions.data());
-  const HashPositionsBody<T, F> positions_body{grid, g.data(), gj.data(), to_positions1.data()};
+  const HashPositionsBody<T, F, S> positions_body{grid, g.data(), gj.data(), to_positions1.data()};
   for (int64_t p = 0; p < n; ++p) positions_body(p);
   expect_near(to_positions1, to_positions, tolerance);
 }
@@ -60,13 +78,59 @@ TEST(Bodies, HashGrid) {
   check_hash_grid<double, 4>(1e-14), check_hash_grid<double, 8>(1e-14);
   check_hash_grid<float, 2>(1e-5), check_hash_grid<float, 8>(1e-5);
 }
+TEST(Bodies, HashGridOf16Bits) {
+  check_hash_grid<float, 1, Half>(1e-5), check_hash_grid<float, 2, Half>(1e-5), check_hash_grid<float, 8, Half>(1e-5);
+  check_hash_grid<float, 2, Bfloat16>(1e-5), check_hash_grid<float, 4, Bfloat16>(1e-5);
+}
+
+// ---- the optimiser ----
+
+// Rows of which each second one has no gradient.
+template <class T> void check_adamw(double tolerance, int64_t columns, bool sparse) {
+  const int64_t n = 61 * columns;
+  Random random(static_cast<uint32_t>(columns));
+  const AdamwRule<T> rule(0.1, 0.9, 0.99, 1e-8, 0.2, 3);
+  auto grad = random.uniforms<T>(n, -1);
+  for (int64_t i = 0; i < n; ++i)
+    if (i / columns % 2 == 0 || random.below(3) == 0) grad[i] = T(0);
+  const auto param = random.uniforms<T>(n, -1), m = random.uniforms<T>(n, -1), v = random.uniforms<T>(n);
+  auto param1 = param, m1 = m, v1 = v, param2 = param, m2 = m, v2 = v;
+  std::vector<Half> half1(n), half2(n);
+  std::vector<Bfloat16> bfloat1(n), bfloat2(n);
+  for (int64_t i = 0; i < n; ++i) {
+    half1[i] = half2[i] = narrow<Half>(float(param[i]));
+    bfloat1[i] = bfloat2[i] = narrow<Bfloat16>(float(param[i]));
+  }
+  cpu::adamw_step<T>(
+      rule, {n, columns, sparse, param1.data(), grad.data(), m1.data(), v1.data(), half1.data(), bfloat1.data()});
+  const AdamwBody<T> body{
+      rule, {n, columns, sparse, param2.data(), grad.data(), m2.data(), v2.data(), half2.data(), bfloat2.data()}};
+  for (int64_t i = 0; i < n; ++i) body(i);
+  expect_near(param2, param1, tolerance), expect_near(m2, m1, tolerance), expect_near(v2, v1, tolerance);
+  for (int64_t i = 0; i < n; ++i) {
+    for (const Half x : {half1[i], half2[i]}) EXPECT_NEAR(widen(x), param1[i], 1e-3 * (1 + std::abs(param1[i]))) << i;
+    for (const Bfloat16 x : {bfloat1[i], bfloat2[i]})
+      EXPECT_NEAR(widen(x), param1[i], 8e-3 * (1 + std::abs(param1[i]))) << i;
+    if (sparse && i / columns % 2 == 0) { EXPECT_TRUE(param1[i] == param[i] && m1[i] == m[i] && v1[i] == v[i]) << i; }
+  }
+}
+
+TEST(Bodies, Adamw) {
+  for (const int64_t columns : {1, 2, 3, 8, 700}) {
+    for (const bool sparse : {false, true}) {
+      check_adamw<double>(1e-14, columns, sparse);
+      check_adamw<float>(1e-6, columns, sparse);
+    }
+  }
+}
 
 // What a thread reads and writes at once is never wider than 16 bytes, nor than the values' own alignment in their rows.
 TEST(Bodies, PacksAreAlignedToWhatTheirRowsAre) {
   const size_t alignments[] = {alignof(Pack<float, 1>), alignof(Pack<float, 2>),  alignof(Pack<float, 4>),
-                               alignof(Pack<float, 8>), alignof(Pack<double, 1>), alignof(Pack<double, 8>)};
-  const size_t expected[] = {4, 8, 16, 16, 8, 16};
-  for (int i = 0; i < 6; ++i) EXPECT_EQ(alignments[i], expected[i]) << i;
+                               alignof(Pack<float, 8>), alignof(Pack<double, 1>), alignof(Pack<double, 8>),
+                               alignof(Pack<Half, 1>),  alignof(Pack<Half, 2>),   alignof(Pack<Bfloat16, 8>)};
+  const size_t expected[] = {4, 8, 16, 16, 8, 16, 2, 4, 16};
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(alignments[i], expected[i]) << i;
   EXPECT_EQ(sizeof(Pack<float, 8>), 32u);
   EXPECT_EQ(sizeof(Pack<double, 1>), 8u);
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import shutil
 from pathlib import Path
@@ -120,17 +121,22 @@ def test_a_learning_rate_of_a_thousand_loses_no_checkpoint(data, begun, capsys):
 
 
 def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path, monkeypatch, capsys):  # noqa: F811
-    original, seen = trainer.GradientWatch.allows, []
+    original, allows, seen = trainer.GradientWatch.largest, trainer.GradientWatch.allows, []
 
-    def planting(watch, step):
+    def planting(watch):
+        step = len(seen)
         if step in (3, 5, 6):
             watch.parameters[0].grad.view(-1)[0] = torch.nan if step == 3 else 1e30
+        return original(watch)
+
+    def recording(watch, step, largest):
         before = [p.detach().clone() for p in watch.parameters]
-        allowed = original(watch, step)
+        allowed = allows(watch, step, largest)
         seen.append((allowed, before))
         return allowed
 
-    monkeypatch.setattr(trainer.GradientWatch, "allows", planting)
+    monkeypatch.setattr(trainer.GradientWatch, "largest", planting)
+    monkeypatch.setattr(trainer.GradientWatch, "allows", recording)
     trained = trainer.train(load_dataset(data), small(steps=8), tmp_path)
     assert [i for i, (allowed, _) in enumerate(seen) if not allowed] == [3, 5, 6]
     for i in (3, 5, 6):
@@ -146,23 +152,23 @@ def test_large_gradients_that_cancel_are_seen():
     watch = trainer.GradientWatch(parameters)
     for parameter, value in zip(parameters, (1e30, -1e30)):
         parameter.grad = torch.full((3,), value)
-    assert not watch.allows(0) and watch.skipped == 1
+    assert not watch.allows(0, watch.largest().item()) and watch.skipped == 1
     for parameter in parameters:
         parameter.grad = torch.full((3,), -1e17)
-    assert watch.allows(1)
+    assert watch.allows(1, watch.largest().item())
 
 
 def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch):  # noqa: F811
     run, before = begun
-    original = trainer.GradientWatch.allows
+    original, steps = trainer.GradientWatch.largest, itertools.count(8)  # the run stands at step 8
 
-    def planting(watch, step):
-        if step > 12:
+    def planting(watch):
+        if next(steps) > 12:
             watch.parameters[0].grad.view(-1)[0] = torch.inf
-        return original(watch, step)
+        return original(watch)
 
     with monkeypatch.context() as patch:
-        patch.setattr(trainer.GradientWatch, "allows", planting)
+        patch.setattr(trainer.GradientWatch, "largest", planting)
         with pytest.raises(Diverged, match=f"step {12 + MOST_SKIPPED}: .*{MOST_SKIPPED} steps in a row"):
             trainer.train(load_dataset(data), small(steps=60), run, resume=True)
     goes_on(data, run, before)

@@ -133,7 +133,11 @@ def test_errors_name_what_is_wrong(device):
         str(SPEC.n_entries - 1),
     )
     check_error(
-        lambda: lib.hash_encode(positions, table.long(), *grid), "hash_encode", "table", "float32 or float64", "int64"
+        lambda: lib.hash_encode(positions, table.long(), *grid),
+        "hash_encode",
+        "table",
+        "float32, float64, float16 or bfloat16",
+        "int64",
     )
     check_error(lambda: lib.hash_encode(positions, table[0], *grid), "hash_encode", "table", "[n_entries, n_features]")
     check_error(lambda: hash_encode(positions, table, SPEC, 4), "hash_encode", "n_active", "[0, n_levels]", "4")

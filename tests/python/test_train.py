@@ -66,6 +66,23 @@ def test_the_error_falls(data, tmp_path):
     assert psnr[-1] > psnr[0] + 2.0
 
 
+@pytest.mark.parametrize("settings", [{"sparse_steps": True}, {"table_dtype": "bfloat16"},
+                                      {"sparse_steps": True, "table_dtype": "float16"}])  # fmt: skip
+def test_the_error_falls_with_other_steps_and_tables(data, tmp_path, settings):
+    """And the copy that is read is that of the table as it was trained."""
+    from splitnerf.data.dataset import load_dataset
+    from splitnerf.ops.hash_grid import rounded
+    from splitnerf.train import train as train_scene
+
+    config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {"steps": 120} | settings)
+    grid = train_scene(load_dataset(data), config, tmp_path).model.sdf_field.grid
+    psnr = [json.loads(line)["psnr"] for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
+    assert psnr[-1] > psnr[0] + 2.0
+    assert (grid.stored() is None) == ("table_dtype" not in settings)
+    if grid.copy is not None:
+        assert torch.equal(grid.stored(), rounded(grid.table, grid.copy.dtype)) and grid.table.dtype == torch.float32
+
+
 def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     """Trained, resumed and loaded, a run with occlusion=bits renders with the factors of the mesh that it stored."""
     from splitnerf.data.dataset import load_dataset

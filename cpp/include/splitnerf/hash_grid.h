@@ -2,8 +2,11 @@
 // Source: Mueller et al. 2022, section 3; progressive levels: Li et al. 2023 (Neuralangelo).
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <type_traits>
 
+#include "splitnerf/half.h"
 #include "splitnerf/vec.h"
 
 namespace splitnerf {
@@ -23,6 +26,30 @@ struct HashLevel {
   int64_t n_entries;
   int resolution;  // cells along an edge; resolution + 1 nodes
   bool dense;      // every node has an entry of its own
+};
+
+// The table as it is stored: in the numbers that are computed with, or, for float, in 16 bits each.
+class HashTable {
+ public:
+  HashTable(std::nullptr_t = nullptr) {}
+  HashTable(const float* entries) : entries_(entries) {}
+  HashTable(const double* entries) : entries_(entries) {}
+  HashTable(const Half* entries) : entries_(entries), stored_(Stored::kHalf) {}
+  HashTable(const Bfloat16* entries) : entries_(entries), stored_(Stored::kBfloat16) {}
+
+  // Calls body(entries) with the pointer that the table was made from; T is what is computed with.
+  template <class T, class Body> void read_as(Body&& body) const {
+    if constexpr (std::is_same_v<T, float>) {
+      if (stored_ == Stored::kHalf) return body(static_cast<const Half*>(entries_));
+      if (stored_ == Stored::kBfloat16) return body(static_cast<const Bfloat16*>(entries_));
+    }
+    body(static_cast<const T*>(entries_));
+  }
+
+ private:
+  enum class Stored { kReal, kHalf, kBfloat16 };
+  const void* entries_ = nullptr;  // [n_entries, n_features]
+  Stored stored_ = Stored::kReal;
 };
 
 // What is wrong with a shape, in words; empty for one that can be built.

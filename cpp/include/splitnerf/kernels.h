@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "splitnerf/bodies/adamw.h"
 #include "splitnerf/config.h"
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/light_pyramid.h"
@@ -20,7 +21,7 @@ template <class T> struct HashEncodeArgs {
   int n_active;    // levels [0, n_active) are open
   int64_t n_points;
   const T* positions;  // [n, 3] in the unit cube
-  const T* table;      // [n_entries, n_features]
+  HashTable table;     // [n_entries, n_features]
 };
 
 // The distance field: hash-grid features and a layer over them.
@@ -106,6 +107,8 @@ template <class T> struct Kernels {
   void (*light_lookup_backward)(const LightPyramid<T>&, int64_t begin, int64_t end, const T* directions,
                                 const T* roughness, const T* grad_radiance, T* grad_directions, T* grad_roughness,
                                 T* grad_levels, T* grad_sh);
+  // Rows [begin, end) of columns > 0.
+  void (*adamw_step)(const AdamwRule<T>&, const AdamwArrays<T>&, int64_t begin, int64_t end);
 };
 
 // Those for this processor. SPLITNERF_ISA = base | avx2 | avx512 in the environment picks a lower

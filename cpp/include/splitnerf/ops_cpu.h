@@ -21,9 +21,9 @@ namespace splitnerf::cpu {
 
 // ---- hash grid. C = n_levels * n_features; columns of closed levels are written as 0. ----
 
-// positions [n, 3], table [n_entries, n_features] -> features [n, C], jacobian [n, 3, C] or null.
+// positions [n, 3], table [n_entries, n_features] of T or of 16 bits -> features [n, C], jacobian [n, 3, C] or null.
 template <class T>
-SPLITNERF_API void hash_encode(const HashGridShape& shape, int n_active, int64_t n, const T* positions, const T* table,
+SPLITNERF_API void hash_encode(const HashGridShape& shape, int n_active, int64_t n, const T* positions, HashTable table,
                                T* features, T* jacobian);
 // grad_features [n, C] and grad_jacobian [n, 3, C] (either may be null) -> grad_table, overwritten.
 // Levels are spread over the threads, so that no two threads write one entry: no atomics, and the same bits each time.
@@ -32,7 +32,7 @@ SPLITNERF_API void hash_encode_backward(const HashGridShape& shape, int n_active
                                         const T* grad_features, const T* grad_jacobian, T* grad_table);
 template <class T>
 SPLITNERF_API void hash_encode_backward_positions(const HashGridShape& shape, int n_active, int64_t n,
-                                                  const T* positions, const T* table, const T* grad_features,
+                                                  const T* positions, HashTable table, const T* grad_features,
                                                   const T* grad_jacobian, T* grad_positions);
 
 // ---- shading; lut: brdf_lut()'s layout ----
@@ -259,5 +259,9 @@ SPLITNERF_API void cached_occlusion(const VisibilityCache<T>& cache, int64_t n, 
 template <class T>
 SPLITNERF_API void cached_visibility(const VisibilityCache<T>& cache, int64_t n, const T* positions, const T* normals,
                                      T* visible, T* arriving);
+
+// ---- the optimiser ----
+
+template <class T> SPLITNERF_API void adamw_step(const AdamwRule<T>& rule, const AdamwArrays<T>& x);
 
 }  // namespace splitnerf::cpu

@@ -31,13 +31,13 @@ int64_t read_number(const Queue& queue, const int64_t* number);
 
 template <class T>
 void hash_encode(const Queue& queue, const HashGridShape& shape, int n_active, int64_t n, const T* positions,
-                 const T* table, T* features, T* jacobian);
+                 HashTable table, T* features, T* jacobian);
 template <class T>
 void hash_encode_backward(const Queue& queue, const HashGridShape& shape, int n_active, int64_t n, const T* positions,
                           const T* grad_features, const T* grad_jacobian, T* grad_table);
 template <class T>
 void hash_encode_backward_positions(const Queue& queue, const HashGridShape& shape, int n_active, int64_t n,
-                                    const T* positions, const T* table, const T* grad_features, const T* grad_jacobian,
+                                    const T* positions, HashTable table, const T* grad_features, const T* grad_jacobian,
                                     T* grad_positions);
 
 // ---- shading ----
@@ -190,5 +190,9 @@ template <class T>
 void sample_rays(const Queue& queue, const SdfField<T>& field, const MarchOptions& march, const OccupancyView& cells,
                  const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter,
                  int64_t* offsets, int64_t* n_evaluated, const SampleAllocator<T>& allocate);
+
+// ---- the optimiser ----
+
+template <class T> void adamw_step(const Queue& queue, const AdamwRule<T>& rule, const AdamwArrays<T>& x);
 
 }  // namespace splitnerf::cuda

@@ -22,7 +22,7 @@ template <class T> struct SdfWeights {
 template <class T> struct SdfField {
   HashGridShape shape;
   int n_active;
-  const T* table;
+  HashTable table;
   SdfWeights<T> weights;
 };
 

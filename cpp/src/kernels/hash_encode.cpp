@@ -55,17 +55,20 @@ template <class T, int F> void locate(const HashLevel& level, int64_t n, const L
 // F values, in one go.
 template <int F, class T> void copy_entry(const T* from, T* to) { std::memcpy(to, from, F * sizeof(T)); }
 
-template <bool WithJacobian, class T, int F>
-void encode_level(const HashEncodeArgs<T>& args, int l, int64_t n, const Cells<T, F>& cells, T* features, T* jacobian) {
+template <bool WithJacobian, class T, int F, class S>
+void encode_level(const HashEncodeArgs<T>& args, const S* entries, int l, int64_t n, const Cells<T, F>& cells,
+                  T* features, T* jacobian) {
   constexpr int64_t kLanes = kPoints * F;
-  const T* table = args.table + args.levels[l].offset * F;
-  T corner[8][kLanes], value[kLanes], dx[kLanes], dy[kLanes], dz[kLanes];
+  const S* table = entries + args.levels[l].offset * F;
+  S corner[8][kLanes];
+  T value[kLanes], dx[kLanes], dy[kLanes], dz[kLanes];
   for (int64_t p = 0; p < n; ++p)
     for (int i = 0; i < 8; ++i) copy_entry<F>(table + int64_t(cells.entry[i][p * F]) * F, corner[i] + p * F);
 #pragma omp simd
   for (int64_t q = 0; q < n * F; ++q) {
-    const Trilinear<T> t = trilinear(corner[0][q], corner[1][q], corner[2][q], corner[3][q], corner[4][q], corner[5][q],
-                                     corner[6][q], corner[7][q], cells.x[q], cells.y[q], cells.z[q]);
+    const Trilinear<T> t = trilinear(widen(corner[0][q]), widen(corner[1][q]), widen(corner[2][q]), widen(corner[3][q]),
+                                     widen(corner[4][q]), widen(corner[5][q]), widen(corner[6][q]), widen(corner[7][q]),
+                                     cells.x[q], cells.y[q], cells.z[q]);
     value[q] = t.value;
     if constexpr (WithJacobian)
       dx[q] = t.dx * cells.scale_x[q], dy[q] = t.dy * cells.scale_y[q], dz[q] = t.dz * cells.scale_z[q];
@@ -120,14 +123,14 @@ void scatter_level(const HashEncodeArgs<T>& args, int l, const T* grad_features,
   }
 }
 
-template <class T, int F>
-void position_gradient(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, const T* grad_features,
-                       const T* grad_jacobian, T* grad_positions) {
+template <class T, int F, class S>
+void position_gradient(const HashEncodeArgs<T>& args, const S* table, int64_t begin, int64_t end,
+                       const T* grad_features, const T* grad_jacobian, T* grad_positions) {
   for (int64_t p = begin; p < end; ++p) {
     Vec3<T> grad{T(0), T(0), T(0)};
     for (int l = 0; l < args.n_active; ++l)
-      add_position_gradient<F>(args.levels[l], l, args.n_levels, p, args.positions, args.table, grad_features,
-                               grad_jacobian, grad);
+      add_position_gradient<F>(args.levels[l], l, args.n_levels, p, args.positions, table, grad_features, grad_jacobian,
+                               grad);
     store3(grad_positions + 3 * p, grad);
   }
 }
@@ -143,22 +146,22 @@ template <class T> int cached_together(const HashEncodeArgs<T>& args, int first,
   return last;
 }
 
-template <class T, int F>
-void encode_all(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, T* features, T* jacobian) {
+template <class T, int F, class S>
+void encode_all(const HashEncodeArgs<T>& args, const S* entries, int64_t begin, int64_t end, T* features, T* jacobian) {
   const int64_t n_columns = int64_t(args.n_levels) * F;
   Lanes<T, F> at;
   Cells<T, F> cells;
   for (int first = 0, last = 0; first < args.n_active; first = last) {
-    last = cached_together(args, first, F * sizeof(T));
+    last = cached_together(args, first, F * sizeof(S));
     for (int64_t b = begin; b < end; b += kPoints) {
       const int64_t n = min_of(kPoints, end - b);
       at.load(n, args.positions + 3 * b);
       for (int l = first; l < last; ++l) {
         locate(args.levels[l], n, at, cells);
         if (jacobian) {
-          encode_level<true>(args, l, n, cells, features + b * n_columns, jacobian + 3 * b * n_columns);
+          encode_level<true>(args, entries, l, n, cells, features + b * n_columns, jacobian + 3 * b * n_columns);
         } else {
-          encode_level<false, T, F>(args, l, n, cells, features + b * n_columns, nullptr);
+          encode_level<false>(args, entries, l, n, cells, features + b * n_columns, static_cast<T*>(nullptr));
         }
       }
     }
@@ -169,16 +172,18 @@ void encode_all(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, T* fe
 
 template <class T>
 void hash_encode(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, T* features, T* jacobian) {
-  switch (args.n_features) {
-    case 1:
-      return encode_all<T, 1>(args, begin, end, features, jacobian);
-    case 2:
-      return encode_all<T, 2>(args, begin, end, features, jacobian);
-    case 4:
-      return encode_all<T, 4>(args, begin, end, features, jacobian);
-    case 8:
-      return encode_all<T, 8>(args, begin, end, features, jacobian);
-  }
+  args.table.template read_as<T>([&](auto* entries) {
+    switch (args.n_features) {
+      case 1:
+        return encode_all<T, 1>(args, entries, begin, end, features, jacobian);
+      case 2:
+        return encode_all<T, 2>(args, entries, begin, end, features, jacobian);
+      case 4:
+        return encode_all<T, 4>(args, entries, begin, end, features, jacobian);
+      case 8:
+        return encode_all<T, 8>(args, entries, begin, end, features, jacobian);
+    }
+  });
 }
 
 template <class T>
@@ -199,16 +204,18 @@ void hash_scatter(const HashEncodeArgs<T>& args, int level, const T* grad_featur
 template <class T>
 void hash_position_gradient(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, const T* grad_features,
                             const T* grad_jacobian, T* grad_positions) {
-  switch (args.n_features) {
-    case 1:
-      return position_gradient<T, 1>(args, begin, end, grad_features, grad_jacobian, grad_positions);
-    case 2:
-      return position_gradient<T, 2>(args, begin, end, grad_features, grad_jacobian, grad_positions);
-    case 4:
-      return position_gradient<T, 4>(args, begin, end, grad_features, grad_jacobian, grad_positions);
-    case 8:
-      return position_gradient<T, 8>(args, begin, end, grad_features, grad_jacobian, grad_positions);
-  }
+  args.table.template read_as<T>([&](auto* entries) {
+    switch (args.n_features) {
+      case 1:
+        return position_gradient<T, 1>(args, entries, begin, end, grad_features, grad_jacobian, grad_positions);
+      case 2:
+        return position_gradient<T, 2>(args, entries, begin, end, grad_features, grad_jacobian, grad_positions);
+      case 4:
+        return position_gradient<T, 4>(args, entries, begin, end, grad_features, grad_jacobian, grad_positions);
+      case 8:
+        return position_gradient<T, 8>(args, entries, begin, end, grad_features, grad_jacobian, grad_positions);
+    }
+  });
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                        \

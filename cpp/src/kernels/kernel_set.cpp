@@ -25,7 +25,8 @@ Kernels<float> kernels_float32() {
           split_sum_shade_backward<float>,
           sparse_product<float>,
           light_lookup<float>,
-          light_lookup_backward<float>};
+          light_lookup_backward<float>,
+          adamw_step<float>};
 }
 
 Kernels<double> kernels_float64() {
@@ -48,7 +49,8 @@ Kernels<double> kernels_float64() {
           split_sum_shade_backward<double>,
           sparse_product<double>,
           light_lookup<double>,
-          light_lookup_backward<double>};
+          light_lookup_backward<double>,
+          adamw_step<double>};
 }
 
 }  // namespace splitnerf::SPLITNERF_ISA

@@ -36,6 +36,7 @@ template <class T> void sparse_product(const SparseRows<T>&, int64_t, int64_t, c
 template <class T> void light_lookup(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, T*);
 template <class T>
 void light_lookup_backward(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, const T*, T*, T*, T*, T*);
+template <class T> void adamw_step(const AdamwRule<T>&, const AdamwArrays<T>&, int64_t, int64_t);
 
 Kernels<float> kernels_float32();
 Kernels<double> kernels_float64();

@@ -169,8 +169,9 @@ def draw(result: Result, path: Path) -> None:
         raise InputError("the charts need matplotlib: pip install 'splitnerf[bench]'") from error
     columns = min(COLUMNS, len(result.charts))
     rows = -(-len(result.charts) // columns)
-    figure = Figure(figsize=(5.6 * columns, 4.4 * rows + 0.9), dpi=80, layout="constrained")
     names = list(dict.fromkeys(p.series for chart in result.charts for p in chart.points))
+    legend = 0.2 * math.ceil((len(names) + 1) / (2 * columns))
+    figure = Figure(figsize=(5.6 * columns, 4.4 * rows + legend), dpi=80, layout="constrained")
     handles: dict[str, object] = {}
     for i, chart in enumerate(result.charts):
         axes = figure.add_subplot(rows, columns, i + 1)
@@ -198,6 +199,6 @@ def draw(result: Result, path: Path) -> None:
         axes.set_ylabel(chart.error, fontsize=8)
         axes.tick_params(labelsize=7, which="both")
         axes.grid(True, which="major", linewidth=0.3)
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5, fontsize=8)
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=2 * columns, fontsize=8)
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format="png")

@@ -33,14 +33,15 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def add_training_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--preset",
-        choices=["cpu", "paper"],
-        help="cpu: small, for a few cores (default); paper: the publication's settings",
+        choices=["cpu", "fast", "paper"],
+        help="cpu: small, for a few cores (default there); fast: for a GPU (default there); paper: the publication's settings",
     )
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
     parser.add_argument("--max-minutes", type=float, metavar="M", help="training time; the schedule fits itself to it")
     parser.add_argument(
-        "--device", choices=["cpu"], default="cpu", help="where to train (the operators run on the CPU)"
-    )
+        "--device", choices=["cpu", "cuda"], default="cpu",
+        help="where to train (default: cpu; on cuda the kernels were never run, see docs/cuda.md)",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, help="of all random numbers (default: 0)")
     parser.add_argument(
         "--deterministic",
@@ -60,12 +61,14 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from splitnerf.checkpoint import config_of, load_checkpoint
     from splitnerf.config import parse_setting, preset
+    from splitnerf.devices import choose_device
     from splitnerf.workflow import reconstruct
 
     if args.resume and args.overwrite:
         raise InputError("--resume and --overwrite exclude each other")
     if args.max_minutes is not None and args.max_minutes <= 0:
         raise InputError(f"--max-minutes must be positive, got {args.max_minutes}")
+    device = choose_device(args.device)
     run = args.out or Path("runs") / args.data.resolve().name
     settings = dict(parse_setting(text) for text in args.settings)
     settings |= budget(args.steps, args.max_minutes)
@@ -78,10 +81,12 @@ def run(args: argparse.Namespace) -> int:
             raise InputError("--preset cannot change in a run that is resumed")
         base = config_of(load_checkpoint(run / "checkpoint.pt"))
     else:
-        base = preset(args.preset or "cpu")
+        base = preset(args.preset or ("cpu" if device.type == "cpu" else "fast"))
+    config = base.replace(settings)
     trained, evaluation = reconstruct(
-        args.data, run, base.replace(settings), downscale=args.downscale, resume=args.resume, overwrite=args.overwrite
-    )
+        args.data, run, config, downscale=args.downscale, device=device, resume=args.resume,
+        overwrite=args.overwrite,
+    )  # fmt: skip
     if evaluation is None:
         print(f"stopped at step {trained.step}; the state is in {run}. To go on, repeat the command with --resume.")
         return INTERRUPTED

@@ -88,7 +88,7 @@ class Light(nn.Module, abc.ABC):
 
 def panorama_directions(height: int, device: torch.device | str = "cpu") -> Tensor:
     """[height, 2 height, 3] unit directions of an equirectangular map's texel centres."""
-    return torch.from_numpy(_core.equirect_directions(height, 2 * height)).to(device, torch.float32)
+    return torch.from_numpy(_core.equirect_directions(height, 2 * height)).to(device=device, dtype=torch.float32)
 
 
 def lobe_roughness(solid_angle: Tensor | float) -> Tensor | float:

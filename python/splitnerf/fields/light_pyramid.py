@@ -9,6 +9,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
+from splitnerf.devices import tensor_cores
 from splitnerf.fields.light import Light
 from splitnerf.ops import (
     SparseMap,
@@ -51,6 +52,20 @@ class PyramidMaps(NamedTuple):
     resolutions: Tensor
     nodes: Tensor
     zonal: Tensor
+
+    def to(self, device: torch.device) -> PyramidMaps:
+        """Copies on a device; resolutions and nodes stay on the CPU, where the lookup wants them."""
+        sparse = (SparseMap(*(part.to(device) for part in matrix)) for matrix in self[:3])
+        return PyramidMaps(
+            *sparse, self.projection.to(device), self.projected, self.resolutions, self.nodes, self.zonal.to(device)
+        )
+
+
+@functools.lru_cache(maxsize=4)
+def maps_on(resolution: int, device: torch.device) -> PyramidMaps:
+    """:func:`pyramid_maps` on a device, copied once."""
+    with torch.inference_mode(False):
+        return pyramid_maps(resolution).to(device)
 
 
 @functools.lru_cache(maxsize=2)
@@ -114,8 +129,7 @@ class LightPyramid(Light):
     def __init__(self, resolution: int = 64, start: float = 0.5):
         super().__init__()
         self.resolution = resolution
-        self.maps = pyramid_maps(resolution)
-        self.texels = nn.Parameter(torch.zeros(len(self.maps.sum_of_levels.transposed_offsets) - 1, 3))
+        self.texels = nn.Parameter(torch.zeros(len(pyramid_maps(resolution).sum_of_levels.transposed_offsets) - 1, 3))
         with torch.no_grad():
             self.texels[: 4 * 4] = math.log(start)
         self._cached: tuple | None = None
@@ -131,6 +145,11 @@ class LightPyramid(Light):
             "_held": None,
             "_stand_ins": [],
         }  # copies start anew
+
+    @property
+    def maps(self) -> PyramidMaps:
+        """The linear maps, where the texels are."""
+        return maps_on(self.resolution, self.texels.device)
 
     def radiance(self) -> Tensor:
         """[n^2, 3] radiance of the texels."""
@@ -165,7 +184,9 @@ class LightPyramid(Light):
         averages = sparse_product(self.maps.averages, radiance)
         levels = torch.cat([radiance, sparse_product(self.maps.filters, averages)])
         # Three rows times a matrix, forward and backward: several times faster than the matrix times three columns.
-        return levels, (averages[self.maps.projected].T.contiguous() @ self.maps.projection.T).T.contiguous()
+        with tensor_cores(False):
+            sh = averages[self.maps.projected].T.contiguous() @ self.maps.projection.T
+        return levels, sh.T.contiguous()
 
     def collect(self, on: bool = True) -> None:
         """From now on the gradients of backward passes stop at the maps and add up there; off: they no longer do."""

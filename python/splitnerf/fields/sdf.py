@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from splitnerf.devices import tensor_cores
 from splitnerf.ops import HashGrid, HashGridSpec, SdfNetwork, sdf_layer, sdf_values
 
 SOFTPLUS_BETA = 100.0
@@ -44,14 +45,18 @@ class SdfField(nn.Module):
         width: Hidden units.
         n_outputs: Outputs, the distance included.
         radius: The field starts as a sphere of this radius, scene units.
+        table_dtype: Of :class:`splitnerf.ops.HashGrid`.
 
     Source: SplitNeRF, section 4.1; sphere initialisation: Atzmon and Lipman 2020.
     """
 
-    def __init__(self, spec: HashGridSpec, box: float, width: int = 64, n_outputs: int = 13, radius: float = 0.5):
+    def __init__(
+        self, spec: HashGridSpec, box: float, width: int = 64, n_outputs: int = 13, radius: float = 0.5,
+        table_dtype: torch.dtype | None = None,
+    ):  # fmt: skip
         super().__init__()
         self.box = box
-        self.grid = HashGrid(spec)
+        self.grid = HashGrid(spec, table_dtype=table_dtype)
         hidden = torch.zeros(width, 3 + spec.n_outputs)
         hidden[:, :3] = torch.randn(width, 3) * math.sqrt(2.0 / width)
         out = torch.randn(n_outputs, width) * math.sqrt(1.0 / width)
@@ -98,7 +103,8 @@ class SdfField(nn.Module):
     def network(self) -> SdfNetwork:
         """The field's numbers as they stand, for operators that ask for distances on their own."""
         hidden, out = self._weights()
-        table, biases = self.grid.table.detach(), (self.hidden_bias.detach(), self.out_bias.detach())
+        stored, biases = self.grid.stored(), (self.hidden_bias.detach(), self.out_bias.detach())
+        table = self.grid.table.detach() if stored is None else stored
         return SdfNetwork(
             self.grid.spec, self.grid.n_active, table, hidden, biases[0], out, biases[1], SOFTPLUS_BETA, self.box
         )
@@ -127,7 +133,8 @@ class SdfField(nn.Module):
         resolution = self.grid.spec.levels()[max(0, self.grid.n_active - 1)][0]
         eps = cells * 2.0 * self.box / resolution
         steps = eps * torch.cat([torch.eye(3), -torch.eye(3)]).to(positions)
-        taps = self.sdf((positions[:, None, :] + steps).reshape(-1, 3)).view(-1, 2, 3)
+        with tensor_cores(False):  # their differences are small
+            taps = self.sdf((positions[:, None, :] + steps).reshape(-1, 3)).view(-1, 2, 3)
         features = self.grid(self._to_unit(positions))
         outputs = self._outputs(self._inputs(positions, features))
         return SdfSample(outputs, features, (taps[:, 0] - taps[:, 1]) / (2.0 * eps))

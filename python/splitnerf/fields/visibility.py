@@ -36,6 +36,18 @@ class CellLight(NamedTuple):
     solid_angles: Tensor
 
 
+class TracedBits(NamedTuple):
+    """What the vertices of a mesh see.
+
+    Attributes:
+        cache: The bits, on the CPU.
+        sees_all: Whether hardly anything is blocked: the surface is convex, near enough.
+    """
+
+    cache: VisibilityCache
+    sees_all: bool
+
+
 def bit_counts(words: Tensor) -> Tensor:
     """How many bits of [n, k] int32 words are set, [n]."""
     bits = np.unpackbits(words.contiguous().numpy().view(np.uint8).reshape(len(words), -1), axis=1)
@@ -61,39 +73,52 @@ class VisibilityBits(nn.Module):
     def __init__(self, n_directions: int, offset: float, n_channels: int, indirect: bool, open_below: float = 0.0):
         super().__init__()
         self.offset, self.n_channels, self.indirect, self.open_below = offset, n_channels, indirect, open_below
-        self.directions = torch.from_numpy(_core.fibonacci_sphere(n_directions)).float()
+        directions = torch.from_numpy(_core.fibonacci_sphere(n_directions)).float()
         height = math.ceil(math.sqrt(TEXELS_PER_CELL * n_directions / 2))
         texels = torch.from_numpy(_core.equirect_directions(height, 2 * height)).float().reshape(-1, 3)
-        self._texels, self._texel_roughness = texels, lobe_roughness(4.0 * math.pi / len(texels))
-        self._cell = torch.cat([(part @ self.directions.T).argmax(1) for part in texels.split(4096)])
-        self._solid_angle = (1.0 - texels[:, 2:] ** 2).clamp(min=0.0).sqrt()  # up to a factor
-        self.light = torch.ones_like(self.directions)
+        self._texel_roughness = lobe_roughness(4.0 * math.pi / len(texels))
+        constants = {
+            "directions": directions,
+            "light": torch.ones_like(directions),
+            "_texels": texels,
+            "_cell": torch.cat([(part @ directions.T).argmax(1) for part in texels.split(4096)]),
+            "_solid_angle": (1.0 - texels[:, 2:] ** 2).clamp(min=0.0).sqrt(),  # up to a factor
+        }
+        for name, value in constants.items():
+            self.register_buffer(name, value, persistent=False)
         self._cell_light: tuple[CellLight, object] | None = None
         self.cache: VisibilityCache | None = None
-        self.sees_all = False  # the surface is convex, near enough
+        self.sees_all = False
         self.radiance: Tensor | None = None
 
     def __getstate__(self) -> dict:
         return {**super().__getstate__(), "_cell_light": None}  # copies compute their own
 
     def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> None:
-        """Traces every vertex of the mesh. What the vertices send out is unknown until :meth:`refresh`.
+        """Traces a mesh and reads from its bits from now on."""
+        self.take(self.traced(scene, vertices, faces))
+
+    def take(self, bits: TracedBits) -> None:
+        """Reads from these bits from now on. What the vertices send out is unknown until :meth:`refresh`."""
+        self.cache, self.sees_all, self.radiance = bits.cache.to(self.directions.device), bits.sees_all, None
+
+    def traced(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> TracedBits:
+        """Traces every vertex of the mesh on the CPU. Changes nothing here: another thread may call it.
 
         Args:
             scene: The mesh below.
-            vertices: [n, 3], scene units.
+            vertices: [n, 3], scene units, on the CPU.
             faces: [m, 3].
         """
         mesh = trimesh.Trimesh(vertices.numpy(), faces.numpy(), process=False)
         normals = torch.from_numpy(np.array(mesh.vertex_normals, dtype=np.float32))
-        self.cache = VisibilityCache.trace(
-            scene, vertices.float(), normals, float(mesh.area), self.directions, offset=self.offset,
+        cache = VisibilityCache.trace(
+            scene, vertices.float(), normals, float(mesh.area), self.directions.cpu(), offset=self.offset,
             with_hits=self.indirect,
         )  # fmt: skip
-        self.radiance = None
-        open_bits, blocked_bits = (bit_counts(self.cache.bits[:, side]) for side in (0, 1))
+        open_bits, blocked_bits = (bit_counts(cache.bits[:, side]) for side in (0, 1))
         blocked = blocked_bits / (open_bits + blocked_bits).clamp(min=1)
-        self.sees_all = len(blocked) > 0 and blocked.max().item() < self.open_below
+        return TracedBits(cache, len(blocked) > 0 and blocked.max().item() < self.open_below)
 
     @torch.no_grad()
     def set_light(self, light: Light) -> None:
@@ -115,7 +140,7 @@ class VisibilityBits(nn.Module):
     def _cell_means(self, light: Light) -> CellLight:
         radiance = light(self._texels, torch.full_like(self._solid_angle, self._texel_roughness))
         weighted = torch.cat([radiance * self._solid_angle, self._solid_angle], dim=1)
-        sums = torch.zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
+        sums = weighted.new_zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
         power = weighted[:, :3].detach().sum(1, keepdim=True)
         centres = torch.zeros_like(self.directions).index_add(0, self._cell, self._texels * power)
         area = sums[:, 3].detach()
@@ -131,7 +156,7 @@ class VisibilityBits(nn.Module):
         """The share [n, k] of the light from each direction that arrives at points, and what the mesh sends from there,
         [n, k, 3] or None. Below the horizon both mean nothing."""
         if self.sees_all:
-            return torch.ones(len(positions), len(self.directions)), None
+            return positions.new_ones(len(positions), len(self.directions)), None
         return cached_visibility(self.cache, positions, normals, self.radiance)
 
     @torch.no_grad()

@@ -1,5 +1,6 @@
 """The operators of SplitNeRF: ``torch.ops.splitnerf.*`` with typed, documented wrappers."""
 
+from splitnerf.ops.adamw import AdamW, adamw_step_
 from splitnerf.ops.hash_grid import HashGrid, HashGridSpec, growth_for, hash_encode, hash_encode_jacobian
 from splitnerf.ops.light import fibonacci_directions, prefilter_light, sample_ggx_lobe
 from splitnerf.ops.light_pyramid import (
@@ -33,8 +34,8 @@ from splitnerf.ops.srgb import linear_to_srgb, srgb_to_linear
 from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_visibility, visibility_bits
 
 __all__ = [
-    "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "LightSums",
-    "MeshScene", "PackedSamples", "QUERIES", "SdfNetwork", "SparseMap", "Spread", "VisibilityCache", "brdf_lut",
+    "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "LightSums",
+    "MeshScene", "PackedSamples", "QUERIES", "SdfNetwork", "SparseMap", "Spread", "VisibilityCache", "adamw_step_", "brdf_lut",
     "cached_occlusion", "cached_visibility", "composite", "fibonacci_directions", "gradient_losses", "growth_for",
     "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters", "light_lookup", "light_sum_of_levels",
     "linear_to_srgb", "march_rays", "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors",

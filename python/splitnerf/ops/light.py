@@ -39,11 +39,13 @@ def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, l
 def fibonacci_directions(n: int, generator: torch.Generator | None = None, dtype=torch.float32) -> Tensor:
     """[n, 3] uniform lattice on the sphere under a random rotation (Haar measure).
 
-    At equal n its error in gbar is 2 to 10 times below that of independent directions.
+    At equal n its error in gbar is 2 to 10 times below that of independent directions. They are on the generator's device.
     """
-    lattice = torch.from_numpy(_core.fibonacci_sphere(n)).to(dtype)
-    q, r = torch.linalg.qr(torch.randn(3, 3, dtype=dtype, generator=generator))
-    return lattice @ (q * torch.sign(torch.diagonal(r)))
+    device = torch.device("cpu") if generator is None else generator.device
+    lattice = torch.from_numpy(_core.fibonacci_sphere(n)).to(device=device, dtype=dtype)
+    q, r = torch.linalg.qr(torch.randn(3, 3, dtype=dtype, generator=generator, device=device))
+    rotation = q * torch.sign(torch.diagonal(r))
+    return (lattice[:, :, None] * rotation).sum(1)
 
 
 def sample_ggx_lobe(axes: Tensor, roughness: Tensor, n_samples: int, seed: int = 0) -> Tensor:

@@ -1,5 +1,8 @@
 """Visibility and occlusion factors by tracing a triangle mesh.
 
+The mesh is traced on the CPU. Tensors on another device are copied there, and what was found is copied back: the caller
+waits for both.
+
 Neither operator has a gradient: its outputs are targets. Asking for one raises.
 """
 
@@ -51,7 +54,7 @@ def trace_visibility(scene: MeshScene, origins: Tensor, directions: Tensor, t_fa
         ValueError: A shape or dtype does not fit.
         IndexError: The scene no longer exists.
     """
-    return lib.trace_visibility(scene.handle, origins, directions, t_far)
+    return lib.trace_visibility(scene.handle, origins.cpu(), directions.cpu(), t_far).to(origins.device)
 
 
 def occlusion_factors(
@@ -99,9 +102,10 @@ def occlusion_factors(
     if n_channels not in (1, 3):
         raise ValueError(f"occlusion_factors: n_channels must be 1 or 3, got {n_channels}")
     o_d, o_s = lib.occlusion_factors(
-        scene.handle, positions, normals, lobe_dirs, roughness, environment,
+        scene.handle, *(x.cpu() for x in (positions, normals, lobe_dirs, roughness, environment)),
         n_diffuse_rays, n_specular_rays, offset, along_ray, seed,
     )  # fmt: skip
+    o_d, o_s = o_d.to(positions.device), o_s.to(positions.device)
     return (o_d, o_s) if n_channels == 3 else (o_d.mean(-1, keepdim=True), o_s.mean(-1, keepdim=True))
 
 

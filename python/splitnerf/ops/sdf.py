@@ -23,7 +23,7 @@ class SdfNetwork(NamedTuple):
     Attributes:
         spec: Shape of the hash grid that gives the features.
         n_active: Its open levels.
-        table: [spec.n_entries, spec.n_features].
+        table: [spec.n_entries, spec.n_features], of the dtype of the others; or float16 or bfloat16 beside float32.
         hidden, hidden_bias: [width, 3 + spec.n_outputs], [width].
         out, out_bias: [m, width], [m].
         beta: softplus(y) = log(1 + exp(beta y)) / beta.
@@ -39,6 +39,10 @@ class SdfNetwork(NamedTuple):
     out_bias: Tensor
     beta: float
     box: float
+
+    def snapshot(self) -> SdfNetwork:
+        """A copy that later steps of a training do not change."""
+        return SdfNetwork(*(x.clone() if isinstance(x, Tensor) else x for x in self))
 
     def arguments(self) -> tuple:
         """As the operators take them."""

@@ -1,11 +1,14 @@
 """Visibility bits cached on a mesh: occlusion factors and one bounce of light without a ray in the step.
 
+The bits are traced on the CPU (:func:`visibility_bits`, :meth:`VisibilityCache.trace`); what reads them runs wherever
+:meth:`VisibilityCache.to` has put them.
+
 No operator here has a gradient: asking for one raises.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
@@ -75,6 +78,11 @@ class VisibilityCache:
         return VisibilityCache(
             vertices, normals, directions, bits, hits, radius, *lib.vertex_grids(vertices, radius, GRID_LEVELS)
         )
+
+    def to(self, device: torch.device | str) -> VisibilityCache:
+        """A copy on a device; itself where it is there."""
+        moved = (getattr(self, field.name) for field in fields(self))
+        return VisibilityCache(*(x.to(device) if isinstance(x, Tensor) else x for x in moved))
 
     def n_bytes(self) -> int:
         tensors = (self.vertices, self.normals, self.directions, self.bits, self.hits, self.starts, self.order)

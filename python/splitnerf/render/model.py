@@ -20,6 +20,7 @@ from splitnerf.fields import (
     VisibilityBits,
 )
 from splitnerf.fields.sdf import SdfSample, sharpness
+from splitnerf.fields.visibility import TracedBits
 from splitnerf.ops import HashGridSpec, MeshScene, query_direction, shade_sums, split_sum_shade, summed_light
 
 START_BOUNCES = 3  # of indirect light on a new mesh
@@ -91,7 +92,8 @@ class SceneModel(nn.Module):
         spec = HashGridSpec(
             config.n_levels, config.n_features, config.base_resolution, config.growth, config.log2_table_size
         )
-        self.sdf_field = SdfField(spec, config.box, config.sdf_width, config.sdf_outputs, config.sphere_radius)
+        dtype = None if config.table_dtype == "float32" else getattr(torch, config.table_dtype)
+        self.sdf_field = SdfField(spec, config.box, config.sdf_width, config.sdf_outputs, config.sphere_radius, dtype)
         n_inputs = config.sdf_outputs + (3 + spec.n_outputs if config.head_inputs == "grid" else 0)
         self.material = MaterialHead(
             n_inputs, config.material_width, config.material_layers, config.initial_roughness, config.min_roughness
@@ -100,6 +102,11 @@ class SceneModel(nn.Module):
         self.light = make_light(config)
         self.variance = nn.Parameter(torch.tensor(config.initial_variance))
         self.occlusion_ready = False  # until the first mesh was traced the occlusion factors are 1
+
+    @property
+    def device(self) -> torch.device:
+        """Where the parameters are."""
+        return self.variance.device
 
     @property
     def s(self) -> Tensor:
@@ -225,16 +232,17 @@ class SceneModel(nn.Module):
         answers = self.occlusion(OcclusionQuery(*(part[leaders] for part in query)))
         return Occlusion(*(None if part is None else part[stretch] for part in answers))
 
-    def use_mesh(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> None:
-        """From now on occlusion factors count; bits are traced anew on this mesh, and its light bounces a few times.
+    def use_mesh(self, scene: MeshScene, vertices: Tensor, faces: Tensor, bits: TracedBits | None = None) -> None:
+        """From now on occlusion factors count; bits are those of this mesh, and its light bounces a few times.
 
         Args:
             scene: The mesh below.
-            vertices, faces: [n, 3], [m, 3].
+            vertices, faces: [n, 3], [m, 3], on the CPU.
+            bits: What its vertices see, where somebody has traced it; None: it is traced now.
         """
         self.occlusion_ready = self.occlusion is not None
         if isinstance(self.occlusion, VisibilityBits):
-            self.occlusion.trace(scene, vertices, faces)
+            self.occlusion.take(bits or self.occlusion.traced(scene, vertices, faces))
             self.refresh_light()
             for _ in range(START_BOUNCES):
                 self.refresh_indirect()

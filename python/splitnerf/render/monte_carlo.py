@@ -56,7 +56,7 @@ def monte_carlo_radiance(
         facing = torch.where((normals * view_dirs).sum(-1, keepdim=True) < 0, -normals, normals)
         origins = (positions + c.occlusion_offset * facing)[:, None].expand_as(directions)
         above = pdf.flatten() > 0
-        lit = torch.zeros(above.shape, dtype=torch.bool)
+        lit = torch.zeros_like(above)
         lit[above] = trace_visibility(scene, origins.reshape(-1, 3)[above], directions.reshape(-1, 3)[above])
         lit = lit.nonzero().squeeze(1)
         filter_roughness = lobe_roughness(1.0 / (k * pdf.flatten()[lit]))[:, None]
@@ -78,9 +78,9 @@ def monte_carlo_colours(
     weights = ray.shares
     rays = ray.samples.ray_indices[ray.shaded]
     key = torch.log(weights) - torch.log(
-        -torch.log(torch.rand(len(weights), generator=generator).clamp(1e-7, 1 - 1e-7))
+        -torch.log(torch.rand(len(weights), generator=generator, device=weights.device).clamp(1e-7, 1 - 1e-7))
     )
-    best = torch.full((len(ray.opacity),), -math.inf).scatter_reduce(0, rays, key, "amax")
+    best = torch.full_like(ray.opacity, -math.inf).scatter_reduce(0, rays, key, "amax")
     drawn = (key == best[rays]).nonzero().squeeze(1)
     rays, points = rays[drawn], ray.points
     on_surface = (ray.positions[drawn] - ray.normals[drawn] * ray.sdf[drawn, None]).detach()
@@ -89,7 +89,7 @@ def monte_carlo_colours(
     mean = composite(ray.weights.detach(), ray.values.detach(), ray.samples.offsets) / opacity
     colours = []
     for _ in range(2):
-        seed = int(torch.randint(1 << 31, (), generator=generator))
+        seed = int(torch.randint(1 << 31, (), generator=generator, device=generator.device))
         radiance = monte_carlo_radiance(
             model, scene, on_surface, ray.normals[drawn].detach(), view_dirs[rays], points.albedo[drawn], points.roughness[drawn],
             points.metallic[drawn], seed,

@@ -29,21 +29,22 @@ class OccupancyGrid:
         resolution: Cells along an edge.
         box: Half size of the cube.
         hull: [r, r, r] bool or None.
+        device: Of the cells, and of the points that the field is asked at.
 
     Attributes:
         values: [r^3] what is kept of each cell, part of a checkpoint: its signed distance.
         cells: [r, r, r] uint8.
     """
 
-    def __init__(self, resolution: int, box: float, hull: Tensor | None = None):
-        self.resolution, self.box, self.hull = resolution, box, hull
+    def __init__(self, resolution: int, box: float, hull: Tensor | None = None, device: torch.device | str = "cpu"):
+        self.resolution, self.box, self.hull, self.device = resolution, box, hull, device
         self.half_diagonal = math.sqrt(3.0) * box / resolution
-        self.values = torch.zeros(resolution**3)
-        self.cells = torch.full((resolution,) * 3, CELL_OCCUPIED, dtype=torch.uint8)
+        self.values = torch.zeros(resolution**3, device=device)
+        self.cells = torch.full((resolution,) * 3, CELL_OCCUPIED, dtype=torch.uint8, device=device)
 
     def centres(self) -> Tensor:
         """[r^3, 3] cell centres, scene units."""
-        axis = (torch.arange(self.resolution) + 0.5) * (2 * self.box / self.resolution) - self.box
+        axis = (torch.arange(self.resolution, device=self.device) + 0.5) * (2 * self.box / self.resolution) - self.box
         return torch.stack(torch.meshgrid(axis, axis, axis, indexing="ij"), dim=-1).reshape(-1, 3)
 
     @torch.no_grad()
@@ -61,7 +62,7 @@ class OccupancyGrid:
         """
         bound = LIPSCHITZ * self.half_diagonal + DENSITY_CUTOFF / s
         if first:
-            due = torch.arange(len(self.values))
+            due = torch.arange(len(self.values), device=self.device)
         else:
             near = self.values.abs() < 2.0 * bound
             due = (near | (torch.rand_like(self.values) < REFRESHED_SHARE)).nonzero().squeeze(1)
@@ -86,8 +87,10 @@ class AveragedGrid(OccupancyGrid):
     Source: SplitNeRF, supplement, after nerfacc's description of its occupancy grid.
     """
 
-    def __init__(self, resolution: int, box: float, step: float, hull: Tensor | None = None):
-        super().__init__(resolution, box, hull)
+    def __init__(
+        self, resolution: int, box: float, step: float, hull: Tensor | None = None, device: torch.device | str = "cpu"
+    ):
+        super().__init__(resolution, box, hull, device)
         self.step = step
 
     @torch.no_grad()
@@ -96,14 +99,14 @@ class AveragedGrid(OccupancyGrid):
     ) -> None:
         """All cells during the first 256 steps; then a quarter at random and a quarter of the cells from the occupied."""
         n = len(self.values)
-        due = torch.arange(n)
+        due = torch.arange(n, device=self.device)
         if not first and step >= ALL_CELLS_UNTIL:
             occupied = (self.cells.reshape(-1) == CELL_OCCUPIED).nonzero().squeeze(1)
-            due = torch.randint(n, (n // 4,))
+            due = torch.randint(n, (n // 4,), device=self.device)
             if len(occupied):
-                due = torch.cat([due, occupied[torch.randint(len(occupied), (n // 4,))]]).unique()
+                due = torch.cat([due, occupied[torch.randint(len(occupied), (n // 4,), device=self.device)]]).unique()
         cell = 2 * self.box / self.resolution
-        points = self.centres()[due] + (torch.rand(len(due), 3) - 0.5) * cell
+        points = self.centres()[due] + (torch.rand(len(due), 3, device=self.device) - 0.5) * cell
         f, half = evaluate(sdf, points), 0.5 * self.step
         opacity = -torch.expm1(logsigmoid(s * (f - half)) - logsigmoid(s * (f + half)))
         self.values[due] = torch.maximum(DECAY * self.values[due], opacity)
@@ -111,16 +114,16 @@ class AveragedGrid(OccupancyGrid):
         self._set(torch.where(self.values > threshold, CELL_OCCUPIED, CELL_EMPTY).to(torch.uint8), use_hull)
 
 
-def make_grid(config: Config, hull: Tensor | None = None) -> OccupancyGrid:
+def make_grid(config: Config, hull: Tensor | None = None, device: torch.device | str = "cpu") -> OccupancyGrid:
     """The grid that the setting ``occupancy`` names."""
     if config.occupancy == "average":
-        return AveragedGrid(config.grid_resolution, config.box, config.min_step, hull)
-    return OccupancyGrid(config.grid_resolution, config.box, hull)
+        return AveragedGrid(config.grid_resolution, config.box, config.min_step, hull, device)
+    return OccupancyGrid(config.grid_resolution, config.box, hull, device)
 
 
 def evaluate(sdf: Callable[[Tensor], Tensor], points: Tensor) -> Tensor:
     """The field at points [n, 3], in chunks."""
-    return torch.cat([sdf(chunk) for chunk in points.split(1 << 16)]) if len(points) else torch.empty(0)
+    return torch.cat([sdf(chunk) for chunk in points.split(1 << 16)]) if len(points) else points[:, 0]
 
 
 def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intrinsics: Tensor) -> Tensor:
@@ -133,9 +136,9 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
         poses: [n, 4, 4] camera-to-world, OpenGL axes.
         intrinsics: [n, 4] fx, fy, cx, cy in pixels.
     """
-    grid = OccupancyGrid(resolution, box)
+    grid = OccupancyGrid(resolution, box, device=masks.device)
     centres, cell = grid.centres(), 2 * box / resolution
-    inside = torch.ones(len(centres), dtype=torch.bool)
+    inside = torch.ones(len(centres), dtype=torch.bool, device=masks.device)
     n, height, width = masks.shape
     for i in range(n):
         fx, fy, cx, cy = intrinsics[i].tolist()

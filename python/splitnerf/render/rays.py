@@ -7,6 +7,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.data.dataset import Dataset
+from splitnerf.devices import tensor_cores
 
 
 def pixel_rays(pose: Tensor, intrinsics: Tensor, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
@@ -29,18 +30,20 @@ def pixel_matrix(pose: Tensor, intrinsics: Tensor) -> Tensor:
     fx, fy, cx, cy = intrinsics.unbind(-1)
     zero, one = torch.zeros_like(fx), torch.ones_like(fx)
     rows = [1 / fx, zero, -cx / fx, zero, -1 / fy, cy / fy, zero, zero, -one]
-    return pose[..., :3, :3] @ torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
+    with tensor_cores(False):
+        return pose[..., :3, :3] @ torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
 
 
 def through_pixels(matrix: Tensor, x: Tensor, y: Tensor) -> Tensor:
     """[n, 3] unit directions through image points x, y [n], by matrices [n, 3, 3] or [3, 3]."""
     points = torch.stack([x, y, torch.ones_like(x)], dim=-1)
-    return F.normalize((matrix @ points[..., None]).squeeze(-1), dim=-1)
+    return F.normalize((matrix * points[..., None, :]).sum(-1), dim=-1)
 
 
 def image_rays(pose: Tensor, intrinsics: Tensor, height: int, width: int) -> tuple[Tensor, Tensor]:
     """Rays through all pixel centres of an image, row by row, [H * W, 3] each."""
-    y, x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
+    rows, columns = (torch.arange(n, device=pose.device) + 0.5 for n in (height, width))
+    y, x = torch.meshgrid(rows, columns, indexing="ij")
     return pixel_rays(pose, intrinsics, x.reshape(-1), y.reshape(-1))
 
 
@@ -50,24 +53,28 @@ class PixelSource:
     Args:
         dataset: The train split.
         foreground_share: Share of the rays drawn within a few pixels of a mask.
+        generator: Draws the pixels. Images and cameras are kept on its device.
     """
 
     def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator):
-        self.pixels = torch.from_numpy(dataset.images).reshape(-1, 4)
-        self.poses, self.intrinsics = torch.from_numpy(dataset.poses), torch.from_numpy(dataset.intrinsics)
+        self.device = generator.device
+        images, self.poses, self.intrinsics = (
+            torch.from_numpy(x).to(self.device) for x in (dataset.images, dataset.poses, dataset.intrinsics)
+        )
+        self.pixels, self.masks = images.reshape(-1, 4), images[..., 3]
         self.matrices, self.origins = pixel_matrix(self.poses, self.intrinsics), self.poses[:, :3, 3].contiguous()
         self.height, self.width = dataset.height, dataset.width
         self.share, self.generator = foreground_share, generator
         margin = max(2, self.width // 50)
-        masks = torch.from_numpy(dataset.images[..., 3])[:, None]
-        near = F.max_pool2d(masks, 2 * margin + 1, stride=1, padding=margin) > 0
+        near = F.max_pool2d(self.masks[:, None], 2 * margin + 1, stride=1, padding=margin) > 0
         self.foreground = near.reshape(-1).nonzero().squeeze(1)
 
     def draw(self, n: int) -> tuple[Tensor, Tensor, Tensor]:
         """rays_o [n, 3], rays_d [n, 3] and the pixels [n, 4] (sRGB, straight alpha)."""
         n_near = int(n * self.share) if len(self.foreground) else 0
-        near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), generator=self.generator)]
-        anywhere = torch.randint(len(self.pixels), (n - n_near,), generator=self.generator)
+        draw = {"generator": self.generator, "device": self.device}
+        near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), **draw)]
+        anywhere = torch.randint(len(self.pixels), (n - n_near,), **draw)
         index = torch.cat([near, anywhere])
         row = index // self.width
         view, column = row // self.height, index - row * self.width

@@ -53,7 +53,7 @@ class FoundSamples(NamedTuple):
         beside: [m] the samples whose neighbours the last m are.
         step: Length of a sample, scene units.
         anneal: Of the cosine by which they were chosen.
-        n_evaluated: Points at which the distance was asked for to find them.
+        evaluated: [n_rays] int64, points at which the distance was asked for to find them.
     """
 
     packed: PackedSamples
@@ -64,7 +64,7 @@ class FoundSamples(NamedTuple):
     beside: Tensor
     step: float
     anneal: float
-    n_evaluated: int
+    evaluated: Tensor
 
 
 @dataclass
@@ -76,7 +76,7 @@ class RenderedRays:
         linear: Whether that is linear, or sRGB.
         opacity: [n_rays].
         samples: The packed samples.
-        n_evaluated: Points at which the distance was asked for.
+        evaluated: [n_rays] int64, points at which the distance was asked for.
         weights: [n].
         values: [n, 3] what is composited: radiance of the split sum, linear or sRGB as `compositing` says. With `shading =
             summed` the colour has, beside their composite, what the sum adds at each ray's heaviest sample.
@@ -94,7 +94,7 @@ class RenderedRays:
     linear: bool
     opacity: Tensor
     samples: PackedSamples
-    n_evaluated: int
+    evaluated: Tensor
     weights: Tensor
     values: Tensor
     gradients: Tensor
@@ -141,23 +141,22 @@ def find_samples(
     step = sample_step(c, s)
     if c.sample_above == 0:
         packed = march_rays(rays_o, rays_d, jitter, cells, c.box, step, c.max_samples_per_ray)
-        n_evaluated = len(packed.ray_indices)
+        evaluated = packed.offsets.diff()
     else:
         packed, evaluated = sample_rays(
             rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=s, anneal=anneal,
             min_weight=c.sample_above, min_transmittance=c.min_transmittance, reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
             max_samples=c.max_samples_per_ray,
         )  # fmt: skip
-        n_evaluated = int(evaluated.sum())
     directions = rays_d[packed.ray_indices]
     positions = rays_o[packed.ray_indices] + directions * packed.middles[:, None]
-    beside = torch.empty(0, dtype=torch.int64)
+    beside = torch.empty(0, dtype=torch.int64, device=positions.device)
     if probes is not None:
         beside = (probes.chosen * len(positions)).long() if len(positions) else beside
         neighbours = positions[beside] + probes.shifts[: len(beside)]
         positions = torch.cat([positions, probes.anywhere, neighbours])
     phase = (PHASES * jitter) % 1.0  # where samples stand shall not decide which are shaded
-    return FoundSamples(packed, rays_d, phase, positions, directions, beside, step, anneal, n_evaluated)
+    return FoundSamples(packed, rays_d, phase, positions, directions, beside, step, anneal, evaluated)
 
 
 def render_rays(
@@ -211,7 +210,7 @@ def render_rays(
         )
         mean = mean.index_add(0, samples.ray_indices[shaded[at]], gained)
     return RenderedRays(
-        mean, c.compositing == "linear", opacity, samples, found.n_evaluated, weights, values, field.gradient, found.beside,
+        mean, c.compositing == "linear", opacity, samples, found.evaluated, weights, values, field.gradient, found.beside,
         shaded, shares, positions, normals, sdf, points,
     )  # fmt: skip
 
@@ -229,14 +228,14 @@ def render_view(
     rays_o, rays_d = image_rays(pose, intrinsics, height, width)
     rows = []
     for o, d in zip(rays_o.split(chunk), rays_d.split(chunk)):
-        ray = render_rays(model, find_samples(model, cells, o, d, torch.full((len(o),), 0.5)))
+        ray = render_rays(model, find_samples(model, cells, o, d, torch.full_like(o[:, 0], 0.5)))
         p = ray.points
         maps = torch.cat(
             [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), ray.normals],
             1,
         )
-        weighed = ray.shares[:, None] * torch.cat([maps, torch.ones(len(maps), 1)], 1)
-        sums = torch.zeros(len(o), weighed.shape[1]).index_add(0, ray.samples.ray_indices[ray.shaded], weighed)
+        weighed = ray.shares[:, None] * torch.cat([maps, torch.ones_like(maps[:, :1])], 1)
+        sums = weighed.new_zeros(len(o), weighed.shape[1]).index_add(0, ray.samples.ray_indices[ray.shaded], weighed)
         mean = sums[:, :-1] / sums[:, -1:].clamp(min=MIN_OPACITY)
         rows.append(torch.cat([ray.colour.clamp(0, 1), ray.opacity[:, None], mean], 1))
     image = torch.cat(rows).view(height, width, -1)

@@ -6,22 +6,31 @@
 
 namespace splitnerf {
 
-template <class T> struct HashGridView {
+// S: what the table stores of each T, see half.h.
+template <class T, class S = T> struct HashGridView {
   HashLevel levels[kMaxLevels];
   int n_levels, n_active;
   const T* positions;  // [n, 3] in the unit cube
-  const T* table;      // [n_entries, F]
+  const S* table;      // [n_entries, F]
 };
+
+// An entry, read at once.
+template <class T, int F, class S> SPLITNERF_HD Pack<T, F> load_entry(const S* from) {
+  const Pack<S, F> stored = load_pack<F>(from);
+  Pack<T, F> entry;
+  for (int f = 0; f < F; ++f) entry[f] = widen(stored[f]);
+  return entry;
+}
 
 // The features of one level at a point, and their derivatives by its position.
 template <class T, int F> struct LevelFeatures {
   Pack<T, F> value{}, dx{}, dy{}, dz{};
 };
-template <int F, class T>
-SPLITNERF_HD LevelFeatures<T, F> level_features(const HashLevel& level, const T* table, Vec3<T> position) {
+template <int F, class T, class S>
+SPLITNERF_HD LevelFeatures<T, F> level_features(const HashLevel& level, const S* table, Vec3<T> position) {
   const HashCell<T> cell = hash_cell(level, position);
   Pack<T, F> corner[8];
-  for (int i = 0; i < 8; ++i) corner[i] = load_pack<F>(table + cell.index[i] * F);
+  for (int i = 0; i < 8; ++i) corner[i] = load_entry<T, F>(table + cell.index[i] * F);
   LevelFeatures<T, F> out;
   for (int f = 0; f < F; ++f) {
     const Trilinear<T> t = trilinear(corner[0][f], corner[1][f], corner[2][f], corner[3][f], corner[4][f], corner[5][f],
@@ -33,8 +42,8 @@ SPLITNERF_HD LevelFeatures<T, F> level_features(const HashLevel& level, const T*
 }
 
 // features [n, C] and jacobian [n, 3, C], C = n_levels F; closed levels are written as 0.
-template <class T, int F, bool WithJacobian> struct HashEncodeBody {
-  HashGridView<T> grid;
+template <class T, int F, bool WithJacobian, class S = T> struct HashEncodeBody {
+  HashGridView<T, S> grid;
   T *features, *jacobian;
 
   SPLITNERF_HD void operator()(int64_t p, int l) const {
@@ -90,27 +99,27 @@ template <class T, int F> struct HashScatterBody {
 };
 
 // Adds one level's part of the gradient to the position of point p; grad_features and grad_jacobian may be null.
-template <int F, class T>
+template <int F, class T, class S>
 SPLITNERF_HD void add_position_gradient(const HashLevel& level, int l, int n_levels, int64_t p, const T* positions,
-                                        const T* table, const T* grad_features, const T* grad_jacobian, Vec3<T>& grad) {
+                                        const S* table, const T* grad_features, const T* grad_jacobian, Vec3<T>& grad) {
   const int64_t columns = int64_t(n_levels) * F;
   const HashCell<T> cell = hash_cell(level, load3(positions + 3 * p));
   for (int i = 0; i < 8; ++i) {
     const CornerWeight<T> w = corner_weight_derivatives(cell, i);
-    const T* entry = table + cell.index[i] * F;
     for (int f = 0; f < F; ++f) {
-      if (grad_features) grad += w.d * (entry[f] * grad_features[p * columns + l * F + f]);
+      const T entry = widen(table[cell.index[i] * F + f]);
+      if (grad_features) grad += w.d * (entry * grad_features[p * columns + l * F + f]);
       if (!grad_jacobian) continue;
       const T* gj = grad_jacobian + p * 3 * columns + l * F + f;
       const T gx = gj[0], gy = gj[columns], gz = gj[2 * columns];
-      grad += Vec3<T>{w.dxy * gy + w.dxz * gz, w.dxy * gx + w.dyz * gz, w.dxz * gx + w.dyz * gy} * entry[f];
+      grad += Vec3<T>{w.dxy * gy + w.dxz * gz, w.dxy * gx + w.dyz * gz, w.dxz * gx + w.dyz * gy} * entry;
     }
   }
 }
 
 // grad_positions [n, 3], one thread a point.
-template <class T, int F> struct HashPositionsBody {
-  HashGridView<T> grid;
+template <class T, int F, class S = T> struct HashPositionsBody {
+  HashGridView<T, S> grid;
   const T *grad_features, *grad_jacobian;
   T* grad_positions;
 

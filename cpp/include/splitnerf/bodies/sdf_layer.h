@@ -189,8 +189,8 @@ template <class T> SPLITNERF_HD T sdf_bias_sum(const SdfTile<T>& tile, int n_poi
 }
 
 // The inputs of a point of the field itself: its position and the hash grid's features.
-template <int F, class T>
-SPLITNERF_HD void load_field_inputs(const HashGridView<T>& grid, T scale, Vec3<T> position, const SdfTile<T>& tile,
+template <int F, class T, class S>
+SPLITNERF_HD void load_field_inputs(const HashGridView<T, S>& grid, T scale, Vec3<T> position, const SdfTile<T>& tile,
                                     int p) {
   for (int axis = 0; axis < 3; ++axis) tile.input(axis, p) = position[axis];
   const Vec3<T> unit{position.x * scale + T(0.5), position.y * scale + T(0.5), position.z * scale + T(0.5)};
@@ -203,8 +203,8 @@ SPLITNERF_HD void load_field_inputs(const HashGridView<T>& grid, T scale, Vec3<T
 
 // Follows a ray through the field to its end; keep(t_start) takes the samples to be kept. Returns how often the distance was
 // asked for.
-template <int F, class T, class Keep>
-SPLITNERF_HD int64_t walk_ray(const HashGridView<T>& grid, const SdfLayer<T>& layer, const SdfTile<T>& tile, int p,
+template <int F, class T, class S, class Keep>
+SPLITNERF_HD int64_t walk_ray(const HashGridView<T, S>& grid, const SdfLayer<T>& layer, const SdfTile<T>& tile, int p,
                               const RayLattice<T>& lattice, const OccupancyView& cells, const MarchOptions& march,
                               const SampleRules<T>& rules, Keep keep) {
   Walk<T> walk(lattice, 0, march, cells);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 
 import torch
@@ -11,6 +12,7 @@ from splitnerf import ops
 from splitnerf.bench.stability import exact_fields
 from splitnerf.bench.stability.cases import Draw
 from splitnerf.bench.stability.entry import Entry, Rows
+from splitnerf.ops.hash_grid import rounded
 
 SPEC = ops.HashGridSpec(n_levels=6, n_features=2, base_resolution=4, growth=2.0, log2_table_size=9)
 WIDTH, OUTPUTS, BETA, BOX = 16, 5, 100.0, 1.0
@@ -38,9 +40,21 @@ def encoded(rows: Rows, shared: Rows) -> Rows:
     return {"features": ops.hash_encode(rows["positions"], shared["table"], SPEC)}
 
 
-def with_jacobian(rows: Rows, shared: Rows) -> Rows:
-    features, jacobian = ops.hash_encode_jacobian(rows["positions"], shared["table"], SPEC)
+def with_jacobian(rows: Rows, shared: Rows, stored: torch.Tensor | None = None) -> Rows:
+    features, jacobian = ops.hash_encode_jacobian(rows["positions"], shared["table"], SPEC, stored=stored)
     return {"features": features, "jacobian": jacobian}
+
+
+def from_16_bits(dtype: torch.dtype) -> Callable[[Rows, Rows], Rows]:
+    """:func:`with_jacobian` of a table that is read in 16 bits; in float64, of the same numbers."""
+
+    def call(rows: Rows, shared: Rows) -> Rows:
+        table = shared["table"]
+        if table.dtype == torch.float32:
+            return with_jacobian(rows, shared, rounded(table, dtype))
+        return with_jacobian(rows, {"table": table + (rounded(table, dtype).double() - table).detach()})
+
+    return call
 
 
 def draw_layer(draw: Draw, n: int) -> Rows:
@@ -74,14 +88,14 @@ def values(rows: Rows, shared: Rows) -> Rows:
     return {"values": ops.sdf_values(rows["positions"], field)[:, None]}
 
 
-def grid_entry(name: str, call, exact) -> Entry:
+def grid_entry(name: str, call, exact, dtype: torch.dtype = torch.float32) -> Entry:
     return Entry(
         name,
         draw=draw_positions,
         call=call,
         smooth=("positions",),
         smooth_shared=("table",),
-        shared=grid(),
+        shared={"table": grid()["table"].to(dtype).float()},
         conditioned=True,
         bound=2e-6,
         gradient_bound=4e-6,
@@ -95,6 +109,10 @@ WEIGHTS = ("hidden", "hidden_bias", "out", "out_bias")
 ENTRIES = (
     grid_entry("hash_encode", encoded, exact_fields.hash_encode),
     grid_entry("hash_encode_jacobian", with_jacobian, exact_fields.hash_encode_jacobian),
+    *(
+        grid_entry(f"hash_encode_jacobian, {name}", from_16_bits(dtype), exact_fields.hash_encode_jacobian, dtype)
+        for name, dtype in (("float16", torch.float16), ("bfloat16", torch.bfloat16))
+    ),
     Entry(
         "sdf_layer",
         draw=draw_layer,

@@ -168,5 +168,5 @@ of a row over the largest number there plus, where the condition counts, how muc
 change of the inputs; the columns "without condition" leave the latter out. The condition is only asked for above what
 is promised: an error just below that is an upper bound. The outputs of the worst thousand inputs were asked again in
 50 digits where the operator has such a formula: "against exact". Gradients are held against float64 alone. "Not finite" counts
-rows with NaN or infinity where the truth has a float32, or whose truth is NaN. No operator takes bfloat16
-or float16: they raise."""
+rows with NaN or infinity where the truth has a float32, or whose truth is NaN. Tables of the hash
+grid may be float16 or bfloat16: compared with float64 on the same numbers. No other input may be: they raise."""

@@ -1,0 +1,140 @@
+"""AdamW with one operator a tensor, on the CPU and the GPU, which can leave rows without gradient alone.
+
+Source: Loshchilov and Hutter 2019, Algorithm 2; rows without gradient: Mueller et al. 2022, section 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+import torch
+from torch import Tensor
+
+from splitnerf.ops._library import lib
+from splitnerf.ops.hash_grid import TableCopy
+
+
+def adamw_step_(
+    param: Tensor, grad: Tensor, exp_avg: Tensor, exp_avg_sq: Tensor, *, lr: float, beta1: float, beta2: float, eps: float,
+    weight_decay: float, step: int, sparse: bool = False, copy: Tensor | None = None,
+) -> None:  # fmt: skip
+    """One step of AdamW, written to param, exp_avg and exp_avg_sq.
+
+    ``m = beta1 m + (1 - beta1) g``, ``v = beta2 v + (1 - beta2) g^2``,
+    ``p = p (1 - lr weight_decay) - lr (m / (1 - beta1^step)) / (sqrt(v / (1 - beta2^step)) + eps)``.
+
+    A gradient that is NaN makes its number and both moments NaN. One whose square, times 1 - beta2, exceeds the dtype makes v
+    infinite, and its number is moved by weight decay alone from then on. One whose square vanishes counts as 0 in v.
+
+    Args:
+        param: Any shape, float32 or float64, contiguous.
+        grad: Like param.
+        exp_avg, exp_avg_sq: Like param, contiguous: the moments m and v; 0 before the first step.
+        lr: Learning rate, at least 0.
+        beta1, beta2: In [0, 1).
+        eps: At least 0.
+        weight_decay: At least 0, decoupled.
+        step: Steps taken, this one included; at least 1.
+        sparse: Leaves rows (of the last dimension) whose gradients are all exactly 0 as they are: param and both moments.
+        copy: Like param, float16 or bfloat16, contiguous, equal to param but for rounding: is written as well, rounded as by
+            :func:`splitnerf.ops.hash_grid.rounded`.
+
+    Raises:
+        ValueError: A shape, dtype or number does not fit; the message names it.
+    """
+    lib.adamw_step_(
+        param, grad, exp_avg, exp_avg_sq, lr, beta1, beta2, eps, weight_decay, step, sparse, copy
+    )  # fmt: skip
+    torch.autograd.graph.increment_version([t for t in (param, exp_avg, exp_avg_sq, copy) if t is not None])
+
+
+class AdamW(torch.optim.Optimizer):
+    """torch.optim.AdamW by :func:`adamw_step_`; a state_dict of either loads into the other.
+
+    Args:
+        params: Tensors, or groups of them with settings of their own, all contiguous.
+        lr, betas, eps, weight_decay, sparse: As of :func:`adamw_step_`.
+        copies: Copies of parameters that a step writes as well, as ``{grid.table: grid.copy}`` of a
+            :class:`splitnerf.ops.HashGrid` with a table_dtype. Without it the grid renews its copy on its own.
+
+    Raises:
+        ValueError: In a step, where a setting, a parameter or a gradient does not fit.
+
+    Example:
+        >>> table = torch.nn.Parameter(torch.zeros(4, 2))
+        >>> optimiser = AdamW([table], lr=0.1, sparse=True)
+        >>> table.grad = torch.tensor([[1.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+        >>> optimiser.step()
+        >>> table.detach()[0]
+        tensor([-0.1000,  0.0000])
+    """
+
+    counts_versions = True  # tells TableCopy that its steps are seen without a hook
+
+    def __init__(
+        self,
+        params: Iterable,
+        lr: float = 1e-3,
+        betas: tuple[float, float] = (0.9, 0.999),
+        eps: float = 1e-8,
+        weight_decay: float = 1e-2,
+        *,
+        sparse: bool = False,
+        copies: Mapping[Tensor, TableCopy] | None = None,
+    ):
+        super().__init__(params, {"lr": lr, "betas": betas, "eps": eps, "weight_decay": weight_decay, "sparse": sparse})
+        self._copies = dict(copies or {})
+
+    def load_state_dict(self, state_dict: dict) -> None:
+        """Takes over the moments and settings of this class or of torch.optim.AdamW, whose groups keep their ``sparse``.
+
+        Raises:
+            ValueError: The other one maximises or is AMSGrad.
+        """
+        if any(group.get("maximize") or group.get("amsgrad") for group in state_dict["param_groups"]):
+            raise ValueError("AdamW: a state with maximize or amsgrad cannot be gone on from")
+        ours = [group["sparse"] for group in self.param_groups]
+        super().load_state_dict(state_dict)
+        for group, theirs, sparse in zip(self.param_groups, state_dict["param_groups"], ours):
+            group["sparse"] = theirs.get("sparse", sparse)
+
+    def __setstate__(self, state: dict) -> None:
+        super().__setstate__(state)
+        self.__dict__.setdefault("_copies", {})
+        for group in self.param_groups:
+            group.setdefault("sparse", self.defaults["sparse"])
+        for moments in self.state.values():
+            moments["step"] = moments["step"].cpu()
+
+    @torch.no_grad()
+    def step(self, closure: Callable[[], Tensor] | None = None) -> Tensor | None:
+        """One step of every parameter that has a gradient; the closure, if any, is called before and its loss returned."""
+        loss = None
+        if closure is not None:
+            with torch.enable_grad():
+                loss = closure()
+        for group in self.param_groups:
+            for param in group["params"]:
+                if param.grad is not None:
+                    self._step(param, group)
+        return loss
+
+    def _step(self, param: Tensor, group: dict) -> None:
+        state = self.state[param]
+        if not state:
+            state["step"] = torch.zeros((), dtype=torch.float32)
+            state["exp_avg"] = torch.zeros_like(param)
+            state["exp_avg_sq"] = torch.zeros_like(param)
+        copy = self._copies.get(param)
+        beta1, beta2 = group["betas"]
+        adamw_step_(
+            param, param.grad, state["exp_avg"], state["exp_avg_sq"], lr=float(group["lr"]), beta1=beta1, beta2=beta2,
+            eps=group["eps"], weight_decay=group["weight_decay"], step=int(state["step"]) + 1, sparse=group["sparse"],
+            copy=None if copy is None else copy.of(param),
+        )  # fmt: skip
+        state["step"] += 1
+        if copy is not None:
+            copy.was_written(param)
+
+
+torch.library.register_fake("splitnerf::adamw_step_", lambda *arguments: None)

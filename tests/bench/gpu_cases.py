@@ -1,0 +1,443 @@
+"""Every operator that has a kernel, at the sizes of a training step on a GPU: its inputs, and how many operations it takes.
+
+Operations are those of the formula, a multiplication, an addition or an elementary function each counted as one, index
+arithmetic not at all. Bytes are those of the inputs and results, each moved once (:func:`bytes_moved`).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+import trimesh
+from test_ops_cuda import CASES as TEST_INPUTS
+from test_ops_cuda import with_gradients
+from torch import Tensor
+from torch.nn import functional as F
+
+from splitnerf.bench import eager
+from splitnerf.fields.light_pyramid import pyramid_maps
+from splitnerf.fields.sdf import SdfField
+from splitnerf.ops import (
+    CELL_EMPTY,
+    CELL_OCCUPIED,
+    CELL_OPAQUE,
+    HashGridSpec,
+    MeshScene,
+    VisibilityCache,
+    brdf_lut,
+    fibonacci_directions,
+)
+
+lib = torch.ops.splitnerf
+BOX, RADIUS, SHELL = 1.5, 0.7, 0.3  # the surface is a ball, and its samples lie in a shell about it
+CORNERS = 8
+UNREAD = {"sparse_product": (3, 4, 5)}  # inputs that are for the backward pass
+S, ANNEAL, MIN_TRANSMITTANCE = 60.0, 1.0, 1e-3
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much there is of everything; the defaults are a step of the preset for a GPU."""
+
+    rays: int = 8192
+    per_ray: int = 32  # samples
+    points: int = 25_600  # shaded
+    levels: int = 16
+    log2_table: int = 19
+    width: int = 64
+    outputs: int = 13
+    queries: int = 8192
+    lights: int = 8192
+    traced: int = 2048  # points with directions of their own
+    own: int = 16  # such directions
+    directions: int = 256  # of the bits
+    light_resolution: int = 128
+    subdivisions: int = 5  # of the mesh, 2 x 10242 vertices
+    entropy: int = 384
+    cells: int = 96
+
+    @property
+    def samples(self) -> int:
+        return self.rays * self.per_ray
+
+    @property
+    def spec(self) -> HashGridSpec:
+        return HashGridSpec(self.levels, 2, 32, 1.3195079, self.log2_table)
+
+    @property
+    def features(self) -> int:
+        return self.spec.n_outputs
+
+    def encode(self, numbers: int) -> int:
+        """Of a point: 6 for its place in a cell and, for each corner, 2 for its weight and 2 for each number gathered."""
+        return self.levels * (6 + CORNERS * (2 + 2 * numbers))
+
+    @property
+    def layer(self) -> int:
+        """Of a point: a matrix [width, 3 + features] with a vector."""
+        return 2 * self.width * (3 + self.features)
+
+
+TINY = Sizes(
+    rays=24, per_ray=8, points=40, levels=3, log2_table=8, width=16, outputs=5, queries=20, lights=64, traced=10, own=4,
+    directions=64, light_resolution=16, subdivisions=1, entropy=12, cells=12,
+)  # fmt: skip
+
+
+def unit(x: Tensor) -> Tensor:
+    return F.normalize(x, dim=-1)
+
+
+class Rays(NamedTuple):
+    origins: Tensor
+    directions: Tensor
+    jitter: Tensor
+    t: Tensor  # [samples], of their middles
+    offsets: Tensor
+    positions: Tensor
+    step: float
+
+
+class World:
+    """What the inputs are taken from, on the CPU in float32, made when asked for.
+
+    Args:
+        sizes: How much of it.
+    """
+
+    def __init__(self, sizes: Sizes):
+        self.sizes = sizes
+
+    def generator(self, seed: int) -> torch.Generator:
+        return torch.Generator().manual_seed(seed)
+
+    def rand(self, *shape: int, seed: int = 0) -> Tensor:
+        return torch.rand(*shape, generator=self.generator(seed))
+
+    def randn(self, *shape: int, seed: int = 0) -> Tensor:
+        return torch.randn(*shape, generator=self.generator(seed))
+
+    @functools.cached_property
+    def rays(self) -> Rays:
+        """Rays from around the ball to it, their samples side by side across its surface."""
+        s = self.sizes
+        origins = 3.0 * unit(self.randn(s.rays, 3))
+        aims = 0.6 * unit(self.randn(s.rays, 3, seed=1)) * self.rand(s.rays, 1, seed=2)
+        directions, step = unit(aims - origins), SHELL / s.per_ray
+        b = (origins * directions).sum(1, keepdim=True)
+        hit = -b - (b * b - 9.0 + RADIUS**2).clamp(min=0).sqrt()
+        t = (hit + step * (torch.arange(s.per_ray) - s.per_ray / 2 + 0.5)).reshape(-1)
+        offsets = s.per_ray * torch.arange(s.rays + 1)
+        index = torch.arange(s.rays).repeat_interleave(s.per_ray)
+        positions = origins[index] + directions[index] * t[:, None]
+        return Rays(origins, directions, self.rand(s.rays, seed=3), t, offsets, positions, step)
+
+    @functools.cached_property
+    def network(self) -> tuple:
+        torch.manual_seed(0)
+        field = SdfField(self.sizes.spec, BOX, self.sizes.width, self.sizes.outputs, RADIUS)
+        network = field.network()._replace(n_active=self.sizes.levels)
+        table = 1e-3 * self.randn(*network.table.shape, seed=4)
+        hidden = torch.cat([network.hidden[:, :3], self.randn(self.sizes.width, self.sizes.features, seed=5)], 1)
+        return network._replace(table=table, hidden=hidden).arguments()
+
+    def grid(self, scattered: bool = False) -> tuple:
+        """Arguments of the hash grid, at the rays' samples or anywhere."""
+        at = self.rand(self.sizes.samples, 3, seed=6) if scattered else self.rays.positions / (2 * BOX) + 0.5
+        table = self.randn(self.sizes.spec.n_entries, 2, seed=7)
+        return at, table, *self.sizes.spec.arguments(self.sizes.levels)
+
+    def grid_gradients(self, first: int, jacobian: bool, scattered: bool = False) -> tuple:
+        at, table, *numbers = self.grid(scattered)
+        n, c = self.sizes.samples, self.sizes.features
+        grads = (self.randn(n, c, seed=8), self.randn(n, 3, c, seed=9))[: 1 + jacobian]
+        return *(at, table)[:first], *grads, *numbers
+
+    def layer(self) -> tuple:
+        _, hidden, hidden_bias, out, out_bias, beta, *_ = self.network
+        at = self.rays.positions
+        table = 1e-3 * self.randn(self.sizes.spec.n_entries, 2, seed=7)
+        numbers = self.sizes.spec.arguments(self.sizes.levels)
+        encoded = lib.hash_encode_jacobian(at / (2 * BOX) + 0.5, table, *numbers)
+        return at, *encoded, hidden, hidden_bias, out, out_bias, beta, BOX
+
+    @functools.cached_property
+    def cells(self) -> Tensor:
+        n = self.sizes.cells
+        centres = ((torch.arange(n) + 0.5) / n - 0.5) * 2 * BOX
+        x, y, z = torch.meshgrid(centres, centres, centres, indexing="ij")
+        outside = (x * x + y * y + z * z).sqrt() - RADIUS
+        state = torch.where(outside.abs() < SHELL / 2 + BOX / n, CELL_OCCUPIED, CELL_EMPTY)
+        return torch.where(outside < -SHELL, CELL_OPAQUE, state).to(torch.uint8)
+
+    def marching(self) -> tuple:
+        return *self.rays[:3], self.cells, BOX, self.rays.step, 1024
+
+    def sampling(self) -> tuple:
+        rules = (self.rays.step, 1024, S, ANNEAL, 1e-3, MIN_TRANSMITTANCE, 0.1, 1.25)
+        return *self.rays[:3], self.cells, *self.network, *rules
+
+    @functools.cached_property
+    def distances(self) -> Tensor:
+        return self.rays.positions.norm(dim=1) - RADIUS
+
+    def neus(self) -> tuple:
+        half = 0.4 * self.rays.step
+        return self.distances + half, self.distances - half, torch.tensor(S), self.rays.offsets, MIN_TRANSMITTANCE
+
+    def surface(self) -> tuple:
+        gradient = unit(self.rays.positions) + 0.1 * self.randn(self.sizes.samples, 3, seed=10)
+        sharp = torch.tensor(S)
+        numbers = (self.rays.step, ANNEAL, MIN_TRANSMITTANCE)
+        return self.distances, gradient, self.rays.directions, sharp, self.rays.offsets, *numbers
+
+    @functools.cached_property
+    def weights(self) -> Tensor:
+        return lib.neus_weights(*self.neus())[0]
+
+    def spreading(self) -> tuple:
+        return self.weights, self.rays.t, self.rays.offsets, self.rays.jitter, 0.1, 4
+
+    def interpolation(self) -> tuple:
+        """Values of the shaded samples, and between which two each sample lies."""
+        shaded, first, second, share = lib.spread_samples(*self.spreading())[:4]
+        return self.randn(len(shaded), 8, seed=11), first, second, share
+
+    def interpolation_backward(self) -> tuple:
+        values, first, second, share = self.interpolation()
+        return self.randn(len(first), 8, seed=12), first, second, share, values
+
+    def shading(self) -> tuple:
+        """Normals, views, albedo, roughness, metallic."""
+        p = self.sizes.points
+        normals = unit(self.randn(p, 3, seed=13))
+        views = unit(normals + 0.7 * unit(self.randn(p, 3, seed=14)))
+        return normals, views, self.rand(p, 3, seed=15), 0.1 + 0.8 * self.rand(p, 1, seed=16), self.rand(p, 1, seed=17)
+
+    def threes(self, n: int) -> list[Tensor]:
+        return [0.1 + self.rand(self.sizes.points, 3, seed=18 + i) for i in range(n)]
+
+    def split_sum(self) -> tuple:
+        return *self.shading(), *self.threes(4), brdf_lut(), 0, True
+
+    def query(self) -> tuple:
+        normals, views, _, roughness, _ = self.shading()
+        return normals, views, roughness, brdf_lut(), True
+
+    def prefiltering(self) -> tuple:
+        s = self.sizes
+        roughness = 0.2 + 0.8 * self.rand(s.queries, 1, seed=31)
+        lights = fibonacci_directions(s.lights, self.generator(32))
+        return unit(self.randn(s.queries, 3, seed=30)), roughness, lights, self.rand(s.lights, 3, seed=33)
+
+    def prefiltering_backward(self) -> tuple:
+        queries, roughness, lights, light = self.prefiltering()
+        total = lib.prefilter_light(queries, roughness, lights, light)[1]
+        return queries, roughness, total, self.randn(self.sizes.queries, 3, seed=34), lights
+
+    def pyramid(self) -> tuple:
+        maps = pyramid_maps(self.sizes.light_resolution)
+        normals, _, _, roughness, _ = self.shading()
+        n_texels = int((maps.resolutions**2).sum())
+        harmonics = 0.1 * self.randn(len(maps.projection), 3, seed=36)
+        return normals, roughness, self.rand(n_texels, 3, seed=35), harmonics, maps.resolutions, maps.nodes, maps.zonal
+
+    def averaging(self) -> tuple:
+        matrix = pyramid_maps(self.sizes.light_resolution).averages
+        return *matrix, self.rand(len(matrix.transposed_offsets) - 1, 3, seed=37)
+
+    def own_directions(self) -> tuple:
+        """Normals, views, roughness, directions, densities, radiance."""
+        t, j = self.sizes.traced, self.sizes.own
+        normals = unit(self.randn(t, 3, seed=38))
+        views = unit(normals + 0.7 * unit(self.randn(t, 3, seed=39)))
+        roughness = 0.2 + 0.7 * self.rand(t, 1, seed=40)
+        drawn = lib.sample_bsdf(normals, views, roughness, j, 3)
+        return normals, views, roughness, *drawn, self.rand(t, j, 3, seed=41)
+
+    def shared_directions(self) -> tuple:
+        p, k = self.sizes.points, self.sizes.directions
+        normals, views, _, roughness, _ = self.shading()
+        seen = self.rand(p, k, seed=44), 0.2 * self.rand(p, k, 3, seed=45)
+        around = fibonacci_directions(k, self.generator(42)), torch.full((k,), 4 * math.pi / k)
+        return normals, views, roughness, *around, self.rand(k, 3, seed=43), *seen
+
+    @functools.cached_property
+    def cache(self) -> VisibilityCache:
+        """Of two balls that touch, in the middle of each other's sky."""
+        ball = trimesh.creation.icosphere(self.sizes.subdivisions, RADIUS)
+        mesh = trimesh.util.concatenate([ball, ball.copy().apply_translation((0.0, 0.0, 2 * RADIUS))])
+        vertices, normals = (torch.tensor(x.copy()).float() for x in (mesh.vertices, mesh.vertex_normals))
+        directions = fibonacci_directions(self.sizes.directions, self.generator(46))
+        scene = MeshScene(vertices.numpy(), mesh.faces)
+        return VisibilityCache.trace(scene, vertices, normals, mesh.area, directions, with_hits=True)
+
+    def near_the_mesh(self) -> tuple:
+        normals = unit(self.randn(self.sizes.points, 3, seed=47))
+        c = self.cache
+        kept = (c.vertices, c.normals, c.starts, c.order, c.radius, c.bits, c.hits)
+        return RADIUS * normals, normals, *kept, self.rand(len(c.vertices), 3, seed=48), c.directions
+
+    def occlusion(self) -> tuple:
+        at, normals, *cache = self.near_the_mesh()
+        lobes = unit(normals + 0.3 * self.randn(*normals.shape, seed=49))
+        light = self.rand(self.sizes.directions, 3, seed=50)
+        return at, normals, lobes, self.rand(len(at), 1, seed=51), *cache, light
+
+    def pixels(self) -> tuple:
+        r = self.sizes.rays
+        return self.rand(r, 3, seed=52), self.rand(r, seed=53), self.rand(r, 4, seed=54), self.rand(r, 3, seed=55), True
+
+    def normals_beside(self) -> tuple:
+        """Gradients of all samples, then of points beside some of them."""
+        n, m = self.sizes.samples, self.sizes.entropy
+        gradients = unit(self.randn(n + m, 3, seed=56)) * (0.9 + 0.2 * self.rand(n + m, 1, seed=57))
+        return gradients, self.weights, torch.randint(n, (m,), generator=self.generator(58))
+
+    def materials(self) -> tuple:
+        p = self.sizes.points
+        return self.rand(p, 3, seed=59), self.rand(p, 1, seed=60), self.rand(p, seed=61), False
+
+
+class Case(NamedTuple):
+    """One line of the table.
+
+    Attributes:
+        op: The operator.
+        inputs: On the CPU in float32.
+        operations: Of one call, from the sizes and the call's results.
+        plain: The same in torch eager, where the package has that.
+        table: Which input may be stored in 16 bits.
+        variant: What tells it from another line of the same operator.
+    """
+
+    op: str
+    inputs: Callable[[World], tuple]
+    operations: Callable[[Sizes, tuple], float]
+    plain: Callable[..., object] | None = None
+    table: int | None = None
+    variant: str = ""
+
+    @property
+    def name(self) -> str:
+        return f"{self.op}, {self.variant}" if self.variant else self.op
+
+
+def backward(case: Case, operations: Callable[[Sizes, tuple], float], *between: int) -> Case:
+    """The backward pass of a case: its inputs, some of its results, random gradients to all of them."""
+    return Case(case.op + "_backward", lambda w: with_gradients(case.op, case.inputs(w), *between), operations)
+
+
+def bytes_moved(case: Case, sizes: Sizes, inputs: tuple, outputs: tuple) -> float:
+    """Each input read once and each result written once; of a table no more entries than there are corners."""
+    read = [x for i, x in enumerate(inputs) if i not in UNREAD.get(case.op, ())]
+    tensors = [x for x in (*read, *outputs) if isinstance(x, Tensor)]
+    total = sum(x.numel() * x.element_size() for x in tensors)
+    entries = sizes.spec.n_entries
+    if case.op in ("hash_encode", "hash_encode_jacobian", "hash_encode_jacobian_backward_positions", "sdf_values"):
+        corners = CORNERS * len(inputs[0])
+        touched = sum(min(level[2], corners) for level in sizes.spec.levels()[: sizes.levels])
+        table = next(x for x in tensors if len(x) == entries)
+        total -= (entries - touched) * table.shape[1] * table.element_size()
+    return float(total)
+
+
+def gather(operations_of_a_sample: Callable[[Sizes], float]) -> Callable[[Sizes, tuple], float]:
+    return lambda s, out: s.samples * operations_of_a_sample(s)
+
+
+def a_point(n: float) -> Callable[[Sizes, tuple], float]:
+    return lambda s, out: n * s.points
+
+
+def a_sample(n: float) -> Callable[[Sizes, tuple], float]:
+    return lambda s, out: n * s.samples
+
+
+# 2 features; with the Jacobian 4 numbers of each (the value and three derivatives) are summed over the corners.
+HASH = Case("hash_encode", World.grid, gather(lambda s: s.encode(2)), eager.hash_encode, 1)
+SCATTERED = Case(
+    "hash_encode",
+    lambda w: w.grid(True),
+    gather(lambda s: s.encode(2)),
+    eager.hash_encode,
+    1,
+    variant="scattered points",
+)
+# The layer's forward: the hidden units, the outputs, the distance's gradient by the units and the Jacobian.
+LAYER = Case(
+    "sdf_layer", World.layer,
+    gather(lambda s: 2 * s.layer + 2 * s.outputs * s.width + 6 * s.features + 4 * s.width),
+)  # fmt: skip
+QUERY = Case("query_direction", World.query, a_point(45), eager.query_direction)
+SPLIT = Case("split_sum_shade", World.split_sum, a_point(70), eager.split_sum_shade)
+SUMS = Case("shade_sums", lambda w: (*w.shading(), *w.threes(3), brdf_lut(), True), a_point(75))
+PREFILTER = Case(  # of a pair: a cosine 5, the lobe 10, three sums and their total 7
+    "prefilter_light", World.prefiltering, lambda s, out: 22 * s.queries * s.lights,
+    eager.prefilter_light,
+)  # fmt: skip
+# Half of the points are rough: 169 basis functions of 4 each, and their sums with three colours, 6 each.
+LOOKUP = Case("light_lookup", World.pyramid, a_point(60 + 0.5 * 169 * 10))
+OWN = Case("monte_carlo_light", World.own_directions, lambda s, out: 55 * s.traced * s.own)
+SHARED = Case("summed_light", World.shared_directions, lambda s, out: 45 * s.points * s.directions)
+NEUS = Case("neus_weights", World.neus, a_sample(12))
+SURFACE = Case("surface_weights", World.surface, a_sample(35))
+COMPOSITE = Case("composite", lambda w: (w.weights, w.randn(w.sizes.samples, 8), w.rays.offsets), a_sample(16))
+SRGB = Case("linear_to_srgb", lambda w: (w.rand(w.sizes.samples, 3),), a_sample(12))
+
+CASES = [
+    HASH, SCATTERED,
+    Case("hash_encode_backward", lambda w: w.grid_gradients(1, False), gather(lambda s: s.encode(2))),
+    Case("hash_encode_backward", lambda w: w.grid_gradients(1, False, True), gather(lambda s: s.encode(2)),
+         variant="scattered points"),
+    Case("hash_encode_jacobian", World.grid, gather(lambda s: s.encode(8)), None, 1),
+    Case("hash_encode_jacobian_backward", lambda w: w.grid_gradients(1, True), gather(lambda s: s.encode(8))),
+    # Of a corner: the products with four gradients and six second derivatives of the weight.
+    Case("hash_encode_jacobian_backward_positions", lambda w: w.grid_gradients(2, True),
+         gather(lambda s: s.encode(8) + s.levels * CORNERS * 12)),
+    # The units twice (value and slope), the gradients to features and slopes, and two outer products for the weights.
+    LAYER, backward(LAYER, gather(lambda s: 6 * s.layer + 4 * s.outputs * s.width + 12 * s.features)),
+    Case("sdf_values", lambda w: (w.rays.positions, *w.network),
+         gather(lambda s: s.encode(2) + s.layer + 6 * s.width), None, 1),
+    # Per distance asked for, as many as the last result says.
+    Case("sample_rays", World.sampling,
+         lambda s, out: float(out[-1].sum()) * (s.encode(2) + s.layer + 6 * s.width + 20), None, 4),
+    Case("march_rays", World.marching, lambda s, out: 12 * len(out[0])),
+    NEUS, backward(NEUS, a_sample(20), 0), SURFACE, backward(SURFACE, a_sample(60), 1),
+    COMPOSITE, backward(COMPOSITE, a_sample(32)),
+    Case("spread_samples", World.spreading, a_sample(6)),
+    Case("interpolate", World.interpolation, a_sample(24)),
+    Case("interpolate_backward", World.interpolation_backward, a_sample(24)),
+    QUERY, backward(QUERY, a_point(110)), SPLIT, backward(SPLIT, a_point(180)), SUMS, backward(SUMS, a_point(190)),
+    PREFILTER, Case("prefilter_light_backward", World.prefiltering_backward, lambda s, out: 22 * s.queries * s.lights),
+    Case("sample_ggx_lobe", lambda w: (*w.prefiltering()[:2], w.sizes.own, 3), lambda s, out: 25 * s.queries * s.own),
+    Case("sparse_product", World.averaging, lambda s, out: 12 * s.light_resolution**2), LOOKUP,
+    backward(LOOKUP, a_point(120 + 169 * 10)),
+    Case("sample_bsdf", lambda w: (*w.own_directions()[:3], w.sizes.own, 3), lambda s, out: 60 * s.traced * s.own),
+    OWN, backward(OWN, lambda s, out: 120 * s.traced * s.own), SHARED,
+    backward(SHARED, lambda s, out: 100 * s.points * s.directions),
+    # About eight vertices around a point, an addition and a product for each of the directions.
+    Case("cached_visibility", World.near_the_mesh, lambda s, out: 16 * s.points * s.directions),
+    Case("cached_occlusion", World.occlusion, lambda s, out: (16 + 30) * s.points * s.directions),
+    SRGB, backward(SRGB, a_sample(12)), Case("srgb_to_linear", lambda w: (w.rand(w.sizes.samples, 3),), a_sample(12)),
+    Case("pixel_losses", World.pixels, lambda s, out: 60 * s.rays),
+    Case("gradient_losses", World.normals_beside, a_sample(10)),
+    Case("material_losses", World.materials, a_point(20)),
+    # Of a pair of five numbers: their distance 15, its exponential and the sum.
+    Case("quadratic_entropy", lambda w: (w.randn(w.sizes.entropy, 5),), lambda s, out: 17 * s.entropy**2),
+]  # fmt: skip
+
+
+def all_cases() -> list[Case]:
+    """Those above, and operators that are new since, with the inputs of their test."""
+    known = {case.op for case in CASES}
+    missing = [op for op in TEST_INPUTS if op not in known]
+    return CASES + [
+        Case(op, lambda w, op=op: TEST_INPUTS[op](torch.float32), lambda s, out: math.nan, variant="small inputs")
+        for op in missing
+    ]

@@ -1,0 +1,283 @@
+"""AdamW as one operator: against torch's, in float64, at the ends of the range; rows left alone; copies; states exchanged."""
+
+from __future__ import annotations
+
+import copy
+import math
+
+import pytest
+import torch
+from op_checks import check_error, devices, generator, lib
+from test_ops_hash_grid import SPEC
+
+from splitnerf.checkpoint import restore_optimiser
+from splitnerf.ops import AdamW, HashGrid, adamw_step_
+from splitnerf.ops.hash_grid import rounded
+
+SHAPES = [(), (7,), (1000, 2), (37, 1), (5, 300), (3, 2, 4), (0, 2)]
+SETTINGS = {"lr": 0.01, "betas": (0.9, 0.99), "eps": 1e-15, "weight_decay": 0.1}
+each_device = pytest.mark.parametrize("device", devices("adamw_step_"))
+
+
+def parameters(device, dtype) -> list[torch.nn.Parameter]:
+    g = generator(3)
+    return [
+        torch.nn.Parameter(torch.randn(shape, generator=g, dtype=torch.float64).to(device, dtype)) for shape in SHAPES
+    ]
+
+
+def run(optimiser: torch.optim.Optimizer, steps: range) -> None:
+    """Steps with drawn gradients, some of them 0, under a rate that changes."""
+    g = generator(4)
+    for step in range(steps.stop):
+        for group in optimiser.param_groups:
+            group["lr"] = 0.01 / (1 + step)
+            for parameter in group["params"]:
+                grad = torch.randn(parameter.shape, generator=g, dtype=torch.float64) * 10 ** (step % 5 - 2)
+                grad = torch.where(torch.rand(parameter.shape, generator=g) < 0.3, 0, grad)
+                parameter.grad = grad.to(parameter)
+        if step in steps:
+            optimiser.step()
+
+
+def close(got: list, expected: list, tolerance: float) -> None:
+    for a, b in zip(got, expected):
+        torch.testing.assert_close(a.double(), b.double(), rtol=tolerance, atol=tolerance)
+
+
+def everything(optimiser: torch.optim.Optimizer) -> list[torch.Tensor]:
+    """Parameters and moments."""
+    ours = [p for group in optimiser.param_groups for p in group["params"]]
+    return [x.detach().cpu() for p in ours for x in (p, *(optimiser.state[p][m] for m in ("exp_avg", "exp_avg_sq")))]
+
+
+@each_device
+@pytest.mark.parametrize("decay", [0.0, 0.1])
+def test_fifty_steps_are_those_of_torch(device, decay):
+    settings = SETTINGS | {"weight_decay": decay}
+    ours, fused = AdamW(parameters(device, torch.float32), **settings), parameters(device, torch.float32)
+    theirs = torch.optim.AdamW(fused, **settings, fused=True)
+    exact = torch.optim.AdamW(parameters("cpu", torch.float64), **settings)
+    double = AdamW(parameters(device, torch.float64), **settings)
+    for optimiser in (ours, theirs, exact, double):
+        run(optimiser, range(50))
+    close(everything(double), everything(exact), 1e-12)
+    close(everything(ours), everything(exact), 3e-6)
+    close(everything(ours), everything(theirs), 3e-6)
+
+
+@each_device
+@pytest.mark.parametrize("shape", SHAPES)
+def test_rows_without_gradient_are_left_alone(device, shape):
+    g = generator()
+    start = [torch.randn(shape, generator=g) for _ in range(2)] + [torch.rand(shape, generator=g)]
+    grad = torch.randn(shape, generator=g)
+    if shape and grad.numel():
+        rows = grad.view(-1, shape[-1])
+        rows[torch.rand(len(rows), generator=g) < 0.6] = 0.0
+        rows[:, 0] *= torch.rand(len(rows), generator=g) < 0.5  # one number of a row may be 0
+        rows[-1] = -0.0
+    numbers = dict(lr=0.1, beta1=0.9, beta2=0.99, eps=1e-8, weight_decay=0.1, step=5)
+    found = []
+    for sparse in (False, True):
+        now = [x.clone().to(device) for x in start]
+        adamw_step_(now[0], grad.to(device), *now[1:], **numbers, sparse=sparse)
+        found.append([x.cpu() for x in now])
+    still = (grad == 0) if not shape else (grad == 0).all(-1, keepdim=True).expand(shape)
+    for before, dense, sparse in zip(start, *found):
+        assert torch.equal(sparse, torch.where(still, before, dense))
+        assert not grad.numel() or not shape or not torch.equal(sparse, dense)
+
+
+@each_device
+def test_all_rows_moving_is_the_dense_step(device):
+    found = []
+    for sparse in (False, True):
+        table = torch.nn.Parameter(torch.linspace(-1, 1, 2000, device=device).view(1000, 2))
+        table.grad = torch.ones_like(table)
+        AdamW([table], **SETTINGS, sparse=sparse).step()
+        found.append(table.detach())
+    assert torch.equal(*found)
+
+
+@each_device
+def test_the_ends_of_the_range(device):
+    grads = torch.tensor([1e18, -1e18, 1e-30, 1e-44, 0.0, math.nan, 1e30, math.inf], device=device)
+    param = torch.nn.Parameter(torch.ones(8, device=device))
+    optimiser = AdamW([param], lr=0.01, betas=(0.9, 0.99), eps=1e-15, weight_decay=0.0)
+    for _ in range(3):
+        param.grad = grads
+        optimiser.step()
+    got, v = param.detach().cpu(), optimiser.state[param]["exp_avg_sq"].cpu()
+    torch.testing.assert_close(got[:2], torch.tensor([0.97, 1.03]))
+    assert got[2] == got[3] == got[4] == 1.0  # far below eps
+    assert got[5].isnan() and v[5].isnan()
+    assert got[6] == 1.0 and v[6].isinf()  # moved no more
+    assert got[7].isnan()  # as with torch: inf / inf
+    theirs = torch.nn.Parameter(torch.ones(8))
+    fused = torch.optim.AdamW([theirs], lr=0.01, betas=(0.9, 0.99), eps=1e-15, weight_decay=0.0, fused=True)
+    for _ in range(3):
+        theirs.grad = grads.cpu()
+        fused.step()
+    torch.testing.assert_close(got, theirs.detach(), equal_nan=True)
+
+
+# ---- copies of 16 bits ----
+
+
+@each_device
+@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16], ids=["float16", "bfloat16"])
+def test_a_copy_is_rounded_as_torch_rounds_and_never_infinite(device, dtype):
+    """At a rate of 0, on numbers of all magnitudes, and on those halfway between two of the copy's."""
+    bits = torch.randint(-(2**31), 2**31, (100_000,), generator=generator()).to(torch.int32)
+    bits[::4] &= -0x1000 if dtype == torch.float16 else -0x8000
+    bits[1::4] = 0x33000000 + bits[1::4].remainder(0x17000000)  # what float16 has numbers for
+    bits[2::4] = 0x33000000 + (bits[2::4].remainder(0x17000000) & -0x1000)
+    param = bits.view(torch.float32).clone()
+    param[:6] = torch.tensor([65504.0, 65520.0, 1e30, math.inf, -math.inf, math.nan])
+    param, zeros = param.to(device), torch.zeros(len(param), device=device)
+    copy = rounded(param, dtype) * 0
+    arguments = torch.ones_like(zeros), zeros, zeros.clone(), 0.0, 0.9, 0.99, 1e-8, 0.0, 1, False, copy
+    lib.adamw_step_(param, *arguments)
+    torch.testing.assert_close(copy, rounded(param, dtype), rtol=0, atol=0, equal_nan=True)
+    assert not copy.isinf().any() and copy[5].isnan()
+
+
+@pytest.mark.parametrize("sparse", [False, True])
+def test_the_grid_takes_the_copy_that_the_step_wrote(sparse):
+    grid = HashGrid(SPEC, 1.0, torch.float16)
+    optimiser = AdamW(grid.parameters(), lr=0.1, sparse=sparse, copies={grid.table: grid.copy})
+    x, first = torch.rand(5, 3, generator=generator()), grid.stored()
+    before = first.clone()
+    for _ in range(3):
+        grid.table.grad = None
+        grid(x).square().sum().backward()
+        optimiser.step()
+        assert grid.stored() is first  # not made anew
+        assert torch.equal(first, grid.table.detach().half())
+    assert not torch.equal(before, first)
+    torch.optim.SGD(grid.parameters(), lr=0.1).step()
+    assert torch.equal(grid.stored(), grid.table.detach().half())
+    with torch.no_grad():
+        grid.table.zero_()
+    assert not grid.stored().any()
+
+
+def test_writing_is_seen_by_autograd():
+    param = torch.nn.Parameter(torch.ones(3))
+    loss = param.square().sum()
+    param.grad = torch.ones(3)
+    AdamW([param]).step()
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        loss.backward()
+
+
+# ---- states ----
+
+
+def test_states_pass_from_one_to_the_other():
+    """Five steps of one and five of the other are ten of either; by state_dict and by a checkpoint."""
+    make = {"ours": AdamW, "torch": lambda *a, **k: torch.optim.AdamW(*a, **k, fused=True)}
+    whole = torch.optim.AdamW(parameters("cpu", torch.float32), **SETTINGS, fused=True)
+    run(whole, range(10))
+    for first, second in (("ours", "torch"), ("torch", "ours"), ("ours", "ours")):
+        for by_checkpoint in (False, True):
+            ours = parameters("cpu", torch.float32)
+            before = make[first](ours, **SETTINGS)
+            run(before, range(5))
+            after = make[second](ours, **SETTINGS)
+            if by_checkpoint:
+                restore_optimiser(after, {"optimiser": before.state_dict()}, None)
+            else:
+                after.load_state_dict(before.state_dict())
+            run(after, range(5, 10))
+            close(everything(after), everything(whole), 3e-6)
+            for group in after.state_dict()["state"].values():
+                assert list(group) == ["step", "exp_avg", "exp_avg_sq"]
+                assert group["step"].dtype == torch.float32 and group["step"] == 10
+
+
+def test_a_group_may_be_sparse_and_a_closure_is_called():
+    table, other = (torch.nn.Parameter(torch.ones(4, 2)) for _ in range(2))
+    optimiser = AdamW([{"params": [table], "sparse": True}, {"params": [other]}], lr=0.1)
+
+    def closure():
+        optimiser.zero_grad()
+        loss = table[0].sum() + other[0].sum()
+        loss.backward()
+        return loss
+
+    assert optimiser.step(closure) == 4.0
+    assert (table[1:] == 1.0).all() and (table[0] < 1.0).all() and (other < 1.0).all()
+    optimiser.load_state_dict(optimiser.state_dict())
+    assert [group["sparse"] for group in optimiser.param_groups] == [True, False]
+
+
+# ---- the operator ----
+
+
+def arguments(device="cpu", copy=None) -> list:
+    tensors = [torch.rand(6, 2, generator=generator(i)).to(device) for i in range(4)]
+    return [*tensors, 0.1, 0.9, 0.99, 1e-8, 0.1, 3, True, copy]
+
+
+@each_device
+def test_opcheck(device):
+    for stored in (None, torch.zeros(6, 2, dtype=torch.float16, device=device)):
+        torch.library.opcheck(lib.adamw_step_, tuple(arguments(device, stored)))
+
+
+@each_device
+def test_a_gradient_need_not_be_contiguous(device):
+    found = []
+    for grad in (arguments(device)[1], arguments(device)[1].t().contiguous().t()):
+        now = arguments(device)
+        now[1] = grad
+        lib.adamw_step_(*now)
+        found.append(now[0])
+    assert torch.equal(*found)
+
+
+def test_errors_name_what_is_wrong():
+    def wrong(position, value, *parts):
+        changed = arguments()
+        changed[position] = value
+        check_error(lambda: lib.adamw_step_(*changed), "adamw_step_", *parts)
+
+    good = arguments()[0]
+    wrong(0, good.long(), "param", "float32 or float64", "int64")
+    wrong(0, good.t().contiguous().t(), "param", "contiguous")
+    wrong(1, good[:5], "grad", "[6, 2] float32", "[5, 2] float32")
+    wrong(1, good.double(), "grad", "float32", "float64")
+    wrong(2, good[:, :1], "exp_avg", "[6, 2]", "[6, 1]")
+    wrong(3, good.t().contiguous().t(), "exp_avg_sq", "contiguous")
+    wrong(4, -0.1, "lr", "-0.1")
+    wrong(4, math.nan, "lr", "nan")
+    wrong(5, 1.0, "beta1", "[0, 1)", "1.0")
+    wrong(6, -0.5, "beta2", "[0, 1)")
+    wrong(7, -1.0, "eps")
+    wrong(8, -1.0, "weight_decay")
+    wrong(9, 0, "step", "at least 1", "0")
+    wrong(11, good.clone(), "copy", "float16 or bfloat16", "float32")
+    wrong(11, good[:5].half(), "copy", "[6, 2] float16", "[5, 2]")
+
+
+def test_a_copy_of_an_optimiser_goes_on():
+    weight = torch.nn.Parameter(torch.ones(3, 2))
+    optimiser = AdamW([weight], lr=0.1)
+    weight.grad = torch.ones(3, 2)
+    optimiser.step()
+    twin = copy.deepcopy(optimiser)
+    twin.param_groups[0]["params"][0].grad = torch.ones(3, 2)
+    twin.step()
+    assert twin.param_groups[0]["params"][0][0, 0] < weight[0, 0]
+
+
+def test_states_that_cannot_be_gone_on_from_are_refused():
+    weight = torch.nn.Parameter(torch.ones(3, 2))
+    ours = AdamW([{"params": [weight], "sparse": True}], lr=0.1)
+    for wrong in ("maximize", "amsgrad"):
+        with pytest.raises(ValueError, match=wrong):
+            ours.load_state_dict(torch.optim.AdamW([weight], lr=0.1, **{wrong: True}).state_dict())
+    ours.load_state_dict(torch.optim.AdamW([weight], lr=0.2).state_dict())
+    assert ours.param_groups[0]["sparse"] and ours.param_groups[0]["lr"] == 0.2
