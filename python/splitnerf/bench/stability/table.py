@@ -7,13 +7,15 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from splitnerf.bench.machine import describe_machine
-from splitnerf.bench.stability import fields, light, losses, properties, rays, shading
+from splitnerf.bench.stability import fields, light, losses, optimiser, properties, rays, shading
 from splitnerf.bench.stability.entry import Entry, Rows
 from splitnerf.bench.stability.properties import Property, Verdict, verify
 from splitnerf.bench.stability.search import Result, run
 from splitnerf.errors import InputError
 
-ENTRIES: tuple[Entry, ...] = shading.ENTRIES + light.ENTRIES + rays.ENTRIES + fields.ENTRIES + losses.ENTRIES
+ENTRIES: tuple[Entry, ...] = (
+    shading.ENTRIES + light.ENTRIES + rays.ENTRIES + fields.ENTRIES + losses.ENTRIES + optimiser.ENTRIES
+)
 PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
 NAME = "stability"
 COLUMNS = (
