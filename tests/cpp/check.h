@@ -1,4 +1,4 @@
-// What the tests of formulas share: seeded inputs, and gradients by central differences.
+// What the tests of formulas share: seeded inputs, arrays that should agree, and gradients by central differences.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -61,6 +61,14 @@ void expect_gradient(F f, std::vector<double>& x, const std::vector<double>& gra
     x[i] = kept;
     EXPECT_NEAR(gradient[i], (above - below) / (2 * step), tolerance * largest) << what << "[" << i << "]";
   }
+}
+
+// Equal up to a share of the largest expected number.
+template <class T> void expect_near(const std::vector<T>& got, const std::vector<T>& expected, double tolerance) {
+  ASSERT_EQ(got.size(), expected.size());
+  double largest = 1e-30;
+  for (T x : expected) largest = std::max(largest, std::abs(double(x)));
+  for (size_t i = 0; i < got.size(); ++i) EXPECT_NEAR(got[i], expected[i], tolerance * largest) << i;
 }
 
 }  // namespace splitnerf

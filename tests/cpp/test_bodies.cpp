@@ -11,13 +11,6 @@
 namespace splitnerf {
 namespace {
 
-template <class T> void expect_near(const std::vector<T>& got, const std::vector<T>& expected, double tolerance) {
-  ASSERT_EQ(got.size(), expected.size());
-  double largest = 1e-30;
-  for (T x : expected) largest = std::max(largest, std::abs(double(x)));
-  for (size_t i = 0; i < got.size(); ++i) EXPECT_NEAR(got[i], expected[i], tolerance * largest) << i;
-}
-
 // ---- hash grid ----
 
 // Numbers in [-1, 1] as a table stores them; of 16 bits any that are finite and not above 1.

@@ -9,13 +9,6 @@
 namespace splitnerf {
 namespace {
 
-template <class T> void expect_near(const std::vector<T>& got, const std::vector<T>& expected, double tolerance) {
-  ASSERT_EQ(got.size(), expected.size());
-  double largest = 1e-30;
-  for (T x : expected) largest = std::max(largest, std::abs(double(x)));
-  for (size_t i = 0; i < got.size(); ++i) EXPECT_NEAR(got[i], expected[i], tolerance * largest) << i;
-}
-
 // ---- the distance field: a tile of points, phase by phase as a block of threads runs it ----
 
 constexpr HashGridShape kShape{3, 2, 4, 1.7, 8};

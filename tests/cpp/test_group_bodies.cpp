@@ -10,13 +10,6 @@
 namespace splitnerf {
 namespace {
 
-template <class T> void expect_near(const std::vector<T>& got, const std::vector<T>& expected, double tolerance) {
-  ASSERT_EQ(got.size(), expected.size());
-  double largest = 1e-30;
-  for (T x : expected) largest = std::max(largest, std::abs(double(x)));
-  for (size_t i = 0; i < got.size(); ++i) EXPECT_NEAR(got[i], expected[i], tolerance * largest) << i;
-}
-
 // Rays of many lengths, among them none, one and just a group's; distances that fall from .1 to below 0, with rises between.
 struct Rays {
   std::vector<int64_t> offsets{0};

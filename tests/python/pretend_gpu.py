@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import numpy as np
 import torch
 from torch import Tensor
 from torch.overrides import TorchFunctionMode, resolve_name
@@ -61,6 +60,11 @@ def named_device(values: list) -> torch.device | None:
     return None
 
 
+def on_cpu(value: object) -> object:
+    """The same argument, the CPU in place of a device."""
+    return CPU if named_device([value]) is not None else value
+
+
 class PretendGpu(TorchFunctionMode):
     """Within its block tensors can be on ``cuda``.
 
@@ -108,8 +112,9 @@ class PretendGpu(TorchFunctionMode):
         if target is None:
             target = GPU if isinstance(args[0], GpuTensor) else CPU
         crossed = isinstance(args[0], GpuTensor) != (target.type == "cuda")
-        to_cpu = lambda x: CPU if named_device([x]) is not None else x  # noqa: E731
-        result = func(*map(to_cpu, args), **{k: to_cpu(v) for k, v in kwargs.items()}) if how == "to" else args[0]
+        result = args[0]
+        if how == "to":  # a dtype may change as well
+            result = func(*map(on_cpu, args), **{name: on_cpu(value) for name, value in kwargs.items()})
         if crossed:
             result = result.clone() if result is args[0] else result
         return marked(result) if target.type == "cuda" else unmarked(result)
@@ -141,8 +146,3 @@ def pretend_gpu(monkeypatch) -> Iterator[PretendGpu]:
             yield mode
     finally:
         torch.__future__.set_overwrite_module_params_on_conversion(before)
-
-
-def as_array(x: Tensor) -> np.ndarray:
-    """The numbers of a tensor of either device."""
-    return x.detach().cpu().numpy()
