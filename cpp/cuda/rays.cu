@@ -103,7 +103,8 @@ void composite_backward(const Queue& queue, const PackedRays& rays, int64_t n_ch
 
 template <class T>
 void spread_samples(const Queue& queue, const PackedRays& rays, const T* weights, const T* t, const T* phase, T gap,
-                    int per_ray, int64_t* first, int64_t* second, T* share, const SpreadAllocator& allocate) {
+                    int per_ray, int64_t* sizes, int64_t* first, int64_t* second, T* share,
+                    const SpreadAllocator& allocator) {
   const char* op = "spread_samples";
   const int64_t n = rays.n_rays;
   int64_t *drawn = queue.scratch<int64_t>(n + 1), *stretches = queue.scratch<int64_t>(n + 1),
@@ -111,8 +112,13 @@ void spread_samples(const Queue& queue, const PackedRays& rays, const T* weights
   for_each(queue, op, n,
            SpreadCountBody<T>{rays, weights, t, phase, gap, per_ray, drawn + 1, stretches + 1, filled + 1});
   for (int64_t* counts : {drawn, stretches, filled}) sum_counts(queue, op, n, counts);
+  for_each(queue, op, 1, SpreadSizesBody{drawn + n, filled + n, stretches + n, sizes});
   const Spread to =
-      allocate({read_number(queue, drawn + n), read_number(queue, filled + n), read_number(queue, stretches + n)});
+      allocator.allocate(allocator.fixed ? *allocator.fixed
+                                         : SpreadSizes{read_number(queue, sizes), read_number(queue, sizes + 1),
+                                                       read_number(queue, sizes + 2)});
+  const SpreadUnusedBody<T> unused{rays, 0, to, first, second, share};
+  for_each(queue, op, unused.count(), unused);
   for_each(
       queue, op, n,
       SpreadFillBody<T>{rays, weights, t, phase, gap, per_ray, drawn, stretches, filled, to, first, second, share});
@@ -147,7 +153,7 @@ void interpolate_backward(const Queue& queue, int64_t n, int64_t m, int64_t n_ch
   template void composite<T>(const Queue&, const PackedRays&, int64_t, const T*, const T*, T*);                        \
   template void composite_backward<T>(const Queue&, const PackedRays&, int64_t, const T*, const T*, const T*, T*, T*); \
   template void spread_samples<T>(const Queue&, const PackedRays&, const T*, const T*, const T*, T, int, int64_t*,     \
-                                  int64_t*, T*, const SpreadAllocator&);                                               \
+                                  int64_t*, int64_t*, T*, const SpreadAllocator&);                                     \
   template void interpolate<T>(const Queue&, int64_t, int64_t, int64_t, const int64_t*, const int64_t*, const T*,      \
                                const T*, T*);                                                                          \
   template void interpolate_backward<T>(const Queue&, int64_t, int64_t, int64_t, const int64_t*, const int64_t*,       \

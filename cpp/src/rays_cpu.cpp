@@ -18,7 +18,7 @@ void interval_ends(const SurfaceSamples<T>& in, int64_t ray, const Vec3<T>* norm
   const Vec3<T> direction = load3(in.directions + 3 * ray);
   const int64_t first = in.rays.offsets[ray], n = in.rays.offsets[ray + 1] - first;
   for (int64_t i = 0; i < n; ++i) {
-    const NeusInterval<T> ends = surface_interval(in.sdf[first + i], dot(direction, normals[i]), in.step, in.anneal);
+    const NeusInterval<T> ends = surface_interval(in.sdf[first + i], dot(direction, normals[i]), *in.step, *in.anneal);
     f_prev[i] = ends.f_prev, f_next[i] = ends.f_next, apart[i] = ends.apart;
   }
 }
@@ -102,6 +102,10 @@ template <class T> void surface_weights(const SurfaceSamples<T>& in, T* normals,
       work.load(in, r);
       for (int64_t i = 0; i < n; ++i) store3(normals + 3 * (first + i), work.normals[i]);
       opacity[r] = neus_ray_weights(OneThread{}, work.ends(), *in.s, n, in.min_transmittance, weights + first);
+      in.rays.for_each_unowned(OneThread{}, r, [&](int64_t i) {
+        weights[i] = T(0);
+        store3(normals + 3 * i, Vec3<T>{T(0), T(0), T(0)});
+      });
     }
   });
 }
@@ -117,7 +121,7 @@ void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, con
       const Vec3<T> direction = load3(in.directions + 3 * r);
       work.load(in, r);
       const auto keep = [&](int64_t i, const OpticalDepthGrad<T>& g) {
-        const T grad_cosine = surface_interval_backward(g, dot(direction, work.normals[i]), in.step, in.anneal);
+        const T grad_cosine = surface_interval_backward(g, dot(direction, work.normals[i]), *in.step, *in.anneal);
         grad_sdf[first + i] = g.both;
         const Vec3<T> grad_normal = load3(grad_normals + 3 * (first + i)) + direction * grad_cosine;
         store3(grad_gradient + 3 * (first + i),
@@ -126,13 +130,17 @@ void surface_weights_backward(const SurfaceSamples<T>& in, const T* weights, con
       grad_s_rays[r] =
           neus_ray_weights_backward(OneThread{}, work.ends(), *in.s, n, in.min_transmittance, weights + first,
                                     grad_weights + first, grad_opacity[r], work.depths.data(), keep);
+      in.rays.for_each_unowned(OneThread{}, r, [&](int64_t i) {
+        grad_sdf[i] = T(0);
+        store3(grad_gradient + 3 * i, Vec3<T>{T(0), T(0), T(0)});
+      });
     }
   });
 }
 
 template <class T>
 void spread_samples(const PackedRays& rays, const T* weights, const T* t, const T* phase, T gap, int per_ray,
-                    int64_t* first, int64_t* second, T* share, const SpreadAllocator& allocate) {
+                    int64_t* sizes, int64_t* first, int64_t* second, T* share, const SpreadAllocator& allocator) {
   std::vector<int64_t> shaded, heaviest, leaders, stretch;
   for (int64_t r = 0; r < rays.n_rays; ++r) {
     const int64_t begin = rays.offsets[r], end = rays.offsets[r + 1], at = static_cast<int64_t>(shaded.size());
@@ -148,12 +156,17 @@ void spread_samples(const PackedRays& rays, const T* weights, const T* t, const 
     leaders.resize(n_before + n_stretches);
     heaviest.push_back(heaviest_drawn(ray));
   }
-  const Spread to = allocate({static_cast<int64_t>(shaded.size()), static_cast<int64_t>(heaviest.size()),
-                              static_cast<int64_t>(leaders.size())});
-  std::copy(shaded.begin(), shaded.end(), to.shaded);
-  std::copy(heaviest.begin(), heaviest.end(), to.heaviest);
-  std::copy(leaders.begin(), leaders.end(), to.leaders);
-  std::copy(stretch.begin(), stretch.end(), to.stretch);
+  const SpreadSizes counted{static_cast<int64_t>(shaded.size()), static_cast<int64_t>(heaviest.size()),
+                            static_cast<int64_t>(leaders.size())};
+  sizes[0] = counted.shaded, sizes[1] = counted.heaviest, sizes[2] = counted.leaders;
+  const Spread to = allocator.allocate(allocator.fixed ? *allocator.fixed : counted);
+  const bool fits = to.has_room(counted.shaded, counted.leaders);
+  const SpreadUnusedBody<T> unused{rays, fits ? rays.n_owned() : 0, to, first, second, share};
+  if (allocator.fixed || rays.n_owned() < rays.n_samples)
+    for (int64_t i = 0; i < unused.count(); ++i) unused(i);
+  if (!fits) return;
+  std::copy(shaded.begin(), shaded.end(), to.shaded), std::copy(stretch.begin(), stretch.end(), to.stretch);
+  std::copy(heaviest.begin(), heaviest.end(), to.heaviest), std::copy(leaders.begin(), leaders.end(), to.leaders);
 }
 
 template <class T>
@@ -184,8 +197,8 @@ void interpolate_backward(int64_t n, int64_t m, int64_t n_channels, const int64_
   template void surface_weights<T>(const SurfaceSamples<T>&, T*, T*, T*);                                              \
   template void surface_weights_backward<T>(const SurfaceSamples<T>&, const T*, const T*, const T*, const T*, T*, T*,  \
                                             T*);                                                                       \
-  template void spread_samples<T>(const PackedRays&, const T*, const T*, const T*, T, int, int64_t*, int64_t*, T*,     \
-                                  const SpreadAllocator&);                                                             \
+  template void spread_samples<T>(const PackedRays&, const T*, const T*, const T*, T, int, int64_t*, int64_t*,         \
+                                  int64_t*, T*, const SpreadAllocator&);                                               \
   template void interpolate<T>(int64_t, int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, T*);     \
   template void interpolate_backward<T>(int64_t, int64_t, int64_t, const int64_t*, const int64_t*, const T*, const T*, \
                                         T*);

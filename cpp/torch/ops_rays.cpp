@@ -39,15 +39,16 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> march_rays(Tensor rays_o, Tensor rays
   return {ray_indices, t_starts, t_ends, offsets};
 }
 
-// The sample ranges of the rays: offsets is non-decreasing, from 0 to n_samples. To look at them on a GPU would mean waiting for it.
+// The sample ranges of the rays: offsets is non-decreasing, from 0 to n_samples at most. To look at them on a GPU would mean
+// waiting for it.
 Tensor checked_offsets(const char* op, const Tensor& offsets, int64_t n_samples, Kind kind) {
   const Tensor o = checked(op, "offsets", offsets, {kAny}, kind.with(ScalarType::Long));
-  require(o.size(0) >= 1, op, "offsets must be [n_rays + 1]");
+  require(o.size(0) >= (n_samples > 0 ? 2 : 1), op, "offsets must be [n_rays + 1], with rays where there are samples");
   if (!kind.on_cpu()) return o;
   const int64_t *p = in<int64_t>(o), n_rays = o.size(0) - 1;
-  bool sorted = p[0] == 0 && p[n_rays] == n_samples;
+  bool sorted = p[0] == 0 && p[n_rays] <= n_samples;
   for (int64_t r = 0; r < n_rays; ++r) sorted = sorted && p[r] <= p[r + 1];
-  require(sorted, op, "offsets must rise from 0 to the number of samples, " + std::to_string(n_samples));
+  require(sorted, op, "offsets must rise from 0 to the number of samples at most, " + std::to_string(n_samples));
   return o;
 }
 
@@ -124,18 +125,19 @@ std::tuple<Tensor, Tensor> composite_backward(Tensor weights, Tensor values, Ten
 // Samples of a surface, checked and contiguous.
 struct Surface {
   Kind type;
-  Tensor sdf, gradient, rays_d, s, offsets;
-  double step, anneal, min_transmittance;
+  Tensor sdf, gradient, rays_d, s, offsets, step, anneal;
+  double min_transmittance;
 
   Surface(const char* op, const Tensor& sdf_in, const Tensor& gradient_in, const Tensor& rays_d_in, const Tensor& s_in,
-          const Tensor& offsets_in, double step, double anneal, double min_transmittance)
+          const Tensor& offsets_in, const Tensor& step_in, const Tensor& anneal_in, double min_transmittance)
       : type(real_kind(op, "sdf", sdf_in)), sdf(checked(op, "sdf", sdf_in, {kAny}, type)),
         gradient(checked(op, "gradient", gradient_in, {sdf.size(0), 3}, type)),
         rays_d(checked(op, "rays_d", rays_d_in, {kAny, 3}, type)), s(checked(op, "s", s_in, {}, type)),
-        offsets(checked_offsets(op, offsets_in, sdf.size(0), type)), step(step), anneal(anneal),
-        min_transmittance(min_transmittance) {
+        offsets(checked_offsets(op, offsets_in, sdf.size(0), type)), step(checked(op, "step", step_in, {}, type)),
+        anneal(checked(op, "anneal", anneal_in, {}, type)), min_transmittance(min_transmittance) {
     require(offsets.size(0) == n_rays() + 1, op, "offsets must be [n_rays + 1]");
-    require(step > 0, op, "step must be positive");
+    if (!type.on_cpu()) return;
+    dispatch_real(type, [&](auto zero) { require(*in<decltype(zero)>(this->step) > 0, op, "step must be positive"); });
   }
   int64_t n_rays() const { return rays_d.size(0); }
   template <class T> SurfaceSamples<T> view() const {
@@ -144,14 +146,14 @@ struct Surface {
             in<T>(gradient),
             in<T>(rays_d),
             in<T>(s),
-            T(step),
-            T(anneal),
+            in<T>(step),
+            in<T>(anneal),
             T(min_transmittance)};
   }
 };
 
 std::tuple<Tensor, Tensor, Tensor> surface_weights(Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets,
-                                                   double step, double anneal, double min_transmittance) {
+                                                   Tensor step, Tensor anneal, double min_transmittance) {
   const Surface x("surface_weights", sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance);
   Tensor normals = empty_like_type(x.sdf, {x.sdf.size(0), 3}, x.type),
          weights = empty_like_type(x.sdf, {x.sdf.size(0)}, x.type);
@@ -164,7 +166,7 @@ std::tuple<Tensor, Tensor, Tensor> surface_weights(Tensor sdf, Tensor gradient, 
 }
 
 std::tuple<Tensor, Tensor, Tensor> surface_weights_backward(Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s,
-                                                            Tensor offsets, double step, double anneal,
+                                                            Tensor offsets, Tensor step, Tensor anneal,
                                                             double min_transmittance, Tensor weights,
                                                             Tensor grad_normals, Tensor grad_weights,
                                                             Tensor grad_opacity) {
@@ -185,9 +187,9 @@ std::tuple<Tensor, Tensor, Tensor> surface_weights_backward(Tensor sdf, Tensor g
   return {grad_sdf, grad_gradient, grad_s};
 }
 
-std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> spread_samples(Tensor weights, Tensor t,
-                                                                                  Tensor offsets, Tensor phase,
-                                                                                  double gap, int64_t per_ray) {
+using Tensors8 = std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor>;
+Tensors8 spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, double gap, int64_t per_ray,
+                        int64_t max_shaded, int64_t max_stretches) {
   const char* op = "spread_samples";
   const Kind type = real_kind(op, "weights", weights);
   const Tensor w = checked(op, "weights", weights, {kAny}, type), at = checked(op, "t", t, {w.size(0)}, type);
@@ -195,22 +197,27 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> spread_sample
                u = checked(op, "phase", phase, {o.size(0) - 1}, type);
   require(gap > 0, op, "gap must be positive");
   require(per_ray >= 0 && per_ray < 1 << 20, op, "per_ray must be in [0, 2^20)");
+  const bool fixed = max_shaded >= 0;
+  require(fixed == (max_stretches >= 0), op, "max_shaded and max_stretches must be given both or neither");
+  const SpreadSizes room{max_shaded, u.size(0), max_stretches};
   const auto indices = [&](int64_t n) { return empty_like_type(w, {n}, ScalarType::Long); };
   Tensor first = indices(w.size(0)), second = indices(w.size(0)), share = empty_like_type(w, {w.size(0)}, type);
-  Tensor shaded, heaviest, leaders, stretch;
-  const SpreadAllocator allocate = [&](const SpreadSizes& sizes) {
-    shaded = indices(sizes.shaded), heaviest = indices(sizes.heaviest), leaders = indices(sizes.leaders);
-    stretch = indices(sizes.shaded);
-    return Spread{out<int64_t>(shaded), out<int64_t>(heaviest), out<int64_t>(leaders), out<int64_t>(stretch)};
-  };
+  Tensor shaded, heaviest, leaders, stretch, sizes = indices(3);
+  const SpreadAllocator allocator{[&](const SpreadSizes& n) {
+                                    shaded = indices(n.shaded), heaviest = indices(n.heaviest);
+                                    leaders = indices(n.leaders), stretch = indices(n.shaded);
+                                    return Spread{out<int64_t>(shaded), out<int64_t>(heaviest), out<int64_t>(leaders),
+                                                  out<int64_t>(stretch), n};
+                                  },
+                                  fixed ? &room : nullptr};
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     const auto inside = [](T p) { return p >= T(0) && p < T(1); };
     require(!type.on_cpu() || std::all_of(in<T>(u), in<T>(u) + u.size(0), inside), op, "phase must be in [0, 1)");
     device.spread_samples(packed_rays(o, w.size(0)), in<T>(w), in<T>(at), in<T>(u), T(gap), static_cast<int>(per_ray),
-                          out<int64_t>(first), out<int64_t>(second), out<T>(share), allocate);
+                          out<int64_t>(sizes), out<int64_t>(first), out<int64_t>(second), out<T>(share), allocator);
   });
-  return {shaded, first, second, share, heaviest, leaders, stretch};
+  return {shaded, first, second, share, heaviest, leaders, stretch, sizes};
 }
 
 // Positions in [0, m), one for each of n samples.
@@ -260,8 +267,8 @@ Tensor interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor secon
 
 }  // namespace
 
-#define SPLITNERF_SURFACE                                                                                  \
-  "Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets, float step, float anneal, float " \
+#define SPLITNERF_SURFACE                                                                                    \
+  "Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets, Tensor step, Tensor anneal, float " \
   "min_transmittance"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
@@ -278,8 +285,9 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
         ", Tensor weights, Tensor grad_normals, "
         "Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
   m.def(
-      "spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray) -> "
-      "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
+      "spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray, int "
+      "max_shaded=-1, "
+      "int max_stretches=-1) -> (Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
   m.def("interpolate(Tensor values, Tensor first, Tensor second, Tensor share) -> Tensor");
   m.def(
       "interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor second, Tensor share, Tensor shaded) -> "

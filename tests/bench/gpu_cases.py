@@ -193,7 +193,7 @@ class World:
     def surface(self) -> tuple:
         gradient = unit(self.rays.positions) + 0.1 * self.randn(self.sizes.samples, 3, seed=10)
         sharp = torch.tensor(S)
-        numbers = (self.rays.step, ANNEAL, MIN_TRANSMITTANCE)
+        numbers = (torch.tensor(self.rays.step), torch.tensor(ANNEAL), MIN_TRANSMITTANCE)
         return self.distances, gradient, self.rays.directions, sharp, self.rays.offsets, *numbers
 
     @functools.cached_property

@@ -113,14 +113,16 @@ def composite(weights, values, offsets):
     return torch.zeros(len(offsets) - 1, values.shape[1]).index_add(0, rays, weights[:, None] * values)
 
 
-def spread_samples(weights, t, offsets, phase, gap, per_ray):
+def spread_samples(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_stretches=-1):
     every = torch.arange(len(weights))
     rays = torch.repeat_interleave(torch.arange(len(offsets) - 1), offsets.diff())
     most = torch.zeros(len(offsets) - 1).scatter_reduce(0, rays, weights, "amax")
     heaviest = torch.full((len(offsets) - 1,), -1).scatter_reduce(
         0, rays, torch.where(weights == most[rays], every, -1), "amax"
     )
-    return every, every, every, torch.zeros_like(weights), heaviest[heaviest >= 0], every, every
+    heaviest = heaviest[heaviest >= 0]
+    sizes = torch.tensor([len(every), len(heaviest), len(every)])
+    return every, every, every, torch.zeros_like(weights), heaviest, every, every, sizes
 
 
 # ---- shading ----

@@ -11,10 +11,11 @@ namespace splitnerf {
 namespace {
 
 // Rays of many lengths, among them none, one and just a group's; distances that fall from .1 to below 0, with rises between.
+// Behind them are samples of no ray.
 struct Rays {
   std::vector<int64_t> offsets{0};
   std::vector<double> f_prev, f_next, sdf, gradient, directions;
-  double s = 40;
+  double s = 40, step = 0.02, anneal = 0.7;
 
   Rays() {
     Random random(3);
@@ -30,11 +31,15 @@ struct Rays {
       }
       offsets.push_back(int64_t(f_prev.size()));
     }
+    for (int i = 0; i < 11; ++i) {
+      f_prev.push_back(0.1), f_next.push_back(-0.1), sdf.push_back(0);
+      gradient.insert(gradient.end(), {0., 0., 1.});
+    }
   }
   int64_t n() const { return int64_t(f_prev.size()); }
   PackedRays packed() const { return {int64_t(offsets.size()) - 1, n(), offsets.data()}; }
   SurfaceSamples<double> surface() const {
-    return {packed(), sdf.data(), gradient.data(), directions.data(), &s, 0.02, 0.7, 0.01};
+    return {packed(), sdf.data(), gradient.data(), directions.data(), &s, &step, &anneal, 0.01};
   }
 };
 
@@ -44,7 +49,8 @@ TEST(GroupBodies, NeusWeightsAndTheirGradients) {
   Random random(1);
   const auto gw = random.uniforms(n, -1), go = random.uniforms(n_rays, -1);
   for (const double least : {0., 0.3}) {
-    std::vector<double> w(n), o(n_rays), prev(n), next(n), s(n_rays), w8(n), o8(n_rays), prev8(n), next8(n), s8(n_rays);
+    std::vector<double> w(n, 9), o(n_rays), prev(n, 9), next(n, 9), s(n_rays), w8(n, 7), o8(n_rays), prev8(n, 7),
+        next8(n, 7), s8(n_rays);
     cpu::neus_weights(r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(), o.data());
     cpu::neus_weights_backward(r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(), gw.data(),
                                go.data(), prev.data(), next.data(), s.data());
@@ -63,7 +69,7 @@ TEST(GroupBodies, NeusWeightsByThirtyTwoLanesPassANanOn) {
   Rays r;
   r.f_next[size_t(r.offsets[4]) + 5] = std::nan("");
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
-  std::vector<double> w(n), o(n_rays), w32(n), o32(n_rays);
+  std::vector<double> w(n, 9), o(n_rays), w32(n, 7), o32(n_rays);
   cpu::neus_weights(r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, 0., w.data(), o.data());
   for_each_by_lanes<32>(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
                                                                    0., w32.data(), o32.data()});
@@ -80,16 +86,17 @@ TEST(GroupBodies, SurfaceWeightsAndTheirGradients) {
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
   Random random(2);
   const auto gn = random.uniforms(3 * n, -1), gw = random.uniforms(n, -1), go = random.uniforms(n_rays, -1);
-  std::vector<double> normals(3 * n), w(n), o(n_rays), to_sdf(n), to_gradient(3 * n), to_s(n_rays);
+  std::vector<double> normals(3 * n, 9), w(n, 9), o(n_rays), to_sdf(n, 9), to_gradient(3 * n, 9), to_s(n_rays);
   cpu::surface_weights(in, normals.data(), w.data(), o.data());
   cpu::surface_weights_backward(in, w.data(), gn.data(), gw.data(), go.data(), to_sdf.data(), to_gradient.data(),
                                 to_s.data());
-  std::vector<double> normals8(3 * n), w8(n), o8(n_rays), to_sdf8(n), to_gradient8(3 * n), to_s8(n_rays);
+  std::vector<double> normals8(3 * n, 7), w8(n, 7), o8(n_rays), to_sdf8(n, 7), to_gradient8(3 * n, 7), to_s8(n_rays);
   for_each_by_lanes<8>(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals8.data(), w8.data(), o8.data()});
   for_each_by_lanes<8>(in.rays.n_rays,
                        SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(), to_sdf8.data(),
                                                           to_gradient8.data(), to_s8.data()});
   expect_near(normals8, normals, 0), expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
+  for (const double last : {w8.back(), to_gradient8.back(), normals8.back()}) EXPECT_EQ(last, 0);
   expect_near(to_sdf8, to_sdf, 1e-13), expect_near(to_gradient8, to_gradient, 1e-13), expect_near(to_s8, to_s, 1e-13);
 }
 
@@ -98,8 +105,8 @@ TEST(GroupBodies, CompositeAndItsGradients) {
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays), channels = 5;
   Random random(4);
   const auto w = random.uniforms(n), v = random.uniforms(n * channels, -1), g = random.uniforms(n_rays * channels, -1);
-  std::vector<double> sums(n_rays * channels), to_w(n), to_v(n * channels), sums8(n_rays * channels), to_w8(n),
-      to_v8(n * channels);
+  std::vector<double> sums(n_rays * channels), to_w(n, 9), to_v(n * channels, 9), sums8(n_rays * channels), to_w8(n, 7),
+      to_v8(n * channels, 7);
   cpu::composite(r.packed(), channels, w.data(), v.data(), sums.data());
   cpu::composite_backward(r.packed(), channels, w.data(), v.data(), g.data(), to_w.data(), to_v.data());
   for_each_by_lanes<8>(r.packed().n_rays,
@@ -126,12 +133,13 @@ TEST(GroupBodies, SpreadSamples) {
         Spread allocate(const SpreadSizes& sizes) {
           shaded.resize(sizes.shaded), heaviest.resize(sizes.heaviest), leaders.resize(sizes.leaders);
           stretch.resize(sizes.shaded);
-          return {shaded.data(), heaviest.data(), leaders.data(), stretch.data()};
+          return {shaded.data(), heaviest.data(), leaders.data(), stretch.data(), sizes};
         }
       };
       Result one{Indices(n), Indices(n), {}, {}, {}, {}, std::vector<double>(n)}, two = one;
-      cpu::spread_samples(r.packed(), w.data(), t.data(), phase.data(), gap, per_ray, one.first.data(),
-                          one.second.data(), one.share.data(), [&](const SpreadSizes& s) { return one.allocate(s); });
+      int64_t sizes[3];
+      cpu::spread_samples(r.packed(), w.data(), t.data(), phase.data(), gap, per_ray, sizes, one.first.data(),
+                          one.second.data(), one.share.data(), {[&](const SpreadSizes& s) { return one.allocate(s); }});
       Indices drawn(n_rays + 1), stretches(n_rays + 1), filled(n_rays + 1);
       const SpreadCountBody<double> count{
           r.packed(),           w.data(),         t.data(), phase.data(), gap, per_ray, drawn.data() + 1,
@@ -140,7 +148,10 @@ TEST(GroupBodies, SpreadSamples) {
         count(i);
         for (Indices* sums : {&drawn, &stretches, &filled}) (*sums)[i + 1] += (*sums)[i];
       }
-      const Spread to = two.allocate({drawn.back(), filled.back(), stretches.back()});
+      int64_t counted[3];
+      SpreadSizesBody{&drawn.back(), &filled.back(), &stretches.back(), counted}(0);
+      EXPECT_TRUE(std::equal(counted, counted + 3, sizes));
+      const Spread to = two.allocate({counted[0], counted[1], counted[2]});
       const SpreadFillBody<double> fill{r.packed(),       w.data(),          t.data(),         phase.data(),  gap,
                                         per_ray,          drawn.data(),      stretches.data(), filled.data(), to,
                                         two.first.data(), two.second.data(), two.share.data()};

@@ -107,9 +107,9 @@ CASES = {
     "march_rays": lambda t: rays.march_inputs("cpu", t, 300),
     "neus_weights": lambda t: rays.sample_inputs("cpu", t, 0.01),
     "neus_weights_backward": lambda t: with_gradients("neus_weights", rays.sample_inputs("cpu", t, 0.01), 0),
-    "surface_weights": lambda t: (*rays.surface_inputs(t), 0.1, 0.4, 1e-3),
+    "surface_weights": lambda t: (*rays.surface_inputs(t), torch.tensor(0.1, dtype=t), torch.tensor(0.4, dtype=t), 1e-3),
     "surface_weights_backward": lambda t: with_gradients(
-        "surface_weights", (*rays.surface_inputs(t), 0.1, 0.4, 1e-3), 1
+        "surface_weights", (*rays.surface_inputs(t), torch.tensor(0.1, dtype=t), torch.tensor(0.4, dtype=t), 1e-3), 1
     ),
     "composite": lambda t: rays.composite_inputs("cpu", t),
     "composite_backward": lambda t: with_gradients("composite", rays.composite_inputs("cpu", t)),

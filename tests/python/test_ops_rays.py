@@ -229,13 +229,39 @@ def test_surface_weights_and_their_gradients_are_the_formula(anneal, min_transmi
 
 def test_surface_weights_opcheck_and_errors():
     x = surface_inputs()
-    check_op(lib.surface_weights, (*x, 0.1, 0.4, 1e-3), (0, 1, 3))
-    outputs = lib.surface_weights(*x, 0.1, 0.4, 1e-3)
-    check_op(lib.surface_weights_backward, (*x, 0.1, 0.4, 1e-3, outputs[1], *(torch.ones_like(o) for o in outputs)))
+    x = *x, torch.tensor(0.1).to(x[0]), torch.tensor(0.4).to(x[0])
+    check_op(lib.surface_weights, (*x, 1e-3), (0, 1, 3))
+    outputs = lib.surface_weights(*x, 1e-3)
+    check_op(lib.surface_weights_backward, (*x, 1e-3, outputs[1], *(torch.ones_like(o) for o in outputs)))
+    x = x[:5]
     with pytest.raises(RuntimeError, match="no gradient to rays_d"):
         surface_weights(*grad_leaves(x, (2,)), step=0.1)[1].sum().backward()
     check_error(lambda: surface_weights(x[0], x[1][:, :2], *x[2:], step=0.1), "surface_weights", "gradient")
     check_error(lambda: surface_weights(*x, step=0.0), "surface_weights", "step")
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_samples_of_no_ray_count_for_nothing(dtype):
+    """Arrays may be longer than the last offset: outputs and gradients there are 0, whatever the inputs; others as without."""
+    sdf, gradient, rays_d, s, offsets = surface_inputs(dtype)
+    n, more = len(sdf), 300
+    values = torch.randn(n, 4, generator=generator(3)).to(dtype)
+    longer = [torch.cat([x, torch.full((more, *x.shape[1:]), 7.0, dtype=dtype)]) for x in (sdf, gradient, values)]
+
+    def render(sdf, gradient, values):
+        leaves = [x.clone().requires_grad_() for x in (sdf, gradient, values, s)]
+        normals, weights, opacity = surface_weights(*leaves[:2], rays_d, leaves[3], offsets, step=0.1)
+        sums = composite(weights, leaves[2], offsets)
+        by_ends, passed = neus_weights(leaves[0] + 0.05, leaves[0] - 0.05, leaves[3], offsets)
+        of_samples = (normals[:, 0] + weights + by_ends) * torch.arange(1.0, len(sdf) + 1)
+        (of_samples.sum() + sums.square().sum() + opacity.square().sum() + passed.sum()).backward()
+        return (normals, weights, by_ends, *(x.grad for x in leaves[:3])), (opacity, sums, passed, leaves[3].grad)
+
+    (long, alike), (short, same) = render(*longer), render(sdf, gradient, values)
+    for a, b in zip(long, short):
+        assert torch.equal(a[:n], b) and not a[n:].any()
+    for a, b in zip(alike, same):
+        torch.testing.assert_close(a, b)
 
 
 # ---- spread_samples, interpolate ----
@@ -302,6 +328,41 @@ def test_a_second_surface_has_a_sample_and_a_colour_of_its_own():
     assert spread_samples(weights, samples, 0, phase[None], gap=0.15).shaded.tolist() == [0, 1, 2, 3, 4]
 
 
+def test_room_that_is_given_holds_the_same_and_what_counts_for_nothing():
+    weights, samples, phase = packed()
+    free = spread_samples(weights, samples, 2, phase, 0.3)
+    n_shaded, n_rays, n_stretches = free.sizes.tolist()
+    assert (n_shaded, n_rays, n_stretches) == (len(free.shaded), len(free.heaviest), len(free.leaders)) and n_rays == 49
+    longer = torch.cat([weights, weights.new_full((9,), 5.0)])
+    padded = PackedSamples(*(torch.cat([x, x[:9]]) for x in samples[:3]), samples.offsets)
+    roomy = spread_samples(longer, padded, 2, phase, torch.tensor(0.3, dtype=weights.dtype), room=(300, 250))
+    assert (len(roomy.shaded), len(roomy.stretch), len(roomy.leaders), len(roomy.heaviest)) == (300, 300, 250, 50)
+    assert roomy.sizes.tolist() == free.sizes.tolist()
+    for name, short in free._asdict().items():
+        long = getattr(roomy, name)
+        torch.testing.assert_close(long[: len(short)], short)
+        assert (long[len(short) :] >= 0).all(), name
+    assert not any(x[len(weights) :].any() for x in (roomy.first, roomy.second, roomy.share))
+    assert max(roomy.leaders.max(), roomy.heaviest.max()) < 300 and roomy.stretch.max() < 250
+    assert roomy.shaded.max() < len(weights) and roomy.shaded[n_shaded:].unique().numel() > 20
+    values = torch.randn(300, 3, generator=generator(), dtype=weights.dtype)
+    torch.testing.assert_close(roomy.interpolate(values)[: len(weights)], free.interpolate(values[:n_shaded]))
+    assert not roomy.gather(torch.cat([weights, weights.new_zeros(9)]))[n_shaded:].any()
+
+
+def test_too_little_room_is_told_and_indices_stay_in_range():
+    weights, samples, phase = packed()
+    n_shaded, _, n_stretches = spread_samples(weights, samples, 2, phase, 0.3).sizes.tolist()
+    for room in ((n_shaded - 1, n_stretches), (n_shaded, n_stretches - 1), (1, 1)):
+        spread = spread_samples(weights, samples, 2, phase, 0.3, room=room)
+        assert spread.sizes.tolist() == [n_shaded, 49, n_stretches]
+        assert spread.interpolate(weights.new_ones(room[0], 1)).eq(1).all() and spread.stretch.max() < room[1]
+        assert max(spread.leaders.max(), spread.heaviest.max()) < room[0] and spread.shaded.max() < len(weights)
+    check_error(
+        lambda: lib.spread_samples(weights, samples.middles, samples.offsets, phase, 0.3, 2, 5), "max_stretches"
+    )
+
+
 def test_spread_draws_in_proportion_to_the_weights():
     weights, samples, _ = packed()
     counts = torch.zeros(len(weights), dtype=torch.float64)
@@ -339,6 +400,7 @@ def test_interpolate_opcheck_gradcheck_and_errors():
     spread = spread_samples(weights, samples, 2, phase)
     middle = 0.5 * (samples.t_starts + samples.t_ends)
     check_op(lib.spread_samples, (weights, middle, samples.offsets, phase, 0.5, 2))
+    check_op(lib.spread_samples, (weights, middle, samples.offsets, phase, 0.5, 2, 300, 250))
     values = torch.randn(len(spread.shaded), 3, generator=generator(), dtype=torch.float64)
     where = spread.first, spread.second, spread.share
     check_op(lib.interpolate, (values, *where), (0,))
@@ -386,4 +448,4 @@ def test_composite_empty_and_errors(device):
     check_error(lambda: composite(weights, values[1:], offsets), "composite", "values", "[24, n] float32", "[23, 4]")
     check_error(lambda: composite(weights, values.double(), offsets), "composite", "values", "float32", "float64")
     if device == "cpu":
-        check_error(lambda: composite(weights, values, offsets[:-1]), "composite", "offsets must rise")
+        check_error(lambda: composite(weights[:9], values[:9], offsets), "composite", "offsets must rise")

@@ -162,6 +162,17 @@ struct PackedRays {
     const int64_t first = clamp<int64_t>(offsets[ray], 0, n_samples);
     return {first, clamp<int64_t>(offsets[ray + 1], first, n_samples) - first};
   }
+  // The samples that are of a ray.
+  SPLITNERF_HD int64_t n_owned() const {
+    if (n_rays == 0) return 0;
+    const SampleRange last = samples_of(n_rays - 1);
+    return last.first + last.n;
+  }
+  // Calls clear(i) for this ray's share of the samples behind those of the last ray, which are of none.
+  template <class Group, class Clear>
+  SPLITNERF_HD void for_each_unowned(const Group& group, int64_t ray, Clear clear) const {
+    for (int64_t i = n_owned() + ray * Group::size + group.lane(); i < n_samples; i += n_rays * Group::size) clear(i);
+  }
 };
 
 // Samples of a surface: distance and gradient in their middles, for which the distance is taken as linear over a
@@ -169,8 +180,8 @@ struct PackedRays {
 template <class T> struct SurfaceSamples {
   PackedRays rays;
   const T *sdf, *gradient, *directions;  // [n], [n, 3], [n_rays, 3] unit
-  const T* s;                            // one number
-  T step, anneal, min_transmittance;
+  const T *s, *step, *anneal;            // one number each
+  T min_transmittance;
 };
 
 // The distances at both ends of a sample and what it falls by; seen grazing that is less than the roundings of both ends.

@@ -151,10 +151,11 @@ void composite(const Queue& queue, const PackedRays& rays, int64_t n_channels, c
 template <class T>
 void composite_backward(const Queue& queue, const PackedRays& rays, int64_t n_channels, const T* weights,
                         const T* values, const T* grad_sums, T* grad_weights, T* grad_values);
-// Waits for the sizes.
+// Waits for the sizes, but where they are fixed.
 template <class T>
 void spread_samples(const Queue& queue, const PackedRays& rays, const T* weights, const T* t, const T* phase, T gap,
-                    int per_ray, int64_t* first, int64_t* second, T* share, const SpreadAllocator& allocate);
+                    int per_ray, int64_t* sizes, int64_t* first, int64_t* second, T* share,
+                    const SpreadAllocator& allocator);
 template <class T>
 void interpolate(const Queue& queue, int64_t n, int64_t m, int64_t n_channels, const int64_t* first,
                  const int64_t* second, const T* share, const T* values, T* interpolated);

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <functional>
 
+#include "splitnerf/config.h"
+
 namespace splitnerf {
 
 // Samples of all rays in one array, ray after ray: [n] each.
@@ -21,7 +23,18 @@ struct Spread {
   int64_t* heaviest;  // [rays with samples] positions in `shaded`: the largest weight of those
   int64_t* leaders;   // [stretches] positions in `shaded`: the largest weight of each
   int64_t* stretch;   // [shaded] the stretch of each
+  SpreadSizes room;   // of these arrays
+
+  // For so many shaded samples and stretches; of rays with samples there are no more than rays.
+  SPLITNERF_HD bool has_room(int64_t n_shaded, int64_t n_stretches) const {
+    return n_shaded <= room.shaded && n_stretches <= room.leaders;
+  }
 };
-using SpreadAllocator = std::function<Spread(const SpreadSizes& sizes)>;
+
+// Makes room for what was counted, or, where `fixed` is set, for as many whatever was counted.
+struct SpreadAllocator {
+  std::function<Spread(const SpreadSizes& sizes)> allocate;
+  const SpreadSizes* fixed = nullptr;
+};
 
 }  // namespace splitnerf

@@ -156,10 +156,13 @@ class TableCopy:
         self._of: tuple | None = None
 
     def of(self, table: Tensor) -> Tensor:
-        """The copy, of the table as it stands; in its shape and on its device."""
+        """The copy, of the table as it stands; in its shape and on its device. It is renewed in place: a backward pass through
+        an older state of it raises."""
         if self._state(table) != self._of:
             with torch.inference_mode(False):  # whoever asks first, autograd may keep it later
-                self._values, self._of = rounded(table, self.dtype), self._state(table)
+                values, kept = rounded(table, self.dtype), self._values
+                alike = kept is not None and (kept.shape, kept.device) == (values.shape, values.device)
+                self._values, self._of = kept.copy_(values) if alike else values, self._state(table)
         return self._values
 
     def was_written(self, table: Tensor) -> None:

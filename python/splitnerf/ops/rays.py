@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from splitnerf.ops._library import lib, refuse_gradients, register
 
@@ -37,6 +38,10 @@ class PackedSamples(NamedTuple):
     def middles(self) -> Tensor:
         """[n] distances along the ray."""
         return 0.5 * (self.t_starts + self.t_ends)
+
+    def extended(self, n: int) -> PackedSamples:
+        """The same with n more samples behind them that are of no ray, though ``ray_indices`` says 0."""
+        return self if n == 0 else PackedSamples(*(F.pad(x, (0, n)) for x in self[:3]), self.offsets)
 
 
 def march_rays(
@@ -94,8 +99,8 @@ def surface_weights(
     s: Tensor,
     offsets: Tensor,
     *,
-    step: float,
-    anneal: float = 1.0,
+    step: float | Tensor,
+    anneal: float | Tensor = 1.0,
     min_transmittance: float = 0.0,
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Normals and rendering weights of samples that know the distance and its gradient in their middles.
@@ -108,8 +113,8 @@ def surface_weights(
         rays_d: [n_rays, 3] unit.
         s: [] sharpness, positive.
         offsets: [n_rays + 1] int64.
-        step: Length of a sample, scene units.
-        anneal: Of the cosine, 0 at the start of a training, 1 when done.
+        step: Length of a sample, scene units; a number or a tensor [].
+        anneal: Of the cosine, 0 at the start of a training, 1 when done; a number or a tensor [].
         min_transmittance: As of :func:`neus_weights`.
 
     Returns:
@@ -120,7 +125,13 @@ def surface_weights(
 
     Source: NeuS Eq. (13) and its released code's estimate of both ends from one evaluation.
     """
-    return lib.surface_weights(sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance)
+    return lib.surface_weights(
+        sdf, gradient, rays_d, s, offsets, _as_tensor(step, sdf), _as_tensor(anneal, sdf), min_transmittance
+    )
+
+
+def _as_tensor(value: float | Tensor, like: Tensor) -> Tensor:
+    return value if isinstance(value, Tensor) else like.new_full((), value)
 
 
 class Spread(NamedTuple):
@@ -134,6 +145,7 @@ class Spread(NamedTuple):
         heaviest: [rays with samples] int64 positions in ``shaded``: the largest weight among these.
         leaders: [stretches] int64 positions in ``shaded``: the largest weight among those of a stretch.
         stretch: [m] int64, which stretch each of ``shaded`` is of.
+        sizes: [3] int64, how many shaded samples, rays with samples and stretches there are.
     """
 
     shaded: Tensor
@@ -143,6 +155,7 @@ class Spread(NamedTuple):
     heaviest: Tensor
     leaders: Tensor
     stretch: Tensor
+    sizes: Tensor
 
     def interpolate(self, values: Tensor) -> Tensor:
         """Values [m, c] at the shaded samples -> [n, c] at all."""
@@ -154,8 +167,9 @@ class Spread(NamedTuple):
 
 
 def spread_samples(
-    weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor, gap: float = math.inf
-) -> Spread:
+    weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor, gap: float | Tensor = math.inf,
+    room: tuple[int, int] | None = None,
+) -> Spread:  # fmt: skip
     """Draws samples of each ray in proportion to their weights, for what is asked at few of them.
 
     The weights of a ray are laid end to end, and a sample is drawn where one of `per_ray` evenly spaced marks falls on it:
@@ -167,14 +181,20 @@ def spread_samples(
         samples: The packed samples.
         per_ray: Marks on a ray; 0 draws all samples.
         phase: [n_rays] in [0, 1), where the marks begin.
-        gap: Along the ray, scene units, positive.
+        gap: Along the ray, scene units, positive; a number or a tensor [].
+        room: Shaded samples and stretches for which the result has room, whatever their number, so that a GPU need not be
+            waited for; ``heaviest`` then is [n_rays]. Entries behind what there is are in range and count for nothing. Where
+            there is too little, ``sizes`` tells, and the rest means nothing, but is in range.
 
     Raises:
         ValueError: A shape, dtype or number does not fit.
 
     Source: Systematic resampling (Kitagawa 1996).
     """
-    return Spread(*lib.spread_samples(weights, samples.middles, samples.offsets, phase, gap, per_ray))
+    t = samples.middles
+    if isinstance(gap, Tensor):
+        t, gap = t / gap, 1.0
+    return Spread(*lib.spread_samples(weights, t, samples.offsets, phase, gap, per_ray, *(room or ())))
 
 
 def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:
@@ -225,11 +245,14 @@ def _composite_backward(ctx, grad):
     return *lib.composite_backward(*ctx.saved_tensors, grad), None
 
 
-def _fake_spread(weights, t, offsets, phase, gap, per_ray):
-    sizes = (torch.library.get_ctx().new_dynamic_size() for _ in range(3))
+def _fake_spread(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_stretches=-1):
+    sizes = (max_shaded, phase.shape[0], max_stretches)
+    if max_shaded < 0:
+        sizes = (torch.library.get_ctx().new_dynamic_size() for _ in range(3))
     shaded, heaviest, leaders = (weights.new_empty(size, dtype=torch.int64) for size in sizes)
     first, second = (weights.new_empty(weights.shape, dtype=torch.int64) for _ in range(2))
-    return shaded, first, second, weights.new_empty(weights.shape), heaviest, leaders, shaded.new_empty(shaded.shape)
+    share, stretch = weights.new_empty(weights.shape), shaded.new_empty(shaded.shape)
+    return shaded, first, second, share, heaviest, leaders, stretch, shaded.new_empty(3)
 
 
 def _keep_interpolation(ctx, inputs, output):
@@ -243,17 +266,15 @@ def _interpolation_backward(ctx, grad):
 
 
 def _keep_surface(ctx, inputs, output):
-    *tensors, ctx.step, ctx.anneal, ctx.min_transmittance = inputs
+    *tensors, ctx.min_transmittance = inputs
     ctx.save_for_backward(*tensors, output[1])
 
 
 def _surface_backward(ctx, grad_normals, grad_weights, grad_opacity):
-    refuse_gradients(ctx, "surface_weights", rays_d=2)
+    refuse_gradients(ctx, "surface_weights", rays_d=2, step=5, anneal=6)
     *tensors, weights = ctx.saved_tensors
     grad_sdf, grad_gradient, grad_s = lib.surface_weights_backward(
         *tensors,
-        ctx.step,
-        ctx.anneal,
         ctx.min_transmittance,
         weights,
         grad_normals,

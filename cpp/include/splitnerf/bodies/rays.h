@@ -76,6 +76,7 @@ template <class T> struct NeusWeightsBody {
     const NeusEnds<T> ends{f_prev + ray.first, f_next + ray.first, nullptr};
     const T sum = neus_ray_weights(group, ends, *s, ray.n, min_transmittance, weights + ray.first);
     if (group.lane() == 0) opacity[r] = sum;
+    rays.for_each_unowned(group, r, [&](int64_t i) { weights[i] = T(0); });
   }
 };
 
@@ -94,6 +95,7 @@ template <class T> struct NeusWeightsBackwardBody {
         group, ends, *s, ray.n, min_transmittance, weights + ray.first, grad_weights + ray.first, grad_opacity[r],
         to_next, [&](int64_t i, const OpticalDepthGrad<T>& g) { to_prev[i] = g.f_prev, to_next[i] = g.f_next; });
     if (group.lane() == 0) grad_s_rays[r] = grad_s;
+    rays.for_each_unowned(group, r, [&](int64_t i) { grad_f_prev[i] = grad_f_next[i] = T(0); });
   }
 };
 
@@ -105,7 +107,7 @@ template <class T> struct SurfaceIntervals {
 
   SPLITNERF_HD T cosine(int64_t i) const { return dot(direction, unit_normal(load3(in.gradient + 3 * (first + i)))); }
   SPLITNERF_HD NeusInterval<T> operator()(int64_t i) const {
-    return surface_interval(in.sdf[first + i], cosine(i), in.step, in.anneal);
+    return surface_interval(in.sdf[first + i], cosine(i), *in.step, *in.anneal);
   }
 };
 
@@ -121,6 +123,10 @@ template <class T> struct SurfaceWeightsBody {
     const SurfaceIntervals<T> intervals{in, ray.first, load3(in.directions + 3 * r)};
     const T sum = neus_ray_weights(group, intervals, *in.s, ray.n, in.min_transmittance, weights + ray.first);
     if (group.lane() == 0) opacity[r] = sum;
+    in.rays.for_each_unowned(group, r, [&](int64_t i) {
+      weights[i] = T(0);
+      store3(normals + 3 * i, Vec3<T>{T(0), T(0), T(0)});
+    });
   }
 };
 
@@ -137,13 +143,17 @@ template <class T> struct SurfaceWeightsBackwardBody {
     const T grad_s = neus_ray_weights_backward(
         group, intervals, *in.s, ray.n, in.min_transmittance, weights + first, grad_weights + first, grad_opacity[r],
         grad_sdf + first, [&](int64_t i, const OpticalDepthGrad<T>& g) {
-          const T grad_cosine = surface_interval_backward(g, intervals.cosine(i), in.step, in.anneal);
+          const T grad_cosine = surface_interval_backward(g, intervals.cosine(i), *in.step, *in.anneal);
           grad_sdf[first + i] = g.both;
           store3(grad_gradient + 3 * (first + i),
                  unit_normal_backward(load3(in.gradient + 3 * (first + i)),
                                       load3(grad_normals + 3 * (first + i)) + intervals.direction * grad_cosine));
         });
     if (group.lane() == 0) grad_s_rays[r] = grad_s;
+    in.rays.for_each_unowned(group, r, [&](int64_t i) {
+      grad_sdf[i] = T(0);
+      store3(grad_gradient + 3 * i, Vec3<T>{T(0), T(0), T(0)});
+    });
   }
 };
 
@@ -183,6 +193,10 @@ template <class T> struct CompositeBackwardBody {
       }
       grad_weights[i] = grad_weight;
     }
+    rays.for_each_unowned(group, r, [&](int64_t i) {
+      grad_weights[i] = T(0);
+      for (int64_t c = 0; c < n_channels; ++c) grad_values[i * n_channels + c] = T(0);
+    });
   }
 };
 
@@ -205,7 +219,37 @@ template <class T> struct SpreadCountBody {
   }
 };
 
-// The sums of those counts [n_rays + 1] -> what Spread holds, and first, second, share [n].
+// The sums of those counts, as SpreadSizes has them; one call.
+struct SpreadSizesBody {
+  const int64_t *drawn, *filled, *stretches;
+  int64_t* sizes;
+
+  SPLITNERF_HD void operator()(int64_t) const { sizes[0] = *drawn, sizes[1] = *filled, sizes[2] = *stretches; }
+};
+
+// What stands where nothing else will. Samples from `cleared` on lie at the first shaded one; unused entries, which count for
+// nothing, are spread over what is in range, so that their gradients, which are 0, are not all added to one number.
+template <class T> struct SpreadUnusedBody {
+  PackedRays rays;
+  int64_t cleared;
+  Spread to;
+  int64_t *first, *second;
+  T* share;
+
+  SPLITNERF_HD int64_t count() const {
+    return max_of(max_of(rays.n_samples, to.room.shaded), max_of(to.room.heaviest, to.room.leaders));
+  }
+  SPLITNERF_HD void operator()(int64_t i) const {
+    if (i >= cleared && i < rays.n_samples) first[i] = second[i] = 0, share[i] = T(0);
+    if (i < to.room.shaded) to.shaded[i] = within(i, rays.n_owned()), to.stretch[i] = within(i, to.room.leaders);
+    if (i < to.room.heaviest) to.heaviest[i] = within(i, to.room.shaded);
+    if (i < to.room.leaders) to.leaders[i] = within(i, to.room.shaded);
+  }
+  SPLITNERF_HD static int64_t within(int64_t i, int64_t n) { return n > 0 ? i % n : 0; }
+};
+
+// The sums of those counts [n_rays + 1] -> what Spread holds, and first, second, share [n]. A ray for which there is no room
+// leaves all as it is.
 template <class T> struct SpreadFillBody {
   PackedRays rays;
   const T *weights, *t, *phase;
@@ -219,7 +263,7 @@ template <class T> struct SpreadFillBody {
   SPLITNERF_HD void operator()(int64_t r) const {
     const SampleRange samples = rays.samples_of(r);
     const int64_t begin = samples.first, at = drawn[r], n_drawn = drawn[r + 1] - at;
-    if (n_drawn == 0) return;
+    if (n_drawn == 0 || !to.has_room(drawn[r + 1], stretches[r + 1])) return;
     int64_t k = at;
     spread_by_weight(weights + begin, t + begin, samples.n, gap, per_ray, double(phase[r]),
                      [&](int64_t i) { to.shaded[k++] = begin + i; });
@@ -273,6 +317,7 @@ template <class T> struct InterpolateBackwardBody {
     const int64_t i = at / n_channels, c = at % n_channels;
     const int64_t a = clamp<int64_t>(first[i], 0, m - 1), b = clamp<int64_t>(second[i], 0, m - 1);
     const T g = grad_interpolated[at];
+    if (g == T(0)) return;  // samples of no ray are all of one
     add_to(grad_values + a * n_channels + c, g * (T(1) - share[i]));
     add_to(grad_values + b * n_channels + c, g * share[i]);
   }
