@@ -45,6 +45,9 @@ class Config:
     steps: int = 6000
     max_minutes: float = 0.0  # training time; 0: only the steps count
     deterministic: bool = False  # two runs give the same bits, on one machine with one number of threads
+    cuda_graphs: bool = (
+        False  # of a GPU: the launches of a step are recorded and repeated; the number of rays changes seldom
+    )
     tensor_cores: bool = True  # of a GPU, for products of matrices: TF32, factors of 10 bits; not where digits cancel
     box: float = 1.5
 
@@ -226,6 +229,14 @@ class Config:
         if self.deterministic and self.max_minutes > 0:
             raise InputError(
                 "a deterministic run ends by its steps alone; leave out --max-minutes (max_minutes) and give --steps"
+            )
+        if self.cuda_graphs and (
+            self.occlusion == "mlp" or self.light == "mlp" or self.normals != "analytic" or self.finetune_from < 1
+            or self.entropy_points == 1
+        ):  # fmt: skip
+            raise InputError(
+                "cuda_graphs needs light = pyramid, occlusion = bits or off, normals = analytic, finetune_from = 1 and "
+                "more than one of entropy_points; set cuda_graphs=false"
             )
         if not 1 <= self.growth <= 16:
             raise InputError(f"growth must be in [1, 16], got {self.growth}")

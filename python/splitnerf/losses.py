@@ -46,9 +46,8 @@ def _seed(weight: float, device: torch.device) -> Tensor:
 def backward(terms: dict[str, Term]) -> None:
     """Takes the gradient of the weighted sum of the terms to all that they come from. The weights are where the backward
     pass begins, so that no product or sum of them is computed."""
-    values = [
-        (term.value, _seed(term.weight, term.value.device)) for term in terms.values() if term.value.requires_grad
-    ]
+    seeds = [_seed(term.weight, term.value.device) for term in terms.values()]  # all, that later steps find them made
+    values = [(term.value, seed) for term, seed in zip(terms.values(), seeds) if term.value.requires_grad]
     torch.autograd.backward(*map(list, zip(*values)))
 
 

@@ -18,7 +18,8 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples
-from splitnerf.train import batch_losses, light_moves, light_period
+from splitnerf.schedule import light_moves, light_period
+from splitnerf.train import batch_losses
 
 WARM_UP, REPEATS = 1, 3
 EVERYWHERE_RAYS = 32  # of the batch where no space is empty

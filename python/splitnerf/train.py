@@ -27,6 +27,7 @@ from splitnerf.data.dataset import Dataset, dataset_fingerprint
 from splitnerf.devices import tensor_cores
 from splitnerf.errors import InputError
 from splitnerf.finite import GradientWatch, check_state, explain_loss
+from splitnerf.graphs import StepGraphs, records_graphs
 from splitnerf.losses import Term
 from splitnerf.meshes import SurfaceMesh
 from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
@@ -39,6 +40,7 @@ from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
 from splitnerf.repeatable import same_bits
+from splitnerf.schedule import cosine_anneal, light_moves, light_period, next_ray_count
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first ones are logged one by one
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion rays
@@ -91,6 +93,7 @@ def train(
         hull = visual_hull(c.grid_resolution, c.box, source.masks, source.poses, source.intrinsics)
     grid = make_grid(c, hull, device)
     mesh = SurfaceMesh(model, background=c.background_meshes)
+    graphs = StepGraphs(model, generator, c.target_samples, on=c.cuda_graphs and records_graphs(model.device))
     environment: Tensor | None = None
     step, seconds, n_rays, previewed_at = 0, 0.0, c.initial_rays, 0.0
 
@@ -133,7 +136,7 @@ def train(
     log = open(run / "metrics.jsonl", "a")
     with (
         log, Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic),
-        tensor_cores(c.tensor_cores),
+        tensor_cores(c.tensor_cores), graphs.stream(),
     ):  # fmt: skip
         while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % light_steps == 0):
             model.open_levels(progress)
@@ -156,27 +159,42 @@ def train(
                 model.refresh_indirect()
 
             batch = draw_batch(source, n_rays, c)
-            found = find_samples(model, grid.cells, *batch.rays, anneal=cosine_anneal(c, progress), probes=batch.probes)
-            ray, terms = batch_losses(
-                model, batch, found, scene, environment if traces else None, generator, step, progress
+            found = find_samples(
+                model,
+                grid.cells,
+                *batch.rays,
+                anneal=cosine_anneal(c, progress),
+                probes=batch.probes,
+                room=graphs.capacity,
             )
-            optimiser.zero_grad(set_to_none=True)
-            losses.backward(terms)
+
+            def differentiate(
+                given: tuple[Batch, FoundSamples], room: tuple[int, int] | None
+            ) -> tuple[RenderedRays, dict[str, Term]]:
+                traced = environment if traces else None
+                ray, terms = batch_losses(model, *given, scene, traced, generator, step, progress, room)
+                optimiser.zero_grad(set_to_none=True)
+                losses.backward(terms)
+                return ray, terms
+
+            ray, terms = graphs(decided(model, mesh, step, progress), differentiate, (batch, found))
             if light_moves(c, step):
                 model.light.deliver()
-            numbers = *(term.value.detach() for term in terms.values()), watch.largest(), ray.evaluated.sum().float()
-            *values, largest, n_evaluated = torch.stack(numbers).tolist()  # waits for the device
+            counts = ray.n_samples, ray.evaluated.sum(), *ray.sizes
+            numbers = *(term.value.detach() for term in terms.values()), watch.largest(), *(n.float() for n in counts)
+            *values, largest, n_samples, n_evaluated, n_shaded, _, n_stretches = torch.stack(numbers).tolist()  # waits
             loss = sum(term.weight * value for term, value in zip(terms.values(), values))
-            if not math.isfinite(loss):
+            fitted = graphs.fits(n_shaded, n_stretches)
+            if fitted and not math.isfinite(loss):
                 raise explain_loss(step, dict(zip(terms, values)), dataset, batch, model, ray)
-            if watch.allows(step, largest):
+            if fitted and watch.allows(step, largest):
                 optimiser.step()
 
-            n_samples = len(ray.weights)
             n_rays = next_ray_count(n_rays, n_samples, c)
             step, first, seconds = step + 1, False, time.monotonic() - started
             psnr = -10.0 * math.log10(max(values[0], 1e-10))
-            psnr_mean = psnr if psnr_mean is None else 0.95 * psnr_mean + 0.05 * psnr
+            if fitted:
+                psnr_mean = psnr if psnr_mean is None else 0.95 * psnr_mean + 0.05 * psnr
             samples_mean = n_evaluated / len(batch.target)
             bar.show(progress_now(), step, psnr_mean, samples_mean)
             if step % LOG_EVERY == 0 or step <= LOG_EVERY or progress_now() >= 1.0:
@@ -186,9 +204,9 @@ def train(
                     **{f"loss_{name}": term.weight * value for (name, term), value in zip(terms.items(), values)},
                     "psnr": psnr_mean,
                     "rays": len(batch.target), "samples_per_ray": samples_mean,
-                    "kept": n_samples / max(1, n_evaluated), "shaded": len(ray.shaded) / max(1, n_evaluated),
+                    "kept": n_samples / max(1, n_evaluated), "shaded": n_shaded / max(1, n_evaluated),
                     "s": model.s_value, "sees_all": getattr(model.occlusion, "sees_all", False),
-                    "skipped": watch.skipped,
+                    "skipped": watch.skipped + graphs.thrown_away,
                 }) + "\n")  # fmt: skip
                 log.flush()
             if progress_now() - previewed_at >= c.preview_every:
@@ -197,6 +215,7 @@ def train(
             if time.monotonic() - saved_at > 60.0 * c.checkpoint_minutes and step % light_steps == 0:
                 save()
                 saved_at = time.monotonic()
+        optimiser.zero_grad(set_to_none=True)
         check_state(step, model, optimiser)
         finished = progress_now() >= 1.0
         mesh.arrive(wait=finished)
@@ -211,7 +230,7 @@ def train(
 
 def batch_losses(
     model: SceneModel, batch: Batch, found: FoundSamples, scene: MeshScene | None, environment: Tensor | None,
-    generator: torch.Generator, step: int, progress: float,
+    generator: torch.Generator, step: int, progress: float, room: tuple[int, int] | None = None,
 ) -> tuple[RenderedRays, dict[str, losses.Term]]:  # fmt: skip
     """The rays as they are rendered now, and the terms of the loss by name, the colour's first.
 
@@ -223,10 +242,11 @@ def batch_losses(
         environment: [h, 2h, 3], the light that weighs the occlusion rays; None: none are traced.
         generator: Draws subsets.
         step, progress: Where the training stands.
+        room: As of :func:`splitnerf.render.renderer.render_rays`.
     """
     c = model.config
     finetune = progress >= c.finetune_from and scene is not None
-    ray = render_rays(model, found, shades_per_ray=c.shades_per_ray, fixed_materials=finetune)
+    ray = render_rays(model, found, shades_per_ray=c.shades_per_ray, fixed_materials=finetune, room=room)
     colour, mask = pixel_losses(ray.mean, ray.opacity, batch.target, batch.background, linear=ray.linear)
     eikonal, smoothness = gradient_losses(ray.gradients, ray.weights.detach(), ray.beside)
     metal, binary_metal, dark_metal = material_losses(
@@ -261,25 +281,11 @@ def batch_losses(
     return ray, terms
 
 
-def cosine_anneal(config: Config, progress: float) -> float:
-    """0 at the start, 1 from ``cos_anneal_by`` of the run."""
-    return min(1.0, progress / config.cos_anneal_by) if config.cos_anneal_by > 0 else 1.0
-
-
-def light_period(config: Config) -> int:
-    """Steps that share one pass through the light's maps."""
-    return config.light_step_every if config.light == "pyramid" else 1
-
-
-def light_moves(config: Config, step: int) -> bool:
-    """Whether the light takes its gradients in this step."""
-    return (step + 1) % light_period(config) == 0 or step + 1 == config.steps
-
-
-def next_ray_count(n_rays: int, n_samples: int, config: Config) -> int:
-    """As many rays as fill the budget of samples, moving by at most a factor of 1.25 a step."""
-    wanted = n_rays * config.target_samples / max(1, n_samples)
-    return int(min(config.max_rays, max(64, min(1.25 * n_rays, max(0.8 * n_rays, wanted)))))
+def decided(model: SceneModel, mesh: SurfaceMesh, step: int, progress: float) -> tuple:
+    """What the host decides about a step, but for sizes: steps that agree in it do the same to their tensors."""
+    c = model.config
+    since = step % light_period(c) + 1 if light_moves(c, step) else 0
+    return model.sdf_field.grid.n_active, since, progress >= c.priors_from, mesh.made_at, model.occlusion_ready
 
 
 def check_repeatable(config: Config, device: torch.device | str) -> None:

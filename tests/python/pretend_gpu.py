@@ -98,6 +98,8 @@ class PretendGpu(TorchFunctionMode):
             self.check(name, generator.device.type == (asked.type if asked else "cuda" if on_gpu else "cpu"), given)
         if asked is not None:
             kwargs["device"], on_gpu = CPU, asked.type == "cuda"
+            if on_gpu and last in ("tensor", "as_tensor"):  # copied from memory that the GPU does not reach by itself
+                self.waits[last] += 1
         elif on_gpu and last not in ACROSS:
             allowed = [args[i] for i in ON_CPU_BY_CONTRACT.get(name.removesuffix(".default"), ())]
             same = all(isinstance(x, GpuTensor) or x.dim() == 0 or any(x is y for y in allowed) for x in given)

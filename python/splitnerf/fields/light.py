@@ -68,6 +68,12 @@ class Light(nn.Module, abc.ABC):
     def deliver(self) -> None:
         """Takes gradients that have come together since :meth:`collect` to the parameters."""
 
+    def forget(self) -> None:
+        """Drops gradients that have come together."""
+
+    def prepare(self) -> None:
+        """Computes now what all uses of the light share as it stands."""
+
     def stand_in(self, value: Tensor) -> tuple[Tensor, object]:
         """What takes the place of a value computed from the light until the next :meth:`deliver`, and a token that is the
         same as long as it may. Here that is the value itself, for one backward pass."""

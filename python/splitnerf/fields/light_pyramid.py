@@ -136,14 +136,16 @@ class LightPyramid(Light):
         self._collects = False
         self._held: tuple | None = None  # state, maps and harmonics, and the leaves that stand for them
         self._stand_ins: list[tuple[Tensor, Tensor]] = []
+        self._leaves: list[Tensor] = []  # of the maps, the harmonics and the stand-ins: always the same memory
 
     def __getstate__(self) -> dict:
         return {
-            **super().__getstate__(),
+            **self.__dict__,
             "_cached": None,
             "_collects": False,
             "_held": None,
             "_stand_ins": [],
+            "_leaves": [],
         }  # copies start anew
 
     @property
@@ -171,7 +173,7 @@ class LightPyramid(Light):
                 return (levels, sh) if wanted else (levels.detach(), sh.detach())
         levels, sh = self._compute()
         if self._collects and wanted:
-            self._held = state, levels, sh, levels.detach().requires_grad_(), sh.detach().requires_grad_()
+            self._held = state, levels, sh, self._leaf(0, levels), self._leaf(1, sh)
             return self._held[-2:]
         self._cached = (state, inference, levels, sh)
         if wanted:
@@ -190,24 +192,42 @@ class LightPyramid(Light):
 
     def collect(self, on: bool = True) -> None:
         """From now on the gradients of backward passes stop at the maps and add up there; off: they no longer do."""
-        self._collects, self._held, self._stand_ins, self._cached = on, None, [], None
+        self._collects, self._held, self._stand_ins, self._cached, self._leaves = on, None, [], None, []
+
+    def _leaf(self, i: int, value: Tensor) -> Tensor:
+        """The i-th leaf, with this value and no gradient so far."""
+        assert i <= len(self._leaves), "leaves are asked for in one order"
+        if i < len(self._leaves):
+            leaf = self._leaves[i]
+            leaf.grad.zero_()
+            with torch.no_grad():
+                return leaf.copy_(value)
+        leaf = value.detach().clone().requires_grad_()
+        leaf.grad = torch.zeros_like(leaf)
+        self._leaves.append(leaf)
+        return leaf
+
+    def forget(self) -> None:
+        for leaf in self._leaves:
+            leaf.grad.zero_()
+
+    def prepare(self) -> None:
+        self.chain()
 
     def deliver(self) -> None:
         """Takes the gradients that have come together to the parameters; what is asked for next is computed anew."""
         if self._held is None:
             return
         for value, leaf in self._stand_ins:
-            if leaf.grad is not None:
-                value.backward(leaf.grad)
+            value.backward(leaf.grad)
         _, levels, sh, *leaves = self._held
         self._held, self._stand_ins, self._cached = None, [], None
-        grads = [torch.zeros_like(leaf) if leaf.grad is None else leaf.grad for leaf in leaves]
-        torch.autograd.backward([levels, sh], grads)
+        torch.autograd.backward([levels, sh], [leaf.grad for leaf in leaves])
 
     def stand_in(self, value: Tensor) -> tuple[Tensor, object]:
         if not self._collects or not value.requires_grad:
             return super().stand_in(value)
-        leaf = value.detach().requires_grad_()
+        leaf = self._leaf(2 + len(self._stand_ins), value)
         self._stand_ins.append((value, leaf))
         return leaf, self._held
 

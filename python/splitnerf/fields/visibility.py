@@ -92,7 +92,7 @@ class VisibilityBits(nn.Module):
         self.radiance: Tensor | None = None
 
     def __getstate__(self) -> dict:
-        return {**super().__getstate__(), "_cell_light": None}  # copies compute their own
+        return {**self.__dict__, "_cell_light": None}  # copies compute their own
 
     def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> None:
         """Traces a mesh and reads from its bits from now on."""
@@ -123,7 +123,7 @@ class VisibilityBits(nn.Module):
     @torch.no_grad()
     def set_light(self, light: Light) -> None:
         """Takes the light that weighs the factors, its mean over each direction's cell."""
-        self.light = self.cell_light(light).radiance
+        self.light.copy_(self.cell_light(light).radiance)
 
     def cell_light(self, light: Light) -> CellLight:
         """The light's mean over each direction's cell, differentiable in the light; asked for again while nothing has
@@ -134,7 +134,10 @@ class VisibilityBits(nn.Module):
         if torch.is_grad_enabled():
             radiance, token = light.stand_in(cells.radiance)
             cells = cells._replace(radiance=radiance)
-            self._cell_light = (cells, token) if light.stands(token) else None
+            if light.stands(token):
+                kept = self._cell_light[0] if self._cell_light else cells  # always the same memory
+                cells = CellLight(radiance, *(old.copy_(new) for old, new in zip(kept[1:], cells[1:])))
+                self._cell_light = cells, token
         return cells
 
     def _cell_means(self, light: Light) -> CellLight:
@@ -167,7 +170,8 @@ class VisibilityBits(nn.Module):
         """
         if self.indirect and self.cache is not None and not self.sees_all:
             parts = zip(self.cache.vertices.split(SHADED_CHUNK), self.cache.normals.split(SHADED_CHUNK))
-            self.radiance = torch.cat([shade(x, n) for x, n in parts])
+            radiance = torch.cat([shade(x, n) for x, n in parts])
+            self.radiance = radiance if self.radiance is None else self.radiance.copy_(radiance)
 
     @torch.no_grad()
     def forward(self, query: OcclusionQuery) -> Occlusion:

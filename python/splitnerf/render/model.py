@@ -180,8 +180,8 @@ class SceneModel(nn.Module):
         return ShadedPoints(radiance, *materials, occlusion.diffuse, occlusion.specular, facing, lobe_dirs)
 
     def summed_less_split(
-        self, on_surface: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints, among: Tensor, *,
-        fixed_materials: bool = False,
+        self, on_surface: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints, among: Tensor,
+        n_among: Tensor | None = None, *, fixed_materials: bool = False,
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
         """What radiance gains without the split: the BRDF summed over the light from the bits' directions.
 
@@ -193,17 +193,23 @@ class SceneModel(nn.Module):
             normals, view_dirs: [n, 3] unit.
             points: What :meth:`shade` gave for them.
             among: [k] int64, the points that are asked for.
+            n_among: [] how many of these count; others gain 0, nobody looks at who gains something, and no GPU is waited for.
+                None: all.
             fixed_materials: No gradient flows to the materials.
 
         Returns:
-            at: [m] int64, those of the points that gain something.
+            at: [m] int64, those of the points that gain something; with ``n_among`` all of ``among``.
             gained: [m, 3].
 
         Source: SplitNeRF Eq. (4)-(6), by quadrature.
         """
         over = (points.roughness.detach()[among, 0] - self.occlusion.summed_from) / SUMMED_BAND + 0.5
-        wide = (over > 0).nonzero().squeeze(1)
-        at, t = among[wide], over[wide, None].clamp(max=1.0)
+        if n_among is None:
+            wide = (over > 0).nonzero().squeeze(1)
+            at, t = among[wide], over[wide, None].clamp(max=1.0)
+        else:
+            counts = torch.arange(len(among), device=among.device) < n_among
+            at, t = among, (over * counts)[:, None].clamp(0.0, 1.0)
         normals, view_dirs = normals[at], view_dirs[at]
         materials = (points.albedo[at], points.roughness[at], points.metallic[at])
         albedo, roughness, metallic = (m.detach() for m in materials) if fixed_materials else materials
@@ -246,6 +252,13 @@ class SceneModel(nn.Module):
             self.refresh_light()
             for _ in range(START_BOUNCES):
                 self.refresh_indirect()
+
+    def prepare(self) -> None:
+        """Computes what follows from the parameters as they stand and is kept, so that no step does."""
+        self.sdf_field.grid.stored()
+        self.light.prepare()
+        if self.sums_light:
+            self.occlusion.cell_light(self.light)
 
     def refresh_light(self) -> None:
         """Hands the current light to the occlusion's weights, where these do not come from traced rays."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from splitnerf.config import Config
 from splitnerf.ops import (
@@ -44,6 +45,9 @@ class ProbePoints(NamedTuple):
 class FoundSamples(NamedTuple):
     """The samples of a batch of rays, and all that follows from where they are.
 
+    n is the room there is, in all that follows from these samples too: what is behind those of the last ray is of none, and
+    `positions` has the first ones again in their stead, for the field to be looked at.
+
     Attributes:
         packed: Where on the rays they are.
         rays_d: [n_rays, 3] unit.
@@ -51,8 +55,8 @@ class FoundSamples(NamedTuple):
         positions: [n + k + m, 3] of the n samples in their middles, and of the probes.
         directions: [n, 3] of their rays.
         beside: [m] the samples whose neighbours the last m are.
-        step: Length of a sample, scene units.
-        anneal: Of the cosine by which they were chosen.
+        step: [] length of a sample, scene units.
+        anneal: [] of the cosine by which they were chosen.
         evaluated: [n_rays] int64, points at which the distance was asked for to find them.
     """
 
@@ -62,8 +66,8 @@ class FoundSamples(NamedTuple):
     positions: Tensor
     directions: Tensor
     beside: Tensor
-    step: float
-    anneal: float
+    step: Tensor
+    anneal: Tensor
     evaluated: Tensor
 
 
@@ -83,6 +87,8 @@ class RenderedRays:
         gradients: [n + k + m, 3] d sdf / d position of all samples and probes.
         beside: [m] the samples whose neighbours the last m are.
         shaded: [m] indices of the samples that were shaded.
+        n_samples: [] int64, how many of the n are of a ray.
+        sizes: [3] int64, how many samples were shaded, rays have samples, stretches of rays share what is seen from them.
         shares: [m] how much of their ray's colour they are, no gradient.
         positions: [m, 3] of the shaded samples, on the level set through the sample.
         normals: [m, 3].
@@ -100,6 +106,8 @@ class RenderedRays:
     gradients: Tensor
     beside: Tensor
     shaded: Tensor
+    n_samples: Tensor
+    sizes: Tensor
     shares: Tensor
     positions: Tensor
     normals: Tensor
@@ -126,6 +134,7 @@ def find_samples(
     jitter: Tensor,
     anneal: float = 1.0,
     probes: ProbePoints | None = None,
+    room: int = 0,
 ) -> FoundSamples:
     """The samples that pixels are made of, by the field as it stands.
 
@@ -136,6 +145,7 @@ def find_samples(
         jitter: [n_rays] in [0, 1).
         anneal: Of the cosine, 0 at the start, 1 when done.
         probes: More points at which the field will be wanted.
+        room: Make room for so many samples where there are fewer.
     """
     c, s = model.config, model.s_value
     step = sample_step(c, s)
@@ -154,14 +164,19 @@ def find_samples(
     if probes is not None:
         beside = (probes.chosen * len(positions)).long() if len(positions) else beside
         neighbours = positions[beside] + probes.shifts[: len(beside)]
-        positions = torch.cat([positions, probes.anywhere, neighbours])
+        n, n_more = len(positions), max(0, room - len(positions))
+        again = positions[torch.arange(n_more, device=positions.device) % n] if n else positions.new_zeros(n_more, 3)
+        packed, directions = packed.extended(n_more), F.pad(directions, (0, 0, 0, n_more))
+        positions = torch.cat([positions, again, probes.anywhere, neighbours])
     phase = (PHASES * jitter) % 1.0  # where samples stand shall not decide which are shaded
-    return FoundSamples(packed, rays_d, phase, positions, directions, beside, step, anneal, evaluated)
+    numbers = (positions.new_full((), x) for x in (step, anneal))
+    return FoundSamples(packed, rays_d, phase, positions, directions, beside, *numbers, evaluated)
 
 
 def render_rays(
-    model: SceneModel, found: FoundSamples, *, shades_per_ray: int = 0, fixed_materials: bool = False
-) -> RenderedRays:
+    model: SceneModel, found: FoundSamples, *, shades_per_ray: int = 0, fixed_materials: bool = False,
+    room: tuple[int, int] | None = None,
+) -> RenderedRays:  # fmt: skip
     """Renders rays from their samples.
 
     Args:
@@ -169,6 +184,8 @@ def render_rays(
         found: The samples; the field may have moved a little since.
         shades_per_ray: Samples of a ray that are shaded, about; others take what lies between. 0 shades all.
         fixed_materials: The colours have a gradient to surface and light alone.
+        room: As of :func:`splitnerf.ops.spread_samples`; without it a GPU is waited for. Where it is too small ``sizes`` tells,
+            and the colours mean nothing.
 
     Source: SplitNeRF Eq. (1)-(2), (17).
     """
@@ -187,7 +204,7 @@ def render_rays(
         min_transmittance=c.min_transmittance,
     )
 
-    spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step)
+    spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step, room)
     shaded = spread.shaded
     positions, view_dirs = found.positions[shaded], -found.directions[shaded]
     normals, sdf = normals[shaded], sdf[shaded]
@@ -206,12 +223,13 @@ def render_rays(
     if model.sums_light:
         on_surface = positions - normals.detach() * sdf.detach()[:, None]
         at, gained = model.summed_less_split(
-            on_surface, normals, view_dirs, points, spread.heaviest, fixed_materials=fixed_materials
-        )
+            on_surface, normals, view_dirs, points, spread.heaviest, None if room is None else spread.sizes[1],
+            fixed_materials=fixed_materials,
+        )  # fmt: skip
         mean = mean.index_add(0, samples.ray_indices[shaded[at]], gained)
     return RenderedRays(
         mean, c.compositing == "linear", opacity, samples, found.evaluated, weights, values, field.gradient, found.beside,
-        shaded, shares, positions, normals, sdf, points,
+        shaded, samples.offsets[-1], spread.sizes, shares, positions, normals, sdf, points,
     )  # fmt: skip
 
 

@@ -1,0 +1,94 @@
+"""CUDA graphs that are none: work of the CPU, recorded operator by operator and repeated on the same memory.
+
+As on a GPU nothing is done while it is recorded, numbers of the host are frozen, what waits for a result is refused, and
+what is written to is always the same memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.utils._python_dispatch import TorchDispatchMode
+from torch.utils._pytree import tree_iter
+
+REFUSED = (
+    "_local_scalar_dense",
+    "lift_fresh",
+    "_to_copy",
+    "nonzero",
+    "masked_select",
+    "_unique2",
+    "march_rays",
+    "sample_rays",
+)
+
+
+def tensors(value: object) -> list[Tensor]:
+    return [x for x in tree_iter(value) if isinstance(x, Tensor)]
+
+
+def memory(x: Tensor) -> int:
+    return x.untyped_storage().data_ptr()
+
+
+class PretendGraph(TorchDispatchMode):
+    """Records within its block."""
+
+    def __init__(self, generator: torch.Generator) -> None:
+        super().__init__()
+        self.generator, self.calls = generator, []
+        self.before: dict[int, tuple[Tensor, Tensor]] = {}  # what is written to, and what it held
+        self.made: set[int] = set()  # memory of the recording itself
+
+    def __torch_dispatch__(self, func, types, args=(), kwargs=None):
+        kwargs = kwargs or {}
+        name = func._schema.name.split("::")[1]
+        free = name == "spread_samples" and len(args) < 8
+        masks = name == "index" and any(x.dtype in (torch.bool, torch.uint8) for x in tensors(args[1]))
+        if name in REFUSED or free or masks or any(x.device.type != "cpu" for x in tensors((args, kwargs))):
+            raise RuntimeError(f"{name} waits for the GPU")
+        for argument, value in zip(func._schema.arguments, args):
+            if argument.alias_info is not None and argument.alias_info.is_write:
+                for x in tensors(value):
+                    if memory(x) not in self.made:
+                        self.before.setdefault(id(x), (x, x.clone()))
+        result = func(*args, **kwargs)
+        given = {memory(x) for x in tensors((args, kwargs))}
+        fresh = [
+            None if memory(x) in given else torch.ops.aten.alias(x) for x in tensors(result)
+        ]  # squeeze_ may follow
+        self.made.update(memory(x) for x in fresh if x is not None)
+        writes = any(a.alias_info is not None and a.alias_info.is_write for a in func._schema.arguments)
+        if writes or any(x is not None for x in fresh):  # else a view
+            self.calls.append((func, args, kwargs, fresh))
+        return result
+
+    def __enter__(self) -> PretendGraph:
+        self.state = self.generator.get_state()
+        return super().__enter__()
+
+    def __exit__(self, *exception) -> None:
+        super().__exit__(*exception)
+        self.generator.set_state(self.state)
+        with torch.no_grad():
+            for x, held in self.before.values():
+                x.copy_(held)
+
+    @torch.no_grad()
+    def replay(self) -> None:
+        for func, args, kwargs, fresh in self.calls:
+            for old, new in zip(fresh, tensors(func(*args, **kwargs)), strict=True):
+                if old is not None:
+                    assert old.shape == new.shape, func
+                    old.copy_(new)
+
+
+def record(function: Callable[[], Any], pool: object, generator: torch.Generator) -> tuple[PretendGraph, Any]:
+    """As :func:`splitnerf.graphs.record`."""
+    graph = PretendGraph(generator)
+    with graph:
+        outputs = function()
+    return graph, outputs

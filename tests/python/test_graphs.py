@@ -1,0 +1,167 @@
+"""Training steps that are recorded and repeated, on a CPU that pretends to."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import pretend_graphs
+import pytest
+import torch
+from test_device import tiny
+from test_train import data  # noqa: F401
+
+from splitnerf import graphs, losses, train as trainer
+from splitnerf.batches import draw_batch
+from splitnerf.config import Config
+from splitnerf.data.dataset import load_dataset
+from splitnerf.errors import InputError
+from splitnerf.graphs import StepGraphs
+from splitnerf.meshes import SurfaceMesh
+from splitnerf.render.model import SceneModel
+from splitnerf.render.rays import PixelSource
+from splitnerf.render.renderer import find_samples
+
+
+class NoStream:
+    def __init__(self, *_) -> None:
+        pass
+
+    def wait_stream(self, other) -> None:
+        pass
+
+
+@pytest.fixture
+def recording(monkeypatch):
+    """Graphs on the CPU; counts how they were used."""
+    used = {"recorded": 0, "replayed": 0}
+
+    def record(*arguments):
+        used["recorded"] += 1
+        return pretend_graphs.record(*arguments)
+
+    def replay(self):
+        used["replayed"] += 1
+        replay_calls(self)
+
+    replay_calls = pretend_graphs.PretendGraph.replay
+    monkeypatch.setattr(pretend_graphs.PretendGraph, "replay", replay)
+    monkeypatch.setattr(graphs, "record", record)
+    monkeypatch.setattr(trainer, "records_graphs", lambda device: True)
+    monkeypatch.setattr(torch.cuda, "Stream", NoStream)
+    monkeypatch.setattr(torch.cuda, "graph_pool_handle", lambda: None)
+    monkeypatch.setattr(torch.cuda, "current_stream", lambda device: NoStream())
+    monkeypatch.setattr(torch.cuda, "stream", lambda stream: pytest.MonkeyPatch.context())
+    return used
+
+
+def losses_of(folder) -> list[dict]:
+    return [json.loads(line) for line in (folder / "metrics.jsonl").read_text().splitlines()]
+
+
+@pytest.mark.parametrize("settings", [
+    {}, {"sparse_steps": True, "table_dtype": "float16"}, {"table_dtype": "bfloat16", "seed": 3},
+    {"table_dtype": "float16", "sample_above": 0.0, "grid_every": 3, "target_samples": 16384},
+])  # fmt: skip
+def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, recording, settings):  # noqa: F811
+    """While the light moves, levels open, meshes come, priors begin and the anneal goes on. Both have as much room."""
+    room = {"target_samples": 4608, "open_below": 0.0, "indirect_every": 50, "start_levels": 1}
+    config = tiny("cpu", steps=240, cuda_graphs=True, **room | settings)
+    for name in ("recorded", "called"):
+        (tmp_path / name).mkdir()
+    monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
+    trainer.train(load_dataset(data), config, tmp_path / "recorded")
+    assert recording["replayed"] > 150 and recording["recorded"] < 60
+    called = []
+
+    def call(function, pool, generator):
+        outputs = [None, None]
+        called.append(lambda: outputs.__setitem__(slice(None), function()))
+        return SimpleNamespace(replay=called[-1]), outputs
+
+    monkeypatch.setattr(graphs, "record", call)
+    trainer.train(load_dataset(data), config, tmp_path / "called")
+    assert len(called) == recording["recorded"]
+    for ours, theirs in zip(losses_of(tmp_path / "recorded"), losses_of(tmp_path / "called"), strict=True):
+        assert ours | {"seconds": 0} == theirs | {"seconds": 0}
+
+
+def test_room_changes_roundings_alone(data, monkeypatch):  # noqa: F811
+    """Losses and gradients of one step with room for more of everything, against those with none."""
+    dataset = load_dataset(data)
+    config = tiny(
+        "cpu",
+        open_below=0.0,
+        n_levels=6,
+        target_samples=3000,
+        initial_variance=0.4,
+        eikonal_weight=0.0,
+        entropy_weight=0.0,
+    )
+    model = SceneModel(config)
+    generator = torch.Generator().manual_seed(0)
+    source = PixelSource(dataset, 0.85, generator)
+    mesh = SurfaceMesh(model)
+    mesh.renew(0.5)
+    batch, cells = draw_batch(source, 200, config), torch.ones(16, 16, 16, dtype=torch.uint8)
+    found = find_samples(model, cells, *batch.rays, probes=batch.probes)
+    n = len(found.directions)
+    kept = find_samples(model, cells, *batch.rays, probes=batch.probes, room=n + 77)
+    assert n > 500 and len(kept.directions) == n + 77 and model.sums_light
+
+    def step(found, room):
+        drawn = torch.Generator().manual_seed(1)
+        model.zero_grad()
+        ray, terms = trainer.batch_losses(model, batch, found, mesh.scene, None, drawn, 3, 0.9, room)
+        losses.backward(terms)
+        model.light.deliver()
+        return {k: t.value.detach() for k, t in terms.items()}, [p.grad for p in model.parameters()], ray
+
+    model.light.collect()
+    terms, grads, ray = step(found, None)
+    padded_terms, padded_grads, padded = step(kept, (4096, 2048))
+    assert (
+        padded.sizes.tolist() == ray.sizes.tolist() and len(padded.shaded) == 4096 and ray.n_samples == padded.n_samples
+    )
+    assert {"colour", "neutral", "smoothness", "mask", "dark_metal"} <= set(terms)
+    for name, value in terms.items():
+        if name != "eikonal":  # it looks at some points twice, and counts for nothing here
+            torch.testing.assert_close(padded_terms[name], value, rtol=1e-5, atol=1e-7)
+    for (name, _), a, b in zip(model.named_parameters(), padded_grads, grads, strict=True):
+        assert (a - b).norm() <= 1e-4 * b.norm(), name
+
+
+def test_a_step_with_too_little_room_is_not_taken(data, tmp_path, monkeypatch, recording):  # noqa: F811
+    monkeypatch.setattr(graphs, "SHADING_ROOM", 0.2)
+    monkeypatch.setattr(graphs, "ROOM_UNIT", 1)
+    fitted, fits = [], StepGraphs.fits
+    monkeypatch.setattr(StepGraphs, "fits", lambda self, *counts: fitted.append(fits(self, *counts)) or fitted[-1])
+    taken, step = [0], torch.optim.AdamW.step
+    monkeypatch.setattr(torch.optim.AdamW, "step", lambda self: taken.append(1) or step(self))
+    monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
+    config = tiny("cpu", steps=40, cuda_graphs=True, target_samples=4608)
+    trained = trainer.train(load_dataset(data), config, tmp_path)
+    assert fitted.count(False) > 0 and len(taken) - 1 == fitted.count(True) and trained.finished
+
+
+def test_what_cannot_be_recorded_is_refused():
+    for settings in ({"light": "mlp"}, {"occlusion": "mlp"}, {"normals": "finite_difference"}, {"finetune_from": 0.8}):
+        with pytest.raises(InputError, match="cuda_graphs"):
+            Config().replace({"cuda_graphs": True, "shading": "split", **settings})
+
+
+def test_waiting_while_recording_is_refused():
+    generator = torch.Generator()
+    for waits in (lambda x: x.sum().item(), lambda x: x.nonzero(), lambda x: x[x > 0]):
+        with pytest.raises(RuntimeError, match="waits"):
+            pretend_graphs.record(lambda: waits(torch.ones(3)), None, generator)
+    x, total = torch.ones(3), torch.zeros(3)
+    graph, drawn = pretend_graphs.record(
+        lambda: total.add_(x * 2) + torch.rand(3, generator=generator), None, generator
+    )
+    assert not total.any()
+    graph.replay()
+    first = drawn.clone()
+    x.fill_(2.0)
+    graph.replay()
+    assert total.tolist() == [6.0] * 3 and not torch.equal(drawn - 6, first - 2)
