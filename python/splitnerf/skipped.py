@@ -19,7 +19,7 @@ from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples
 from splitnerf.schedule import light_moves, light_period
-from splitnerf.train import batch_losses
+from splitnerf.step import batch_losses
 
 WARM_UP, REPEATS = 1, 3
 EVERYWHERE_RAYS = 32  # of the batch where no space is empty

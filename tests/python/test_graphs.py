@@ -21,6 +21,7 @@ from splitnerf.meshes import SurfaceMesh
 from splitnerf.render.model import SceneModel
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples
+from splitnerf.step import batch_losses
 
 
 class NoStream:
@@ -112,7 +113,7 @@ def test_room_changes_roundings_alone(data, monkeypatch):  # noqa: F811
     def step(found, room):
         drawn = torch.Generator().manual_seed(1)
         model.zero_grad()
-        ray, terms = trainer.batch_losses(model, batch, found, mesh.scene, None, drawn, 3, 0.9, room)
+        ray, terms = batch_losses(model, batch, found, mesh.scene, None, drawn, 3, 0.9, room)
         losses.backward(terms)
         model.light.deliver()
         return {k: t.value.detach() for k, t in terms.items()}, [p.grad for p in model.parameters()], ray
