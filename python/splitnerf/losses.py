@@ -150,8 +150,10 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
         return weights.new_zeros(())
     weights = weights.nan_to_num(0.0, 0.0, 0.0) + 1e-12  # the loss tells of what is not finite
     chosen = torch.multinomial(weights, c.entropy_points, replacement=True, generator=generator)
-    gloss = torch.cat([points.roughness[chosen], points.metallic[chosen]], dim=1)
-    x = torch.cat([torch.log(points.albedo[chosen] + ALBEDO_FLOOR) / c.albedo_width, gloss / c.gloss_width], dim=1)
+    taken = points.albedo, points.roughness, points.metallic
+    albedo, roughness, metallic = (x.index_select(0, chosen) for x in taken)
+    gloss = torch.cat([roughness, metallic], dim=1) / c.gloss_width
+    x = torch.cat([torch.log(albedo + ALBEDO_FLOOR) / c.albedo_width, gloss], dim=1)
     return quadratic_entropy(x)
 
 

@@ -180,9 +180,11 @@ def train(
             ray, terms = graphs(decided(model, mesh, step, progress), differentiate, (batch, found))
             if light_moves(c, step):
                 model.light.deliver()
-            counts = ray.n_samples, ray.evaluated.sum(), *ray.sizes
-            numbers = *(term.value.detach() for term in terms.values()), watch.largest(), *(n.float() for n in counts)
-            *values, largest, n_samples, n_evaluated, n_shaded, _, n_stretches = torch.stack(numbers).tolist()  # waits
+            numbers = torch.stack([*(term.value.detach() for term in terms.values()), watch.largest()])
+            counts = torch.cat([ray.samples.offsets[-1:], ray.evaluated.sum()[None], ray.sizes])
+            *values, largest, n_samples, n_evaluated, n_shaded, _, n_stretches = torch.cat(
+                [numbers, counts]
+            ).tolist()  # waits
             loss = sum(term.weight * value for term, value in zip(terms.values(), values))
             fitted = graphs.fits(n_shaded, n_stretches)
             if fitted and not math.isfinite(loss):

@@ -121,9 +121,7 @@ def test_room_changes_roundings_alone(data, monkeypatch):  # noqa: F811
     model.light.collect()
     terms, grads, ray = step(found, None)
     padded_terms, padded_grads, padded = step(kept, (4096, 2048))
-    assert (
-        padded.sizes.tolist() == ray.sizes.tolist() and len(padded.shaded) == 4096 and ray.n_samples == padded.n_samples
-    )
+    assert padded.sizes.tolist() == ray.sizes.tolist() and len(padded.shaded) == 4096
     assert {"colour", "neutral", "smoothness", "mask", "dark_metal"} <= set(terms)
     for name, value in terms.items():
         if name != "eikonal":  # it looks at some points twice, and counts for nothing here

@@ -210,8 +210,9 @@ class SceneModel(nn.Module):
         else:
             counts = torch.arange(len(among), device=among.device) < n_among
             at, t = among, (over * counts)[:, None].clamp(0.0, 1.0)
-        normals, view_dirs = normals[at], view_dirs[at]
-        materials = (points.albedo[at], points.roughness[at], points.metallic[at])
+        taken = normals, points.albedo, points.roughness, points.metallic, points.radiance
+        normals, *materials, split = (x.index_select(0, at) for x in taken)
+        view_dirs = view_dirs[at]
         albedo, roughness, metallic = (m.detach() for m in materials) if fixed_materials else materials
         light = self.occlusion.cell_light(self.light)
         visible, sent = self.occlusion.visibility(on_surface[at], points.facing.detach()[at])
@@ -219,7 +220,7 @@ class SceneModel(nn.Module):
             normals, view_dirs, roughness, light.directions, light.solid_angles, light.radiance, visible, sent
         )
         radiance = shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, self.config.compensate)
-        return at, (radiance - points.radiance[at]) * (t * t * (3.0 - 2.0 * t))
+        return at, (radiance - split) * (t * t * (3.0 - 2.0 * t))
 
     @property
     def sums_light(self) -> bool:

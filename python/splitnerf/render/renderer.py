@@ -87,7 +87,6 @@ class RenderedRays:
         gradients: [n + k + m, 3] d sdf / d position of all samples and probes.
         beside: [m] the samples whose neighbours the last m are.
         shaded: [m] indices of the samples that were shaded.
-        n_samples: [] int64, how many of the n are of a ray.
         sizes: [3] int64, how many samples were shaded, rays have samples, stretches of rays share what is seen from them.
         shares: [m] how much of their ray's colour they are, no gradient.
         positions: [m, 3] of the shaded samples, on the level set through the sample.
@@ -106,7 +105,6 @@ class RenderedRays:
     gradients: Tensor
     beside: Tensor
     shaded: Tensor
-    n_samples: Tensor
     sizes: Tensor
     shares: Tensor
     positions: Tensor
@@ -164,10 +162,12 @@ def find_samples(
     if probes is not None:
         beside = (probes.chosen * len(positions)).long() if len(positions) else beside
         neighbours = positions[beside] + probes.shifts[: len(beside)]
-        n, n_more = len(positions), max(0, room - len(positions))
-        again = positions[torch.arange(n_more, device=positions.device) % n] if n else positions.new_zeros(n_more, 3)
-        packed, directions = packed.extended(n_more), F.pad(directions, (0, 0, 0, n_more))
-        positions = torch.cat([positions, again, probes.anywhere, neighbours])
+        again, n, n_more = [], len(positions), room - len(positions)
+        if n_more > 0:
+            packed, directions = packed.extended(n_more), F.pad(directions, (0, 0, 0, n_more))
+            which = torch.arange(n_more, device=positions.device) % max(n, 1)
+            again = [positions[which] if n else positions.new_zeros(n_more, 3)]
+        positions = torch.cat([positions, *again, probes.anywhere, neighbours])
     phase = (PHASES * jitter) % 1.0  # where samples stand shall not decide which are shaded
     numbers = (positions.new_full((), x) for x in (step, anneal))
     return FoundSamples(packed, rays_d, phase, positions, directions, beside, *numbers, evaluated)
@@ -207,11 +207,13 @@ def render_rays(
     spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step, room)
     shaded = spread.shaded
     positions, view_dirs = found.positions[shaded], -found.directions[shaded]
-    normals, sdf = normals[shaded], sdf[shaded]
+    # The gradient of index_select is a sum; that of indexing sorts on a GPU.
+    normals, outputs, features = (x.index_select(0, shaded) for x in (normals, field.outputs, field.features))
+    sdf = outputs[:, 0]
     points = model.shade(
         positions,
-        field.outputs[shaded],
-        field.features[shaded],
+        outputs,
+        features,
         normals,
         view_dirs,
         (spread.leaders, spread.stretch),
@@ -229,7 +231,7 @@ def render_rays(
         mean = mean.index_add(0, samples.ray_indices[shaded[at]], gained)
     return RenderedRays(
         mean, c.compositing == "linear", opacity, samples, found.evaluated, weights, values, field.gradient, found.beside,
-        shaded, samples.offsets[-1], spread.sizes, shares, positions, normals, sdf, points,
+        shaded, spread.sizes, shares, positions, normals, sdf, points,
     )  # fmt: skip
 
 
