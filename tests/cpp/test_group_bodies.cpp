@@ -1,4 +1,6 @@
 // The bodies that a warp runs on the GPU, run by as many threads here, against the operators of the CPU.
+#include <tuple>
+
 #include "check.h"
 #include "lanes.h"
 #include "splitnerf/bodies/light_pyramid.h"
@@ -116,7 +118,8 @@ TEST(GroupBodies, CompositeAndItsGradients) {
   expect_near(sums8, sums, 1e-14), expect_near(to_w8, to_w, 0), expect_near(to_v8, to_v, 0);
 }
 
-// The counts of all rays, their sums, then what each ray fills, against the one pass of the CPU.
+// The counts of all rays, their sums, what stands where nothing else will, then what each ray fills, against the one pass of
+// the CPU; with as much room as is needed, and with more.
 TEST(GroupBodies, SpreadSamples) {
   const Rays r;
   const int64_t n = r.n(), n_rays = r.packed().n_rays;
@@ -124,46 +127,51 @@ TEST(GroupBodies, SpreadSamples) {
   const auto w = random.uniforms(size_t(n)), phase = random.uniforms(size_t(n_rays));
   std::vector<double> t(n);
   for (int64_t i = 0; i < n; ++i) t[i] = (i ? t[i - 1] : 0) + random.uniform(0.01, 0.2);
-  for (const int per_ray : {0, 1, 4})
-    for (const double gap : {0.15, double(INFINITY)}) {
-      using Indices = std::vector<int64_t>;
-      struct Result {
-        Indices first, second, shaded, heaviest, leaders, stretch;
-        std::vector<double> share;
-        Spread allocate(const SpreadSizes& sizes) {
-          shaded.resize(sizes.shaded), heaviest.resize(sizes.heaviest), leaders.resize(sizes.leaders);
-          stretch.resize(sizes.shaded);
-          return {shaded.data(), heaviest.data(), leaders.data(), stretch.data(), sizes};
-        }
-      };
-      Result one{Indices(n), Indices(n), {}, {}, {}, {}, std::vector<double>(n)}, two = one;
-      int64_t sizes[3];
-      cpu::spread_samples(r.packed(), w.data(), t.data(), phase.data(), gap, per_ray, sizes, one.first.data(),
-                          one.second.data(), one.share.data(), {[&](const SpreadSizes& s) { return one.allocate(s); }});
-      Indices drawn(n_rays + 1), stretches(n_rays + 1), filled(n_rays + 1);
-      const SpreadCountBody<double> count{
-          r.packed(),           w.data(),         t.data(), phase.data(), gap, per_ray, drawn.data() + 1,
-          stretches.data() + 1, filled.data() + 1};
-      for (int64_t i = 0; i < n_rays; ++i) {
-        count(i);
-        for (Indices* sums : {&drawn, &stretches, &filled}) (*sums)[i + 1] += (*sums)[i];
+  const SpreadSizes room{200, n_rays, 160};
+  for (const auto& [per_ray, gap, fixed] : std::initializer_list<std::tuple<int, double, const SpreadSizes*>>{
+           {0, 0.15, nullptr}, {1, 0.15, nullptr}, {4, INFINITY, nullptr}, {4, 0.15, &room}, {1, INFINITY, &room}}) {
+    using Indices = std::vector<int64_t>;
+    struct Result {
+      Indices first, second, shaded, heaviest, leaders, stretch;
+      std::vector<double> share;
+      Spread allocate(const SpreadSizes& sizes) {
+        shaded.resize(sizes.shaded), heaviest.resize(sizes.heaviest), leaders.resize(sizes.leaders);
+        stretch.resize(sizes.shaded);
+        return {shaded.data(), heaviest.data(), leaders.data(), stretch.data(), sizes};
       }
-      int64_t counted[3];
-      SpreadSizesBody{&drawn.back(), &filled.back(), &stretches.back(), counted}(0);
-      EXPECT_TRUE(std::equal(counted, counted + 3, sizes));
-      const Spread to = two.allocate({counted[0], counted[1], counted[2]});
-      const SpreadFillBody<double> fill{r.packed(),       w.data(),          t.data(),         phase.data(),  gap,
-                                        per_ray,          drawn.data(),      stretches.data(), filled.data(), to,
-                                        two.first.data(), two.second.data(), two.share.data()};
-      for (int64_t i = n_rays; i-- > 0;) fill(i);
-      EXPECT_EQ(two.shaded, one.shaded);
-      EXPECT_EQ(two.first, one.first);
-      EXPECT_EQ(two.second, one.second);
-      EXPECT_EQ(two.heaviest, one.heaviest);
-      EXPECT_EQ(two.leaders, one.leaders);
-      EXPECT_EQ(two.stretch, one.stretch);
-      EXPECT_EQ(two.share, one.share);
+    };
+    Result one{Indices(n, -1), Indices(n, -1), {}, {}, {}, {}, std::vector<double>(n, -1)}, two = one;
+    int64_t sizes[3];
+    cpu::spread_samples(r.packed(), w.data(), t.data(), phase.data(), gap, per_ray, sizes, one.first.data(),
+                        one.second.data(), one.share.data(),
+                        {[&](const SpreadSizes& s) { return one.allocate(s); }, fixed});
+    Indices drawn(n_rays + 1), stretches(n_rays + 1), filled(n_rays + 1);
+    const SpreadCountBody<double> count{
+        r.packed(),           w.data(),         t.data(), phase.data(), gap, per_ray, drawn.data() + 1,
+        stretches.data() + 1, filled.data() + 1};
+    for (int64_t i = 0; i < n_rays; ++i) {
+      count(i);
+      for (Indices* sums : {&drawn, &stretches, &filled}) (*sums)[i + 1] += (*sums)[i];
     }
+    int64_t counted[3];
+    SpreadSizesBody{&drawn.back(), &filled.back(), &stretches.back(), counted}(0);
+    EXPECT_TRUE(std::equal(counted, counted + 3, sizes));
+    const Spread to = two.allocate(fixed ? *fixed : SpreadSizes{counted[0], counted[1], counted[2]});
+    const SpreadUnusedBody<double> unused{r.packed(), 0, to, two.first.data(), two.second.data(), two.share.data()};
+    for (int64_t i = 0; i < unused.count(); ++i) unused(i);
+    const SpreadFillBody<double> fill{r.packed(),       w.data(),          t.data(),         phase.data(),  gap,
+                                      per_ray,          drawn.data(),      stretches.data(), filled.data(), to,
+                                      two.first.data(), two.second.data(), two.share.data()};
+    for (int64_t i = n_rays; i-- > 0;) fill(i);
+    EXPECT_EQ(two.shaded, one.shaded);
+    EXPECT_EQ(two.first, one.first);
+    EXPECT_EQ(two.second, one.second);
+    EXPECT_EQ(two.heaviest, one.heaviest);
+    EXPECT_EQ(two.leaders, one.leaders);
+    EXPECT_EQ(two.stretch, one.stretch);
+    EXPECT_EQ(two.share, one.share);
+    EXPECT_EQ(two.first.back(), 0);
+  }
 }
 
 // Offsets that nobody has checked: nothing outside the arrays is touched.
