@@ -45,9 +45,7 @@ class Config:
     steps: int = 6000
     max_minutes: float = 0.0  # training time; 0: only the steps count
     deterministic: bool = False  # two runs give the same bits, on one machine with one number of threads
-    cuda_graphs: bool = (
-        False  # of a GPU: the launches of a step are recorded and repeated; the number of rays changes seldom
-    )
+    cuda_graphs: bool = False  # of a GPU: a step's launches are recorded and repeated, and rays change in number seldom
     tensor_cores: bool = True  # of a GPU, for products of matrices: TF32, factors of 10 bits; not where digits cancel
     box: float = 1.5
 

@@ -159,14 +159,8 @@ def train(
                 model.refresh_indirect()
 
             batch = draw_batch(source, n_rays, c)
-            found = find_samples(
-                model,
-                grid.cells,
-                *batch.rays,
-                anneal=cosine_anneal(c, progress),
-                probes=batch.probes,
-                room=graphs.capacity,
-            )
+            anneal = cosine_anneal(c, progress)
+            found = find_samples(model, grid.cells, *batch.rays, anneal, batch.probes, room=graphs.capacity)
 
             def differentiate(
                 given: tuple[Batch, FoundSamples], room: tuple[int, int] | None
@@ -182,9 +176,8 @@ def train(
                 model.light.deliver()
             numbers = torch.stack([*(term.value.detach() for term in terms.values()), watch.largest()])
             counts = torch.cat([ray.samples.offsets[-1:], ray.evaluated.sum()[None], ray.sizes])
-            *values, largest, n_samples, n_evaluated, n_shaded, _, n_stretches = torch.cat(
-                [numbers, counts]
-            ).tolist()  # waits
+            read = torch.cat([numbers, counts]).tolist()  # waits for the device
+            *values, largest, n_samples, n_evaluated, n_shaded, _, n_stretches = read
             loss = sum(term.weight * value for term, value in zip(terms.values(), values))
             fitted = graphs.fits(n_shaded, n_stretches)
             if fitted and not math.isfinite(loss):

@@ -87,7 +87,7 @@ def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, rec
         assert ours | {"seconds": 0} == theirs | {"seconds": 0}
 
 
-def test_room_changes_roundings_alone(data, monkeypatch):  # noqa: F811
+def test_room_changes_roundings_alone(data):  # noqa: F811
     """Losses and gradients of one step with room for more of everything, against those with none."""
     dataset = load_dataset(data)
     config = tiny(
