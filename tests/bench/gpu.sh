@@ -14,7 +14,7 @@ set -u
 root=$(cd "$(dirname "$0")/../.." && pwd)
 mkdir -p "$1" && out=$(cd "$1" && pwd) || exit 2
 bundle=${2:+$(cd "$2" && pwd)} || exit 2
-python=${PYTHON:-python3} dry=${GPU_DRY:-}
+python=$(command -v "${PYTHON:-python3}") dry=${GPU_DRY:-}
 if [ -n "${GPU_WORK:-}" ]; then
   mkdir -p "$GPU_WORK" && work=$(cd "$GPU_WORK" && pwd) || exit 2
 else
@@ -62,7 +62,7 @@ part() { # name, seconds, command
   if [ "$left" -lt 5 ]; then row "$name" "left out" 0 "no time left"; return 1; fi
   [ "$limit" -le "$left" ] || limit=$left
   echo "== $name" >&2
-  (export -f setup data relight; timeout --kill-after=10 "$limit" "$@") >"$log" 2>&1 </dev/null
+  (export -f setup data relight gpu_tests; timeout --kill-after=10 "$limit" "$@") >"$log" 2>&1 </dev/null
   code=$?
   [ "$code" = 0 ] || result="failed ($code)"
   [ "$code" = 0 ] || [ $((SECONDS - begin)) -lt "$limit" ] || result="stopped at $limit s"
@@ -101,6 +101,16 @@ from splitnerf.demo.scene import write_demo_dataset
 write_demo_dataset(Path('$work/writing'), $picture)" && mv "$work/writing" "$work/demo" && echo "$work/demo"
 }
 
+gpu_tests() { # each file in a process of its own: a kernel that takes the device down fails one file alone
+  mkdir -p "$work/tests"
+  grep -lE 'DEVICES|devices\(|"cuda"' tests/python/test_*.py | xargs -P 5 -I{} bash -c 'CUDA_LAUNCH_BLOCKING=1 "$run_python" -m pytest {} -q -k cuda -p no:cacheprovider -o faulthandler_timeout=60 -r fE >"$work/tests/$(basename {}).log" 2>&1'
+  code=$?
+  grep -hE '^(FAILED|ERROR|E  )' "$work"/tests/*.log
+  for log in "$work"/tests/*.log; do echo "$(basename "$log" .py.log): $(tail -n 1 "$log")"; done | tee "$work/tests/summary"
+  sed -n 's/.*: //p' "$work/tests/summary" | awk '{ for (i = 2; i <= NF; i++) n[$i] += $(i - 1) } END { printf "%d passed, %d failed, %d errors\n", n["passed"] + n["passed,"], n["failed"] + n["failed,"], n["error"] + n["errors"] + n["error,"] + n["errors,"] }'
+  return "$code"
+}
+
 relight() { # of the run, where the data have lights to compare with
   splitnerf evaluate "$work/runs/fast" --data "$1" --views 4 --spp 32 &&
     "$run_python" -c 'import json, sys; print("relit views %.2f dB" % json.load(open(sys.argv[1]))["relight"]["psnr"])' "$work/runs/fast/evaluation.json"
@@ -112,20 +122,19 @@ part setup 90 bash -c setup
 CMAKE_PREFIX_PATH="$work/embree/usr" part build 200 "$run_python" -m pip --disable-pip-version-check install --no-index --no-deps \
   --no-build-isolation --no-cache-dir --force-reinstall "$root" -C build-dir="$work/build" -C cmake.define.SPLITNERF_CUDA=$cuda -v
 if part info 30 bash -c 'set -o pipefail; splitnerf info | paste -sd ";" | sed "s/;/; /g"'; then
-  # shellcheck disable=SC2046  # file names; other files may need packages that are not here
-  part tests 110 "$run_python" -m pytest $(grep -lE 'DEVICES|devices\(|"cuda"' tests/python/test_*.py) -q -k cuda -p no:cacheprovider -o faulthandler_timeout=60 -r fE
-  # shellcheck disable=SC2086  # words
-  part operators 125 "$run_python" tests/bench/gpu_ops.py --out "$out" --device $device $ops
+  part tests 130 bash -c gpu_tests
   if part data 60 bash -c data; then
     scene=$(tail -n 1 "$work/data.log") train=("$run_python" tests/bench/gpu_train.py)
     steps=$(splitnerf info --settings fast 2>/dev/null | sed -n 's/^steps = //p')
     [ -z "$dry" ] || steps=60
-    part fast 220 "${train[@]}" "$scene" --out "$work/runs/fast" --preset fast --device $device --steps "${steps:-20000}" \
-      --max-minutes $fast_minutes "${small[@]}"
     part profile 60 "${train[@]}" "$scene" --out "$work/runs/profile" --preset fast --device $device --steps $profile_steps \
       --profile "$out/profile.md" "${small[@]}"
     part graphs 45 "${train[@]}" "$scene" --out "$work/runs/graphs" --preset fast --device $device --steps $graph_steps \
       --set cuda_graphs=true --set export_resolution=128 --set preview_every=1.0 "${small[@]}"
+    # shellcheck disable=SC2086  # words
+    part operators 125 "$run_python" tests/bench/gpu_ops.py --out "$out" --device $device $ops
+    part fast 220 "${train[@]}" "$scene" --out "$work/runs/fast" --preset fast --device $device --steps "${steps:-20000}" \
+      --max-minutes $fast_minutes "${small[@]}"
     part paper 120 "${train[@]}" "$scene" --out "$work/runs/paper" --preset paper --device $device --steps $paper_steps \
       --max-minutes $paper_minutes "${paper[@]}"
     [ -z "$(find "$scene" -maxdepth 1 -name 'relight_*.hdr' 2>/dev/null)" ] || part relight 60 bash -c 'relight "$1"' - "$scene"
