@@ -108,10 +108,6 @@ class Config:
     hull_until: float = 0.1  # the masks' visual hull is sampled until then
     foreground_share: float = 0.85  # of the rays, drawn near the masks
 
-    # Monte Carlo shading in the last part.
-    finetune_from: float = 1.0  # the fraction at which it begins; 1: never
-    finetune_samples: int = 16  # directions of each of a ray's two estimates
-
     # Losses.
     colour_weight: float = 10.0
     light_weight: float = 1.0
@@ -229,11 +225,11 @@ class Config:
                 "a deterministic run ends by its steps alone; leave out --max-minutes (max_minutes) and give --steps"
             )
         if self.cuda_graphs and (
-            self.occlusion == "mlp" or self.light == "mlp" or self.normals != "analytic" or self.finetune_from < 1
+            self.occlusion == "mlp" or self.light == "mlp" or self.normals != "analytic"
             or self.entropy_points == 1
         ):  # fmt: skip
             raise InputError(
-                "cuda_graphs needs light = pyramid, occlusion = bits or off, normals = analytic, finetune_from = 1 and "
+                "cuda_graphs needs light = pyramid, occlusion = bits or off, normals = analytic and "
                 "more than one of entropy_points; set cuda_graphs=false"
             )
         if not 1 <= self.growth <= 16:
@@ -243,10 +239,6 @@ class Config:
         for key in ("entropy_points", "smoothness_points", "neutral_queries", "albedo_width", "gloss_width"):
             if getattr(self, key) <= 0:
                 raise InputError(f"{key} must be positive, got {getattr(self, key)}")
-        if self.finetune_from < 1 and self.compositing != "linear":
-            raise InputError("finetune_from below 1 needs compositing = linear")
-        if self.finetune_samples < 1:
-            raise InputError(f"finetune_samples must be at least 1, got {self.finetune_samples}")
         if not 64 <= self.occlusion_directions <= 1024 or self.occlusion_directions % 32:
             raise InputError(
                 f"occlusion_directions must be a multiple of 32 in 64 to 1024, got {self.occlusion_directions}"
@@ -280,30 +272,7 @@ class Config:
             table = tomllib.loads(path.read_text())
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise InputError(f"{path}: not a readable run configuration ({error})") from error
-        return Config.stored(table)
-
-    @staticmethod
-    def stored(table: dict[str, object]) -> Config:
-        """The settings of a run, which may be older than some of them."""
-        return Config().replace(FIRST_SETTINGS | {k: v for k, v in table.items() if k not in RETIRED})
-
-
-# What runs did that were trained before these settings existed, and settings that no longer do.
-FIRST_SETTINGS: dict[str, object] = dict(
-    light="mlp",
-    neutral_weight=0.0,
-    shading="split",
-    entropy_weight=0.0,
-    dark_metal_weight=0.0,
-    normal_smoothness=0.0,
-    binary_metal_weight=0.0,
-    sample_above=0.0,
-    shades_per_ray=0,
-    light_step_every=1,
-    open_below=0.0,
-    light_noise=0.0,
-)
-RETIRED = ("albedo_smoothness", "gloss_smoothness", "entropy_from", "shade_above")
+        return Config().replace(table)
 
 # Section 4 and supplement of the paper; fractions stand for 20,000 steps.
 PAPER = dict(

@@ -12,30 +12,28 @@ import numpy as np
 import torch
 import trimesh
 
-from splitnerf.checkpoint import config_of, load_checkpoint, restore_model, restored_occupancy
+from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_model, restored_occupancy
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.json_files import read_json, write_json
+from splitnerf.data.json_files import write_json
 from splitnerf.data.truth import load_scene_truth, load_view_truths, read_mesh
 from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Evaluated, Protocol, asset_mesh, choose_views, evaluation_path, relit_scores
 from splitnerf.evaluate.lpips import load_distance
 from splitnerf.export.meshing import EmptyMesh
-from splitnerf.meshes import SurfaceMesh
+from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.outputs import Exported, evaluate_scene, light_panels, write_assets
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.render.path_traced import AssetRenderer
-from splitnerf.render.rays import PixelSource
 from splitnerf.report.html import write_report
-from splitnerf.skipped import measure_skips
-from splitnerf.train import TrainedScene, check_repeatable, check_same_scene, train
+from splitnerf.training.loop import TrainedScene, check_repeatable, check_same_scene, train
 
 RUN_FILES = (
     "config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
-    "evaluation.json", "skipped.json", "report.html",
+    "evaluation.json", "report.html",
 )  # fmt: skip
 REPORT_VIEWS = 4
 
@@ -85,7 +83,7 @@ def reconstruct(
 
     Raises:
         InputError: The data, the settings or the run's folder cannot be used; nothing was written.
-        Diverged, EmptyMesh, OSError: See :func:`splitnerf.train.train`.
+        Diverged, EmptyMesh, OSError: See :func:`splitnerf.training.loop.train`.
     """
     check_repeatable(config, device)
     dataset, test = load_splits(data, downscale)
@@ -94,9 +92,6 @@ def reconstruct(
     trained = train(dataset, config, run, device=device, resume=resume)
     if not trained.finished:
         return trained, None
-    source = PixelSource(dataset, config.foreground_share, torch.Generator(device).manual_seed(0))
-    skips = measure_skips(trained.model, trained.grid, trained.scene, source, trained.n_rays, trained.step)
-    write_json(run / "skipped.json", {skip.name: skip.text() for skip in skips})
     return trained, finish(trained.model, trained.grid, dataset, test, run, {"training": trained.seconds})
 
 
@@ -141,11 +136,10 @@ def write_run_report(
         truth |= {"rgb": views.images[i, ..., :3], "alpha": views.images[i, ..., 3]}
         pages.append({"name": views.frame_names[i], "truth": truth, "prediction": prediction})
     lines = (run / "metrics.jsonl").read_text().splitlines()
-    skipped = {"Skipped": read_json(run / "skipped.json", "empty space")} if (run / "skipped.json").is_file() else {}
     write_report(
         run / "report.html",
         title=views.name,
-        summary={"Result": headline(evaluation), **skipped, "All scores": evaluation, "Settings": asdict(model.config)},
+        summary={"Result": headline(evaluation), "All scores": evaluation, "Settings": asdict(model.config)},
         views=pages,
         lights=light_panels(model),
         light_truth=load_scene_truth(views.root).light,
@@ -231,31 +225,15 @@ def export_run(
     n_faces: int,
     texture_size: int,
     resolution: int | None = None,
-    data: Path | None = None,
-    downscale: int = 1,
 ) -> Exported:
     """Writes a run's meshes and light into a folder, see :func:`splitnerf.outputs.write_assets`.
 
-    Args:
-        data, downscale: What the run was trained on; needed where the checkpoint does not say how the data's world
-            lies about the scene.
-
     Raises:
-        InputError: The run or the data cannot be used, or a format needs a package that is not installed.
+        InputError: The run cannot be used, or a format needs a package that is not installed.
         EmptyMesh: The surface is empty.
     """
     model, _, content = load_run(run)
-    if data is not None:
-        dataset = load_dataset(data, "train", downscale)
-        check_same_scene(content, dataset_fingerprint(dataset), run)
-        box_from_world = dataset.box_from_world
-    elif "box_from_world" in content:
-        box_from_world = content["box_from_world"].numpy()
-    else:
-        raise InputError(
-            f"{run / 'checkpoint.pt'}: an older version wrote it, without the data's world frame; name the data that "
-            "the run was trained on with --data DATA"
-        )
+    box_from_world = content["box_from_world"].numpy()
     out.mkdir(parents=True, exist_ok=True)
     return write_assets(
         out, model, box_from_world, formats=formats, resolution=resolution, n_faces=n_faces, texture_size=texture_size

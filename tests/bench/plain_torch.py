@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
 import reference  # noqa: E402
 
 import splitnerf.ops as ops  # noqa: E402
-from splitnerf import train as training
+from splitnerf.training import loop as training
 from splitnerf.bench.eager import hash_encode, lobe_terms, query_direction, split_sum_shade, turned
 from splitnerf.config import Config
 from splitnerf.fields.sdf import SOFTPLUS_BETA, SdfField, SdfSample
@@ -43,7 +43,7 @@ from splitnerf.ops import shading as shading_module
 from splitnerf.ops import visibility as visibility_module
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples, render_rays
-from splitnerf.meshes import SurfaceMesh
+from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.workflow import load_run, load_splits
 
 # ---- field ----

@@ -29,7 +29,7 @@ import atheris
 import numpy as np
 import torch
 
-from splitnerf.checkpoint import load_checkpoint, restore_model, restore_optimiser, save_checkpoint
+from splitnerf.training.checkpoint import load_checkpoint, restore_model, restore_optimiser, save_checkpoint
 from splitnerf.config import Config
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import load_dataset
@@ -40,7 +40,7 @@ from splitnerf.data.images import read_image, read_radiance, write_image
 from splitnerf.errors import InputError
 from splitnerf.export.glb import write_glb
 from splitnerf.render.model import SceneModel
-from splitnerf.optimiser import make_optimiser
+from splitnerf.training.optimiser import make_optimiser
 
 DEFAULTS = {"-rss_limit_mb": "3000", "-timeout": "20", "-max_len": "65536"}
 INSTRUMENTED = ("splitnerf", "zipfile", "pickletools", "torch._weights_only_unpickler")

@@ -87,7 +87,7 @@ class PretendGraph(TorchDispatchMode):
 
 
 def record(function: Callable[[], Any], pool: object, generator: torch.Generator) -> tuple[PretendGraph, Any]:
-    """As :func:`splitnerf.graphs.record`."""
+    """As :func:`splitnerf.training.graphs.record`."""
     graph = PretendGraph(generator)
     with graph:
         outputs = function()

@@ -13,12 +13,12 @@ import pytest
 import torch
 from test_train import SMALL, data, train  # noqa: F401
 
-from splitnerf import train as trainer
-from splitnerf.checkpoint import load_checkpoint
+from splitnerf.training import loop as trainer
+from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, FAILED
 from splitnerf.config import Config, parse_setting, preset
 from splitnerf.data.dataset import load_dataset
-from splitnerf.finite import MOST_SKIPPED, Diverged, first_not_finite
+from splitnerf.training.finite import MOST_SKIPPED, Diverged, first_not_finite
 
 
 def small(**settings: object) -> Config:

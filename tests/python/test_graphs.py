@@ -11,17 +11,17 @@ import torch
 from test_device import tiny
 from test_train import data  # noqa: F401
 
-from splitnerf import graphs, losses, train as trainer
-from splitnerf.batches import draw_batch
+from splitnerf.training import graphs, losses, loop as trainer
+from splitnerf.training.batches import draw_batch
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
-from splitnerf.graphs import StepGraphs
-from splitnerf.meshes import SurfaceMesh
+from splitnerf.training.graphs import StepGraphs
+from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.render.model import SceneModel
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples
-from splitnerf.step import batch_losses
+from splitnerf.training.step import batch_losses
 
 
 class NoStream:
@@ -144,7 +144,7 @@ def test_a_step_with_too_little_room_is_not_taken(data, tmp_path, monkeypatch, r
 
 
 def test_what_cannot_be_recorded_is_refused():
-    for settings in ({"light": "mlp"}, {"occlusion": "mlp"}, {"normals": "finite_difference"}, {"finetune_from": 0.8}):
+    for settings in ({"light": "mlp"}, {"occlusion": "mlp"}, {"normals": "finite_difference"}):
         with pytest.raises(InputError, match="cuda_graphs"):
             Config().replace({"cuda_graphs": True, "shading": "split", **settings})
 

@@ -16,8 +16,8 @@ from gltf_builder import Gltf, triangle
 from test_data import edit, make_blender, set_pose
 from test_finite import begun, data, small  # noqa: F401
 
-from splitnerf import train as trainer
-from splitnerf.checkpoint import load_checkpoint
+from splitnerf.training import loop as trainer
+from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset

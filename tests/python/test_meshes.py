@@ -7,9 +7,9 @@ import threading
 import pytest
 import torch
 
-from splitnerf import meshes
+from splitnerf.training import meshes
 from splitnerf.config import preset
-from splitnerf.meshes import SurfaceMesh
+from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.render.model import SceneModel
 
 SMALL = {"n_levels": 2, "start_levels": 2, "log2_table_size": 8, "mesh_resolution": 24, "light_resolution": 16}

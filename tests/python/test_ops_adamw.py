@@ -10,7 +10,7 @@ import torch
 from op_checks import check_error, devices, generator, lib
 from test_ops_hash_grid import SPEC
 
-from splitnerf.checkpoint import restore_optimiser
+from splitnerf.training.checkpoint import restore_optimiser
 from splitnerf.ops import AdamW, HashGrid, adamw_step_
 from splitnerf.ops.hash_grid import rounded
 

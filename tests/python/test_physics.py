@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from splitnerf import losses
+from splitnerf.training import losses
 from splitnerf.config import Config
 
 

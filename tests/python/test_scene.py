@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 
-from splitnerf import losses
+from splitnerf.training import losses
 from splitnerf.config import preset
 from splitnerf.fields import LightMlp, OcclusionHead, SdfField
 from splitnerf.fields.light import LightSamples

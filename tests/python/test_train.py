@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import torch
 
-from splitnerf.checkpoint import config_of, load_checkpoint
+from splitnerf.training.checkpoint import config_of, load_checkpoint
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
 from splitnerf.config import Config, parse_setting, preset
 from splitnerf.demo.scene import write_demo_dataset
@@ -48,7 +48,7 @@ def test_a_run_holds_every_file(data, tmp_path, capsys):
     run = tmp_path / "run"
     assert train(data, run, "--steps", "25") == DONE
     for name in ("config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr",
-                 "environment.hdr", "evaluation.json", "skipped.json", "report.html"):  # fmt: skip
+                 "environment.hdr", "evaluation.json", "report.html"):  # fmt: skip
         assert (run / name).stat().st_size > 0, name
     assert list((run / "previews").glob("step_*.png"))
     evaluation = json.loads((run / "evaluation.json").read_text())
@@ -72,7 +72,7 @@ def test_the_error_falls_with_other_steps_and_tables(data, tmp_path, settings):
     """And the copy that is read is that of the table as it was trained."""
     from splitnerf.data.dataset import load_dataset
     from splitnerf.ops.hash_grid import rounded
-    from splitnerf.train import train as train_scene
+    from splitnerf.training.loop import train as train_scene
 
     config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {"steps": 120} | settings)
     grid = train_scene(load_dataset(data), config, tmp_path).model.sdf_field.grid
@@ -87,7 +87,7 @@ def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     """Trained, resumed and loaded, a run with occlusion=bits renders with the factors of the mesh that it stored."""
     from splitnerf.data.dataset import load_dataset
     from splitnerf.outputs import render_maps
-    from splitnerf.train import train as train_scene
+    from splitnerf.training.loop import train as train_scene
     from splitnerf.workflow import load_run
 
     config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {
@@ -154,7 +154,7 @@ def test_a_deterministic_run_can_be_repeated_bit_by_bit(data, tmp_path):
 
 
 def test_torch_adds_in_a_fixed_order_where_asked():
-    from splitnerf.repeatable import same_bits
+    from splitnerf.training.repeatable import same_bits
 
     for on in (False, True):
         with same_bits(on):
@@ -165,7 +165,7 @@ def test_torch_adds_in_a_fixed_order_where_asked():
 def test_resume_goes_on_where_the_run_stopped(data, tmp_path):
     """Interrupted and resumed, the steps that follow are those of a run that was never interrupted."""
     from splitnerf.data.dataset import load_dataset
-    from splitnerf.train import train as train_scene
+    from splitnerf.training.loop import train as train_scene
 
     dataset = load_dataset(data)
     config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {"steps": 14, "grid_every": 1000})
@@ -186,7 +186,7 @@ def test_resume_goes_on_where_the_run_stopped(data, tmp_path):
 
 def _stop_after(steps: int, run) -> None:
     """Sends SIGINT to this process when the given step begins; raises KeyboardInterrupt once training returned."""
-    from splitnerf import train as module
+    from splitnerf.training import loop as module
 
     original, count = module.set_learning_rate, 0
 
@@ -331,35 +331,3 @@ def test_a_config_survives_its_file(tmp_path):
     (tmp_path / "config.toml").write_text("steps = [")
     with pytest.raises(InputError, match="config.toml"):
         Config.read(tmp_path / "config.toml")
-
-
-def test_runs_from_before_a_setting_keep_what_they_were_trained_with():
-    stored = dataclasses.asdict(Config())
-    assert config_of({"config": stored}) == Config()
-    later = ("sample_above", "shades_per_ray", "light_step_every", "open_below", "light_noise")
-    for name in (
-        "light",
-        "neutral_weight",
-        "shading",
-        "entropy_weight",
-        "dark_metal_weight",
-        "normal_smoothness",
-        "binary_metal_weight",
-        *later,
-    ):
-        del stored[name]
-    stored |= {
-        "occlusion": "mlp",
-        "albedo_smoothness": 0.0,
-        "gloss_smoothness": 0.0,
-        "entropy_from": 0.5,
-        "shade_above": 1e-3,
-    }
-    config = config_of({"config": stored})
-    assert (config.light, config.occlusion, config.shading) == ("mlp", "mlp", "split")
-    assert (config.sample_above, config.shades_per_ray, config.light_step_every) == (
-        0.0,
-        0,
-        1,
-    ) and config.open_below == config.light_noise == 0.0
-    assert config.neutral_weight == config.entropy_weight == config.dark_metal_weight == config.normal_smoothness == 0.0

@@ -44,7 +44,6 @@ SWITCHES: dict[str, dict[str, object]] = {
     "dark metals allowed": {"dark_metal_weight": 0.0},
     "metals by halves": {"binary_metal_weight": 0.0},
     "no metal loss at all": {"metal_regulariser": False, "binary_metal_weight": 0.0, "dark_metal_weight": 0.0},
-    "Monte Carlo fine-tune": {"finetune_from": 0.85, "compositing": "linear"},
 }
 # What rows are compared with that differ from the full method in more than what they are called by.
 REFERENCES = {

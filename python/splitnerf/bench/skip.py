@@ -17,7 +17,7 @@ from splitnerf.data.json_files import read_json
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
 from splitnerf.outputs import render_maps
-from splitnerf.train import train
+from splitnerf.training.loop import train
 
 # What stands where a skip is off.
 UNSKIPPED: dict[str, object] = {"sample_above": 0.0, "shades_per_ray": 0, "light_step_every": 1, "open_below": 0.0}

@@ -26,8 +26,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ("--texture-size", int, 2048, "N", "texels along an edge (default: 2048)"),
         ("--resolution", int, None, "N", "nodes along an edge of the grid that is meshed (default: as in training)"),
         ("--formats", str, "glb,ply", "LIST", "of glb, ply, obj, usdz (default: glb,ply); usdz needs the extra 'usd'"),
-        ("--data", Path, None, "DATA", "the data that RUN was trained on, for runs of older versions"),
-        ("--downscale", int, 1, "N", "as in training, with --data (default: 1)"),
     ):
         parser.add_argument(option, type=kind, default=default, metavar=name, help=text)
     parser.set_defaults(execute=run)
@@ -53,7 +51,6 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{out}: is a file; give --out a folder")
     exported = export_run(
         args.run, out, formats=formats, n_faces=args.faces, texture_size=args.texture_size, resolution=args.resolution,
-        data=args.data, downscale=args.downscale,
     )  # fmt: skip
     closed = "watertight" if exported.watertight else "not watertight"
     floaters = f"{exported.n_dropped} floating component{'' if exported.n_dropped == 1 else 's'} dropped"

@@ -59,7 +59,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.checkpoint import config_of, load_checkpoint
+    from splitnerf.training.checkpoint import config_of, load_checkpoint
     from splitnerf.config import parse_setting, preset
     from splitnerf.devices import choose_device
     from splitnerf.workflow import reconstruct

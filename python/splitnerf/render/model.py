@@ -143,8 +143,6 @@ class SceneModel(nn.Module):
         normals: Tensor,
         view_dirs: Tensor,
         stretches: tuple[Tensor, Tensor] | None = None,
-        *,
-        fixed_materials: bool = False,
     ) -> ShadedPoints:
         """Outgoing radiance of points towards the camera.
 
@@ -154,14 +152,12 @@ class SceneModel(nn.Module):
             normals, view_dirs: [n, 3] unit; view_dirs point to the camera.
             stretches: [k] the points whose cached visibility serves all of their stretch of a ray, and [n] the stretch of
                 each point; None: each its own.
-            fixed_materials: No gradient flows from the radiance to the materials, which are returned with theirs.
 
         Source: SplitNeRF Eq. (6)-(10), (17).
         """
         c = self.config
         inputs = self.head_inputs(positions, outputs, features)
-        materials = self.material(inputs)
-        albedo, roughness, metallic = (m.detach() for m in materials) if fixed_materials else materials
+        albedo, roughness, metallic = self.material(inputs)
         lobe_dirs = query_direction(normals, view_dirs, roughness, c.query)
         n, facing = len(normals), turned_to(normals, view_dirs)
         light = self.light(torch.cat([lobe_dirs, facing]), torch.cat([roughness, torch.ones_like(roughness)]))
@@ -177,11 +173,11 @@ class SceneModel(nn.Module):
             normals, view_dirs, albedo, roughness, metallic, light_s, light_d, factor_s, factor_d,
             c.fresnel_mode, c.compensate,
         )  # fmt: skip
-        return ShadedPoints(radiance, *materials, occlusion.diffuse, occlusion.specular, facing, lobe_dirs)
+        return ShadedPoints(radiance, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, facing, lobe_dirs)
 
     def summed_less_split(
         self, on_surface: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints, among: Tensor,
-        n_among: Tensor | None = None, *, fixed_materials: bool = False,
+        n_among: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
         """What radiance gains without the split: the BRDF summed over the light from the bits' directions.
 
@@ -195,7 +191,6 @@ class SceneModel(nn.Module):
             among: [k] int64, the points that are asked for.
             n_among: [] how many of these count; others gain 0, nobody looks at who gains something, and no GPU is waited for.
                 None: all.
-            fixed_materials: No gradient flows to the materials.
 
         Returns:
             at: [m] int64, those of the points that gain something; with ``n_among`` all of ``among``.
@@ -211,9 +206,8 @@ class SceneModel(nn.Module):
             counts = torch.arange(len(among), device=among.device) < n_among
             at, t = among, (over * counts)[:, None].clamp(0.0, 1.0)
         taken = normals, points.albedo, points.roughness, points.metallic, points.radiance
-        normals, *materials, split = (x.index_select(0, at) for x in taken)
+        normals, albedo, roughness, metallic, split = (x.index_select(0, at) for x in taken)
         view_dirs = view_dirs[at]
-        albedo, roughness, metallic = (m.detach() for m in materials) if fixed_materials else materials
         light = self.occlusion.cell_light(self.light)
         visible, sent = self.occlusion.visibility(on_surface[at], points.facing.detach()[at])
         sums = summed_light(

@@ -174,7 +174,7 @@ def find_samples(
 
 
 def render_rays(
-    model: SceneModel, found: FoundSamples, *, shades_per_ray: int = 0, fixed_materials: bool = False,
+    model: SceneModel, found: FoundSamples, *, shades_per_ray: int = 0,
     room: tuple[int, int] | None = None,
 ) -> RenderedRays:  # fmt: skip
     """Renders rays from their samples.
@@ -183,7 +183,6 @@ def render_rays(
         model: The scene.
         found: The samples; the field may have moved a little since.
         shades_per_ray: Samples of a ray that are shaded, about; others take what lies between. 0 shades all.
-        fixed_materials: The colours have a gradient to surface and light alone.
         room: As of :func:`splitnerf.ops.spread_samples`; without it a GPU is waited for. Where it is too small ``sizes`` tells,
             and the colours mean nothing.
 
@@ -210,15 +209,7 @@ def render_rays(
     # The gradient of index_select is a sum; that of indexing sorts on a GPU.
     normals, outputs, features = (x.index_select(0, shaded) for x in (normals, field.outputs, field.features))
     sdf = outputs[:, 0]
-    points = model.shade(
-        positions,
-        outputs,
-        features,
-        normals,
-        view_dirs,
-        (spread.leaders, spread.stretch),
-        fixed_materials=fixed_materials,
-    )
+    points = model.shade(positions, outputs, features, normals, view_dirs, (spread.leaders, spread.stretch))
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
@@ -226,7 +217,6 @@ def render_rays(
         on_surface = positions - normals.detach() * sdf.detach()[:, None]
         at, gained = model.summed_less_split(
             on_surface, normals, view_dirs, points, spread.heaviest, None if room is None else spread.sizes[1],
-            fixed_materials=fixed_materials,
         )  # fmt: skip
         mean = mean.index_add(0, samples.ray_indices[shaded[at]], gained)
     return RenderedRays(

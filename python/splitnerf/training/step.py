@@ -5,15 +5,14 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from splitnerf import losses
-from splitnerf.batches import Batch
-from splitnerf.losses import Term
-from splitnerf.meshes import SurfaceMesh
+from splitnerf.training import losses
+from splitnerf.training.batches import Batch
+from splitnerf.training.losses import Term
+from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
 from splitnerf.render.model import SceneModel
-from splitnerf.render.monte_carlo import monte_carlo_colours
 from splitnerf.render.renderer import FoundSamples, RenderedRays, render_rays
-from splitnerf.schedule import light_moves, light_period
+from splitnerf.training.schedule import light_moves, light_period
 
 
 def batch_losses(
@@ -33,18 +32,13 @@ def batch_losses(
         room: As of :func:`splitnerf.render.renderer.render_rays`.
     """
     c = model.config
-    finetune = progress >= c.finetune_from and scene is not None
-    ray = render_rays(model, found, shades_per_ray=c.shades_per_ray, fixed_materials=finetune, room=room)
+    ray = render_rays(model, found, shades_per_ray=c.shades_per_ray, room=room)
     colour, mask = pixel_losses(ray.mean, ray.opacity, batch.target, batch.background, linear=ray.linear)
     eikonal, smoothness = gradient_losses(ray.gradients, ray.weights.detach(), ray.beside)
     metal, binary_metal, dark_metal = material_losses(
         ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.metal_loss_form == "smooth_l1"
     )
     terms = {"colour": Term(c.colour_weight, colour), "eikonal": Term(c.eikonal_weight, eikonal)}
-    if finetune:
-        colours = monte_carlo_colours(model, scene, ray, -batch.rays_d, generator)
-        error = losses.monte_carlo_colour_loss(colours, ray, batch.target, batch.background)
-        terms["finetune"] = Term(c.colour_weight, error)
     if c.mask_weight:
         terms["mask"] = Term(c.mask_weight, mask)
     if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:

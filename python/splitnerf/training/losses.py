@@ -56,31 +56,6 @@ def penalty(error: Tensor, form: str) -> Tensor:
     return error.square() if form == "square" else F.smooth_l1_loss(error, torch.zeros_like(error), reduction="none")
 
 
-def monte_carlo_colour_loss(
-    colours: tuple[Tensor, Tensor], ray: RenderedRays, target: Tensor, background: Tensor
-) -> Tensor:
-    """As the colour's error for two independent noisy estimates: the mean product of their errors.
-
-    Its expectation is the squared error of the mean; that of one estimate would add the noise's variance, and the
-    materials would turn to whatever is less noisy. It can be negative.
-    """
-    truth = blended(target, background)
-    opacity = ray.opacity.detach()
-    first, second = (over_background(colour, opacity, target, background) - truth for colour in colours)
-    return (first * second).mean()
-
-
-def over_background(colour: Tensor, opacity: Tensor, target: Tensor, background: Tensor) -> Tensor:
-    """[n_rays, 3] predicted pixels; where the photo is saturated the colour is clipped like it."""
-    colour = torch.where(target[:, :3] >= _core.SATURATED, colour.clamp(max=1.0), colour)
-    return torch.lerp(background, colour, opacity[:, None])
-
-
-def blended(target: Tensor, background: Tensor) -> Tensor:
-    """[n_rays, 3] pixels of the photo over the background."""
-    return torch.lerp(background, target[:, :3], target[:, 3:])
-
-
 def light_loss(light: Light, config: Config, generator: torch.Generator, seed: int) -> Tensor:
     """Distance of g(w, rho) from the Monte Carlo integral of g(w, 0), for random directions and roughness.
 

@@ -77,7 +77,7 @@ def load_checkpoint(path: Path) -> dict:
 
 def config_of(content: dict) -> Config:
     """The settings of the run that wrote the checkpoint."""
-    return Config.stored(content["config"])
+    return Config().replace(content["config"])
 
 
 def restore_model(model: nn.Module, content: dict, path: Path) -> None:
@@ -116,7 +116,7 @@ def restore_generator(generator: torch.Generator, content: dict, path: Path) -> 
         InputError: They are no states of generators.
     """
     try:
-        if content.get("device", "cpu") == generator.device.type:
+        if content["device"] == generator.device.type:
             generator.set_state(content["generator"])
         else:
             generator.manual_seed(config_of(content).seed + content["step"])
@@ -182,14 +182,13 @@ def _check_content(content: dict) -> None:
         _check_tensor("the optimiser's step", moments.get("step"), (), torch.float32)
         for name in MOMENTS:
             _check_tensor(f"the optimiser's {name}", moments.get(name), None, torch.float32)
-    if content.get("device", "cpu") not in ("cpu", "cuda"):
-        raise ValueError(f"device is {content['device']!r}")
+    if content.get("device") not in ("cpu", "cuda"):
+        raise ValueError(f"device is {content.get('device')!r}")
     for key in ("generator", "torch_generator"):
         _check_tensor(key, content.get(key), (-1,), torch.uint8)
     _check_tensor("occupancy", content.get("occupancy"), (config.grid_resolution**3,), torch.float32)
     _check_sizes(config, content["model"])
-    if "box_from_world" in content:
-        _check_tensor("box_from_world", content["box_from_world"], (4, 4), torch.float64)
+    _check_tensor("box_from_world", content.get("box_from_world"), (4, 4), torch.float64)
     vertices, faces = content.get("mesh_vertices"), content.get("mesh_faces")
     if vertices is not None or faces is not None:
         _check_tensor("mesh_vertices", vertices, (-1, 3), torch.float32)

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn.utils import get_total_norm
 
-from splitnerf.batches import Batch
+from splitnerf.training.batches import Batch
 from splitnerf.data.dataset import Dataset
 from splitnerf.notes import note
 from splitnerf.render.model import SceneModel
