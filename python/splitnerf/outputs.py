@@ -155,7 +155,8 @@ def light_panels(model: SceneModel, height: int = 64, n_samples: int = 8192) -> 
     from splitnerf.fields.light import panorama_directions
 
     sources = fibonacci_directions(n_samples, torch.Generator(model.device).manual_seed(0))
-    light = torch.cat([model.light(d, torch.zeros_like(d[:, :1])) for d in sources.split(1 << 15)])
+    maps = model.light.evaluate()
+    light = torch.cat([maps(d, torch.zeros_like(d[:, :1])) for d in sources.split(1 << 15)])
     queries = panorama_directions(height, model.device).reshape(-1, 3)
     panels = []
     for roughness in REPORT_ROUGHNESS:

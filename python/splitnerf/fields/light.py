@@ -1,9 +1,11 @@
-"""What every model of the light offers."""
+"""What every model of the light offers, and the light as it stands at one moment."""
 
 from __future__ import annotations
 
 import abc
 import math
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
 
 import torch
 from torch import Tensor, nn
@@ -15,8 +17,8 @@ FEWEST_SAMPLES = 64
 
 
 class LightSamples:
-    """How many directions the light's consistency loss takes: so many that the noise of its integrals makes up the share
-    of the squared error that they are to tell that is asked for.
+    """How many directions the light's consistency loss takes: as many as keep the noise of its integrals at a given share of
+    the squared error that the loss measures.
 
     Both are running means, as a lamp that few directions meet is seen in few steps.
     """
@@ -37,11 +39,101 @@ class LightSamples:
         return int(min(most, max(FEWEST_SAMPLES, self.variance / (share * self.squared_error))))
 
 
+class LightMaps(Protocol):
+    """The light g(w, rho) as it stands, until its parameters move.
+
+    Attributes:
+        leaves: Tensors at which the gradients of lookups gather; () where every backward pass reaches the parameters.
+    """
+
+    leaves: tuple[Tensor, ...]
+
+    def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
+        """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
+
+    def backward(self) -> None:
+        """Hands the gradients that have gathered at the leaves to the parameters, once."""
+
+    def with_leaves(self, leaves: Sequence[Tensor]) -> LightMaps:
+        """The same light, read from other leaves."""
+
+
+class CellLight(NamedTuple):
+    """The environment as a fixed set of directions sees it, each of which stands for a cell of the sphere.
+
+    Attributes:
+        radiance: [k, 3], the mean over a direction's cell.
+        directions: [k, 3] unit, the cell's centre of power: a small lamp shines from where it is.
+        solid_angles: [k] sr; they sum to 4 pi.
+    """
+
+    radiance: Tensor
+    directions: Tensor
+    solid_angles: Tensor
+
+
+class EvaluatedLight:
+    """The light as it stands, shared by all that read it until its parameters move.
+
+    Calls look the light up. Gradients gather at :attr:`leaves`, over as many steps as share this value, until
+    :meth:`backward` hands them to the light's parameters.
+
+    Args:
+        maps: What lookups read.
+        cells: The light of the cells, computed from the maps; None where nobody sums over cells.
+    """
+
+    def __init__(self, maps: LightMaps, cells: CellLight | None = None):
+        self.maps, self.cells = maps, cells
+        self._cell_root: Tensor | None = None
+        if cells is not None and maps.leaves and cells.radiance.requires_grad:
+            self._cell_root = cells.radiance
+            self.cells = cells._replace(radiance=leaf_of(cells.radiance))
+
+    def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
+        """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
+        return self.maps(directions, roughness)
+
+    @property
+    def leaves(self) -> tuple[Tensor, ...]:
+        """Tensors at which gradients gather, () where they reach the parameters at once."""
+        return (*self.maps.leaves, *(() if self._cell_root is None else (self.cells.radiance,)))
+
+    @property
+    def constants(self) -> tuple[Tensor, ...]:
+        """Tensors that are read and have no gradient."""
+        return () if self.cells is None else self.cells[1:]
+
+    def with_tensors(self, leaves: Sequence[Tensor], constants: Sequence[Tensor]) -> EvaluatedLight:
+        """The same light, read from other leaves and constants; its gradients gather there and go no farther."""
+        n = len(self.maps.leaves)
+        copy = EvaluatedLight(self.maps.with_leaves(leaves[:n]))
+        if self.cells is not None:
+            copy.cells = CellLight(*leaves[n:] or (self.cells.radiance,), *constants)
+        return copy
+
+    def backward(self) -> None:
+        """Hands the gradients that have gathered to the light's parameters. Call it once, before they move."""
+        if self._cell_root is not None and self.cells.radiance.grad is not None:
+            self._cell_root.backward(self.cells.radiance.grad)
+        self.maps.backward()
+
+    def zero_grad(self) -> None:
+        """Drops the gradients that have gathered."""
+        for leaf in self.leaves:
+            leaf.grad = None
+
+
+def leaf_of(value: Tensor) -> Tensor:
+    """The same numbers as a leaf, at which gradients stop."""
+    return value.detach().requires_grad_()
+
+
 class Light(nn.Module, abc.ABC):
     """The pre-integrated light g(w, rho): the environment filtered by the lobe of roughness rho.
 
-    g(w, 0) is the environment itself and g(n, 1) the irradiance over pi. A subclass defines
-    :meth:`forward`, differentiable in its parameters, in directions and in roughness.
+    g(w, 0) is the environment itself and g(n, 1) the irradiance over pi. A subclass defines :meth:`forward`, which is
+    differentiable in its parameters, in directions and in roughness, and :meth:`evaluate`, what of it steps can share.
 
     Attributes:
         needs_consistency_loss: Whether only ``losses.light_loss`` ties g(w, rho) to g(w, 0). False where
@@ -61,35 +153,17 @@ class Light(nn.Module, abc.ABC):
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
 
-    def collect(self, on: bool = True) -> None:
-        """From now on gradients may stop short of the parameters until :meth:`deliver`, or, off, no longer; here they never
-        do."""
-
-    def deliver(self) -> None:
-        """Takes gradients that have come together since :meth:`collect` to the parameters."""
-
-    def forget(self) -> None:
-        """Drops gradients that have come together."""
-
-    def prepare(self) -> None:
-        """Computes now what all uses of the light share as it stands."""
-
-    def stand_in(self, value: Tensor) -> tuple[Tensor, object]:
-        """What takes the place of a value computed from the light until the next :meth:`deliver`, and a token that is the
-        same as long as it may. Here that is the value itself, for one backward pass."""
-        return value, object()
-
-    def stands(self, token: object) -> bool:
-        """Whether a stand-in with this token still may be used."""
-        return False
+    @abc.abstractmethod
+    def evaluate(self) -> LightMaps:
+        """The light as it stands; without gradients where they are disabled."""
 
     @torch.no_grad()
     def panorama(self, height: int, roughness: float = 0.0) -> Tensor:
         """[height, 2 height, 3] equirectangular radiance at one roughness (z up, centre column along +x)."""
         parameter = next(self.parameters())
         flat = panorama_directions(height, parameter.device).reshape(-1, 3).to(parameter.dtype)
-        rho = torch.full_like(flat[:, :1], roughness)
-        return torch.cat([self(d, r) for d, r in zip(flat.split(1 << 16), rho.split(1 << 16))]).view(height, -1, 3)
+        rho, maps = torch.full_like(flat[:, :1], roughness), self.evaluate()
+        return torch.cat([maps(d, r) for d, r in zip(flat.split(1 << 16), rho.split(1 << 16))]).view(height, -1, 3)
 
 
 def panorama_directions(height: int, device: torch.device | str = "cpu") -> Tensor:

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 import torch
 import trimesh
-from torch import Tensor, nn
+from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf import _core
-from splitnerf.fields.light import Light, lobe_roughness
-from splitnerf.fields.occlusion import Occlusion, OcclusionQuery
+from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, lobe_roughness
+from splitnerf.fields.occlusion import Occlusion, OcclusionModel, OcclusionQuery, RaySegments
 from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility
 
 TEXELS_PER_CELL = 8  # of the light, for its mean over a direction's cell
@@ -22,30 +22,16 @@ LOBE_DIRECTIONS = 15  # within the lobe that a sum over the directions resolves
 SHADED_CHUNK = 1 << 15  # vertices shaded at a time
 
 
-class CellLight(NamedTuple):
-    """The environment as the directions of the bits see it.
-
-    Attributes:
-        radiance: [k, 3] mean over a direction's cell.
-        directions: [k, 3] unit, where in the cell it comes from, by power: a small lamp shines from where it is.
-        solid_angles: [k] sr, of the cells; they sum to 4 pi.
-    """
-
-    radiance: Tensor
-    directions: Tensor
-    solid_angles: Tensor
-
-
 class TracedBits(NamedTuple):
     """What the vertices of a mesh see.
 
     Attributes:
         cache: The bits, on the CPU.
-        sees_all: Whether hardly anything is blocked: the surface is convex, near enough.
+        is_unoccluded: Whether hardly anything is blocked: the surface is convex, near enough.
     """
 
     cache: VisibilityCache
-    sees_all: bool
+    is_unoccluded: bool
 
 
 def bit_counts(words: Tensor) -> Tensor:
@@ -54,12 +40,11 @@ def bit_counts(words: Tensor) -> Tensor:
     return torch.from_numpy(bits.sum(axis=1, dtype=np.int64))
 
 
-class VisibilityBits(nn.Module):
+class VisibilityBits(OcclusionModel):
     """o_d and o_s from what each mesh vertex sees in a fixed set of directions, and the light of what it does not see.
 
-    Nothing is learned here and nothing is part of the state: :meth:`trace` fills the cache from a mesh,
-    :meth:`set_light` takes the current light, :meth:`refresh` the light that the vertices send out. No gradient flows
-    through the factors.
+    Nothing is learned here and nothing is part of the state: :meth:`use` takes the cache of a traced mesh, :meth:`set_light`
+    the current light, :meth:`refresh` the light that the vertices send out. No gradient flows through the factors.
 
     Args:
         n_directions: Fibonacci directions over the sphere, a multiple of 32.
@@ -71,8 +56,8 @@ class VisibilityBits(nn.Module):
     """
 
     def __init__(self, n_directions: int, offset: float, n_channels: int, indirect: bool, open_below: float = 0.0):
-        super().__init__()
-        self.offset, self.n_channels, self.indirect, self.open_below = offset, n_channels, indirect, open_below
+        super().__init__(n_channels)
+        self.offset, self.indirect, self.open_below = offset, indirect, open_below
         directions = torch.from_numpy(_core.fibonacci_sphere(n_directions)).float()
         height = math.ceil(math.sqrt(TEXELS_PER_CELL * n_directions / 2))
         texels = torch.from_numpy(_core.equirect_directions(height, 2 * height)).float().reshape(-1, 3)
@@ -86,30 +71,11 @@ class VisibilityBits(nn.Module):
         }
         for name, value in constants.items():
             self.register_buffer(name, value, persistent=False)
-        self._cell_light: tuple[CellLight, object] | None = None
         self.cache: VisibilityCache | None = None
-        self.sees_all = False
         self.radiance: Tensor | None = None
 
-    def __getstate__(self) -> dict:
-        return {**self.__dict__, "_cell_light": None}  # copies compute their own
-
-    def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> None:
-        """Traces a mesh and reads from its bits from now on."""
-        self.take(self.traced(scene, vertices, faces))
-
-    def take(self, bits: TracedBits) -> None:
-        """Reads from these bits from now on. What the vertices send out is unknown until :meth:`refresh`."""
-        self.cache, self.sees_all, self.radiance = bits.cache.to(self.directions.device), bits.sees_all, None
-
-    def traced(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> TracedBits:
-        """Traces every vertex of the mesh on the CPU. Changes nothing here: another thread may call it.
-
-        Args:
-            scene: The mesh below.
-            vertices: [n, 3], scene units, on the CPU.
-            faces: [m, 3].
-        """
+    def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> TracedBits:
+        """What every vertex of a mesh sees, traced on the CPU; see :meth:`OcclusionModel.trace`."""
         mesh = trimesh.Trimesh(vertices.numpy(), faces.numpy(), process=False)
         normals = torch.from_numpy(np.array(mesh.vertex_normals, dtype=np.float32))
         cache = VisibilityCache.trace(
@@ -120,27 +86,19 @@ class VisibilityBits(nn.Module):
         blocked = blocked_bits / (open_bits + blocked_bits).clamp(min=1)
         return TracedBits(cache, len(blocked) > 0 and blocked.max().item() < self.open_below)
 
+    def use(self, traced: TracedBits) -> None:
+        """Reads from these bits from now on. What the vertices send out is unknown until :meth:`refresh`."""
+        super().use(traced)
+        self.cache, self.is_unoccluded = traced.cache.to(self.directions.device), traced.is_unoccluded
+        self.radiance = None
+
     @torch.no_grad()
-    def set_light(self, light: Light) -> None:
+    def set_light(self, light: EvaluatedLight) -> None:
         """Takes the light that weighs the factors, its mean over each direction's cell."""
-        self.light.copy_(self.cell_light(light).radiance)
+        self.light.copy_((light.cells or self.cell_light(light.maps)).radiance)
 
-    def cell_light(self, light: Light) -> CellLight:
-        """The light's mean over each direction's cell, differentiable in the light; asked for again while nothing has
-        changed, the same."""
-        if torch.is_grad_enabled() and self._cell_light is not None and light.stands(self._cell_light[1]):
-            return self._cell_light[0]
-        cells = self._cell_means(light)
-        if torch.is_grad_enabled():
-            radiance, token = light.stand_in(cells.radiance)
-            cells = cells._replace(radiance=radiance)
-            if light.stands(token):
-                kept = self._cell_light[0] if self._cell_light else cells  # always the same memory
-                cells = CellLight(radiance, *(old.copy_(new) for old, new in zip(kept[1:], cells[1:])))
-                self._cell_light = cells, token
-        return cells
-
-    def _cell_means(self, light: Light) -> CellLight:
+    def cell_light(self, light: LightMaps) -> CellLight:
+        """The light's mean over each direction's cell, differentiable in the light."""
         radiance = light(self._texels, torch.full_like(self._solid_angle, self._texel_roughness))
         weighted = torch.cat([radiance * self._solid_angle, self._solid_angle], dim=1)
         sums = weighted.new_zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
@@ -158,7 +116,7 @@ class VisibilityBits(nn.Module):
     def visibility(self, positions: Tensor, normals: Tensor) -> tuple[Tensor, Tensor | None]:
         """The share [n, k] of the light from each direction that arrives at points, and what the mesh sends from there,
         [n, k, 3] or None. Below the horizon both mean nothing."""
-        if self.sees_all:
+        if self.is_unoccluded:
             return positions.new_ones(len(positions), len(self.directions)), None
         return cached_visibility(self.cache, positions, normals, self.radiance)
 
@@ -168,17 +126,17 @@ class VisibilityBits(nn.Module):
 
         The shading itself reads the radiance of the former refresh: a bounce is added each time.
         """
-        if self.indirect and self.cache is not None and not self.sees_all:
+        if self.indirect and self.cache is not None and not self.is_unoccluded:
             parts = zip(self.cache.vertices.split(SHADED_CHUNK), self.cache.normals.split(SHADED_CHUNK))
             radiance = torch.cat([shade(x, n) for x, n in parts])
             self.radiance = radiance if self.radiance is None else self.radiance.copy_(radiance)
 
     @torch.no_grad()
-    def forward(self, query: OcclusionQuery) -> Occlusion:
-        """The factors at points; before :meth:`trace` there is nothing to answer from."""
-        if self.sees_all:
-            ones = torch.ones_like(query.roughness).expand(-1, self.n_channels)
-            return Occlusion(ones, ones)
+    def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:
+        """The factors at points, or those of the leaders for the whole of their segments."""
+        if segments is not None:
+            leaders = self.answer(OcclusionQuery(*(part[segments.leaders] for part in query)), None)
+            return Occlusion(*(None if part is None else part[segments.segment] for part in leaders))
         o_d, o_s, i_d, i_s = cached_occlusion(
             self.cache, query.positions, query.normals, query.lobe_dirs, query.roughness, self.light, self.radiance
         )

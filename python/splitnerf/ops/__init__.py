@@ -21,7 +21,7 @@ from splitnerf.ops.rays import (
     CELL_OCCUPIED,
     CELL_OPAQUE,
     PackedSamples,
-    Spread,
+    ShadingSubset,
     composite,
     march_rays,
     neus_weights,
@@ -35,7 +35,7 @@ from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_v
 
 __all__ = [
     "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "LightSums",
-    "MeshScene", "PackedSamples", "QUERIES", "SdfNetwork", "SparseMap", "Spread", "VisibilityCache", "adamw_step_", "brdf_lut",
+    "MeshScene", "PackedSamples", "QUERIES", "SdfNetwork", "SparseMap", "ShadingSubset", "VisibilityCache", "adamw_step_", "brdf_lut",
     "cached_occlusion", "cached_visibility", "composite", "fibonacci_directions", "gradient_losses", "growth_for",
     "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters", "light_lookup", "light_sum_of_levels",
     "linear_to_srgb", "march_rays", "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors",

@@ -134,7 +134,7 @@ def _as_tensor(value: float | Tensor, like: Tensor) -> Tensor:
     return value if isinstance(value, Tensor) else like.new_full((), value)
 
 
-class Spread(NamedTuple):
+class ShadingSubset(NamedTuple):
     """Which samples are shaded, and between which of them each sample lies.
 
     Attributes:
@@ -168,8 +168,8 @@ class Spread(NamedTuple):
 
 def spread_samples(
     weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor, gap: float | Tensor = math.inf,
-    room: tuple[int, int] | None = None,
-) -> Spread:  # fmt: skip
+    capacity: tuple[int, int] | None = None,
+) -> ShadingSubset:  # fmt: skip
     """Draws samples of each ray in proportion to their weights, for what is asked at few of them.
 
     The weights of a ray are laid end to end, and a sample is drawn where one of `per_ray` evenly spaced marks falls on it:
@@ -182,9 +182,9 @@ def spread_samples(
         per_ray: Marks on a ray; 0 draws all samples.
         phase: [n_rays] in [0, 1), where the marks begin.
         gap: Along the ray, scene units, positive; a number or a tensor [].
-        room: Shaded samples and stretches for which the result has room, whatever their number, so that a GPU need not be
-            waited for; ``heaviest`` then is [n_rays]. Entries behind what there is are in range and count for nothing. Where
-            there is too little, ``sizes`` tells, and the rest means nothing, but is in range.
+        capacity: Lengths of the result, for shaded samples and for stretches, whatever their number, so that the host need
+            not wait for a GPU; ``heaviest`` then is [n_rays]. Entries past the count are in range and weigh nothing. Where a
+            count exceeds its capacity, ``sizes`` tells so; the other results are then in range but have no meaning.
 
     Raises:
         ValueError: A shape, dtype or number does not fit.
@@ -194,7 +194,7 @@ def spread_samples(
     t = samples.middles
     if isinstance(gap, Tensor):
         t, gap = t / gap, 1.0
-    return Spread(*lib.spread_samples(weights, t, samples.offsets, phase, gap, per_ray, *(room or ())))
+    return ShadingSubset(*lib.spread_samples(weights, t, samples.offsets, phase, gap, per_ray, *(capacity or ())))
 
 
 def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:

@@ -9,19 +9,22 @@ from torch import Tensor, nn
 
 from splitnerf.config import Config
 from splitnerf.fields import (
+    EvaluatedLight,
     Light,
     LightMlp,
     LightPyramid,
     MaterialHead,
-    Occlusion,
+    NoOcclusion,
     OcclusionHead,
+    OcclusionModel,
     OcclusionQuery,
+    RaySegments,
     SdfField,
     VisibilityBits,
 )
 from splitnerf.fields.sdf import SdfSample, sharpness
 from splitnerf.fields.visibility import TracedBits
-from splitnerf.ops import HashGridSpec, MeshScene, query_direction, shade_sums, split_sum_shade, summed_light
+from splitnerf.ops import HashGridSpec, query_direction, shade_sums, split_sum_shade, summed_light
 
 START_BOUNCES = 3  # of indirect light on a new mesh
 SUMMED_BAND = 0.15  # of roughness, in which the sum over directions takes the split sum's place
@@ -59,8 +62,8 @@ def make_light(config: Config) -> Light:
     )  # fmt: skip
 
 
-def make_occlusion(config: Config, n_inputs: int) -> OcclusionHead | VisibilityBits | None:
-    """What the setting ``occlusion`` names; None for ``off``."""
+def make_occlusion(config: Config, n_inputs: int) -> OcclusionModel:
+    """The occlusion that the setting ``occlusion`` names."""
     c = config
     if c.occlusion == "mlp":
         return OcclusionHead(
@@ -70,10 +73,10 @@ def make_occlusion(config: Config, n_inputs: int) -> OcclusionHead | VisibilityB
         return VisibilityBits(
             c.occlusion_directions, c.occlusion_offset, c.occlusion_channels, c.indirect, c.open_below
         )
-    return None
+    return NoOcclusion(c.occlusion_channels)
 
 
-def turned_to(normals: Tensor, view_dirs: Tensor) -> Tensor:
+def face_forward(normals: Tensor, view_dirs: Tensor) -> Tensor:
     """Normals [n, 3] on the viewer's side."""
     side = (normals.detach() * view_dirs).sum(-1, keepdim=True)
     return normals * torch.copysign(torch.ones_like(side), side)
@@ -101,7 +104,6 @@ class SceneModel(nn.Module):
         self.occlusion = make_occlusion(config, n_inputs)
         self.light = make_light(config)
         self.variance = nn.Parameter(torch.tensor(config.initial_variance))
-        self.occlusion_ready = False  # until the first mesh was traced the occlusion factors are 1
 
     @property
     def device(self) -> torch.device:
@@ -135,23 +137,29 @@ class SceneModel(nn.Module):
             return outputs
         return torch.cat([outputs, positions, features], dim=1)
 
+    def evaluate_light(self) -> EvaluatedLight:
+        """The light as it stands, for all that reads it until its parameters move."""
+        maps = self.light.evaluate()
+        return EvaluatedLight(maps, self.occlusion.cell_light(maps) if self.config.shading == "summed" else None)
+
     def shade(
         self,
+        light: EvaluatedLight,
         positions: Tensor,
         outputs: Tensor,
         features: Tensor,
         normals: Tensor,
         view_dirs: Tensor,
-        stretches: tuple[Tensor, Tensor] | None = None,
+        segments: RaySegments | None = None,
     ) -> ShadedPoints:
         """Outgoing radiance of points towards the camera.
 
         Args:
+            light: The light as it stands.
             positions: [n, 3].
-            outputs, features: [n, 13] and [n, C] of the SDF there.
+            outputs, features: [n, 13] and [n, C], the SDF's outputs and hash features there.
             normals, view_dirs: [n, 3] unit; view_dirs point to the camera.
-            stretches: [k] the points whose cached visibility serves all of their stretch of a ray, and [n] the stretch of
-                each point; None: each its own.
+            segments: The stretches of rays whose cached visibility is looked up once; None: every point's is.
 
         Source: SplitNeRF Eq. (6)-(10), (17).
         """
@@ -159,112 +167,90 @@ class SceneModel(nn.Module):
         inputs = self.head_inputs(positions, outputs, features)
         albedo, roughness, metallic = self.material(inputs)
         lobe_dirs = query_direction(normals, view_dirs, roughness, c.query)
-        n, facing = len(normals), turned_to(normals, view_dirs)
-        light = self.light(torch.cat([lobe_dirs, facing]), torch.cat([roughness, torch.ones_like(roughness)]))
+        n, facing = len(normals), face_forward(normals, view_dirs)
+        radiance = light(torch.cat([lobe_dirs, facing]), torch.cat([roughness, torch.ones_like(roughness)]))
         query = OcclusionQuery(inputs, positions - normals * outputs[:, :1], facing, lobe_dirs, roughness)
-        occlusion = self.occlusion_factors(query, stretches if isinstance(self.occlusion, VisibilityBits) else None)
-        light_s, light_d = light[:n], light[n:]
+        occlusion = self.occlusion(query, segments)
+        light_s, light_d = radiance[:n], radiance[n:]
         factor_s, factor_d = occlusion.specular, occlusion.diffuse
         if occlusion.indirect_specular is not None:
             light_s = factor_s * light_s + occlusion.indirect_specular
             light_d = factor_d * light_d + occlusion.indirect_diffuse
             factor_s = factor_d = torch.ones_like(roughness)
-        radiance = split_sum_shade(
+        shaded = split_sum_shade(
             normals, view_dirs, albedo, roughness, metallic, light_s, light_d, factor_s, factor_d,
             c.fresnel_mode, c.compensate,
         )  # fmt: skip
-        return ShadedPoints(radiance, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, facing, lobe_dirs)
+        return ShadedPoints(
+            shaded, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, facing, lobe_dirs
+        )
 
-    def summed_less_split(
-        self, on_surface: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints, among: Tensor,
-        n_among: Tensor | None = None,
+    def quadrature_correction(
+        self, light: EvaluatedLight, on_surface: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints,
+        candidates: Tensor, n_candidates: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
-        """What radiance gains without the split: the BRDF summed over the light from the bits' directions.
+        """Radiance without the split less that of the split sum: the BRDF summed over the light from the bits' directions.
 
         The sum takes the split sum's place smoothly where lobes are wide enough for so few directions: at 256 of them
-        between a roughness of .3 and .45. Narrower ones gain nothing.
+        between a roughness of .3 and .45. Narrower lobes are not corrected.
 
         Args:
+            light: The light as it stands.
             on_surface: [n, 3].
             normals, view_dirs: [n, 3] unit.
-            points: What :meth:`shade` gave for them.
-            among: [k] int64, the points that are asked for.
-            n_among: [] how many of these count; others gain 0, nobody looks at who gains something, and no GPU is waited for.
-                None: all.
+            points: The points as :meth:`shade` returned them.
+            candidates: [k] int64, the points that may be corrected.
+            n_candidates: [] int64, how many of the candidates count; the correction of the others is 0, and the result is
+                [k], so that the host need not wait for a GPU. None: all count, and those of narrow lobes are left out.
 
         Returns:
-            at: [m] int64, those of the points that gain something; with ``n_among`` all of ``among``.
-            gained: [m, 3].
+            at: [m] int64, the points that are corrected.
+            correction: [m, 3].
 
         Source: SplitNeRF Eq. (4)-(6), by quadrature.
         """
-        over = (points.roughness.detach()[among, 0] - self.occlusion.summed_from) / SUMMED_BAND + 0.5
-        if n_among is None:
+        over = (points.roughness.detach()[candidates, 0] - self.occlusion.summed_from) / SUMMED_BAND + 0.5
+        if n_candidates is None:
             wide = (over > 0).nonzero().squeeze(1)
-            at, t = among[wide], over[wide, None].clamp(max=1.0)
+            at, t = candidates[wide], over[wide, None].clamp(max=1.0)
         else:
-            counts = torch.arange(len(among), device=among.device) < n_among
-            at, t = among, (over * counts)[:, None].clamp(0.0, 1.0)
+            counts = torch.arange(len(candidates), device=candidates.device) < n_candidates
+            at, t = candidates, (over * counts)[:, None].clamp(0.0, 1.0)
         taken = normals, points.albedo, points.roughness, points.metallic, points.radiance
         normals, albedo, roughness, metallic, split = (x.index_select(0, at) for x in taken)
         view_dirs = view_dirs[at]
-        light = self.occlusion.cell_light(self.light)
         visible, sent = self.occlusion.visibility(on_surface[at], points.facing.detach()[at])
+        cells = light.cells
         sums = summed_light(
-            normals, view_dirs, roughness, light.directions, light.solid_angles, light.radiance, visible, sent
+            normals, view_dirs, roughness, cells.directions, cells.solid_angles, cells.radiance, visible, sent
         )
         radiance = shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, self.config.compensate)
         return at, (radiance - split) * (t * t * (3.0 - 2.0 * t))
 
     @property
     def sums_light(self) -> bool:
-        """Whether :meth:`summed_less_split` stands in for the split sum: once there is a mesh."""
-        return self.config.shading == "summed" and self.occlusion_ready
+        """Whether :meth:`quadrature_correction` applies: once there is a mesh."""
+        return self.config.shading == "summed" and self.occlusion.ready
 
-    def occlusion_factors(self, query: OcclusionQuery, stretches: tuple[Tensor, Tensor] | None = None) -> Occlusion:
-        """The factors at surface points, or of their stretches; 1 before the first mesh. The geometry gets no gradient."""
-        if self.occlusion is None or not self.occlusion_ready:
-            ones = torch.ones_like(query.roughness).expand(-1, self.config.occlusion_channels)
-            return Occlusion(ones, ones)
-        query = OcclusionQuery(query.inputs, *(part.detach() for part in query[1:]))
-        if stretches is None:
-            return self.occlusion(query)
-        leaders, stretch = stretches
-        answers = self.occlusion(OcclusionQuery(*(part[leaders] for part in query)))
-        return Occlusion(*(None if part is None else part[stretch] for part in answers))
-
-    def use_mesh(self, scene: MeshScene, vertices: Tensor, faces: Tensor, bits: TracedBits | None = None) -> None:
-        """From now on occlusion factors count; bits are those of this mesh, and its light bounces a few times.
+    @torch.no_grad()
+    def use_mesh(self, traced: TracedBits | None) -> None:
+        """Answers occlusion from this mesh from now on; its light bounces a few times.
 
         Args:
-            scene: The mesh below.
-            vertices, faces: [n, 3], [m, 3], on the CPU.
-            bits: What its vertices see, where somebody has traced it; None: it is traced now.
+            traced: What :meth:`splitnerf.fields.OcclusionModel.trace` returned for it.
         """
-        self.occlusion_ready = self.occlusion is not None
-        if isinstance(self.occlusion, VisibilityBits):
-            self.occlusion.take(bits or self.occlusion.traced(scene, vertices, faces))
-            self.refresh_light()
-            for _ in range(START_BOUNCES):
-                self.refresh_indirect()
+        self.occlusion.use(traced)
+        light = self.evaluate_light()
+        self.occlusion.set_light(light)
+        for _ in range(START_BOUNCES):
+            self.refresh_indirect(light)
 
-    def prepare(self) -> None:
-        """Computes what follows from the parameters as they stand and is kept, so that no step does."""
-        self.sdf_field.grid.stored()
-        self.light.prepare()
-        if self.sums_light:
-            self.occlusion.cell_light(self.light)
-
-    def refresh_light(self) -> None:
-        """Hands the current light to the occlusion's weights, where these do not come from traced rays."""
-        if isinstance(self.occlusion, VisibilityBits):
-            self.occlusion.set_light(self.light)
-
-    def refresh_indirect(self) -> None:
+    @torch.no_grad()
+    def refresh_indirect(self, light: EvaluatedLight) -> None:
         """Shades the cached mesh anew, by the split sum, with the light that it sent so far. The view is the normal's."""
-        if isinstance(self.occlusion, VisibilityBits):
-            self.occlusion.refresh(self._radiance_along_normal)
 
-    def _radiance_along_normal(self, positions: Tensor, normals: Tensor) -> Tensor:
-        field = self.surface(positions)
-        return self.shade(positions, field.outputs, field.features, normals, normals).radiance
+        def shade(positions: Tensor, normals: Tensor) -> Tensor:
+            field = self.surface(positions)
+            return self.shade(light, positions, field.outputs, field.features, normals, normals).radiance
+
+        self.occlusion.refresh(shade)

@@ -10,6 +10,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.config import Config
+from splitnerf.fields import EvaluatedLight, RaySegments
 from splitnerf.ops import (
     PackedSamples,
     composite,
@@ -45,8 +46,8 @@ class ProbePoints(NamedTuple):
 class FoundSamples(NamedTuple):
     """The samples of a batch of rays, and all that follows from where they are.
 
-    n is the room there is, in all that follows from these samples too: what is behind those of the last ray is of none, and
-    `positions` has the first ones again in their stead, for the field to be looked at.
+    n is at least the capacity that was asked for. Samples past those of the last ray belong to no ray; in their place
+    `positions` repeats the first ones, so that the field is finite there.
 
     Attributes:
         packed: Where on the rays they are.
@@ -132,7 +133,7 @@ def find_samples(
     jitter: Tensor,
     anneal: float = 1.0,
     probes: ProbePoints | None = None,
-    room: int = 0,
+    capacity: int = 0,
 ) -> FoundSamples:
     """The samples that pixels are made of, by the field as it stands.
 
@@ -143,7 +144,7 @@ def find_samples(
         jitter: [n_rays] in [0, 1).
         anneal: Of the cosine, 0 at the start, 1 when done.
         probes: More points at which the field will be wanted.
-        room: Make room for so many samples where there are fewer.
+        capacity: The fewest samples of the result; what is missing is filled with samples of no ray.
     """
     c, s = model.config, model.s_value
     step = sample_step(c, s)
@@ -162,7 +163,7 @@ def find_samples(
     if probes is not None:
         beside = (probes.chosen * len(positions)).long() if len(positions) else beside
         neighbours = positions[beside] + probes.shifts[: len(beside)]
-        again, n, n_more = [], len(positions), room - len(positions)
+        again, n, n_more = [], len(positions), capacity - len(positions)
         if n_more > 0:
             packed, directions = packed.extended(n_more), F.pad(directions, (0, 0, 0, n_more))
             which = torch.arange(n_more, device=positions.device) % max(n, 1)
@@ -174,17 +175,18 @@ def find_samples(
 
 
 def render_rays(
-    model: SceneModel, found: FoundSamples, *, shades_per_ray: int = 0,
-    room: tuple[int, int] | None = None,
+    model: SceneModel, light: EvaluatedLight, found: FoundSamples, *, shades_per_ray: int = 0,
+    capacity: tuple[int, int] | None = None,
 ) -> RenderedRays:  # fmt: skip
     """Renders rays from their samples.
 
     Args:
         model: The scene.
+        light: Its light as it stands.
         found: The samples; the field may have moved a little since.
-        shades_per_ray: Samples of a ray that are shaded, about; others take what lies between. 0 shades all.
-        room: As of :func:`splitnerf.ops.spread_samples`; without it a GPU is waited for. Where it is too small ``sizes`` tells,
-            and the colours mean nothing.
+        shades_per_ray: Samples of a ray that are shaded, about; others are interpolated. 0 shades all.
+        capacity: See :func:`splitnerf.ops.spread_samples`; None waits for a GPU to count. Where it is exceeded ``sizes`` tells
+            so, and the colours have no meaning.
 
     Source: SplitNeRF Eq. (1)-(2), (17).
     """
@@ -203,22 +205,23 @@ def render_rays(
         min_transmittance=c.min_transmittance,
     )
 
-    spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step, room)
+    spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step, capacity)
     shaded = spread.shaded
     positions, view_dirs = found.positions[shaded], -found.directions[shaded]
     # The gradient of index_select is a sum; that of indexing sorts on a GPU.
     normals, outputs, features = (x.index_select(0, shaded) for x in (normals, field.outputs, field.features))
     sdf = outputs[:, 0]
-    points = model.shade(positions, outputs, features, normals, view_dirs, (spread.leaders, spread.stretch))
+    segments = RaySegments(spread.leaders, spread.stretch)
+    points = model.shade(light, positions, outputs, features, normals, view_dirs, segments)
     radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
     if model.sums_light:
         on_surface = positions - normals.detach() * sdf.detach()[:, None]
-        at, gained = model.summed_less_split(
-            on_surface, normals, view_dirs, points, spread.heaviest, None if room is None else spread.sizes[1],
-        )  # fmt: skip
-        mean = mean.index_add(0, samples.ray_indices[shaded[at]], gained)
+        at, correction = model.quadrature_correction(
+            light, on_surface, normals, view_dirs, points, spread.heaviest, None if capacity is None else spread.sizes[1]
+        )
+        mean = mean.index_add(0, samples.ray_indices[shaded[at]], correction)
     return RenderedRays(
         mean, c.compositing == "linear", opacity, samples, found.evaluated, weights, values, field.gradient, found.beside,
         shaded, spread.sizes, shares, positions, normals, sdf, points,
@@ -236,9 +239,9 @@ def render_view(
         occlusion_d, occlusion_s [H, W], normal [H, W, 3] unit, world.
     """
     rays_o, rays_d = image_rays(pose, intrinsics, height, width)
-    rows = []
+    light, rows = model.evaluate_light(), []
     for o, d in zip(rays_o.split(chunk), rays_d.split(chunk)):
-        ray = render_rays(model, find_samples(model, cells, o, d, torch.full_like(o[:, 0], 0.5)))
+        ray = render_rays(model, light, find_samples(model, cells, o, d, torch.full_like(o[:, 0], 0.5)))
         p = ray.points
         maps = torch.cat(
             [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), ray.normals],

@@ -2,87 +2,79 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+import gc
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, NamedTuple, Protocol
 
 import torch
 from torch import Tensor
 from torch.utils._pytree import tree_leaves, tree_map
 
+from splitnerf.fields import EvaluatedLight
 from splitnerf.render.model import SceneModel
+from splitnerf.render.renderer import FoundSamples, RenderedRays
+from splitnerf.training.batches import Batch
+from splitnerf.training.losses import Term
+from splitnerf.training.schedule import light_moves, light_period
+from splitnerf.training.step import Step
 
 MOST_GRAPHS = 4  # kept; they share work memory, but each has the gradients that it leaves
-SAMPLE_ROOM = 1.15  # of the samples that are aimed at
-SHADING_ROOM = 1.25  # of what was last counted
-ROOM_UNIT = 256
-
-
-def records_graphs(device: torch.device) -> bool:
-    """Whether work of a device can be recorded."""
-    return device.type == "cuda"
+SAMPLE_SLACK = 1.15  # capacity over the samples that are aimed at
+SHADING_SLACK = 1.25  # capacity over what was last counted
+CAPACITY_UNIT = 256
 
 
 class Graph(Protocol):
-    """What has been recorded."""
+    """Recorded work."""
 
     def replay(self) -> None:
         """Does it again, with what its tensors hold now."""
 
 
 class Recorded(NamedTuple):
-    """A recorded call.
+    """A recorded step.
 
     Attributes:
-        graph: Of what it did.
-        inputs: Where it reads.
-        outputs: What it returned.
-        grads: Gradients of the parameters, where it leaves them.
-        room: Of the shaded samples and of the stretches.
+        graph: The work.
+        batch, found, light: The inputs that it reads, in memory of their own.
+        outputs: Its rays and the terms of its loss.
+        grads: The gradients of the model's parameters, in memory that each replay writes.
+        capacity: The numbers of shaded samples and of segments for which it has room.
     """
 
     graph: Graph
-    inputs: Any
-    outputs: Any
+    batch: Batch
+    found: FoundSamples
+    light: EvaluatedLight
+    outputs: tuple[RenderedRays, dict[str, Term]]
     grads: list[Tensor | None]
-    room: tuple[int, int]
+    capacity: tuple[int, int]
 
 
-class StepGraphs:
-    """Calls a function that leaves gradients at a model's parameters, on a GPU by CUDA graphs where shapes allow.
+class GraphedStep(Step):
+    """A step whose rendering, losses and backward pass are one launch where shapes allow; see :class:`Step`.
 
-    A graph repeats what the host decided when it was recorded: sizes, numbers, memory. So samples have room for
-    ``capacity`` of them, and all else that the host decides is the key of the graph. The first call with a key is made as it
-    is, the next is recorded. What one call leaves is gone with the next.
-
-    Args:
-        model: The scene. Its parameters, light and caches stay where they are in memory for as long as keys are the same.
-        generator: Random numbers that the function draws.
-        n_samples: Of a step, about.
-        on: Otherwise all calls are made as they are.
-
-    Attributes:
-        capacity: Samples for which there shall be room; 0 where nothing is recorded.
-        thrown_away: Calls that had too little room.
+    A graph repeats what the host decided when it was recorded: sizes, numbers, memory. So samples are padded to a fixed
+    capacity, and all else that the host decides is the key of the graph. The first step with a key is made as it is, the
+    next is recorded. What one step returns is overwritten by the next. Parameters and caches of the model keep their memory
+    as long as keys are the same.
     """
 
-    def __init__(self, model: SceneModel, generator: torch.Generator, n_samples: int, *, on: bool):
-        self.model, self.generator, self.thrown_away = model, generator, 0
-        self.capacity = round_up(SAMPLE_ROOM * n_samples) if on else 0
-        self._counts: tuple[float, float] | None = None  # of the last call
-        self._used: tuple[int, int] | None = None  # its room
+    def __init__(self, model: SceneModel, *parts: Any):
+        super().__init__(model, *parts)
+        self.capacity = round_up(SAMPLE_SLACK * model.config.target_samples)
+        self._counts: tuple[float, float] | None = None  # shaded samples and segments of the last step
+        self._used: tuple[int, int] | None = None  # its capacity
         self._seen: set[Hashable] = set()
+        self._has_loaded = False  # every kernel of a step with a capacity
         self._graphs: dict[Hashable, Recorded] = {}
-        self._stream = torch.cuda.Stream(model.device) if on else None
-        self._pool = torch.cuda.graph_pool_handle() if on else None
+        self._stream = torch.cuda.Stream(model.device)
+        self._pool = torch.cuda.graph_pool_handle()
 
     @contextmanager
     def stream(self) -> Iterator[None]:
-        """All work of the block goes to the queue in which graphs are recorded: gradients are tied to theirs."""
-        if self._stream is None:
-            yield
-            return
+        """All work of the block goes to the queue in which graphs are recorded, to which their gradients are tied."""
         outside = torch.cuda.current_stream(self.model.device)
         self._stream.wait_stream(outside)
         try:
@@ -91,82 +83,108 @@ class StepGraphs:
         finally:
             outside.wait_stream(self._stream)
 
-    def __call__(self, key: Hashable, function: Callable[[Any, tuple[int, int] | None], Any], inputs: Any) -> Any:
-        """function(inputs, room), whose room is None where the function may wait for the GPU to tell.
+    def __call__(
+        self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
+    ) -> tuple[RenderedRays, dict[str, Term]]:
+        found = self.find(batch, progress, self.capacity)
 
-        Args:
-            key: All that the host decides, but for shapes.
-            function: Returns the same, and leaves the same gradients, whenever key, inputs and the model are the same.
-            inputs: Tuples, lists and dictionaries of tensors, those of samples ``capacity`` long where that is enough.
-        """
-        self._used = None
-        given = tree_leaves(inputs)
-        key = key, *(x.shape for x in given)
-        known = key in self._seen and self._counts is not None
-        if not self.capacity or not known or all(len(x) != self.capacity for x in given if x.dim()):
+        def differentiate(batch: Batch, found: FoundSamples, light: EvaluatedLight, capacity: tuple[int, int] | None):
+            return self.differentiate(batch, found, light, environment, step, progress, capacity)
+
+        self._used, key = None, (*self._decided(step, progress), len(batch.target), len(found.directions))
+        if len(found.directions) != self.capacity or key not in self._seen or self._counts is None:
             self._seen.add(key)
-            return function(inputs, None)
-        self.model.prepare()
-        if key in self._graphs and not has_room(self._graphs[key].room, self._counts, slack=1.1):
+            return differentiate(batch, found, light, None)
+        self.model.sdf_field.grid.stored()  # a copy in 16 bits is made before, not by the graph
+        if key in self._graphs and not has_room(self._graphs[key].capacity, self._counts, slack=1.1):
             del self._graphs[key]
         if key not in self._graphs:
+            self._used = tuple(round_up(SHADING_SLACK * n) for n in self._counts)
+            if not self._has_loaded:
+                self._has_loaded = True
+                return differentiate(batch, found, light, self._used)
             while len(self._graphs) >= MOST_GRAPHS:
                 del self._graphs[next(iter(self._graphs))]
-            self._graphs[key] = self._recorded(function, inputs)
-        recorded = self._graphs[key]
-        by_type = defaultdict(lambda: ([], []))  # one launch for all of a type
-        for old, new in zip(tree_leaves(recorded.inputs), given, strict=True):
-            for tensors, x in zip(by_type[new.dtype], (old, new)):
-                tensors.append(x)
-        for old, new in by_type.values():
-            torch._foreach_copy_(old, new)
+            self._graphs[key] = self._recorded(differentiate, batch, found, light, self._used)
+        return self._replayed(self._graphs[key], batch, found, light)
+
+    def _decided(self, step: int, progress: float) -> tuple:
+        """What the host decides about a step, but for sizes: steps that agree in it do the same to their tensors."""
+        c, model = self.model.config, self.model
+        since = step % light_period(c) + 1 if light_moves(c, step) else 0
+        return model.sdf_field.grid.n_active, since, progress >= c.priors_from, self.mesh.made_at, model.occlusion.ready
+
+    def _recorded(
+        self, function: Callable, batch: Batch, found: FoundSamples, light: EvaluatedLight, capacity: tuple[int, int]
+    ) -> Recorded:
+        batch, found = tree_map(torch.clone, (batch, found))
+        leaves = [leaf.detach().clone().requires_grad_() for leaf in light.leaves]
+        light = light.with_tensors(leaves, [x.clone() for x in light.constants])
+        graph, outputs = record(lambda: function(batch, found, light, capacity), self._pool, self.generator)
+        grads = [p.grad for p in self.model.parameters()]
+        return Recorded(graph, batch, found, light, outputs, grads, capacity)
+
+    def _replayed(
+        self, recorded: Recorded, batch: Batch, found: FoundSamples, light: EvaluatedLight
+    ) -> tuple[RenderedRays, dict[str, Term]]:
+        self._used = recorded.capacity
+        old = [*tree_leaves((recorded.batch, recorded.found)), *recorded.light.leaves, *recorded.light.constants]
+        new = [*tree_leaves((batch, found)), *light.leaves, *light.constants]
+        with torch.no_grad():
+            for dtype in {x.dtype for x in new}:  # one launch for all of a type
+                torch._foreach_copy_(
+                    [x for x in old if x.dtype == dtype], [x.detach() for x in new if x.dtype == dtype]
+                )
+        recorded.graph.replay()
         for parameter, grad in zip(self.model.parameters(), recorded.grads):
             parameter.grad = grad
-        recorded.graph.replay()
-        self._used = recorded.room
+        for ours, theirs in zip(light.leaves, recorded.light.leaves):
+            if theirs.grad is not None:
+                ours.grad = theirs.grad.clone() if ours.grad is None else ours.grad.add_(theirs.grad)
         return recorded.outputs
 
-    def fits(self, n_shaded: float, n_stretches: float) -> bool:
-        """Whether the last call had room for as many as it counted. Where it had not, what it left must not be used, all graphs
-        are dropped, and so is what has come together of the light's gradients."""
-        self._counts = n_shaded, n_stretches
-        fitted = self._used is None or has_room(self._used, self._counts)
-        if not fitted:
-            self.thrown_away += 1
+    def is_complete(self, n_shaded: float, n_segments: float) -> bool:
+        """Whether the last step had room for as many as it counted. Where it had not, its results have no meaning, and all
+        graphs are dropped."""
+        self._counts = n_shaded, n_segments
+        complete = self._used is None or has_room(self._used, self._counts)
+        if not complete:
+            self.n_discarded += 1
             self._graphs.clear()
-            self.model.light.forget()
-        return fitted
-
-    def _recorded(self, function: Callable, inputs: Any) -> Recorded:
-        inputs = tree_map(torch.clone, inputs)
-        room = tuple(round_up(SHADING_ROOM * n) for n in self._counts)
-        graph, outputs = record(lambda: function(inputs, room), self._pool, self.generator)
-        return Recorded(graph, inputs, outputs, [p.grad for p in self.model.parameters()], room)
+        return complete
 
 
 def record(function: Callable[[], Any], pool: Any, generator: torch.Generator) -> tuple[Graph, Any]:
     """A graph of what a function does on the current stream, and what it returned; nothing is done yet.
 
     Args:
-        function: Called once.
-        pool: Of work memory. Graphs that share one must not need what another has left.
-        generator: Random numbers that it draws.
+        function: Work without an answer to wait for, called once.
+        pool: Memory that graphs share. None of them may need what another has left.
+        generator: Random numbers that the function draws.
     """
     graph = torch.cuda.CUDAGraph()
     graph.register_generator_state(generator)
+    collects = gc.isenabled()
+    gc.disable()  # what it would free within the recording would be part of it
     graph.capture_begin(pool=pool, capture_error_mode="thread_local")  # meshes are made by another thread
     try:
         outputs = function()
+    except BaseException:
+        with suppress(RuntimeError):  # the first error is the one to tell
+            graph.capture_end()
+        raise
     finally:
-        graph.capture_end()
+        if collects:
+            gc.enable()
+    graph.capture_end()
     return graph, outputs
 
 
-def has_room(room: tuple[int, int], counts: tuple[float, float], slack: float = 1.0) -> bool:
-    """Whether that is enough for so many, times `slack`."""
-    return all(slack * n <= r for n, r in zip(counts, room))
+def has_room(capacity: tuple[int, int], counts: tuple[float, float], slack: float = 1.0) -> bool:
+    """Whether the capacity is enough for so many, times `slack`."""
+    return all(slack * n <= room for n, room in zip(counts, capacity))
 
 
 def round_up(n: float) -> int:
-    """To a multiple of the unit in which room is made."""
-    return -(-int(n) // ROOM_UNIT) * ROOM_UNIT
+    """To a multiple of the unit of capacities."""
+    return -(-int(n) // CAPACITY_UNIT) * CAPACITY_UNIT

@@ -1,4 +1,4 @@
-"""Training: from posed images to a surface, its materials and the light. Reads top to bottom."""
+"""The training loop: from posed images to a surface, its materials and the light. Reads top to bottom."""
 
 from __future__ import annotations
 
@@ -7,11 +7,22 @@ import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple, TextIO
 
 import torch
 from torch import Tensor
 
-from splitnerf.training import losses
+from splitnerf.config import Config
+from splitnerf.data.dataset import Dataset, dataset_fingerprint
+from splitnerf.devices import tensor_cores
+from splitnerf.errors import InputError
+from splitnerf.fields import EvaluatedLight
+from splitnerf.ops import MeshScene
+from splitnerf.outputs import write_preview
+from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
+from splitnerf.render.rays import PixelSource
+from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.batches import Batch, draw_batch
 from splitnerf.training.checkpoint import (
     load_checkpoint,
@@ -21,28 +32,18 @@ from splitnerf.training.checkpoint import (
     restored_occupancy,
     save_checkpoint,
 )
-from splitnerf.config import Config
-from splitnerf.data.dataset import Dataset, dataset_fingerprint
-from splitnerf.devices import tensor_cores
-from splitnerf.errors import InputError
 from splitnerf.training.finite import GradientWatch, check_state, explain_loss
-from splitnerf.training.graphs import StepGraphs, records_graphs
+from splitnerf.training.graphs import GraphedStep
 from splitnerf.training.losses import Term
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.ops import MeshScene
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
-from splitnerf.outputs import write_preview
 from splitnerf.training.progress import Interrupt, Progress
-from splitnerf.render.model import SceneModel
-from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
-from splitnerf.render.rays import PixelSource
-from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples
 from splitnerf.training.repeatable import same_bits
-from splitnerf.training.schedule import cosine_anneal, light_moves, light_period, next_ray_count
-from splitnerf.training.step import batch_losses, decided
+from splitnerf.training.schedule import light_moves, light_period, next_ray_count
+from splitnerf.training.step import Step
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first ones are logged one by one
-ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion rays
+ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion
 
 
 @dataclass
@@ -52,10 +53,29 @@ class TrainedScene:
     model: SceneModel
     grid: OccupancyGrid
     scene: MeshScene | None
-    n_rays: int
     step: int
     seconds: float
     finished: bool
+
+
+class StepNumbers(NamedTuple):
+    """What the host reads of a step, in one go.
+
+    Attributes:
+        values: The terms of the loss without their weights, by name, the colour's first.
+        loss: The weighted sum.
+        largest_gradient: The largest magnitude among all gradients.
+        n_samples, n_evaluated, n_shaded: Samples composited, points evaluated to find them, samples shaded.
+        is_complete: Whether the step's results may be used.
+    """
+
+    values: dict[str, float]
+    loss: float
+    largest_gradient: float
+    n_samples: int
+    n_evaluated: int
+    n_shaded: int
+    is_complete: bool
 
 
 def train(
@@ -76,150 +96,189 @@ def train(
 
     Raises:
         InputError: The checkpoint belongs to another scene or cannot be read, or the device cannot repeat its bits.
-        splitnerf.training.finite.Diverged: Numbers are no longer finite, by the rule that stands there; the last checkpoint stands.
+        splitnerf.training.finite.Diverged: Numbers are no longer finite, by the rule that stands there; the last checkpoint
+            stands.
         OSError: The disk is full; the last checkpoint stands.
     """
-    c = config
-    check_repeatable(c, device)
-    torch.manual_seed(c.seed)
-    generator = torch.Generator(device).manual_seed(c.seed)
-    fingerprint = dataset_fingerprint(dataset)
-    source = PixelSource(dataset, c.foreground_share, generator)
-    model = SceneModel(c).to(device)
-    optimiser = make_optimiser(model, c)
-    hull = None
-    if c.hull_until > 0:
-        hull = visual_hull(c.grid_resolution, c.box, source.masks, source.poses, source.intrinsics)
-    grid = make_grid(c, hull, device)
-    mesh = SurfaceMesh(model, background=c.background_meshes)
-    graphs = StepGraphs(model, generator, c.target_samples, on=c.cuda_graphs and records_graphs(model.device))
-    environment: Tensor | None = None
-    step, seconds, n_rays, previewed_at = 0, 0.0, c.initial_rays, 0.0
-
+    check_repeatable(config, device)
+    training = Training(dataset, config, run, torch.device(device))
     if resume:
-        path = run / "checkpoint.pt"
-        content = load_checkpoint(path)
-        check_same_scene(content, fingerprint, run)
-        restore_model(model, content, path)
-        restore_optimiser(optimiser, content, path)
-        restore_generator(generator, content, path)
-        grid.values = restored_occupancy(grid.values, content, path)
-        step, seconds, n_rays, previewed_at = (content[key] for key in ("step", "seconds", "n_rays", "previewed_at"))
+        training.restore()
+    with (
+        open(run / "metrics.jsonl", "a") as log, Interrupt() as interrupt, Progress(training.progress) as bar,
+        same_bits(config.deterministic), tensor_cores(config.tensor_cores), training.take_step.stream(),
+    ):  # fmt: skip
+        while training.progress < 1.0 and not (interrupt.asked and training.may_stop):
+            training.refresh()
+            training.advance(log, bar)
+        training.finish()
+    return training.result()
 
-    def save() -> None:
-        check_state(step, model, optimiser)
+
+class Training:
+    """A training and all that a checkpoint keeps of it.
+
+    Args:
+        dataset, config, run, device: See :func:`train`.
+    """
+
+    def __init__(self, dataset: Dataset, config: Config, run: Path, device: torch.device):
+        c = self.config = config
+        self.dataset, self.run = dataset, run
+        self.fingerprint = dataset_fingerprint(dataset)
+        torch.manual_seed(c.seed)
+        self.generator = torch.Generator(device).manual_seed(c.seed)
+        self.source = source = PixelSource(dataset, c.foreground_share, self.generator)
+        self.model = SceneModel(c).to(device)
+        self.optimiser = make_optimiser(self.model, c)
+        hull = None
+        if c.hull_until > 0:
+            hull = visual_hull(c.grid_resolution, c.box, source.masks, source.poses, source.intrinsics)
+        self.grid = make_grid(c, hull, device)
+        self.mesh = SurfaceMesh(self.model, background=c.background_meshes)
+        step = GraphedStep if c.cuda_graphs and device.type == "cuda" else Step
+        self.take_step = step(self.model, self.grid, self.mesh, self.generator)
+        self.watch = GradientWatch(self.model.parameters())
+        self.light: EvaluatedLight | None = None  # as it stands, until it moves
+        self.environment: Tensor | None = None  # the light that weighs traced occlusion
+        self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.initial_rays, 0.0
+        self.psnr_mean: float | None = None
+        self.started = self.saved_at = time.monotonic()
+        self.first = True  # step of this process
+
+    def restore(self) -> None:
+        """Goes on from the run's checkpoint."""
+        path = self.run / "checkpoint.pt"
+        content = load_checkpoint(path)
+        check_same_scene(content, self.fingerprint, self.run)
+        restore_model(self.model, content, path)
+        restore_optimiser(self.optimiser, content, path)
+        restore_generator(self.generator, content, path)
+        self.grid.values = restored_occupancy(self.grid.values, content, path)
+        for name in ("step", "seconds", "n_rays", "previewed_at"):
+            setattr(self, name, content[name])
+        self.model.open_levels(self.progress)
+        self.mesh.restore(content)
+        self.started = time.monotonic() - self.seconds
+
+    def save(self) -> None:
+        """Writes the checkpoint."""
+        check_state(self.step, self.model, self.optimiser)
         save_checkpoint(
-            run / "checkpoint.pt",
-            config=c,
-            fingerprint=fingerprint,
+            self.run / "checkpoint.pt", config=self.config, fingerprint=self.fingerprint,
             state=dict(
-                step=step, seconds=seconds, n_rays=n_rays, previewed_at=previewed_at,
-                model=model.state_dict(), optimiser=optimiser.state_dict(), device=generator.device.type,
-                generator=generator.get_state(), torch_generator=torch.get_rng_state(), occupancy=grid.values,
-                box_from_world=torch.from_numpy(dataset.box_from_world), **mesh.state(),
+                step=self.step, seconds=self.seconds, n_rays=self.n_rays, previewed_at=self.previewed_at,
+                model=self.model.state_dict(), optimiser=self.optimiser.state_dict(), device=self.generator.device.type,
+                generator=self.generator.get_state(), torch_generator=torch.get_rng_state(), occupancy=self.grid.values,
+                box_from_world=torch.from_numpy(self.dataset.box_from_world), **self.mesh.state(),
             ),
         )  # fmt: skip
+        self.saved_at = time.monotonic()
 
-    def progress_now() -> float:
-        by_time = seconds / (60.0 * c.max_minutes) if c.max_minutes > 0 else 0.0
-        return min(1.0, max(step / c.steps, by_time))
+    @property
+    def progress(self) -> float:
+        """Where the schedule stands, in [0, 1]."""
+        c = self.config
+        by_time = self.seconds / (60.0 * c.max_minutes) if c.max_minutes > 0 else 0.0
+        return min(1.0, max(self.step / c.steps, by_time))
 
-    if resume:
-        model.open_levels(progress_now())
-        mesh.restore(content)
-    model.light.collect()
-    light_steps = light_period(c)
-    started, saved_at, first = time.monotonic() - seconds, time.monotonic(), True
-    psnr_mean = samples_mean = None
-    watch = GradientWatch(model.parameters())
-    log = open(run / "metrics.jsonl", "a")
-    with (
-        log, Interrupt() as interrupt, Progress(progress_now()) as bar, same_bits(c.deterministic),
-        tensor_cores(c.tensor_cores), graphs.stream(),
-    ):  # fmt: skip
-        while (progress := progress_now()) < 1.0 and not (interrupt.asked and step % light_steps == 0):
-            model.open_levels(progress)
-            set_learning_rate(optimiser, c, step, progress)
-            if first or step % c.grid_every == 0:
-                grid.update(
-                    model.sdf_field.sdf, model.s_value, first=first, step=step, use_hull=progress < c.hull_until
-                )
-            if model.occlusion is not None and progress - mesh.asked_at >= c.mesh_every:
-                check_state(step, model, optimiser)
-                mesh.renew(progress)
-            mesh.arrive(wait=c.deterministic)
-            scene = mesh.scene
-            traces = scene is not None and c.occlusion == "mlp" and c.occlusion_weight > 0
-            if traces and (environment is None or step % ENVIRONMENT_EVERY == 0):
-                environment = model.light.panorama(c.environment_height)
-            if scene is not None and step % ENVIRONMENT_EVERY == 0:
-                model.refresh_light()
-            if c.indirect and scene is not None and step % c.indirect_every == 0:
-                model.refresh_indirect()
+    @property
+    def may_stop(self) -> bool:
+        """Whether no gradients wait for the light to move."""
+        return self.step % light_period(self.config) == 0
 
-            batch = draw_batch(source, n_rays, c)
-            anneal = cosine_anneal(c, progress)
-            found = find_samples(model, grid.cells, *batch.rays, anneal, batch.probes, room=graphs.capacity)
+    def refresh(self) -> None:
+        """Brings up to date what steps share: levels, rates, occupied cells, the mesh, and the light that it sees and sends."""
+        c, model, step, progress = self.config, self.model, self.step, self.progress
+        model.open_levels(progress)
+        set_learning_rate(self.optimiser, c, step, progress)
+        if self.first or step % c.grid_every == 0:
+            use_hull = progress < c.hull_until
+            self.grid.update(model.sdf_field.sdf, model.s_value, first=self.first, step=step, use_hull=use_hull)
+        if model.occlusion.needs_mesh and progress - self.mesh.asked_at >= c.mesh_every:
+            check_state(step, model, self.optimiser)
+            self.mesh.request(progress)
+        self.mesh.poll(wait=c.deterministic)
+        if self.light is None:
+            self.light = model.evaluate_light()
+        if self.mesh.scene is None:
+            return
+        if c.occlusion == "mlp" and c.occlusion_weight > 0:
+            if self.environment is None or step % ENVIRONMENT_EVERY == 0:
+                self.environment = model.light.panorama(c.environment_height)
+        if step % ENVIRONMENT_EVERY == 0:
+            model.occlusion.set_light(self.light)
+        if c.indirect and step % c.indirect_every == 0:
+            model.refresh_indirect(self.light)
 
-            def differentiate(
-                given: tuple[Batch, FoundSamples], room: tuple[int, int] | None
-            ) -> tuple[RenderedRays, dict[str, Term]]:
-                traced = environment if traces else None
-                ray, terms = batch_losses(model, *given, scene, traced, generator, step, progress, room)
-                optimiser.zero_grad(set_to_none=True)
-                losses.backward(terms)
-                return ray, terms
+    def advance(self, log: TextIO, bar: Progress) -> None:
+        """Makes one step: rays, gradients, parameters; then what is written from time to time."""
+        c, light = self.config, self.light
+        batch = draw_batch(self.source, self.n_rays, c)
+        ray, terms = self.take_step(batch, light, self.environment, self.step, self.progress)
+        if light_moves(c, self.step):
+            light.backward()
+            self.light = None
+        numbers = self.read(ray, terms)
+        if not numbers.is_complete:
+            light.zero_grad()
+        else:
+            if not math.isfinite(numbers.loss):
+                raise explain_loss(self.step, numbers.values, self.dataset, batch, self.model, ray)
+            if self.watch.allows(self.step, numbers.largest_gradient):
+                self.optimiser.step()
+            psnr = -10.0 * math.log10(max(numbers.values["colour"], 1e-10))
+            self.psnr_mean = psnr if self.psnr_mean is None else 0.95 * self.psnr_mean + 0.05 * psnr
+        self.n_rays = next_ray_count(self.n_rays, numbers.n_samples, c)
+        self.step, self.first, self.seconds = self.step + 1, False, time.monotonic() - self.started
+        bar.show(self.progress, self.step, self.psnr_mean, numbers.n_evaluated / len(batch.target))
+        if self.step % LOG_EVERY == 0 or self.step <= LOG_EVERY or self.progress >= 1.0:
+            check_state(self.step, self.model, self.optimiser)
+            log.write(json.dumps(self.line(batch, terms, numbers)) + "\n")
+            log.flush()
+        if self.progress - self.previewed_at >= c.preview_every:
+            self.previewed_at = self.progress
+            write_preview(self.run, self.model, self.grid, self.dataset, self.step)
+        if time.monotonic() - self.saved_at > 60.0 * c.checkpoint_minutes and self.may_stop:
+            self.save()
 
-            ray, terms = graphs(decided(model, mesh, step, progress), differentiate, (batch, found))
-            if light_moves(c, step):
-                model.light.deliver()
-            numbers = torch.stack([*(term.value.detach() for term in terms.values()), watch.largest()])
-            counts = torch.cat([ray.samples.offsets[-1:], ray.evaluated.sum()[None], ray.sizes])
-            read = torch.cat([numbers, counts]).tolist()  # waits for the device
-            *values, largest, n_samples, n_evaluated, n_shaded, _, n_stretches = read
-            loss = sum(term.weight * value for term, value in zip(terms.values(), values))
-            fitted = graphs.fits(n_shaded, n_stretches)
-            if fitted and not math.isfinite(loss):
-                raise explain_loss(step, dict(zip(terms, values)), dataset, batch, model, ray)
-            if fitted and watch.allows(step, largest):
-                optimiser.step()
+    def read(self, ray: RenderedRays, terms: dict[str, Term]) -> StepNumbers:
+        """Waits for the step, once."""
+        numbers = torch.stack([*(term.value.detach() for term in terms.values()), self.watch.largest()])
+        counts = torch.cat([ray.samples.offsets[-1:], ray.evaluated.sum()[None], ray.sizes])
+        *values, largest, n_samples, n_evaluated, n_shaded, _, n_segments = torch.cat([numbers, counts]).tolist()
+        loss = sum(term.weight * value for term, value in zip(terms.values(), values))
+        is_complete = self.take_step.is_complete(n_shaded, n_segments)
+        return StepNumbers(dict(zip(terms, values)), loss, largest, n_samples, n_evaluated, n_shaded, is_complete)
 
-            n_rays = next_ray_count(n_rays, n_samples, c)
-            step, first, seconds = step + 1, False, time.monotonic() - started
-            psnr = -10.0 * math.log10(max(values[0], 1e-10))
-            if fitted:
-                psnr_mean = psnr if psnr_mean is None else 0.95 * psnr_mean + 0.05 * psnr
-            samples_mean = n_evaluated / len(batch.target)
-            bar.show(progress_now(), step, psnr_mean, samples_mean)
-            if step % LOG_EVERY == 0 or step <= LOG_EVERY or progress_now() >= 1.0:
-                check_state(step, model, optimiser)
-                log.write(json.dumps({
-                    "step": step, "seconds": round(seconds, 3), "progress": progress_now(), "loss": loss,
-                    **{f"loss_{name}": term.weight * value for (name, term), value in zip(terms.items(), values)},
-                    "psnr": psnr_mean,
-                    "rays": len(batch.target), "samples_per_ray": samples_mean,
-                    "kept": n_samples / max(1, n_evaluated), "shaded": n_shaded / max(1, n_evaluated),
-                    "s": model.s_value, "sees_all": getattr(model.occlusion, "sees_all", False),
-                    "skipped": watch.skipped + graphs.thrown_away,
-                }) + "\n")  # fmt: skip
-                log.flush()
-            if progress_now() - previewed_at >= c.preview_every:
-                previewed_at = progress_now()
-                write_preview(run, model, grid, dataset, step)
-            if time.monotonic() - saved_at > 60.0 * c.checkpoint_minutes and step % light_steps == 0:
-                save()
-                saved_at = time.monotonic()
-        optimiser.zero_grad(set_to_none=True)
-        check_state(step, model, optimiser)
-        finished = progress_now() >= 1.0
-        mesh.arrive(wait=finished)
-        if finished and c.occlusion == "bits":  # what is rendered from here on sees the final surface
-            mesh.renew(1.0)
-            mesh.arrive(wait=True)
-        model.light.collect(False)
-        grid.update(model.sdf_field.sdf, model.s_value)
-        save()
-    return TrainedScene(model, grid, mesh.scene, n_rays, step, seconds, finished)
+    def line(self, batch: Batch, terms: dict[str, Term], numbers: StepNumbers) -> dict[str, object]:
+        """A line of metrics.jsonl."""
+        evaluated = max(1, numbers.n_evaluated)
+        return {
+            "step": self.step, "seconds": round(self.seconds, 3), "progress": self.progress, "loss": numbers.loss,
+            **{f"loss_{name}": term.weight * numbers.values[name] for name, term in terms.items()},
+            "psnr": self.psnr_mean,
+            "rays": len(batch.target), "samples_per_ray": numbers.n_evaluated / len(batch.target),
+            "kept": numbers.n_samples / evaluated, "shaded": numbers.n_shaded / evaluated,
+            "s": self.model.s_value, "is_unoccluded": self.model.occlusion.is_unoccluded,
+            "skipped": self.watch.skipped + self.take_step.n_discarded,
+        }  # fmt: skip
+
+    def finish(self) -> None:
+        """Ends with a checkpoint; a finished run renders from here on with the final surface."""
+        self.optimiser.zero_grad(set_to_none=True)
+        check_state(self.step, self.model, self.optimiser)
+        finished = self.progress >= 1.0
+        self.mesh.poll(wait=finished)
+        if finished and self.config.occlusion == "bits":
+            self.mesh.request(1.0)
+            self.mesh.poll(wait=True)
+        self.grid.update(self.model.sdf_field.sdf, self.model.s_value)
+        self.save()
+
+    def result(self) -> TrainedScene:
+        """What the training leaves in memory."""
+        return TrainedScene(self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0)
 
 
 def check_repeatable(config: Config, device: torch.device | str) -> None:

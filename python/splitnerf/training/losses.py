@@ -11,7 +11,7 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.config import Config
-from splitnerf.fields import Light
+from splitnerf.fields import EvaluatedLight, Light
 from splitnerf.ops import (
     MeshScene,
     fibonacci_directions,
@@ -99,7 +99,7 @@ def light_directions(config: Config, n: int, queries: Tensor, generator: torch.G
     return torch.cat([uniform, queries]) if config.light_set == "uniform_and_queries" else uniform
 
 
-def neutral_light_loss(light: Light, config: Config, generator: torch.Generator) -> Tensor:
+def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.Generator) -> Tensor:
     """Mean squared log chroma of the diffuse light g(n, 1): how far its channels are from their geometric mean.
 
     Images of a diffuse object leave it open whether a colour is the object's or the light's. This prefers a

@@ -12,19 +12,18 @@ from torch import Tensor
 
 from splitnerf.devices import wait_for
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
-from splitnerf.fields import VisibilityBits
 from splitnerf.fields.visibility import TracedBits
 from splitnerf.ops import MeshScene, SdfNetwork, sdf_values
 from splitnerf.render.model import SceneModel
 
 
 class TracedMesh(NamedTuple):
-    """A mesh, ready to be traced, and what its vertices see where the model keeps that.
+    """A mesh through which rays can be traced, and what its vertices see.
 
     Attributes:
         scene: The mesh below.
         vertices, faces: [n, 3] float32 and [m, 3] int32, on the CPU.
-        bits: Of its vertices; None where occlusion is not cached.
+        bits: What the vertices see; None where occlusion is not cached.
     """
 
     scene: MeshScene
@@ -38,8 +37,8 @@ class SurfaceMesh:
 
     Args:
         model: Uses each mesh as soon as it is there.
-        background: Meshes are made by a thread of their own while the caller goes on: it reads a copy of the field, traces on
-            the processor's cores, and :meth:`arrive` hands the mesh over. It ends with the program, done or not.
+        background: Whether a thread of its own makes the meshes while the caller goes on. The thread reads a copy of the field
+            and traces on the processor's cores; :meth:`poll` takes the mesh over. The thread ends with the program.
 
     Attributes:
         current: The mesh in use; None before the first.
@@ -57,7 +56,7 @@ class SurfaceMesh:
         """What rays are traced through."""
         return self.current.scene if self.current else None
 
-    def renew(self, progress: float) -> None:
+    def request(self, progress: float) -> None:
         """Makes a mesh of the surface as it is now; beside the caller's work where that was asked for, unless one is
         being made. The old one stays while the field has no surface.
 
@@ -75,7 +74,7 @@ class SurfaceMesh:
         self._made = Future()
         threading.Thread(target=fulfil, args=(self._made, make_mesh, self.model, network), daemon=True).start()
 
-    def arrive(self, wait: bool = False) -> None:
+    def poll(self, wait: bool = False) -> None:
         """Uses a mesh that was made beside the caller's work, if it is done, or waits for it.
 
         Raises:
@@ -100,7 +99,7 @@ class SurfaceMesh:
         self.made_at = self.asked_at
         if mesh is not None:
             self.current = mesh
-            self.model.use_mesh(*mesh)
+            self.model.use_mesh(mesh.bits)
 
 
 def fulfil(future: Future, function: Callable, *args: object) -> None:
@@ -125,10 +124,9 @@ def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
 
 
 def traced(model: SceneModel, vertices: Tensor, faces: Tensor) -> TracedMesh:
-    """A mesh with the bits of its vertices, where the model reads such."""
+    """A mesh with what the model's occlusion keeps of it."""
     scene = MeshScene(vertices.numpy(), faces.numpy())
-    bits = model.occlusion.traced(scene, vertices, faces) if isinstance(model.occlusion, VisibilityBits) else None
-    return TracedMesh(scene, vertices, faces, bits)
+    return TracedMesh(scene, vertices, faces, model.occlusion.trace(scene, vertices, faces))
 
 
 def distances(network: SdfNetwork) -> Callable[[Tensor], Tensor]:

@@ -1,38 +1,94 @@
-"""What one training step computes: rays as they are rendered now, and the terms of the loss."""
+"""What one training step computes: rays as they are rendered now, the terms of the loss, and their gradients."""
 
 from __future__ import annotations
+
+from contextlib import AbstractContextManager, nullcontext
 
 import torch
 from torch import Tensor
 
+from splitnerf.fields import EvaluatedLight
+from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
+from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import OccupancyGrid
+from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
 from splitnerf.training import losses
 from splitnerf.training.batches import Batch
 from splitnerf.training.losses import Term
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
-from splitnerf.render.model import SceneModel
-from splitnerf.render.renderer import FoundSamples, RenderedRays, render_rays
-from splitnerf.training.schedule import light_moves, light_period
+from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
 
 
-def batch_losses(
-    model: SceneModel, batch: Batch, found: FoundSamples, scene: MeshScene | None, environment: Tensor | None,
-    generator: torch.Generator, step: int, progress: float, room: tuple[int, int] | None = None,
-) -> tuple[RenderedRays, dict[str, Term]]:  # fmt: skip
-    """The rays as they are rendered now, and the terms of the loss by name, the colour's first.
+class Step:
+    """One training step up to the gradients, which it leaves at the model's parameters and the light's leaves.
 
     Args:
-        model: The scene.
-        batch: The rays.
-        found: Their samples.
+        model, grid, mesh: The scene, where it is occupied, and its newest mesh.
+        generator: Random numbers for the losses' subsets.
+    """
+
+    n_discarded = 0  # steps whose results were not complete
+
+    def __init__(self, model: SceneModel, grid: OccupancyGrid, mesh: SurfaceMesh, generator: torch.Generator):
+        self.model, self.grid, self.mesh, self.generator = model, grid, mesh, generator
+
+    def __call__(
+        self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
+    ) -> tuple[RenderedRays, dict[str, Term]]:
+        """Finds the rays' samples, renders them and takes the gradients of the losses.
+
+        Args:
+            batch: The rays.
+            light: The light as it stands.
+            environment: [h, 2h, 3], the light that weighs the traced occlusion; None: none is traced.
+            step, progress: Where the training stands.
+
+        Returns:
+            The rays as they were rendered, and the terms of the loss by name, the colour's first.
+        """
+        return self.differentiate(batch, self.find(batch, progress), light, environment, step, progress)
+
+    def find(self, batch: Batch, progress: float, capacity: int = 0) -> FoundSamples:
+        """The samples of a batch, see :func:`splitnerf.render.renderer.find_samples`."""
+        anneal = cosine_anneal(self.model.config, progress)
+        return find_samples(self.model, self.grid.cells, *batch.rays, anneal, batch.probes, capacity)
+
+    def differentiate(
+        self, batch: Batch, found: FoundSamples, light: EvaluatedLight, environment: Tensor | None, step: int,
+        progress: float, capacity: tuple[int, int] | None = None,
+    ) -> tuple[RenderedRays, dict[str, Term]]:  # fmt: skip
+        """Renders found samples and takes the gradients; ``capacity`` as in :func:`splitnerf.render.renderer.render_rays`."""
+        c = self.model.config
+        ray = render_rays(self.model, light, found, shades_per_ray=c.shades_per_ray, capacity=capacity)
+        terms = loss_terms(self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress)
+        self.model.zero_grad(set_to_none=True)
+        losses.backward(terms)
+        return ray, terms
+
+    def is_complete(self, n_shaded: float, n_segments: float) -> bool:
+        """Whether the last step's results hold all that was counted; here they always do."""
+        return True
+
+    def stream(self) -> AbstractContextManager[None]:
+        """The block in which steps are made."""
+        return nullcontext()
+
+
+def loss_terms(
+    model: SceneModel, light: EvaluatedLight, batch: Batch, ray: RenderedRays, scene: MeshScene | None,
+    environment: Tensor | None, generator: torch.Generator, step: int, progress: float,
+) -> dict[str, Term]:  # fmt: skip
+    """The terms of the loss by name, the colour's first.
+
+    Args:
+        model, light: The scene, and its light as it stands.
+        batch, ray: The rays, and how they are rendered now.
         scene: The surface as a mesh, once there is one.
-        environment: [h, 2h, 3], the light that weighs the occlusion rays; None: none are traced.
-        generator: Draws subsets.
+        environment: [h, 2h, 3], the light that weighs the traced occlusion; None: none is traced.
+        generator: Random numbers for subsets.
         step, progress: Where the training stands.
-        room: As of :func:`splitnerf.render.renderer.render_rays`.
     """
     c = model.config
-    ray = render_rays(model, found, shades_per_ray=c.shades_per_ray, room=room)
     colour, mask = pixel_losses(ray.mean, ray.opacity, batch.target, batch.background, linear=ray.linear)
     eikonal, smoothness = gradient_losses(ray.gradients, ray.weights.detach(), ray.beside)
     metal, binary_metal, dark_metal = material_losses(
@@ -45,7 +101,7 @@ def batch_losses(
         terms["light"] = Term(c.light_weight, losses.light_loss(model.light, c, generator, step))
     if c.neutral_weight and light_moves(c, step):  # for all steps since it moved
         since = step % light_period(c) + 1
-        terms["neutral"] = Term(c.neutral_weight * since, losses.neutral_light_loss(model.light, c, generator))
+        terms["neutral"] = Term(c.neutral_weight * since, losses.neutral_light_loss(light, c, generator))
     if c.normal_smoothness:
         terms["smoothness"] = Term(c.normal_smoothness, smoothness)
     if c.entropy_weight and progress >= c.priors_from:
@@ -60,11 +116,4 @@ def batch_losses(
         terms["occlusion"] = Term(
             c.occlusion_weight, losses.occlusion_loss(ray, scene, environment, c, generator, step)
         )
-    return ray, terms
-
-
-def decided(model: SceneModel, mesh: SurfaceMesh, step: int, progress: float) -> tuple:
-    """What the host decides about a step, but for sizes: steps that agree in it do the same to their tensors."""
-    c = model.config
-    since = step % light_period(c) + 1 if light_moves(c, step) else 0
-    return model.sdf_field.grid.n_active, since, progress >= c.priors_from, mesh.made_at, model.occlusion_ready
+    return terms
