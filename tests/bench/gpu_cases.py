@@ -20,7 +20,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.bench import eager
-from splitnerf.fields.light_pyramid import pyramid_maps
+from splitnerf.fields.light_pyramid import pyramid_filters
 from splitnerf.fields.sdf import SdfField
 from splitnerf.ops import (
     CELL_EMPTY,
@@ -241,14 +241,14 @@ class World:
         return queries, roughness, total, self.randn(self.sizes.queries, 3, seed=34), lights
 
     def pyramid(self) -> tuple:
-        maps = pyramid_maps(self.sizes.light_resolution)
+        maps = pyramid_filters(self.sizes.light_resolution)
         normals, _, _, roughness, _ = self.shading()
         n_texels = int((maps.resolutions**2).sum())
         harmonics = 0.1 * self.randn(len(maps.projection), 3, seed=36)
         return normals, roughness, self.rand(n_texels, 3, seed=35), harmonics, maps.resolutions, maps.nodes, maps.zonal
 
     def averaging(self) -> tuple:
-        matrix = pyramid_maps(self.sizes.light_resolution).averages
+        matrix = pyramid_filters(self.sizes.light_resolution).averages
         return *matrix, self.rand(len(matrix.transposed_offsets) - 1, 3, seed=37)
 
     def own_directions(self) -> tuple:

@@ -347,7 +347,7 @@ def colours(data: Path, source: Path) -> Tensor:
     rays = PixelSource(load_splits(data, DOWNSCALE)[0], 0.85, torch.Generator().manual_seed(0)).draw(300)[:2]
     rays = *rays, torch.full((300,), 0.5)
     with torch.no_grad():
-        ray = render_rays(model, find_samples(model, grid.cells, *rays))
+        ray = render_rays(model, model.evaluate_light(), find_samples(model, grid.cells, *rays))
     return ray.colour * ray.opacity[:, None]
 
 

@@ -11,17 +11,17 @@ import torch
 from test_device import tiny
 from test_train import data  # noqa: F401
 
-from splitnerf.training import graphs, losses, loop as trainer
+from splitnerf.training import graphs
+from splitnerf.training import loop as trainer
 from splitnerf.training.batches import draw_batch
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
-from splitnerf.training.graphs import StepGraphs
+from splitnerf.training.graphs import GraphedStep
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.render.model import SceneModel
 from splitnerf.render.rays import PixelSource
-from splitnerf.render.renderer import find_samples
-from splitnerf.training.step import batch_losses
+from splitnerf.training.step import Step
 
 
 class NoStream:
@@ -48,7 +48,7 @@ def recording(monkeypatch):
     replay_calls = pretend_graphs.PretendGraph.replay
     monkeypatch.setattr(pretend_graphs.PretendGraph, "replay", replay)
     monkeypatch.setattr(graphs, "record", record)
-    monkeypatch.setattr(trainer, "records_graphs", lambda device: True)
+    monkeypatch.setattr(trainer, "Step", GraphedStep)  # on the CPU too
     monkeypatch.setattr(torch.cuda, "Stream", NoStream)
     monkeypatch.setattr(torch.cuda, "graph_pool_handle", lambda: None)
     monkeypatch.setattr(torch.cuda, "current_stream", lambda device: NoStream())
@@ -65,9 +65,9 @@ def losses_of(folder) -> list[dict]:
     {"table_dtype": "float16", "sample_above": 0.0, "grid_every": 3, "target_samples": 16384},
 ])  # fmt: skip
 def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, recording, settings):  # noqa: F811
-    """While the light moves, levels open, meshes come, priors begin and the anneal goes on. Both have as much room."""
-    room = {"target_samples": 4608, "open_below": 0.0, "indirect_every": 50, "start_levels": 1}
-    config = tiny("cpu", steps=240, cuda_graphs=True, **room | settings)
+    """While the light moves, levels open, meshes come, priors begin and the anneal goes on. Both have the same capacity."""
+    settings = {"target_samples": 4608, "open_below": 0.0, "indirect_every": 50, "start_levels": 1} | settings
+    config = tiny("cpu", steps=240, cuda_graphs=True, **settings)
     for name in ("recorded", "called"):
         (tmp_path / name).mkdir()
     monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
@@ -87,7 +87,7 @@ def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, rec
         assert ours | {"seconds": 0} == theirs | {"seconds": 0}
 
 
-def test_room_changes_roundings_alone(data):  # noqa: F811
+def test_a_capacity_changes_roundings_alone(data):  # noqa: F811
     """Losses and gradients of one step with room for more of everything, against those with none."""
     dataset = load_dataset(data)
     config = tiny(
@@ -103,24 +103,24 @@ def test_room_changes_roundings_alone(data):  # noqa: F811
     generator = torch.Generator().manual_seed(0)
     source = PixelSource(dataset, 0.85, generator)
     mesh = SurfaceMesh(model)
-    mesh.renew(0.5)
-    batch, cells = draw_batch(source, 200, config), torch.ones(16, 16, 16, dtype=torch.uint8)
-    found = find_samples(model, cells, *batch.rays, probes=batch.probes)
+    mesh.request(0.5)
+    grid = SimpleNamespace(cells=torch.ones(16, 16, 16, dtype=torch.uint8))
+    take_step = Step(model, grid, mesh, generator)
+    batch = draw_batch(source, 200, config)
+    found = take_step.find(batch, 0.9)
     n = len(found.directions)
-    kept = find_samples(model, cells, *batch.rays, probes=batch.probes, room=n + 77)
-    assert n > 500 and len(kept.directions) == n + 77 and model.sums_light
+    padded_found = take_step.find(batch, 0.9, n + 77)
+    assert n > 500 and len(padded_found.directions) == n + 77 and model.sums_light
 
-    def step(found, room):
-        drawn = torch.Generator().manual_seed(1)
-        model.zero_grad()
-        ray, terms = batch_losses(model, batch, found, mesh.scene, None, drawn, 3, 0.9, room)
-        losses.backward(terms)
-        model.light.deliver()
+    def step(found, capacity):
+        take_step.generator = torch.Generator().manual_seed(1)
+        light = model.evaluate_light()
+        ray, terms = take_step.differentiate(batch, found, light, None, 3, 0.9, capacity)
+        light.backward()
         return {k: t.value.detach() for k, t in terms.items()}, [p.grad for p in model.parameters()], ray
 
-    model.light.collect()
     terms, grads, ray = step(found, None)
-    padded_terms, padded_grads, padded = step(kept, (4096, 2048))
+    padded_terms, padded_grads, padded = step(padded_found, (4096, 2048))
     assert padded.sizes.tolist() == ray.sizes.tolist() and len(padded.shaded) == 4096
     assert {"colour", "neutral", "smoothness", "mask", "dark_metal"} <= set(terms)
     for name, value in terms.items():
@@ -130,17 +130,19 @@ def test_room_changes_roundings_alone(data):  # noqa: F811
         assert (a - b).norm() <= 1e-4 * b.norm(), name
 
 
-def test_a_step_with_too_little_room_is_not_taken(data, tmp_path, monkeypatch, recording):  # noqa: F811
-    monkeypatch.setattr(graphs, "SHADING_ROOM", 0.2)
-    monkeypatch.setattr(graphs, "ROOM_UNIT", 1)
-    fitted, fits = [], StepGraphs.fits
-    monkeypatch.setattr(StepGraphs, "fits", lambda self, *counts: fitted.append(fits(self, *counts)) or fitted[-1])
-    taken, step = [0], torch.optim.AdamW.step
+def test_a_step_that_exceeds_its_capacity_is_not_taken(data, tmp_path, monkeypatch, recording):  # noqa: F811
+    monkeypatch.setattr(graphs, "SHADING_SLACK", 0.2)
+    monkeypatch.setattr(graphs, "CAPACITY_UNIT", 1)
+    complete, asked = [], GraphedStep.is_complete
+    monkeypatch.setattr(
+        GraphedStep, "is_complete", lambda self, *counts: complete.append(asked(self, *counts)) or complete[-1]
+    )
+    taken, step = [], torch.optim.AdamW.step
     monkeypatch.setattr(torch.optim.AdamW, "step", lambda self: taken.append(1) or step(self))
     monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
     config = tiny("cpu", steps=40, cuda_graphs=True, target_samples=4608)
     trained = trainer.train(load_dataset(data), config, tmp_path)
-    assert fitted.count(False) > 0 and len(taken) - 1 == fitted.count(True) and trained.finished
+    assert complete.count(False) > 0 and len(taken) == complete.count(True) and trained.finished
 
 
 def test_what_cannot_be_recorded_is_refused():

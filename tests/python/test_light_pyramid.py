@@ -16,7 +16,7 @@ from test_ops_light_pyramid import octahedral_directions
 from splitnerf.config import Config
 from splitnerf.data.environment import read_environment, sample_environment
 from splitnerf.errors import InputError
-from splitnerf.fields import LightPyramid
+from splitnerf.fields import EvaluatedLight, LightMlp, LightPyramid, VisibilityBits
 from splitnerf.ops import sample_ggx_lobe
 from splitnerf.render.model import SceneModel
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
@@ -154,15 +154,6 @@ def doubled(light: LightPyramid) -> None:
         light.texels += math.log(2) / 3  # of three levels
 
 
-def test_one_chain_serves_all_calls_of_a_step():
-    light = LightPyramid(16)
-    first = light.chain()
-    assert all(a is b for a, b in zip(first, light.chain()))
-    (ask(light) + ask(light)).sum().backward()
-    assert light.chain()[0] is not first[0]
-    ask(light).sum().backward()  # its graph is a new one
-
-
 def test_the_chain_is_never_stale():
     light = LightPyramid(16, start=0.5)
     torch.testing.assert_close(ask(light), torch.full((1, 3), 0.5))
@@ -194,58 +185,61 @@ def test_the_chain_follows_every_step_of_an_optimiser(fused):
     assert all(b > a + 1e-3 for a, b in zip(values, values[1:]))
 
 
-def test_a_chain_without_gradients_or_of_inference_mode_is_not_handed_to_autograd():
+def test_maps_without_gradients_or_of_inference_mode_are_not_handed_to_autograd():
     light = LightPyramid(16)
     with torch.inference_mode():
         ask(light)
     with torch.no_grad():
-        assert not ask(light).requires_grad
+        assert not ask(light).requires_grad and not light.evaluate().leaves
     ask(light).sum().backward()
     assert light.texels.grad.abs().sum() > 0
 
 
-def test_collected_gradients_are_those_of_the_steps_together():
-    """Three backward passes that share one chain give the parameters what one pass over the sum of the losses does."""
+def test_gathered_gradients_are_those_of_the_steps_together():
+    """Three backward passes that share one evaluation give the parameters what one pass over the sum of the losses does."""
     steps = [
         (unit(torch.randn(30, 3, generator=generator(i))), torch.rand(30, 1, generator=generator(9 + i)))
         for i in range(3)
     ]
-    together, collected = LightPyramid(16), LightPyramid(16)
+    together, shared = LightPyramid(16), LightPyramid(16)
     sum(together(*step).square().sum() for step in steps).backward()
-    collected.collect()
+    light = EvaluatedLight(shared.evaluate())
     for step in steps:
-        collected(*step).square().sum().backward()
-        assert collected.texels.grad is None
-        torch.testing.assert_close(collected.panorama(8), together.panorama(8))
-    collected.deliver()
-    torch.testing.assert_close(collected.texels.grad, together.texels.grad)
+        light(*step).square().sum().backward()
+        assert shared.texels.grad is None
+    light.backward()
+    torch.testing.assert_close(shared.texels.grad, together.texels.grad)
     with torch.no_grad():
-        collected.texels[: 4 * 4] += 0.5  # the coarsest level alone
-    torch.testing.assert_close(collected(*steps[0]), together(*steps[0]) * math.exp(0.5))
-    collected.texels.grad = None
-    collected.deliver()  # what was asked for since has no backward pass behind it
-    assert collected.texels.grad.abs().sum() == 0
+        shared.texels[: 4 * 4] += 0.5  # the coarsest level alone
+    torch.testing.assert_close(shared.evaluate()(*steps[0]), together(*steps[0]) * math.exp(0.5))
 
 
-def test_a_stand_in_carries_its_gradient_on():
-    """What is computed once for several steps gives the parameters the gradient of being computed in each."""
-    w, rough = unit(torch.randn(30, 3, generator=generator(1))), torch.full((30, 1), 0.4)
-    each, once = LightPyramid(16), LightPyramid(16)
-    (each(w, rough).square().sum() + each(w, rough).exp().sum()).backward()
-    once.collect()
-    value, token = once.stand_in(once(w, rough))
-    value.square().sum().backward()
-    assert once.stands(token)
-    value.exp().sum().backward()
-    once.deliver()
-    assert not once.stands(token)
-    torch.testing.assert_close(once.texels.grad, each.texels.grad)
-    copied = copy.deepcopy(once)
-    copied.texels.grad = None
-    copied(w, rough).sum().backward()  # a copy does not collect
-    assert copied.texels.grad.abs().sum() > 0
-    plain, token = each.stand_in(each(w, rough))
-    assert plain.grad_fn is not None and not each.stands(token)
+def test_dropped_gradients_do_not_reach_the_parameters():
+    pyramid, (w, rough) = LightPyramid(16), (unit(torch.randn(30, 3, generator=generator(1))), torch.full((30, 1), 0.4))
+    light = EvaluatedLight(pyramid.evaluate())
+    light(w, rough).sum().backward()
+    light.zero_grad()
+    light.backward()
+    assert pyramid.texels.grad is None
+
+
+@pytest.mark.parametrize("kind", ["pyramid", "mlp"])
+def test_the_light_of_cells_carries_its_gradient_on(kind):
+    """Cells that are averaged once for several steps give the parameters the gradient of being averaged in each."""
+    bits, grads = VisibilityBits(64, 0.01, 3, indirect=False), []
+    light = LightPyramid(16) if kind == "pyramid" else LightMlp(16, 1, 2, 1)
+    for once in (True, False):
+        light.zero_grad()
+        maps = light.evaluate()
+        if once:
+            shared = EvaluatedLight(maps, bits.cell_light(maps))
+            (shared.cells.radiance.square().sum() + shared.cells.radiance.exp().sum()).backward()
+            shared.backward()
+        else:
+            (bits.cell_light(light).radiance.square().sum() + bits.cell_light(light).radiance.exp().sum()).backward()
+        grads.append(torch.cat([p.grad.flatten() for p in light.parameters()]))
+    assert grads[1].abs().sum() > 0
+    torch.testing.assert_close(*grads)
 
 
 def test_settings_choose_the_light_and_its_rate():
@@ -263,33 +257,3 @@ def test_settings_choose_the_light_and_its_rate():
         Config(light_resolution=48)
     with pytest.raises(ValueError, match="power of 2"):
         LightPyramid(8)
-
-
-def test_after_a_fused_step_the_maps_are_new():
-    """Fused optimisers do not tell that they wrote; what was computed without gradients before must not outlive them."""
-    light = LightPyramid(16)
-    optimiser = torch.optim.AdamW([light.texels], lr=0.5, fused=True)
-    directions, roughness = unit(torch.randn(50, 3, generator=generator())), torch.full((50, 1), 0.4)
-    light.collect()
-    for step in range(6):
-        with torch.no_grad():
-            seen = light(directions, roughness)
-            fresh = copy.deepcopy(light)(directions, roughness)
-        torch.testing.assert_close(seen, fresh, msg=f"step {step}")
-        optimiser.zero_grad(set_to_none=True)
-        light(directions, roughness).sum().backward()
-        if step % 2:
-            light.deliver()
-        optimiser.step()
-
-
-def test_collecting_begins_without_what_was_computed_before():
-    light = LightPyramid(16)
-    directions, roughness = unit(torch.randn(9, 3, generator=generator())), torch.full((9, 1), 0.4)
-    expected = torch.autograd.grad(light(directions, roughness).sum(), light.texels)[0]
-    light.chain()  # with a graph of its own
-    light.collect()
-    value, _ = light.stand_in(light(directions, roughness))
-    value.sum().backward()
-    light.deliver()
-    torch.testing.assert_close(light.texels.grad, expected)

@@ -23,37 +23,37 @@ def model() -> SceneModel:
 
 def test_a_mesh_made_beside_is_that_of_the_moment_it_was_asked_for(model, monkeypatch):
     at_once = SurfaceMesh(model)
-    at_once.renew(0.1)
+    at_once.request(0.1)
     begun, make = threading.Event(), meshes.make_mesh
     monkeypatch.setattr(meshes, "make_mesh", lambda *args: (begun.wait(10), make(*args))[1])
     beside = SurfaceMesh(model, background=True)
-    beside.renew(0.2)
+    beside.request(0.2)
     with torch.no_grad():
         model.sdf_field.out_bias[0] += 0.3  # the surface moves on
         model.sdf_field.grid.table += 0.1
-    beside.renew(0.3)  # one is being made
-    beside.arrive()
+    beside.request(0.3)  # one is being made
+    beside.poll()
     assert beside.current is None and beside.asked_at == 0.2
     assert beside.state() == {"mesh_vertices": None, "mesh_faces": None, "meshed_at": 0.0}
     begun.set()
-    beside.arrive(wait=True)
+    beside.poll(wait=True)
     assert beside.made_at == 0.2
     for ours, theirs in zip(beside.current[1:3], at_once.current[1:3]):
         assert torch.equal(ours, theirs)
     assert torch.equal(beside.current.bits.cache.bits, at_once.current.bits.cache.bits)
-    assert model.occlusion_ready and torch.equal(model.occlusion.cache.vertices, beside.current.vertices)
+    assert model.occlusion.ready and torch.equal(model.occlusion.cache.vertices, beside.current.vertices)
 
 
 @pytest.mark.parametrize("background", [False, True])
 def test_without_a_surface_the_old_mesh_stays(model, background):
     mesh = SurfaceMesh(model, background=background)
-    mesh.renew(0.1)
-    mesh.arrive(wait=True)
+    mesh.request(0.1)
+    mesh.poll(wait=True)
     before = mesh.current
     with torch.no_grad():
         model.sdf_field.out_bias[0] = 10.0
-    mesh.renew(0.2)
-    mesh.arrive(wait=True)
+    mesh.request(0.2)
+    mesh.poll(wait=True)
     assert mesh.made_at == 0.2 and before is not None and mesh.current is before
 
 
@@ -61,7 +61,7 @@ def test_what_goes_wrong_beside_is_told(model):
     with torch.no_grad():
         model.sdf_field.out_bias[0] = torch.nan
     mesh = SurfaceMesh(model, background=True)
-    mesh.renew(0.1)
+    mesh.request(0.1)
     with pytest.raises(RuntimeError, match="not finite"):
-        mesh.arrive(wait=True)
+        mesh.poll(wait=True)
     assert mesh.current is None

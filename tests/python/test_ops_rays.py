@@ -335,7 +335,7 @@ def test_room_that_is_given_holds_the_same_and_what_counts_for_nothing():
     assert (n_shaded, n_rays, n_stretches) == (len(free.shaded), len(free.heaviest), len(free.leaders)) and n_rays == 49
     longer = torch.cat([weights, weights.new_full((9,), 5.0)])
     padded = PackedSamples(*(torch.cat([x, x[:9]]) for x in samples[:3]), samples.offsets)
-    roomy = spread_samples(longer, padded, 2, phase, torch.tensor(0.3, dtype=weights.dtype), room=(300, 250))
+    roomy = spread_samples(longer, padded, 2, phase, torch.tensor(0.3, dtype=weights.dtype), capacity=(300, 250))
     assert (len(roomy.shaded), len(roomy.stretch), len(roomy.leaders), len(roomy.heaviest)) == (300, 300, 250, 50)
     assert roomy.sizes.tolist() == free.sizes.tolist()
     for name, short in free._asdict().items():
@@ -354,7 +354,7 @@ def test_too_little_room_is_told_and_indices_stay_in_range():
     weights, samples, phase = packed()
     n_shaded, _, n_stretches = spread_samples(weights, samples, 2, phase, 0.3).sizes.tolist()
     for room in ((n_shaded - 1, n_stretches), (n_shaded, n_stretches - 1), (1, 1)):
-        spread = spread_samples(weights, samples, 2, phase, 0.3, room=room)
+        spread = spread_samples(weights, samples, 2, phase, 0.3, capacity=room)
         assert spread.sizes.tolist() == [n_shaded, 49, n_stretches]
         assert spread.interpolate(weights.new_ones(room[0], 1)).eq(1).all() and spread.stretch.max() < room[1]
         assert max(spread.leaders.max(), spread.heaviest.max()) < room[0] and spread.shaded.max() < len(weights)

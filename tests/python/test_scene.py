@@ -148,9 +148,10 @@ class TestOcclusionHead:
         features, directions, roughness = torch.randn(6, 13), torch.randn(6, 3), torch.rand(6, 1)
         for directional in (False, True):
             head = OcclusionHead(13, 16, 2, 1, directional)
+            head.use(None)
             with torch.no_grad():
                 head.net[-1].weight.normal_()
-            query = OcclusionQuery(features, None, None, directions, roughness)
+            query = OcclusionQuery(features, directions, directions, directions, roughness)
             a, b = head(query).specular, head(query._replace(lobe_dirs=-directions)).specular
             assert torch.equal(a, b) != directional
             assert ((a >= 0) & (a <= 1)).all()
@@ -305,7 +306,7 @@ class TestRendering:
         model, grid = sphere_model
         rays_o, rays_d = torch.tensor([[4.0, 0.0, 0.0]]), torch.tensor([[-1.0, 0.0, 0.0]])
         rays = rays_o, rays_d, torch.tensor([0.5])
-        ray = render_rays(model, find_samples(model, grid.cells, *rays))
+        ray = render_rays(model, model.evaluate_light(), find_samples(model, grid.cells, *rays))
         heaviest = ray.weights[ray.shaded].argmax()
         assert ray.points.lobe_dirs[heaviest, 0] > 0.95
 
@@ -316,7 +317,7 @@ class TestRendering:
         colours = []
         for threshold, shades in ((0.0, 0), (1e-3, 0), (1e-3, 4)):
             model.config.sample_above = threshold
-            ray = render_rays(model, find_samples(model, grid.cells, *rays), shades_per_ray=shades)
+            ray = render_rays(model, model.evaluate_light(), find_samples(model, grid.cells, *rays), shades_per_ray=shades)
             colours.append((ray.colour * ray.opacity[:, None]).detach())
         assert (colours[0] - colours[1]).abs().max() < 0.02
         assert (colours[1] - colours[2]).abs().max() < 0.02

@@ -63,7 +63,8 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
     model = SceneModel(Config().replace({"n_levels": 2, "log2_table_size": 8}))
     model.light = Lamp((0.3, -0.5, 0.7))
     mesh = trimesh.creation.icosphere(3, 0.5)
-    model.use_mesh(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces))
+    model.use_mesh(model.occlusion.trace(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces)))
+    lit = model.evaluate_light()
     g = generator(5)
     n = unit(torch.randn(200, 3, generator=g))
     views = unit(n + 0.9 * unit(torch.randn(200, 3, generator=g)))
@@ -76,15 +77,15 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
     split = split_sum_shade(n, views, albedo, rough, metal, light[:200], light[200:], one, one, "exact", True)
     points = ShadedPoints(split, albedo, rough, metal, one, one, n, n)
     every = torch.arange(len(n))
-    summed = split.index_add(0, *model.summed_less_split(0.5 * n, n, views, points, every))
-    lit = n @ model.light.axis > 0
+    summed = split.index_add(0, *model.quadrature_correction(lit, 0.5 * n, n, views, points, every))
+    bright = n @ model.light.axis > 0
 
     def error(radiance: torch.Tensor) -> float:
-        return ((radiance - exact) / exact)[lit].abs().mean().item()
+        return ((radiance - exact) / exact)[bright].abs().mean().item()
 
     assert error(summed) < 0.035 and 0.06 < error(split) < 0.09
     narrow = points._replace(roughness=torch.full((200, 1), 0.29))
-    assert len(model.summed_less_split(0.5 * n, n, views, narrow, every)[0]) == 0  # too narrow for so few directions
+    assert len(model.quadrature_correction(lit, 0.5 * n, n, views, narrow, every)[0]) == 0  # too narrow for so few directions
 
 
 @pytest.mark.parametrize("metallic", [0.0, 1.0])
@@ -96,14 +97,15 @@ def test_the_furnace_of_the_whole_model(metallic):
     with torch.no_grad():
         model.light.texels.zero_()  # exp(0) = 1
     mesh = trimesh.creation.icosphere(3, 0.5)
-    model.use_mesh(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces))
+    model.use_mesh(model.occlusion.trace(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces)))
+    lit = model.evaluate_light()
     g, k = generator(5), 600
     n = unit(torch.randn(k, 3, generator=g))
     views = unit(n + 0.9 * unit(torch.randn(k, 3, generator=g)))
     rough = 0.05 + 0.95 * torch.rand(k, 1, generator=g)
     model.material = Given((torch.ones(k, 3), rough, torch.full((k, 1), metallic)))
-    points = model.shade(0.5 * n, torch.zeros(k, 13), torch.zeros(k, 4), n, views)
-    summed = points.radiance.index_add(0, *model.summed_less_split(0.5 * n, n, views, points, torch.arange(k)))
+    points = model.shade(lit, 0.5 * n, torch.zeros(k, 13), torch.zeros(k, 4), n, views)
+    summed = points.radiance.index_add(0, *model.quadrature_correction(lit, 0.5 * n, n, views, points, torch.arange(k)))
     torch.testing.assert_close(points.radiance, torch.ones(k, 3), rtol=0, atol=0.01)
     assert summed[rough[:, 0] > 0.45].mean().item() == pytest.approx(1.0, abs=0.002)
     assert (summed - 1).abs().max() < 0.05

@@ -95,7 +95,7 @@ def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     })  # fmt: skip
     dataset = load_dataset(data)
     trained = train_scene(dataset, config, tmp_path)
-    assert trained.finished and trained.model.occlusion_ready and trained.model.occlusion.radiance.isfinite().all()
+    assert trained.finished and trained.model.occlusion.ready and trained.model.occlusion.radiance.isfinite().all()
     before = render_maps(trained.model, trained.grid, dataset, 0)
     model, grid, content = load_run(tmp_path)
     after = render_maps(model, grid, dataset, 0)
@@ -117,7 +117,7 @@ def test_without_a_mesh_nothing_is_occluded():
         points = torch.rand(5, 3)
         field = model.surface(points)
         up = torch.tensor([[0.0, 0.0, 1.0]]).expand(5, 3)
-        shaded = model.shade(points, field.outputs, field.features, up, up)
+        shaded = model.shade(model.evaluate_light(), points, field.outputs, field.features, up, up)
         assert (shaded.occlusion_d == 1).all() and (shaded.occlusion_s == 1).all() and shaded.radiance.isfinite().all()
 
 

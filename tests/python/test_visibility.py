@@ -14,7 +14,7 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.config import Config
-from splitnerf.fields import Light, OcclusionQuery, VisibilityBits
+from splitnerf.fields import EvaluatedLight, Light, OcclusionQuery, VisibilityBits
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import (
     MeshScene,
@@ -147,8 +147,8 @@ def test_a_lone_sphere_is_open_at_and_between_its_vertices():
             assert (o_d == 1).all() and (o_s == 1).all() and i_d is None
 
 
-@pytest.mark.parametrize("solid, sees_all", [("sphere", True), ("box", True), ("torus", False)])
-def test_convex_surfaces_are_known_to_see_the_whole_sky(solid, sees_all):
+@pytest.mark.parametrize("solid, is_unoccluded", [("sphere", True), ("box", True), ("torus", False)])
+def test_convex_surfaces_are_known_to_see_the_whole_sky(solid, is_unoccluded):
     """What is left out for them changes no factor; asked for or not."""
     mesh = {
         "sphere": trimesh.creation.icosphere(4), "box": trimesh.creation.box().subdivide_loop(4), "torus": trimesh.creation.torus(1, 0.4)
@@ -157,15 +157,15 @@ def test_convex_surfaces_are_known_to_see_the_whole_sky(solid, sees_all):
     answers = []
     for open_below in (0.02, 0.0):
         bits = VisibilityBits(256, OFFSET, 3, True, open_below)
-        bits.trace(scene_of(mesh), vertices, faces)
-        assert bits.sees_all == (sees_all and open_below > 0)
+        bits.use(bits.trace(scene_of(mesh), vertices, faces))
+        assert bits.is_unoccluded == (is_unoccluded and open_below > 0)
         n = torch.tensor(np.array(mesh.vertex_normals)).float()
         answers.append(bits(OcclusionQuery(torch.empty(0), vertices, n, n, torch.full((len(n), 1), 0.3))))
     (first, second) = answers
     assert first.diffuse.shape == second.diffuse.shape == (len(vertices), 3)
     torch.testing.assert_close(first.diffuse, second.diffuse, rtol=0, atol=0.02)
     torch.testing.assert_close(first.specular, second.specular, rtol=0, atol=0.02)
-    assert (first.diffuse.min() == 1) == sees_all
+    assert (first.diffuse.min() == 1) == is_unoccluded
 
 
 def test_the_sides_of_a_thin_plate_do_not_mix():
@@ -220,8 +220,8 @@ def test_spheres_on_a_plane_against_4096_rays():
     mesh = nine_spheres()
     bits = VisibilityBits(256, OFFSET, 1, indirect=False)
     vertices, normals = corners(mesh)
-    bits.trace(scene_of(mesh), vertices, torch.tensor(np.asarray(mesh.faces)))
-    bits.set_light(Field(sky))
+    bits.use(bits.trace(scene_of(mesh), vertices, torch.tensor(np.asarray(mesh.faces))))
+    bits.set_light(EvaluatedLight(Field(sky)))
     some = torch.randperm(len(vertices), generator=generator())[:300]
     for x, n in ((vertices[some], normals[some]), between(mesh, 300)):
         for rho, bound in ((0.1, 0.13), (0.2, 0.084), (0.3, 0.051), (0.5, 0.025)):
@@ -246,9 +246,9 @@ def test_spheres_on_a_plane_against_4096_rays():
 
 def test_light_of_the_cells():
     bits = VisibilityBits(256, OFFSET, 1, indirect=False)
-    bits.set_light(Field(lambda w: torch.full_like(w, 3.0)))
+    bits.set_light(EvaluatedLight(Field(lambda w: torch.full_like(w, 3.0))))
     torch.testing.assert_close(bits.light, torch.full((256, 3), 3.0))
-    bits.set_light(Field(lambda w: w))  # the mean direction of a cell is that of its centre
+    bits.set_light(EvaluatedLight(Field(lambda w: w)))  # the mean direction of a cell is that of its centre
     assert (F.normalize(bits.light, dim=1) - bits.directions).norm(dim=1).max() < 0.12
     assert bits.light.mean(0).norm() < 0.01
     area = bits.cell_light(Field(torch.ones_like)).solid_angles
@@ -324,14 +324,14 @@ def test_the_model_shades_with_the_light_of_its_mesh():
     model = SceneModel(Config().replace(settings | {"initial_roughness": 0.9}))
     mesh = half_shell(3)
     vertices, faces = torch.tensor(np.asarray(mesh.vertices)).float(), torch.tensor(np.asarray(mesh.faces))
-    model.use_mesh(scene_of(mesh), vertices, faces)
+    model.use_mesh(model.occlusion.trace(scene_of(mesh), vertices, faces))
     bits = model.occlusion
     assert not any(key.startswith("occlusion") for key in model.state_dict())
 
     x, n = bits.cache.vertices[::9], bits.cache.normals[::9]
     field = model.surface(x)
     field = field._replace(outputs=field.outputs * torch.tensor([0.0] + [1.0] * 12))  # as if the level set passed there
-    shaded = model.shade(x, field.outputs, field.features, n, n)
+    shaded = model.shade(model.evaluate_light(), x, field.outputs, field.features, n, n)
     occlusion = bits(OcclusionQuery(torch.empty(0), x, n, shaded.lobe_dirs, shaded.roughness))
     light_s, light_d = model.light(shaded.lobe_dirs, shaded.roughness), model.light(n, torch.ones(len(x), 1))
     expected = split_sum_shade(
@@ -343,7 +343,7 @@ def test_the_model_shades_with_the_light_of_its_mesh():
 
     bits.radiance, levels = None, []
     for _ in range(6):
-        model.refresh_indirect()
+        model.refresh_indirect(model.evaluate_light())
         levels.append(bits.radiance.mean().item())
     steps = np.diff(levels)
     assert (steps > 0).all() and (steps[1:] < 0.6 * steps[:-1]).all() and steps[0] > 0.05 * levels[0]

@@ -18,6 +18,7 @@ from splitnerf.bench.peers import drjit_ready, peer
 from splitnerf.bench.timing import interleaved
 from splitnerf.config import preset
 from splitnerf.errors import CheckFailed
+from splitnerf.fields.light import EvaluatedLight
 from splitnerf.fields.occlusion import OcclusionQuery
 from splitnerf.fields.visibility import VisibilityBits
 from splitnerf.ops import MeshScene, occlusion_factors, sample_ggx_lobe, trace_visibility
@@ -95,8 +96,8 @@ def error_charts(light_name: str, points: Points, quick: bool, rounds: int) -> l
         calls["independent rays", f"n = {n}"] = lambda n=n: independent(points, n)
     for n in (256,) if quick else (64, 128, 256, 512, 1024):
         bits = VisibilityBits(n, OFFSET, 3, indirect=False)
-        bits.trace(points.scene, points.vertices, points.faces)
-        bits.set_light(EnvironmentOf(points.light))
+        bits.use(bits.trace(points.scene, points.vertices, points.faces))
+        bits.set_light(EvaluatedLight(EnvironmentOf(points.light)))
         calls["bits", f"k = {n}"] = lambda bits=bits: bits(
             OcclusionQuery(None, points.positions, points.normals, points.axes, points.roughness)
         )[:2]
@@ -124,15 +125,14 @@ def error_charts(light_name: str, points: Points, quick: bool, rounds: int) -> l
 class EnvironmentOf:
     """A map as the light that the bits are weighed with."""
 
+    leaves: tuple[Tensor, ...] = ()
+
     def __init__(self, light: MapLight):
         self.light = light
 
     def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
         alpha2 = roughness[:, 0] ** 4
         return self.light.filtered(directions, 4 * np.pi * alpha2)
-
-    def stands(self, token: object) -> bool:
-        return False
 
 
 def independent(points: Points, n: int) -> tuple[Tensor, Tensor]:

@@ -118,13 +118,7 @@ def lobe_integral(roughness: Tensor) -> Tensor:
 
 def pyramid(light: MapLight, resolution: int) -> Estimate:
     """The maps computed anew, as after each step of the light, and a lookup for each query."""
-    field = pyramid_of(light, resolution)
-
-    def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
-        field.collect(False)
-        return field(axes, roughness)
-
-    return estimate
+    return pyramid_of(light, resolution)
 
 
 def harmonics(light: MapLight) -> Estimate:

@@ -85,10 +85,11 @@ class EvaluatedLight:
 
     def __init__(self, maps: LightMaps, cells: CellLight | None = None):
         self.maps, self.cells = maps, cells
-        self._cell_root: Tensor | None = None
-        if cells is not None and maps.leaves and cells.radiance.requires_grad:
-            self._cell_root = cells.radiance
-            self.cells = cells._replace(radiance=leaf_of(cells.radiance))
+        self._cell_root: Tensor | None = None  # what the leaf of the cells stands for
+        self._cell_leaves: tuple[Tensor, ...] = ()
+        if cells is not None and maps.leaves:
+            self._cell_root, leaf = cells.radiance, leaf_of(cells.radiance)
+            self.cells, self._cell_leaves = cells._replace(radiance=leaf), (leaf,)
 
     def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
@@ -97,7 +98,7 @@ class EvaluatedLight:
     @property
     def leaves(self) -> tuple[Tensor, ...]:
         """Tensors at which gradients gather, () where they reach the parameters at once."""
-        return (*self.maps.leaves, *(() if self._cell_root is None else (self.cells.radiance,)))
+        return (*self.maps.leaves, *self._cell_leaves)
 
     @property
     def constants(self) -> tuple[Tensor, ...]:
@@ -108,8 +109,9 @@ class EvaluatedLight:
         """The same light, read from other leaves and constants; its gradients gather there and go no farther."""
         n = len(self.maps.leaves)
         copy = EvaluatedLight(self.maps.with_leaves(leaves[:n]))
+        copy._cell_leaves = tuple(leaves[n:])
         if self.cells is not None:
-            copy.cells = CellLight(*leaves[n:] or (self.cells.radiance,), *constants)
+            copy.cells = CellLight(*copy._cell_leaves or (self.cells.radiance,), *constants)
         return copy
 
     def backward(self) -> None:
@@ -153,9 +155,18 @@ class Light(nn.Module, abc.ABC):
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
 
-    @abc.abstractmethod
+    leaves: tuple[Tensor, ...] = ()
+
     def evaluate(self) -> LightMaps:
-        """The light as it stands; without gradients where they are disabled."""
+        """The light as it stands: here the module itself, whose every backward pass reaches the parameters."""
+        return self
+
+    def backward(self) -> None:
+        """Does nothing: no gradients gather here."""
+
+    def with_leaves(self, leaves: Sequence[Tensor]) -> LightMaps:
+        """The module itself, which has no leaves."""
+        return self
 
     @torch.no_grad()
     def panorama(self, height: int, roughness: float = 0.0) -> Tensor:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import torch
 from torch import Tensor, nn
@@ -44,19 +43,6 @@ class LightMlp(Light):
         nn.init.normal_(self.out.weight, std=0.01)
         start = 0.5
         nn.init.constant_(self.out.bias, math.log(math.expm1(start)) if activation == "softplus" else math.log(start))
-
-    leaves: tuple[Tensor, ...] = ()
-
-    def evaluate(self) -> LightMlp:
-        """The network itself: every backward pass reaches its parameters."""
-        return self
-
-    def backward(self) -> None:
-        """Nothing has gathered."""
-
-    def with_leaves(self, leaves: Sequence[Tensor]) -> LightMlp:
-        """Itself: it has no leaves."""
-        return self
 
     def encode(self, directions: Tensor, roughness: Tensor) -> Tensor:
         w = (directions[:, :, None] * self.direction_scales).flatten(1)

@@ -120,7 +120,12 @@ class GraphedStep(Step):
         batch, found = tree_map(torch.clone, (batch, found))
         leaves = [leaf.detach().clone().requires_grad_() for leaf in light.leaves]
         light = light.with_tensors(leaves, [x.clone() for x in light.constants])
-        graph, outputs = record(lambda: function(batch, found, light, capacity), self._pool, self.generator)
+
+        def work() -> tuple[RenderedRays, dict[str, Term]]:
+            light.zero_grad()  # gradients of one step, not of all
+            return function(batch, found, light, capacity)
+
+        graph, outputs = record(work, self._pool, self.generator)
         grads = [p.grad for p in self.model.parameters()]
         return Recorded(graph, batch, found, light, outputs, grads, capacity)
 
@@ -135,9 +140,9 @@ class GraphedStep(Step):
                 torch._foreach_copy_(
                     [x for x in old if x.dtype == dtype], [x.detach() for x in new if x.dtype == dtype]
                 )
-        recorded.graph.replay()
         for parameter, grad in zip(self.model.parameters(), recorded.grads):
             parameter.grad = grad
+        recorded.graph.replay()
         for ours, theirs in zip(light.leaves, recorded.light.leaves):
             if theirs.grad is not None:
                 ours.grad = theirs.grad.clone() if ours.grad is None else ours.grad.add_(theirs.grad)

@@ -1,11 +1,14 @@
-"""What a long run shows and hears: its progress bar, and Ctrl-C."""
+"""What a long run shows and hears: its progress, and Ctrl-C."""
 
 from __future__ import annotations
 
 import signal
 import sys
+import time
 
 from tqdm import tqdm
+
+LINE_EVERY = 10.0  # seconds between lines where the output is no terminal
 
 
 class Interrupt:
@@ -26,20 +29,31 @@ class Interrupt:
 
 
 class Progress:
-    """The progress bar: share done, time left, PSNR of the batch and samples a ray."""
+    """Share done, time left, PSNR of the batch and samples a ray: a bar on a terminal, elsewhere a line every ten seconds."""
 
     def __init__(self, start: float):
+        self._is_terminal = sys.stderr.isatty()
         self._bar = tqdm(
-            total=100.0, initial=100.0 * start, file=sys.stderr,
+            total=100.0, initial=100.0 * start, file=sys.stderr, disable=not self._is_terminal,
             bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining} {postfix}",
         )  # fmt: skip
+        self._start, self._started, self._told = start, time.monotonic(), 0.0
 
     def __enter__(self) -> Progress:
         return self
 
-    def show(self, progress: float, step: int, psnr: float, samples_per_ray: float) -> None:
-        self._bar.set_postfix_str(f"step {step} PSNR {psnr:.2f} dB, {samples_per_ray:.1f} samples/ray", refresh=False)
-        self._bar.update(100.0 * progress - self._bar.n)
+    def show(self, progress: float, step: int, psnr: float | None, samples_per_ray: float) -> None:
+        told = f"step {step} " + (f"PSNR {psnr:.2f} dB, " if psnr is not None else "") + f"{samples_per_ray:.1f} samples/ray"
+        if self._is_terminal:
+            self._bar.set_postfix_str(told, refresh=False)
+            self._bar.update(100.0 * progress - self._bar.n)
+            return
+        elapsed = time.monotonic() - self._started
+        if elapsed - self._told >= LINE_EVERY or progress >= 1.0:
+            self._told = elapsed
+            left = elapsed * (1.0 - progress) / max(progress - self._start, 1e-9)
+            times = "<".join(tqdm.format_interval(seconds) for seconds in (elapsed, left))
+            print(f"{100 * progress:3.0f}% {times} {told}", file=sys.stderr, flush=True)
 
     def __exit__(self, *exception) -> None:
         self._bar.close()
