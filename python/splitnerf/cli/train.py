@@ -40,7 +40,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-minutes", type=float, metavar="M", help="training time; the schedule fits itself to it")
     parser.add_argument(
         "--device", choices=["cpu", "cuda"], default="cpu",
-        help="where to train (default: cpu; on cuda the kernels were never run, see docs/cuda.md)",
+        help="where to train (default: cpu; see docs/cuda.md)",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, help="of all random numbers (default: 0)")
     parser.add_argument(

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
 from splitnerf.fields.heads import relu_mlp
-from splitnerf.ops import MeshScene
-
-if TYPE_CHECKING:
-    from splitnerf.fields.light import EvaluatedLight
-    from splitnerf.fields.visibility import TracedBits
+from splitnerf.fields.light import EvaluatedLight
+from splitnerf.ops import MeshScene, VisibilityCache
 
 
 class OcclusionQuery(NamedTuple):
@@ -59,6 +56,18 @@ class Occlusion(NamedTuple):
     specular: Tensor
     indirect_diffuse: Tensor | None = None
     indirect_specular: Tensor | None = None
+
+
+class TracedBits(NamedTuple):
+    """What the vertices of a mesh see.
+
+    Attributes:
+        cache: The bits, on the CPU.
+        is_unoccluded: Whether hardly anything is blocked: the surface is convex, near enough.
+    """
+
+    cache: VisibilityCache
+    is_unoccluded: bool
 
 
 class OcclusionModel(nn.Module, abc.ABC):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -14,24 +13,12 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, lobe_roughness
-from splitnerf.fields.occlusion import Occlusion, OcclusionModel, OcclusionQuery, RaySegments
+from splitnerf.fields.occlusion import Occlusion, OcclusionModel, OcclusionQuery, RaySegments, TracedBits
 from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility
 
 TEXELS_PER_CELL = 8  # of the light, for its mean over a direction's cell
 LOBE_DIRECTIONS = 15  # within the lobe that a sum over the directions resolves
 SHADED_CHUNK = 1 << 15  # vertices shaded at a time
-
-
-class TracedBits(NamedTuple):
-    """What the vertices of a mesh see.
-
-    Attributes:
-        cache: The bits, on the CPU.
-        is_unoccluded: Whether hardly anything is blocked: the surface is convex, near enough.
-    """
-
-    cache: VisibilityCache
-    is_unoccluded: bool
 
 
 def bit_counts(words: Tensor) -> Tensor:

@@ -22,8 +22,8 @@ from splitnerf.fields import (
     SdfField,
     VisibilityBits,
 )
+from splitnerf.fields.occlusion import TracedBits
 from splitnerf.fields.sdf import SdfSample, sharpness
-from splitnerf.fields.visibility import TracedBits
 from splitnerf.ops import HashGridSpec, query_direction, shade_sums, split_sum_shade, summed_light
 
 START_BOUNCES = 3  # of indirect light on a new mesh
