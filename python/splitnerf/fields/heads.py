@@ -25,7 +25,9 @@ class MaterialHead(nn.Module):
     """Albedo (linear), roughness (perceptual) and metallic of a point, each in [0, 1] by a sigmoid; roughness from
     ``min_roughness``.
 
-    Source: SplitNeRF, section 4.2.
+    The bias of metallic starts at -2: most of the world is no metal. That is ours, the paper says nothing of it.
+
+    Source: SplitNeRF's material network; width and depth from its supplement.
     """
 
     def __init__(

@@ -141,7 +141,8 @@ class OcclusionHead(OcclusionModel):
     """Occlusion factors o_d and o_s of a point, 1 = open, predicted by a network.
 
     With ``directional`` the specular factor also reads the lobe's axis and width, so that it is a
-    function of the reflection; without it the head is the paper's, which depends on position alone.
+    function of the reflection; without it the head is the paper's, which depends on position alone. The biases start at +2,
+    mostly open: that is ours.
 
     Source: SplitNeRF Eq. (12)-(15).
     """

@@ -45,9 +45,10 @@ class SdfField(nn.Module):
         width: Hidden units.
         n_outputs: Outputs, the distance included.
         radius: The field starts as a sphere of this radius, scene units.
-        table_dtype: Of :class:`splitnerf.ops.HashGrid`.
+        table_dtype: The type in which the hash table is read, see :class:`splitnerf.ops.HashGrid`.
 
-    Source: SplitNeRF, section 4.1; sphere initialisation: Atzmon and Lipman 2020.
+    Source: NeuS (Wang et al. 2021) on a hash grid (Mueller et al. 2022), with the sizes of SplitNeRF's supplement; sphere
+    initialisation: Atzmon and Lipman 2020.
     """
 
     def __init__(
@@ -128,7 +129,7 @@ class SdfField(nn.Module):
             positions: [n, 3], scene units.
             cells: eps of the differences, in cells of the finest open level.
 
-        Source: SplitNeRF, section 4.1 (Neuralangelo's numerical gradients).
+        Source: Neuralangelo (Li et al. 2023), section 3.1; SplitNeRF's released code does the same.
         """
         resolution = self.grid.spec.levels()[max(0, self.grid.n_active - 1)][0]
         eps = cells * 2.0 * self.box / resolution

@@ -79,12 +79,12 @@ class OccupancyGrid:
 
 
 class AveragedGrid(OccupancyGrid):
-    """The paper's grid: a cell is occupied while the decaying maximum of its opacity exceeds min(mean, .001).
+    """The released code's grid: a cell is occupied while the decaying maximum of its opacity exceeds min(mean, .001).
 
     It gives no bound: a cell whose point was drawn beside a thin part may be dropped. Opacity is that of a sample of
     length ``step`` seen head-on.
 
-    Source: SplitNeRF, supplement, after nerfacc's description of its occupancy grid.
+    Source: Instant NGP (Mueller et al. 2022), as nerfacc, which SplitNeRF's released code uses, describes it.
     """
 
     def __init__(
