@@ -1,6 +1,6 @@
 """Occlusion factor o_d along a ground plane under a sphere, against the closed form right below it.
 
-A sphere of half angle theta straight above hides sin^2(theta) of the cosine-weighted hemisphere.
+A sphere straight above, of half angle theta, hides a share sin^2(theta) of the cosine-weighted hemisphere.
 """
 
 import numpy as np
@@ -9,7 +9,8 @@ import trimesh
 
 from splitnerf.ops import MeshScene, occlusion_factors
 
-HEIGHT, OFFSET = 2.0, 0.0125  # of the sphere's centre; of the rays' origin
+HEIGHT = 2.0  # the sphere's centre above the plane
+OFFSET = 0.0125  # the start of the rays above the plane
 
 
 def main() -> None:

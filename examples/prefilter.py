@@ -1,4 +1,4 @@
-"""Pre-integrates a small light and compares it with closed forms.
+"""Pre-integrates a linear light over GGX lobes and compares the result with closed forms.
 
 For L(w) = 1 + k.w the lobe of roughness 1 is a cosine, so gbar(n, 1) = 1 + (2/3) k.n exactly; for any roughness
 gbar = 1 + c(rho) k.n with one number c, which a one-dimensional integral gives.

@@ -1,4 +1,6 @@
-"""Renders the signed distance field of a sphere by NeuS weights: march, weigh, composite.
+"""Renders the signed distance field of a sphere with NeuS weights: march along rays, weigh the samples, composite.
+
+The training estimates both ends of a sample from its middle (`surface_weights`); here both are known (`neus_weights`).
 
 Prints the depth's error against the exact intersection and writes the normals as a PNG: rays.py [FILE].
 """
@@ -18,7 +20,7 @@ def sdf(x: torch.Tensor) -> torch.Tensor:
 
 
 def main(path: str = "rays.png") -> None:
-    # Cells whose centre is nearer to the surface than half a diagonal, and a little more, are occupied.
+    # A cell is occupied if its centre is nearer to the surface than half a diagonal and a little more.
     centre = ((torch.arange(RESOLUTION) + 0.5) / RESOLUTION * 2 - 1) * BOX
     centres = torch.stack(torch.meshgrid(centre, centre, centre, indexing="ij"), dim=-1)
     cells = (sdf(centres).abs() < 3**0.5 * BOX / RESOLUTION + 0.03).to(torch.uint8) * CELL_OCCUPIED

@@ -1,6 +1,6 @@
-"""Shades a sphere by split sum under a two-colour sky and writes it as a PNG: shading.py [FILE].
+"""Shades spheres by the split sum under a two-colour sky and writes them as a PNG: shading.py [FILE].
 
-Three spheres, roughness 0.1, 0.4 and 0.8; gold above, red plastic below.
+Three spheres a row, with roughness 0.1, 0.4 and 0.8; gold above, red plastic below.
 """
 
 import sys
