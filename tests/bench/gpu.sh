@@ -125,7 +125,7 @@ if part info 30 bash -c 'set -o pipefail; splitnerf info | paste -sd ";" | sed "
   part tests 130 bash -c gpu_tests
   if part data 60 bash -c data; then
     scene=$(tail -n 1 "$work/data.log") train=("$run_python" tests/bench/gpu_train.py)
-    steps=$(splitnerf info --settings fast 2>/dev/null | sed -n 's/^steps = //p')
+    steps=$(splitnerf info --settings fast 2>/dev/null | sed -n 's/^run\.steps = \([0-9]*\).*/\1/p')
     [ -z "$dry" ] || steps=60
     part profile 60 "${train[@]}" "$scene" --out "$work/runs/profile" --preset fast --device $device --steps $profile_steps \
       --profile "$out/profile.md" "${small[@]}"

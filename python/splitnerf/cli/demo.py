@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     data = args.out / "data"
     print(f"rendering the demo scene into {data} ...", file=sys.stderr)
     write_demo_dataset(data, seed=args.seed)
-    config = preset("cpu").replace({"seed": args.seed, **budget(None, args.max_minutes)})
+    config = preset("cpu").replace({"run.seed": args.seed, **budget(None, args.max_minutes)})
     trained, evaluation = reconstruct(data, args.out, config, overwrite=True)
     if evaluation is None:
         print("stopped; run the demo again to start over.")

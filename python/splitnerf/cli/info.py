@@ -11,22 +11,23 @@ from splitnerf.cli.exit_codes import DONE
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("info", help="show versions, the build, and the settings of a preset")
     parser.add_argument(
-        "--settings", metavar="PRESET", nargs="?", const="cpu", help="print every setting of a preset (default: cpu)"
+        "--settings",
+        metavar="PRESET",
+        nargs="?",
+        const="cpu",
+        help="print every setting of a preset: its value, unit, range and meaning (default: cpu)",
     )
     parser.set_defaults(execute=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    import dataclasses
-
     import torch
 
     from splitnerf import _core
-    from splitnerf.config import preset
+    from splitnerf.config import preset, settings_table
 
     if args.settings:
-        for key, value in dataclasses.asdict(preset(args.settings)).items():
-            print(f"{key} = {value!r}")
+        print(settings_table(preset(args.settings)))
         return DONE
     print(f"splitnerf {splitnerf.__version__}")
     print(f"torch {torch.__version__}, {torch.get_num_threads()} threads")

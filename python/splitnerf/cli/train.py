@@ -73,9 +73,9 @@ def run(args: argparse.Namespace) -> int:
     settings = dict(parse_setting(text) for text in args.settings)
     settings |= budget(args.steps, args.max_minutes)
     if args.seed is not None:
-        settings["seed"] = args.seed
+        settings["run.seed"] = args.seed
     if args.deterministic:
-        settings["deterministic"] = True
+        settings["run.deterministic"] = True
     if args.resume:
         if args.preset:
             raise InputError("--preset cannot change in a run that is resumed")
@@ -97,5 +97,5 @@ def run(args: argparse.Namespace) -> int:
 def budget(steps: int | None, minutes: float | None) -> dict[str, object]:
     """The settings that end a run: of steps and minutes what was asked for alone counts, both count together."""
     if minutes is None:
-        return {} if steps is None else {"steps": steps, "max_minutes": 0.0}
-    return {"steps": UNLIMITED_STEPS if steps is None else steps, "max_minutes": minutes}
+        return {} if steps is None else {"run.steps": steps, "run.max_minutes": 0.0}
+    return {"run.steps": UNLIMITED_STEPS if steps is None else steps, "run.max_minutes": minutes}

@@ -1,0 +1,11 @@
+"""Every setting of a training run in one place: groups, presets, and their TOML form."""
+
+from splitnerf.config.groups import MIN_EXPORT_SIZE
+from splitnerf.config.presets import PRESETS, parse_setting, preset
+from splitnerf.config.settings import FIELDS, GROUPS, OLD_NAMES, Config
+from splitnerf.config.table import settings_table
+
+__all__ = [
+    "FIELDS", "GROUPS", "MIN_EXPORT_SIZE", "OLD_NAMES", "PRESETS", "Config", "parse_setting", "preset",
+    "settings_table",
+]  # fmt: skip

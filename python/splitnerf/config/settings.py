@@ -1,0 +1,179 @@
+"""All settings of a run: groups, their checks, and their TOML form."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tomli_w
+
+from splitnerf.config.groups import (
+    Export,
+    Light,
+    Losses,
+    Materials,
+    Mesh,
+    Occlusion,
+    Optimiser,
+    Run,
+    Sampling,
+    Shading,
+    Surface,
+)
+from splitnerf.data.images import atomic_path
+from splitnerf.errors import InputError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+SUMMED_DIRECTIONS = 256  # fewer do not resolve the lobes that `shading.method = summed` sums
+
+# Names that settings had before there were groups, where they differ from the name within the group.
+RENAMED = {
+    "surface.width": "sdf_width", "surface.outputs": "sdf_outputs",
+    "materials.width": "material_width", "materials.layers": "material_layers", "materials.inputs": "head_inputs",
+    "light.kind": "light", "light.resolution": "light_resolution", "light.width": "light_width",
+    "light.layers": "light_layers", "light.direction_frequencies": "light_direction_frequencies",
+    "light.roughness_frequencies": "light_roughness_frequencies", "light.activation": "light_activation",
+    "shading.method": "shading", "shading.fresnel": "fresnel_mode",
+    "occlusion.kind": "occlusion", "occlusion.channels": "occlusion_channels",
+    "occlusion.directional": "occlusion_directional", "occlusion.width": "occlusion_width",
+    "occlusion.layers": "occlusion_layers", "occlusion.share": "occlusion_share", "occlusion.rays": "occlusion_rays",
+    "occlusion.ray_start": "occlusion_ray_start", "occlusion.offset": "occlusion_offset",
+    "occlusion.directions": "occlusion_directions",
+    "mesh.every": "mesh_every", "mesh.resolution": "mesh_resolution", "mesh.background": "background_meshes",
+    "sampling.min_weight": "sample_above",
+    "losses.smoothness_weight": "normal_smoothness", "losses.light_form": "light_loss_form",
+    "losses.occlusion_form": "occlusion_loss_form", "losses.metal_form": "metal_loss_form",
+    "export.resolution": "export_resolution", "export.faces": "export_faces",
+    "export.texture_size": "export_texture_size", "export.environment_height": "export_environment_height",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Config:
+    """Settings of one run, in groups. The defaults are the preset ``cpu``.
+
+    Raises:
+        InputError: A value is of another type or out of its range, or values exclude each other.
+    """
+
+    run: Run = field(default_factory=Run)
+    surface: Surface = field(default_factory=Surface)
+    materials: Materials = field(default_factory=Materials)
+    light: Light = field(default_factory=Light)
+    shading: Shading = field(default_factory=Shading)
+    occlusion: Occlusion = field(default_factory=Occlusion)
+    mesh: Mesh = field(default_factory=Mesh)
+    sampling: Sampling = field(default_factory=Sampling)
+    losses: Losses = field(default_factory=Losses)
+    optimiser: Optimiser = field(default_factory=Optimiser)
+    export: Export = field(default_factory=Export)
+
+    def __post_init__(self) -> None:
+        for group, kind in GROUPS.items():
+            if type(getattr(self, group)) is not kind:
+                raise InputError(f"{group} is a group of settings, got {getattr(self, group)!r}")
+        for name, known in FIELDS.items():
+            value, limits = self[name], known.metadata["limits"]
+            if type(value).__name__ != known.type and not (known.type == "float" and type(value) is int):
+                raise InputError(f"{name} takes a value of type {known.type}, got {value!r}")
+            if not limits.allow(value):
+                raise InputError(f"{name} must be {limits}, got {value!r}")
+        for broken, message in RULES:
+            if broken(self):
+                raise InputError(message)
+
+    def __getitem__(self, name: str) -> object:
+        """The value of a setting by its name, ``group.name`` or as it was before there were groups."""
+        group, _, key = OLD_NAMES.get(name, name).partition(".")
+        return getattr(getattr(self, group), key)
+
+    def replace(self, settings: dict[str, object]) -> Config:
+        """A copy with some settings changed.
+
+        Args:
+            settings: Values by ``group.name``, by the name before there were groups, or as a table for a group.
+
+        Raises:
+            InputError: A name is unknown, or a value cannot be.
+        """
+        changes: dict[str, dict[str, object]] = {}
+        for name, value in _flat(settings):
+            group, _, key = name.partition(".")
+            changes.setdefault(group, {})[key] = value
+        groups = {group: dataclasses.replace(getattr(self, group), **values) for group, values in changes.items()}
+        return dataclasses.replace(self, **groups)
+
+    def write(self, path: Path) -> None:
+        with atomic_path(path) as temporary:
+            temporary.write_text(tomli_w.dumps(dataclasses.asdict(self)))
+
+    @staticmethod
+    def read(path: Path) -> Config:
+        try:
+            table = tomllib.loads(path.read_text())
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path}: not a readable run configuration ({error})") from error
+        try:
+            return Config().replace(table)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+
+
+GROUPS = {group.name: group.default_factory for group in dataclasses.fields(Config)}
+FIELDS = {f"{group}.{known.name}": known for group, kind in GROUPS.items() for known in dataclasses.fields(kind)}
+OLD_NAMES = {RENAMED.get(name, known.name): name for name, known in FIELDS.items()}
+
+# Settings that exclude each other: when, and what to say.
+RULES = (
+    (
+        lambda c: c.shading.method == "summed" and not (
+            c.occlusion.kind == "bits" and c.shading.compositing == "linear" and c.shading.fresnel == "exact"
+            and c.occlusion.directions >= SUMMED_DIRECTIONS
+        ),
+        f"shading.method = summed needs occlusion.kind = bits with at least {SUMMED_DIRECTIONS} occlusion.directions, "
+        "shading.compositing = linear and shading.fresnel = exact; set shading.method=split",
+    ),
+    (
+        lambda c: c.run.deterministic and c.run.max_minutes > 0,
+        "a deterministic run ends by its steps alone; leave out --max-minutes (run.max_minutes) and give --steps",
+    ),
+    (
+        lambda c: c.run.cuda_graphs and (
+            c.occlusion.kind == "mlp" or c.light.kind == "mlp" or c.surface.normals != "analytic"
+            or c.losses.entropy_points == 1
+        ),
+        "run.cuda_graphs needs light.kind = pyramid, occlusion.kind = bits or off, surface.normals = analytic and "
+        "more than one of losses.entropy_points; set run.cuda_graphs=false",
+    ),
+)  # fmt: skip
+
+
+def _flat(settings: dict[str, object]) -> Iterator[tuple[str, object]]:
+    """Each setting by its name with the group, in order."""
+    for key, value in settings.items():
+        if key in GROUPS and isinstance(value, dict):
+            for inner, x in value.items():
+                yield _known(f"{key}.{inner}"), x
+        else:
+            yield _known(key), value
+
+
+def _known(key: object) -> str:
+    """The name of a setting with its group. Raises InputError where there is none."""
+    name = OLD_NAMES.get(key, key)
+    if name in FIELDS:
+        return name
+    if name in GROUPS:
+        member = next(known for known in FIELDS if known.startswith(f"{name}."))
+        raise InputError(f"{name} is a group of settings; set one of them, such as {member}")
+    near = difflib.get_close_matches(str(key), [*FIELDS, *OLD_NAMES], n=1)
+    hint = f"did you mean {OLD_NAMES.get(near[0], near[0])}? " if near else ""
+    raise InputError(f"unknown setting {key!r}; {hint}`splitnerf info --settings` lists them")
