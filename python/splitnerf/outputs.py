@@ -99,12 +99,12 @@ def write_assets(
         RuntimeError: A field is not finite.
     """
     c = model.config
-    resolution = c.export_resolution if resolution is None else resolution
-    n_faces = c.export_faces if n_faces is None else n_faces
+    resolution = c.export.resolution if resolution is None else resolution
+    n_faces = c.export.faces if n_faces is None else n_faces
     if "usdz" in formats:
         require_usd()
     surface = surface_of(model)
-    vertices, faces, n_dropped = drop_floaters(*extract_mesh(surface.sdf, c.box, resolution))
+    vertices, faces, n_dropped = drop_floaters(*extract_mesh(surface.sdf, c.surface.box, resolution))
     world_from_box = np.linalg.inv(box_from_world)
     mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
     exported = Exported(mesh, len(faces), is_closed(faces), n_dropped)
@@ -112,8 +112,8 @@ def write_assets(
         write_mesh_ply(out / "mesh.ply", mesh.vertices, faces, surface_materials(surface, vertices)[0])
     if set(formats) - {"ply"}:
         textured = textured_asset(
-            "object", vertices, faces, surface, n_faces=n_faces, texture_size=texture_size or c.export_texture_size,
-            spacing=2.0 * c.box / (resolution - 1), occlusion_offset=c.occlusion_offset,
+            "object", vertices, faces, surface, n_faces=n_faces, texture_size=texture_size or c.export.texture_size,
+            spacing=2.0 * c.surface.box / (resolution - 1), occlusion_offset=c.occlusion.offset,
         )  # fmt: skip
         asset = dataclasses.replace(textured.asset, vertices=transform_points(world_from_box, textured.asset.vertices))
         if "glb" in formats:
@@ -123,7 +123,7 @@ def write_assets(
         if "usdz" in formats:
             write_usdz(out / "mesh.usdz", asset, textured.occlusion)
         exported = Exported(mesh, len(asset.triangles), textured.watertight, n_dropped)
-    write_environment(out, model.light.panorama(c.export_environment_height).cpu().numpy())
+    write_environment(out, model.light.panorama(c.export.environment_height).cpu().numpy())
     return exported
 
 
@@ -184,7 +184,7 @@ def evaluate_scene(
     """
     predictions = [render_maps(model, grid, test, i) for i in range(len(test))]
     truth = load_scene_truth(test.root)
-    light = model.light.panorama(model.config.export_environment_height).cpu().numpy()
+    light = model.light.panorama(model.config.export.environment_height).cpu().numpy()
     result = evaluate_maps(
         predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1),
         relight=relight, distance=distance,

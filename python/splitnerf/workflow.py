@@ -180,7 +180,7 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     model.open_levels(1.0)
     SurfaceMesh(model).restore(content)
     grid = make_grid(config)
-    if config.occupancy == "average":  # a mean over time, unlike the distance
+    if config.sampling.occupancy == "average":  # a mean over time, unlike the distance
         grid.values = restored_occupancy(grid.values, content, run / "checkpoint.pt")
     grid.update(model.sdf_field.sdf, model.s_value)
     return model, grid, content

@@ -73,7 +73,7 @@ def main() -> None:
         from splitnerf.workflow import load_run
 
         model, _, _ = load_run(Path(run))
-        compare(Path(run).name, model.sdf_field.sdf, model.config.box)
+        compare(Path(run).name, model.sdf_field.sdf, model.config.surface.box)
 
 
 if __name__ == "__main__":

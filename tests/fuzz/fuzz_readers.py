@@ -224,7 +224,7 @@ class CheckpointReader(Reader):
             data = RAW + container.getvalue()
         path = self.file("checkpoint.pt", data[1:])
         content = load_checkpoint(path)
-        config = Config.stored(content["config"])
+        config = Config().replace(content["config"])
         model = SceneModel(config)
         restore_model(model, content, path)
         restore_optimiser(make_optimiser(model, config), content, path)

@@ -264,8 +264,8 @@ class TestWhole:
 
     def test_every_configuration_is_possible(self):
         configs = whole.configurations(whole.NAMES, {"seed": 3})
-        assert len({c.preset + repr(c) for c in configs.values()}) == len(configs) == 1 + len(whole.NAMES)
-        assert all(c.seed == 3 for c in configs.values())
+        assert len({c.run.preset + repr(c) for c in configs.values()}) == len(configs) == 1 + len(whole.NAMES)
+        assert all(c.run.seed == 3 for c in configs.values())
 
     def test_the_command_trains_once_and_goes_on(self, tmp_path, capsys):
         pytest.importorskip("matplotlib")

@@ -236,8 +236,14 @@ def test_bad_environment_writes_nothing(tmp_path, value):
 def save_run(run, **state):
     """A run that was never trained: its surface is a sphere of radius 0.7 about the box's centre."""
     torch.manual_seed(0)
-    config = Config(
-        n_levels=4, log2_table_size=10, grid_resolution=16, export_resolution=48, export_environment_height=8
+    config = Config().replace(
+        {
+            "surface.n_levels": 4,
+            "surface.log2_table_size": 10,
+            "sampling.grid_resolution": 16,
+            "export.resolution": 48,
+            "export.environment_height": 8,
+        }
     )
     run.mkdir()
     content = dict(

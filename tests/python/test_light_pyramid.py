@@ -243,17 +243,26 @@ def test_the_light_of_cells_carries_its_gradient_on(kind):
 
 
 def test_settings_choose_the_light_and_its_rate():
-    config = Config(light="pyramid", light_resolution=16, light_learning_rate=0.03, warmup_steps=0)
+    config = Config().replace(
+        {
+            "light.kind": "pyramid",
+            "light.resolution": 16,
+            "optimiser.light_learning_rate": 0.03,
+            "optimiser.warmup_steps": 0,
+        }
+    )
     model = SceneModel(config)
     assert isinstance(model.light, LightPyramid) and model.light.resolution == 16
     optimiser = make_optimiser(model, config)
     set_learning_rate(optimiser, config, 0, 0.0)
     rates = {id(p): group["lr"] for group in optimiser.param_groups for p in group["params"]}
-    assert rates[id(model.light.texels)] == 0.03 and rates[id(model.variance)] == config.variance_learning_rate
+    assert (
+        rates[id(model.light.texels)] == 0.03 and rates[id(model.variance)] == config.optimiser.variance_learning_rate
+    )
     assert len(rates) == len(list(model.parameters()))
-    with pytest.raises(InputError, match="light must be one of mlp, pyramid"):
-        Config(light="cube")
-    with pytest.raises(InputError, match="light_resolution must be a power of 2"):
-        Config(light_resolution=48)
+    with pytest.raises(InputError, match="light.kind must be one of mlp, pyramid"):
+        Config().replace({"light.kind": "cube"})
+    with pytest.raises(InputError, match="light.resolution must be a power of 2"):
+        Config().replace({"light.resolution": 48})
     with pytest.raises(ValueError, match="power of 2"):
         LightPyramid(8)

@@ -316,8 +316,10 @@ class TestRendering:
         rays = rays_o, rays_d, torch.full((len(rays_o),), 0.5)
         colours = []
         for threshold, shades in ((0.0, 0), (1e-3, 0), (1e-3, 4)):
-            model.config.sample_above = threshold
-            ray = render_rays(model, model.evaluate_light(), find_samples(model, grid.cells, *rays), shades_per_ray=shades)
+            model.config = model.config.replace({"sampling.min_weight": threshold})
+            ray = render_rays(
+                model, model.evaluate_light(), find_samples(model, grid.cells, *rays), shades_per_ray=shades
+            )
             colours.append((ray.colour * ray.opacity[:, None]).detach())
         assert (colours[0] - colours[1]).abs().max() < 0.02
         assert (colours[1] - colours[2]).abs().max() < 0.02

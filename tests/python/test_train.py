@@ -126,7 +126,7 @@ def test_without_a_mesh_nothing_is_occluded():
     {"indirect_every": 0},
 ])  # fmt: skip
 def test_settings_of_the_bits_are_checked(settings):
-    with pytest.raises(InputError, match="occlusion_directions|indirect"):
+    with pytest.raises(InputError, match="occlusion.directions|occlusion.indirect_every"):
         preset("cpu").replace(settings)
 
 
@@ -144,7 +144,7 @@ def test_a_deterministic_run_can_be_repeated_bit_by_bit(data, tmp_path):
     for name in "ab":
         assert train(data, tmp_path / name, "--steps", "14", "--seed", "3", "--deterministic") == DONE
     first, second = (load_checkpoint(tmp_path / name / "checkpoint.pt") for name in "ab")
-    assert config_of(first).deterministic and not torch.are_deterministic_algorithms_enabled()
+    assert config_of(first).run.deterministic and not torch.are_deterministic_algorithms_enabled()
     for key in first["model"]:
         assert torch.equal(first["model"][key], second["model"][key]), key
     for moments, others in zip(first["optimiser"]["state"].values(), second["optimiser"]["state"].values()):
@@ -321,7 +321,7 @@ def test_the_paper_preset_takes_steps(data, tmp_path):
                "light_queries=64", "--set", "mesh_resolution=32", "--set", "export_resolution=32", "--set",
                "grid_resolution=32", "--set", "log2_table_size=14", "--set", "mesh_every=0.3"]  # fmt: skip
     assert main(["train", str(data), "--out", str(run), "--preset", "paper", "--steps", "6", *options]) == DONE
-    assert Config.read(run / "config.toml").fresnel_mode == "paper"
+    assert Config.read(run / "config.toml").shading.fresnel == "paper"
 
 
 def test_a_config_survives_its_file(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,7 +70,7 @@ def ablate(plan: Plan, show: Callable[[list[Score]], None]) -> list[Score]:
 
 def run_row(plan: Plan, scene: Path, row: Row, seed: int) -> dict:
     """The evaluation of one run, made now unless it stands already."""
-    config = dataclasses.replace(row.config, seed=seed)
+    config = row.config.replace({"run.seed": seed})
     run = plan.out / scene.resolve().name / (row.slug if seed == 0 else f"{row.slug}_seed{seed}")
     scores = run / "scores.json"
     stored = run / "config.toml"

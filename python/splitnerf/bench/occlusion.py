@@ -108,7 +108,7 @@ def error_charts(light_name: str, points: Points, quick: bool, rounds: int) -> l
     for k, factor in enumerate(("o_d", f"o_s at roughness {ROUGHNESS:g}")):
         dots = [
             Point(*key, 1e3 * times[key].seconds, errors[key][k], 1e3 * times[key].low, 1e3 * times[key].high,
-                  key == ("bits", f"k = {preset('cpu').occlusion_directions}"))
+                  key == ("bits", f"k = {preset('cpu').occlusion.directions}"))
             for key in calls
         ]  # fmt: skip
         charts.append(
@@ -153,7 +153,7 @@ def independent(points: Points, n: int) -> tuple[Tensor, Tensor]:
 
 def ray_rates(name: str, points: Points, quick: bool, rounds: int) -> tuple[list[str], list[list[object]]]:
     """Mrays/s of our factors, rays made and summed included, beside tracers that are handed rays of the same lobes."""
-    n, half = len(points.positions), preset("cpu").occlusion_rays
+    n, half = len(points.positions), preset("cpu").occlusion.rays
     cosine = F.normalize(points.normals[:, None] + F.normalize(torch.randn(n, half, 3), dim=-1), dim=-1)
     lobes = sample_ggx_lobe(points.axes, points.roughness, half, seed=0)
     directions = torch.cat([cosine, lobes], dim=1).reshape(-1, 3)

@@ -191,10 +191,10 @@ def run(quick: bool, rounds: int) -> Result:
 
 def defaults(config: Config, rho: float) -> list[tuple[str, str]]:
     """What the settings take for a roughness: the pyramid, and what holds the MLP honest where `light = mlp`."""
-    narrow = ("own lobe", f"n = {config.light_lobe_samples}")
-    wide = ("Fibonacci", f"n = {config.light_samples}")
-    resolution = f"{config.light_resolution} x {config.light_resolution}"
-    return [("pyramid", resolution), narrow if rho < config.light_lobe_below else wide]
+    narrow = ("own lobe", f"n = {config.losses.light_lobe_samples}")
+    wide = ("Fibonacci", f"n = {config.losses.light_samples}")
+    resolution = f"{config.light.resolution} x {config.light.resolution}"
+    return [("pyramid", resolution), narrow if rho < config.losses.light_lobe_below else wide]
 
 
 def relative_rms(estimates: list[Tensor], true: Tensor) -> float:

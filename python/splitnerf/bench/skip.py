@@ -75,7 +75,7 @@ def skip_table(
     lines = [baseline]
     show(HEADER)
     show(baseline.text(baseline))
-    alone = {name: plain.replace({key: getattr(full, key) for key in keys}) for name, keys in SKIPS.items()}
+    alone = {name: plain.replace({key: full[key] for key in keys}) for name, keys in SKIPS.items()}
     for i, (name, config) in enumerate((alone | {ALL: full}).items()):
         line, _ = run_line(name, config, minutes, steps, training, views, out / f"skip_{i}")
         lines.append(line)

@@ -54,7 +54,7 @@ def whole(
         for length in sorted(minutes):
             for name, config in configs.items():
                 row = Row(f"{name}, {length:g} minutes", config.replace({"max_minutes": length}))
-                scores[name, length] = found = run_row(plan, scene, row, config.seed)
+                scores[name, length] = found = run_row(plan, scene, row, config.run.seed)
                 values = (f"{MEASURES[key]} {score['psnr']:.2f} dB" for key in MEASURES if (score := found.get(key)))
                 show(f"{scene.name}: {row.name}: {', '.join(values)}")
         charts += [chart for key in MEASURES if (chart := chart_of(scene, key, scores)).points]

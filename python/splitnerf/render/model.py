@@ -54,26 +54,30 @@ class ShadedPoints(NamedTuple):
 
 def make_light(config: Config) -> Light:
     """The light that the configuration names."""
-    if config.light == "pyramid":
-        return LightPyramid(config.light_resolution)
+    if config.light.kind == "pyramid":
+        return LightPyramid(config.light.resolution)
     return LightMlp(
-        config.light_width, config.light_layers, config.light_direction_frequencies,
-        config.light_roughness_frequencies, config.light_activation,
+        config.light.width, config.light.layers, config.light.direction_frequencies,
+        config.light.roughness_frequencies, config.light.activation,
     )  # fmt: skip
 
 
 def make_occlusion(config: Config, n_inputs: int) -> OcclusionModel:
-    """The occlusion that the setting ``occlusion`` names."""
+    """The occlusion that the setting ``occlusion.kind`` names."""
     c = config
-    if c.occlusion == "mlp":
+    if c.occlusion.kind == "mlp":
         return OcclusionHead(
-            n_inputs, c.occlusion_width, c.occlusion_layers, c.occlusion_channels, c.occlusion_directional
+            n_inputs, c.occlusion.width, c.occlusion.layers, c.occlusion.channels, c.occlusion.directional
         )
-    if c.occlusion == "bits":
+    if c.occlusion.kind == "bits":
         return VisibilityBits(
-            c.occlusion_directions, c.occlusion_offset, c.occlusion_channels, c.indirect, c.open_below
+            c.occlusion.directions,
+            c.occlusion.offset,
+            c.occlusion.channels,
+            c.occlusion.indirect,
+            c.occlusion.open_below,
         )
-    return NoOcclusion(c.occlusion_channels)
+    return NoOcclusion(c.occlusion.channels)
 
 
 def face_forward(normals: Tensor, view_dirs: Tensor) -> Tensor:
@@ -93,17 +97,27 @@ class SceneModel(nn.Module):
         super().__init__()
         self.config = config
         spec = HashGridSpec(
-            config.n_levels, config.n_features, config.base_resolution, config.growth, config.log2_table_size
+            config.surface.n_levels,
+            config.surface.n_features,
+            config.surface.base_resolution,
+            config.surface.growth,
+            config.surface.log2_table_size,
         )
-        dtype = None if config.table_dtype == "float32" else getattr(torch, config.table_dtype)
-        self.sdf_field = SdfField(spec, config.box, config.sdf_width, config.sdf_outputs, config.sphere_radius, dtype)
-        n_inputs = config.sdf_outputs + (3 + spec.n_outputs if config.head_inputs == "grid" else 0)
+        dtype = None if config.surface.table_dtype == "float32" else getattr(torch, config.surface.table_dtype)
+        self.sdf_field = SdfField(
+            spec, config.surface.box, config.surface.width, config.surface.outputs, config.surface.sphere_radius, dtype
+        )
+        n_inputs = config.surface.outputs + (3 + spec.n_outputs if config.materials.inputs == "grid" else 0)
         self.material = MaterialHead(
-            n_inputs, config.material_width, config.material_layers, config.initial_roughness, config.min_roughness
+            n_inputs,
+            config.materials.width,
+            config.materials.layers,
+            config.materials.initial_roughness,
+            config.materials.min_roughness,
         )
         self.occlusion = make_occlusion(config, n_inputs)
         self.light = make_light(config)
-        self.variance = nn.Parameter(torch.tensor(config.initial_variance))
+        self.variance = nn.Parameter(torch.tensor(config.surface.initial_variance))
 
     @property
     def device(self) -> torch.device:
@@ -123,24 +137,26 @@ class SceneModel(nn.Module):
     def open_levels(self, progress: float) -> None:
         """Opens hash-grid levels one after the other until ``levels_open_by`` of the run."""
         c = self.config
-        share = min(1.0, progress / c.levels_open_by) if c.levels_open_by > 0 else 1.0
-        self.sdf_field.grid.n_active = min(c.n_levels, c.start_levels + int(share * (c.n_levels - c.start_levels)))
+        share = min(1.0, progress / c.surface.levels_open_by) if c.surface.levels_open_by > 0 else 1.0
+        self.sdf_field.grid.n_active = min(
+            c.surface.n_levels, c.surface.start_levels + int(share * (c.surface.n_levels - c.surface.start_levels))
+        )
 
     def surface(self, positions: Tensor) -> SdfSample:
         """The SDF, its features and gradient at positions [n, 3]."""
-        if self.config.normals == "analytic":
+        if self.config.surface.normals == "analytic":
             return self.sdf_field.sample(positions)
         return self.sdf_field.sample_finite_difference(positions)
 
     def head_inputs(self, positions: Tensor, outputs: Tensor, features: Tensor) -> Tensor:
-        if self.config.head_inputs == "outputs":
+        if self.config.materials.inputs == "outputs":
             return outputs
         return torch.cat([outputs, positions, features], dim=1)
 
     def evaluate_light(self) -> EvaluatedLight:
         """The light as it stands, for all that reads it until its parameters move."""
         maps = self.light.evaluate()
-        return EvaluatedLight(maps, self.occlusion.cell_light(maps) if self.config.shading == "summed" else None)
+        return EvaluatedLight(maps, self.occlusion.cell_light(maps) if self.config.shading.method == "summed" else None)
 
     def shade(
         self,
@@ -166,7 +182,7 @@ class SceneModel(nn.Module):
         c = self.config
         inputs = self.head_inputs(positions, outputs, features)
         albedo, roughness, metallic = self.material(inputs)
-        lobe_dirs = query_direction(normals, view_dirs, roughness, c.query)
+        lobe_dirs = query_direction(normals, view_dirs, roughness, c.shading.query)
         n, facing = len(normals), face_forward(normals, view_dirs)
         radiance = light(torch.cat([lobe_dirs, facing]), torch.cat([roughness, torch.ones_like(roughness)]))
         query = OcclusionQuery(inputs, positions - normals * outputs[:, :1], facing, lobe_dirs, roughness)
@@ -179,7 +195,7 @@ class SceneModel(nn.Module):
             factor_s = factor_d = torch.ones_like(roughness)
         shaded = split_sum_shade(
             normals, view_dirs, albedo, roughness, metallic, light_s, light_d, factor_s, factor_d,
-            c.fresnel_mode, c.compensate,
+            c.shading.fresnel, c.shading.compensate,
         )  # fmt: skip
         return ShadedPoints(
             shaded, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, facing, lobe_dirs
@@ -224,13 +240,13 @@ class SceneModel(nn.Module):
         sums = summed_light(
             normals, view_dirs, roughness, cells.directions, cells.solid_angles, cells.radiance, visible, sent
         )
-        radiance = shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, self.config.compensate)
+        radiance = shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, self.config.shading.compensate)
         return at, (radiance - split) * (t * t * (3.0 - 2.0 * t))
 
     @property
     def sums_light(self) -> bool:
         """Whether :meth:`quadrature_correction` applies: once there is a mesh."""
-        return self.config.shading == "summed" and self.occlusion.ready
+        return self.config.shading.method == "summed" and self.occlusion.ready
 
     @torch.no_grad()
     def use_mesh(self, traced: TracedBits | None) -> None:

@@ -121,7 +121,10 @@ class RenderedRays:
 
 def sample_step(config: Config, s: float) -> float:
     """Length of a sample: it follows the width 1/s of the density, within the configured bounds."""
-    return min(max(config.step_scale / s, config.min_step), max(config.max_step, config.min_step))
+    return min(
+        max(config.sampling.step_scale / s, config.sampling.min_step),
+        max(config.sampling.max_step, config.sampling.min_step),
+    )
 
 
 @torch.no_grad()
@@ -148,14 +151,15 @@ def find_samples(
     """
     c, s = model.config, model.s_value
     step = sample_step(c, s)
-    if c.sample_above == 0:
-        packed = march_rays(rays_o, rays_d, jitter, cells, c.box, step, c.max_samples_per_ray)
+    if c.sampling.min_weight == 0:
+        packed = march_rays(rays_o, rays_d, jitter, cells, c.surface.box, step, c.sampling.max_samples_per_ray)
         evaluated = packed.offsets.diff()
     else:
         packed, evaluated = sample_rays(
             rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=s, anneal=anneal,
-            min_weight=c.sample_above, min_transmittance=c.min_transmittance, reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
-            max_samples=c.max_samples_per_ray,
+            min_weight=c.sampling.min_weight, min_transmittance=c.sampling.min_transmittance,
+            reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
+            max_samples=c.sampling.max_samples_per_ray,
         )  # fmt: skip
     directions = rays_d[packed.ray_indices]
     positions = rays_o[packed.ray_indices] + directions * packed.middles[:, None]
@@ -202,7 +206,7 @@ def render_rays(
         samples.offsets,
         step=step,
         anneal=found.anneal,
-        min_transmittance=c.min_transmittance,
+        min_transmittance=c.sampling.min_transmittance,
     )
 
     spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step, capacity)
@@ -213,17 +217,24 @@ def render_rays(
     sdf = outputs[:, 0]
     segments = RaySegments(spread.leaders, spread.stretch)
     points = model.shade(light, positions, outputs, features, normals, view_dirs, segments)
-    radiance = points.radiance if c.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
+    radiance = points.radiance if c.shading.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
     mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
     if model.sums_light:
         on_surface = positions - normals.detach() * sdf.detach()[:, None]
         at, correction = model.quadrature_correction(
-            light, on_surface, normals, view_dirs, points, spread.heaviest, None if capacity is None else spread.sizes[1]
+            light,
+            on_surface,
+            normals,
+            view_dirs,
+            points,
+            spread.heaviest,
+            None if capacity is None else spread.sizes[1],
         )
         mean = mean.index_add(0, samples.ray_indices[shaded[at]], correction)
     return RenderedRays(
-        mean, c.compositing == "linear", opacity, samples, found.evaluated, weights, values, field.gradient, found.beside,
+        mean, c.shading.compositing == "linear", opacity, samples, found.evaluated, weights, values, field.gradient,
+        found.beside,
         shaded, spread.sizes, shares, positions, normals, sdf, points,
     )  # fmt: skip
 

@@ -47,10 +47,10 @@ def draw_batch(source: PixelSource, n_rays: int, config: Config) -> Batch:
 def draw_probes(config: Config, generator: torch.Generator) -> ProbePoints:
     """Where the eikonal loss and that of the normals' smoothness look beside the samples."""
     c = config
-    n_beside = c.smoothness_points if c.normal_smoothness else 0
+    n_beside = c.losses.smoothness_points if c.losses.smoothness_weight else 0
     draw = {"generator": generator, "device": generator.device}
     return ProbePoints(
-        (torch.rand(c.eikonal_points, 3, **draw) * 2 - 1) * c.box,
+        (torch.rand(c.losses.eikonal_points, 3, **draw) * 2 - 1) * c.surface.box,
         torch.rand(n_beside, **draw),
-        c.smoothness_radius * torch.randn(n_beside, 3, **draw),
+        c.losses.smoothness_radius * torch.randn(n_beside, 3, **draw),
     )

@@ -119,7 +119,7 @@ def restore_generator(generator: torch.Generator, content: dict, path: Path) -> 
         if content["device"] == generator.device.type:
             generator.set_state(content["generator"])
         else:
-            generator.manual_seed(config_of(content).seed + content["step"])
+            generator.manual_seed(config_of(content).run.seed + content["step"])
         torch.set_rng_state(content["torch_generator"])
     except RuntimeError as error:
         raise InputError(f"{path}: its random generators cannot be restored ({error}); train anew") from None
@@ -171,7 +171,7 @@ def _check_content(content: dict) -> None:
         if not 0 <= content[key] <= largest:
             raise ValueError(f"{key} is {content[key]}")
     config = config_of(content)
-    if not 1 <= content["n_rays"] <= max(config.initial_rays, config.max_rays):
+    if not 1 <= content["n_rays"] <= max(config.sampling.initial_rays, config.sampling.max_rays):
         raise ValueError(f"n_rays is {content['n_rays']}")
     for name, parameter in content["model"].items():
         _check_tensor(f"parameter {name}", parameter, None, torch.float32)
@@ -186,7 +186,7 @@ def _check_content(content: dict) -> None:
         raise ValueError(f"device is {content.get('device')!r}")
     for key in ("generator", "torch_generator"):
         _check_tensor(key, content.get(key), (-1,), torch.uint8)
-    _check_tensor("occupancy", content.get("occupancy"), (config.grid_resolution**3,), torch.float32)
+    _check_tensor("occupancy", content.get("occupancy"), (config.sampling.grid_resolution**3,), torch.float32)
     _check_sizes(config, content["model"])
     _check_tensor("box_from_world", content.get("box_from_world"), (4, 4), torch.float64)
     vertices, faces = content.get("mesh_vertices"), content.get("mesh_faces")
@@ -200,10 +200,12 @@ def _check_content(content: dict) -> None:
 def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:
     """Raises ValueError where the settings ask for more than the file holds: they are about to be allocated."""
     c = config
-    grid = HashGridSpec(c.n_levels, c.n_features, c.base_resolution, c.growth, c.log2_table_size)
-    sizes = {"sdf_field.grid.table": grid.n_entries * c.n_features}
-    if c.light == "pyramid":
-        sizes["light.texels"] = 3 * sum(4**k for k in range(2, c.light_resolution.bit_length()))
+    grid = HashGridSpec(
+        c.surface.n_levels, c.surface.n_features, c.surface.base_resolution, c.surface.growth, c.surface.log2_table_size
+    )
+    sizes = {"sdf_field.grid.table": grid.n_entries * c.surface.n_features}
+    if c.light.kind == "pyramid":
+        sizes["light.texels"] = 3 * sum(4**k for k in range(2, c.light.resolution.bit_length()))
     for name, size in sizes.items():
         if name not in parameters or parameters[name].numel() != size:
             raise ValueError(f"parameter {name} does not fit the settings")

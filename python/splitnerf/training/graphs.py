@@ -63,7 +63,7 @@ class GraphedStep(Step):
 
     def __init__(self, model: SceneModel, *parts: Any):
         super().__init__(model, *parts)
-        self.capacity = round_up(SAMPLE_SLACK * model.config.target_samples)
+        self.capacity = round_up(SAMPLE_SLACK * model.config.sampling.target_samples)
         self._counts: tuple[float, float] | None = None  # shaded samples and segments of the last step
         self._used: tuple[int, int] | None = None  # its capacity
         self._seen: set[Hashable] = set()
@@ -112,7 +112,13 @@ class GraphedStep(Step):
         """What the host decides about a step, but for sizes: steps that agree in it do the same to their tensors."""
         c, model = self.model.config, self.model
         since = step % light_period(c) + 1 if light_moves(c, step) else 0
-        return model.sdf_field.grid.n_active, since, progress >= c.priors_from, self.mesh.made_at, model.occlusion.ready
+        return (
+            model.sdf_field.grid.n_active,
+            since,
+            progress >= c.losses.priors_from,
+            self.mesh.made_at,
+            model.occlusion.ready,
+        )
 
     def _recorded(
         self, function: Callable, batch: Batch, found: FoundSamples, light: EvaluatedLight, capacity: tuple[int, int]

@@ -106,7 +106,7 @@ def train(
         training.restore()
     with (
         open(run / "metrics.jsonl", "a") as log, Interrupt() as interrupt, Progress(training.progress) as bar,
-        same_bits(config.deterministic), tensor_cores(config.tensor_cores), training.take_step.stream(),
+        same_bits(config.run.deterministic), tensor_cores(config.run.tensor_cores), training.take_step.stream(),
     ):  # fmt: skip
         while training.progress < 1.0 and not (interrupt.asked and training.may_stop):
             training.refresh()
@@ -126,22 +126,22 @@ class Training:
         c = self.config = config
         self.dataset, self.run = dataset, run
         self.fingerprint = dataset_fingerprint(dataset)
-        torch.manual_seed(c.seed)
-        self.generator = torch.Generator(device).manual_seed(c.seed)
-        self.source = source = PixelSource(dataset, c.foreground_share, self.generator)
+        torch.manual_seed(c.run.seed)
+        self.generator = torch.Generator(device).manual_seed(c.run.seed)
+        self.source = source = PixelSource(dataset, c.sampling.foreground_share, self.generator)
         self.model = SceneModel(c).to(device)
         self.optimiser = make_optimiser(self.model, c)
         hull = None
-        if c.hull_until > 0:
-            hull = visual_hull(c.grid_resolution, c.box, source.masks, source.poses, source.intrinsics)
+        if c.sampling.hull_until > 0:
+            hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.masks, source.poses, source.intrinsics)
         self.grid = make_grid(c, hull, device)
-        self.mesh = SurfaceMesh(self.model, background=c.background_meshes)
-        step = GraphedStep if c.cuda_graphs and device.type == "cuda" else Step
+        self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
+        step = GraphedStep if c.run.cuda_graphs and device.type == "cuda" else Step
         self.take_step = step(self.model, self.grid, self.mesh, self.generator)
         self.watch = GradientWatch(self.model.parameters())
         self.light: EvaluatedLight | None = None  # as it stands, until it moves
         self.environment: Tensor | None = None  # the light that weighs traced occlusion
-        self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.initial_rays, 0.0
+        self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.sampling.initial_rays, 0.0
         self.psnr_mean: float | None = None
         self.started = self.saved_at = time.monotonic()
         self.first = True  # step of this process
@@ -179,8 +179,8 @@ class Training:
     def progress(self) -> float:
         """Where the schedule stands, in [0, 1]."""
         c = self.config
-        by_time = self.seconds / (60.0 * c.max_minutes) if c.max_minutes > 0 else 0.0
-        return min(1.0, max(self.step / c.steps, by_time))
+        by_time = self.seconds / (60.0 * c.run.max_minutes) if c.run.max_minutes > 0 else 0.0
+        return min(1.0, max(self.step / c.run.steps, by_time))
 
     @property
     def may_stop(self) -> bool:
@@ -192,23 +192,23 @@ class Training:
         c, model, step, progress = self.config, self.model, self.step, self.progress
         model.open_levels(progress)
         set_learning_rate(self.optimiser, c, step, progress)
-        if self.first or step % c.grid_every == 0:
-            use_hull = progress < c.hull_until
+        if self.first or step % c.sampling.grid_every == 0:
+            use_hull = progress < c.sampling.hull_until
             self.grid.update(model.sdf_field.sdf, model.s_value, first=self.first, step=step, use_hull=use_hull)
-        if model.occlusion.needs_mesh and progress - self.mesh.asked_at >= c.mesh_every:
+        if model.occlusion.needs_mesh and progress - self.mesh.asked_at >= c.mesh.every:
             check_state(step, model, self.optimiser)
             self.mesh.request(progress)
-        self.mesh.poll(wait=c.deterministic)
+        self.mesh.poll(wait=c.run.deterministic)
         if self.light is None:
             self.light = model.evaluate_light()
         if self.mesh.scene is None:
             return
-        if c.occlusion == "mlp" and c.occlusion_weight > 0:
+        if c.occlusion.kind == "mlp" and c.losses.occlusion_weight > 0:
             if self.environment is None or step % ENVIRONMENT_EVERY == 0:
-                self.environment = model.light.panorama(c.environment_height)
+                self.environment = model.light.panorama(c.occlusion.environment_height)
         if step % ENVIRONMENT_EVERY == 0:
             model.occlusion.set_light(self.light)
-        if c.indirect and step % c.indirect_every == 0:
+        if c.occlusion.indirect and step % c.occlusion.indirect_every == 0:
             model.refresh_indirect(self.light)
 
     def advance(self, log: TextIO, bar: Progress) -> None:
@@ -236,10 +236,10 @@ class Training:
             check_state(self.step, self.model, self.optimiser)
             log.write(json.dumps(self.line(batch, terms, numbers)) + "\n")
             log.flush()
-        if self.progress - self.previewed_at >= c.preview_every:
+        if self.progress - self.previewed_at >= c.run.preview_every:
             self.previewed_at = self.progress
             write_preview(self.run, self.model, self.grid, self.dataset, self.step)
-        if time.monotonic() - self.saved_at > 60.0 * c.checkpoint_minutes and self.may_stop:
+        if time.monotonic() - self.saved_at > 60.0 * c.run.checkpoint_minutes and self.may_stop:
             self.save()
 
     def read(self, ray: RenderedRays, terms: dict[str, Term]) -> StepNumbers:
@@ -270,7 +270,7 @@ class Training:
         check_state(self.step, self.model, self.optimiser)
         finished = self.progress >= 1.0
         self.mesh.poll(wait=finished)
-        if finished and self.config.occlusion == "bits":
+        if finished and self.config.occlusion.kind == "bits":
             self.mesh.request(1.0)
             self.mesh.poll(wait=True)
         self.grid.update(self.model.sdf_field.sdf, self.model.s_value)
@@ -283,7 +283,7 @@ class Training:
 
 def check_repeatable(config: Config, device: torch.device | str) -> None:
     """Raises InputError where a run shall have the same bits on a device that adds in any order."""
-    if config.deterministic and torch.device(device).type != "cpu":
+    if config.run.deterministic and torch.device(device).type != "cpu":
         raise InputError("a deterministic run needs the CPU, as a GPU adds in any order; leave out --device")
 
 

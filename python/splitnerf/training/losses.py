@@ -68,15 +68,19 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     """
     c = config
     n_sets, n = (
-        (2, light.loss_samples.count(c.light_noise, c.light_samples)) if c.light_noise > 0 else (1, c.light_samples)
+        (2, light.loss_samples.count(c.losses.light_noise, c.losses.light_samples))
+        if c.losses.light_noise > 0
+        else (1, c.losses.light_samples)
     )
     draw = {"generator": generator, "device": generator.device}
-    queries = F.normalize(torch.randn(c.light_queries, 3, **draw), dim=1)
+    queries = F.normalize(torch.randn(c.losses.light_queries, 3, **draw), dim=1)
     directions = torch.cat([light_directions(c, n // n_sets, queries, generator) for _ in range(n_sets)])
     roughness = torch.ones_like(queries[:, :1])
-    roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, **draw).sort(0).values  # narrow lobes first
-    n_narrow = int((roughness < c.light_lobe_below).sum()) if c.light_lobe_below > 0 else 0
-    own = sample_ggx_lobe(queries[:n_narrow], roughness[:n_narrow], c.light_lobe_samples, seed).reshape(-1, 3)
+    roughness[: c.losses.light_queries // 2] = (
+        torch.rand(c.losses.light_queries // 2, 1, **draw).sort(0).values
+    )  # narrow lobes first
+    n_narrow = int((roughness < c.losses.light_lobe_below).sum()) if c.losses.light_lobe_below > 0 else 0
+    own = sample_ggx_lobe(queries[:n_narrow], roughness[:n_narrow], c.losses.light_lobe_samples, seed).reshape(-1, 3)
     asked = torch.cat([directions, own, queries])
     g = light(asked, torch.cat([roughness.new_zeros(len(directions) + len(own), 1), roughness]))
     shared, lobes, prefiltered = g.split([len(directions), len(own), len(queries)])
@@ -84,19 +88,19 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
         prefilter_light(queries[n_narrow:], roughness[n_narrow:], *part)
         for part in zip(directions.chunk(n_sets), shared.chunk(n_sets))
     ])  # fmt: skip
-    error = prefiltered - torch.cat([lobes.view(n_narrow, c.light_lobe_samples, 3).mean(1), sums.mean(0)])
+    error = prefiltered - torch.cat([lobes.view(n_narrow, c.losses.light_lobe_samples, 3).mean(1), sums.mean(0)])
     if n_sets == 2:
         noise = ((sums[0] - sums[1]) / 2).square().sum().item()
         light.loss_samples.learn(noise, error[n_narrow:].square().sum().item(), n)
-    return penalty(error, c.light_loss_form).sum(-1).mean()
+    return penalty(error, c.losses.light_form).sum(-1).mean()
 
 
 def light_directions(config: Config, n: int, queries: Tensor, generator: torch.Generator) -> Tensor:
     """The n directions [n, 3] that the light loss integrates over, with ``uniform_and_queries`` more."""
-    if config.light_set == "fibonacci":
+    if config.losses.light_set == "fibonacci":
         return fibonacci_directions(n, generator)
     uniform = F.normalize(torch.randn(n, 3, generator=generator, device=generator.device), dim=1)
-    return torch.cat([uniform, queries]) if config.light_set == "uniform_and_queries" else uniform
+    return torch.cat([uniform, queries]) if config.losses.light_set == "uniform_and_queries" else uniform
 
 
 def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.Generator) -> Tensor:
@@ -105,7 +109,9 @@ def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.G
     Images of a diffuse object leave it open whether a colour is the object's or the light's. This prefers a
     light without colour where nothing speaks against it.
     """
-    normals = F.normalize(torch.randn(config.neutral_queries, 3, generator=generator, device=generator.device), dim=1)
+    normals = F.normalize(
+        torch.randn(config.losses.neutral_queries, 3, generator=generator, device=generator.device), dim=1
+    )
     log_light = torch.log(light(normals, torch.ones_like(normals[:, :1])) + 1e-6)
     return (log_light - log_light.mean(1, keepdim=True)).square().mean()
 
@@ -124,11 +130,11 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
     if len(weights) == 0:
         return weights.new_zeros(())
     weights = weights.nan_to_num(0.0, 0.0, 0.0) + 1e-12  # the loss tells of what is not finite
-    chosen = torch.multinomial(weights, c.entropy_points, replacement=True, generator=generator)
+    chosen = torch.multinomial(weights, c.losses.entropy_points, replacement=True, generator=generator)
     taken = points.albedo, points.roughness, points.metallic
     albedo, roughness, metallic = (x.index_select(0, chosen) for x in taken)
-    gloss = torch.cat([roughness, metallic], dim=1) / c.gloss_width
-    x = torch.cat([torch.log(albedo + ALBEDO_FLOOR) / c.albedo_width, gloss], dim=1)
+    gloss = torch.cat([roughness, metallic], dim=1) / c.losses.gloss_width
+    x = torch.cat([torch.log(albedo + ALBEDO_FLOOR) / c.losses.albedo_width, gloss], dim=1)
     return quadratic_entropy(x)
 
 
@@ -137,25 +143,26 @@ def occlusion_loss(
 ) -> Tensor:
     """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples.
 
-    The specular lobe is that about the light's direction, or, without ``occlusion_directional``, that about the normal,
+    The specular lobe is that about the light's direction, or, without ``occlusion.directional``, that about the normal,
     as published.
 
     Source: SplitNeRF Eq. (12)-(16).
     """
     c = config
     random = torch.rand(len(ray.shaded), generator=generator, device=generator.device)
-    chosen = (random < c.occlusion_share).nonzero().squeeze(1)
+    chosen = (random < c.occlusion.share).nonzero().squeeze(1)
     if len(chosen) == 0:
         return ray.shares.new_zeros(())
     with torch.no_grad():
         normals = ray.normals[chosen]
         on_surface = ray.positions[chosen] - normals * ray.sdf[chosen, None]
         o_d, o_s = occlusion_factors(
-            scene, on_surface, normals, ray.points.lobe_dirs[chosen] if c.occlusion_directional else normals,
-            ray.points.roughness[chosen], environment, n_diffuse_rays=c.occlusion_rays, n_specular_rays=c.occlusion_rays,
-            offset=c.occlusion_offset, along_ray=c.occlusion_ray_start == "ray", seed=seed, n_channels=c.occlusion_channels,
+            scene, on_surface, normals, ray.points.lobe_dirs[chosen] if c.occlusion.directional else normals,
+            ray.points.roughness[chosen], environment, n_diffuse_rays=c.occlusion.rays,
+            n_specular_rays=c.occlusion.rays, offset=c.occlusion.offset, along_ray=c.occlusion.ray_start == "ray",
+            seed=seed, n_channels=c.occlusion.channels,
         )  # fmt: skip
     error_d, error_s = ray.points.occlusion_d[chosen] - o_d, ray.points.occlusion_s[chosen] - o_s
-    error = penalty(error_d, c.occlusion_loss_form) + penalty(error_s, c.occlusion_loss_form)
+    error = penalty(error_d, c.losses.occlusion_form) + penalty(error_s, c.losses.occlusion_form)
     shares = ray.shares[chosen]
-    return shares @ error.sum(1) / (shares.sum().clamp(min=1e-8) * c.occlusion_channels)
+    return shares @ error.sum(1) / (shares.sum().clamp(min=1e-8) * c.occlusion.channels)

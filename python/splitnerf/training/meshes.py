@@ -117,7 +117,7 @@ def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
         RuntimeError: The field is not finite.
     """
     try:
-        vertices, faces = extract_mesh(distances(network), model.config.box, model.config.mesh_resolution)
+        vertices, faces = extract_mesh(distances(network), model.config.surface.box, model.config.mesh.resolution)
     except EmptyMesh:
         return None
     return traced(model, torch.from_numpy(vertices), torch.from_numpy(faces))

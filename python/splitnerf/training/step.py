@@ -59,7 +59,7 @@ class Step:
     ) -> tuple[RenderedRays, dict[str, Term]]:  # fmt: skip
         """Renders found samples and takes the gradients; ``capacity`` as in :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
-        ray = render_rays(self.model, light, found, shades_per_ray=c.shades_per_ray, capacity=capacity)
+        ray = render_rays(self.model, light, found, shades_per_ray=c.sampling.shades_per_ray, capacity=capacity)
         terms = loss_terms(self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress)
         self.model.zero_grad(set_to_none=True)
         losses.backward(terms)
@@ -92,28 +92,28 @@ def loss_terms(
     colour, mask = pixel_losses(ray.mean, ray.opacity, batch.target, batch.background, linear=ray.linear)
     eikonal, smoothness = gradient_losses(ray.gradients, ray.weights.detach(), ray.beside)
     metal, binary_metal, dark_metal = material_losses(
-        ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.metal_loss_form == "smooth_l1"
+        ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.losses.metal_form == "smooth_l1"
     )
-    terms = {"colour": Term(c.colour_weight, colour), "eikonal": Term(c.eikonal_weight, eikonal)}
-    if c.mask_weight:
-        terms["mask"] = Term(c.mask_weight, mask)
-    if model.light.needs_consistency_loss and c.light_weight and step % c.light_every == 0:
-        terms["light"] = Term(c.light_weight, losses.light_loss(model.light, c, generator, step))
-    if c.neutral_weight and light_moves(c, step):  # for all steps since it moved
+    terms = {"colour": Term(c.losses.colour_weight, colour), "eikonal": Term(c.losses.eikonal_weight, eikonal)}
+    if c.losses.mask_weight:
+        terms["mask"] = Term(c.losses.mask_weight, mask)
+    if model.light.needs_consistency_loss and c.losses.light_weight and step % c.losses.light_every == 0:
+        terms["light"] = Term(c.losses.light_weight, losses.light_loss(model.light, c, generator, step))
+    if c.losses.neutral_weight and light_moves(c, step):  # for all steps since it moved
         since = step % light_period(c) + 1
-        terms["neutral"] = Term(c.neutral_weight * since, losses.neutral_light_loss(light, c, generator))
-    if c.normal_smoothness:
-        terms["smoothness"] = Term(c.normal_smoothness, smoothness)
-    if c.entropy_weight and progress >= c.priors_from:
-        terms["entropy"] = Term(c.entropy_weight, losses.material_entropy_loss(ray, c, generator))
-    if c.metal_regulariser:
-        terms["metal"] = Term(c.metal_weight, metal)
-    if c.binary_metal_weight and progress >= c.priors_from:
-        terms["binary_metal"] = Term(c.binary_metal_weight, binary_metal)
-    if c.dark_metal_weight:
-        terms["dark_metal"] = Term(c.dark_metal_weight, dark_metal)
+        terms["neutral"] = Term(c.losses.neutral_weight * since, losses.neutral_light_loss(light, c, generator))
+    if c.losses.smoothness_weight:
+        terms["smoothness"] = Term(c.losses.smoothness_weight, smoothness)
+    if c.losses.entropy_weight and progress >= c.losses.priors_from:
+        terms["entropy"] = Term(c.losses.entropy_weight, losses.material_entropy_loss(ray, c, generator))
+    if c.losses.metal_regulariser:
+        terms["metal"] = Term(c.losses.metal_weight, metal)
+    if c.losses.binary_metal_weight and progress >= c.losses.priors_from:
+        terms["binary_metal"] = Term(c.losses.binary_metal_weight, binary_metal)
+    if c.losses.dark_metal_weight:
+        terms["dark_metal"] = Term(c.losses.dark_metal_weight, dark_metal)
     if environment is not None:
         terms["occlusion"] = Term(
-            c.occlusion_weight, losses.occlusion_loss(ray, scene, environment, c, generator, step)
+            c.losses.occlusion_weight, losses.occlusion_loss(ray, scene, environment, c, generator, step)
         )
     return terms
