@@ -12,6 +12,7 @@ from splitnerf.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, make_rows
 from splitnerf.ablate.table import Score, csv_table, differences, markdown_table
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
+from splitnerf.config.settings import OLD_NAMES
 from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.errors import InputError
 
@@ -49,7 +50,7 @@ def test_each_of_the_papers_ablations_changes_one_thing_of_its_preset(name):
     rows = {row.name: row for row in make_rows(preset("paper"), [name])}
     ablated, reference = (flat(dataclasses.asdict(rows[row].config)) for row in (name, rows[name].reference))
     assert rows[name].reference == FULL
-    assert [key for key in ablated if ablated[key] != reference[key]] == [next(reversed(PAPER[name]))]
+    assert [key for key in ablated if ablated[key] != reference[key]] == [OLD_NAMES[next(reversed(PAPER[name]))]]
 
 
 def test_a_row_brings_what_it_is_compared_with():

@@ -101,7 +101,7 @@ SETTINGS = {
     "sampling.grid_every": ("grid_every", 32, 16, PAPER),
     "sampling.hull_until": ("hull_until", 0.1, 0.0, PAPER),
     "sampling.foreground_share": ("foreground_share", 0.85, 0.0, PAPER),
-    "losses.colour_weight": ("colour_weight", 10.0, 10.0, PAPER),
+    "losses.colour_weight": ("colour_weight", 10.0 / 3.0, 10.0, PAPER),  # the sum over channels, Eq. (3)
     "losses.light_weight": ("light_weight", 1.0, 10.0, PAPER),
     "losses.occlusion_weight": ("occlusion_weight", 0.1, 0.01, PAPER),
     "losses.eikonal_weight": ("eikonal_weight", 3.0, 0.1, PAPER),

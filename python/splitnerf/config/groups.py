@@ -203,7 +203,7 @@ class Sampling:
 class Losses:
     """Weights of the loss's terms, and what these terms compare."""
 
-    colour_weight: float = setting(10.0, "weight of the squared error of colours")
+    colour_weight: float = setting(10.0 / 3.0, "weight of the squared error of colours, summed over channels")
     light_weight: float = setting(1.0, "weight of the light's consistency (of the MLP)")
     occlusion_weight: float = setting(0.1, "weight of the traced occlusion factors (of the MLP)")
     eikonal_weight: float = setting(3.0, "weight of |gradient of the distance| = 1")

@@ -34,7 +34,7 @@ PAPER = dict(
         foreground_share=0.0,
     ),
     losses=dict(
-        eikonal_weight=0.1, light_weight=10.0, occlusion_weight=0.01, metal_weight=0.001, mask_weight=0.0,
+        colour_weight=10.0, eikonal_weight=0.1, light_weight=10.0, occlusion_weight=0.01, metal_weight=0.001, mask_weight=0.0,
         light_form="square", light_set="uniform", light_samples=8129, light_noise=0.0, light_queries=8129,
         light_lobe_below=0.0, eikonal_points=0,
         # beyond the paper

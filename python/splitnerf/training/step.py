@@ -18,6 +18,8 @@ from splitnerf.training.losses import Term
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
 
+CHANNELS = 3
+
 
 class Step:
     """One training step up to the gradients, which it leaves at the model's parameters and the light's leaves.
@@ -94,7 +96,8 @@ def loss_terms(
     metal, binary_metal, dark_metal = material_losses(
         ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.losses.metal_form == "smooth_l1"
     )
-    terms = {"colour": Term(c.losses.colour_weight, colour), "eikonal": Term(c.losses.eikonal_weight, eikonal)}
+    # SplitNeRF Eq. (3) sums the channels, of which `colour` is the mean.
+    terms = {"colour": Term(CHANNELS * c.losses.colour_weight, colour), "eikonal": Term(c.losses.eikonal_weight, eikonal)}
     if c.losses.mask_weight:
         terms["mask"] = Term(c.losses.mask_weight, mask)
     if model.light.needs_consistency_loss and c.losses.light_weight and step % c.losses.light_every == 0:
