@@ -2,46 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from tiny_runs import SMALL, train
 
 from splitnerf.training.checkpoint import config_of, load_checkpoint
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
-from splitnerf.config import Config, parse_setting, preset
-from splitnerf.demo.scene import write_demo_dataset
+from splitnerf.config import Config, preset
 from splitnerf.errors import InputError
-
-SMALL = [
-    "--set", "n_levels=4", "--set", "log2_table_size=10", "--set", "target_samples=512", "--set", "initial_rays=64",
-    "--set", "grid_resolution=16", "--set", "light_resolution=16", "--set", "light_samples=64", "--set", "light_queries=16", "--set", "eikonal_points=32",
-    "--set", "mesh_resolution=24", "--set", "export_resolution=32", "--set", "export_environment_height=16",
-    "--set", "export_faces=500", "--set", "export_texture_size=64",
-]  # fmt: skip
-
-
-@pytest.fixture(scope="session")
-def data(tmp_path_factory) -> Path:
-    """A dataset small enough that a step takes milliseconds."""
-    return write_demo_dataset(tmp_path_factory.mktemp("data") / "tiny", size=24, n_train=6, n_test=2, spp=4)
-
-
-@pytest.fixture(scope="session")
-def other_data(tmp_path_factory) -> Path:
-    return write_demo_dataset(tmp_path_factory.mktemp("data") / "other", size=24, n_train=5, n_test=2, spp=4)
-
-
-def train(data: Path, run: Path, *options: str) -> int:
-    return main(["train", str(data), "--out", str(run), *SMALL, *options])
 
 
 def test_a_run_holds_every_file(data, tmp_path, capsys):
@@ -74,7 +50,7 @@ def test_the_error_falls_with_other_steps_and_tables(data, tmp_path, settings):
     from splitnerf.ops.hash_grid import rounded
     from splitnerf.training.loop import train as train_scene
 
-    config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {"steps": 120} | settings)
+    config = preset("cpu").replace(SMALL | {"steps": 120} | settings)
     grid = train_scene(load_dataset(data), config, tmp_path).model.sdf_field.grid
     psnr = [json.loads(line)["psnr"] for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
     assert psnr[-1] > psnr[0] + 2.0
@@ -90,7 +66,7 @@ def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     from splitnerf.training.loop import train as train_scene
     from splitnerf.workflow import load_run
 
-    config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {
+    config = preset("cpu").replace(SMALL | {
         "steps": 24, "occlusion": "bits", "indirect": True, "indirect_every": 5, "occlusion_directions": 256, "open_below": 0.0,
     })  # fmt: skip
     dataset = load_dataset(data)
@@ -111,7 +87,7 @@ def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
 def test_without_a_mesh_nothing_is_occluded():
     from splitnerf.render.model import SceneModel
 
-    small = dict(parse_setting(s) for s in SMALL[1::2])
+    small = SMALL
     for kind in ("mlp", "bits", "off"):
         model = SceneModel(preset("cpu").replace(small | {"occlusion": kind, "shading": "split"}))
         points = torch.rand(5, 3)
@@ -168,7 +144,7 @@ def test_resume_goes_on_where_the_run_stopped(data, tmp_path):
     from splitnerf.training.loop import train as train_scene
 
     dataset = load_dataset(data)
-    config = preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | {"steps": 14, "grid_every": 1000})
+    config = preset("cpu").replace(SMALL | {"steps": 14, "grid_every": 1000})
     for name in ("whole", "halves"):
         (tmp_path / name).mkdir()
     whole = train_scene(dataset, config, tmp_path / "whole")
