@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import torch
 import trimesh
-from test_ops_cuda import CASES as TEST_INPUTS
-from test_ops_cuda import with_gradients
+from op_cases import CASES as TEST_INPUTS
+from op_cases import with_gradients
 from torch import Tensor
 from torch.nn import functional as F
 

@@ -31,7 +31,7 @@ import torch
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "python")]
 from gpu_cases import TINY, Case, Sizes, World, all_cases, bytes_moved, lib  # noqa: E402
 from op_checks import as_tuple, has_cuda_kernel  # noqa: E402
-from test_ops_cuda import ROUNDED_ALIKE, moved, truth  # noqa: E402
+from op_cases import ROUNDED_ALIKE, moved, truth  # noqa: E402
 
 STORED = {"float32": torch.float32, "float16": torch.float16, "bfloat16": torch.bfloat16}
 WORST = {"float32": 1e-4, "float16": 5e-3, "bfloat16": 5e-3}  # error beyond which a line has failed

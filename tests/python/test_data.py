@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from blender_data import ANGLE, SIZE, edit, make_blender, poses_around, set_pose, sphere_alpha
 
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
@@ -16,52 +17,7 @@ from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths, read_mesh
 from splitnerf.errors import InputError
 
-SIZE = 48
-ANGLE = 0.7
 REAL = Path(os.environ.get("SPLITNERF_DATA", "../shared/data"))
-
-
-def look_at(position, target):
-    back = np.subtract(position, target) / np.linalg.norm(np.subtract(position, target))
-    right = np.cross([0, 0, 1], back)
-    right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3] = np.stack([right, np.cross(back, right), back, position], axis=1)
-    return pose
-
-
-def sphere_alpha(pose, centre, radius, size=SIZE):
-    """Coverage of a sphere seen by a pinhole camera, straight from the quadratic."""
-    focal = 0.5 * size / np.tan(0.5 * ANGLE)
-    y, x = np.mgrid[:size, :size] + 0.5
-    rays = np.stack([(x - size / 2) / focal, -(y - size / 2) / focal, -np.ones_like(x)], axis=-1) @ pose[:3, :3].T
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    offset = pose[:3, 3] - centre
-    return ((rays @ offset) ** 2 > offset @ offset - radius**2).astype(np.float32)
-
-
-def poses_around(centre, radius, count):
-    golden = np.pi * (3 - np.sqrt(5))
-    heights = np.linspace(-0.6, 0.8, count)
-    angles, rings = golden * np.arange(count), np.sqrt(1 - heights**2)
-    directions = np.stack([np.cos(angles) * rings, np.sin(angles) * rings, heights], axis=1)
-    return [look_at(centre + 4 * radius * direction, centre) for direction in directions]
-
-
-def make_blender(root, centre=(0, 0, 0), radius=1.0, train=12, test=3, aim=None, grey=0.5):
-    """A grey sphere in the NeRF-Blender layout; the cameras look at `aim`, by default its centre."""
-    centre = np.array(centre, dtype=float)
-    poses = poses_around(centre if aim is None else np.array(aim, dtype=float), radius, train + test)
-    for split, chosen in (("train", poses[:train]), ("test", poses[train:])):
-        frames = []
-        for i, pose in enumerate(chosen):
-            image = np.full((SIZE, SIZE, 4), grey)
-            image[..., 3] = sphere_alpha(pose, centre, radius)
-            write_image(root / split / f"r_{i}.png", image)
-            frames.append({"file_path": f"./{split}/r_{i}", "transform_matrix": pose.tolist()})
-        meta = {"camera_angle_x": ANGLE, "frames": frames}
-        (root / f"transforms_{split}.json").write_text(json.dumps(meta))
-    return root
 
 
 def make_single(root, count=16):
@@ -95,12 +51,6 @@ def make_folders(root):
         (root / name / "metadata.json").write_text(json.dumps(meta))
     (root / "val_000").mkdir()
     return root
-
-
-def edit(root, change, name="transforms_train.json"):
-    meta = json.loads((root / name).read_text())
-    change(meta)
-    (root / name).write_text(json.dumps(meta))
 
 
 def test_blender_layout(scene):
@@ -267,14 +217,6 @@ def test_degenerate_mesh_is_named(tmp_path):
     (tmp_path / "text.ply").write_text("no mesh")
     with pytest.raises(InputError, match="text.ply"):
         read_mesh(tmp_path / "text.ply")
-
-
-def set_pose(index, value):
-    def change(meta):
-        pose = np.array(meta["frames"][index]["transform_matrix"])
-        meta["frames"][index]["transform_matrix"] = value(pose)
-
-    return change
 
 
 def nan_at_corner(pose):

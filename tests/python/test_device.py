@@ -9,12 +9,11 @@ import statistics
 import pytest
 import torch
 from pretend_gpu import GPU, GpuTensor, pretend_gpu
-from test_train import SMALL, data  # noqa: F401
+from tiny_runs import tiny
 
 from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, main
-from splitnerf.config import Config, parse_setting, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
 from splitnerf.render.renderer import find_samples
@@ -49,12 +48,8 @@ def test_modules_and_gradients_stay_there(monkeypatch):
         assert layer.weight.grad.device == GPU and optimiser.state[layer.weight]["exp_avg"].device == GPU
 
 
-def tiny(name: str, **settings: object) -> Config:
-    return preset(name).replace(dict(parse_setting(s) for s in SMALL[1::2]) | settings)
-
-
 @pytest.mark.parametrize("name", ["cpu", "fast", "paper"])
-def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeypatch, name):  # noqa: F811
+def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeypatch, name):
     """Beside the operators that must know how many samples there are: for s, for the sums' samples, for the loss."""
     waits = []
 
@@ -72,7 +67,7 @@ def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeyp
 
 
 @pytest.mark.parametrize("settings", [{}, {"sparse_steps": True, "table_dtype": "float16"}])
-def test_runs_go_on_on_the_other_device_and_back(data, tmp_path, monkeypatch, settings):  # noqa: F811
+def test_runs_go_on_on_the_other_device_and_back(data, tmp_path, monkeypatch, settings):
     dataset = load_dataset(data)
     config = tiny("cpu", occlusion_directions=256, open_below=0.0, **settings)
     trainer.train(dataset, config.replace({"steps": 12}), tmp_path)
@@ -88,7 +83,7 @@ def test_runs_go_on_on_the_other_device_and_back(data, tmp_path, monkeypatch, se
     assert all(abs(a - b) < 1.0 for a, b in itertools.pairwise(psnr))
 
 
-def test_all_files_are_written_from_there(data, tmp_path, monkeypatch):  # noqa: F811
+def test_all_files_are_written_from_there(data, tmp_path, monkeypatch):
     with pretend_gpu(monkeypatch):
         _, evaluation = reconstruct(data, tmp_path / "run", tiny("cpu", steps=24), device="cuda")
     assert evaluation["novel_view"]["psnr"] > 5
@@ -96,7 +91,7 @@ def test_all_files_are_written_from_there(data, tmp_path, monkeypatch):  # noqa:
         assert (tmp_path / "run" / name).stat().st_size > 0, name
 
 
-def test_a_gpu_is_refused_where_bits_shall_repeat(data, tmp_path, monkeypatch):  # noqa: F811
+def test_a_gpu_is_refused_where_bits_shall_repeat(data, tmp_path, monkeypatch):
     config = tiny("cpu", deterministic=True)
     with pretend_gpu(monkeypatch), pytest.raises(InputError, match="deterministic"):
         reconstruct(data, tmp_path / "run", config, device="cuda")
@@ -105,7 +100,7 @@ def test_a_gpu_is_refused_where_bits_shall_repeat(data, tmp_path, monkeypatch): 
         trainer.train(load_dataset(data), config, tmp_path, device="cuda")
 
 
-def test_without_a_gpu_the_device_is_refused(data, tmp_path, capsys):  # noqa: F811
+def test_without_a_gpu_the_device_is_refused(data, tmp_path, capsys):
     if torch.cuda.is_available():
         pytest.skip("there is a GPU")
     assert main(["train", str(data), "--out", str(tmp_path / "run"), "--device", "cuda"]) == BAD_INPUT

@@ -10,7 +10,7 @@ import pytest
 
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import read_image, srgb_to_linear, write_image
+from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
 from splitnerf.data.relit import map_files, read_relit, relight_maps
 from splitnerf.data.truth import ViewTruth
 from splitnerf.errors import InputError
@@ -146,6 +146,20 @@ def test_relit_images_are_scored_with_one_scale_and_per_map(views):
         image[..., :3] = 51
     relit = relight_scores(RelitViews(images, views, 8))
     assert relit["maps"]["my_sun"]["psnr"] > relit["psnr"] > relit["maps"]["city"]["psnr"]
+
+
+def test_an_image_that_is_darker_by_a_factor_in_linear_light_is_as_good(views):
+    """The scale is one of radiance: predictions of half the truth's radiance, in 8-bit sRGB, leave no error but their
+    rounding. As numbers of sRGB the two are no factor apart."""
+    level = np.linspace(0.1, 0.95, SIZE * SIZE).reshape(SIZE, SIZE, 1)  # sRGB
+    half = linear_to_srgb(srgb_to_linear(level) / 2)
+    opaque = np.ones((SIZE, SIZE, 1))
+    for path in views.image_paths:
+        write_image(path.with_name(f"{path.stem}_relit_city.png"), np.concatenate([level] * 3 + [opaque], -1))
+    prediction = np.rint(255 * np.concatenate([half] * 3 + [opaque], -1)).astype(np.uint8)
+    relit = relight_scores(RelitViews({"city": [prediction] * 5}, views, 8))
+    assert relit["lsq"]["scale"] == pytest.approx([2, 2, 2], rel=3e-3)
+    assert relit["psnr"] > 50 and relit["raw"]["psnr"] < 20
 
 
 def test_renderings_become_straight_srgb():

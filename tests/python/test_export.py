@@ -10,6 +10,7 @@ import struct
 import zipfile
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 import torch
 import trimesh
@@ -26,6 +27,8 @@ from splitnerf.export.glb import write_glb
 from splitnerf.export.mesh import write_mesh_ply
 from splitnerf.export.obj import write_obj
 from splitnerf.export.usdz import write_usdz
+from splitnerf.fields import Light
+from splitnerf.outputs import write_assets
 from splitnerf.render.model import SceneModel
 
 
@@ -280,6 +283,37 @@ def test_export_writes_the_asset_in_the_data_s_world(tmp_path, run, capsys):
     assert np.ptp(arrays["POSITION"], axis=0) == pytest.approx(0.7, rel=0.2)
     outward = ((arrays["POSITION"] - centre) * arrays["NORMAL"]).sum(axis=1)
     assert (outward > 0).all() and "TANGENT" in arrays and len(document["images"]) == 3
+
+
+class ThreeLamps(Light):
+    """A red lamp along +x, a green one along +y, a blue one along +z, ten degrees wide, over a dim sky."""
+
+    def __init__(self):
+        super().__init__()
+        self.level = torch.nn.Parameter(torch.tensor(5.0))
+
+    def forward(self, directions, roughness):
+        return 0.1 + self.level * (directions > np.cos(np.radians(10.0)))
+
+
+@pytest.mark.parametrize("suffix", ["exr", "hdr"])
+def test_the_exported_light_stands_as_it_does_in_the_world(tmp_path, suffix):
+    """u = 0.5 - atan2(y, x) / (2 pi) from the left, v = acos(z) / pi from the top: +x in the middle, +y a quarter of the
+    width to the left of it, +z at the top, as Blender has it. Read without the package."""
+    torch.manual_seed(0)
+    small = {"n_levels": 2, "log2_table_size": 8, "export_resolution": 24, "export_environment_height": 32}
+    model = SceneModel(Config().replace(small))
+    model.light = ThreeLamps()
+    write_assets(tmp_path, model, np.eye(4), formats=("ply",))
+    pixels = oiio.ImageBuf(str(tmp_path / f"environment.{suffix}")).get_pixels(oiio.FLOAT)[..., :3]
+    assert pixels.shape == (32, 64, 3)
+    row, column = np.mgrid[:32, :64] + 0.5
+    red, green, blue = (pixels[..., k] > 1 for k in range(3))
+    for lamp, x, y in ((red, 32, 16), (green, 16, 16)):
+        assert (column[lamp].mean(), row[lamp].mean()) == pytest.approx((x, y), abs=0.1) and lamp.sum() > 4
+        assert np.hypot(column[lamp] - x, row[lamp] - y).max() < 3
+    assert row[blue].max() < 32 * 11 / 180 and blue[0].all()
+    assert pixels[~(red | green | blue)] == pytest.approx(0.1, rel=0.01)
 
 
 def test_export_goes_into_the_run_and_ply_needs_no_textures(run):

@@ -11,33 +11,19 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 import torch
-from test_train import SMALL, data, train  # noqa: F401
+from tiny_runs import tiny, train
 
 from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, FAILED
-from splitnerf.config import Config, parse_setting, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.training.finite import MOST_SKIPPED, Diverged, first_not_finite
 
 
-def small(**settings: object) -> Config:
-    return preset("cpu").replace(dict(parse_setting(s) for s in SMALL[1::2]) | settings)
-
-
-@pytest.fixture
-def begun(data, tmp_path) -> tuple[Path, bytes]:  # noqa: F811
-    """A run of 8 steps, and its checkpoint."""
-    run = tmp_path / "run"
-    run.mkdir()
-    trainer.train(load_dataset(data), small(steps=8), run)
-    return run, (run / "checkpoint.pt").read_bytes()
-
-
-def goes_on(data: Path, run: Path, before: bytes) -> None:  # noqa: F811
+def goes_on(data: Path, run: Path, before: bytes) -> None:
     """The checkpoint is the one from before, and the run goes on from it."""
     assert (run / "checkpoint.pt").read_bytes() == before
-    trainer.train(load_dataset(data), small(steps=12), run, resume=True)
+    trainer.train(load_dataset(data), tiny(steps=12), run, resume=True)
     assert load_checkpoint(run / "checkpoint.pt")["step"] == 12
 
 
@@ -49,7 +35,7 @@ def write_floats(path: Path, pixels: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -0.5, 2.0])
-def test_an_image_with_a_bad_pixel_is_refused_and_named(data, tmp_path, capsys, value):  # noqa: F811
+def test_an_image_with_a_bad_pixel_is_refused_and_named(data, tmp_path, capsys, value):
     shutil.copytree(data, tmp_path / "data")
     dataset = load_dataset(tmp_path / "data")
     pixels = dataset.images[2].copy()
@@ -61,7 +47,7 @@ def test_an_image_with_a_bad_pixel_is_refused_and_named(data, tmp_path, capsys, 
     assert not (tmp_path / "run").exists()
 
 
-def test_a_nan_pixel_stops_the_run_and_is_named(data, begun):  # noqa: F811
+def test_a_nan_pixel_stops_the_run_and_is_named(data, begun):
     """The image came another way than through the reader."""
     run, before = begun
     dataset = load_dataset(data)
@@ -70,12 +56,12 @@ def test_a_nan_pixel_stops_the_run_and_is_named(data, begun):  # noqa: F811
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(trainer, "dataset_fingerprint", lambda _: resumed(load_dataset(data)))
         with pytest.raises(Diverged, match=rf"loss is not finite \(colour.*image {dataset.frame_names[2]} \(1 of 2304"):
-            trainer.train(dataset, small(steps=4000, foreground_share=1.0), run, resume=True)
+            trainer.train(dataset, tiny(steps=4000, foreground_share=1.0), run, resume=True)
     goes_on(data, run, before)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_light_texel_that_is_not_finite_stops_the_run(data, begun, monkeypatch, value):  # noqa: F811
+def test_a_light_texel_that_is_not_finite_stops_the_run(data, begun, monkeypatch, value):
     """An infinite one is clamped where it is used and harms no loss, but it may not be saved."""
     run, before = begun
     original = trainer.set_learning_rate
@@ -88,11 +74,11 @@ def test_a_light_texel_that_is_not_finite_stops_the_run(data, begun, monkeypatch
     with monkeypatch.context() as patch:
         patch.setattr(trainer, "set_learning_rate", planting)
         with pytest.raises(Diverged, match=r"not finite: parameter light.texels \(1 of"):
-            trainer.train(load_dataset(data), small(steps=20), run, resume=True)
+            trainer.train(load_dataset(data), tiny(steps=20), run, resume=True)
     goes_on(data, run, before)
 
 
-def test_light_that_is_infinite_is_named(data, begun, monkeypatch):  # noqa: F811
+def test_light_that_is_infinite_is_named(data, begun, monkeypatch):
     """One sample of the light on its way to the pixels."""
     from splitnerf.fields import LightPyramid
 
@@ -106,11 +92,11 @@ def test_light_that_is_infinite_is_named(data, begun, monkeypatch):  # noqa: F81
     with monkeypatch.context() as patch:
         patch.setattr(LightPyramid, "forward", planting)
         with pytest.raises(Diverged, match=r"loss is not finite .*first not finite: rendered radiance"):
-            trainer.train(load_dataset(data), small(steps=20), run, resume=True)
+            trainer.train(load_dataset(data), tiny(steps=20), run, resume=True)
     goes_on(data, run, before)
 
 
-def test_a_learning_rate_of_a_thousand_loses_no_checkpoint(data, begun, capsys):  # noqa: F811
+def test_a_learning_rate_of_a_thousand_loses_no_checkpoint(data, begun, capsys):
     run, before = begun
     options = ["--set", "learning_rate=1e3", "--set", "warmup_steps=1"]
     capsys.readouterr()
@@ -120,7 +106,7 @@ def test_a_learning_rate_of_a_thousand_loses_no_checkpoint(data, begun, capsys):
     goes_on(data, run, before)
 
 
-def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path, monkeypatch, capsys):  # noqa: F811
+def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path, monkeypatch, capsys):
     original, allows, seen = trainer.GradientWatch.largest, trainer.GradientWatch.allows, []
 
     def planting(watch):
@@ -137,7 +123,7 @@ def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path,
 
     monkeypatch.setattr(trainer.GradientWatch, "largest", planting)
     monkeypatch.setattr(trainer.GradientWatch, "allows", recording)
-    trained = trainer.train(load_dataset(data), small(steps=8), tmp_path)
+    trained = trainer.train(load_dataset(data), tiny(steps=8), tmp_path)
     assert [i for i, (allowed, _) in enumerate(seen) if not allowed] == [3, 5, 6]
     for i in (3, 5, 6):
         assert all(torch.equal(a, b) for a, b in zip(seen[i][1], seen[i + 1][1]))
@@ -158,7 +144,7 @@ def test_large_gradients_that_cancel_are_seen():
     assert watch.allows(1, watch.largest().item())
 
 
-def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch):  # noqa: F811
+def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch):
     run, before = begun
     original, steps = trainer.GradientWatch.largest, itertools.count(8)  # the run stands at step 8
 
@@ -170,7 +156,7 @@ def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch):  # n
     with monkeypatch.context() as patch:
         patch.setattr(trainer.GradientWatch, "largest", planting)
         with pytest.raises(Diverged, match=f"step {12 + MOST_SKIPPED}: .*{MOST_SKIPPED} steps in a row"):
-            trainer.train(load_dataset(data), small(steps=60), run, resume=True)
+            trainer.train(load_dataset(data), tiny(steps=60), run, resume=True)
     goes_on(data, run, before)
 
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from types import SimpleNamespace
 
 import pretend_graphs
 import pytest
 import torch
-from test_device import tiny
-from test_train import data  # noqa: F401
+from tiny_runs import lines_of, tiny
 
 from splitnerf.training import graphs
 from splitnerf.training import loop as trainer
@@ -56,15 +54,11 @@ def recording(monkeypatch):
     return used
 
 
-def losses_of(folder) -> list[dict]:
-    return [json.loads(line) for line in (folder / "metrics.jsonl").read_text().splitlines()]
-
-
 @pytest.mark.parametrize("settings", [
     {}, {"sparse_steps": True, "table_dtype": "float16"}, {"table_dtype": "bfloat16", "seed": 3},
     {"table_dtype": "float16", "sample_above": 0.0, "grid_every": 3, "target_samples": 16384},
 ])  # fmt: skip
-def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, recording, settings):  # noqa: F811
+def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, recording, settings):
     """While the light moves, levels open, meshes come, priors begin and the anneal goes on. Both have the same capacity."""
     settings = {"target_samples": 4608, "open_below": 0.0, "indirect_every": 50, "start_levels": 1} | settings
     config = tiny("cpu", steps=240, cuda_graphs=True, **settings)
@@ -83,11 +77,11 @@ def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, rec
     monkeypatch.setattr(graphs, "record", call)
     trainer.train(load_dataset(data), config, tmp_path / "called")
     assert len(called) == recording["recorded"]
-    for ours, theirs in zip(losses_of(tmp_path / "recorded"), losses_of(tmp_path / "called"), strict=True):
+    for ours, theirs in zip(lines_of(tmp_path / "recorded"), lines_of(tmp_path / "called"), strict=True):
         assert ours | {"seconds": 0} == theirs | {"seconds": 0}
 
 
-def test_a_capacity_changes_roundings_alone(data):  # noqa: F811
+def test_a_capacity_changes_roundings_alone(data):
     """Losses and gradients of one step with room for more of everything, against those with none."""
     dataset = load_dataset(data)
     config = tiny(
@@ -130,7 +124,7 @@ def test_a_capacity_changes_roundings_alone(data):  # noqa: F811
         assert (a - b).norm() <= 1e-4 * b.norm(), name
 
 
-def test_a_step_that_exceeds_its_capacity_is_not_taken(data, tmp_path, monkeypatch, recording):  # noqa: F811
+def test_a_step_that_exceeds_its_capacity_is_not_taken(data, tmp_path, monkeypatch, recording):
     monkeypatch.setattr(graphs, "SHADING_SLACK", 0.2)
     monkeypatch.setattr(graphs, "CAPACITY_UNIT", 1)
     complete, asked = [], GraphedStep.is_complete

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 import torch
+from blender_data import edit, make_blender, set_pose
 from gltf_builder import Gltf, triangle
-from test_data import edit, make_blender, set_pose
-from test_finite import begun, data, small  # noqa: F401
+from tiny_runs import tiny
 
 from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint
@@ -164,7 +164,7 @@ class Calls:
     lambda folder: Calls(bytearray, 10**15),
     lambda folder: Calls(torch.FloatTensor, 10**15),
 ])  # fmt: skip
-def test_a_checkpoint_calls_nothing(begun, tmp_path, payload):  # noqa: F811
+def test_a_checkpoint_calls_nothing(begun, tmp_path, payload):
     path = begun[0] / "checkpoint.pt"
     repack(path, lambda _: pickle.dumps({"format": 1, "model": payload(tmp_path)}, protocol=2))
     with pytest.raises(InputError, match="checkpoint.pt: not a readable checkpoint .it asks for"):
@@ -172,14 +172,14 @@ def test_a_checkpoint_calls_nothing(begun, tmp_path, payload):  # noqa: F811
     assert not (tmp_path / "owned").exists()
 
 
-def test_a_checkpoint_is_not_compressed(begun):  # noqa: F811
+def test_a_checkpoint_is_not_compressed(begun):
     path = begun[0] / "checkpoint.pt"
     repack(path, compression=zipfile.ZIP_DEFLATED)
     with pytest.raises(InputError, match="compressed"):
         load_checkpoint(path)
 
 
-def test_a_checkpoint_is_no_longer_than_its_file(begun):  # noqa: F811
+def test_a_checkpoint_is_no_longer_than_its_file(begun):
     """A directory that lists one part many times."""
     path = begun[0] / "checkpoint.pt"
     raw = path.read_bytes()
@@ -232,9 +232,9 @@ BAD_CONTENTS = {
 
 
 @pytest.fixture(scope="module")
-def written(data, tmp_path_factory) -> bytes:  # noqa: F811
+def written(data, tmp_path_factory) -> bytes:
     run = tmp_path_factory.mktemp("written")
-    trainer.train(load_dataset(data), small(steps=2), run)
+    trainer.train(load_dataset(data), tiny(steps=2), run)
     return (run / "checkpoint.pt").read_bytes()
 
 
@@ -260,22 +260,22 @@ BAD_STATES = {
 
 
 @pytest.mark.parametrize("case", BAD_STATES)
-def test_a_checkpoint_that_does_not_fit(data, written, tmp_path, case):  # noqa: F811
+def test_a_checkpoint_that_does_not_fit(data, written, tmp_path, case):
     path = tmp_path / "checkpoint.pt"
     content = torch.load(io.BytesIO(written), weights_only=True)
     BAD_STATES[case](content)
     torch.save(content, path)
     before = torch.get_rng_state()
     with pytest.raises(InputError, match="checkpoint.pt: its") as caught:
-        trainer.train(load_dataset(data), small(steps=4), tmp_path, resume=True)
+        trainer.train(load_dataset(data), tiny(steps=4), tmp_path, resume=True)
     assert len(str(caught.value).splitlines()) == 1
     torch.set_rng_state(before)
 
 
-def test_settings_that_no_longer_fit_are_named(data, begun):  # noqa: F811
+def test_settings_that_no_longer_fit_are_named(data, begun):
     for settings in ({"n_levels": 5}, {"grid_resolution": 20}):
         with pytest.raises(InputError, match="checkpoint.pt: its .* does not fit the settings"):
-            trainer.train(load_dataset(data), small(steps=12, **settings), begun[0], resume=True)
+            trainer.train(load_dataset(data), tiny(steps=12, **settings), begun[0], resume=True)
 
 
 @pytest.mark.parametrize("settings", [

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from op_cases import octahedral_directions
 from op_checks import generator, unit
-from test_ops_light_pyramid import octahedral_directions
 
 from splitnerf.config import Config
 from splitnerf.data.environment import read_environment, sample_environment

@@ -7,8 +7,8 @@ import math
 
 import pytest
 import torch
+from op_cases import HASH_SPEC
 from op_checks import check_error, devices, generator, lib
-from test_ops_hash_grid import SPEC
 
 from splitnerf.training.checkpoint import restore_optimiser
 from splitnerf.ops import AdamW, HashGrid, adamw_step_
@@ -145,7 +145,7 @@ def test_a_copy_is_rounded_as_torch_rounds_and_never_infinite(device, dtype):
 
 @pytest.mark.parametrize("sparse", [False, True])
 def test_the_grid_takes_the_copy_that_the_step_wrote(sparse):
-    grid = HashGrid(SPEC, 1.0, torch.float16)
+    grid = HashGrid(HASH_SPEC, 1.0, torch.float16)
     optimiser = AdamW(grid.parameters(), lr=0.1, sparse=sparse, copies={grid.table: grid.copy})
     x, first = torch.rand(5, 3, generator=generator()), grid.stored()
     before = first.clone()

@@ -5,54 +5,39 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib
+from op_cases import HASH_SPEC, hash_gradients, hash_inputs
+from op_checks import DEVICES, check_error, check_no_gradient, check_op, grad_leaves, lib
 from reference import hash_encode as reference_encode
 
 from splitnerf.ops import HashGrid, HashGridSpec, growth_for, hash_encode, hash_encode_jacobian
-
-SPEC = HashGridSpec(n_levels=3, n_features=2, base_resolution=3, growth=1.9, log2_table_size=7)
-
-
-def sample_inputs(device, dtype, n: int = 9) -> tuple:
-    """Arguments of ``hash_encode``: points off the cells' faces, some outside, and one closed level."""
-    positions = torch.rand(n, 3, generator=generator(), dtype=torch.float64) * 1.1 - 0.05
-    table = torch.rand(SPEC.n_entries, 2, generator=generator(1), dtype=torch.float64) * 2 - 1
-    return positions.to(device, dtype), table.to(device, dtype), *SPEC.arguments(2)
-
-
-def gradients_like(inputs: tuple) -> tuple:
-    n = inputs[0].shape[0]
-    features = torch.randn(n, SPEC.n_outputs, generator=generator(2), dtype=torch.float64)
-    jacobian = torch.randn(n, 3, SPEC.n_outputs, generator=generator(3), dtype=torch.float64)
-    return tuple(x.to(inputs[0]) for x in (features, jacobian))
 
 
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("n_active", [0, 1, 3])
 def test_matches_the_reference(device, n_active):
-    positions, table, *_ = sample_inputs(device, torch.float64, 40)
-    got = hash_encode(positions, table, SPEC, n_active)
-    expected = reference_encode(positions.cpu().numpy(), table.cpu().numpy(), SPEC, n_active)
+    positions, table, *_ = hash_inputs(device, torch.float64, 40)
+    got = hash_encode(positions, table, HASH_SPEC, n_active)
+    expected = reference_encode(positions.cpu().numpy(), table.cpu().numpy(), HASH_SPEC, n_active)
     np.testing.assert_allclose(got.cpu().numpy(), expected, atol=1e-14)
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_float32_is_close_to_float64(device):
     single, double = (
-        hash_encode_jacobian(*sample_inputs(device, t, 200)[:2], SPEC) for t in (torch.float32, torch.float64)
+        hash_encode_jacobian(*hash_inputs(device, t, 200)[:2], HASH_SPEC) for t in (torch.float32, torch.float64)
     )
     for got, expected in zip(single, double):
         torch.testing.assert_close(got.double(), expected, rtol=1e-4, atol=1e-4)
-    again = hash_encode(*sample_inputs(device, torch.float32, 200)[:2], SPEC)
+    again = hash_encode(*hash_inputs(device, torch.float32, 200)[:2], HASH_SPEC)
     torch.testing.assert_close(single[0], again, rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_opcheck(device):
     for dtype in (torch.float32, torch.float64):
-        inputs = sample_inputs(device, dtype)
+        inputs = hash_inputs(device, dtype)
         positions, table, *grid = inputs
-        g, gj = gradients_like(inputs)
+        g, gj = hash_gradients(inputs)
         check_op(lib.hash_encode, inputs, (0, 1))
         check_op(lib.hash_encode_jacobian, inputs, (0, 1))
         check_op(lib.hash_encode_backward, (positions, g, *grid), (0, 1))
@@ -62,7 +47,7 @@ def test_opcheck(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_gradcheck(device):
-    inputs = grad_leaves(sample_inputs(device, torch.float64), (0, 1))
+    inputs = grad_leaves(hash_inputs(device, torch.float64), (0, 1))
     torch.autograd.gradcheck(lib.hash_encode, inputs)
     torch.autograd.gradgradcheck(lib.hash_encode, inputs)
     torch.autograd.gradcheck(lib.hash_encode_jacobian, inputs)
@@ -70,18 +55,18 @@ def test_gradcheck(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_jacobian_is_the_derivative_of_the_features(device):
-    positions, table, *_ = grad_leaves(sample_inputs(device, torch.float64), (0,))
-    features, jacobian = hash_encode_jacobian(positions, table, SPEC)
-    for column in range(SPEC.n_outputs):
+    positions, table, *_ = grad_leaves(hash_inputs(device, torch.float64), (0,))
+    features, jacobian = hash_encode_jacobian(positions, table, HASH_SPEC)
+    for column in range(HASH_SPEC.n_outputs):
         (expected,) = torch.autograd.grad(features[:, column].sum(), positions, retain_graph=True)
         torch.testing.assert_close(jacobian[:, :, column], expected)
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_missing_gradients_raise(device):
-    inputs = sample_inputs(device, torch.float64)
+    inputs = hash_inputs(device, torch.float64)
     positions, table, *grid = inputs
-    g, gj = gradients_like(inputs)
+    g, gj = hash_gradients(inputs)
     for index in range(3):
         check_no_gradient(lib.hash_encode_jacobian_backward, (positions, g, gj, *grid), index)
     for index in range(4):
@@ -95,7 +80,7 @@ def test_missing_gradients_raise(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_empty_batch(device):
-    positions, table, *grid = grad_leaves(sample_inputs(device, torch.float32, 0), (0, 1))
+    positions, table, *grid = grad_leaves(hash_inputs(device, torch.float32, 0), (0, 1))
     features, jacobian = lib.hash_encode_jacobian(positions, table, *grid)
     assert features.shape == (0, 6) and jacobian.shape == (0, 3, 6)
     lib.hash_encode(positions, table, *grid).sum().backward()
@@ -104,17 +89,17 @@ def test_empty_batch(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_positions_outside_and_nan(device):
-    _, table, *_ = sample_inputs(device, torch.float32)
+    _, table, *_ = hash_inputs(device, torch.float32)
     nan = float("nan")
     x = torch.tensor([[-1, 0.5, 0.5], [0, 0.5, 0.5], [nan, 0.5, 0.5], [2, 9, -7], [1, 1, 0]], device=device)
-    features = hash_encode(x, table, SPEC)
+    features = hash_encode(x, table, HASH_SPEC)
     assert torch.equal(features[0], features[1]) and torch.equal(features[3], features[4])
     assert features[2].isnan().all() and not features[[0, 1, 3, 4]].isnan().any()
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_errors_name_what_is_wrong(device):
-    positions, table, *grid = sample_inputs(device, torch.float32)
+    positions, table, *grid = hash_inputs(device, torch.float32)
     check_error(
         lambda: lib.hash_encode(positions[:, :2], table, *grid),
         "hash_encode",
@@ -129,8 +114,8 @@ def test_errors_name_what_is_wrong(device):
         lambda: lib.hash_encode(positions, table[1:], *grid),
         "hash_encode",
         "table",
-        str(SPEC.n_entries),
-        str(SPEC.n_entries - 1),
+        str(HASH_SPEC.n_entries),
+        str(HASH_SPEC.n_entries - 1),
     )
     check_error(
         lambda: lib.hash_encode(positions, table.long(), *grid),
@@ -140,14 +125,17 @@ def test_errors_name_what_is_wrong(device):
         "int64",
     )
     check_error(lambda: lib.hash_encode(positions, table[0], *grid), "hash_encode", "table", "[n_entries, n_features]")
-    check_error(lambda: hash_encode(positions, table, SPEC, 4), "hash_encode", "n_active", "[0, n_levels]", "4")
+    check_error(lambda: hash_encode(positions, table, HASH_SPEC, 4), "hash_encode", "n_active", "[0, n_levels]", "4")
     check_error(lambda: lib.hash_encode(positions, table, 33, 4, 1.5, 8, 2), "n_levels", "[1, 32]", "33")
     check_error(lambda: lib.hash_encode(positions, table, 3, 0, 1.5, 8, 2), "base_resolution", "0")
     check_error(lambda: lib.hash_encode(positions, table, 3, 4, 0.5, 8, 2), "growth", "0.5")
     check_error(lambda: lib.hash_encode(positions, table, 3, 4, 1.5, 31, 2), "log2_table_size", "[1, 30]", "31")
     check_error(lambda: lib.hash_encode(positions, table, 32, 16, 3.0, 8, 2), "finest level")
     check_error(
-        lambda: hash_encode_jacobian(positions[None], table, SPEC), "hash_encode_jacobian", "positions", "[1, 9, 3]"
+        lambda: hash_encode_jacobian(positions[None], table, HASH_SPEC),
+        "hash_encode_jacobian",
+        "positions",
+        "[1, 9, 3]",
     )
 
 
@@ -161,7 +149,7 @@ def test_an_impossible_shape_raises(name, value):
 
 
 def test_module_opens_levels_one_by_one():
-    grid = HashGrid(SPEC, init_scale=1.0)
+    grid = HashGrid(HASH_SPEC, init_scale=1.0)
     x = torch.rand(5, 3)
     full = grid(x)
     grid.n_active = 1

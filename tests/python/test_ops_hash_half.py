@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import pytest
-import test_ops_sdf as sdf
 import torch
+from op_cases import (
+    BOX,
+    HASH_SPEC,
+    SDF_SPEC,
+    field_rays,
+    full_cells,
+    hash_gradients,
+    hash_inputs,
+    sample_rays_inputs,
+    sampling_settings,
+)
 from op_checks import DEVICES, check_error, check_op, generator, lib
-from test_ops_hash_grid import SPEC, gradients_like, sample_inputs
 
 from splitnerf.fields.sdf import SdfField
-from splitnerf.ops import HashGrid, HashGridSpec, hash_encode, hash_encode_jacobian
+from splitnerf.ops import HashGrid, HashGridSpec, hash_encode, hash_encode_jacobian, sample_rays
 
 DTYPES = [torch.float16, torch.bfloat16]
 ROUNDING = {torch.float16: 2.0**-11, torch.bfloat16: 2.0**-8}  # half a unit in the last place, relative
@@ -19,7 +28,7 @@ each_device = pytest.mark.parametrize("device", DEVICES)
 
 def exact_inputs(device, n: int = 200) -> tuple:
     """Positions and a table of multiples of 1/64 in [-1, 1], which float32, float16 and bfloat16 all have."""
-    positions, table, *_ = sample_inputs(device, torch.float32, n)
+    positions, table, *_ = hash_inputs(device, torch.float32, n)
     return positions, (table * 64).round() / 64
 
 
@@ -29,12 +38,12 @@ def test_the_same_entries_are_read_to_the_bit(device, dtype):
     positions, table = exact_inputs(device)
     for n_active in (2, 3):
         expected = (
-            *hash_encode_jacobian(positions, table, SPEC, n_active),
-            hash_encode(positions, table, SPEC, n_active),
+            *hash_encode_jacobian(positions, table, HASH_SPEC, n_active),
+            hash_encode(positions, table, HASH_SPEC, n_active),
         )
         for arguments in (
-            (table.to(dtype), SPEC, n_active),
-            (torch.full_like(table, 9), SPEC, n_active, table.to(dtype)),
+            (table.to(dtype), HASH_SPEC, n_active),
+            (torch.full_like(table, 9), HASH_SPEC, n_active, table.to(dtype)),
         ):
             got = *hash_encode_jacobian(positions, *arguments), hash_encode(positions, *arguments)
             for a, b in zip(got, expected):
@@ -44,11 +53,11 @@ def test_the_same_entries_are_read_to_the_bit(device, dtype):
 @each_device
 @each_dtype
 def test_the_error_is_the_rounding_of_the_entries(device, dtype):
-    positions, table, *_ = sample_inputs(device, torch.float32, 500)
-    true = hash_encode_jacobian(positions.double(), table.double(), SPEC)
-    got = hash_encode_jacobian(positions, table.to(dtype), SPEC)
-    single = hash_encode_jacobian(positions, table, SPEC)
-    largest = [1.0, 2.0 * torch.tensor([level[0] for level in SPEC.levels()], device=device).repeat_interleave(2)]
+    positions, table, *_ = hash_inputs(device, torch.float32, 500)
+    true = hash_encode_jacobian(positions.double(), table.double(), HASH_SPEC)
+    got = hash_encode_jacobian(positions, table.to(dtype), HASH_SPEC)
+    single = hash_encode_jacobian(positions, table, HASH_SPEC)
+    largest = [1.0, 2.0 * torch.tensor([level[0] for level in HASH_SPEC.levels()], device=device).repeat_interleave(2)]
     for a, b, c, size in zip(got, true, single, largest):  # an entry's error, times the weights that it is taken with
         bound = ROUNDING[dtype] * size + (c - b).abs()
         assert ((a - b).abs() <= bound).all()
@@ -60,11 +69,11 @@ def test_the_error_is_the_rounding_of_the_entries(device, dtype):
 @pytest.mark.parametrize("encode", [hash_encode, hash_encode_jacobian])
 def test_gradients_are_those_of_a_float32_table_of_these_numbers(device, dtype, encode):
     positions, table = exact_inputs(device)
-    features, jacobian = gradients_like((positions,))
+    features, jacobian = hash_gradients((positions,))
     found = []
     for learned, stored in ((table, None), (torch.full_like(table, 9), table.to(dtype))):
         leaves = positions.clone().requires_grad_(), learned.clone().requires_grad_()
-        out = encode(*leaves, SPEC, 2, stored)
+        out = encode(*leaves, HASH_SPEC, 2, stored)
         outputs, cotangents = (out, (features, jacobian)) if isinstance(out, tuple) else ((out,), (features,))
         torch.autograd.backward(outputs, cotangents)
         found.append([leaf.grad for leaf in leaves])
@@ -81,7 +90,7 @@ def test_second_order_passes_through_the_copy(device):
     found = []
     for learned, stored in ((table, None), (torch.full_like(table, 9), table.half())):
         leaves = positions.clone().requires_grad_(), learned.clone().requires_grad_()
-        features = hash_encode(*leaves, SPEC, 2, stored)
+        features = hash_encode(*leaves, HASH_SPEC, 2, stored)
         (slope,) = torch.autograd.grad(features.square().sum(), leaves[0], create_graph=True)
         found.append(torch.autograd.grad(slope.square().sum(), leaves))
     for got, expected in zip(found[1], found[0]):
@@ -92,17 +101,17 @@ def test_second_order_passes_through_the_copy(device):
 @each_dtype
 def test_small_gradients_are_summed_in_float32(device, dtype):
     """256 of 1e-9, which float16 has no number for."""
-    table = torch.zeros(SPEC.n_entries, 2, device=device, requires_grad=True)
+    table = torch.zeros(HASH_SPEC.n_entries, 2, device=device, requires_grad=True)
     corner = torch.zeros(256, 3, device=device)
-    (1e-9 * hash_encode(corner, table, SPEC, 1, table.detach().to(dtype)).sum()).backward()
+    (1e-9 * hash_encode(corner, table, HASH_SPEC, 1, table.detach().to(dtype)).sum()).backward()
     torch.testing.assert_close(table.grad[0], torch.full((2,), 256e-9, device=device), rtol=1e-4, atol=0)
 
 
 @each_device
 @each_dtype
 def test_opcheck(device, dtype):
-    positions, table, *grid = sample_inputs(device, torch.float32)
-    g, gj = gradients_like((positions,))
+    positions, table, *grid = hash_inputs(device, torch.float32)
+    g, gj = hash_gradients((positions,))
     rounded = table.to(dtype)
     for op in (lib.hash_encode, lib.hash_encode_jacobian):
         check_op(op, (positions, rounded, *grid), (0,))
@@ -114,7 +123,7 @@ def test_opcheck(device, dtype):
 @each_dtype
 @pytest.mark.parametrize("op", ["hash_encode", "hash_encode_jacobian"])
 def test_no_gradient_is_rounded(device, dtype, op):
-    positions, table, *grid = sample_inputs(device, torch.float32)
+    positions, table, *grid = hash_inputs(device, torch.float32)
     leaf = table.to(dtype).requires_grad_()
     for arguments in ((leaf, *grid), (table, *grid, leaf)):
         out = getattr(lib, op)(positions, *arguments)
@@ -125,7 +134,7 @@ def test_no_gradient_is_rounded(device, dtype, op):
 
 @each_device
 def test_errors_name_what_is_wrong(device):
-    positions, table, *grid = sample_inputs(device, torch.float32)
+    positions, table, *grid = hash_inputs(device, torch.float32)
     half = table.half()
 
     def encode(*arguments):
@@ -134,9 +143,11 @@ def test_errors_name_what_is_wrong(device):
     check_error(encode(positions.double(), half, *grid), "hash_encode", "positions", "float32", "float64")
     check_error(encode(positions, table, *grid, table), "stored must be float16 or bfloat16", "float32")
     check_error(encode(positions.double(), table.double(), *grid, half), "stored", "beside a float32 table", "float64")
-    check_error(encode(positions, table, *grid, half[1:]), "stored", str(SPEC.n_entries), str(SPEC.n_entries - 1))
-    check_error(encode(positions, half[1:], *grid), "table", "float16", str(SPEC.n_entries - 1))
-    check_error(lambda: HashGrid(SPEC, table_dtype=torch.float64), "table_dtype", "float16", "float64")
+    check_error(
+        encode(positions, table, *grid, half[1:]), "stored", str(HASH_SPEC.n_entries), str(HASH_SPEC.n_entries - 1)
+    )
+    check_error(encode(positions, half[1:], *grid), "table", "float16", str(HASH_SPEC.n_entries - 1))
+    check_error(lambda: HashGrid(HASH_SPEC, table_dtype=torch.float64), "table_dtype", "float16", "float64")
 
 
 # ---- the module ----
@@ -144,14 +155,14 @@ def test_errors_name_what_is_wrong(device):
 
 @each_dtype
 def test_the_module_reads_a_copy_that_follows_the_parameter(dtype):
-    grid, x = HashGrid(SPEC, 1.0, dtype), torch.rand(50, 3, generator=generator())
+    grid, x = HashGrid(HASH_SPEC, 1.0, dtype), torch.rand(50, 3, generator=generator())
     assert list(grid.state_dict()) == ["table"] and grid.table.dtype == torch.float32
 
     def check():
         stored = grid.stored()
         assert stored.dtype == dtype and torch.equal(stored, grid.table.detach().to(dtype))
-        assert torch.equal(grid(x), hash_encode(x, stored, SPEC))
-        assert torch.equal(grid.jacobian(x)[1], hash_encode_jacobian(x, stored, SPEC)[1])
+        assert torch.equal(grid(x), hash_encode(x, stored, HASH_SPEC))
+        assert torch.equal(grid.jacobian(x)[1], hash_encode_jacobian(x, stored, HASH_SPEC)[1])
         return stored
 
     stored = check()
@@ -163,16 +174,16 @@ def test_the_module_reads_a_copy_that_follows_the_parameter(dtype):
     optimiser.step()
     assert check() is stored and not torch.equal(stored, first)  # a recorded step reads this memory
     second = stored.clone()
-    grid.load_state_dict({"table": torch.rand(SPEC.n_entries, 2)})
+    grid.load_state_dict({"table": torch.rand(HASH_SPEC.n_entries, 2)})
     assert not torch.equal(check(), second)
-    grid.table = torch.nn.Parameter(torch.rand(SPEC.n_entries, 2))
+    grid.table = torch.nn.Parameter(torch.rand(HASH_SPEC.n_entries, 2))
     check()
 
 
 @each_dtype
 def test_what_16_bits_cannot_hold_becomes_their_largest_number(dtype):
     largest = torch.finfo(dtype).max
-    grid = HashGrid(SPEC, table_dtype=dtype)
+    grid = HashGrid(HASH_SPEC, table_dtype=dtype)
     beyond = [65504.0, 65519.9, 65520.0, 1e30, 3.4e38, float("inf"), 65504.0, 1e-30]
     with torch.no_grad():
         grid.table[:8, 0], grid.table[:8, 1] = torch.tensor(beyond), -torch.tensor(beyond)
@@ -186,7 +197,7 @@ def test_what_16_bits_cannot_hold_becomes_their_largest_number(dtype):
 
 
 def test_the_copy_costs_nothing_without_a_dtype():
-    assert HashGrid(SPEC).stored() is None
+    assert HashGrid(HASH_SPEC).stored() is None
 
 
 # ---- the distance field ----
@@ -194,7 +205,7 @@ def test_the_copy_costs_nothing_without_a_dtype():
 
 def exact_field(table_dtype=None) -> SdfField:
     torch.manual_seed(0)
-    field = SdfField(sdf.SPEC, sdf.BOX, table_dtype=table_dtype)
+    field = SdfField(SDF_SPEC, BOX, table_dtype=table_dtype)
     with torch.no_grad():
         field.grid.table.copy_((torch.randn(field.grid.table.shape) * 16).round() / 64)
     return field
@@ -209,9 +220,9 @@ def test_the_field_reads_the_copy(dtype):
         assert torch.equal(rounded.sdf(x), plain.sdf(x))
     a, b = rounded.sample(x), plain.sample(x)
     assert torch.equal(a.outputs, b.outputs) and torch.equal(a.gradient, b.gradient)
-    o, d, jitter = (t.float() for t in sdf.rays())
+    o, d, jitter = (t.float() for t in field_rays())
     samples = [
-        sdf.sample_rays(o, d, jitter, sdf.cells(), field.network(), **sdf.settings()) for field in (rounded, plain)
+        sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings()) for field in (rounded, plain)
     ]
     assert len(samples[0][0].t_starts) > 30
     for got, expected in zip((*samples[0][0], samples[0][1]), (*samples[1][0], samples[1][1])):
@@ -220,7 +231,7 @@ def test_the_field_reads_the_copy(dtype):
 
 @each_dtype
 def test_the_field_opchecks(dtype):
-    x, *network = (sdf.arguments(torch.float32)[0], *sdf.arguments(torch.float32)[4:16])
+    x, *network = (sample_rays_inputs(torch.float32)[0], *sample_rays_inputs(torch.float32)[4:16])
     check_op(lib.sdf_values, (x, network[0].to(dtype), *network[1:]))
     doubles = [t.double() if isinstance(t, torch.Tensor) else t for t in network[1:]]
     check_error(lambda: lib.sdf_values(x.double(), network[0].to(dtype), *doubles), "sdf_values", "table", "float64")

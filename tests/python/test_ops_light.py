@@ -6,38 +6,24 @@ import numpy as np
 import pytest
 import reference
 import torch
+from op_cases import prefilter_backward_inputs, prefilter_inputs
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 
 from splitnerf.ops import fibonacci_directions, prefilter_light, sample_ggx_lobe
 
 
-def sample_inputs(device, dtype, n_queries: int = 6, n_lights: int = 40) -> tuple:
-    """Arguments of ``prefilter_light``: a lattice of lights, so that every lobe meets some."""
-    queries = unit(torch.randn(n_queries, 3, generator=generator(), dtype=torch.float64))
-    roughness = torch.rand(n_queries, 1, generator=generator(1), dtype=torch.float64) * 0.8 + 0.2
-    lights = fibonacci_directions(n_lights, generator(2), torch.float64)
-    light = torch.rand(n_lights, 3, generator=generator(3), dtype=torch.float64) * 5
-    return tuple(x.to(device, dtype) for x in (queries, roughness, lights, light))
-
-
-def backward_inputs(device, dtype) -> tuple:
-    queries, roughness, lights, light = sample_inputs(device, dtype)
-    total = lib.prefilter_light(queries, roughness, lights, light)[1]
-    return queries, roughness, total, torch.randn(6, 3, generator=generator(4)).to(device, dtype), lights
-
-
 @pytest.mark.parametrize("device", DEVICES)
 def test_prefilter_matches_the_reference(device):
-    inputs = sample_inputs(device, torch.float64, 100, 900)
+    inputs = prefilter_inputs(device, torch.float64, 100, 900)
     got = prefilter_light(*inputs)
     np.testing.assert_allclose(got.cpu(), reference.prefilter_light(*(x.cpu().numpy() for x in inputs)), rtol=1e-10)
-    single = prefilter_light(*sample_inputs(device, torch.float32, 100, 900))
+    single = prefilter_light(*prefilter_inputs(device, torch.float32, 100, 900))
     torch.testing.assert_close(single.double(), got, rtol=1e-4, atol=0)
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_constant_light_stays_itself(device):
-    queries, _, lights, light = sample_inputs(device, torch.float32, 50, 300)
+    queries, _, lights, light = prefilter_inputs(device, torch.float32, 50, 300)
     for roughness in (0.0, 0.05, 0.5, 1.0):
         out = prefilter_light(queries, torch.full_like(queries[:, :1], roughness), lights, torch.full_like(light, 3.0))
         torch.testing.assert_close(out, torch.full_like(out, 3.0))
@@ -46,32 +32,32 @@ def test_constant_light_stays_itself(device):
 @pytest.mark.parametrize("device", DEVICES)
 def test_opcheck(device):
     for dtype in (torch.float32, torch.float64):
-        queries, roughness, lights, light = sample_inputs(device, dtype)
+        queries, roughness, lights, light = prefilter_inputs(device, dtype)
         check_op(lib.prefilter_light, (queries, roughness, lights, light), (3,))
-        check_op(lib.prefilter_light_backward, backward_inputs(device, dtype))
+        check_op(lib.prefilter_light_backward, prefilter_backward_inputs(device, dtype))
         check_op(lib.sample_ggx_lobe, (queries, roughness, 5, 3))
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_gradcheck(device):
-    inputs = grad_leaves(sample_inputs(device, torch.float64), (3,))
+    inputs = grad_leaves(prefilter_inputs(device, torch.float64), (3,))
     torch.autograd.gradcheck(lambda light: prefilter_light(*inputs[:3], light), inputs[3])
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_missing_gradients_raise(device):
-    inputs = sample_inputs(device, torch.float64)
+    inputs = prefilter_inputs(device, torch.float64)
     for index in range(3):
         check_no_gradient(lib.prefilter_light, inputs, index)
     for index in range(5):
-        check_no_gradient(lib.prefilter_light_backward, backward_inputs(device, torch.float64), index)
+        check_no_gradient(lib.prefilter_light_backward, prefilter_backward_inputs(device, torch.float64), index)
     for index in range(2):
         check_no_gradient(lib.sample_ggx_lobe, (*inputs[:2], 4, 0), index)
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_empty_batch(device):
-    queries, roughness, lights, light = grad_leaves(sample_inputs(device, torch.float32, 0), (3,))
+    queries, roughness, lights, light = grad_leaves(prefilter_inputs(device, torch.float32, 0), (3,))
     out = prefilter_light(queries, roughness, lights, light)
     out.sum().backward()
     assert out.shape == (0, 3) and not light.grad.any()
@@ -100,7 +86,7 @@ def test_fibonacci_directions_are_uniform_and_seeded():
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_lobe_samples_estimate_the_prefiltered_light(device):
-    queries, _, lights, _ = sample_inputs(device, torch.float64, 20, 60000)
+    queries, _, lights, _ = prefilter_inputs(device, torch.float64, 20, 60000)
     smooth = lambda w: 1 + torch.sin(2 * w)  # noqa: E731
     for rho in (0.2, 0.6, 1.0):
         roughness = torch.full_like(queries[:, :1], rho)
@@ -113,7 +99,7 @@ def test_lobe_samples_estimate_the_prefiltered_light(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_errors_name_what_is_wrong(device):
-    queries, roughness, lights, light = sample_inputs(device, torch.float32)
+    queries, roughness, lights, light = prefilter_inputs(device, torch.float32)
     check_error(
         lambda: prefilter_light(queries, roughness[:, 0], lights, light),
         "prefilter_light",

@@ -6,6 +6,7 @@ import math
 
 import pytest
 import torch
+from op_cases import LIGHT_NODES, lookup_inputs, octahedral_directions
 from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 
 from splitnerf import _core
@@ -19,32 +20,6 @@ from splitnerf.ops import (
     sparse_product,
     zonal_factors,
 )
-
-NODES = (0.05, 0.2, 0.4, 0.5)
-RESOLUTIONS = (16, 8, 4)
-ROUGHNESS = (0.0, 0.03, 0.1, 0.31, 0.43, 0.49, 0.55, 0.8, 0.97)
-
-
-def octahedral_directions(n: int) -> torch.Tensor:
-    """[n^2, 3] unit float64 directions of the texel centres."""
-    centres = (torch.arange(n, dtype=torch.float64) + 0.5) * 2 / n - 1
-    y, x = torch.meshgrid(centres, centres, indexing="ij")
-    z = 1 - x.abs() - y.abs()
-    sign = lambda v: torch.where(v < 0, -1.0, 1.0).double()  # noqa: E731
-    below = z < 0
-    x, y = torch.where(below, (1 - y.abs()) * sign(x), x), torch.where(below, (1 - x.abs()) * sign(y), y)
-    return unit(torch.stack([x, y, z], -1).reshape(-1, 3))
-
-
-def lookup_inputs(dtype=torch.float64, n: int = 18) -> tuple:
-    directions = unit(torch.randn(n, 3, generator=generator(1), dtype=torch.float64))
-    roughness = torch.tensor(ROUGHNESS, dtype=torch.float64).repeat(n)[:n, None]
-    levels = torch.rand(sum(r * r for r in RESOLUTIONS), 3, generator=generator(2), dtype=torch.float64) + 0.1
-    sh = torch.randn(169, 3, generator=generator(3), dtype=torch.float64) * 0.1
-    sh[0] = 4.0
-    zonal = zonal_factors(NODES[-1], 33)
-    floats = (x.to(dtype) for x in (directions, roughness, levels, sh))
-    return (*floats, torch.tensor(RESOLUTIONS), torch.tensor(NODES, dtype=torch.float64), zonal.to(dtype))
 
 
 def as_double(matrix: SparseMap) -> SparseMap:
@@ -151,7 +126,7 @@ def test_the_lookup_is_continuous_across_every_seam_and_node():
             for side in (-step, step):
                 near = light_lookup(unit(points + side * offset), roughness, *rest)
                 assert (near - at).abs().max() < 20 * step * 16
-    for node in NODES:
+    for node in LIGHT_NODES:
         sides = [
             light_lookup(points, torch.full_like(roughness, node + s), levels, sh, resolutions, nodes, zonal)
             for s in (-1e-9, 1e-9)

@@ -7,13 +7,10 @@ import math
 import pytest
 import reference
 import torch
+from op_cases import field_gradients, pixel_inputs, rand
 from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 
 from splitnerf.ops import gradient_losses, material_losses, pixel_losses, quadratic_entropy
-
-
-def rand(*shape: int, seed: int = 0, dtype=torch.float64) -> torch.Tensor:
-    return torch.rand(*shape, generator=generator(seed), dtype=torch.float64).to(dtype)
 
 
 def same_as(ours: tuple, theirs: tuple, leaves: tuple, twins: tuple) -> None:
@@ -30,18 +27,10 @@ def same_as(ours: tuple, theirs: tuple, leaves: tuple, twins: tuple) -> None:
 # ---- pixels ----
 
 
-def pixels(n: int = 60, dtype=torch.float64) -> tuple:
-    """Colours up to 1.6, some below 0; opacities beyond both bounds of the mask's; some channels clipped by the photo."""
-    target = rand(n, 4, seed=3)
-    target[::7, :2] = 1.0
-    parts = 1.7 * rand(n, 3) - 0.1, 1.004 * rand(n, seed=1) - 0.002, target, rand(n, 3, seed=4)
-    return tuple(part.to(dtype) for part in parts)
-
-
 @pytest.mark.parametrize("linear", [True, False])
 @pytest.mark.parametrize("n", [1, 60])
 def test_pixels_and_their_gradients_are_the_formula(n, linear):
-    leaves, twins = grad_leaves(pixels(n), (0, 1)), grad_leaves(pixels(n), (0, 1))
+    leaves, twins = grad_leaves(pixel_inputs(n), (0, 1)), grad_leaves(pixel_inputs(n), (0, 1))
     same_as(pixel_losses(*leaves, linear=linear), reference.pixel_losses(*twins, linear), leaves, twins)
 
 
@@ -79,13 +68,6 @@ def test_smoothness_counts_bends():
     crossed = 0.5 * torch.erfc(torch.tensor(0.5) / 2**0.5).item()  # a normal variable beyond half its deviation
     assert loss(-0.5) == pytest.approx(0.0, abs=1e-6) and loss(0.5) == pytest.approx(0.0, abs=1e-6)
     assert loss(-0.01) == pytest.approx(crossed, rel=0.05)
-
-
-def field_gradients(dtype=torch.float64) -> tuple:
-    g = torch.randn(40, 3, generator=generator(), dtype=torch.float64)
-    g[30:] = g[[4, 4, 9, 2, 0, 11, 19, 7, 7, 3]] + 0.4 * torch.randn(10, 3, generator=generator(1), dtype=torch.float64)
-    beside = torch.tensor([4, 4, 9, 2, 0, 11, 19, 7, 7, 5])  # the last one's neighbour is somewhere else
-    return g.to(dtype), rand(20, seed=2, dtype=dtype), beside
 
 
 def test_gradients_and_theirs_are_the_formula():
@@ -177,7 +159,7 @@ def test_a_batch_without_anything_costs_nothing():
 
 def test_a_nan_shows():
     for k, linear in ((0, True), (0, False), (1, True)):
-        x = list(pixels())
+        x = list(pixel_inputs())
         x[k][3] = math.nan
         assert pixel_losses(*x, linear=linear)[0].isnan()
     g, w, beside = field_gradients()
@@ -190,27 +172,27 @@ def test_a_nan_shows():
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_opcheck_of_the_losses(dtype):
-    check_op(lib.pixel_losses, (*pixels(9, dtype), True), (0, 1))
+    check_op(lib.pixel_losses, (*pixel_inputs(9, dtype), True), (0, 1))
     check_op(lib.gradient_losses, field_gradients(dtype), (0,))
     check_op(lib.material_losses, (rand(6, 3, dtype=dtype), rand(6, 1, dtype=dtype), rand(6, dtype=dtype), False), (1,))
 
 
 def test_float32_of_the_losses_is_close_to_float64():
     for op, inputs in (
-        (lambda *x: pixel_losses(*x), pixels), (lambda *x: gradient_losses(*x), field_gradients),
+        (lambda *x: pixel_losses(*x), pixel_inputs), (lambda *x: gradient_losses(*x), field_gradients),
     ):  # fmt: skip
         for single, exact in zip(op(*inputs(dtype=torch.float32)), op(*inputs())):
             assert single.item() == pytest.approx(exact.item(), rel=1e-5)
 
 
 def test_what_has_no_gradient_and_what_does_not_fit():
-    check_no_gradient(lib.pixel_losses, (*pixels(5), True), 2)
+    check_no_gradient(lib.pixel_losses, (*pixel_inputs(5), True), 2)
     check_no_gradient(lib.gradient_losses, field_gradients(), 1)
     check_no_gradient(lib.material_losses, (rand(6, 3), rand(6, 1), rand(6), False), 0)
     g, w, beside = field_gradients()
     check_error(lambda: gradient_losses(g, w, beside + 15), "gradient_losses", "beside must hold indices of weights")
     check_error(lambda: gradient_losses(g[:25], w, beside), "gradient_losses", "samples and their neighbours")
-    check_error(lambda: pixel_losses(*pixels(4)[:3], rand(5, 3)), "pixel_losses", "background must be [4, 3]")
+    check_error(lambda: pixel_losses(*pixel_inputs(4)[:3], rand(5, 3)), "pixel_losses", "background must be [4, 3]")
     check_error(lambda: material_losses(rand(4, 3), rand(5, 1), rand(5)), "material_losses", "albedo must be [5, 3]")
 
 

@@ -6,20 +6,12 @@ import math
 
 import pytest
 import torch
-from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
+from op_cases import drawn_inputs, shared_inputs
+from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 
 from splitnerf.ops import brdf_lut, monte_carlo_light, sample_bsdf
 
 GRADIENTS = (0, 2, 5)  # normals, roughness, radiance
-
-
-def inputs(n: int = 5, k: int = 6, dtype=torch.float64, seed: int = 0) -> tuple:
-    g = generator(seed)
-    normals = unit(torch.randn(n, 3, generator=g, dtype=dtype))
-    view_dirs = unit(normals + 0.7 * unit(torch.randn(n, 3, generator=g, dtype=dtype)))
-    roughness = 0.2 + 0.7 * torch.rand(n, 1, generator=g, dtype=dtype)
-    directions, pdf = sample_bsdf(normals, view_dirs, roughness, k, seed)
-    return normals, view_dirs, roughness, directions, pdf, torch.rand(n, k, 3, generator=g, dtype=dtype)
 
 
 def at(n_dot_v: float, roughness: float, dtype=torch.float64) -> tuple:
@@ -58,21 +50,21 @@ def test_density_integrates_to_one_and_matches_the_samples(roughness):
 
 
 def test_a_normal_that_faces_away_is_turned():
-    normals, view_dirs, roughness, directions, pdf, radiance = inputs()
+    normals, view_dirs, roughness, directions, pdf, radiance = drawn_inputs()
     flipped = monte_carlo_light(-normals, view_dirs, roughness, directions, pdf, radiance)
     for a, b in zip(flipped, monte_carlo_light(normals, view_dirs, roughness, directions, pdf, radiance)):
         torch.testing.assert_close(a, b)
 
 
 def test_opcheck():
-    check_op(lib.sample_bsdf, (*inputs()[:3], 4, 1))
-    check_op(lib.monte_carlo_light, inputs(), GRADIENTS)
+    check_op(lib.sample_bsdf, (*drawn_inputs()[:3], 4, 1))
+    check_op(lib.monte_carlo_light, drawn_inputs(), GRADIENTS)
     grad_sums = torch.ones(5, 3, 3, dtype=torch.float64)
-    check_op(lib.monte_carlo_light_backward, (*inputs(), grad_sums))
+    check_op(lib.monte_carlo_light_backward, (*drawn_inputs(), grad_sums))
 
 
 def test_gradcheck():
-    x = inputs()
+    x = drawn_inputs()
     assert torch.autograd.gradcheck(
         lambda n, r, l: torch.stack(monte_carlo_light(n, x[1], r, x[3], x[4], l)), grad_leaves((x[0], x[2], x[5]), (0, 1, 2)),
         atol=1e-7, rtol=1e-6,
@@ -80,8 +72,8 @@ def test_gradcheck():
 
 
 def test_float32_is_close_to_float64():
-    exact = monte_carlo_light(*inputs(200, 32))
-    single = monte_carlo_light(*(x.float() for x in inputs(200, 32)))
+    exact = monte_carlo_light(*drawn_inputs(200, 32))
+    single = monte_carlo_light(*(x.float() for x in drawn_inputs(200, 32)))
     for a, b in zip(single, exact):
         torch.testing.assert_close(a.double(), b, rtol=2e-4, atol=1e-5)
 
@@ -103,9 +95,9 @@ def test_edges_stay_finite(n_dot_v, roughness):
 def test_missing_gradients_raise():
     for position in (1, 3, 4):
         with pytest.raises(RuntimeError, match="no gradient to"):
-            torch.stack(monte_carlo_light(*grad_leaves(inputs(), (position,)))).sum().backward()
+            torch.stack(monte_carlo_light(*grad_leaves(drawn_inputs(), (position,)))).sum().backward()
     with pytest.raises(RuntimeError, match="no gradient"):
-        sample_bsdf(*grad_leaves(inputs()[:3], (0,)), 4)[0].sum().backward()
+        sample_bsdf(*grad_leaves(drawn_inputs()[:3], (0,)), 4)[0].sum().backward()
 
 
 def test_empty_batch():
@@ -116,7 +108,7 @@ def test_empty_batch():
 
 
 def test_errors_name_what_is_wrong():
-    n, v, r, d, p, l = inputs()
+    n, v, r, d, p, l = drawn_inputs()
     with pytest.raises(Exception, match=r"pdf must be \[5, 6\] float64"):
         monte_carlo_light(n, v, r, d, p[:, :3], l)
     with pytest.raises(Exception, match="n_samples must be in"):
@@ -124,17 +116,6 @@ def test_errors_name_what_is_wrong():
 
 
 # ---- one set of directions for all points ----
-
-
-def shared_inputs(n: int = 5, k: int = 24, dtype=torch.float64, with_sent: bool = True) -> tuple:
-    g = generator(8)
-    normals, view_dirs, roughness = (x.to(dtype) for x in inputs(n)[:3])
-    directions = unit(torch.randn(k, 3, generator=g, dtype=torch.float64)).to(dtype)
-    solid_angles, radiance, visible, sent = (
-        torch.rand(*shape, generator=g, dtype=torch.float64).to(dtype)
-        for shape in ((k,), (k, 3), (n, k), (n if with_sent else 0, k, 3))
-    )
-    return normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent
 
 
 @pytest.mark.parametrize("with_sent", [True, False])

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 import reference
 import torch
-from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
+from op_cases import OFFSETS, composite_inputs, march_inputs, neus_inputs, packed_samples, surface_inputs
+from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 
 from splitnerf.ops import (
-    CELL_OCCUPIED,
-    CELL_OPAQUE,
     PackedSamples,
     composite,
     march_rays,
@@ -18,47 +17,6 @@ from splitnerf.ops import (
     spread_samples,
     surface_weights,
 )
-
-OFFSETS = [0, 9, 9, 10, 24]  # one ray without samples
-
-
-def sample_inputs(device, dtype, min_transmittance: float = 0.0) -> tuple:
-    """Arguments of ``neus_weights``: rays that cross the surface, with some samples along which f rises."""
-    n = OFFSETS[-1]
-    draw = generator()
-    f_prev = torch.linspace(0.5, -0.3, n, dtype=torch.float64) + 0.1 * torch.rand(
-        n, generator=draw, dtype=torch.float64
-    )
-    f_next = f_prev - 0.1 + 0.15 * torch.rand(n, generator=draw, dtype=torch.float64)
-    offsets = torch.tensor(OFFSETS, device=device)
-    return (
-        f_prev.to(device, dtype),
-        f_next.to(device, dtype),
-        torch.tensor(8.0, device=device, dtype=dtype),
-        offsets,
-        min_transmittance,
-    )
-
-
-def composite_inputs(device, dtype) -> tuple:
-    weights = torch.rand(OFFSETS[-1], generator=generator(1), dtype=torch.float64)
-    values = torch.randn(OFFSETS[-1], 4, generator=generator(2), dtype=torch.float64)
-    return weights.to(device, dtype), values.to(device, dtype), torch.tensor(OFFSETS, device=device)
-
-
-def march_inputs(device, dtype, n: int = 40) -> tuple:
-    """Arguments of ``march_rays``: cameras inside and outside the box, some rays parallel to an axis."""
-    draw = generator(3)
-    origins = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64)) * (
-        1 + 2 * torch.rand(n, 1, generator=draw, dtype=torch.float64)
-    )
-    directions = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64) * 0.4 - origins)
-    directions[::8] = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64)
-    jitter = torch.rand(n, generator=draw, dtype=torch.float64)
-    cells = torch.randint(0, 12, (7, 7, 7), generator=draw)
-    cells = torch.where(cells == 11, CELL_OPAQUE, torch.where(cells > 5, CELL_OCCUPIED, 0)).to(torch.uint8)
-    return *(x.to(device, dtype) for x in (origins, directions, jitter)), cells.to(device), 1.5, 0.03, 64
-
 
 # ---- march_rays ----
 
@@ -115,26 +73,26 @@ def test_march_errors(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_neus_matches_the_reference(device):
-    inputs = sample_inputs(device, torch.float64)
+    inputs = neus_inputs(device, torch.float64)
     weights, opacity = neus_weights(*inputs)
     expected = reference.neus_weights(*(x.cpu() for x in inputs[:3]), OFFSETS)
     torch.testing.assert_close(weights.cpu(), expected[0])
     torch.testing.assert_close(opacity.cpu(), expected[1])
-    single = neus_weights(*sample_inputs(device, torch.float32))
+    single = neus_weights(*neus_inputs(device, torch.float32))
     torch.testing.assert_close(single[0].double(), weights, rtol=1e-4, atol=1e-6)
 
 
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("min_transmittance", [0.0, 0.3])
 def test_neus_gradcheck(device, min_transmittance):
-    inputs = grad_leaves(sample_inputs(device, torch.float64, min_transmittance), (0, 1, 2))
+    inputs = grad_leaves(neus_inputs(device, torch.float64, min_transmittance), (0, 1, 2))
     torch.autograd.gradcheck(lib.neus_weights, inputs)
     torch.autograd.gradcheck(lambda *x: lib.neus_weights(*x)[1], inputs)
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_neus_gradient_matches_the_reference(device):
-    got, expected = (grad_leaves(sample_inputs(d, torch.float64), (0, 1, 2)) for d in (device, "cpu"))
+    got, expected = (grad_leaves(neus_inputs(d, torch.float64), (0, 1, 2)) for d in (device, "cpu"))
     g = torch.randn(OFFSETS[-1], generator=generator(5), dtype=torch.float64)
     (neus_weights(*got)[0] * g.to(device)).sum().backward()
     (reference.neus_weights(*expected[:3], OFFSETS)[0] * g).sum().backward()
@@ -145,7 +103,7 @@ def test_neus_gradient_matches_the_reference(device):
 @pytest.mark.parametrize("device", DEVICES)
 def test_neus_opcheck(device):
     for dtype in (torch.float32, torch.float64):
-        inputs = sample_inputs(device, dtype)
+        inputs = neus_inputs(device, dtype)
         outputs = lib.neus_weights(*inputs)
         check_op(lib.neus_weights, inputs, (0, 1, 2))
         check_op(lib.neus_weights_backward, (*inputs, outputs[0], *(torch.ones_like(x) for x in outputs)))
@@ -153,7 +111,7 @@ def test_neus_opcheck(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_neus_missing_gradients_raise(device):
-    inputs = sample_inputs(device, torch.float64)
+    inputs = neus_inputs(device, torch.float64)
     outputs = lib.neus_weights(*inputs)
     backward = (*inputs, outputs[0], *(torch.ones_like(x) for x in outputs))
     for index in (0, 1, 2, 5, 6, 7):
@@ -177,7 +135,7 @@ def test_neus_empty_batches(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_neus_errors(device):
-    f_prev, f_next, s, offsets, _ = sample_inputs(device, torch.float32)
+    f_prev, f_next, s, offsets, _ = neus_inputs(device, torch.float32)
     check_error(lambda: neus_weights(f_prev, f_next[1:], s, offsets), "neus_weights", "f_next", "[24] float32", "[23]")
     check_error(lambda: neus_weights(f_prev, f_next, s[None], offsets), "neus_weights", "s must be [] float32", "[1]")
     check_error(lambda: neus_weights(f_prev, f_next, s, offsets.int()), "neus_weights", "offsets", "int64")
@@ -189,18 +147,6 @@ def test_neus_errors(device):
 
 
 # ---- surface_weights ----
-
-
-def surface_inputs(dtype=torch.float64) -> tuple:
-    """Samples of 50 rays around a surface, some seen from behind, one with next to no gradient."""
-    _, samples, _ = packed()
-    n, g = int(samples.offsets[-1]), generator(8)
-    sdf = 0.2 * torch.randn(n, generator=g, dtype=torch.float64)
-    gradient = torch.randn(n, 3, generator=g, dtype=torch.float64)
-    gradient[5] *= 1e-5
-    rays_d = unit(torch.randn(50, 3, generator=g, dtype=torch.float64))
-    s = torch.tensor(12.0, dtype=torch.float64)
-    return *(x.to(dtype) for x in (sdf, gradient, rays_d, s)), samples.offsets
 
 
 def surface_by_formula(sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance) -> tuple:
@@ -267,25 +213,9 @@ def test_samples_of_no_ray_count_for_nothing(dtype):
 # ---- spread_samples, interpolate ----
 
 
-def packed(dtype=torch.float64, seed: int = 4) -> tuple:
-    """Weights and samples of 50 rays, the third without samples and the fifth without weight."""
-    g = generator(seed)
-    counts = torch.randint(1, 12, (50,), generator=g)
-    counts[2] = 0
-    offsets = torch.cat([torch.zeros(1, dtype=torch.int64), counts.cumsum(0)])
-    n = int(offsets[-1])
-    rays = torch.repeat_interleave(torch.arange(50), counts)
-    starts = torch.rand(n, generator=g, dtype=torch.float64).cumsum(0)
-    weights = torch.rand(n, generator=g, dtype=torch.float64) ** 4
-    weights[rays == 4] = 0
-    phase = torch.rand(50, generator=g, dtype=torch.float64)
-    samples = PackedSamples(rays, starts.to(dtype), (starts + 0.1).to(dtype), offsets)
-    return weights.to(dtype), samples, phase.to(dtype)
-
-
 @pytest.mark.parametrize("per_ray", [1, 3, 7])
 def test_spread_draws_what_weighs_and_one_of_each_ray(per_ray):
-    weights, samples, phase = packed()
+    weights, samples, phase = packed_samples()
     shaded = spread_samples(weights, samples, per_ray, phase).shaded
     assert (shaded.diff() > 0).all()
     drawn = torch.bincount(samples.ray_indices[shaded], minlength=50)
@@ -297,7 +227,7 @@ def test_spread_draws_what_weighs_and_one_of_each_ray(per_ray):
 
 
 def test_spread_draws_all_and_names_the_heaviest():
-    weights, samples, phase = packed()
+    weights, samples, phase = packed_samples()
     spread = spread_samples(weights, samples, 0, phase)
     n = len(weights)
     assert torch.equal(spread.shaded, torch.arange(n)) and torch.equal(
@@ -329,7 +259,7 @@ def test_a_second_surface_has_a_sample_and_a_colour_of_its_own():
 
 
 def test_room_that_is_given_holds_the_same_and_what_counts_for_nothing():
-    weights, samples, phase = packed()
+    weights, samples, phase = packed_samples()
     free = spread_samples(weights, samples, 2, phase, 0.3)
     n_shaded, n_rays, n_stretches = free.sizes.tolist()
     assert (n_shaded, n_rays, n_stretches) == (len(free.shaded), len(free.heaviest), len(free.leaders)) and n_rays == 49
@@ -351,7 +281,7 @@ def test_room_that_is_given_holds_the_same_and_what_counts_for_nothing():
 
 
 def test_too_little_room_is_told_and_indices_stay_in_range():
-    weights, samples, phase = packed()
+    weights, samples, phase = packed_samples()
     n_shaded, _, n_stretches = spread_samples(weights, samples, 2, phase, 0.3).sizes.tolist()
     for room in ((n_shaded - 1, n_stretches), (n_shaded, n_stretches - 1), (1, 1)):
         spread = spread_samples(weights, samples, 2, phase, 0.3, capacity=room)
@@ -364,7 +294,7 @@ def test_too_little_room_is_told_and_indices_stay_in_range():
 
 
 def test_spread_draws_in_proportion_to_the_weights():
-    weights, samples, _ = packed()
+    weights, samples, _ = packed_samples()
     counts = torch.zeros(len(weights), dtype=torch.float64)
     for phase in torch.linspace(0, 1, 1001, dtype=torch.float64)[:-1]:
         counts[spread_samples(weights, samples, 3, phase.expand(50)).shaded] += 1e-3
@@ -375,7 +305,7 @@ def test_spread_draws_in_proportion_to_the_weights():
 
 
 def test_interpolation_is_exact_for_what_is_linear_along_a_ray():
-    weights, samples, phase = packed()
+    weights, samples, phase = packed_samples()
     spread = spread_samples(weights, samples, 4, phase)
     middle = 0.5 * (samples.t_starts + samples.t_ends)
     slope = torch.randn(50, 2, generator=generator(), dtype=torch.float64)[samples.ray_indices]
@@ -396,7 +326,7 @@ def test_interpolation_is_exact_for_what_is_linear_along_a_ray():
 
 
 def test_interpolate_opcheck_gradcheck_and_errors():
-    weights, samples, phase = packed()
+    weights, samples, phase = packed_samples()
     spread = spread_samples(weights, samples, 2, phase)
     middle = 0.5 * (samples.t_starts + samples.t_ends)
     check_op(lib.spread_samples, (weights, middle, samples.offsets, phase, 0.5, 2))

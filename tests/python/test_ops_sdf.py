@@ -6,43 +6,27 @@ import math
 
 import pytest
 import torch
-from op_checks import check_op, generator, grad_leaves, lib, unit
+from op_cases import (
+    BOX,
+    SDF_SPEC,
+    STEP,
+    bumpy_field,
+    field_rays,
+    full_cells,
+    sample_rays_inputs,
+    sampling_settings,
+    sdf_layer_inputs,
+)
+from op_checks import check_op, generator, grad_leaves, lib
 
-from splitnerf.fields.sdf import SdfField
 from splitnerf.ops import (
     CELL_EMPTY,
-    CELL_OCCUPIED,
-    HashGridSpec,
     SdfNetwork,
     march_rays,
     sample_rays,
     sdf_values,
     surface_weights,
 )
-
-BOX, STEP = 1.5, 0.02
-SPEC = HashGridSpec(n_levels=3, n_features=2, base_resolution=4, growth=1.7, log2_table_size=9)
-
-
-def bumpy_field(scale: float = 0.02) -> SdfField:
-    torch.manual_seed(0)
-    field = SdfField(SPEC, BOX, width=32, radius=0.7).double()
-    with torch.no_grad():
-        field.grid.table.copy_(scale * torch.randn(field.grid.table.shape, generator=generator(), dtype=torch.float64))
-        field.hidden_direction[:, 3:] = torch.randn(32, SPEC.n_outputs, generator=generator(1), dtype=torch.float64)
-        field.hidden_length.copy_(field.hidden_direction.norm(dim=1, keepdim=True))
-    return field
-
-
-def rays(n: int = 200, dtype=torch.float64) -> tuple:
-    g = generator(2)
-    origins = 3 * unit(torch.randn(n, 3, generator=g, dtype=dtype))
-    directions = unit(0.9 * torch.rand(n, 3, generator=g, dtype=dtype) - 0.45 - origins)
-    return origins, directions, torch.rand(n, generator=g, dtype=dtype)
-
-
-def cells(resolution: int = 12) -> torch.Tensor:
-    return torch.full((resolution,) * 3, CELL_OCCUPIED, dtype=torch.uint8)
 
 
 def depth_between(f, f_next, s: float):
@@ -73,18 +57,14 @@ def stretches(field, samples, origins, directions, s: float, anneal: float = 1.0
     return weights
 
 
-def settings(**changes) -> dict:
-    return dict(step=STEP, s=60.0, min_weight=0.01, min_transmittance=0.0, reach=10.0, lipschitz=1.25) | changes
-
-
 @pytest.mark.parametrize("anneal", [0.0, 0.4, 1.0])
 def test_keeps_the_neighbours_that_may_weigh(anneal):
-    field, (o, d, jitter) = bumpy_field(), rays()
-    samples = march_rays(o, d, jitter, cells(), BOX, STEP)
+    field, (o, d, jitter) = bumpy_field(), field_rays()
+    samples = march_rays(o, d, jitter, full_cells(), BOX, STEP)
     weights = stretches(field, samples, o, d, 60.0, anneal)
     heavy = weights > 0.01
     wanted = heavy | torch.cat([torch.tensor([False]), heavy[:-1]])
-    kept, evaluated = sample_rays(o, d, jitter, cells(), field.network(), **settings(anneal=anneal))
+    kept, evaluated = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings(anneal=anneal))
     assert int(evaluated.sum()) == len(weights)
     assert torch.equal(kept.ray_indices, samples.ray_indices[wanted])
     torch.testing.assert_close(kept.t_starts, samples.t_starts[wanted])
@@ -95,12 +75,14 @@ def test_keeps_the_neighbours_that_may_weigh(anneal):
 
 
 def test_far_from_the_surface_it_asks_less_and_keeps_the_same():
-    field, (o, d, jitter) = bumpy_field(), rays()
+    field, (o, d, jitter) = bumpy_field(), field_rays()
     with torch.no_grad():  # a field whose gradient is bounded by 1
         x = 3 * torch.rand(4000, 3, generator=generator(), dtype=torch.float64) - 1.5
         bound = field.sample(x).gradient.norm(dim=1).max().item() * 1.1
-    everything, all_points = sample_rays(o, d, jitter, cells(), field.network(), **settings())
-    some, points = sample_rays(o, d, jitter, cells(), field.network(), **settings(reach=8 / 60.0, lipschitz=bound))
+    everything, all_points = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings())
+    some, points = sample_rays(
+        o, d, jitter, full_cells(), field.network(), **sampling_settings(reach=8 / 60.0, lipschitz=bound)
+    )
     assert torch.equal(some.ray_indices, everything.ray_indices)
     torch.testing.assert_close(some.t_starts, everything.t_starts)
     assert points.sum() < 0.5 * all_points.sum()
@@ -110,14 +92,19 @@ def test_far_from_the_surface_it_asks_less_and_keeps_the_same():
 @pytest.mark.parametrize("s", [200.0, 2000.0, 8000.0])
 def test_a_thin_sheet_is_never_jumped_over(thickness, s):
     """|z| - thickness / 2 as two softplus units: every ray that crosses the sheet keeps samples at it."""
-    zeros = torch.zeros(SPEC.n_entries, SPEC.n_features)
-    hidden = torch.zeros(2, 3 + SPEC.n_outputs)
+    zeros = torch.zeros(SDF_SPEC.n_entries, SDF_SPEC.n_features)
+    hidden = torch.zeros(2, 3 + SDF_SPEC.n_outputs)
     hidden[0, 2], hidden[1, 2] = 1.0, -1.0
     bias = torch.tensor([-thickness / 2])
-    sheet = SdfNetwork(SPEC, 3, zeros, hidden, torch.zeros(2), torch.ones(1, 2), bias, 1e5, BOX)
-    o, d, jitter = (x.float() for x in rays())
+    sheet = SdfNetwork(SDF_SPEC, 3, zeros, hidden, torch.zeros(2), torch.ones(1, 2), bias, 1e5, BOX)
+    o, d, jitter = (x.float() for x in field_rays())
     kept, evaluated = sample_rays(
-        o, d, jitter, cells(), sheet, **settings(step=0.005, s=s, min_weight=1e-3, reach=7.0 / s, lipschitz=1.25)
+        o,
+        d,
+        jitter,
+        full_cells(),
+        sheet,
+        **sampling_settings(step=0.005, s=s, min_weight=1e-3, reach=7.0 / s, lipschitz=1.25),
     )
     t = -o[:, 2] / d[:, 2]
     crosses = (t > 0) & ((o + d * t[:, None])[:, :2].abs().amax(1) < 1.4) & (d[:, 2].abs() > 0.3)
@@ -129,10 +116,10 @@ def test_a_thin_sheet_is_never_jumped_over(thickness, s):
 
 
 def test_a_ray_ends_where_nothing_gets_through():
-    field, (o, d, jitter) = bumpy_field(), rays()
-    whole, all_points = sample_rays(o, d, jitter, cells(), field.network(), **settings(min_weight=0.0))
+    field, (o, d, jitter) = bumpy_field(), field_rays()
+    whole, all_points = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings(min_weight=0.0))
     ended, points = sample_rays(
-        o, d, jitter, cells(), field.network(), **settings(min_weight=0.0, min_transmittance=1e-3)
+        o, d, jitter, full_cells(), field.network(), **sampling_settings(min_weight=0.0, min_transmittance=1e-3)
     )
     assert points.sum() < 0.8 * all_points.sum()
     assert len(ended.t_starts) < len(whole.t_starts)
@@ -151,16 +138,16 @@ def whole_opacity(field, samples, origins, directions) -> torch.Tensor:
 
 def left_out(field, s: float, anneal: float = 1.0, lipschitz: float = 1.25) -> tuple[torch.Tensor, torch.Tensor]:
     """The weights [n] that surface_weights gives to all samples, those kept set to 0, and their sums [n_rays]."""
-    o, d, jitter = rays()
-    samples = march_rays(o, d, jitter, cells(), BOX, STEP)
+    o, d, jitter = field_rays()
+    samples = march_rays(o, d, jitter, full_cells(), BOX, STEP)
     at = o[samples.ray_indices] + d[samples.ray_indices] * (0.5 * (samples.t_starts + samples.t_ends))[:, None]
     there = field.sample(at)
     sharp = torch.tensor(s, dtype=torch.float64)
     _, weights, _ = surface_weights(
         there.sdf.detach(), there.gradient.detach(), d, sharp, samples.offsets, step=STEP, anneal=anneal
     )
-    rules = settings(s=s, anneal=anneal, min_weight=1e-3, reach=7.0 / s, lipschitz=lipschitz)
-    kept, _ = sample_rays(o, d, jitter, cells(), field.network(), **rules)
+    rules = sampling_settings(s=s, anneal=anneal, min_weight=1e-3, reach=7.0 / s, lipschitz=lipschitz)
+    kept, _ = sample_rays(o, d, jitter, full_cells(), field.network(), **rules)
     lattice = lambda some: some.ray_indices * 100000 + (some.t_starts / STEP * 8).round().long()  # noqa: E731
     faint = torch.where(torch.isin(lattice(samples), lattice(kept)), 0.0, weights)
     return faint, torch.zeros(len(o), dtype=torch.float64).index_add(0, samples.ray_indices, faint)
@@ -176,7 +163,7 @@ def test_what_is_left_out_weighs_little(s, anneal):
 
 
 def test_where_the_field_is_steeper_than_promised_the_walk_goes_back():
-    o, d, _ = rays()
+    o, d, _ = field_rays()
     with torch.no_grad():
         steepest = bumpy_field().sample(o - d * (o * d).sum(1, keepdim=True)).gradient.norm(dim=1).max()
     faint, _ = left_out(bumpy_field(), 400.0, lipschitz=1.0)
@@ -194,29 +181,23 @@ def test_values_are_the_field(n):
 
 
 def test_empty_cells_are_not_asked():
-    field, (o, d, jitter) = bumpy_field(), rays()
-    samples, evaluated = sample_rays(o, d, jitter, torch.full_like(cells(), CELL_EMPTY), field.network(), **settings())
+    field, (o, d, jitter) = bumpy_field(), field_rays()
+    samples, evaluated = sample_rays(
+        o, d, jitter, torch.full_like(full_cells(), CELL_EMPTY), field.network(), **sampling_settings()
+    )
     assert len(samples.t_starts) == 0 and int(evaluated.sum()) == 0
 
 
 def test_a_nan_is_kept_for_the_loss_to_see():
-    field, (o, d, jitter) = bumpy_field(), rays(8)
+    field, (o, d, jitter) = bumpy_field(), field_rays(8)
     network = field.network()._replace(out_bias=torch.full((13,), math.nan, dtype=torch.float64))
-    samples, evaluated = sample_rays(o, d, jitter, cells(), network, **settings())
+    samples, evaluated = sample_rays(o, d, jitter, full_cells(), network, **sampling_settings())
     assert len(samples.t_starts) == int(evaluated.sum()) > 0
-
-
-def arguments(dtype=torch.float64) -> tuple:
-    n = bumpy_field().to(dtype).network()
-    o, d, jitter = rays(12, dtype)
-    return (
-        o, d, jitter, cells(), *n._replace(n_active=2).arguments(), STEP, 64, 60.0, 1.0, 0.01, 1e-3, 0.1, 1.25,
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_opcheck_and_empty_batch(dtype):
-    x = arguments(dtype)
+    x = sample_rays_inputs(dtype)
     check_op(lib.sample_rays, x)
     check_op(lib.sdf_values, (x[0], *x[4:16]))
     nothing = lib.sample_rays(x[0][:0], x[1][:0], x[2][:0], *x[3:])
@@ -224,41 +205,30 @@ def test_opcheck_and_empty_batch(dtype):
 
 
 def test_float32_keeps_what_float64_does():
-    field, (o, d, jitter) = bumpy_field(), rays()
-    exact, _ = sample_rays(o, d, jitter, cells(), field.network(), **settings())
-    single, _ = sample_rays(o.float(), d.float(), jitter.float(), cells(), field.float().network(), **settings())
+    field, (o, d, jitter) = bumpy_field(), field_rays()
+    exact, _ = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings())
+    single, _ = sample_rays(
+        o.float(), d.float(), jitter.float(), full_cells(), field.float().network(), **sampling_settings()
+    )
     assert abs(len(single.t_starts) - len(exact.t_starts)) < 0.01 * len(exact.t_starts)
 
 
 def test_errors_name_what_is_wrong():
-    x = list(arguments())
+    x = list(sample_rays_inputs())
     x[7] = x[7][:, :3]
     with pytest.raises(Exception, match=r"sample_rays: out must be \[n, 32\] float64"):
         lib.sample_rays(*x)
-    x = list(arguments())
+    x = list(sample_rays_inputs())
     x[16] = 0.0
     with pytest.raises(Exception, match="step.* must be positive"):
         lib.sample_rays(*x)
     with pytest.raises(RuntimeError, match="no gradient"):
-        x = list(arguments())
+        x = list(sample_rays_inputs())
         x[4] = x[4].clone().requires_grad_()
         lib.sample_rays(*x)[1].sum().backward()
 
 
 # ---- sdf_layer ----
-
-
-def layer_inputs(n: int = 7, dtype=torch.float64) -> tuple:
-    g = generator(5)
-
-    def randn(*shape: int) -> torch.Tensor:
-        return torch.randn(*shape, generator=g, dtype=torch.float64).to(dtype)
-
-    beta_scale = 0.02  # around the bend of softplus_100
-    return (
-        randn(n, 3), randn(n, 6), randn(n, 3, 6), beta_scale * randn(10, 9), beta_scale * randn(10), randn(4, 10), randn(4),
-        100.0, BOX,
-    )  # fmt: skip
 
 
 def layer_by_formula(positions, features, jacobian, hidden, hidden_bias, out, out_bias, beta, box) -> tuple:
@@ -270,7 +240,7 @@ def layer_by_formula(positions, features, jacobian, hidden, hidden_bias, out, ou
 
 @pytest.mark.parametrize("n", [0, 1, 63, 64, 65, 1500])
 def test_layer_and_its_gradients_are_the_formula(n):
-    x = layer_inputs(n)
+    x = sdf_layer_inputs(n)
     leaves, twins = grad_leaves(x, range(1, 7)), grad_leaves(x, range(1, 7))
     ours, theirs = lib.sdf_layer(*leaves), layer_by_formula(*twins)
     weights = [torch.randn(t.shape, generator=generator(6), dtype=t.dtype) for t in theirs]
@@ -283,8 +253,8 @@ def test_layer_and_its_gradients_are_the_formula(n):
 
 
 def test_layer_float32_is_close_to_float64():
-    exact = lib.sdf_layer(*layer_inputs(500))
-    single = lib.sdf_layer(*layer_inputs(500, torch.float32))
+    exact = lib.sdf_layer(*sdf_layer_inputs(500))
+    single = lib.sdf_layer(*sdf_layer_inputs(500, torch.float32))
     for a, b in zip(single, exact):
         torch.testing.assert_close(a.double(), b, rtol=1e-5, atol=1e-5)
 
@@ -298,7 +268,7 @@ def test_the_fields_gradient_is_that_of_its_values():
 
 
 def test_layer_opcheck_gradcheck_and_errors():
-    x = layer_inputs()
+    x = sdf_layer_inputs()
     check_op(lib.sdf_layer, x, tuple(range(1, 7)))
     check_op(lib.sdf_layer_backward, (*x, torch.ones(7, 4).double(), torch.ones(7, 3).double()))
     assert torch.autograd.gradcheck(lambda *y: lib.sdf_layer(*y), grad_leaves(x, range(1, 7)), atol=1e-6, rtol=1e-5)

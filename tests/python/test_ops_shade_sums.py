@@ -4,23 +4,12 @@ from __future__ import annotations
 
 import pytest
 import torch
-from op_checks import check_op, generator, grad_leaves, lib, unit
+from op_cases import sums_inputs
+from op_checks import check_op, grad_leaves, lib
 
 from splitnerf.ops import LightSums, brdf_lut, shade_sums, split_sum_shade
 
 DIFFERENTIABLE = tuple(range(8))
-
-
-def inputs(n: int = 6, dtype=torch.float64, seed: int = 0) -> tuple:
-    g = generator(seed)
-
-    def rand(columns: int, lo: float, hi: float) -> torch.Tensor:
-        return lo + (hi - lo) * torch.rand(n, columns, generator=g, dtype=dtype)
-
-    normals = unit(torch.randn(n, 3, generator=g, dtype=dtype))
-    view_dirs = unit(normals + 0.7 * unit(torch.randn(n, 3, generator=g, dtype=dtype)))
-    sums = [rand(3, 0.5, 2.0), rand(3, 0.0, 0.3), rand(3, 0.1, 2.0)]
-    return normals, view_dirs, rand(3, 0.05, 0.9), rand(1, 0.1, 0.9), rand(1, 0.1, 0.9), *sums
 
 
 def shade(*x: torch.Tensor, compensate: bool) -> torch.Tensor:
@@ -31,7 +20,7 @@ def shade(*x: torch.Tensor, compensate: bool) -> torch.Tensor:
 @pytest.mark.parametrize("turned", [1.0, -1.0])
 def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
     """Where the light is L over the specular lobe, the sums are (F1 + F2) L and F2 L."""
-    normals, view_dirs, albedo, roughness, metallic, light, _, diffuse = inputs(200)
+    normals, view_dirs, albedo, roughness, metallic, light, _, diffuse = sums_inputs(200)
     normals = turned * normals
     one, black = torch.ones_like(albedo), torch.zeros_like(albedo)
     metal = torch.ones_like(metallic)
@@ -48,14 +37,14 @@ def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
 
 def test_light_at_grazing_angles_alone_is_reflected_whole():
     """All of the light where Schlick's weight is 1: reflected by every material alike."""
-    normals, view_dirs, albedo, roughness, metallic, light, _, _ = inputs()
+    normals, view_dirs, albedo, roughness, metallic, light, _, _ = sums_inputs()
     sums = LightSums(light, light, torch.zeros_like(light))
     torch.testing.assert_close(shade_sums(normals, view_dirs, albedo, roughness, metallic, sums), light)
 
 
 @pytest.mark.parametrize("compensate", [False, True])
 def test_opcheck_and_gradcheck(compensate):
-    x = inputs()
+    x = sums_inputs()
     check_op(lib.shade_sums, (*x, brdf_lut(), compensate), DIFFERENTIABLE)
     check_op(lib.shade_sums_backward, (*x, brdf_lut(), compensate, torch.ones_like(x[0])))
     leaves = grad_leaves(x, DIFFERENTIABLE)
@@ -63,7 +52,7 @@ def test_opcheck_and_gradcheck(compensate):
 
 
 def test_float32_is_close_to_float64():
-    x = inputs(500)
+    x = sums_inputs(500)
     single = shade(*(y.float() for y in x), compensate=True)
     torch.testing.assert_close(single.double(), shade(*x, compensate=True), rtol=1e-5, atol=1e-6)
 
@@ -71,7 +60,7 @@ def test_float32_is_close_to_float64():
 @pytest.mark.parametrize("n_dot_v", [0.0, 1e-7, 1.0])
 @pytest.mark.parametrize("roughness", [0.0, 1e-4, 1.0])
 def test_edges_stay_finite(n_dot_v, roughness):
-    x = list(inputs(1, torch.float32))
+    x = list(sums_inputs(1, torch.float32))
     x[0] = torch.tensor([[0.0, 0.0, 1.0]])
     x[1] = torch.tensor([[(1 - n_dot_v**2) ** 0.5, 0.0, n_dot_v]])
     x[3] = torch.tensor([[roughness]])
@@ -82,10 +71,10 @@ def test_edges_stay_finite(n_dot_v, roughness):
 
 
 def test_empty_batch_and_errors():
-    assert shade(*inputs(0), compensate=True).shape == (0, 3)
-    x = list(inputs())
+    assert shade(*sums_inputs(0), compensate=True).shape == (0, 3)
+    x = list(sums_inputs())
     x[6] = x[6][:, :1]
     with pytest.raises(Exception, match=r"grazing must be \[6, 3\] float64"):
         shade(*x, compensate=False)
     with pytest.raises(RuntimeError, match="no gradient to lut"):
-        lib.shade_sums(*inputs(), brdf_lut().clone().requires_grad_(), False).sum().backward()
+        lib.shade_sums(*sums_inputs(), brdf_lut().clone().requires_grad_(), False).sum().backward()

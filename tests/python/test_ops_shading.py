@@ -8,28 +8,12 @@ import numpy as np
 import pytest
 import reference
 import torch
+from op_cases import query_inputs, split_sum_inputs
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 
 from splitnerf.ops import FRESNEL_MODES, brdf_lut, query_direction, split_sum_shade
 
 MODES = [(mode, compensate, channels) for mode in range(3) for compensate in (False, True) for channels in (1, 3)]
-
-
-def query_inputs(device, dtype, mean: bool = True, n: int = 7) -> tuple:
-    """Arguments of ``query_direction``; some normals face away from the viewer."""
-    normals, views = (unit(torch.randn(n, 3, generator=generator(i), dtype=torch.float64)) for i in (0, 1))
-    roughness = torch.rand(n, 1, generator=generator(2), dtype=torch.float64) * 0.8 + 0.1
-    return *(x.to(device, dtype) for x in (normals, views, roughness)), brdf_lut(device), mean
-
-
-def sample_inputs(device, dtype, mode: int = 0, compensate: bool = False, channels: int = 1, n: int = 7) -> tuple:
-    """Arguments of ``split_sum_shade``."""
-    normals, views, roughness, lut, _ = query_inputs(device, dtype, n=n)
-    draw = generator(3)
-    rest = [torch.rand(n, k, generator=draw, dtype=torch.float64) for k in (3, 1, 3, 3, channels, channels)]
-    albedo, metallic, specular, diffuse, occlusion_s, occlusion_d = (x.to(device, dtype) for x in rest)
-    return (normals, views, albedo, roughness, metallic, 3 * specular, 2 * diffuse, occlusion_s, occlusion_d, lut,
-            mode, compensate)  # fmt: skip
 
 
 def arrays(inputs) -> list:
@@ -50,12 +34,12 @@ def test_query_matches_the_reference(device, mean):
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize(("mode", "compensate", "channels"), MODES)
 def test_shade_matches_the_reference(device, mode, compensate, channels):
-    inputs = sample_inputs(device, torch.float64, mode, compensate, channels, 200)
+    inputs = split_sum_inputs(device, torch.float64, mode, compensate, channels, 200)
     values = arrays(inputs)
     values[10] = FRESNEL_MODES[mode]
     got = lib.split_sum_shade(*inputs)
     np.testing.assert_allclose(got.cpu(), reference.split_sum_shade(*values), atol=1e-12)
-    single = lib.split_sum_shade(*sample_inputs(device, torch.float32, mode, compensate, channels, 200))
+    single = lib.split_sum_shade(*split_sum_inputs(device, torch.float32, mode, compensate, channels, 200))
     torch.testing.assert_close(single.double(), got, rtol=0, atol=2e-5)
 
 
@@ -67,7 +51,7 @@ def test_opcheck(device):
             check_op(lib.query_direction, query_inputs(device, dtype, mean), (0, 1, 2))
             check_op(lib.query_direction_backward, (*query_inputs(device, dtype, mean), grad))
         for channels in (1, 3):
-            inputs = sample_inputs(device, dtype, channels=channels)
+            inputs = split_sum_inputs(device, dtype, channels=channels)
             check_op(lib.split_sum_shade, inputs, tuple(range(9)))
             check_op(lib.split_sum_shade_backward, (*inputs, grad))
 
@@ -81,13 +65,13 @@ def test_query_gradcheck(device, mean):
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize(("mode", "compensate", "channels"), MODES)
 def test_shade_gradcheck(device, mode, compensate, channels):
-    inputs = sample_inputs(device, torch.float64, mode, compensate, channels, 4)
+    inputs = split_sum_inputs(device, torch.float64, mode, compensate, channels, 4)
     torch.autograd.gradcheck(lib.split_sum_shade, grad_leaves(inputs, range(9)))
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_missing_gradients_raise(device):
-    query, shade = query_inputs(device, torch.float64), sample_inputs(device, torch.float64)
+    query, shade = query_inputs(device, torch.float64), split_sum_inputs(device, torch.float64)
     grad = torch.ones(7, 3, dtype=torch.float64, device=device)
     for index in (0, 1, 2, 5):
         check_no_gradient(lib.query_direction_backward, (*query, grad), index)
@@ -101,7 +85,7 @@ def test_missing_gradients_raise(device):
 @pytest.mark.parametrize("device", DEVICES)
 def test_empty_batch(device):
     for op, inputs, n in ((lib.query_direction, query_inputs(device, torch.float32, n=0), 3),
-                          (lib.split_sum_shade, sample_inputs(device, torch.float32, n=0), 9)):  # fmt: skip
+                          (lib.split_sum_shade, split_sum_inputs(device, torch.float32, n=0), 9)):  # fmt: skip
         leaves = grad_leaves(inputs, range(n))
         out = op(*leaves)
         assert out.shape == (0, 3)
@@ -111,7 +95,7 @@ def test_empty_batch(device):
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_white_furnace(device):
-    normals, views, _, roughness, *_ = sample_inputs(device, torch.float64, n=500)
+    normals, views, _, roughness, *_ = split_sum_inputs(device, torch.float64, n=500)
     one = torch.ones_like(normals)
     single = torch.ones_like(roughness)
     dielectric = split_sum_shade(normals, views, one, roughness, 0 * single, one, one, single, single)
@@ -164,7 +148,7 @@ def test_errors_name_what_is_wrong(device):
         "[32, 32, 3]",
         "[31, 32, 3]",
     )
-    inputs = sample_inputs(device, torch.float32)
+    inputs = split_sum_inputs(device, torch.float32)
     names = (
         "normals",
         "view_dirs",

@@ -35,6 +35,22 @@ def perturbed_field() -> SdfField:
     return field
 
 
+def plane_field(slope: torch.Tensor, edge: bool = False) -> SdfField:
+    """The field slope.x, or |slope.x|, by two hidden units; its grid has nothing to say."""
+    field = SdfField(
+        HashGridSpec(n_levels=3, base_resolution=4, growth=2.0, log2_table_size=8), box=1.5, width=2, n_outputs=1
+    )
+    with torch.no_grad():
+        field.grid.table.zero_()
+        field.hidden_direction.zero_()
+        field.hidden_direction[:, :3] = torch.stack([slope, -slope])
+        field.hidden_length.fill_(slope.norm())
+        field.out_direction.copy_(torch.tensor([[1.0, 1.0 if edge else -1.0]]))
+        field.out_length.fill_(math.sqrt(2.0))
+        field.out_bias.zero_()
+    return field
+
+
 class TestSdf:
     def test_the_closed_gradient_is_that_of_autograd(self):
         field = perturbed_field()
@@ -50,6 +66,28 @@ class TestSdf:
         exact = torch.nn.functional.normalize(field.sample(points).gradient, dim=1)
         taps = torch.nn.functional.normalize(field.sample_finite_difference(points).gradient, dim=1)
         assert (exact * taps).sum(-1).min() > 0.99
+
+    def test_finite_differences_of_a_plane_are_its_slope(self):
+        """f(x) = a.x + b, whatever the step: softplus(a.x) - softplus(-a.x) = a.x."""
+        slope = torch.tensor([0.3, -0.5, 0.8])
+        field = plane_field(slope)
+        for cells in (0.25, 1.0, 3.0):
+            points = torch.rand(50, 3) * 2 - 1
+            found = field.sample_finite_difference(points, cells)
+            torch.testing.assert_close(found.gradient, slope.expand(50, 3), rtol=0, atol=1e-4)
+            torch.testing.assert_close(found.sdf, points @ slope, rtol=0, atol=1e-5)
+
+    def test_taps_lie_one_cell_of_the_finest_open_level_away(self):
+        """Beside an edge, f = |x| as two units, the difference is x / eps up to eps from it and 1 beyond."""
+        field = plane_field(torch.tensor([1.0, 0.0, 0.0]), edge=True)
+        for n_active, resolution in ((1, 4), (2, 8), (3, 16)):  # cells along the box of 3
+            field.grid.n_active = n_active
+            eps = 3.0 / resolution
+            x = torch.tensor([0.3, 0.6, 1.4, 1.7]) * eps
+            points = torch.stack([x, 0.1 + 0 * x, -0.2 + 0 * x], 1)
+            gradient = field.sample_finite_difference(points).gradient
+            assert gradient[:, 0].tolist() == pytest.approx([0.3, 0.6, 1.0, 1.0], abs=0.02)
+            assert gradient[:, 1:].abs().max() < 1e-4
 
     def test_it_starts_as_a_sphere(self):
         torch.manual_seed(2)

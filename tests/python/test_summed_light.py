@@ -7,8 +7,8 @@ import math
 import pytest
 import torch
 import trimesh
+from mesh_shapes import OFFSET, scene_of
 from op_checks import generator, unit
-from test_visibility import OFFSET, scene_of
 
 from splitnerf import _core
 from splitnerf.config import Config

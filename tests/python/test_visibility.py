@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+from mesh_shapes import OFFSET, between, cache_of, corners, grid_mesh, lattice, scene_of
+from op_cases import cached_occlusion_inputs, cached_visibility_inputs
 from op_checks import check_error, check_no_gradient, check_op, generator, lib, unit
 from torch.nn import functional as F
 
@@ -17,7 +19,6 @@ from splitnerf.config import Config
 from splitnerf.fields import EvaluatedLight, Light, OcclusionQuery, VisibilityBits
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import (
-    MeshScene,
     VisibilityCache,
     cached_occlusion,
     cached_visibility,
@@ -29,51 +30,13 @@ from splitnerf.ops import (
 )
 from splitnerf.render.model import SceneModel
 
-OFFSET = 0.0125
 UP = torch.tensor([[0.0, 0.0, 1.0]])
-
-
-def lattice(n: int) -> torch.Tensor:
-    return torch.from_numpy(_core.fibonacci_sphere(n)).float()
-
-
-def scene_of(mesh: trimesh.Trimesh) -> MeshScene:
-    return MeshScene(np.asarray(mesh.vertices), np.asarray(mesh.faces))
-
-
-def corners(mesh: trimesh.Trimesh) -> tuple[torch.Tensor, torch.Tensor]:
-    """The vertices of a mesh and their normals."""
-    return tuple(torch.tensor(np.asarray(x), dtype=torch.float32) for x in (mesh.vertices, mesh.vertex_normals))
-
-
-def cache_of(mesh: trimesh.Trimesh, n: int = 256, offset: float = OFFSET, with_hits: bool = False) -> VisibilityCache:
-    return VisibilityCache.trace(
-        scene_of(mesh), *corners(mesh), mesh.area, lattice(n), offset=offset, with_hits=with_hits
-    )
-
-
-def grid_mesh(size: float, cells: int, z: float = 0.0) -> trimesh.Trimesh:
-    """A square in the plane z, facing up."""
-    x, y = np.meshgrid(*[np.linspace(-size / 2, size / 2, cells + 1)] * 2, indexing="ij")
-    first = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
-    quads = np.stack([first, first + cells + 1, first + cells + 2, first + 1], axis=1)
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return trimesh.Trimesh(np.stack([x.ravel(), y.ravel(), np.full(x.size, z)], axis=1), faces, process=False)
 
 
 def read(cache: VisibilityCache, x: torch.Tensor, n: torch.Tensor, *, rho: float = 1.0, light=None, radiance=None):
     """cached_occlusion with the lobe about the normal."""
     light = torch.ones_like(cache.directions) if light is None else light
     return cached_occlusion(cache, x, n, n, torch.full((len(x), 1), rho), light, radiance)
-
-
-def between(mesh: trimesh.Trimesh, n: int) -> tuple[torch.Tensor, torch.Tensor]:
-    """Random points on the faces and their interpolated normals."""
-    vertices, normals = corners(mesh)
-    faces = torch.tensor(np.asarray(mesh.faces))[torch.randint(len(mesh.faces), (n,), generator=generator(1))]
-    share = torch.rand(n, 3, 1, generator=generator(2))
-    share = share / share.sum(1, keepdim=True)
-    return (vertices[faces] * share).sum(1), F.normalize((normals[faces] * share).sum(1), dim=1)
 
 
 # ---- the bits ----
@@ -402,42 +365,23 @@ def test_sums_of_directions_agree_with_the_factors():
 # ---- the operators ----
 
 
-def op_inputs(dtype, n: int = 9, with_hits: bool = True) -> tuple:
-    mesh = trimesh.util.concatenate(
-        [grid_mesh(2.0, 5), trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))]
-    )
-    cache = cache_of(mesh, 64, with_hits=with_hits)
-    x, normals = (t[:n].to(dtype) for t in between(mesh, 9))
-    lobes = unit(normals + 0.3 * unit(torch.randn(9, 3, generator=generator(1)))[:n].to(dtype))
-    roughness = torch.rand(9, 1, generator=generator(2))[:n].to(dtype)
-    radiance = torch.rand(len(cache.vertices) if with_hits else 0, 3, generator=generator(3)).to(dtype)
-    light = torch.rand(64, 3, generator=generator(4)).to(dtype)
-    return (x, normals, lobes, roughness, cache.vertices.to(dtype), cache.normals.to(dtype), cache.starts, cache.order,
-            cache.radius, cache.bits, cache.hits, radiance, cache.directions.to(dtype), light)  # fmt: skip
-
-
-def visibility_inputs(dtype, with_hits: bool = True) -> tuple:
-    inputs = op_inputs(dtype, with_hits=with_hits)
-    return (*inputs[:2], *inputs[4:13])
-
-
 def test_opcheck_precision_and_gradients():
     scene, mesh = scene_of(trimesh.creation.icosphere(1)), trimesh.creation.icosphere(1)
     check_op(lib.visibility_bits, (scene.handle, *corners(mesh), lattice(64), OFFSET, True))
     check_op(lib.vertex_grids, (corners(mesh)[0], 0.2, 3))
     for with_hits in (False, True):
-        check_op(lib.cached_occlusion, op_inputs(torch.float32, with_hits=with_hits))
-    for a, b in zip(*(lib.cached_occlusion(*op_inputs(t)) for t in (torch.float32, torch.float64))):
+        check_op(lib.cached_occlusion, cached_occlusion_inputs(torch.float32, with_hits=with_hits))
+    for a, b in zip(*(lib.cached_occlusion(*cached_occlusion_inputs(t)) for t in (torch.float32, torch.float64))):
         torch.testing.assert_close(a.double(), b, rtol=0, atol=2e-5)
     for index in (0, 1, 2, 3, 4, 11, 13):
-        check_no_gradient(lib.cached_occlusion, op_inputs(torch.float32), index)
+        check_no_gradient(lib.cached_occlusion, cached_occlusion_inputs(torch.float32), index)
     for with_hits in (False, True):
-        check_op(lib.cached_visibility, visibility_inputs(torch.float32, with_hits=with_hits))
-    for a, b in zip(*(lib.cached_visibility(*visibility_inputs(t)) for t in (torch.float32, torch.float64))):
+        check_op(lib.cached_visibility, cached_visibility_inputs(torch.float32, with_hits=with_hits))
+    for a, b in zip(*(lib.cached_visibility(*cached_visibility_inputs(t)) for t in (torch.float32, torch.float64))):
         torch.testing.assert_close(a.double(), b, rtol=0, atol=2e-5)
     for index in (0, 1, 2, 3, 9, 10):
-        check_no_gradient(lib.cached_visibility, visibility_inputs(torch.float32), index)
-    assert all(t.shape == (0, 3) for t in lib.cached_occlusion(*op_inputs(torch.float32, 0)))
+        check_no_gradient(lib.cached_visibility, cached_visibility_inputs(torch.float32), index)
+    assert all(t.shape == (0, 3) for t in lib.cached_occlusion(*cached_occlusion_inputs(torch.float32, 0)))
 
 
 def test_errors():
@@ -445,7 +389,7 @@ def test_errors():
     check_error(lambda: visibility_bits(scene, x, n[1:], w), "visibility_bits", "normals", "[42, 3]", "[41, 3]")
     check_error(lambda: visibility_bits(scene, x, n, w[:40]), "visibility_bits", "multiple of 32")
     check_error(lambda: lib.vertex_grids(x, 0.0, 2), "vertex_grids", "radius")
-    good = op_inputs(torch.float32)
+    good = cached_occlusion_inputs(torch.float32)
     for index, part in (
         (3, "roughness"),
         (5, "vertex_normals"),
@@ -456,6 +400,6 @@ def test_errors():
     ):
         bad = (*good[:index], good[index][1:], *good[index + 1 :])
         check_error(lambda: lib.cached_occlusion(*bad), "cached_occlusion", part)
-    short = visibility_inputs(torch.float32)
+    short = cached_visibility_inputs(torch.float32)
     check_error(lambda: lib.cached_visibility(short[0], short[1][1:], *short[2:]), "cached_visibility", "normals")
     check_error(lambda: lib.cached_occlusion(*good[:7], good[7] + 1, *good[8:]), "cached_occlusion", "order")

@@ -1,0 +1,69 @@
+"""A sphere seen by cameras around it, as files, and ways to break them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from splitnerf.data.images import write_image
+
+SIZE = 48
+ANGLE = 0.7
+
+
+def look_at(position, target):
+    back = np.subtract(position, target) / np.linalg.norm(np.subtract(position, target))
+    right = np.cross([0, 0, 1], back)
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3] = np.stack([right, np.cross(back, right), back, position], axis=1)
+    return pose
+
+
+def sphere_alpha(pose, centre, radius, size=SIZE):
+    """Coverage of a sphere seen by a pinhole camera, straight from the quadratic."""
+    focal = 0.5 * size / np.tan(0.5 * ANGLE)
+    y, x = np.mgrid[:size, :size] + 0.5
+    rays = np.stack([(x - size / 2) / focal, -(y - size / 2) / focal, -np.ones_like(x)], axis=-1) @ pose[:3, :3].T
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    offset = pose[:3, 3] - centre
+    return ((rays @ offset) ** 2 > offset @ offset - radius**2).astype(np.float32)
+
+
+def poses_around(centre, radius, count):
+    golden = np.pi * (3 - np.sqrt(5))
+    heights = np.linspace(-0.6, 0.8, count)
+    angles, rings = golden * np.arange(count), np.sqrt(1 - heights**2)
+    directions = np.stack([np.cos(angles) * rings, np.sin(angles) * rings, heights], axis=1)
+    return [look_at(centre + 4 * radius * direction, centre) for direction in directions]
+
+
+def make_blender(root, centre=(0, 0, 0), radius=1.0, train=12, test=3, aim=None, grey=0.5):
+    """A grey sphere in the NeRF-Blender layout; the cameras look at `aim`, by default its centre."""
+    centre = np.array(centre, dtype=float)
+    poses = poses_around(centre if aim is None else np.array(aim, dtype=float), radius, train + test)
+    for split, chosen in (("train", poses[:train]), ("test", poses[train:])):
+        frames = []
+        for i, pose in enumerate(chosen):
+            image = np.full((SIZE, SIZE, 4), grey)
+            image[..., 3] = sphere_alpha(pose, centre, radius)
+            write_image(root / split / f"r_{i}.png", image)
+            frames.append({"file_path": f"./{split}/r_{i}", "transform_matrix": pose.tolist()})
+        meta = {"camera_angle_x": ANGLE, "frames": frames}
+        (root / f"transforms_{split}.json").write_text(json.dumps(meta))
+    return root
+
+
+def edit(root, change, name="transforms_train.json"):
+    meta = json.loads((root / name).read_text())
+    change(meta)
+    (root / name).write_text(json.dumps(meta))
+
+
+def set_pose(index, value):
+    def change(meta):
+        pose = np.array(meta["frames"][index]["transform_matrix"])
+        meta["frames"][index]["transform_matrix"] = value(pose)
+
+    return change

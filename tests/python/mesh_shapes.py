@@ -1,0 +1,51 @@
+"""Meshes, and what their vertices see, for the tests of occlusion."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+import trimesh
+from op_checks import generator
+from torch.nn import functional as F
+
+from splitnerf import _core
+from splitnerf.ops import MeshScene, VisibilityCache
+
+OFFSET = 0.0125
+
+
+def lattice(n: int) -> torch.Tensor:
+    return torch.from_numpy(_core.fibonacci_sphere(n)).float()
+
+
+def scene_of(mesh: trimesh.Trimesh) -> MeshScene:
+    return MeshScene(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def corners(mesh: trimesh.Trimesh) -> tuple[torch.Tensor, torch.Tensor]:
+    """The vertices of a mesh and their normals."""
+    return tuple(torch.tensor(np.asarray(x), dtype=torch.float32) for x in (mesh.vertices, mesh.vertex_normals))
+
+
+def cache_of(mesh: trimesh.Trimesh, n: int = 256, offset: float = OFFSET, with_hits: bool = False) -> VisibilityCache:
+    return VisibilityCache.trace(
+        scene_of(mesh), *corners(mesh), mesh.area, lattice(n), offset=offset, with_hits=with_hits
+    )
+
+
+def grid_mesh(size: float, cells: int, z: float = 0.0) -> trimesh.Trimesh:
+    """A square in the plane z, facing up."""
+    x, y = np.meshgrid(*[np.linspace(-size / 2, size / 2, cells + 1)] * 2, indexing="ij")
+    first = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    quads = np.stack([first, first + cells + 1, first + cells + 2, first + 1], axis=1)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return trimesh.Trimesh(np.stack([x.ravel(), y.ravel(), np.full(x.size, z)], axis=1), faces, process=False)
+
+
+def between(mesh: trimesh.Trimesh, n: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """Random points on the faces and their interpolated normals."""
+    vertices, normals = corners(mesh)
+    faces = torch.tensor(np.asarray(mesh.faces))[torch.randint(len(mesh.faces), (n,), generator=generator(1))]
+    share = torch.rand(n, 3, 1, generator=generator(2))
+    share = share / share.sum(1, keepdim=True)
+    return (vertices[faces] * share).sum(1), F.normalize((normals[faces] * share).sum(1), dim=1)

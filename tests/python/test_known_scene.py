@@ -1,0 +1,150 @@
+"""A scene with a known answer, from images to files: a ball, red on one side and blue on the other, under one lamp.
+
+An analytic renderer of a few lines draws the images; files are read by trimesh, Pillow and OpenImageIO. Nothing here shares a
+convention with the package but by what its documents say: where the ball is, how large, which side is red, where the lamp stands,
+and that no axis is mirrored on the way in or out.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+import trimesh
+from blender_data import look_at
+from PIL import Image
+from tiny_runs import tiny
+
+from splitnerf.data.dataset import load_dataset
+from splitnerf.outputs import write_assets
+from splitnerf.training.loop import train
+
+CENTRE, RADIUS = np.array([0.9, -0.6, 0.4]), 0.8
+RED, BLUE = (
+    np.array([0.65, 0.12, 0.08]),
+    np.array([0.08, 0.15, 0.6]),
+)  # linear albedo where x is above and below the centre's
+LAMP = np.array([0.35, 0.75, 0.56]) / np.linalg.norm([0.35, 0.75, 0.56])
+SIZE, ANGLE, DISTANCE, N_VIEWS = 24, 0.7, 3.2, 14
+FINER = 4  # rays along an edge of a pixel
+
+
+def sky(directions: np.ndarray) -> np.ndarray:
+    """[n] grey radiance: dim, with a lamp of about 25 degrees."""
+    return 0.25 + 6.0 * np.exp(10.0 * (directions @ LAMP - 1.0))
+
+
+def fibonacci(n: int) -> np.ndarray:
+    """[n, 3] directions over the sphere."""
+    z = 1 - (2 * np.arange(n) + 1) / n
+    angle = np.pi * (3 - math.sqrt(5)) * np.arange(n)
+    ring = np.sqrt(1 - z * z)
+    return np.stack([ring * np.cos(angle), ring * np.sin(angle), z], 1)
+
+
+def reflected(normals: np.ndarray) -> np.ndarray:
+    """[n] what white of Lambert's sends out: the mean of the sky over the cosine."""
+    w = fibonacci(4000)
+    return np.maximum(normals @ w.T, 0) @ sky(w) * 4 / len(w)
+
+
+def picture(pose: np.ndarray) -> np.ndarray:
+    """[SIZE, SIZE, 4] sRGB, straight alpha, of the ball seen through a pinhole."""
+    focal, n = 0.5 * SIZE / math.tan(0.5 * ANGLE), SIZE * FINER
+    y, x = (np.mgrid[:n, :n] + 0.5) / FINER
+    rays = np.stack([(x - SIZE / 2) / focal, (SIZE / 2 - y) / focal, -np.ones_like(x)], -1).reshape(-1, 3)
+    rays = rays @ pose[:3, :3].T
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    off = pose[:3, 3] - CENTRE
+    b = rays @ off
+    inside = b * b - off @ off + RADIUS**2
+    t = -b - np.sqrt(np.maximum(inside, 0))
+    normals = (off + t[:, None] * rays) / RADIUS
+    albedo = np.where(normals[:, :1] > 0, RED, BLUE)
+    linear = np.where(inside[:, None] > 0, albedo * reflected(normals)[:, None], 0.0)
+    both = np.c_[linear, inside > 0].reshape(SIZE, FINER, SIZE, FINER, 4).mean((1, 3))
+    straight = np.clip(both[..., :3] / np.maximum(both[..., 3:], 1e-6), 0, 1)
+    encoded = np.where(straight <= 0.0031308, 12.92 * straight, 1.055 * straight ** (1 / 2.4) - 0.055)
+    return np.concatenate([encoded, both[..., 3:]], -1)
+
+
+class Result(NamedTuple):
+    """The files of a run, as others read them.
+
+    Attributes:
+        vertices: [n, 3] of mesh.glb, its y up.
+        albedo: [n, 3] linear, of its texture there.
+        light: [h, 2h, 3] of environment.exr.
+    """
+
+    vertices: np.ndarray
+    albedo: np.ndarray
+    light: np.ndarray
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory) -> Result:
+    root: Path = tmp_path_factory.mktemp("known")
+    frames = []
+    for i, towards in enumerate(fibonacci(N_VIEWS)):
+        pose = look_at(CENTRE + DISTANCE * towards, CENTRE)
+        Image.fromarray(np.rint(255 * picture(pose)).astype(np.uint8)).save(root / f"r_{i}.png")
+        frames.append({"file_path": f"./r_{i}", "transform_matrix": pose.tolist()})
+    (root / "transforms_train.json").write_text(json.dumps({"camera_angle_x": ANGLE, "frames": frames}))
+    config = tiny(
+        steps=360, warmup_steps=20, target_samples=2048, max_rays=256, log2_table_size=12, export_resolution=48, export_faces=1500,
+        export_texture_size=128, export_environment_height=32, preview_every=2.0, mesh_every=0.5,
+    )  # fmt: skip
+    dataset = load_dataset(root)
+    trained = train(dataset, config, root)
+    write_assets(root, trained.model, dataset.box_from_world)
+    mesh = trimesh.load(root / "mesh.glb", process=False).to_geometry()
+    texture = np.asarray(mesh.visual.material.baseColorTexture.convert("RGB"), np.float64) / 255
+    h, w = texture.shape[:2]
+    u, v = mesh.visual.uv.T  # trimesh has v upwards
+    encoded = texture[np.clip(((1 - v) * h).astype(int), 0, h - 1), np.clip((u * w).astype(int), 0, w - 1)]
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    light = oiio.ImageBuf(str(root / "environment.exr")).get_pixels(oiio.FLOAT)[..., :3]
+    return Result(np.asarray(mesh.vertices), linear, light)
+
+
+def z_up(vertices: np.ndarray) -> np.ndarray:
+    """glTF's x right, y up, z to the viewer, as x right, y away, z up."""
+    x, y, z = vertices.T
+    return np.stack([x, -z, y], 1)
+
+
+def sphere_through(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre and radius by least squares: |x|^2 = 2 c.x + r^2 - |c|^2."""
+    solution = np.linalg.lstsq(np.c_[2 * points, np.ones(len(points))], (points**2).sum(1), rcond=None)[0]
+    return solution[:3], math.sqrt(solution[3] + solution[:3] @ solution[:3])
+
+
+def test_the_ball_is_where_it_is_and_as_large(result):
+    """Closer than half a pixel, which is .05 of the world's units there and moves the ball by half of that up or down."""
+    centre, radius = sphere_through(z_up(result.vertices))
+    np.testing.assert_allclose(centre, CENTRE, atol=0.012)
+    assert radius == pytest.approx(RADIUS, abs=0.015)
+
+
+def test_its_red_side_is_red_and_its_blue_side_blue(result):
+    side = z_up(result.vertices)[:, 0] - CENTRE[0]
+    red, blue = result.albedo[side > 0.25].mean(0), result.albedo[side < -0.25].mean(0)
+    assert red[0] > 2.5 * red[2] and red[0] > 2.5 * red[1] and blue[2] > 2.5 * blue[0] and blue[2] > 2 * blue[1]
+
+
+def test_the_lamp_shines_from_where_it_is(result):
+    """The mean direction of the recovered light by its power, u = .5 - atan2(y, x) / (2 pi) and v = acos(z) / pi."""
+    height, width = result.light.shape[:2]
+    v, u = (np.mgrid[:height, :width] + 0.5) / np.array([height, width])[:, None, None]
+    azimuth, polar = 2 * np.pi * (0.5 - u), np.pi * v
+    directions = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
+    power = (result.light.mean(-1) * np.sin(polar))[..., None]
+    found = (power * directions).sum((0, 1))
+    angle = math.degrees(math.acos(found @ LAMP / np.linalg.norm(found)))
+    assert angle < 12

@@ -1,0 +1,246 @@
+"""Every schedule of a training by its closed form, alone and as a run follows it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+
+import pytest
+import torch
+from tiny_runs import tiny
+
+from splitnerf.config import Config, preset
+from splitnerf.data.dataset import load_dataset
+from splitnerf.render.model import SceneModel
+from splitnerf.training import loop as trainer
+from splitnerf.training.optimiser import make_optimiser, set_learning_rate
+from splitnerf.training.schedule import cosine_anneal, light_moves, light_period, next_ray_count
+
+RATES = {"learning_rate": 0.01, "variance_learning_rate": 0.001, "light_learning_rate": 0.02}
+
+
+def one_parameter(rate: float = 1.0) -> torch.optim.Optimizer:
+    """An optimiser with one group at this rate."""
+    return torch.optim.AdamW([{"params": [torch.zeros(1)], "rate": rate, "lr": rate}])
+
+
+def factor(config: Config, step: int) -> float:
+    """What the learning rate is multiplied by at a step of a run that only counts steps."""
+    optimiser = one_parameter()
+    set_learning_rate(optimiser, config, step, step / config.run.steps)
+    return optimiser.param_groups[0]["lr"]
+
+
+# ---- the learning rate ----
+
+
+def test_the_rate_warms_up_in_equal_steps():
+    config = Config().replace({"steps": 1000, "warmup_steps": 50})
+    for step in range(50):
+        assert factor(config, step) == pytest.approx((step + 1) / 50, rel=1e-12)
+    assert factor(config, 50) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_the_rate_then_decays_exponentially_to_its_last_value():
+    """lr(p) = f^((p - w) / (1 - w)) after a warm-up of the share w: equal factors in equal times, f at the end."""
+    config = Config().replace({"steps": 1000, "warmup_steps": 200, "final_learning_rate": 0.01})
+    for step, expected in ((200, 1.0), (400, 0.01**0.25), (600, 0.1), (800, 0.01**0.75), (1000, 0.01)):
+        assert factor(config, step) == pytest.approx(expected, rel=1e-9)
+    ratios = [factor(config, step + 1) / factor(config, step) for step in range(200, 1000)]
+    assert ratios == pytest.approx([0.01 ** (1 / 800)] * 800, rel=1e-9)
+
+
+def test_the_papers_rate():
+    """500 steps of warm-up, then exponentially to a tenth at 20,000; .01, and .001 for the sharpness."""
+    config = preset("paper")
+    assert factor(config, 0) == pytest.approx(1 / 500) and factor(config, 499) == 1.0
+    assert factor(config, 10_250) == pytest.approx(0.1**0.5) and factor(config, 20_000) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(("warmup", "steps", "expected"), [
+    (0, 100, {0: 1.0, 50: 0.1, 100: 0.01}),  # none
+    (80, 100, {0: 1 / 80, 49: 50 / 80, 75: 76 / 80 * 0.1, 100: 0.01}),  # the decay begins at half of the run at the latest
+])  # fmt: skip
+def test_warm_ups_at_the_bounds(warmup, steps, expected):
+    config = Config().replace({"steps": steps, "warmup_steps": warmup, "final_learning_rate": 0.01})
+    for step, rate in expected.items():
+        assert factor(config, step) == pytest.approx(rate, rel=1e-9), step
+
+
+@pytest.mark.parametrize("sparse", [False, True])
+@pytest.mark.parametrize("light", ["pyramid", "mlp"])
+def test_each_part_has_its_rate_and_its_decay(light, sparse):
+    """The sharpness and the light's texels have rates of their own and no decay, all else the common ones; none is left out."""
+    settings = RATES | {"weight_decay": 0.03, "light": light, "shading": "split", "sparse_steps": sparse}
+    model = SceneModel(tiny(**settings))
+    optimiser = make_optimiser(model, tiny(**settings))
+    rates, decays, sparsely = {}, {}, {}
+    for group in optimiser.param_groups:
+        for parameter in group["params"]:
+            assert id(parameter) not in rates
+            rates[id(parameter)], decays[id(parameter)] = group["lr"], group["weight_decay"]
+            sparsely[id(parameter)] = group["sparse"]
+            assert group["betas"] == (0.9, 0.99) and group["eps"] == 1e-15
+    for name, parameter in model.named_parameters():
+        own = {"variance": (0.001, 0.0), "light.texels": (0.02, 0.0)}.get(name, (0.01, 0.03))
+        assert (rates[id(parameter)], decays[id(parameter)]) == own, name
+        assert sparsely[id(parameter)] == (sparse and name == "sdf_field.grid.table"), name
+
+
+def test_all_rates_follow_one_factor():
+    config = tiny(steps=100, warmup_steps=10, final_learning_rate=0.25, **RATES)
+    optimiser = make_optimiser(SceneModel(config), config)
+    full = [group["lr"] for group in optimiser.param_groups]
+    for step in (0, 99, 55, 3):  # in any order: nothing adds up
+        set_learning_rate(optimiser, config, step, step / 100)
+        assert [group["lr"] for group in optimiser.param_groups] == pytest.approx(
+            [factor(config, step) * x for x in full]
+        )
+
+
+# ---- levels, annealing ----
+
+
+def test_the_papers_levels_open_one_each_thousand_steps():
+    """From 4 on; all 16 at 12,000 steps."""
+    model = SceneModel(preset("paper").replace({"log2_table_size": 8, "light_width": 8}))
+    for step in range(0, 20_001, 250):
+        model.open_levels(step / 20_000)
+        assert model.sdf_field.grid.n_active == min(16, 4 + step // 1000), step
+
+
+@pytest.mark.parametrize(("settings", "opened"), [
+    ({"n_levels": 6, "start_levels": 2, "levels_open_by": 0.5}, {0.0: 2, 0.124: 2, 0.126: 3, 0.376: 5, 0.499: 5, 0.5: 6, 1.0: 6}),
+    ({"n_levels": 6, "start_levels": 2, "levels_open_by": 0.0}, {0.0: 6, 1.0: 6}),
+    ({"n_levels": 3, "start_levels": 4}, {0.0: 3, 1.0: 3}),
+])  # fmt: skip
+def test_levels_open_evenly(settings, opened):
+    model = SceneModel(tiny(**settings))
+    for progress, n in opened.items():
+        model.open_levels(progress)
+        assert model.sdf_field.grid.n_active == n, progress
+
+
+def test_the_cosine_is_annealed_from_0_to_1():
+    """t = min(1, step / 20,000), as published; elsewhere by the share of the run that is set."""
+    for step in (0, 1, 5_000, 10_000, 20_000):
+        assert cosine_anneal(preset("paper"), step / 20_000) == pytest.approx(step / 20_000)
+    config = Config().replace({"cos_anneal_by": 0.4})
+    found = [cosine_anneal(config, progress) for progress in (0.0, 0.1, 0.3, 0.4, 0.7, 1.0)]
+    assert found == pytest.approx([0.0, 0.25, 0.75, 1.0, 1.0, 1.0])
+    assert cosine_anneal(config.replace({"cos_anneal_by": 0.0}), 0.0) == 1.0
+
+
+# ---- rays ----
+
+
+def converged(n_rays: int, per_ray: float, config: Config) -> list[int]:
+    """Numbers of rays step by step, where each has so many samples."""
+    counts = [n_rays]
+    while len(counts) < 100:
+        counts.append(next_ray_count(counts[-1], counts[-1] * per_ray, config))
+    return counts
+
+
+@pytest.mark.parametrize("per_ray", [1.7, 30.0, 130.0])
+def test_rays_are_as_many_as_fill_the_budget(per_ray):
+    """In the end budget / samples a ray; on the way there by a factor of 1.25 up and .8 down at most."""
+    config = Config().replace({"target_samples": 30_000, "max_rays": 100_000})
+    for start in (64, 50_000):
+        counts = converged(start, per_ray, config)
+        assert counts[-1] == pytest.approx(30_000 / per_ray, abs=1)
+        far = [(a, b) for a, b in itertools.pairwise(counts) if not 0.8 < 30_000 / per_ray / a < 1.25]
+        assert far and all(b == int(1.25 * a if a < 30_000 / per_ray else 0.8 * a) for a, b in far)
+
+
+def test_rays_have_bounds():
+    config = Config().replace({"target_samples": 30_000, "max_rays": 900})
+    assert converged(256, 1.0, config)[-1] == 900 and converged(256, 1e5, config)[-1] == 64
+    assert next_ray_count(256, 0, config) == int(1.25 * 256)  # all rays missed
+
+
+def test_recorded_steps_keep_their_number_of_rays_while_the_budget_is_nearly_met():
+    config = Config().replace({"target_samples": 30_000, "max_rays": 100_000, "cuda_graphs": True})
+    for samples, kept in ((30_000 / 1.09, True), (30_000 / 0.91, True), (30_000 / 1.11, False), (30_000 / 0.89, False)):
+        assert (next_ray_count(1000, samples, config) == 1000) == kept, samples
+    for n in range(64, 5000, 37):
+        count = next_ray_count(n, n * 30_000 / (1.2 * n), config)
+        assert count % (2 ** (count.bit_length() - 1) // 16) == 0 and count <= 1.25 * n
+
+
+# ---- the light ----
+
+
+def test_the_light_moves_once_in_its_period_and_with_the_last_step():
+    config = Config().replace({"steps": 10, "light_step_every": 4})
+    assert light_period(config) == 4
+    assert [step for step in range(10) if light_moves(config, step)] == [3, 7, 9]
+    mlp = config.replace({"light": "mlp", "shading": "split"})
+    assert light_period(mlp) == 1 and all(light_moves(mlp, step) for step in range(10))
+
+
+# ---- what a run does ----
+
+
+def recorded(monkeypatch, name: str, note: Callable) -> list:
+    """What `note` makes of the arguments and the result of each call that the trainer makes of this function."""
+    notes, function = [], getattr(trainer, name)
+
+    def noted(*args, **kwargs):
+        result = function(*args, **kwargs)
+        notes.append(note(args, kwargs, result))
+        return result
+
+    monkeypatch.setattr(trainer, name, noted)
+    return notes
+
+
+def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
+    """Levels, anneal, rates, and the terms that begin late or stand for several steps, as a run of 41 steps has them."""
+    n = 41
+    config = tiny(
+        steps=n, n_levels=8, start_levels=2, levels_open_by=0.6, cos_anneal_by=0.5, warmup_steps=8, final_learning_rate=0.1,
+        light_step_every=4, priors_from=0.5, entropy_weight=0.01, binary_metal_weight=0.01, neutral_weight=0.03, mesh_every=0.25,
+    )  # fmt: skip
+    levels = recorded(monkeypatch, "find_samples", lambda args, _, __: args[0].sdf_field.grid.n_active)
+    anneals = recorded(monkeypatch, "find_samples", lambda args, *_: args[5])
+    rates = recorded(
+        monkeypatch, "set_learning_rate", lambda args, *_: [g["lr"] / g["rate"] for g in args[0].param_groups]
+    )
+    terms = recorded(monkeypatch, "batch_losses", lambda _, __, result: {k: t.weight for k, t in result[1].items()})
+    renewed, renew = [], trainer.SurfaceMesh.renew
+    monkeypatch.setattr(
+        trainer.SurfaceMesh, "renew", lambda self, progress: renewed.append(progress) or renew(self, progress)
+    )
+    trainer.train(load_dataset(data), config, tmp_path)
+
+    assert levels == [min(8, 2 + math.floor(6 * step / (0.6 * n))) for step in range(n)]
+    assert anneals == pytest.approx([min(1.0, step / (0.5 * n)) for step in range(n)])
+    w = 8 / n
+    expected = [min(1.0, (step + 1) / 8) * 0.1 ** max(0.0, (step / n - w) / (1 - w)) for step in range(n)]
+    assert all(group == pytest.approx([rate] * len(group)) for group, rate in zip(rates, expected, strict=True))
+    for prior in ("entropy", "binary_metal"):
+        assert [prior in step for step in terms] == [step / n >= 0.5 for step in range(n)]
+    assert [step for step in range(n) if "neutral" in terms[step]] == [*range(3, 40, 4), 40]
+    assert sum(step.get("neutral", 0.0) for step in terms) == pytest.approx(0.03 * n)
+    apart = math.ceil(0.25 * n)
+    assert renewed == pytest.approx([apart / n, 2 * apart / n, 3 * apart / n, 1.0])
+
+
+def test_minutes_move_the_schedule_where_they_are_ahead_of_the_steps(data, tmp_path, monkeypatch):
+    """Half of the minutes are gone: the run is at its half, however many steps are left; when all are, it is done."""
+    config = tiny(steps=100_000, max_minutes=1.0, n_levels=8, start_levels=2, levels_open_by=1.0, preview_every=2.0)
+    clock = itertools.chain([0.0], itertools.count(0.0, 1.0))
+    now = [0.0]
+
+    def tick() -> float:
+        now[0] = next(clock)
+        return now[0]
+
+    monkeypatch.setattr(trainer.time, "monotonic", tick)
+    progress = recorded(monkeypatch, "set_learning_rate", lambda args, *_: args[3])
+    trained = trainer.train(load_dataset(data), config, tmp_path)
+    assert trained.finished and 15 < trained.step < 70 and trained.seconds >= 60.0
+    assert progress == sorted(progress) and progress[0] == 0.0 and 0.9 < progress[-1] < 1.0
+    assert len({round(b - a, 6) for a, b in itertools.pairwise(progress[1:])}) <= 2

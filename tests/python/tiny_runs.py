@@ -1,0 +1,36 @@
+"""Runs small enough that a step takes milliseconds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from splitnerf.cli import main
+from splitnerf.config import Config, preset
+
+# A tenth of the default sizes and less; the method is that of the preset.
+SMALL = dict(
+    n_levels=4, log2_table_size=10, target_samples=512, initial_rays=64, grid_resolution=16, light_resolution=16,
+    light_samples=64, light_queries=16, eikonal_points=32, mesh_resolution=24, export_resolution=32,
+    export_environment_height=16, export_faces=500, export_texture_size=64,
+)  # fmt: skip
+
+
+def tiny(name: str = "cpu", **settings: object) -> Config:
+    """The settings of a preset, small, with some changed."""
+    return preset(name).replace(SMALL | settings)
+
+
+def as_options(settings: dict[str, object]) -> list[str]:
+    """The same settings for the command line."""
+    return [part for key, value in settings.items() for part in ("--set", f"{key}={json.dumps(value)}")]
+
+
+def train(data: Path, run: Path, *options: str) -> int:
+    """`splitnerf train` with small settings; returns its exit code."""
+    return main(["train", str(data), "--out", str(run), *as_options(SMALL), *options])
+
+
+def lines_of(run: Path) -> list[dict]:
+    """The lines of a run's metrics.jsonl."""
+    return [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
