@@ -75,8 +75,8 @@ void light_lookup_backward(const Queue& queue, const LightPyramid<T>& pyramid, i
   check(cudaGetLastError(), op);
 }
 
-template void light_lookup_backward<float>(const Queue&, const LightPyramid<float>&, int64_t, const float*, const float*,
-                                           const float*, float*, float*, float*, float*);
+template void light_lookup_backward<float>(const Queue&, const LightPyramid<float>&, int64_t, const float*,
+                                           const float*, const float*, float*, float*, float*, float*);
 template void light_lookup_backward<double>(const Queue&, const LightPyramid<double>&, int64_t, const double*,
                                             const double*, const double*, double*, double*, double*, double*);
 

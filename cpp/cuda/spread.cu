@@ -27,9 +27,9 @@ void spread_samples(const Queue& queue, const PackedRays& rays, const T* weights
       SpreadFillBody<T>{rays, weights, t, phase, gap, per_ray, drawn, stretches, filled, to, first, second, share});
 }
 
-template void spread_samples<float>(const Queue&, const PackedRays&, const float*, const float*, const float*, float, int,
-                                    int64_t*, int64_t*, int64_t*, float*, const SpreadAllocator&);
-template void spread_samples<double>(const Queue&, const PackedRays&, const double*, const double*, const double*, double,
-                                     int, int64_t*, int64_t*, int64_t*, double*, const SpreadAllocator&);
+template void spread_samples<float>(const Queue&, const PackedRays&, const float*, const float*, const float*, float,
+                                    int, int64_t*, int64_t*, int64_t*, float*, const SpreadAllocator&);
+template void spread_samples<double>(const Queue&, const PackedRays&, const double*, const double*, const double*,
+                                     double, int, int64_t*, int64_t*, int64_t*, double*, const SpreadAllocator&);
 
 }  // namespace splitnerf::cuda

@@ -45,8 +45,8 @@ void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t n, const T* d
   }
 }
 
-template void light_lookup_backward<float>(const LightPyramid<float>&, int64_t, const float*, const float*, const float*,
-                                           float*, float*, float*, float*);
+template void light_lookup_backward<float>(const LightPyramid<float>&, int64_t, const float*, const float*,
+                                           const float*, float*, float*, float*, float*);
 template void light_lookup_backward<double>(const LightPyramid<double>&, int64_t, const double*, const double*,
                                             const double*, double*, double*, double*, double*);
 

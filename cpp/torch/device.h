@@ -23,12 +23,13 @@ namespace splitnerf::glue {
   X(prefilter_light_backward) X(light_lookup_backward) X(spread_samples) X(sdf_values) X(sdf_layer)        \
   X(sdf_layer_backward) X(sample_rays)
 
-// What an operator's body asks of a device. `op` names the operator in errors of a GPU; scratch memory lives as long as the device.
+// What an operator asks of a device. The first argument names the operator in errors of a GPU; scratch memory lives until the
+// call of on_device ends.
 class OnCpu {
  public:
   template <class Body> void run(const char*, int64_t n, const Body& body) const { cpu::run(n, body); }
   template <class T> T* scratch(int64_t n) const {
-    scratch_.push_back(std::make_unique<unsigned char[]>(n * sizeof(T)));
+    scratch_.emplace_back(new unsigned char[n * sizeof(T)]);
     return reinterpret_cast<T*>(scratch_.back().get());
   }
   template <class T> void clear(const char*, T* values, int64_t n) const { std::fill_n(values, n, T(0)); }

@@ -43,8 +43,8 @@ std::tuple<Tensor, Tensor, Tensor> gradient_losses(Tensor gradients, Tensor weig
     using T = decltype(zero);
     T* smoothness = out<T>(smoothness_by);
     auto* scale = device.template scratch<double>(1);
-    device.run(op, n,
-               EikonalBody<T>{in<T>(g), T(1) / T(max_of<int64_t>(n, 1)), out<T>(losses), out<T>(eikonal_by), smoothness});
+    const T per_point = T(1) / T(max_of<int64_t>(n, 1));
+    device.run(op, n, EikonalBody<T>{in<T>(g), per_point, out<T>(losses), out<T>(eikonal_by), smoothness});
     device.run(op, m,
                NormalPairsBody<T>{n, n_weights, m, in<T>(g), in<T>(w), in<int64_t>(b), out<T>(losses) + 1, smoothness,
                                   scale});

@@ -27,7 +27,8 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> march_rays(Tensor rays_o, Tensor rays
   Tensor offsets = empty_like_type(o, {n_rays + 1}, ScalarType::Long), ray_indices, t_starts, t_ends;
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.run(op, blocks.numel(), OccupiedBlocksBody{occupancy.cells, occupancy.resolution, occupancy.n_blocks, out<uint8_t>(blocks)});
+    device.run(op, blocks.numel(),
+               OccupiedBlocksBody{occupancy.cells, occupancy.resolution, occupancy.n_blocks, out<uint8_t>(blocks)});
     device.run(op, n_rays,
                MarchCountBody<T>{options, occupancy, in<T>(o), in<T>(d), in<T>(u), out<int64_t>(offsets) + 1});
     device.sum_counts(op, n_rays, out<int64_t>(offsets));
