@@ -1,19 +1,9 @@
-#include "features.cuh"
 #include "launch.cuh"
+#include "splitnerf/ops_cuda.h"
 #include "splitnerf/bodies/hash_encode.h"
+#include "splitnerf/features.h"
 
 namespace splitnerf::cuda {
-namespace {
-
-template <class T, class S>
-HashGridView<T, S> make_view(const HashGridShape& shape, int n_active, const T* positions, const S* table) {
-  HashGridView<T, S> view{};
-  hash_levels(shape, view.levels);
-  view.n_levels = shape.n_levels, view.n_active = n_active, view.positions = positions, view.table = table;
-  return view;
-}
-
-}  // namespace
 
 // Level after level, so that a level's part of the table stays in the L2 cache while all points read it.
 template <class T>

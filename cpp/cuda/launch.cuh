@@ -1,4 +1,4 @@
-// Launching kernels over index ranges, with errors as exceptions.
+// Kernels over the bodies of splitnerf/bodies/, with errors as exceptions: cuda::run and what it chooses from.
 #pragma once
 
 #include <cuda_runtime.h>
@@ -6,11 +6,13 @@
 #include <stdexcept>
 #include <string>
 
-#include "splitnerf/ops_cuda.h"
+#include "splitnerf/run.h"
+#include "splitnerf/run_cuda.h"
 
 namespace splitnerf::cuda {
 
-inline constexpr int kBlock = 256;  // threads
+inline constexpr int kBlock = 256;       // threads
+inline constexpr int kSumBlocks = 512;  // blocks that add up
 
 inline void check(cudaError_t error, const char* what) {
   if (error != cudaSuccess) throw std::runtime_error(std::string(what) + ": " + cudaGetErrorString(error));
@@ -44,8 +46,95 @@ template <class Body> void for_each_pair(const Queue& queue, const char* op, int
   check(cudaGetLastError(), op);
 }
 
-template <class T> void clear(const Queue& queue, const char* op, T* values, int64_t n) {
-  if (n > 0) check(cudaMemsetAsync(values, 0, n * sizeof(T), queue.stream), op);
+// A warp as the group of threads of splitnerf/group.h.
+struct Warp {
+  static constexpr int size = 32;
+  static constexpr unsigned all = 0xffffffffu;
+
+  __device__ int lane() const { return threadIdx.x % size; }
+  template <class T> __device__ T sum(T value) const {
+    for (int step = size / 2; step > 0; step /= 2) value += __shfl_xor_sync(all, value, step);
+    return value;
+  }
+  template <class T> __device__ T sum_before(T value) const {
+    T running = __shfl_up_sync(all, value, 1);
+    if (lane() == 0) running = T(0);
+    for (int step = 1; step < size; step *= 2) {
+      const T before = __shfl_up_sync(all, running, step);
+      if (lane() >= step) running += before;
+    }
+    return running;
+  }
+  template <class T> __device__ T last(T value) const { return __shfl_sync(all, value, size - 1); }
+  __device__ uint32_t ballot(bool yes) const { return __ballot_sync(all, yes); }
+  __device__ void sync() const { __syncwarp(); }
+};
+
+// A warp for each index.
+template <class Body> __global__ void __launch_bounds__(kBlock) for_each_group_kernel(int64_t n, const Body body) {
+  const int64_t i = int64_t(blockIdx.x) * (kBlock / Warp::size) + threadIdx.x / Warp::size;
+  if (i < n) body(Warp{}, i);
+}
+template <class Body> void for_each_group(const Queue& queue, const char* op, int64_t n, const Body& body) {
+  if (n <= 0) return;
+  for_each_group_kernel<<<blocks_for(n, kBlock / Warp::size), kBlock, 0, queue.stream>>>(n, body);
+  check(cudaGetLastError(), op);
+}
+
+// ---- sums ----
+
+// Sums of the threads of a block, in its first thread.
+template <int N> __device__ void add_up_block(double (&sums)[N]) {
+  __shared__ double of_warps[N][kBlock / Warp::size];
+  const Warp warp;
+  for (int k = 0; k < N; ++k) {
+    const double sum = warp.sum(sums[k]);
+    if (warp.lane() == 0) of_warps[k][threadIdx.x / Warp::size] = sum;
+  }
+  __syncthreads();
+  for (int k = 0; k < N; ++k) sums[k] = warp.sum(warp.lane() < kBlock / Warp::size ? of_warps[k][warp.lane()] : 0.0);
+}
+
+// parts [blocks, Body::n_sums]: each block's sums over its share of the items.
+template <class Body>
+__global__ void __launch_bounds__(kBlock) add_up_kernel(int64_t n, const Body body, double* parts) {
+  double sums[Body::n_sums] = {};
+  for (int64_t i = int64_t(blockIdx.x) * kBlock + threadIdx.x; i < n; i += int64_t(gridDim.x) * kBlock) body(i, sums);
+  add_up_block(sums);
+  if (threadIdx.x == 0)
+    for (int k = 0; k < Body::n_sums; ++k) parts[blockIdx.x * Body::n_sums + k] = sums[k];
+}
+template <class Body>
+__global__ void __launch_bounds__(kBlock) finish_kernel(int n_parts, const Body body, const double* parts) {
+  double sums[Body::n_sums] = {};
+  for (int i = threadIdx.x; i < n_parts; i += kBlock)
+    for (int k = 0; k < Body::n_sums; ++k) sums[k] += parts[i * Body::n_sums + k];
+  add_up_block(sums);
+  if (threadIdx.x == 0) body.finish(sums);
+}
+
+// Calls body(i, sums) for each item and body.finish(sums) once, in an order that depends on n alone.
+template <class Body> void add_up(const Queue& queue, const char* op, int64_t n, const Body& body) {
+  const auto blocks = min_of<int64_t>((n + kBlock - 1) / kBlock, kSumBlocks);
+  double* parts = queue.scratch<double>(max_of<int64_t>(blocks, 1) * Body::n_sums);
+  if (blocks > 0) {
+    add_up_kernel<<<static_cast<unsigned>(blocks), kBlock, 0, queue.stream>>>(n, body, parts);
+    check(cudaGetLastError(), op);
+  }
+  finish_kernel<<<1, kBlock, 0, queue.stream>>>(static_cast<int>(blocks), body, parts);
+  check(cudaGetLastError(), op);
+}
+
+// ---- the launcher ----
+
+template <class Body> void run(const Queue& queue, const char* op, int64_t n, const Body& body) {
+  if constexpr (is_sum<Body>) {
+    add_up(queue, op, n, body);
+  } else if constexpr (is_single<Body>) {
+    for_each(queue, op, n, body);
+  } else {
+    for_each_group(queue, op, n, body);
+  }
 }
 
 }  // namespace splitnerf::cuda

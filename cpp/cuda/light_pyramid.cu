@@ -1,5 +1,7 @@
 #include "splitnerf/bodies/light_pyramid.h"
-#include "warp.cuh"
+
+#include "launch.cuh"
+#include "splitnerf/ops_cuda.h"
 
 namespace splitnerf::cuda {
 namespace {
@@ -59,18 +61,6 @@ __global__ void __launch_bounds__(kThreads)
 }  // namespace
 
 template <class T>
-void sparse_product(const Queue& queue, const SparseRows<T>& matrix, int64_t n_rows, int64_t, const T* values,
-                    T* products) {
-  for_each_group(queue, "sparse_product", n_rows, SparseProductBody<T>{matrix, values, products});
-}
-
-template <class T>
-void light_lookup(const Queue& queue, const LightPyramid<T>& pyramid, int64_t n, const T* directions,
-                  const T* roughness, T* radiance) {
-  for_each(queue, "light_lookup", n, LightLookupBody<T>{pyramid, *pyramid.recurrence, directions, roughness, radiance});
-}
-
-template <class T>
 void light_lookup_backward(const Queue& queue, const LightPyramid<T>& pyramid, int64_t n, const T* directions,
                            const T* roughness, const T* grad_radiance, T* grad_directions, T* grad_roughness,
                            T* grad_levels, T* grad_sh) {
@@ -85,13 +75,9 @@ void light_lookup_backward(const Queue& queue, const LightPyramid<T>& pyramid, i
   check(cudaGetLastError(), op);
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                      \
-  template void sparse_product<T>(const Queue&, const SparseRows<T>&, int64_t, int64_t, const T*, T*);                \
-  template void light_lookup<T>(const Queue&, const LightPyramid<T>&, int64_t, const T*, const T*, T*);               \
-  template void light_lookup_backward<T>(const Queue&, const LightPyramid<T>&, int64_t, const T*, const T*, const T*, \
-                                         T*, T*, T*, T*);
-SPLITNERF_INSTANTIATE(float)
-SPLITNERF_INSTANTIATE(double)
-#undef SPLITNERF_INSTANTIATE
+template void light_lookup_backward<float>(const Queue&, const LightPyramid<float>&, int64_t, const float*,
+                                           const float*, const float*, float*, float*, float*, float*);
+template void light_lookup_backward<double>(const Queue&, const LightPyramid<double>&, int64_t, const double*,
+                                            const double*, const double*, double*, double*, double*, double*);
 
 }  // namespace splitnerf::cuda

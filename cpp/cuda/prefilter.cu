@@ -1,4 +1,5 @@
 #include "launch.cuh"
+#include "splitnerf/ops_cuda.h"
 #include "splitnerf/bodies/prefilter.h"
 
 namespace splitnerf::cuda {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "features.cuh"
-#include "scan.cuh"
+#include "launch.cuh"
+#include "splitnerf/ops_cuda.h"
 #include "splitnerf/bodies/rays.h"
-#include "warp.cuh"
+#include "splitnerf/features.h"
 
 namespace splitnerf::cuda {
 namespace {
@@ -173,10 +173,7 @@ template <class T> struct FinishBody {
 };
 
 template <class T, class S> HashGridView<T, S> field_grid(const SdfField<T>& field, const S* table) {
-  HashGridView<T, S> grid{};
-  hash_levels(field.shape, grid.levels);
-  grid.n_levels = field.shape.n_levels, grid.n_active = field.n_active, grid.table = table;
-  return grid;
+  return make_view<T>(field.shape, field.n_active, nullptr, table);
 }
 
 // Points of a tile of so many rows, and the shared memory that it takes; the kernel is told to allow it.

@@ -2,6 +2,8 @@
 #include <array>
 
 #include "huge_pages.h"
+#include "splitnerf/bodies/hash_encode.h"
+#include "splitnerf/features.h"
 #include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/parallel.h"
@@ -63,12 +65,12 @@ template <class T>
 void hash_encode_backward_positions(const HashGridShape& shape, int n_active, int64_t n, const T* positions,
                                     HashTable table, const T* grad_features, const T* grad_jacobian,
                                     T* grad_positions) {
-  std::array<HashLevel, kMaxLevels> levels;
-  hash_levels(shape, levels.data());
-  const auto args = make_args(shape, levels.data(), n_active, n, positions, table);
-  const Kernels<T>& k = kernels<T>();
-  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    k.hash_position_gradient(args, begin, end, grad_features, grad_jacobian, grad_positions);
+  with_features(shape.n_features, [&](auto count) {
+    table.read_as<T>([&](auto* entries) {
+      using S = Pointee<decltype(entries)>;
+      const auto grid = make_view<T>(shape, n_active, positions, entries);
+      run(n, HashPositionsBody<T, decltype(count)::n, S>{grid, grad_features, grad_jacobian, grad_positions});
+    });
   });
 }
 

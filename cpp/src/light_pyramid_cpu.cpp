@@ -8,25 +8,17 @@
 namespace splitnerf::cpu {
 namespace {
 
-constexpr int64_t kRowGrain = 512, kPointGrain = 1024, kChunkPoints = 2048;
+constexpr int64_t kPointGrain = 1024, kChunkPoints = 2048;
 
 }  // namespace
 
-template <class T>
-void sparse_product(const SparseRows<T>& matrix, int64_t n_rows, int64_t n_columns, const T* values, T* products) {
-  std::vector<T> padded(4 * n_columns);
-  for (int64_t i = 0; i < n_columns; ++i) std::copy_n(values + 3 * i, 3, &padded[4 * i]);
-  parallel_for(n_rows, kRowGrain, [&](int64_t begin, int64_t end) {
-    kernels<T>().sparse_product(matrix, begin, end, padded.data(), products);
-  });
-}
-
-template <class T>
-void light_lookup(const LightPyramid<T>& pyramid, int64_t n, const T* directions, const T* roughness, T* radiance) {
+template <class T> void run(int64_t n, const LightLookupBody<T>& b) {
   parallel_for(n, kPointGrain, [&](int64_t begin, int64_t end) {
-    kernels<T>().light_lookup(pyramid, begin, end, directions, roughness, radiance);
+    kernels<T>().light_lookup(b.pyramid, begin, end, b.directions, b.roughness, b.radiance);
   });
 }
+template void run<float>(int64_t, const LightLookupBody<float>&);
+template void run<double>(int64_t, const LightLookupBody<double>&);
 
 template <class T>
 void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t n, const T* directions, const T* roughness,
@@ -53,12 +45,9 @@ void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t n, const T* d
   }
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                          \
-  template void sparse_product<T>(const SparseRows<T>&, int64_t, int64_t, const T*, T*);  \
-  template void light_lookup<T>(const LightPyramid<T>&, int64_t, const T*, const T*, T*); \
-  template void light_lookup_backward<T>(const LightPyramid<T>&, int64_t, const T*, const T*, const T*, T*, T*, T*, T*);
-SPLITNERF_INSTANTIATE(float)
-SPLITNERF_INSTANTIATE(double)
-#undef SPLITNERF_INSTANTIATE
+template void light_lookup_backward<float>(const LightPyramid<float>&, int64_t, const float*, const float*,
+                                           const float*, float*, float*, float*, float*);
+template void light_lookup_backward<double>(const LightPyramid<double>&, int64_t, const double*, const double*,
+                                            const double*, double*, double*, double*, double*);
 
 }  // namespace splitnerf::cpu

@@ -1,8 +1,6 @@
 #include <vector>
 
-#include "for_each.h"
 #include "planes.h"
-#include "splitnerf/bodies/monte_carlo.h"
 #include "splitnerf/ggx.h"
 #include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
@@ -64,15 +62,9 @@ void prefilter_light_backward(int64_t n_queries, const T* query_dirs, const T* r
   });
 }
 
-template <class T>
-void sample_ggx_lobe(int64_t n, const T* axes, const T* roughness, int n_samples, uint32_t seed, T* directions) {
-  for_each_alone(n, kGrain, SampleLobeBody<T>{axes, roughness, n_samples, seed, directions});
-}
-
 #define SPLITNERF_INSTANTIATE(T)                                                                                     \
   template void prefilter_light<T>(int64_t, const T*, const T*, int64_t, const T*, const T*, T*, T*);                \
-  template void prefilter_light_backward<T>(int64_t, const T*, const T*, const T*, const T*, int64_t, const T*, T*); \
-  template void sample_ggx_lobe<T>(int64_t, const T*, const T*, int, uint32_t, T*);
+  template void prefilter_light_backward<T>(int64_t, const T*, const T*, const T*, const T*, int64_t, const T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

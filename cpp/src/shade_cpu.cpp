@@ -1,8 +1,6 @@
-#include "for_each.h"
-#include "splitnerf/bodies/shading.h"
+// ShadeBody and its adjoint through the kernels of src/kernels/shading.cpp.
 #include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
-#include "splitnerf/parallel.h"
 
 namespace splitnerf::cpu {
 namespace {
@@ -11,46 +9,20 @@ constexpr int64_t kGrain = 1024;
 
 }  // namespace
 
-template <class T>
-void query_direction(const float* lut, bool mean, int64_t n, const T* normals, const T* view_dirs, const T* roughness,
-                     T* directions) {
-  for_each(n, kGrain, QueryDirectionBody<T>{lut, mean, normals, view_dirs, roughness, directions});
-}
-
-template <class T>
-void query_direction_backward(const float* lut, bool mean, int64_t n, const T* normals, const T* view_dirs,
-                              const T* roughness, const T* grad_directions, T* grad_normals, T* grad_view_dirs,
-                              T* grad_roughness) {
-  for_each(n, kGrain,
-           QueryDirectionBackwardBody<T>{lut, mean, normals, view_dirs, roughness, grad_directions, grad_normals,
-                                         grad_view_dirs, grad_roughness});
-}
-
-template <class T>
-void split_sum_shade(const float* lut, ShadeOptions options, int64_t n, int n_channels, const ShadeArrays<const T>& in,
-                     T* radiance) {
+template <class T> void run(int64_t n, const ShadeBody<T>& b) {
   parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    kernels<T>().split_sum_shade(lut, options, begin, end, n_channels, in, radiance);
+    kernels<T>().split_sum_shade(b.lut, b.options, begin, end, b.n_channels, b.in, b.radiance);
   });
 }
+template void run<float>(int64_t, const ShadeBody<float>&);
+template void run<double>(int64_t, const ShadeBody<double>&);
 
-template <class T>
-void split_sum_shade_backward(const float* lut, ShadeOptions options, int64_t n, int n_channels,
-                              const ShadeArrays<const T>& in, const T* grad_radiance, const ShadeArrays<T>& grad) {
+template <class T> void run(int64_t n, const ShadeBackwardBody<T>& b) {
   parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
-    kernels<T>().split_sum_shade_backward(lut, options, begin, end, n_channels, in, grad_radiance, grad);
+    kernels<T>().split_sum_shade_backward(b.lut, b.options, begin, end, b.n_channels, b.in, b.grad_radiance, b.grad);
   });
 }
-
-#define SPLITNERF_INSTANTIATE(T)                                                                                     \
-  template void query_direction<T>(const float*, bool, int64_t, const T*, const T*, const T*, T*);                   \
-  template void query_direction_backward<T>(const float*, bool, int64_t, const T*, const T*, const T*, const T*, T*, \
-                                            T*, T*);                                                                 \
-  template void split_sum_shade<T>(const float*, ShadeOptions, int64_t, int, const ShadeArrays<const T>&, T*);       \
-  template void split_sum_shade_backward<T>(const float*, ShadeOptions, int64_t, int, const ShadeArrays<const T>&,   \
-                                            const T*, const ShadeArrays<T>&);
-SPLITNERF_INSTANTIATE(float)
-SPLITNERF_INSTANTIATE(double)
-#undef SPLITNERF_INSTANTIATE
+template void run<float>(int64_t, const ShadeBackwardBody<float>&);
+template void run<double>(int64_t, const ShadeBackwardBody<double>&);
 
 }  // namespace splitnerf::cpu

@@ -196,10 +196,8 @@ template <class T> class CacheReader {
 
 }  // namespace
 
-template <class T>
-void cached_occlusion(const VisibilityCache<T>& cache, int64_t n, const T* positions, const T* normals,
-                      const T* lobe_dirs, const T* roughness, T* occlusion_d, T* occlusion_s, T* indirect_d,
-                      T* indirect_s) {
+template <class T> void run(int64_t n, const CachedOcclusionBody<T>& b) {
+  const VisibilityCache<T>& cache = b.cache;
   const Planes<T> direction(cache.directions, cache.n_directions);
   Planes<T> light(cache.light, cache.n_directions);
   for (auto* plane : {&light.x, &light.y, &light.z}) {
@@ -211,19 +209,20 @@ void cached_occlusion(const VisibilityCache<T>& cache, int64_t n, const T* posit
     CacheReader<T> reader(cache, directions);
     for (int64_t i = begin; i < end; ++i) {
       const auto result =
-          reader.read(load3(positions + 3 * i), load3(normals + 3 * i), load3(lobe_dirs + 3 * i), roughness[i]);
-      store3(occlusion_d + 3 * i, result.occlusion_d);
-      store3(occlusion_s + 3 * i, result.occlusion_s);
+          reader.read(load3(b.positions + 3 * i), load3(b.normals + 3 * i), load3(b.lobe_dirs + 3 * i), b.roughness[i]);
+      store3(b.occlusion_d + 3 * i, result.occlusion_d);
+      store3(b.occlusion_s + 3 * i, result.occlusion_s);
       if (!cache.hits) continue;
-      store3(indirect_d + 3 * i, result.indirect_d);
-      store3(indirect_s + 3 * i, result.indirect_s);
+      store3(b.indirect_d + 3 * i, result.indirect_d);
+      store3(b.indirect_s + 3 * i, result.indirect_s);
     }
   });
 }
+template void run<float>(int64_t, const CachedOcclusionBody<float>&);
+template void run<double>(int64_t, const CachedOcclusionBody<double>&);
 
-template <class T>
-void cached_visibility(const VisibilityCache<T>& cache, int64_t n, const T* positions, const T* normals, T* visible,
-                       T* arriving) {
+template <class T> void run(int64_t n, const CachedVisibilityBody<T>& b) {
+  const VisibilityCache<T>& cache = b.cache;
   const Planes<T> direction(cache.directions, cache.n_directions);
   const LobeSide<T> directions{
       direction.x.data(), direction.y.data(), direction.z.data(), nullptr, nullptr, nullptr, nullptr,
@@ -232,19 +231,15 @@ void cached_visibility(const VisibilityCache<T>& cache, int64_t n, const T* posi
   parallel_for(n, kPointGrain, [&](int64_t begin, int64_t end) {
     CacheReader<T> reader(cache, directions);
     for (int64_t i = begin; i < end; ++i) {
-      reader.read_directions(load3(positions + 3 * i), load3(normals + 3 * i), visible + k * i,
-                             cache.hits ? arriving + 3 * k * i : nullptr);
+      reader.read_directions(load3(b.positions + 3 * i), load3(b.normals + 3 * i), b.visible + k * i,
+                             cache.hits ? b.arriving + 3 * k * i : nullptr);
     }
   });
 }
+template void run<float>(int64_t, const CachedVisibilityBody<float>&);
+template void run<double>(int64_t, const CachedVisibilityBody<double>&);
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                    \
-  template void build_vertex_grids<T>(int64_t, const T*, T, int, int64_t, int32_t*, int32_t*);                      \
-  template void cached_occlusion<T>(const VisibilityCache<T>&, int64_t, const T*, const T*, const T*, const T*, T*, \
-                                    T*, T*, T*);                                                                    \
-  template void cached_visibility<T>(const VisibilityCache<T>&, int64_t, const T*, const T*, T*, T*);
-SPLITNERF_INSTANTIATE(float)
-SPLITNERF_INSTANTIATE(double)
-#undef SPLITNERF_INSTANTIATE
+template void build_vertex_grids<float>(int64_t, const float*, float, int, int64_t, int32_t*, int32_t*);
+template void build_vertex_grids<double>(int64_t, const double*, double, int, int64_t, int32_t*, int32_t*);
 
 }  // namespace splitnerf::cpu

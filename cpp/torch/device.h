@@ -1,41 +1,52 @@
-// One call for the CPU and the GPU: an operator's body runs with the functions of cpu:: or with those of cuda::, these on the
-// tensors' device and torch's current stream.
+// One call for the CPU and the GPU: device.run(op, n, body) runs a body of splitnerf/bodies/ on the device of an operator's
+// tensors, a GPU in torch's current stream.
 #pragma once
+
+#include <algorithm>
+#include <memory>
+#include <vector>
 
 #include "check.h"
 #include "splitnerf/ops_cpu.h"
 #ifdef SPLITNERF_WITH_CUDA
 #include <torch/csrc/stable/accelerator.h>
 
-#include <vector>
-
 #include "splitnerf/ops_cuda.h"
 #endif
 
 namespace splitnerf::glue {
 
-// The operators that both devices have.
-// clang-format off
-#define SPLITNERF_EACH_OPERATOR(X)                                                                           \
-  X(hash_encode) X(hash_encode_backward) X(hash_encode_backward_positions) X(query_direction)                \
-  X(query_direction_backward) X(split_sum_shade) X(split_sum_shade_backward) X(prefilter_light)              \
-  X(prefilter_light_backward) X(sample_ggx_lobe) X(sparse_product) X(light_lookup) X(light_lookup_backward)  \
-  X(sample_bsdf) X(monte_carlo_light) X(monte_carlo_light_backward) X(summed_light) X(summed_light_backward) \
-  X(shade_sums) X(shade_sums_backward) X(linear_to_srgb) X(linear_to_srgb_backward) X(srgb_to_linear)        \
-  X(pixel_losses) X(gradient_losses) X(material_losses) X(quadratic_entropy) X(occupied_blocks)              \
-  X(march_rays_count) X(march_rays_fill) X(neus_weights) X(neus_weights_backward) X(surface_weights)         \
-  X(surface_weights_backward) X(composite) X(composite_backward) X(spread_samples) X(interpolate) X(interpolate_backward)      \
-  X(sdf_values) X(sdf_layer) X(sdf_layer_backward) X(cached_occlusion) X(cached_visibility) X(sample_rays)   \
-  X(adamw_step)
-// clang-format on
+// The operators that are more than bodies, with a strategy of its own for each device: device.hash_encode(...) is
+// cpu::hash_encode(...) or cuda::hash_encode(queue, ...).
+#define SPLITNERF_EACH_STRATEGY(X)                                                                         \
+  X(hash_encode) X(hash_encode_backward) X(hash_encode_backward_positions) X(prefilter_light)              \
+  X(prefilter_light_backward) X(light_lookup_backward) X(spread_samples) X(sdf_values) X(sdf_layer)        \
+  X(sdf_layer_backward) X(sample_rays)
 
-// device.hash_encode(...) is cpu::hash_encode(...) or cuda::hash_encode(queue, ...).
-struct OnCpu {
+// What an operator asks of a device. The first argument names the operator in errors of a GPU; scratch memory lives until the
+// call of on_device ends.
+class OnCpu {
+ public:
+  template <class Body> void run(const char*, int64_t n, const Body& body) const { cpu::run(n, body); }
+  template <class T> T* scratch(int64_t n) const {
+    scratch_.emplace_back(new unsigned char[n * sizeof(T)]);
+    return reinterpret_cast<T*>(scratch_.back().get());
+  }
+  template <class T> void clear(const char*, T* values, int64_t n) const { std::fill_n(values, n, T(0)); }
+  // offsets [n + 1]: 0, and the counts in what follows become their sums.
+  void sum_counts(const char*, int64_t n, int64_t* offsets) const {
+    offsets[0] = 0;
+    for (int64_t i = 0; i < n; ++i) offsets[i + 1] += offsets[i];
+  }
+  int64_t read_number(const int64_t* number) const { return *number; }
+
 #define SPLITNERF_CALL(op) \
   template <class... Arguments> auto op(Arguments... arguments) const { return cpu::op(arguments...); }
-  SPLITNERF_EACH_OPERATOR(SPLITNERF_CALL)
+  SPLITNERF_EACH_STRATEGY(SPLITNERF_CALL)
 #undef SPLITNERF_CALL
-  int64_t read_number(const int64_t* number) const { return *number; }
+
+ private:
+  mutable std::vector<std::unique_ptr<unsigned char[]>> scratch_;
 };
 
 #ifdef SPLITNERF_WITH_CUDA
@@ -53,12 +64,16 @@ class OnCuda {
   OnCuda(const OnCuda&) = delete;
   OnCuda& operator=(const OnCuda&) = delete;
 
+  template <class Body> void run(const char* op, int64_t n, const Body& body) const { cuda::run(queue_, op, n, body); }
+  template <class T> T* scratch(int64_t n) const { return queue_.scratch<T>(n); }
+  template <class T> void clear(const char* op, T* values, int64_t n) const { cuda::clear(queue_, op, values, n); }
+  void sum_counts(const char* op, int64_t n, int64_t* offsets) const { cuda::sum_counts(queue_, op, n, offsets); }
+  int64_t read_number(const int64_t* number) const { return cuda::read_number(queue_, number); }
+
 #define SPLITNERF_CALL(op) \
   template <class... Arguments> auto op(Arguments... arguments) const { return cuda::op(queue_, arguments...); }
-  SPLITNERF_EACH_OPERATOR(SPLITNERF_CALL)
+  SPLITNERF_EACH_STRATEGY(SPLITNERF_CALL)
 #undef SPLITNERF_CALL
-
-  int64_t read_number(const int64_t* number) const { return cuda::read_number(queue_, number); }
 
  private:
   static void* allocate(void* self, int64_t bytes) {
@@ -74,7 +89,7 @@ class OnCuda {
 };
 #endif
 
-// Calls body(T{}, device) with T = float or double and the functions of a device.
+// Calls body(T{}, device) with T = float or double and the device.
 template <class Body> void on_device(const Kind& kind, Body&& body) {
 #ifdef SPLITNERF_WITH_CUDA
   if (!kind.on_cpu()) {

@@ -60,7 +60,7 @@ void adamw_step(Tensor param, Tensor grad, Tensor exp_avg, Tensor exp_avg_sq, do
     if (copy && copied == ScalarType::Half) x.half = written<Half>(op, "copy", *copy, param, kind.with(copied));
     if (copy && copied == ScalarType::BFloat16)
       x.bfloat16 = written<Bfloat16>(op, "copy", *copy, param, kind.with(copied));
-    device.adamw_step(AdamwRule<T>(lr, beta1, beta2, eps, weight_decay, step), x);
+    device.run(op, x.n, AdamwBody<T>{AdamwRule<T>(lr, beta1, beta2, eps, weight_decay, step), x});
   });
 }
 

@@ -98,8 +98,9 @@ Tensor sample_ggx_lobe(Tensor axes, Tensor roughness, int64_t n_samples, int64_t
   Tensor directions = empty_like_type(a, {a.size(0), n_samples, 3}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.sample_ggx_lobe(a.size(0), in<T>(a), in<T>(rho), static_cast<int>(n_samples), static_cast<uint32_t>(seed),
-                           out<T>(directions));
+    device.run(op, a.size(0),
+               SampleLobeBody<T>{in<T>(a), in<T>(rho), static_cast<int>(n_samples), static_cast<uint32_t>(seed),
+                                 out<T>(directions)});
   });
   return directions;
 }

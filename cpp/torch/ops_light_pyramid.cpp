@@ -22,7 +22,7 @@ Tensor sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor tra
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     const SparseRows<T> matrix{in<int64_t>(o), in<int32_t>(c), in<T>(w)};
-    device.sparse_product(matrix, o.size(0) - 1, x.size(0), in<T>(x), out<T>(products));
+    device.run(op, o.size(0) - 1, SparseProductBody<T>{matrix, in<T>(x), out<T>(products)});
   });
   return products;
 }
@@ -80,7 +80,8 @@ Tensor light_lookup(Tensor directions, Tensor roughness, Tensor levels, Tensor s
   Tensor radiance = empty_like_type(d, {d.size(0), 3}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.light_lookup(parts.view<T>(), d.size(0), in<T>(d), in<T>(rho), out<T>(radiance));
+    device.run(op, d.size(0),
+               LightLookupBody<T>{parts.view<T>(), sh_recurrence<T>(), in<T>(d), in<T>(rho), out<T>(radiance)});
   });
   return radiance;
 }

@@ -19,8 +19,9 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> pixel_losses(Tensor mean, Tensor opac
   Tensor colour_by_opacity = empty_like_type(m, {n}, type), mask_by_opacity = empty_like_type(m, {n}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.pixel_losses(n, in<T>(m), in<T>(o), in<T>(t), in<T>(b), linear, out<T>(losses), out<T>(colour_by_mean),
-                        out<T>(colour_by_opacity), out<T>(mask_by_opacity));
+    device.run(op, n,
+               make_pixel_losses(n, in<T>(m), in<T>(o), in<T>(t), in<T>(b), linear, out<T>(losses),
+                                 out<T>(colour_by_mean), out<T>(colour_by_opacity), out<T>(mask_by_opacity)));
   });
   return {losses, colour_by_mean, colour_by_opacity, mask_by_opacity};
 }
@@ -40,8 +41,14 @@ std::tuple<Tensor, Tensor, Tensor> gradient_losses(Tensor gradients, Tensor weig
          smoothness_by = torch::stable::empty_like(g);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.gradient_losses(n, n_weights, m, in<T>(g), in<T>(w), in<int64_t>(b), out<T>(losses), out<T>(eikonal_by),
-                           out<T>(smoothness_by));
+    T* smoothness = out<T>(smoothness_by);
+    auto* scale = device.template scratch<double>(1);
+    const T per_point = T(1) / T(max_of<int64_t>(n, 1));
+    device.run(op, n, EikonalBody<T>{in<T>(g), per_point, out<T>(losses), out<T>(eikonal_by), smoothness});
+    device.run(op, m,
+               NormalPairsBody<T>{n, n_weights, m, in<T>(g), in<T>(w), in<int64_t>(b), out<T>(losses) + 1, smoothness,
+                                  scale});
+    device.run(op, 3 * n, ScaleBody<T>{scale, smoothness});
   });
   return {losses, eikonal_by, smoothness_by};
 }
@@ -55,7 +62,12 @@ std::tuple<Tensor, Tensor> material_losses(Tensor albedo, Tensor metallic, Tenso
   Tensor losses = empty_like_type(m, {3}, type), by_metallic = empty_like_type(m, {3, m.size(0)}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.material_losses(m.size(0), in<T>(a), in<T>(m), in<T>(s), smooth_l1, out<T>(losses), out<T>(by_metallic));
+    const int64_t n = m.size(0);
+    auto* scale = device.template scratch<double>(1);
+    device.run(op, n,
+               MaterialLossesBody<T>{n, in<T>(a), in<T>(m), in<T>(s), smooth_l1, out<T>(losses), out<T>(by_metallic),
+                                     scale});
+    device.run(op, 3 * n, ScaleBody<T>{scale, out<T>(by_metallic)});
   });
   return {losses, by_metallic};
 }
@@ -68,7 +80,12 @@ std::tuple<Tensor, Tensor> quadratic_entropy(Tensor x) {
   Tensor entropy = empty_like_type(points, {}, type), gradient = torch::stable::empty_like(points);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.quadratic_entropy(points.size(0), points.size(1), in<T>(points), out<T>(entropy), out<T>(gradient));
+    const int64_t n = points.size(0), n_channels = points.size(1);
+    T* rows = device.template scratch<T>(n * (n_channels + 1));
+    auto* total = device.template scratch<double>(1);
+    device.run(op, n, PairLikenessBody<T>{n, n_channels, in<T>(points), rows});
+    device.run(op, n, EntropyBody<T>{n, n_channels, rows, out<T>(entropy), total});
+    device.run(op, n * n_channels, EntropyGradientBody<T>{n_channels, rows, total, out<T>(gradient)});
   });
   return {entropy, gradient};
 }

@@ -18,8 +18,9 @@ std::tuple<Tensor, Tensor> sample_bsdf(Tensor normals, Tensor view_dirs, Tensor 
   Tensor pdf = empty_like_type(n, {n.size(0), n_samples}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.sample_bsdf(n.size(0), in<T>(n), in<T>(v), in<T>(rho), static_cast<int>(n_samples),
-                       static_cast<uint32_t>(seed), out<T>(directions), out<T>(pdf));
+    device.run(op, n.size(0),
+               SampleBsdfBody<T>{in<T>(n), in<T>(v), in<T>(rho), static_cast<int>(n_samples),
+                                 static_cast<uint32_t>(seed), out<T>(directions), out<T>(pdf)});
   });
   return {directions, pdf};
 }
@@ -41,16 +42,21 @@ struct Inputs {
   }
   int64_t n_points() const { return normals.size(0); }
   int n_samples() const { return static_cast<int>(light_dirs.size(1)); }
+  template <class T> DrawnLight<T> light() const {
+    return {n_samples(), in<T>(light_dirs), in<T>(pdf), in<T>(radiance)};
+  }
 };
 
 Tensor monte_carlo_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf,
                          Tensor radiance) {
-  const Inputs i("monte_carlo_light", normals, view_dirs, roughness, light_dirs, pdf, radiance);
+  const char* op = "monte_carlo_light";
+  const Inputs i(op, normals, view_dirs, roughness, light_dirs, pdf, radiance);
   Tensor sums = empty_like_type(i.normals, {i.n_points(), 3, 3}, i.type);
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.monte_carlo_light(i.n_points(), i.n_samples(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness),
-                             in<T>(i.light_dirs), in<T>(i.pdf), in<T>(i.radiance), out<T>(sums));
+    device.run(op, i.n_points(),
+               DrawnLightBody<T>{i.n_samples(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(),
+                                 out<T>(sums)});
   });
   return sums;
 }
@@ -66,9 +72,11 @@ std::tuple<Tensor, Tensor, Tensor> monte_carlo_light_backward(Tensor normals, Te
   Tensor grad_radiance = empty_like_type(g, {i.n_points(), i.n_samples(), 3}, i.type);
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.monte_carlo_light_backward(i.n_points(), i.n_samples(), in<T>(i.normals), in<T>(i.view_dirs),
-                                      in<T>(i.roughness), in<T>(i.light_dirs), in<T>(i.pdf), in<T>(i.radiance),
-                                      in<T>(g), out<T>(grad_normals), out<T>(grad_roughness), out<T>(grad_radiance));
+    const ToDrawnLight<T> to_light{i.n_samples(), out<T>(grad_radiance)};
+    device.run(op, i.n_points(),
+               DrawnLightBackwardBody<T>{i.n_samples(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness),
+                                         i.light<T>(), in<T>(g), out<T>(grad_normals), out<T>(grad_roughness),
+                                         to_light});
   });
   return {grad_normals, grad_roughness, grad_radiance};
 }
@@ -100,13 +108,15 @@ struct SharedInputs {
 
 Tensor summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor solid_angles,
                     Tensor radiance, Tensor visible, Tensor sent) {
-  const SharedInputs i("summed_light", normals, view_dirs, roughness, directions, solid_angles, radiance, visible,
-                       sent);
+  const char* op = "summed_light";
+  const SharedInputs i(op, normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent);
   Tensor sums = empty_like_type(i.normals, {i.n_points(), 3, 3}, i.type);
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.summed_light(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(),
-                        out<T>(sums));
+    const SharedLight<T> light = i.light<T>();
+    device.run(op, i.n_points(),
+               SharedLightBody<T>{light.n, in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), {light},
+                                  out<T>(sums)});
   });
   return sums;
 }
@@ -121,8 +131,12 @@ std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor 
   Tensor grad_normals = like(i.normals), grad_roughness = like(i.roughness), grad_light = like(i.radiance);
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.summed_light_backward(i.n_points(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(),
-                                 in<T>(g), out<T>(grad_normals), out<T>(grad_roughness), out<T>(grad_light));
+    const SharedLight<T> light = i.light<T>();
+    const ToSharedLight<T> to_light{light.n, light.visible, out<T>(grad_light)};
+    device.clear(op, to_light.grad_light, 3 * int64_t{light.n});
+    device.run(op, i.n_points(),
+               SharedLightBackwardBody<T>{light.n, in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), {light},
+                                          in<T>(g), out<T>(grad_normals), out<T>(grad_roughness), to_light});
   });
   return {grad_normals, grad_roughness, grad_light};
 }
@@ -152,11 +166,12 @@ struct SummedInputs {
 
 Tensor shade_sums(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular,
                   Tensor grazing, Tensor diffuse, Tensor lut, bool compensate) {
-  const SummedInputs i("shade_sums", normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, lut);
+  const char* op = "shade_sums";
+  const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, lut);
   Tensor radiance = empty_like_type(i.normals, {i.n_points(), 3}, i.type);
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.shade_sums(in<float>(i.lut), compensate, i.n_points(), i.arrays<T>(), out<T>(radiance));
+    device.run(op, i.n_points(), ShadeSumsBody<T>{in<float>(i.lut), compensate, i.arrays<T>(), out<T>(radiance)});
   });
   return radiance;
 }
@@ -171,9 +186,10 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade
   Tensor grad[8] = {make(3), make(3), make(3), make(1), make(1), make(3), make(3), make(3)};
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.shade_sums_backward(in<float>(i.lut), compensate, i.n_points(), i.arrays<T>(), in<T>(g),
-                               SummedArrays<T>{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]),
-                                               out<T>(grad[4]), out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7])});
+    const SummedArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]),
+                             out<T>(grad[4]), out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7])};
+    device.run(op, i.n_points(),
+               ShadeSumsBackwardBody<T>{in<float>(i.lut), compensate, i.arrays<T>(), in<T>(g), to});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7]};
 }

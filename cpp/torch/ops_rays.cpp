@@ -27,14 +27,18 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> march_rays(Tensor rays_o, Tensor rays
   Tensor offsets = empty_like_type(o, {n_rays + 1}, ScalarType::Long), ray_indices, t_starts, t_ends;
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.occupied_blocks(in<uint8_t>(grid), static_cast<int>(resolution), out<uint8_t>(blocks));
-    device.march_rays_count(options, occupancy, n_rays, in<T>(o), in<T>(d), in<T>(u), out<int64_t>(offsets));
+    device.run(op, blocks.numel(),
+               OccupiedBlocksBody{occupancy.cells, occupancy.resolution, occupancy.n_blocks, out<uint8_t>(blocks)});
+    device.run(op, n_rays,
+               MarchCountBody<T>{options, occupancy, in<T>(o), in<T>(d), in<T>(u), out<int64_t>(offsets) + 1});
+    device.sum_counts(op, n_rays, out<int64_t>(offsets));
     const int64_t n = device.read_number(in<int64_t>(offsets) + n_rays);  // the one place where a GPU is waited for
     ray_indices = empty_like_type(o, {n}, ScalarType::Long);
     t_starts = empty_like_type(o, {n}, type);
     t_ends = empty_like_type(o, {n}, type);
-    device.march_rays_fill(options, occupancy, n_rays, in<T>(o), in<T>(d), in<T>(u), in<int64_t>(offsets),
-                           out<int64_t>(ray_indices), out<T>(t_starts), out<T>(t_ends));
+    device.run(op, n_rays,
+               MarchFillBody<T>{options, occupancy, in<T>(o), in<T>(d), in<T>(u), in<int64_t>(offsets),
+                                out<int64_t>(ray_indices), out<T>(t_starts), out<T>(t_ends)});
   });
   return {ray_indices, t_starts, t_ends, offsets};
 }
@@ -65,8 +69,9 @@ std::tuple<Tensor, Tensor> neus_weights(Tensor f_prev, Tensor f_next, Tensor s, 
   Tensor weights = empty_like_type(p, {p.size(0)}, type), opacity = empty_like_type(p, {o.size(0) - 1}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.neus_weights(packed_rays(o, p.size(0)), in<T>(p), in<T>(q), in<T>(sharpness), T(min_transmittance),
-                        out<T>(weights), out<T>(opacity));
+    device.run(op, o.size(0) - 1,
+               NeusWeightsBody<T>{packed_rays(o, p.size(0)), in<T>(p), in<T>(q), in<T>(sharpness),
+                                  T(min_transmittance), out<T>(weights), out<T>(opacity)});
   });
   return {weights, opacity};
 }
@@ -86,8 +91,10 @@ std::tuple<Tensor, Tensor, Tensor> neus_weights_backward(Tensor f_prev, Tensor f
   Tensor grad_s = empty_like_type(p, {n_rays}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.neus_weights_backward(packed_rays(o, p.size(0)), in<T>(p), in<T>(q), in<T>(sharpness), T(min_transmittance),
-                                 in<T>(w), in<T>(gw), in<T>(ga), out<T>(grad_p), out<T>(grad_q), out<T>(grad_s));
+    device.run(op, n_rays,
+               NeusWeightsBackwardBody<T>{packed_rays(o, p.size(0)), in<T>(p), in<T>(q), in<T>(sharpness),
+                                          T(min_transmittance), in<T>(w), in<T>(gw), in<T>(ga), out<T>(grad_p),
+                                          out<T>(grad_q), out<T>(grad_s)});
   });
   return {grad_p, grad_q, grad_s};
 }
@@ -101,7 +108,8 @@ Tensor composite(Tensor weights, Tensor values, Tensor offsets) {
   Tensor sums = empty_like_type(w, {o.size(0) - 1, v.size(1)}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.composite(packed_rays(o, w.size(0)), v.size(1), in<T>(w), in<T>(v), out<T>(sums));
+    device.run(op, o.size(0) - 1,
+               CompositeBody<T>{packed_rays(o, w.size(0)), v.size(1), in<T>(w), in<T>(v), out<T>(sums)});
   });
   return sums;
 }
@@ -116,8 +124,9 @@ std::tuple<Tensor, Tensor> composite_backward(Tensor weights, Tensor values, Ten
   Tensor grad_w = empty_like_type(w, {w.size(0)}, type), grad_v = empty_like_type(w, {w.size(0), v.size(1)}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.composite_backward(packed_rays(o, w.size(0)), v.size(1), in<T>(w), in<T>(v), in<T>(g), out<T>(grad_w),
-                              out<T>(grad_v));
+    device.run(op, o.size(0) - 1,
+               CompositeBackwardBody<T>{packed_rays(o, w.size(0)), v.size(1), in<T>(w), in<T>(v), in<T>(g),
+                                        out<T>(grad_w), out<T>(grad_v)});
   });
   return {grad_w, grad_v};
 }
@@ -154,13 +163,15 @@ struct Surface {
 
 std::tuple<Tensor, Tensor, Tensor> surface_weights(Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets,
                                                    Tensor step, Tensor anneal, double min_transmittance) {
-  const Surface x("surface_weights", sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance);
+  const char* op = "surface_weights";
+  const Surface x(op, sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance);
   Tensor normals = empty_like_type(x.sdf, {x.sdf.size(0), 3}, x.type),
          weights = empty_like_type(x.sdf, {x.sdf.size(0)}, x.type);
   Tensor opacity = empty_like_type(x.sdf, {x.n_rays()}, x.type);
   on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.surface_weights(x.view<T>(), out<T>(normals), out<T>(weights), out<T>(opacity));
+    device.run(op, x.n_rays(),
+               SurfaceWeightsBody<T>{x.view<T>(), out<T>(normals), out<T>(weights), out<T>(opacity)});
   });
   return {normals, weights, opacity};
 }
@@ -181,8 +192,9 @@ std::tuple<Tensor, Tensor, Tensor> surface_weights_backward(Tensor sdf, Tensor g
   Tensor grad_s = empty_like_type(w, {n_rays}, x.type);
   on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.surface_weights_backward(x.view<T>(), in<T>(w), in<T>(gn), in<T>(gw), in<T>(ga), out<T>(grad_sdf),
-                                    out<T>(grad_gradient), out<T>(grad_s));
+    device.run(op, n_rays,
+               SurfaceWeightsBackwardBody<T>{x.view<T>(), in<T>(w), in<T>(gn), in<T>(gw), in<T>(ga), out<T>(grad_sdf),
+                                             out<T>(grad_gradient), out<T>(grad_s)});
   });
   return {grad_sdf, grad_gradient, grad_s};
 }
@@ -240,8 +252,9 @@ Tensor interpolate(Tensor values, Tensor first, Tensor second, Tensor share) {
   Tensor interpolated = empty_like_type(v, {x.size(0), v.size(1)}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.interpolate(x.size(0), v.size(0), v.size(1), in<int64_t>(a), in<int64_t>(b), in<T>(x), in<T>(v),
-                       out<T>(interpolated));
+    device.run(op, x.size(0) * v.size(1),
+               InterpolateBody<T>{v.size(0), v.size(1), in<int64_t>(a), in<int64_t>(b), in<T>(x), in<T>(v),
+                                  out<T>(interpolated)});
   });
   return interpolated;
 }
@@ -259,8 +272,10 @@ Tensor interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor secon
   Tensor grad_values = empty_like_type(g, {m, g.size(1)}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.interpolate_backward(x.size(0), m, g.size(1), in<int64_t>(a), in<int64_t>(b), in<T>(x), in<T>(g),
-                                out<T>(grad_values));
+    device.clear(op, out<T>(grad_values), m * g.size(1));
+    device.run(op, x.size(0) * g.size(1),
+               InterpolateBackwardBody<T>{m, g.size(1), in<int64_t>(a), in<int64_t>(b), in<T>(x), in<T>(g),
+                                          out<T>(grad_values)});
   });
   return grad_values;
 }

@@ -160,7 +160,8 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
       t_starts = empty_like_type(o, {n}, field.type), t_ends = empty_like_type(o, {n}, field.type);
       return PackedSamples<T>{out<int64_t>(ray_indices), out<T>(t_starts), out<T>(t_ends)};
     };
-    device.occupied_blocks(in<uint8_t>(grid), static_cast<int>(resolution), out<uint8_t>(blocks));
+    device.run(op, blocks.numel(),
+               OccupiedBlocksBody{occupancy.cells, occupancy.resolution, occupancy.n_blocks, out<uint8_t>(blocks)});
     device.sample_rays(field.view<T>(), march, occupancy, rules, n_rays, in<T>(o), in<T>(d), in<T>(u),
                        out<int64_t>(offsets), out<int64_t>(evaluated), allocate);
   });

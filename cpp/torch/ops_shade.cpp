@@ -20,7 +20,8 @@ Tensor query_direction(Tensor normals, Tensor view_dirs, Tensor roughness, Tenso
   Tensor directions = empty_like_type(n, {n.size(0), 3}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.query_direction(in<float>(table), mean, n.size(0), in<T>(n), in<T>(v), in<T>(rho), out<T>(directions));
+    device.run(op, n.size(0),
+               QueryDirectionBody<T>{in<float>(table), mean, in<T>(n), in<T>(v), in<T>(rho), out<T>(directions)});
   });
   return directions;
 }
@@ -38,8 +39,9 @@ std::tuple<Tensor, Tensor, Tensor> query_direction_backward(Tensor normals, Tens
   Tensor grad_rho = empty_like_type(n, {n.size(0), 1}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.query_direction_backward(in<float>(table), mean, n.size(0), in<T>(n), in<T>(v), in<T>(rho), in<T>(g),
-                                    out<T>(grad_n), out<T>(grad_v), out<T>(grad_rho));
+    device.run(op, n.size(0),
+               QueryDirectionBackwardBody<T>{in<float>(table), mean, in<T>(n), in<T>(v), in<T>(rho), in<T>(g),
+                                             out<T>(grad_n), out<T>(grad_v), out<T>(grad_rho)});
   });
   return {grad_n, grad_v, grad_rho};
 }
@@ -91,7 +93,7 @@ Tensor split_sum_shade(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor r
   Tensor radiance = empty_like_type(p.normals, {p.n, 3}, p.type);
   on_device(p.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.split_sum_shade(in<float>(p.lut), options, p.n, p.n_channels, p.arrays<T>(), out<T>(radiance));
+    device.run(op, p.n, ShadeBody<T>{in<float>(p.lut), options, p.n_channels, p.arrays<T>(), out<T>(radiance)});
   });
   return radiance;
 }
@@ -109,10 +111,10 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tenso
                     make(p.n_channels)};
   on_device(p.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.split_sum_shade_backward(
-        in<float>(p.lut), options, p.n, p.n_channels, p.arrays<T>(), in<T>(g),
-        ShadeArrays<T>{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
-                       out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])});
+    const ShadeArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
+                            out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])};
+    device.run(op, p.n,
+               ShadeBackwardBody<T>{in<float>(p.lut), options, p.n_channels, p.arrays<T>(), in<T>(g), to});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};
 }

@@ -1,5 +1,6 @@
 // linear_to_srgb and srgb_to_linear as torch operators, of tensors of any shape.
 #include "device.h"
+#include "splitnerf/bodies/elementwise.h"
 
 namespace splitnerf::glue {
 namespace {
@@ -16,7 +17,7 @@ template <class Body> Tensor elementwise(const char* op, const char* name, const
 Tensor linear_to_srgb(Tensor linear) {
   return elementwise("linear_to_srgb", "linear", linear, [](const Tensor& x, Tensor& y, auto zero, const auto& device) {
     using T = decltype(zero);
-    device.linear_to_srgb(x.numel(), in<T>(x), out<T>(y));
+    device.run("linear_to_srgb", x.numel(), LinearToSrgbBody<T>{in<T>(x), out<T>(y)});
   });
 }
 
@@ -28,14 +29,14 @@ Tensor linear_to_srgb_backward(Tensor linear, Tensor grad_srgb) {
   const Tensor g = torch::stable::contiguous(grad_srgb);
   return elementwise(op, "linear", linear, [&](const Tensor& x, Tensor& y, auto zero, const auto& device) {
     using T = decltype(zero);
-    device.linear_to_srgb_backward(x.numel(), in<T>(x), in<T>(g), out<T>(y));
+    device.run(op, x.numel(), LinearToSrgbBackwardBody<T>{in<T>(x), in<T>(g), out<T>(y)});
   });
 }
 
 Tensor srgb_to_linear(Tensor srgb) {
   return elementwise("srgb_to_linear", "srgb", srgb, [](const Tensor& x, Tensor& y, auto zero, const auto& device) {
     using T = decltype(zero);
-    device.srgb_to_linear(x.numel(), in<T>(x), out<T>(y));
+    device.run("srgb_to_linear", x.numel(), SrgbToLinearBody<T>{in<T>(x), out<T>(y)});
   });
 }
 

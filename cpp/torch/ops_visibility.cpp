@@ -114,8 +114,9 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> cached_occlusion(Tensor positions, Te
   Tensor i_s = empty_like_type(x, {cache.indirect() ? x.size(0) : 0, 3}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.cached_occlusion(cache.get(in<T>(l)), x.size(0), in<T>(x), in<T>(n), in<T>(d), in<T>(rho), out<T>(o_d),
-                            out<T>(o_s), out<T>(i_d), out<T>(i_s));
+    device.run(op, x.size(0),
+               CachedOcclusionBody<T>{cache.get(in<T>(l)), in<T>(x), in<T>(n), in<T>(d), in<T>(rho), out<T>(o_d),
+                                      out<T>(o_s), out<T>(i_d), out<T>(i_s)});
   });
   return {o_d, o_s, i_d, i_s};
 }
@@ -132,7 +133,8 @@ std::tuple<Tensor, Tensor> cached_visibility(Tensor positions, Tensor normals, T
   Tensor arriving = empty_like_type(x, {cache.indirect() ? x.size(0) : 0, cache.n_directions(), 3}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.cached_visibility(cache.get<T>(nullptr), x.size(0), in<T>(x), in<T>(n), out<T>(visible), out<T>(arriving));
+    device.run(op, x.size(0),
+               CachedVisibilityBody<T>{cache.get<T>(nullptr), in<T>(x), in<T>(n), out<T>(visible), out<T>(arriving)});
   });
   return {visible, arriving};
 }

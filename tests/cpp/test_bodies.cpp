@@ -94,8 +94,9 @@ template <class T> void check_adamw(double tolerance, int64_t columns, bool spar
     half1[i] = half2[i] = narrow<Half>(float(param[i]));
     bfloat1[i] = bfloat2[i] = narrow<Bfloat16>(float(param[i]));
   }
-  cpu::adamw_step<T>(
-      rule, {n, columns, sparse, param1.data(), grad.data(), m1.data(), v1.data(), half1.data(), bfloat1.data()});
+  const AdamwArrays<T> x{n,         columns,   sparse,       param1.data(), grad.data(),
+                         m1.data(), v1.data(), half1.data(), bfloat1.data()};
+  cpu::run(n, AdamwBody<T>{rule, x});
   const AdamwBody<T> body{
       rule, {n, columns, sparse, param2.data(), grad.data(), m2.data(), v2.data(), half2.data(), bfloat2.data()}};
   for (int64_t i = 0; i < n; ++i) body(i);
@@ -149,8 +150,8 @@ TEST(Bodies, SplitSumShading) {
                                      p + 14 * n, p + 17 * n, p + 17 * n + n * channels};
         };
         const ShadeOptions options{mode, compensate};
-        cpu::split_sum_shade(brdf_lut(), options, n, channels, in, radiance.data());
-        cpu::split_sum_shade_backward(brdf_lut(), options, n, channels, in, g.data(), parts(grad.data()));
+        cpu::run(n, ShadeBody<double>{brdf_lut(), options, channels, in, radiance.data()});
+        cpu::run(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad.data())});
         const ShadeBody<double> shade{brdf_lut(), options, channels, in, radiance1.data()};
         const ShadeBackwardBody<double> backward{brdf_lut(), options, channels, in, g.data(), parts(grad1.data())};
         for (int64_t i = 0; i < n; ++i) shade(i), backward(i);
@@ -260,7 +261,7 @@ TEST(Bodies, LightLookup) {
   p.recurrence = &sh_recurrence<double>();
 
   std::vector<double> radiance(3 * n), to_dirs(3 * n), to_rho(n), to_levels(levels.size()), to_sh(sh.size());
-  cpu::light_lookup(p, n, dirs.data(), rho.data(), radiance.data());
+  cpu::run(n, LightLookupBody<double>{p, *p.recurrence, dirs.data(), rho.data(), radiance.data()});
   cpu::light_lookup_backward(p, n, dirs.data(), rho.data(), g.data(), to_dirs.data(), to_rho.data(), to_levels.data(),
                              to_sh.data());
   std::vector<double> radiance1(3 * n), to_dirs1(3 * n), to_rho1(n), to_levels1(levels.size()), to_sh1(sh.size());

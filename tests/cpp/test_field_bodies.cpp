@@ -195,8 +195,8 @@ TEST(FieldBodies, CachedOcclusionAndVisibility) {
     const VisibilityCache<double> cache = ball.cache(with_hits);
     const size_t few = with_hits ? 3 * n : 0, many = with_hits ? 3 * n * k : 0;
     std::vector<double> o_d(3 * n), o_s(3 * n), i_d(few), i_s(few), o_d8(3 * n), o_s8(3 * n), i_d8(few), i_s8(few);
-    cpu::cached_occlusion(cache, n, x.data(), normals.data(), lobes.data(), rho.data(), o_d.data(), o_s.data(),
-                          i_d.data(), i_s.data());
+    cpu::run(n, CachedOcclusionBody<double>{cache, x.data(), normals.data(), lobes.data(), rho.data(), o_d.data(),
+                                            o_s.data(), i_d.data(), i_s.data()});
     for_each_by_lanes<8>(n, CachedOcclusionBody<double>{cache, x.data(), normals.data(), lobes.data(), rho.data(),
                                                         o_d8.data(), o_s8.data(), i_d8.data(), i_s8.data()});
     expect_same_nan_and_near(o_d8, o_d), expect_same_nan_and_near(o_s8, o_s);
@@ -205,7 +205,7 @@ TEST(FieldBodies, CachedOcclusionAndVisibility) {
     if (with_hits) { EXPECT_GT(i_d[0], 0); }
 
     std::vector<double> v(n * k), a(many), v8(n * k), a8(many);
-    cpu::cached_visibility(cache, n, x.data(), normals.data(), v.data(), a.data());
+    cpu::run(n, CachedVisibilityBody<double>{cache, x.data(), normals.data(), v.data(), a.data()});
     for_each_by_lanes<8>(n, CachedVisibilityBody<double>{cache, x.data(), normals.data(), v8.data(), a8.data()});
     expect_same_nan_and_near(v8, v), expect_same_nan_and_near(a8, a);
   }

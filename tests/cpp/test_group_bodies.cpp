@@ -1,4 +1,4 @@
-// The bodies that a warp runs on the GPU, run by as many threads here, against the operators of the CPU.
+// The bodies that a warp runs on the GPU, run by as many threads here, against what the CPU makes of them.
 #include <tuple>
 
 #include "check.h"
@@ -53,9 +53,11 @@ TEST(GroupBodies, NeusWeightsAndTheirGradients) {
   for (const double least : {0., 0.3}) {
     std::vector<double> w(n, 9), o(n_rays), prev(n, 9), next(n, 9), s(n_rays), w8(n, 7), o8(n_rays), prev8(n, 7),
         next8(n, 7), s8(n_rays);
-    cpu::neus_weights(r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(), o.data());
-    cpu::neus_weights_backward(r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(), gw.data(),
-                               go.data(), prev.data(), next.data(), s.data());
+    cpu::run(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least,
+                                                        w.data(), o.data()});
+    cpu::run(r.packed().n_rays,
+             NeusWeightsBackwardBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(),
+                                             gw.data(), go.data(), prev.data(), next.data(), s.data()});
     for_each_by_lanes<8>(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
                                                                     least, w8.data(), o8.data()});
     for_each_by_lanes<8>(r.packed().n_rays, NeusWeightsBackwardBody<double>{
@@ -72,7 +74,8 @@ TEST(GroupBodies, NeusWeightsByThirtyTwoLanesPassANanOn) {
   r.f_next[size_t(r.offsets[4]) + 5] = std::nan("");
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
   std::vector<double> w(n, 9), o(n_rays), w32(n, 7), o32(n_rays);
-  cpu::neus_weights(r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, 0., w.data(), o.data());
+  cpu::run(r.packed().n_rays,
+           NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, 0., w.data(), o.data()});
   for_each_by_lanes<32>(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
                                                                    0., w32.data(), o32.data()});
   for (size_t i = 0; i < n; ++i) {
@@ -89,9 +92,9 @@ TEST(GroupBodies, SurfaceWeightsAndTheirGradients) {
   Random random(2);
   const auto gn = random.uniforms(3 * n, -1), gw = random.uniforms(n, -1), go = random.uniforms(n_rays, -1);
   std::vector<double> normals(3 * n, 9), w(n, 9), o(n_rays), to_sdf(n, 9), to_gradient(3 * n, 9), to_s(n_rays);
-  cpu::surface_weights(in, normals.data(), w.data(), o.data());
-  cpu::surface_weights_backward(in, w.data(), gn.data(), gw.data(), go.data(), to_sdf.data(), to_gradient.data(),
-                                to_s.data());
+  cpu::run(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals.data(), w.data(), o.data()});
+  cpu::run(in.rays.n_rays, SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(),
+                                                              to_sdf.data(), to_gradient.data(), to_s.data()});
   std::vector<double> normals8(3 * n, 7), w8(n, 7), o8(n_rays), to_sdf8(n, 7), to_gradient8(3 * n, 7), to_s8(n_rays);
   for_each_by_lanes<8>(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals8.data(), w8.data(), o8.data()});
   for_each_by_lanes<8>(in.rays.n_rays,
@@ -109,8 +112,9 @@ TEST(GroupBodies, CompositeAndItsGradients) {
   const auto w = random.uniforms(n), v = random.uniforms(n * channels, -1), g = random.uniforms(n_rays * channels, -1);
   std::vector<double> sums(n_rays * channels), to_w(n, 9), to_v(n * channels, 9), sums8(n_rays * channels), to_w8(n, 7),
       to_v8(n * channels, 7);
-  cpu::composite(r.packed(), channels, w.data(), v.data(), sums.data());
-  cpu::composite_backward(r.packed(), channels, w.data(), v.data(), g.data(), to_w.data(), to_v.data());
+  cpu::run(r.packed().n_rays, CompositeBody<double>{r.packed(), channels, w.data(), v.data(), sums.data()});
+  cpu::run(r.packed().n_rays,
+           CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(), g.data(), to_w.data(), to_v.data()});
   for_each_by_lanes<8>(r.packed().n_rays,
                        CompositeBody<double>{r.packed(), channels, w.data(), v.data(), sums8.data()});
   for_each_by_lanes<8>(r.packed().n_rays, CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(),
@@ -222,15 +226,18 @@ TEST(GroupBodies, MarchingTakesTheSamplesOfTheCpuInItsOrder) {
       m.options.max_samples = most;
       const OccupancyCells grid(m.cells.data(), m.resolution);
       Marched one(m.n()), lanes(m.n());
-      cpu::march_rays_count(m.options, grid.view(), m.n(), m.o.data(), m.d.data(), m.jitter.data(), one.offsets.data());
+      cpu::run(m.n(), MarchCountBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
+                                            one.offsets.data() + 1});
       for_each_by_lanes<8>(m.n(), MarchCountBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
                                                         lanes.offsets.data() + 1});
-      for (int64_t r = 0; r < m.n(); ++r) lanes.offsets[r + 1] += lanes.offsets[r];
+      for (Marched* marched : {&one, &lanes})
+        for (int64_t r = 0; r < m.n(); ++r) marched->offsets[r + 1] += marched->offsets[r];
       ASSERT_EQ(lanes.offsets, one.offsets);
       EXPECT_EQ(one.offsets.back() > 0, filled > 0);
       one.allocate(), lanes.allocate();
-      cpu::march_rays_fill(m.options, grid.view(), m.n(), m.o.data(), m.d.data(), m.jitter.data(), one.offsets.data(),
-                           one.ray_indices.data(), one.t_starts.data(), one.t_ends.data());
+      cpu::run(m.n(), MarchFillBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
+                                           one.offsets.data(), one.ray_indices.data(), one.t_starts.data(),
+                                           one.t_ends.data()});
       for_each_by_lanes<8>(m.n(), MarchFillBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
                                                        lanes.offsets.data(), lanes.ray_indices.data(),
                                                        lanes.t_starts.data(), lanes.t_ends.data()});
@@ -245,7 +252,7 @@ TEST(GroupBodies, OccupiedBlocks) {
   const March m(0.001);
   const int n = blocks_along(m.resolution);
   std::vector<uint8_t> one(size_t(n) * n * n), lanes(one.size(), 9);
-  cpu::occupied_blocks(m.cells.data(), m.resolution, one.data());
+  cpu::run(int64_t(one.size()), OccupiedBlocksBody{m.cells.data(), m.resolution, n, one.data()});
   for_each_by_lanes<8>(int64_t(one.size()), OccupiedBlocksBody{m.cells.data(), m.resolution, n, lanes.data()});
   for (size_t i = 0; i < one.size(); ++i) EXPECT_EQ(lanes[i] != 0, one[i] != 0) << i;
   EXPECT_TRUE(std::count(one.begin(), one.end(), 0) > 0 && std::count(one.begin(), one.end(), 0) < int64_t(one.size()));
@@ -259,22 +266,22 @@ TEST(GroupBodies, MonteCarloSumsAndTheirGradients) {
   Random random(9);
   const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n, 0.05, 1);
   std::vector<double> dirs(3 * n * k), pdf(n * k), dirs8(dirs.size()), pdf8(pdf.size());
-  cpu::sample_bsdf(n, normals.data(), views.data(), rho.data(), k, 3u, dirs.data(), pdf.data());
+  cpu::run(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), k, 3u, dirs.data(), pdf.data()});
   for_each_by_lanes<8>(
       n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), k, 3u, dirs8.data(), pdf8.data()});
   expect_near(dirs8, dirs, 0), expect_near(pdf8, pdf, 0);
-  cpu::sample_ggx_lobe(n, normals.data(), rho.data(), k, 5u, dirs.data());
+  cpu::run(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs.data()});
   for_each_by_lanes<8>(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs8.data()});
   expect_near(dirs8, dirs, 0);
 
   const auto radiance = random.uniforms(3 * n * k), g = random.uniforms(9 * n, -1);
   std::vector<double> sums(9 * n), to_n(3 * n), to_rho(n), to_light(3 * n * k), sums8(9 * n), to_n8(3 * n), to_rho8(n),
       to_light8(3 * n * k);
-  cpu::monte_carlo_light(n, k, normals.data(), views.data(), rho.data(), dirs.data(), pdf.data(), radiance.data(),
-                         sums.data());
-  cpu::monte_carlo_light_backward(n, k, normals.data(), views.data(), rho.data(), dirs.data(), pdf.data(),
-                                  radiance.data(), g.data(), to_n.data(), to_rho.data(), to_light.data());
   const DrawnLight<double> light{k, dirs.data(), pdf.data(), radiance.data()};
+  const ToDrawnLight<double> receive{k, to_light.data()};
+  cpu::run(n, DrawnLightBody<double>{k, normals.data(), views.data(), rho.data(), light, sums.data()});
+  cpu::run(n, DrawnLightBackwardBody<double>{k, normals.data(), views.data(), rho.data(), light, g.data(), to_n.data(),
+                                             to_rho.data(), receive});
   for_each_by_lanes<8>(
       n, SumLightBody<double, DrawnLight<double>>{k, normals.data(), views.data(), rho.data(), light, sums8.data()});
   for_each_by_lanes<8>(n,
@@ -303,9 +310,10 @@ TEST(GroupBodies, SummedLightAndItsGradients) {
         k, dirs.data(), angles.data(), radiance.data(), visible.data(), with_sent ? sent.data() : nullptr};
     std::vector<double> sums(9 * n), to_n(3 * n), to_rho(n), to_light(3 * k), sums8(9 * n), to_n8(3 * n), to_rho8(n),
         to_light8(3 * k);
-    cpu::summed_light(n, normals.data(), views.data(), rho.data(), light, sums.data());
-    cpu::summed_light_backward(n, normals.data(), views.data(), rho.data(), light, g.data(), to_n.data(), to_rho.data(),
-                               to_light.data());
+    const ToSharedLight<double> receive{k, visible.data(), to_light.data()};
+    cpu::run(n, SharedLightBody<double>{k, normals.data(), views.data(), rho.data(), {light}, sums.data()});
+    cpu::run(n, SharedLightBackwardBody<double>{k, normals.data(), views.data(), rho.data(), {light}, g.data(),
+                                                to_n.data(), to_rho.data(), receive});
     for_each_by_lanes<8>(n, SumLightBody<double, ArrivingLight<double>>{
                                 k, normals.data(), views.data(), rho.data(), {light}, sums8.data()});
     for_each_by_lanes<8>(n, SumLightBackwardBody<double, ArrivingLight<double>, ToSharedLight<double>>{
@@ -328,18 +336,20 @@ TEST(GroupBodies, QuadraticEntropy) {
   const int64_t n = 21;
   for (const int64_t channels : {1, 8, 11}) {
     const auto x = random.uniforms(n * channels, -1);
-    double entropy, entropy1, total;
-    std::vector<double> gradient(n * channels), gradient1(n * channels), rows(n * (channels + 1));
-    cpu::quadratic_entropy(n, channels, x.data(), &entropy, gradient.data());
-    for_each_by_lanes<8>(n, PairLikenessBody<double>{n, channels, x.data(), rows.data()});
-    const EntropyBody<double> body{n, channels, rows.data(), &entropy1, &total};
-    double sums[1] = {};
-    for (int64_t i = 0; i < n; ++i) body(i, sums);
-    body.finish(sums);
-    const EntropyGradientBody<double> to_x{channels, rows.data(), &total, gradient1.data()};
-    for (int64_t at = 0; at < n * channels; ++at) to_x(at);
-    EXPECT_NEAR(entropy1, entropy, 1e-13);
-    expect_near(gradient1, gradient, 1e-12);
+    std::vector<double> one(n * (channels + 1)), lanes(one.size());
+    cpu::run(n, PairLikenessBody<double>{n, channels, x.data(), one.data()});
+    for_each_by_lanes<8>(n, PairLikenessBody<double>{n, channels, x.data(), lanes.data()});
+    expect_near(lanes, one, 1e-13);
+    // E = -ln(sum k / n^2) and its gradient, from the rows of sums.
+    double entropy, total, expected = 0;
+    std::vector<double> gradient(n * channels);
+    for (int64_t i = 0; i < n; ++i) expected += one[i * (channels + 1) + channels];
+    cpu::run(n, EntropyBody<double>{n, channels, one.data(), &entropy, &total});
+    cpu::run(n * channels, EntropyGradientBody<double>{channels, one.data(), &total, gradient.data()});
+    EXPECT_NEAR(entropy, -std::log(expected / (n * n)), 1e-13);
+    for (int64_t i = 0; i < n; ++i)
+      for (int64_t c = 0; c < channels; ++c)
+        EXPECT_NEAR(gradient[i * channels + c], one[i * (channels + 1) + c] / expected, 1e-13);
   }
 }
 
@@ -355,7 +365,7 @@ TEST(GroupBodies, SparseProduct) {
   const auto weights = random.uniforms(columns.size(), -1), values = random.uniforms(3 * n_columns);
   const SparseRows<double> matrix{offsets.data(), columns.data(), weights.data()};
   std::vector<double> one(3 * n_rows), lanes(3 * n_rows);
-  cpu::sparse_product(matrix, n_rows, n_columns, values.data(), one.data());
+  cpu::run(n_rows, SparseProductBody<double>{matrix, values.data(), one.data()});
   for_each_by_lanes<8>(n_rows, SparseProductBody<double>{matrix, values.data(), lanes.data()});
   expect_near(lanes, one, 1e-14);
 }

@@ -162,12 +162,13 @@ TEST(March, PacksTheRaysOneAfterTheOther) {
     for (int c = 0; c < 3; ++c) o.push_back(r % 3 ? -2 * d[3 * r + c] : 4.f);  // every third ray misses, most likely
   std::vector<int64_t> offsets(n_rays + 1);
   const OccupancyCells cells(grid.cells.data(), grid.resolution);
-  cpu::march_rays_count(grid.options, cells.view(), n_rays, o.data(), d.data(), jitter.data(), offsets.data());
+  cpu::run(n_rays, MarchCountBody<float>{grid.options, cells.view(), o.data(), d.data(), jitter.data(), &offsets[1]});
+  for (int64_t r = 0; r < n_rays; ++r) offsets[r + 1] += offsets[r];
   const size_t n = size_t(offsets.back());
   std::vector<int64_t> rays(n, -1);
   std::vector<float> t_starts(n), t_ends(n);
-  cpu::march_rays_fill(grid.options, cells.view(), n_rays, o.data(), d.data(), jitter.data(), offsets.data(),
-                       rays.data(), t_starts.data(), t_ends.data());
+  cpu::run(n_rays, MarchFillBody<float>{grid.options, cells.view(), o.data(), d.data(), jitter.data(), offsets.data(),
+                                        rays.data(), t_starts.data(), t_ends.data()});
   EXPECT_EQ(offsets[0], 0);
   ASSERT_GT(n, 1000u);
   for (int64_t r = 0; r < n_rays; ++r) {

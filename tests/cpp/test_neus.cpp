@@ -148,12 +148,14 @@ TEST(Neus, AdjointFollowsCentralDifferences) {
       const std::vector<double> gw = random.uniforms(size_t(b.n), -1), ga = random.uniforms(4, -1);
       std::vector<double> weights(b.n), opacity(4), gradient(b.x.size()), grad_s(4);
       const auto f = [&] {
-        cpu::neus_weights(b.rays(), &b.x[0], &b.x[b.n], &b.x.back(), min_transmittance, weights.data(), opacity.data());
+        cpu::run(4, NeusWeightsBody<double>{b.rays(), &b.x[0], &b.x[b.n], &b.x.back(), min_transmittance,
+                                            weights.data(), opacity.data()});
         return inner(gw, weights) + inner(ga, opacity);
       };
       f();
-      cpu::neus_weights_backward(b.rays(), &b.x[0], &b.x[b.n], &b.x.back(), min_transmittance, weights.data(),
-                                 gw.data(), ga.data(), &gradient[0], &gradient[b.n], grad_s.data());
+      cpu::run(4, NeusWeightsBackwardBody<double>{b.rays(), &b.x[0], &b.x[b.n], &b.x.back(), min_transmittance,
+                                                  weights.data(), gw.data(), ga.data(), &gradient[0], &gradient[b.n],
+                                                  grad_s.data()});
       for (double g : grad_s) gradient.back() += g;
       expect_gradient(f, b.x, gradient, 1e-6, "neus", 1e-6);
     }
@@ -199,11 +201,12 @@ TEST(AnnealedCosine, GoesFromSoftToSharp) {
 TEST(Composite, SumsEachRayAndItsAdjointIsExact) {
   const std::vector<int64_t> offsets{0, 2, 2, 3};
   std::vector<double> w{1, 2, 3}, v{1, 10, 2, 20, 3, 30}, sums(6, -7);
-  cpu::composite({3, offsets.back(), offsets.data()}, 2, w.data(), v.data(), sums.data());
+  const PackedRays rays{3, offsets.back(), offsets.data()};
+  cpu::run(3, CompositeBody<double>{rays, 2, w.data(), v.data(), sums.data()});
   EXPECT_EQ(sums, (std::vector<double>{5, 50, 0, 0, 9, 90}));
   const std::vector<double> g{1, 2, 3, 4, 5, 6};
   std::vector<double> gw(3), gv(6);
-  cpu::composite_backward({3, offsets.back(), offsets.data()}, 2, w.data(), v.data(), g.data(), gw.data(), gv.data());
+  cpu::run(3, CompositeBackwardBody<double>{rays, 2, w.data(), v.data(), g.data(), gw.data(), gv.data()});
   EXPECT_EQ(gw, (std::vector<double>{21, 42, 195}));
   EXPECT_EQ(gv, (std::vector<double>{1, 2, 2, 4, 15, 18}));
 }

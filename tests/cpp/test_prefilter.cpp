@@ -154,7 +154,7 @@ TEST(Prefilter, LobeSamplesAgreeWithTheSharedSet) {
   for (const double rho : kRoughness) {
     const std::vector<double> roughness(6, rho), reference = gbar(queries, roughness, fine);
     std::vector<double> samples(3 * 6 * 1024);
-    cpu::sample_ggx_lobe(6, queries.data(), roughness.data(), 1024, 3, samples.data());
+    cpu::run(6, SampleLobeBody<double>{queries.data(), roughness.data(), 1024, 3, samples.data()});
     for (size_t i = 0; i < 6; ++i) {
       Vec3<double> mean{0, 0, 0};
       for (int k = 0; k < 1024; ++k) mean += sky(load3(&samples[3 * (1024 * i + k)])) / 1024.0;

@@ -193,12 +193,13 @@ TEST(Shading, AdjointFollowsCentralDifferences) {
               p + at[0], p + at[1], p + at[2], p + at[3], p + at[4], p + at[5], p + at[6], p + at[7], p + at[8]};
         };
         const auto f = [&] {
-          cpu::split_sum_shade(brdf_lut(), options, n, channels, arrays(static_cast<const double*>(x.data())),
-                               radiance.data());
+          cpu::run(n, ShadeBody<double>{brdf_lut(), options, channels, arrays(static_cast<const double*>(x.data())),
+                                        radiance.data()});
           return inner(g, radiance);
         };
-        cpu::split_sum_shade_backward(brdf_lut(), options, n, channels, arrays(static_cast<const double*>(x.data())),
-                                      g.data(), arrays(gradient.data()));
+        cpu::run(n, ShadeBackwardBody<double>{brdf_lut(), options, channels,
+                                              arrays(static_cast<const double*>(x.data())), g.data(),
+                                              arrays(gradient.data())});
         const std::string what = "mode " + std::to_string(int(mode)) + " compensate " + std::to_string(compensate) +
                                  " channels " + std::to_string(channels);
         expect_gradient(f, x, gradient, 1e-6, what.c_str(), 1e-6);

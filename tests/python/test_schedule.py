@@ -14,6 +14,7 @@ from splitnerf.config import Config, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.render.model import SceneModel
 from splitnerf.training import loop as trainer
+from splitnerf.training import step as step_module
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period, next_ray_count
 
@@ -183,16 +184,16 @@ def test_the_light_moves_once_in_its_period_and_with_the_last_step():
 # ---- what a run does ----
 
 
-def recorded(monkeypatch, name: str, note: Callable) -> list:
+def recorded(monkeypatch, name: str, note: Callable, module=trainer) -> list:
     """What `note` makes of the arguments and the result of each call that the trainer makes of this function."""
-    notes, function = [], getattr(trainer, name)
+    notes, function = [], getattr(module, name)
 
     def noted(*args, **kwargs):
         result = function(*args, **kwargs)
         notes.append(note(args, kwargs, result))
         return result
 
-    monkeypatch.setattr(trainer, name, noted)
+    monkeypatch.setattr(module, name, noted)
     return notes
 
 
@@ -203,15 +204,15 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
         steps=n, n_levels=8, start_levels=2, levels_open_by=0.6, cos_anneal_by=0.5, warmup_steps=8, final_learning_rate=0.1,
         light_step_every=4, priors_from=0.5, entropy_weight=0.01, binary_metal_weight=0.01, neutral_weight=0.03, mesh_every=0.25,
     )  # fmt: skip
-    levels = recorded(monkeypatch, "find_samples", lambda args, _, __: args[0].sdf_field.grid.n_active)
-    anneals = recorded(monkeypatch, "find_samples", lambda args, *_: args[5])
+    levels = recorded(monkeypatch, "find_samples", lambda args, _, __: args[0].sdf_field.grid.n_active, step_module)
+    anneals = recorded(monkeypatch, "find_samples", lambda args, *_: args[5], step_module)
     rates = recorded(
         monkeypatch, "set_learning_rate", lambda args, *_: [g["lr"] / g["rate"] for g in args[0].param_groups]
     )
-    terms = recorded(monkeypatch, "batch_losses", lambda _, __, result: {k: t.weight for k, t in result[1].items()})
-    renewed, renew = [], trainer.SurfaceMesh.renew
+    terms = recorded(monkeypatch, "loss_terms", lambda _, __, result: {k: t.weight for k, t in result.items()}, step_module)
+    requested, request = [], trainer.SurfaceMesh.request
     monkeypatch.setattr(
-        trainer.SurfaceMesh, "renew", lambda self, progress: renewed.append(progress) or renew(self, progress)
+        trainer.SurfaceMesh, "request", lambda self, progress: requested.append(progress) or request(self, progress)
     )
     trainer.train(load_dataset(data), config, tmp_path)
 
@@ -225,7 +226,7 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
     assert [step for step in range(n) if "neutral" in terms[step]] == [*range(3, 40, 4), 40]
     assert sum(step.get("neutral", 0.0) for step in terms) == pytest.approx(0.03 * n)
     apart = math.ceil(0.25 * n)
-    assert renewed == pytest.approx([apart / n, 2 * apart / n, 3 * apart / n, 1.0])
+    assert requested == pytest.approx([apart / n, 2 * apart / n, 3 * apart / n, 1.0])
 
 
 def test_minutes_move_the_schedule_where_they_are_ahead_of_the_steps(data, tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import torch
 from op_checks import generator, unit
 from tiny_runs import tiny
 
-from splitnerf.fields import Light, LightMlp, Occlusion
+from splitnerf.fields import EvaluatedLight, Light, LightMlp, Occlusion
 from splitnerf.ops import FRESNEL_MODES, brdf_lut, split_sum_shade
 from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.training import losses
@@ -35,7 +35,7 @@ class Given(torch.nn.Module):
         super().__init__()
         self.answer = answer
 
-    def forward(self, inputs):
+    def forward(self, *inputs):
         return self.answer
 
 
@@ -50,12 +50,13 @@ def shade(light: Light, materials: tuple, occlusion: Occlusion | None = None, **
     model = SceneModel(tiny(shading="split", **settings))
     model.light, model.material = light, Given(materials)
     if occlusion is not None:
-        model.occlusion, model.occlusion_ready = Given(occlusion), True
+        model.occlusion = Given(occlusion)
     g = generator(4)
     normals = unit(torch.randn(K, 3, generator=g))
     views = unit(normals + 0.97 * unit(torch.randn(K, 3, generator=g)))
     n_features = model.sdf_field.grid.spec.n_outputs
-    return model.shade(torch.zeros(K, 3), torch.zeros(K, 13), torch.zeros(K, n_features), normals, views)
+    light = EvaluatedLight(model.light.evaluate())
+    return model.shade(light, torch.zeros(K, 3), torch.zeros(K, 13), torch.zeros(K, n_features), normals, views)
 
 
 def factors(diffuse: float, specular: float, channels: int = 1) -> Occlusion:

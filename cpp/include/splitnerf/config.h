@@ -1,4 +1,4 @@
-// Function qualifiers shared by g++ and nvcc, and the library's symbol visibility.
+// Function qualifiers shared by g++ and nvcc, the library's symbol visibility, and the list of what the GPU runs.
 #pragma once
 
 #include <cstdint>
@@ -27,3 +27,13 @@
 #else
 #define SPLITNERF_API
 #endif
+
+// SPLITNERF_ON_GPU(Body); stands below a body of splitnerf/bodies/ that cuda::run (ops_cuda.h) is called with, for float and
+// double; SPLITNERF_ON_GPU_TYPE(Body); below one that is no template. cpp/cuda/bodies.cu.in makes kernels of them; elsewhere
+// they say nothing.
+#ifndef SPLITNERF_ON_GPU_TYPE
+#define SPLITNERF_ON_GPU_TYPE(...) static_assert(true)
+#endif
+#define SPLITNERF_ON_GPU(Body)        \
+  SPLITNERF_ON_GPU_TYPE(Body<float>); \
+  SPLITNERF_ON_GPU_TYPE(Body<double>)

@@ -60,9 +60,6 @@ template <class T> struct Kernels {
   // Adds to grad_table. grad_features and grad_jacobian may be null. Level `level`, all points.
   void (*hash_scatter)(const HashEncodeArgs<T>&, int level, const T* grad_features, const T* grad_jacobian,
                        T* grad_table);
-  // grad_positions [n, 3], overwritten. Points [begin, end).
-  void (*hash_position_gradient)(const HashEncodeArgs<T>&, int64_t begin, int64_t end, const T* grad_features,
-                                 const T* grad_jacobian, T* grad_positions);
   // values [n] at positions [n, 3], scene units; n <= kSdfBlock, work [sdf_work_size].
   void (*sdf_values)(const SdfNetwork<T>&, int64_t n, const T* positions, T* work, T* values);
   // outputs [n, M], gradient [n, 3] d distance / d position.
@@ -98,8 +95,6 @@ template <class T> struct Kernels {
   void (*split_sum_shade_backward)(const float* lut, ShadeOptions, int64_t begin, int64_t end, int n_channels,
                                    const ShadeArrays<const T>&, const T* grad_radiance, const ShadeArrays<T>& grad);
 
-  // products [rows, 3] = matrix . values, rows [begin, end); values are [columns, 4], the fourth unused.
-  void (*sparse_product)(const SparseRows<T>&, int64_t begin, int64_t end, const T* values, T* products);
   // radiance [n, 3] of directions [n, 3] and roughness [n]. Points [begin, end).
   void (*light_lookup)(const LightPyramid<T>&, int64_t begin, int64_t end, const T* directions, const T* roughness,
                        T* radiance);

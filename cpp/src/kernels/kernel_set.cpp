@@ -9,7 +9,6 @@ Kernels<float> kernels_float32() {
   return {SPLITNERF_NAME(SPLITNERF_ISA),
           hash_encode<float>,
           hash_scatter<float>,
-          hash_position_gradient<float>,
           sdf_values<float>,
           sdf_layer<float>,
           sdf_layer_backward<float>,
@@ -23,7 +22,6 @@ Kernels<float> kernels_float32() {
           fan_light<float>,
           split_sum_shade<float>,
           split_sum_shade_backward<float>,
-          sparse_product<float>,
           light_lookup<float>,
           light_lookup_backward<float>,
           adamw_step<float>};
@@ -33,7 +31,6 @@ Kernels<double> kernels_float64() {
   return {SPLITNERF_NAME(SPLITNERF_ISA),
           hash_encode<double>,
           hash_scatter<double>,
-          hash_position_gradient<double>,
           sdf_values<double>,
           sdf_layer<double>,
           sdf_layer_backward<double>,
@@ -47,7 +44,6 @@ Kernels<double> kernels_float64() {
           fan_light<double>,
           split_sum_shade<double>,
           split_sum_shade_backward<double>,
-          sparse_product<double>,
           light_lookup<double>,
           light_lookup_backward<double>,
           adamw_step<double>};

@@ -11,7 +11,6 @@ namespace splitnerf::SPLITNERF_ISA {
 
 template <class T> void hash_encode(const HashEncodeArgs<T>&, int64_t, int64_t, T*, T*);
 template <class T> void hash_scatter(const HashEncodeArgs<T>&, int, const T*, const T*, T*);
-template <class T> void hash_position_gradient(const HashEncodeArgs<T>&, int64_t, int64_t, const T*, const T*, T*);
 template <class T> void sdf_values(const SdfNetwork<T>&, int64_t, const T*, T*, T*);
 template <class T> void sdf_layer(const SdfLayer<T>&, const SdfPoints<T>&, T*, T*, T*);
 template <class T>
@@ -32,7 +31,6 @@ void split_sum_shade(const float*, ShadeOptions, int64_t, int64_t, int, const Sh
 template <class T>
 void split_sum_shade_backward(const float*, ShadeOptions, int64_t, int64_t, int, const ShadeArrays<const T>&, const T*,
                               const ShadeArrays<T>&);
-template <class T> void sparse_product(const SparseRows<T>&, int64_t, int64_t, const T*, T*);
 template <class T> void light_lookup(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, T*);
 template <class T>
 void light_lookup_backward(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, const T*, T*, T*, T*, T*);

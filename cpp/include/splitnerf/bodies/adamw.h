@@ -58,5 +58,6 @@ template <class T> struct AdamwBody {
     return false;
   }
 };
+SPLITNERF_ON_GPU(AdamwBody);
 
 }  // namespace splitnerf

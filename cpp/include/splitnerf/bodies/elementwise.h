@@ -11,6 +11,7 @@ template <class T> struct LinearToSrgbBody {
 
   SPLITNERF_HD void operator()(int64_t i) const { srgb[i] = srgb_from_linear(linear[i]).value; }
 };
+SPLITNERF_ON_GPU(LinearToSrgbBody);
 
 template <class T> struct LinearToSrgbBackwardBody {
   const T *linear, *grad_srgb;
@@ -18,6 +19,7 @@ template <class T> struct LinearToSrgbBackwardBody {
 
   SPLITNERF_HD void operator()(int64_t i) const { grad_linear[i] = grad_srgb[i] * srgb_from_linear(linear[i]).slope; }
 };
+SPLITNERF_ON_GPU(LinearToSrgbBackwardBody);
 
 template <class T> struct SrgbToLinearBody {
   const T* srgb;
@@ -25,5 +27,6 @@ template <class T> struct SrgbToLinearBody {
 
   SPLITNERF_HD void operator()(int64_t i) const { linear[i] = linear_from_srgb(srgb[i]); }
 };
+SPLITNERF_ON_GPU(SrgbToLinearBody);
 
 }  // namespace splitnerf

@@ -14,6 +14,14 @@ template <class T, class S = T> struct HashGridView {
   const S* table;      // [n_entries, F]
 };
 
+template <class T, class S>
+HashGridView<T, S> make_view(const HashGridShape& shape, int n_active, const T* positions, const S* table) {
+  HashGridView<T, S> view{};
+  hash_levels(shape, view.levels);
+  view.n_levels = shape.n_levels, view.n_active = n_active, view.positions = positions, view.table = table;
+  return view;
+}
+
 // An entry, read at once.
 template <class T, int F, class S> SPLITNERF_HD Pack<T, F> load_entry(const S* from) {
   const Pack<S, F> stored = load_pack<F>(from);

@@ -69,6 +69,7 @@ template <class T> struct LightLookupBody {
     store3(radiance + 3 * i, read_light(pyramid, recurrence, load3(directions + 3 * i), roughness[i]));
   }
 };
+SPLITNERF_ON_GPU(LightLookupBody);
 
 // products [n_rows, 3] = matrix . values [n_columns, 3]; a group of threads a row.
 template <class T> struct SparseProductBody {
@@ -84,5 +85,6 @@ template <class T> struct SparseProductBody {
     if (group.lane() == 0) store3(products + 3 * r, sum);
   }
 };
+SPLITNERF_ON_GPU(SparseProductBody);
 
 }  // namespace splitnerf

@@ -27,6 +27,7 @@ template <class T> struct PixelLossesBody {
     losses[0] = T(sums[0] * double(per_value)), losses[1] = T(sums[1] * double(per_ray));
   }
 };
+SPLITNERF_ON_GPU(PixelLossesBody);
 template <class T>
 PixelLossesBody<T> make_pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, const T* background,
                                      bool linear, T* losses, T* colour_by_mean, T* colour_by_opacity,
@@ -59,6 +60,7 @@ template <class T> struct EikonalBody {
   }
   SPLITNERF_HD void finish(const double* sums) const { *loss = T(sums[0] * double(per_point)); }
 };
+SPLITNERF_ON_GPU(EikonalBody);
 
 // Pair j is of sample beside[j] and of gradient n - m + j. sums = {weight distance, weight}; adds to smoothness_by, which is
 // then to be scaled by *scale.
@@ -85,6 +87,7 @@ template <class T> struct NormalPairsBody {
     *loss = T(sums[0] * *scale);
   }
 };
+SPLITNERF_ON_GPU(NormalPairsBody);
 
 // sums = {metal, binary, dark, share}; by_metallic is then to be scaled by *scale.
 template <class T> struct MaterialLossesBody {
@@ -110,6 +113,7 @@ template <class T> struct MaterialLossesBody {
     for (int k = 0; k < 3; ++k) losses[k] = T(sums[k] * *scale);
   }
 };
+SPLITNERF_ON_GPU(MaterialLossesBody);
 
 template <class T> struct ScaleBody {
   const double* scale;
@@ -117,6 +121,7 @@ template <class T> struct ScaleBody {
 
   SPLITNERF_HD void operator()(int64_t i) const { values[i] *= T(*scale); }
 };
+SPLITNERF_ON_GPU(ScaleBody);
 
 // ---- quadratic entropy: E = -ln(sum_ij k_ij / n^2),  dE / dx_i = sum_j k_ij (x_i - x_j) / sum k ----
 
@@ -150,6 +155,7 @@ template <class T> struct PairLikenessBody {
     }
   }
 };
+SPLITNERF_ON_GPU(PairLikenessBody);
 
 // sums = {sum_ij k_ij}
 template <class T> struct EntropyBody {
@@ -167,6 +173,7 @@ template <class T> struct EntropyBody {
     *entropy = static_cast<T>(-std::log(sums[0] / (double(n) * double(n))));
   }
 };
+SPLITNERF_ON_GPU(EntropyBody);
 
 // One call for each of gradient [n, n_channels].
 template <class T> struct EntropyGradientBody {
@@ -180,5 +187,6 @@ template <class T> struct EntropyGradientBody {
     gradient[at] = static_cast<T>(double(rows[i * (n_channels + 1) + c]) / *total);
   }
 };
+SPLITNERF_ON_GPU(EntropyGradientBody);
 
 }  // namespace splitnerf

@@ -30,6 +30,7 @@ template <class T> struct SampleLobeBody {
     }
   }
 };
+SPLITNERF_ON_GPU(SampleLobeBody);
 
 // directions [n, n_samples, 3], pdf [n, n_samples]; a group of threads a point.
 template <class T> struct SampleBsdfBody {
@@ -51,6 +52,7 @@ template <class T> struct SampleBsdfBody {
     }
   }
 };
+SPLITNERF_ON_GPU(SampleBsdfBody);
 
 // The directions of one point, drawn for it.
 template <class T> struct DrawnLight {
@@ -133,5 +135,15 @@ template <class T> struct ToSharedLight {
     add3_to(grad_light + 3 * i, grad * visible[p * n + i]);
   }
 };
+
+// The two lights, each with its own sums and adjoint.
+template <class T> using DrawnLightBody = SumLightBody<T, DrawnLight<T>>;
+SPLITNERF_ON_GPU(DrawnLightBody);
+template <class T> using DrawnLightBackwardBody = SumLightBackwardBody<T, DrawnLight<T>, ToDrawnLight<T>>;
+SPLITNERF_ON_GPU(DrawnLightBackwardBody);
+template <class T> using SharedLightBody = SumLightBody<T, ArrivingLight<T>>;
+SPLITNERF_ON_GPU(SharedLightBody);
+template <class T> using SharedLightBackwardBody = SumLightBackwardBody<T, ArrivingLight<T>, ToSharedLight<T>>;
+SPLITNERF_ON_GPU(SharedLightBackwardBody);
 
 }  // namespace splitnerf

@@ -22,6 +22,7 @@ template <class T> struct MarchCountBody {
     if (group.lane() == 0) counts[r] = n;
   }
 };
+SPLITNERF_ON_GPU(MarchCountBody);
 
 template <class T> struct MarchFillBody {
   MarchOptions options;
@@ -41,6 +42,7 @@ template <class T> struct MarchFillBody {
               });
   }
 };
+SPLITNERF_ON_GPU(MarchFillBody);
 
 // blocks [n_blocks^3]: whether a block of kBlockCells^3 cells holds one that is not empty; a group of threads a block.
 struct OccupiedBlocksBody {
@@ -63,6 +65,7 @@ struct OccupiedBlocksBody {
     if (group.lane() == 0) blocks[b] = any;
   }
 };
+SPLITNERF_ON_GPU_TYPE(OccupiedBlocksBody);
 
 // weights [n], opacity [n_rays]
 template <class T> struct NeusWeightsBody {
@@ -79,6 +82,7 @@ template <class T> struct NeusWeightsBody {
     rays.for_each_unowned(group, r, [&](int64_t i) { weights[i] = T(0); });
   }
 };
+SPLITNERF_ON_GPU(NeusWeightsBody);
 
 template <class T> struct NeusWeightsBackwardBody {
   PackedRays rays;
@@ -98,6 +102,7 @@ template <class T> struct NeusWeightsBackwardBody {
     rays.for_each_unowned(group, r, [&](int64_t i) { grad_f_prev[i] = grad_f_next[i] = T(0); });
   }
 };
+SPLITNERF_ON_GPU(NeusWeightsBackwardBody);
 
 // The samples of one ray of a surface, their intervals worked out when they are asked for.
 template <class T> struct SurfaceIntervals {
@@ -129,6 +134,7 @@ template <class T> struct SurfaceWeightsBody {
     });
   }
 };
+SPLITNERF_ON_GPU(SurfaceWeightsBody);
 
 // grad_sdf [n] holds the depths meanwhile.
 template <class T> struct SurfaceWeightsBackwardBody {
@@ -156,6 +162,7 @@ template <class T> struct SurfaceWeightsBackwardBody {
     });
   }
 };
+SPLITNERF_ON_GPU(SurfaceWeightsBackwardBody);
 
 // sums [n_rays, n_channels] of weights [n] times values [n, n_channels], added in double.
 template <class T> struct CompositeBody {
@@ -175,6 +182,7 @@ template <class T> struct CompositeBody {
     }
   }
 };
+SPLITNERF_ON_GPU(CompositeBody);
 
 template <class T> struct CompositeBackwardBody {
   PackedRays rays;
@@ -199,6 +207,7 @@ template <class T> struct CompositeBackwardBody {
     });
   }
 };
+SPLITNERF_ON_GPU(CompositeBackwardBody);
 
 // counts of a ray's shaded samples, of its stretches and of itself, if it has samples; one call a ray.
 template <class T> struct SpreadCountBody {
@@ -305,9 +314,11 @@ template <class T> struct InterpolateBody {
     interpolated[at] = lerp(values[a * n_channels + c], values[b * n_channels + c], share[i]);
   }
 };
+SPLITNERF_ON_GPU(InterpolateBody);
 
 // Adds to grad_values [m, n_channels].
 template <class T> struct InterpolateBackwardBody {
+  static constexpr bool adds_to_shared = true;
   int64_t m, n_channels;
   const int64_t *first, *second;
   const T *share, *grad_interpolated;
@@ -322,5 +333,6 @@ template <class T> struct InterpolateBackwardBody {
     add_to(grad_values + b * n_channels + c, g * share[i]);
   }
 };
+SPLITNERF_ON_GPU(InterpolateBackwardBody);
 
 }  // namespace splitnerf

@@ -17,6 +17,7 @@ template <class T> struct QueryDirectionBody {
            query_direction(lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i]));
   }
 };
+SPLITNERF_ON_GPU(QueryDirectionBody);
 
 template <class T> struct QueryDirectionBackwardBody {
   const float* lut;
@@ -32,6 +33,7 @@ template <class T> struct QueryDirectionBackwardBody {
     grad_roughness[i] = g.roughness;
   }
 };
+SPLITNERF_ON_GPU(QueryDirectionBackwardBody);
 
 // Occlusion factors come as one value for all channels or as three; the gradient of the one is the sum of theirs.
 template <class T> SPLITNERF_HD Vec3<T> load_factors(const T* factors, int64_t i, int n_channels) {
@@ -66,6 +68,7 @@ template <class T> struct ShadeBody {
     store3(radiance + 3 * i, split_sum_shade(lut, options, load_shade_point(in, i, n_channels)));
   }
 };
+SPLITNERF_ON_GPU(ShadeBody);
 
 template <class T> struct ShadeBackwardBody {
   const float* lut;
@@ -89,6 +92,7 @@ template <class T> struct ShadeBackwardBody {
     store_factors(grad.occlusion_d, i, n_channels, g.occlusion_d);
   }
 };
+SPLITNERF_ON_GPU(ShadeBackwardBody);
 
 template <class T> SPLITNERF_HD SummedPoint<T> load_summed_point(const SummedArrays<const T>& in, int64_t i) {
   return {load3(in.normals + 3 * i),
@@ -109,6 +113,7 @@ template <class T> struct ShadeSumsBody {
     store3(radiance + 3 * i, shade_sums(lut, compensate, load_summed_point(in, i)));
   }
 };
+SPLITNERF_ON_GPU(ShadeSumsBody);
 
 template <class T> struct ShadeSumsBackwardBody {
   const float* lut;
@@ -130,5 +135,6 @@ template <class T> struct ShadeSumsBackwardBody {
     store3(grad.diffuse + 3 * i, g.light.diffuse);
   }
 };
+SPLITNERF_ON_GPU(ShadeSumsBackwardBody);
 
 }  // namespace splitnerf

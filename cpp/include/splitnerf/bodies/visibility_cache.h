@@ -113,6 +113,7 @@ template <class T> struct CachedOcclusionBody {
     store3(indirect_d + 3 * p, sent), store3(indirect_s + 3 * p, sent);
   }
 };
+SPLITNERF_ON_GPU(CachedOcclusionBody);
 
 // visible [n, n_directions] and, with hits, arriving [n, n_directions, 3].
 template <class T> struct CachedVisibilityBody {
@@ -140,5 +141,6 @@ template <class T> struct CachedVisibilityBody {
     }
   }
 };
+SPLITNERF_ON_GPU(CachedVisibilityBody);
 
 }  // namespace splitnerf

@@ -3,7 +3,7 @@
 
 #include <type_traits>
 
-namespace splitnerf::cuda {
+namespace splitnerf {
 
 template <int F> struct Features {
   static constexpr int n = F;
@@ -25,4 +25,4 @@ template <class Body> void with_features(int n_features, Body&& body) {
 // What a pointer points to.
 template <class Pointer> using Pointee = std::remove_const_t<std::remove_pointer_t<Pointer>>;
 
-}  // namespace splitnerf::cuda
+}  // namespace splitnerf
