@@ -7,7 +7,7 @@ import math
 import tempfile
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE, FAILED, INTERRUPTED
+from splitnerf.cli.exit_codes import DONE, INTERRUPTED
 from splitnerf.errors import InputError
 
 # Modules of splitnerf.bench, each with run(quick, rounds).
@@ -65,20 +65,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     add_out(whole)
     whole.set_defaults(execute=run_whole)
-    stability = benchmarks.add_parser(
-        "stability", help="how far each operator is from the truth on inputs made to break it",
-        description="Compares every operator in float32 with float64 on adversarial inputs, searches for the worst of them, asks "
-        "these again in 50 digits, and writes the worst errors and their inputs. Exits with 1 where one breaks its promise.",
-    )  # fmt: skip
-    stability.add_argument(
-        "--cases", type=int, default=10**7, metavar="N", help="inputs of an operator (default: 10^7)"
-    )
-    stability.add_argument(
-        "--op", action="append", default=[], metavar="NAME", help="only this operator; may be repeated"
-    )
-    stability.add_argument("--seed", type=int, default=0, metavar="S", help="of the inputs (default: 0)")
-    add_out(stability)
-    stability.set_defaults(execute=run_stability)
 
 
 def add_out(parser: argparse.ArgumentParser) -> None:
@@ -157,15 +143,3 @@ def run_whole(args: argparse.Namespace) -> int:
     for path in write_result(result, out):
         print(path)
     return DONE
-
-
-def run_stability(args: argparse.Namespace) -> int:
-    if args.cases < 1:
-        raise InputError(f"--cases must be positive, got {args.cases}")
-    from splitnerf.bench.stability.table import chosen, run_all, write
-
-    out = args.out or default_folder()
-    results, verdicts = run_all(chosen(args.op), args.cases, args.seed, print_now)
-    for path in write(results, verdicts, args.seed, out):
-        print(path)
-    return DONE if all(x.holds for x in (*results, *verdicts)) else FAILED

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from splitnerf.bench.machine import describe_machine
-from splitnerf.bench.stability import fields, light, losses, optimiser, properties, rays, shading
-from splitnerf.bench.stability.entry import Entry, Rows
-from splitnerf.bench.stability.properties import Property, Verdict, verify
-from splitnerf.bench.stability.search import Result, run
+from stability import fields, light, losses, optimiser, properties, rays, shading
+from stability.entry import Entry, Rows
+from stability.properties import Property, Verdict, verify
+from stability.search import Result, run
 from splitnerf.errors import InputError
 
 ENTRIES: tuple[Entry, ...] = (
