@@ -11,9 +11,8 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from splitnerf.bench import charts, eager, normals, path_tracer, shading, split_sum, whole
+from splitnerf.bench import charts, normals, path_tracer, shading, split_sum, whole
 from splitnerf.bench.charts import Chart, Point, Result, markdown, write_csv, write_result
-from splitnerf.bench.hash_grid import SPEC
 from splitnerf.bench.lights import MapLight, octahedral_directions, pyramid_of
 from splitnerf.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
 from splitnerf.bench.timing import interleaved
@@ -21,7 +20,6 @@ from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.errors import CheckFailed
 from splitnerf.fields import SdfField
-from splitnerf.ops import hash_encode, prefilter_light
 
 SMALL = [
     "n_levels=2", "log2_table_size=8", "initial_rays=32", "grid_resolution=16", "light_resolution=16", "light_queries=8",
@@ -68,20 +66,6 @@ def test_calls_are_timed_in_turns_and_compared_round_by_round():
     assert last_a < last_b and "b" in order[:last_a]
     times.seconds = {"a": [2.0, 4.0, 9.0], "b": [1.0, 2.0, 3.0]}
     assert times.ratio("a", "b").value == 2.0 and times["a"].seconds == 4.0
-
-
-def test_the_plain_hash_grid_is_the_operator():
-    x = torch.rand(200, 3, dtype=torch.float64)
-    table = torch.randn(SPEC.n_entries, SPEC.n_features, dtype=torch.float64)
-    plain = eager.hash_encode(x, table, *SPEC.arguments(SPEC.n_levels))
-    torch.testing.assert_close(plain, hash_encode(x, table, SPEC), rtol=1e-9, atol=1e-12)
-
-
-def test_the_plain_prefilter_is_the_operator():
-    queries, lights = (F.normalize(torch.randn(n, 3, dtype=torch.float64), dim=1) for n in (20, 300))
-    roughness, light = 0.2 + 0.8 * torch.rand(20, 1, dtype=torch.float64), torch.rand(300, 3, dtype=torch.float64)
-    plain = eager.prefilter_light(queries, roughness, lights, light)
-    torch.testing.assert_close(plain, prefilter_light(queries, roughness, lights, light), rtol=1e-8, atol=1e-10)
 
 
 def test_a_wrong_subject_is_refused():

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from splitnerf import _core
-from splitnerf.bench import eager
+from splitnerf.bench import reference
 from splitnerf.bench.charts import Chart, Point, Result
 from splitnerf.bench.peers import DrJitHashGrid, drjit_ready
 from splitnerf.bench.timing import interleaved
@@ -41,7 +41,7 @@ def run(quick: bool, rounds: int) -> Result:
         return hash_encode(x, table, SPEC)
 
     def plain(x: Tensor, table: Tensor) -> Tensor:
-        return eager.hash_encode(x, table, *arguments)
+        return reference.hash_encode(x, table, *arguments)
 
     true = both(plain, x.double(), table.double(), cotangent.double())()
     calls: dict[tuple[str, str], Callable[[], object]] = {

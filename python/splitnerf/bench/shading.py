@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf.bench import eager
+from splitnerf.bench import reference
 from splitnerf.bench.charts import Chart, Point, Result
 from splitnerf.bench.timing import Times, interleaved
 from splitnerf.errors import CheckFailed
@@ -56,7 +56,7 @@ def shading_calls(n: int, compiled: bool) -> tuple[dict[str, Callable[[], object
     lut = brdf_lut()
 
     def plain(*leaves: Tensor) -> Tensor:
-        return eager.split_sum_shade(*leaves, lut.to(leaves[0].dtype), 0, True)
+        return reference.split_sum_shade(*leaves, lut, 0, True)
 
     def ours(*leaves: Tensor) -> Tensor:
         return split_sum_shade(*leaves, compensate=True)
@@ -80,7 +80,7 @@ def prefilter_calls(n_queries: int, n_lights: int) -> tuple[dict[str, Callable[[
     light = (torch.rand(n_lights, 3),)
 
     def plain(light: Tensor) -> Tensor:
-        return eager.prefilter_light(*(t.to(light.dtype) for t in (queries, roughness, directions)), light)
+        return reference.prefilter_light(*(t.to(light.dtype) for t in (queries, roughness, directions)), light)
 
     def ours(light: Tensor) -> Tensor:
         return prefilter_light(queries, roughness, directions, light)
