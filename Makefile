@@ -2,6 +2,7 @@
 # make test   installs, builds, and runs gtest and pytest
 # make sanitize   builds gtest with AddressSanitizer and UndefinedBehaviorSanitizer and runs it
 # make stability   asks each operator STABILITY_CASES times and writes docs/benchmarks/stability.md; more in STABILITY_OPTIONS
+# make tables   says which tables under docs/ are stale
 # make fuzz   feeds each reader damaged files for FUZZ_SECONDS, in four parts: tracing takes memory with every run
 VENV ?= .venv
 PYTHON ?= python3
@@ -14,7 +15,7 @@ STABILITY_CASES ?= 10000000
 STABILITY_OPTIONS ?=
 READERS := json png exr hdr glb checkpoint
 
-.PHONY: demo test test-slow install system gtest sanitize fuzz stability pytest clean
+.PHONY: demo test test-slow install system gtest sanitize fuzz stability tables pytest clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -38,6 +39,9 @@ fuzz: install
 
 stability: install
 	PYTHONPATH=tests $(BIN)/python -m stability --cases $(STABILITY_CASES) $(STABILITY_OPTIONS)
+
+tables: install
+	@$(BIN)/python tests/bench/tables.py
 
 pytest: install
 	$(BIN)/python -m pytest -q

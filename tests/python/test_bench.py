@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import csv
 import math
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from bench import tables
 from torch.nn import functional as F
 
-from splitnerf.bench import charts, normals, path_tracer, shading, split_sum, whole
-from splitnerf.bench.charts import Chart, Point, Result, markdown, write_csv, write_result
+from splitnerf.bench import charts, harness, normals, path_tracer, provenance, shading, split_sum, whole
+from splitnerf.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv, write_result
+from splitnerf.bench.harness import interleaved
 from splitnerf.bench.lights import MapLight, octahedral_directions, pyramid_of
 from splitnerf.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
-from splitnerf.bench.timing import interleaved
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.errors import CheckFailed
@@ -40,22 +42,91 @@ def test_the_front_holds_what_nothing_beats():
 
 
 def test_files_mark_the_front_and_the_default(tmp_path):
-    result = Result("work", "Work", ["b is twice as fast"], [CHART], [("More", ["x"], [[1]])])
-    text = markdown(result)
+    result = Result("work", "Work", ("cpp",), ["b is twice as fast"], [CHART], [("More", ["x"], [[1]])])
+    facts = provenance.provenance(result.sources)
+    text = markdown(result, facts)
     assert "| **d** * |" in text and "| c |" in text and "- b is twice as fast" in text and "## More" in text
-    write_csv(result, tmp_path / "work.csv")
+    write_csv(tmp_path / "work.csv", facts, csv_rows(result.charts))
     lines = (tmp_path / "work.csv").read_text().splitlines()
     heads = [line for line in lines if line.startswith("#")]
-    assert any("processor" in line for line in heads) and any("commit" in line for line in heads)
+    for fact in ("processor", "commit", "date", "command", "measures"):
+        assert any(line.startswith(f"# {fact}: ") for line in heads) and f"; {fact} " in f"; {text}".replace("\n", "; ")
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     assert [row["on_front"] for row in rows] == ["1", "1", "0", "1"] and rows[3]["default"] == "1"
 
 
 def test_a_result_becomes_a_picture(tmp_path):
     pytest.importorskip("matplotlib")
-    files = write_result(Result("work", "Work", [], [CHART]), tmp_path)
+    files = write_result(Result("work", "Work", (), [], [CHART]), tmp_path)
     assert [path.name for path in files] == ["work.md", "work.csv", "work.png"]
     assert (tmp_path / "work.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_machine_is_named(tmp_path):
+    file = tmp_path / "cpuinfo"
+    file.write_text("processor : 0\nmodel name\t: Some CPU @ 2 GHz\n")
+    assert provenance.processor_name(file) == "Some CPU @ 2 GHz"
+    assert provenance.processor_name(tmp_path / "none")
+
+
+class TestTables:
+    """A checkout with one source and a table of it."""
+
+    @pytest.fixture
+    def checkout(self, tmp_path):
+        (tmp_path / "cpp").mkdir()
+        (tmp_path / "docs" / "benchmarks").mkdir(parents=True)
+        (tmp_path / "docs" / "prose.md").write_text("| a |\n|---|\n")
+        self.git(tmp_path, "init", "--quiet")
+        self.change(tmp_path, "cpp/hash_grid.h", "1")
+        return tmp_path
+
+    @staticmethod
+    def git(root, *words):
+        who = ["-c", "user.name=a", "-c", "user.email=a@example.org"]
+        subprocess.run(["git", *who, *words], cwd=root, check=True, capture_output=True)
+
+    def change(self, root, path, text):
+        (root / path).write_text(text)
+        self.git(root, "add", "-A")
+        self.git(root, "commit", "--quiet", "-m", path)
+
+    def measured(self, root):
+        facts = provenance.provenance(("cpp/*hash*", "python"), root=root)
+        (root / "docs" / "benchmarks" / "grid.md").write_text(f"# Grid\n\n{provenance.header(facts)}\n")
+        return tables.states(root)[Path("docs/benchmarks/grid.md")]
+
+    def test_a_change_of_what_is_measured_makes_a_table_stale(self, checkout):
+        assert self.measured(checkout) == "fresh"
+        self.change(checkout, "cpp/other.h", "1")
+        assert tables.states(checkout) == {Path("docs/benchmarks/grid.md"): "fresh"}
+        self.change(checkout, "cpp/hash_grid.h", "2")
+        assert "stale: 1 commits since" in tables.states(checkout)[Path("docs/benchmarks/grid.md")]
+
+    def test_what_was_measured_with_changes_is_stale(self, checkout):
+        (checkout / "docs" / "prose.md").write_text("x")
+        assert self.measured(checkout) == "fresh"
+        (checkout / "cpp" / "hash_grid.h").write_text("3")
+        assert "stale: made beside changes" in self.measured(checkout)
+
+    def test_what_says_nothing_of_itself_is_unknown(self, checkout):
+        page = checkout / "docs" / "benchmarks" / "old.md"
+        page.write_text("commit 1234567.")
+        assert tables.states(checkout) == {Path("docs/benchmarks/old.md"): "unknown: no head with commit and sources"}
+        page.write_text("commit 1234567; measures `cpp`.")
+        assert "unknown: no commit 1234567" in tables.states(checkout)[Path("docs/benchmarks/old.md")]
+
+
+def test_commands_hold_no_path_of_the_machine(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["/x/bin/splitnerf", "bench", "whole", "--data", "/data/chair", "--only", "a; b"])
+    assert provenance.command_line() == "splitnerf bench whole --data chair --only 'a; b'"
+
+
+def test_errors_are_refused_before_they_are_timed():
+    harness.check("work", {("a", "b"): 0.5, "c": 0.9}, 1.0)
+    for wrong in (1.0, math.nan):
+        with pytest.raises(CheckFailed, match="work: a b is wrong by"):
+            harness.check("work", {("a", "b"): wrong}, 1.0)
 
 
 def test_calls_are_timed_in_turns_and_compared_round_by_round():

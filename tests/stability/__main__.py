@@ -40,7 +40,7 @@ def main(argv: list[str] | None = None) -> int:
     except InputError as error:
         print(f"stability: {error}", file=sys.stderr)
         return BAD_INPUT
-    for path in table.write(results, verdicts, args.seed, args.out):
+    for path in table.write(results, verdicts, args.cases, args.seed, args.out):
         print(path)
     return DONE if all(x.holds for x in (*results, *verdicts)) else BROKEN
 

@@ -77,7 +77,7 @@ def default_folder() -> Path:
 
 
 def run_operators(args: argparse.Namespace) -> int:
-    from splitnerf.bench.operators import run_benchmarks
+    from splitnerf.bench.harness import run_benchmarks
 
     for path in run_benchmarks(args.only or BENCHMARKS, args.quick, args.out or default_folder(), print_now):
         print(path)
@@ -138,8 +138,6 @@ def run_whole(args: argparse.Namespace) -> int:
     except Interrupted:
         print(f"stopped; the state is in {args.runs}. To go on, repeat the command.")
         return INTERRUPTED
-    out = args.out or default_folder()
-    out.mkdir(parents=True, exist_ok=True)
-    for path in write_result(result, out):
+    for path in write_result(result, args.out or default_folder()):
         print(path)
     return DONE
