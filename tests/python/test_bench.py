@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +121,10 @@ class TestTables:
 def test_commands_hold_no_path_of_the_machine(monkeypatch):
     monkeypatch.setattr("sys.argv", ["/x/bin/splitnerf", "bench", "whole", "--data", "/data/chair", "--only", "a; b"])
     assert provenance.command_line() == "splitnerf bench whole --data chair --only 'a; b'"
+    monkeypatch.setattr("sys.argv", [".venv/bin/splitnerf", "bench"])
+    assert provenance.command_line() == "splitnerf bench"
+    monkeypatch.setattr("sys.argv", ["tests/bench/gpu_ops.py", "--tiny"])
+    assert provenance.command_line() == "tests/bench/gpu_ops.py --tiny"
 
 
 def test_errors_are_refused_before_they_are_timed():
@@ -185,7 +190,7 @@ class TestLights:
 def test_the_command_writes_tables_and_pictures(tmp_path, monkeypatch, capsys):
     pytest.importorskip("matplotlib")
     monkeypatch.setenv("SPLITNERF_DATA", str(tmp_path / "none"))
-    assert main(["bench", "--quick", "--only", "shading", "--out", str(tmp_path / "out")]) == DONE
+    assert main(["bench", "shading", "--quick", "--out", str(tmp_path / "out")]) == DONE
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"shading.md", "shading.csv", "shading.png"}
     assert "as fast as torch eager" in capsys.readouterr().out
 
@@ -343,3 +348,15 @@ class TestWhole:
     def test_what_cannot_be_run_is_named(self, words, complaint, tmp_path, capsys):
         assert main(["bench", "whole", "--data", str(tmp_path), *words]) == BAD_INPUT
         assert complaint in capsys.readouterr().err
+
+
+def test_a_training_step_in_plain_torch(tmp_path):
+    """The whole step with every operator replaced, before and after there is a mesh to be seen."""
+    data = write_demo_dataset(tmp_path / "tiny", size=16, n_train=4, n_test=1, spp=2)
+    settings = [*SMALL, "target_samples=128", "max_rays=32", "mesh_every=0.3", "preview_every=2.0"]
+    script = Path(__file__).parents[1] / "bench" / "plain_torch.py"
+    command = [sys.executable, script, data, "--steps", "6", *(word for s in settings for word in ("--set", s))]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr[-2000:]
+    ours, plain, ratio = done.stdout.splitlines()
+    assert "ms a step, median of 5" in ours and plain.startswith("plain torch") and ratio.endswith("x")

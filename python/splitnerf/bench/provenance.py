@@ -46,9 +46,10 @@ def commit(sources: Sequence[str] = (), root: Path = ROOT) -> str:
 
 
 def command_line() -> str:
-    """The command as it was typed, of absolute paths the last part alone."""
-    words = [Path(word).name if word.startswith("/") else word for word in sys.argv]
-    return shlex.join(words)
+    """The command as it was typed, of an installed program and of absolute paths the last part alone."""
+    program = Path(sys.argv[0])
+    first = str(program) if program.suffix == ".py" and not program.is_absolute() else program.name
+    return shlex.join([first, *(Path(word).name if word.startswith("/") else word for word in sys.argv[1:])])
 
 
 def provenance(sources: Sequence[str], command: str | None = None, root: Path = ROOT) -> dict[str, str]:
