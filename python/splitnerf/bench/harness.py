@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import torch
 from numpy.typing import ArrayLike
+from torch import Tensor
 
 from splitnerf.bench.charts import Chart, Point, write_result
 from splitnerf.errors import CheckFailed
@@ -89,6 +91,17 @@ def _median_and_quartiles(values: list[float]) -> tuple[float, float, float]:
 def rms(values: ArrayLike) -> float:
     """Root of the mean square of all numbers."""
     return float(np.sqrt(np.mean(np.square(np.asarray(values, np.float64)))))
+
+
+def with_gradients(way: Callable[..., Tensor], inputs: tuple[Tensor, ...], cotangent: Tensor) -> Callable[[], tuple]:
+    """A call that gives a function's result and its gradients to all inputs."""
+    leaves = tuple(x.clone().requires_grad_() for x in inputs)
+
+    def call() -> tuple[Tensor, ...]:
+        out = way(*leaves)
+        return out.detach(), *torch.autograd.grad(out, leaves, cotangent)
+
+    return call
 
 
 def check(subject: str, errors: Mapping[Hashable, float], limit: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import torch
@@ -11,7 +12,7 @@ from torch import Tensor
 from splitnerf import _core
 from splitnerf.bench import reference
 from splitnerf.bench.charts import Result
-from splitnerf.bench.harness import chart_of, check, interleaved
+from splitnerf.bench.harness import chart_of, check, interleaved, with_gradients
 from splitnerf.bench.peers import DrJitHashGrid, drjit_ready
 from splitnerf.ops import HashGridSpec, hash_encode
 
@@ -43,11 +44,15 @@ def run(quick: bool, rounds: int) -> Result:
     def plain(x: Tensor, table: Tensor) -> Tensor:
         return reference.hash_encode(x, table, *arguments)
 
-    true = both(plain, x.double(), table.double(), cotangent.double())()
+    def way(encode: Callable[[Tensor, Tensor], Tensor], dtype: torch.dtype) -> Callable[[], tuple]:
+        at, leaf, grad = (t.to(dtype) for t in (x, table, cotangent))
+        return with_gradients(partial(encode, at), (leaf,), grad)
+
+    true = way(plain, torch.float64)()
     calls: dict[tuple[str, str], Callable[[], object]] = {
-        ("splitnerf", "float32"): both(ours, x, table, cotangent),
-        ("splitnerf", "float64"): both(ours, x.double(), table.double(), cotangent.double()),
-        ("torch eager", "float32"): both(plain, x, table, cotangent),
+        ("splitnerf", "float32"): way(ours, torch.float32),
+        ("splitnerf", "float64"): way(ours, torch.float64),
+        ("torch eager", "float32"): way(plain, torch.float32),
     }
     errors = {key: max(relative(a, b) for a, b in zip(call(), true)) for key, call in calls.items()}
     check("hash grid", errors, TOLERANCE)
@@ -76,20 +81,6 @@ def run(quick: bool, rounds: int) -> Result:
     ]
     beside = ("Time beside peers, of which Dr.Jit has a grid of its own", ["", "dtype", "ms", "quartiles"], rows)
     return Result("hash_grid", "Hash grid encoding: time against error", SOURCES, findings, [chart], [beside])
-
-
-def both(
-    encode: Callable[[Tensor, Tensor], Tensor], x: Tensor, table: Tensor, cotangent: Tensor
-) -> Callable[[], tuple]:
-    """Features and the table's gradient of one call."""
-    leaf = table.clone().requires_grad_()
-
-    def call() -> tuple[Tensor, Tensor]:
-        features = encode(x, leaf)
-        (grad,) = torch.autograd.grad(features, leaf, cotangent)
-        return features.detach(), grad
-
-    return call
 
 
 def relative(a: Tensor, true: Tensor) -> float:

@@ -10,7 +10,7 @@ from torch.nn import functional as F
 
 from splitnerf.bench import reference
 from splitnerf.bench.charts import Result
-from splitnerf.bench.harness import chart_of, check, interleaved
+from splitnerf.bench.harness import chart_of, check, interleaved, with_gradients
 from splitnerf.notes import note
 from splitnerf.ops import brdf_lut, fibonacci_directions, prefilter_light, split_sum_shade
 
@@ -114,16 +114,6 @@ def checked(
         errors[name] = float(max(apart))
     check("relative to float64", errors, TOLERANCE)
     return calls, errors
-
-
-def with_gradients(way: Callable[..., Tensor], inputs: tuple[Tensor, ...], cotangent: Tensor) -> Callable[[], tuple]:
-    leaves = tuple(x.clone().requires_grad_() for x in inputs)
-
-    def call() -> tuple[Tensor, ...]:
-        out = way(*leaves)
-        return out.detach(), *torch.autograd.grad(out, leaves, cotangent)
-
-    return call
 
 
 def copy_of(n_floats: int) -> Callable[[], object]:
