@@ -172,8 +172,9 @@ def test_the_command_writes_both_tables(tmp_path, capsys):
     assert main(["--cases", "500", "--out", str(tmp_path), *names]) == DONE
     assert "srgb_to_linear" in capsys.readouterr().out
     text = (tmp_path / "stability.md").read_text()
-    for part in ("processor ", "torch ", "commit ", "date ", "command `make stability STABILITY_CASES=500`",
-                 "measures `cpp ", "seed 0", "| srgb_to_linear | ", "| srgb_to_linear | forward | srgb = "):  # fmt: skip
+    for part in ("processor ", "torch ", "commit ", "date ", "measures `cpp ",
+                 "command `make stability STABILITY_CASES=500 STABILITY_OPTIONS='--seed 0 --op srgb_to_linear --op tr",
+                 "| srgb_to_linear | ", "| srgb_to_linear | forward | srgb = "):  # fmt: skip
         assert part in text
     lines = (tmp_path / "stability.csv").read_text().splitlines()
     assert lines[0].startswith("# processor: ") and any(line.startswith("operator,inputs,") for line in lines)

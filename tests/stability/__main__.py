@@ -28,6 +28,12 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
+def command(args: argparse.Namespace) -> str:
+    """What makes the same table again."""
+    options = [f"--seed {args.seed}", *(f"--op {name}" for name in args.op)]
+    return f"make stability STABILITY_CASES={args.cases} STABILITY_OPTIONS='{' '.join(options)}'"
+
+
 def main(argv: list[str] | None = None) -> int:
     args = parse(argv)
     try:
@@ -40,7 +46,7 @@ def main(argv: list[str] | None = None) -> int:
     except InputError as error:
         print(f"stability: {error}", file=sys.stderr)
         return BAD_INPUT
-    for path in table.write(results, verdicts, args.cases, args.seed, args.out):
+    for path in table.write(results, verdicts, command(args), args.out):
         print(path)
     return DONE if all(x.holds for x in (*results, *verdicts)) else BROKEN
 

@@ -119,11 +119,11 @@ def inputs_of(results: Iterable[Result], verdicts: Iterable[Verdict]) -> list[tu
     return lines + [(v.claim.name, "broken", input_text(v.worst)) for v in verdicts if not v.holds]
 
 
-def write(results: list[Result], verdicts: list[Verdict], cases: int, seed: int, folder: Path) -> tuple[Path, Path]:
+def write(results: list[Result], verdicts: list[Verdict], command: str, folder: Path) -> tuple[Path, Path]:
     """Writes stability.md and stability.csv, with machine, versions and commit in their heads."""
     folder.mkdir(parents=True, exist_ok=True)
     markdown, table = folder / f"{NAME}.md", folder / f"{NAME}.csv"
-    facts = provenance(SOURCES, f"make stability STABILITY_CASES={cases}") | {"seed": str(seed)}
+    facts = provenance(SOURCES, command)
     markdown.write_text(markdown_text(results, verdicts, facts))
     write_csv(table, facts, csv_rows(results, verdicts))
     return markdown, table
