@@ -1,6 +1,8 @@
 # make demo   installs what is missing, builds, and reconstructs an embedded scene
 # make test   installs, builds, and runs gtest and pytest
 # make sanitize   builds gtest with AddressSanitizer and UndefinedBehaviorSanitizer and runs it
+# make stability   asks each operator STABILITY_CASES times and writes docs/benchmarks/stability.md; more in STABILITY_OPTIONS
+# make tables   says which tables under docs/ are stale
 # make fuzz   feeds each reader damaged files for FUZZ_SECONDS, in four parts: tracing takes memory with every run
 VENV ?= .venv
 PYTHON ?= python3
@@ -9,9 +11,11 @@ BUILD ?= build/tests
 JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 
 FUZZ_SECONDS ?= 600
+STABILITY_CASES ?= 10000000
+STABILITY_OPTIONS ?=
 READERS := json png exr hdr glb checkpoint
 
-.PHONY: demo test test-slow install system gtest sanitize fuzz pytest clean
+.PHONY: demo test test-slow install system gtest sanitize fuzz stability tables pytest clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -32,6 +36,12 @@ fuzz: install
 	$(BIN)/python -m pip install --quiet -e '.[fuzz]' --no-build-isolation
 	set -e; for reader in $(READERS); do for part in 1 2 3 4; do \
 	  $(BIN)/python tests/fuzz/fuzz_readers.py $$reader -max_total_time=$$(($(FUZZ_SECONDS) / 4)); done; done
+
+stability: install
+	PYTHONPATH=tests $(BIN)/python -m stability --cases $(STABILITY_CASES) $(STABILITY_OPTIONS)
+
+tables: install
+	@$(BIN)/python tests/bench/tables.py
 
 pytest: install
 	$(BIN)/python -m pytest -q

@@ -19,7 +19,7 @@ from op_cases import with_gradients
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf.bench import eager
+from splitnerf.bench import reference
 from splitnerf.fields.light_pyramid import pyramid_filters
 from splitnerf.fields.sdf import SdfField
 from splitnerf.ops import (
@@ -360,12 +360,12 @@ def a_sample(n: float) -> Callable[[Sizes, tuple], float]:
 
 
 # 2 features; with the Jacobian 4 numbers of each (the value and three derivatives) are summed over the corners.
-HASH = Case("hash_encode", World.grid, gather(lambda s: s.encode(2)), eager.hash_encode, 1)
+HASH = Case("hash_encode", World.grid, gather(lambda s: s.encode(2)), reference.hash_encode, 1)
 SCATTERED = Case(
     "hash_encode",
     lambda w: w.grid(True),
     gather(lambda s: s.encode(2)),
-    eager.hash_encode,
+    reference.hash_encode,
     1,
     variant="scattered points",
 )
@@ -374,12 +374,12 @@ LAYER = Case(
     "sdf_layer", World.layer,
     gather(lambda s: 2 * s.layer + 2 * s.outputs * s.width + 6 * s.features + 4 * s.width),
 )  # fmt: skip
-QUERY = Case("query_direction", World.query, a_point(45), eager.query_direction)
-SPLIT = Case("split_sum_shade", World.split_sum, a_point(70), eager.split_sum_shade)
+QUERY = Case("query_direction", World.query, a_point(45), reference.query_direction)
+SPLIT = Case("split_sum_shade", World.split_sum, a_point(70), reference.split_sum_shade)
 SUMS = Case("shade_sums", lambda w: (*w.shading(), *w.threes(3), brdf_lut(), True), a_point(75))
 PREFILTER = Case(  # of a pair: a cosine 5, the lobe 10, three sums and their total 7
     "prefilter_light", World.prefiltering, lambda s, out: 22 * s.queries * s.lights,
-    eager.prefilter_light,
+    reference.prefilter_light,
 )  # fmt: skip
 # Half of the points are rough: 169 basis functions of 4 each, and their sums with three colours, 6 each.
 LOOKUP = Case("light_lookup", World.pyramid, a_point(60 + 0.5 * 169 * 10))

@@ -28,6 +28,10 @@ from typing import NamedTuple
 
 import torch
 
+from splitnerf.bench.provenance import header, provenance
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = ("cpp", "python/splitnerf/ops")
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "python")]
 from gpu_cases import TINY, Case, Sizes, World, all_cases, bytes_moved, lib  # noqa: E402
 from op_checks import as_tuple, has_cuda_kernel  # noqa: E402
@@ -223,7 +227,7 @@ def markdown(lines: list[list[str]], device: str) -> str:
     """The table as a page; of the ceilings one line each."""
     by_name = [dict(zip(COLUMNS, line)) for line in lines]
     head = [row for row in by_name if row["case"] in CEILINGS]
-    out = [f"# Operators on {device}", ""]
+    out = [f"# Operators on {device}", "", header(provenance(SOURCES, root=ROOT)), ""]
     out += [
         f"- {row['case']}: {row['GB_s'] + ' GB/s' if row['case'] == 'copy' else row['GFLOP_s'] + ' GFLOP/s'}"
         for row in head

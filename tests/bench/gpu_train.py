@@ -23,8 +23,11 @@ from torch.autograd import DeviceType
 from torch.optim.optimizer import register_optimizer_step_post_hook
 from torch.profiler import ProfilerActivity, profile
 
+from splitnerf.bench.provenance import header, provenance
 from splitnerf.cli import main as splitnerf
 
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = ("cpp", "python/splitnerf")
 PROFILED = 20  # steps
 SHOWN = 60  # kernels
 
@@ -79,7 +82,7 @@ class StepProfiler:
             own, calls = times[name] / 1e3 / PROFILED, counts[name] / PROFILED
             share = own / busy if busy else 0.0
             lines.append(f"| {own:.4f} | {share:.1%} | {calls:.1f} | {1e3 * own / calls:.1f} | `{short(name)}` |")
-        return "\n".join(lines) + "\n"
+        return "\n".join([*lines, "", header(provenance(SOURCES, root=ROOT))]) + "\n"
 
 
 def short(name: str) -> str:

@@ -10,11 +10,12 @@ the eikonal term plus a target on the unit normals; gradients go to the table an
 
 from __future__ import annotations
 
-import time
+from functools import partial
 
 import torch
 from torch.nn import functional as F
 
+from splitnerf.bench.harness import interleaved
 from splitnerf.ops import HashGridSpec, growth_for, hash_encode, hash_encode_jacobian
 
 SPEC = HashGridSpec(n_levels=12, n_features=2, base_resolution=16, growth=growth_for(16, 512, 12), log2_table_size=17)
@@ -64,15 +65,11 @@ def main() -> None:
     print(f"gradients agree to {difference:.1e} (float64); {torch.get_num_threads()} threads")
     for n in (10_000, 100_000):
         x, target, parameters = inputs(n, torch.float32)
-        seconds: dict[str, list[float]] = {"jacobian": [], "double backward": []}
-        for repeat in range(16):  # interleaved, so that both meet the same load; the first round warms up
-            for name, f in (("jacobian", normals_by_jacobian), ("double backward", normals_by_double_backward)):
-                start = time.perf_counter()
-                loss_gradients(f, x, target, parameters)
-                if repeat:
-                    seconds[name].append(time.perf_counter() - start)
-        a, b = (min(seconds[k]) for k in ("jacobian", "double backward"))
-        print(f"{n} points: jacobian {1e3 * a:.1f} ms, double backward {1e3 * b:.1f} ms, ratio {b / a:.2f}")
+        ways = {"jacobian": normals_by_jacobian, "double backward": normals_by_double_backward}
+        calls = {name: partial(loss_gradients, way, x, target, parameters) for name, way in ways.items()}
+        times = interleaved(calls, 15)
+        said = ", ".join(f"{name} {1e3 * times[name].seconds:.1f} ms" for name in calls)
+        print(f"{n} points: {said}, ratio {times.ratio('double backward', 'jacobian')}")
 
 
 if __name__ == "__main__":

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import csv
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from bench import tables
 from torch.nn import functional as F
 
-from splitnerf.bench import charts, eager, normals, path_tracer, shading, split_sum, whole
-from splitnerf.bench.charts import Chart, Point, Result, markdown, write_csv, write_result
-from splitnerf.bench.hash_grid import SPEC
+from splitnerf.bench import charts, harness, normals, path_tracer, provenance, shading, split_sum, whole
+from splitnerf.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv, write_result
+from splitnerf.bench.harness import interleaved
 from splitnerf.bench.lights import MapLight, octahedral_directions, pyramid_of
 from splitnerf.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
-from splitnerf.bench.timing import interleaved
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.errors import CheckFailed
 from splitnerf.fields import SdfField
-from splitnerf.ops import hash_encode, prefilter_light
 
 SMALL = [
     "n_levels=2", "log2_table_size=8", "initial_rays=32", "grid_resolution=16", "light_resolution=16", "light_queries=8",
@@ -42,22 +43,95 @@ def test_the_front_holds_what_nothing_beats():
 
 
 def test_files_mark_the_front_and_the_default(tmp_path):
-    result = Result("work", "Work", ["b is twice as fast"], [CHART], [("More", ["x"], [[1]])])
-    text = markdown(result)
+    result = Result("work", "Work", ("cpp",), ["b is twice as fast"], [CHART], [("More", ["x"], [[1]])])
+    facts = provenance.provenance(result.sources)
+    text = markdown(result, facts)
     assert "| **d** * |" in text and "| c |" in text and "- b is twice as fast" in text and "## More" in text
-    write_csv(result, tmp_path / "work.csv")
+    write_csv(tmp_path / "work.csv", facts, csv_rows(result.charts))
     lines = (tmp_path / "work.csv").read_text().splitlines()
     heads = [line for line in lines if line.startswith("#")]
-    assert any("processor" in line for line in heads) and any("commit" in line for line in heads)
+    for fact in ("processor", "commit", "date", "command", "measures"):
+        assert any(line.startswith(f"# {fact}: ") for line in heads) and f"; {fact} " in f"; {text}".replace("\n", "; ")
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     assert [row["on_front"] for row in rows] == ["1", "1", "0", "1"] and rows[3]["default"] == "1"
 
 
 def test_a_result_becomes_a_picture(tmp_path):
     pytest.importorskip("matplotlib")
-    files = write_result(Result("work", "Work", [], [CHART]), tmp_path)
+    files = write_result(Result("work", "Work", (), [], [CHART]), tmp_path)
     assert [path.name for path in files] == ["work.md", "work.csv", "work.png"]
     assert (tmp_path / "work.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_machine_is_named(tmp_path):
+    file = tmp_path / "cpuinfo"
+    file.write_text("processor : 0\nmodel name\t: Some CPU @ 2 GHz\n")
+    assert provenance.processor_name(file) == "Some CPU @ 2 GHz"
+    assert provenance.processor_name(tmp_path / "none")
+
+
+class TestTables:
+    """A checkout with one source and a table of it."""
+
+    @pytest.fixture
+    def checkout(self, tmp_path):
+        (tmp_path / "cpp").mkdir()
+        (tmp_path / "docs" / "benchmarks").mkdir(parents=True)
+        (tmp_path / "docs" / "prose.md").write_text("| a |\n|---|\n")
+        self.git(tmp_path, "init", "--quiet")
+        self.change(tmp_path, "cpp/hash_grid.h", "1")
+        return tmp_path
+
+    @staticmethod
+    def git(root, *words):
+        who = ["-c", "user.name=a", "-c", "user.email=a@example.org"]
+        subprocess.run(["git", *who, *words], cwd=root, check=True, capture_output=True)
+
+    def change(self, root, path, text):
+        (root / path).write_text(text)
+        self.git(root, "add", "-A")
+        self.git(root, "commit", "--quiet", "-m", path)
+
+    def measured(self, root):
+        facts = provenance.provenance(("cpp/*hash*", "python"), root=root)
+        (root / "docs" / "benchmarks" / "grid.md").write_text(f"# Grid\n\n{provenance.header(facts)}\n")
+        return tables.states(root)[Path("docs/benchmarks/grid.md")]
+
+    def test_a_change_of_what_is_measured_makes_a_table_stale(self, checkout):
+        assert self.measured(checkout) == "fresh"
+        self.change(checkout, "cpp/other.h", "1")
+        assert tables.states(checkout) == {Path("docs/benchmarks/grid.md"): "fresh"}
+        self.change(checkout, "cpp/hash_grid.h", "2")
+        assert "stale: 1 commits since" in tables.states(checkout)[Path("docs/benchmarks/grid.md")]
+
+    def test_what_was_measured_with_changes_is_stale(self, checkout):
+        (checkout / "docs" / "prose.md").write_text("x")
+        assert self.measured(checkout) == "fresh"
+        (checkout / "cpp" / "hash_grid.h").write_text("3")
+        assert "stale: made beside changes" in self.measured(checkout)
+
+    def test_what_says_nothing_of_itself_is_unknown(self, checkout):
+        page = checkout / "docs" / "benchmarks" / "old.md"
+        page.write_text("commit 1234567.")
+        assert tables.states(checkout) == {Path("docs/benchmarks/old.md"): "unknown: no head with commit and sources"}
+        page.write_text("commit 1234567; measures `cpp`.")
+        assert "unknown: no commit 1234567" in tables.states(checkout)[Path("docs/benchmarks/old.md")]
+
+
+def test_commands_hold_no_path_of_the_machine(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["/x/bin/splitnerf", "bench", "whole", "--data", "/data/chair", "--only", "a; b"])
+    assert provenance.command_line() == "splitnerf bench whole --data chair --only 'a; b'"
+    monkeypatch.setattr("sys.argv", [".venv/bin/splitnerf", "bench"])
+    assert provenance.command_line() == "splitnerf bench"
+    monkeypatch.setattr("sys.argv", ["tests/bench/gpu_ops.py", "--tiny"])
+    assert provenance.command_line() == "tests/bench/gpu_ops.py --tiny"
+
+
+def test_errors_are_refused_before_they_are_timed():
+    harness.check("work", {("a", "b"): 0.5, "c": 0.9}, 1.0)
+    for wrong in (1.0, math.nan):
+        with pytest.raises(CheckFailed, match="work: a b is wrong by"):
+            harness.check("work", {("a", "b"): wrong}, 1.0)
 
 
 def test_calls_are_timed_in_turns_and_compared_round_by_round():
@@ -68,20 +142,6 @@ def test_calls_are_timed_in_turns_and_compared_round_by_round():
     assert last_a < last_b and "b" in order[:last_a]
     times.seconds = {"a": [2.0, 4.0, 9.0], "b": [1.0, 2.0, 3.0]}
     assert times.ratio("a", "b").value == 2.0 and times["a"].seconds == 4.0
-
-
-def test_the_plain_hash_grid_is_the_operator():
-    x = torch.rand(200, 3, dtype=torch.float64)
-    table = torch.randn(SPEC.n_entries, SPEC.n_features, dtype=torch.float64)
-    plain = eager.hash_encode(x, table, *SPEC.arguments(SPEC.n_levels))
-    torch.testing.assert_close(plain, hash_encode(x, table, SPEC), rtol=1e-9, atol=1e-12)
-
-
-def test_the_plain_prefilter_is_the_operator():
-    queries, lights = (F.normalize(torch.randn(n, 3, dtype=torch.float64), dim=1) for n in (20, 300))
-    roughness, light = 0.2 + 0.8 * torch.rand(20, 1, dtype=torch.float64), torch.rand(300, 3, dtype=torch.float64)
-    plain = eager.prefilter_light(queries, roughness, lights, light)
-    torch.testing.assert_close(plain, prefilter_light(queries, roughness, lights, light), rtol=1e-8, atol=1e-10)
 
 
 def test_a_wrong_subject_is_refused():
@@ -130,7 +190,7 @@ class TestLights:
 def test_the_command_writes_tables_and_pictures(tmp_path, monkeypatch, capsys):
     pytest.importorskip("matplotlib")
     monkeypatch.setenv("SPLITNERF_DATA", str(tmp_path / "none"))
-    assert main(["bench", "--quick", "--only", "shading", "--out", str(tmp_path / "out")]) == DONE
+    assert main(["bench", "shading", "--quick", "--out", str(tmp_path / "out")]) == DONE
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"shading.md", "shading.csv", "shading.png"}
     assert "as fast as torch eager" in capsys.readouterr().out
 
@@ -288,3 +348,15 @@ class TestWhole:
     def test_what_cannot_be_run_is_named(self, words, complaint, tmp_path, capsys):
         assert main(["bench", "whole", "--data", str(tmp_path), *words]) == BAD_INPUT
         assert complaint in capsys.readouterr().err
+
+
+def test_a_training_step_in_plain_torch(tmp_path):
+    """The whole step with every operator replaced, before and after there is a mesh to be seen."""
+    data = write_demo_dataset(tmp_path / "tiny", size=16, n_train=4, n_test=1, spp=2)
+    settings = [*SMALL, "target_samples=128", "max_rays=32", "mesh_every=0.3", "preview_every=2.0"]
+    script = Path(__file__).parents[1] / "bench" / "plain_torch.py"
+    command = [sys.executable, script, data, "--steps", "6", *(word for s in settings for word in ("--set", s))]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr[-2000:]
+    ours, plain, ratio = done.stdout.splitlines()
+    assert "ms a step, median of 5" in ours and plain.startswith("plain torch") and ratio.endswith("x")

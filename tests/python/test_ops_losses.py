@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import pytest
-import reference
 import torch
 from op_cases import field_gradients, pixel_inputs, rand
 from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 
+from splitnerf.bench import reference
 from splitnerf.ops import gradient_losses, material_losses, pixel_losses, quadratic_entropy
 
 
@@ -199,10 +199,6 @@ def test_what_has_no_gradient_and_what_does_not_fit():
 # ---- entropy ----
 
 
-def by_pairs(x: torch.Tensor) -> torch.Tensor:
-    return -torch.log(torch.exp(-0.25 * (x[:, None] - x[None]).square().sum(-1)).mean())
-
-
 def points(n: int, c: int = 5, dtype=torch.float64) -> torch.Tensor:
     return 2 * torch.randn(n, c, generator=generator(), dtype=torch.float64).to(dtype)
 
@@ -218,7 +214,7 @@ def test_points_alike_have_none_and_points_far_apart_the_logarithm_of_their_numb
 @pytest.mark.parametrize("shift", [0.0, 1000.0])
 def test_it_and_its_gradient_are_the_sum_over_pairs(n, shift):
     ours, theirs = (points(n) + shift).requires_grad_(), (points(n) + shift).requires_grad_()
-    entropy, expected = quadratic_entropy(ours), by_pairs(theirs)
+    entropy, expected = quadratic_entropy(ours), reference.quadratic_entropy(theirs)
     torch.testing.assert_close(entropy, expected, rtol=1e-9, atol=1e-12)
     (3 * entropy).backward()
     (3 * expected).backward()

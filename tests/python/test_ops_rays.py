@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import reference
 import torch
 from op_cases import OFFSETS, composite_inputs, march_inputs, neus_inputs, packed_samples, surface_inputs
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 
+from splitnerf.bench import reference
 from splitnerf.ops import (
     PackedSamples,
     composite,
@@ -26,15 +26,11 @@ def test_march_matches_the_reference(device):
     origins, directions, jitter, cells, *rest = march_inputs(device, torch.float64)
     rays, starts, ends, offsets = march_rays(origins, directions, jitter, cells, *rest)
     box, step, max_samples = float(np.float32(rest[0])), float(np.float32(rest[1])), rest[2]
-    total = 0
-    for r, (o, d, j) in enumerate(zip(origins.cpu().numpy(), directions.cpu().numpy(), jitter.tolist())):
-        expected = reference.march_ray(o, d, j, cells.cpu().numpy(), box, step, max_samples)
-        got = slice(int(offsets[r]), int(offsets[r + 1]))
-        np.testing.assert_allclose(starts[got].cpu(), expected, atol=1e-9)
-        assert (rays[got] == r).all()
-        total += len(expected)
-    assert total == len(starts) > 100
-    torch.testing.assert_close(ends - starts, torch.full_like(starts, step))
+    given = (x.cpu() for x in (origins, directions, jitter, cells))
+    expected = reference.march_rays(*given, box, step, max_samples)
+    for got, true in zip((rays, starts, ends, offsets), expected, strict=True):
+        torch.testing.assert_close(got.cpu(), true, rtol=0, atol=1e-9)
+    assert len(starts) > 100
 
 
 @pytest.mark.parametrize("device", DEVICES)
@@ -75,7 +71,7 @@ def test_march_errors(device):
 def test_neus_matches_the_reference(device):
     inputs = neus_inputs(device, torch.float64)
     weights, opacity = neus_weights(*inputs)
-    expected = reference.neus_weights(*(x.cpu() for x in inputs[:3]), OFFSETS)
+    expected = reference.neus_weights(*(x.cpu() for x in inputs[:4]), 0.0)
     torch.testing.assert_close(weights.cpu(), expected[0])
     torch.testing.assert_close(opacity.cpu(), expected[1])
     single = neus_weights(*neus_inputs(device, torch.float32))
@@ -95,7 +91,7 @@ def test_neus_gradient_matches_the_reference(device):
     got, expected = (grad_leaves(neus_inputs(d, torch.float64), (0, 1, 2)) for d in (device, "cpu"))
     g = torch.randn(OFFSETS[-1], generator=generator(5), dtype=torch.float64)
     (neus_weights(*got)[0] * g.to(device)).sum().backward()
-    (reference.neus_weights(*expected[:3], OFFSETS)[0] * g).sum().backward()
+    (reference.neus_weights(*expected)[0] * g).sum().backward()
     for a, b in zip(got[:3], expected[:3]):
         torch.testing.assert_close(a.grad.cpu(), b.grad)
 
@@ -149,14 +145,6 @@ def test_neus_errors(device):
 # ---- surface_weights ----
 
 
-def surface_by_formula(sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance) -> tuple:
-    squared = (gradient * gradient).sum(1, keepdim=True)
-    gradient = torch.where(squared < 1e-6, gradient.detach(), gradient)
-    normals = gradient * torch.rsqrt((gradient * gradient).sum(1, keepdim=True) + 1e-12)
-    rays = torch.repeat_interleave(torch.arange(len(rays_d)), offsets.diff())
-    c = (rays_d[rays] * normals).sum(1)
-    half = 0.5 * step * -(torch.relu(0.5 - 0.5 * c) * (1 - anneal) + torch.relu(-c) * anneal)
-    return normals, *neus_weights(sdf - half, sdf + half, s, offsets, min_transmittance)
 
 
 @pytest.mark.parametrize("anneal", [0.0, 0.3, 1.0])
@@ -165,7 +153,7 @@ def test_surface_weights_and_their_gradients_are_the_formula(anneal, min_transmi
     x = surface_inputs()
     ours, theirs = grad_leaves(x, (0, 1, 3)), grad_leaves(x, (0, 1, 3))
     got = surface_weights(*ours, step=0.1, anneal=anneal, min_transmittance=min_transmittance)
-    expected = surface_by_formula(*theirs, 0.1, anneal, min_transmittance)
+    expected = reference.surface_weights(*theirs, 0.1, anneal, min_transmittance)
     for outputs in (got, expected):
         sum((torch.randn(o.shape, generator=generator(9), dtype=o.dtype) * o).sum() for o in outputs).backward()
     for a, b in zip((*got, *(ours[i].grad for i in (0, 1, 3))), (*expected, *(theirs[i].grad for i in (0, 1, 3)))):
@@ -348,7 +336,7 @@ def test_interpolate_opcheck_gradcheck_and_errors():
 @pytest.mark.parametrize("device", DEVICES)
 def test_composite_matches_the_reference(device):
     weights, values, offsets = composite_inputs(device, torch.float64)
-    expected = reference.composite(weights.cpu(), values.cpu(), OFFSETS)
+    expected = reference.composite(weights.cpu(), values.cpu(), torch.tensor(OFFSETS))
     torch.testing.assert_close(composite(weights, values, offsets).cpu(), expected)
     single = composite(*composite_inputs(device, torch.float32))
     torch.testing.assert_close(single.cpu().double(), expected, rtol=1e-5, atol=1e-5)

@@ -19,6 +19,7 @@ from op_cases import (
 )
 from op_checks import check_op, generator, grad_leaves, lib
 
+from splitnerf.bench import reference
 from splitnerf.ops import (
     CELL_EMPTY,
     SdfNetwork,
@@ -231,18 +232,13 @@ def test_errors_name_what_is_wrong():
 # ---- sdf_layer ----
 
 
-def layer_by_formula(positions, features, jacobian, hidden, hidden_bias, out, out_bias, beta, box) -> tuple:
-    a = torch.cat([positions, features], 1) @ hidden.T + hidden_bias
-    outputs = torch.nn.functional.softplus(a, beta, threshold=200) @ out.T + out_bias
-    q = (torch.sigmoid(beta * a) * out[0]) @ hidden
-    return outputs, q[:, :3] + (jacobian * q[:, None, 3:]).sum(-1) / (2 * box)
 
 
 @pytest.mark.parametrize("n", [0, 1, 63, 64, 65, 1500])
 def test_layer_and_its_gradients_are_the_formula(n):
     x = sdf_layer_inputs(n)
     leaves, twins = grad_leaves(x, range(1, 7)), grad_leaves(x, range(1, 7))
-    ours, theirs = lib.sdf_layer(*leaves), layer_by_formula(*twins)
+    ours, theirs = lib.sdf_layer(*leaves), reference.sdf_layer(*twins)
     weights = [torch.randn(t.shape, generator=generator(6), dtype=t.dtype) for t in theirs]
     for outputs in (ours, theirs):
         (outputs[0] * weights[0]).sum().add((outputs[1] * weights[1]).sum()).backward()

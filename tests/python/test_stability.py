@@ -1,21 +1,24 @@
-"""Every operator on inputs made to break it, in a hundredth of `splitnerf bench stability`, and the harness itself."""
+"""Every operator on inputs made to break it, a hundredth of `make stability`, and the harness itself."""
 
 from __future__ import annotations
 
 import math
 import subprocess
 import sys
+from pathlib import Path
 
 import hypothesis
 import pytest
 import torch
 from hypothesis import strategies
-from splitnerf import cli, ops
-from splitnerf.bench import machine
-from splitnerf.bench.stability import cases, fields, light, losses, properties, rays, search, shading, table
-from splitnerf.bench.stability.entry import Entry
-from splitnerf.bench.stability.measure import cast, evaluate, measure
+from stability import cases, fields, light, losses, properties, rays, search, shading, table
+from stability.__main__ import BAD_INPUT, BROKEN, DONE, main
+from stability.entry import Entry
+from stability.measure import cast, evaluate, measure
 
+from splitnerf import ops
+
+TESTS = Path(__file__).parents[1]
 CASES, EXACT = 100_000, 50
 FEWER = {"sparse_product": 50_000}  # one call a row
 BY_NAME = {entry.name: entry for entry in table.ENTRIES}
@@ -166,10 +169,12 @@ def test_the_same_seed_gives_the_same_errors():
 
 def test_the_command_writes_both_tables(tmp_path, capsys):
     names = ["--op", "srgb_to_linear", "--op", "trace_visibility"]
-    assert cli.main(["bench", "stability", "--cases", "500", "--out", str(tmp_path), *names]) == 0
+    assert main(["--cases", "500", "--out", str(tmp_path), *names]) == DONE
     assert "srgb_to_linear" in capsys.readouterr().out
     text = (tmp_path / "stability.md").read_text()
-    for part in ("processor: ", "torch: ", "commit: ", "| srgb_to_linear | ", "| srgb_to_linear | forward | srgb = "):
+    for part in ("processor ", "torch ", "commit ", "date ", "measures `cpp ",
+                 "command `make stability STABILITY_CASES=500 STABILITY_OPTIONS='--seed 0 --op srgb_to_linear --op tr",
+                 "| srgb_to_linear | ", "| srgb_to_linear | forward | srgb = "):  # fmt: skip
         assert part in text
     lines = (tmp_path / "stability.csv").read_text().splitlines()
     assert lines[0].startswith("# processor: ") and any(line.startswith("operator,inputs,") for line in lines)
@@ -177,28 +182,21 @@ def test_the_command_writes_both_tables(tmp_path, capsys):
 
 def test_a_broken_promise_is_exit_code_1(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(table, "ENTRIES", (planted(corner(1e-3, 1.0, 1.1)),))
-    assert cli.main(["bench", "stability", "--cases", "500", "--out", str(tmp_path), "--op", "planted"]) == 1
+    assert main(["--cases", "500", "--out", str(tmp_path), "--op", "planted"]) == BROKEN
     assert "BROKEN" in capsys.readouterr().out and "| NO |" in (tmp_path / "stability.md").read_text()
 
 
 @pytest.mark.parametrize("arguments, part", [(["--op", "no_such"], "no such operator"), (["--cases", "0"], "--cases")])
 def test_bad_arguments_are_refused(arguments, part, capsys):
-    assert cli.main(["bench", "stability", *arguments]) == 2
+    assert main(arguments) == BAD_INPUT
     assert part in capsys.readouterr().err
 
 
 def test_without_mpmath_one_line_says_what_to_install():
-    script = "import sys; sys.modules['mpmath'] = None; from splitnerf.cli import main; sys.exit(main(sys.argv[1:]))"
-    done = subprocess.run([sys.executable, "-c", script, "bench", "stability"], capture_output=True, text=True)
-    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "pip install 'splitnerf[bench]'" in done.stderr
-
-
-def test_the_machine_is_named(tmp_path):
-    file = tmp_path / "cpuinfo"
-    file.write_text("processor : 0\nmodel name\t: Some CPU @ 2 GHz\n")
-    assert machine.processor_name(file) == "Some CPU @ 2 GHz"
-    assert machine.processor_name(tmp_path / "none")
-    assert set(machine.describe_machine()) >= {"processor", "torch", "commit"}
+    script = "import sys; sys.modules['mpmath'] = None; from stability.__main__ import main; sys.exit(main([]))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=TESTS)
+    assert done.returncode == BAD_INPUT and done.stderr.count("\n") == 1
+    assert "pip install 'splitnerf[test]'" in done.stderr
 
 
 # ---- what cannot be answered -------------------------------------------------------------------

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from splitnerf.bench.machine import describe_machine
+from splitnerf.bench.provenance import header, provenance
 from splitnerf.data.images import atomic_path
 from splitnerf.errors import InputError
 
@@ -70,8 +70,9 @@ class Result:
     """What one benchmark found.
 
     Attributes:
-        name: Of its files.
-        title: Its heading.
+        name: The name of its files.
+        title: The heading.
+        sources: Git's patterns of the files that are measured.
         findings: Sentences with ratios, the first things to read.
         charts: Cost against error.
         tables: Further tables: title, heads, rows.
@@ -79,6 +80,7 @@ class Result:
 
     name: str
     title: str
+    sources: tuple[str, ...]
     findings: list[str]
     charts: list[Chart] = field(default_factory=list)
     tables: list[tuple[str, Sequence[str], Sequence[Sequence[object]]]] = field(default_factory=list)
@@ -93,39 +95,39 @@ def write_result(result: Result, out: Path) -> list[Path]:
     Raises:
         InputError: matplotlib is missing.
     """
+    out.mkdir(parents=True, exist_ok=True)
+    facts = provenance(result.sources)
     files = [out / f"{result.name}.md"]
     if result.charts:
         files += [out / f"{result.name}.csv", out / f"{result.name}.png"]
-        write_csv(result, files[1])
+        write_csv(files[1], facts, csv_rows(result.charts))
         draw(result, files[2])
     with atomic_path(files[0]) as temporary:
-        temporary.write_text(markdown(result))
+        temporary.write_text(markdown(result, facts))
     return files
 
 
-def write_csv(result: Result, path: Path) -> None:
+def write_csv(path: Path, facts: dict[str, str], rows: Iterable[Sequence[object]]) -> None:
+    """A file of rows, the first of them names, with the facts as comments above."""
     with atomic_path(path) as temporary, open(temporary, "w", newline="") as file:
-        for key, value in describe_machine().items():
-            file.write(f"# {key}: {value}\n")
-        writer = csv.writer(file)
-        writer.writerow(["chart", "series", "variant", "cost", "low", "high", "cost_unit", "error", "error_unit",
-                         "on_front", "default"])  # fmt: skip
-        for chart in result.charts:
-            front = chart.front()
-            for p in chart.points:
-                numbers = [f"{v:.6g}" for v in (p.cost, p.low, p.high)]
-                writer.writerow([chart.title, p.series, p.variant, *numbers, chart.cost, f"{p.error:.6g}", chart.error,
-                                 int(p in front), int(p.default)])  # fmt: skip
+        file.writelines(f"# {key}: {value}\n" for key, value in facts.items())
+        csv.writer(file).writerows(rows)
 
 
-def markdown(result: Result) -> str:
+def csv_rows(charts: Sequence[Chart]) -> Iterator[list[object]]:
+    yield ["chart", "series", "variant", "cost", "low", "high", "cost_unit", "error", "error_unit", "on_front",
+           "default"]  # fmt: skip
+    for chart in charts:
+        front = chart.front()
+        for p in chart.points:
+            numbers = [f"{v:.6g}" for v in (p.cost, p.low, p.high)]
+            yield [chart.title, p.series, p.variant, *numbers, chart.cost, f"{p.error:.6g}", chart.error,
+                   int(p in front), int(p.default)]  # fmt: skip
+
+
+def markdown(result: Result, facts: dict[str, str]) -> str:
     """The result as text: findings, then a table for each chart; * marks the front, and the default is bold."""
-    lines = [
-        f"# {result.title}",
-        "",
-        "; ".join(f"{key} {value}" for key, value in describe_machine().items()) + ".",
-        "",
-    ]
+    lines = [f"# {result.title}", "", header(facts), ""]
     lines += [f"- {finding}" for finding in result.findings]
     if result.charts:
         lines += ["", f"![{result.title}]({result.name}.png)"]

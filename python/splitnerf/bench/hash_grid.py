@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from splitnerf import _core
-from splitnerf.bench import eager
-from splitnerf.bench.charts import Chart, Point, Result
+from splitnerf.bench import reference
+from splitnerf.bench.charts import Result
+from splitnerf.bench.harness import chart_of, check, interleaved, with_gradients
 from splitnerf.bench.peers import DrJitHashGrid, drjit_ready
-from splitnerf.bench.timing import interleaved
-from splitnerf.errors import CheckFailed
 from splitnerf.ops import HashGridSpec, hash_encode
 
 SPEC = HashGridSpec(n_levels=16, n_features=2, base_resolution=32, growth=1.3195079, log2_table_size=19)
 TOLERANCE = 1e-3  # between ours and plain torch, of the largest value
 CORNERS = 8
+SOURCES = ("cpp/*hash*", "python/splitnerf/ops/hash_grid.py")
 
 
 def run(quick: bool, rounds: int) -> Result:
@@ -41,19 +42,20 @@ def run(quick: bool, rounds: int) -> Result:
         return hash_encode(x, table, SPEC)
 
     def plain(x: Tensor, table: Tensor) -> Tensor:
-        return eager.hash_encode(x, table, *arguments)
+        return reference.hash_encode(x, table, *arguments)
 
-    true = both(plain, x.double(), table.double(), cotangent.double())()
+    def way(encode: Callable[[Tensor, Tensor], Tensor], dtype: torch.dtype) -> Callable[[], tuple]:
+        at, leaf, grad = (t.to(dtype) for t in (x, table, cotangent))
+        return with_gradients(partial(encode, at), (leaf,), grad)
+
+    true = way(plain, torch.float64)()
     calls: dict[tuple[str, str], Callable[[], object]] = {
-        ("splitnerf", "float32"): both(ours, x, table, cotangent),
-        ("splitnerf", "float64"): both(ours, x.double(), table.double(), cotangent.double()),
-        ("torch eager", "float32"): both(plain, x, table, cotangent),
+        ("splitnerf", "float32"): way(ours, torch.float32),
+        ("splitnerf", "float64"): way(ours, torch.float64),
+        ("torch eager", "float32"): way(plain, torch.float32),
     }
-    errors = {}
-    for key, call in calls.items():
-        errors[key] = [relative(a, b) for a, b in zip(call(), true)]
-        if max(errors[key]) > TOLERANCE:
-            raise CheckFailed(f"hash grid: {' '.join(key)} is {max(errors[key]):.1e} from float64")
+    errors = {key: max(relative(a, b) for a, b in zip(call(), true)) for key, call in calls.items()}
+    check("hash grid", errors, TOLERANCE)
     if not quick and drjit_ready():
         peers = {storage: DrJitHashGrid(SPEC, storage, x, cotangent) for storage in ("Float32", "Float16")}
         calls |= {("Dr.Jit", storage.lower()): peer.forward_backward for storage, peer in peers.items()}
@@ -71,38 +73,14 @@ def run(quick: bool, rounds: int) -> Result:
         f"corner and level, reach {2 * times[limit].seconds / times[first].seconds:.0%} of it",
     ]
     findings += [f"{times.ratio(key, first)} as fast as Dr.Jit with {key[1]}" for key in calls if key[0] == "Dr.Jit"]
-    points = [
-        Point(
-            *key, 1e3 * times[key].seconds, max(errors[key]), 1e3 * times[key].low, 1e3 * times[key].high, key == first
-        )
-        for key in errors
-    ]
-    chart = Chart(
-        f"{n} points, 16 levels x 2, 2^19 entries",
-        "ms forward and backward",
-        "largest error, of the largest value",
-        points,
-    )
+    title, cost = f"{n} points, 16 levels x 2, 2^19 entries", "ms forward and backward"
+    chart = chart_of(title, cost, "largest error, of the largest value", times, errors, {first})
     rows = [
         [*key, f"{1e3 * times[key].seconds:.1f}", f"{1e3 * times[key].low:.1f} to {1e3 * times[key].high:.1f}"]
         for key in calls
     ]
     beside = ("Time beside peers, of which Dr.Jit has a grid of its own", ["", "dtype", "ms", "quartiles"], rows)
-    return Result("hash_grid", "Hash grid encoding: time against error", findings, [chart], [beside])
-
-
-def both(
-    encode: Callable[[Tensor, Tensor], Tensor], x: Tensor, table: Tensor, cotangent: Tensor
-) -> Callable[[], tuple]:
-    """Features and the table's gradient of one call."""
-    leaf = table.clone().requires_grad_()
-
-    def call() -> tuple[Tensor, Tensor]:
-        features = encode(x, leaf)
-        (grad,) = torch.autograd.grad(features, leaf, cotangent)
-        return features.detach(), grad
-
-    return call
+    return Result("hash_grid", "Hash grid encoding: time against error", SOURCES, findings, [chart], [beside])
 
 
 def relative(a: Tensor, true: Tensor) -> float:

@@ -10,14 +10,12 @@ import trimesh
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf.bench.charts import Chart, Point, Result
+from splitnerf.bench.charts import Chart, Result
+from splitnerf.bench.harness import chart_of, check, interleaved, rms
 from splitnerf.bench.lights import MapLight, lights
-from splitnerf.bench.measures import rms
 from splitnerf.bench.meshes import armadillo, bumpy_sphere
 from splitnerf.bench.peers import drjit_ready, peer
-from splitnerf.bench.timing import interleaved
 from splitnerf.config import preset
-from splitnerf.errors import CheckFailed
 from splitnerf.fields.light import EvaluatedLight
 from splitnerf.fields.occlusion import OcclusionQuery
 from splitnerf.fields.visibility import VisibilityBits
@@ -27,6 +25,8 @@ OFFSET = 0.0125
 ROUGHNESS = 0.3
 ENVIRONMENT_HEIGHT = 128
 DISAGREEMENT = 1e-3  # share of rays that two tracers may answer differently: they graze a triangle
+SOURCES = ("cpp/*occlusion*", "cpp/*visibility*", "cpp/*scene*", "python/splitnerf/ops/occlusion.py",
+           "python/splitnerf/ops/visibility.py", "python/splitnerf/fields/visibility.py")  # fmt: skip
 LARGE = 500  # columns and rows of the mesh of 500k triangles
 
 
@@ -83,7 +83,7 @@ def run(quick: bool, rounds: int) -> Result:
         findings += found
         rows += more
     table = ("Rays a second", ["mesh", "tracer", "Mrays/s", "what is timed"], rows)
-    return Result("occlusion", "Occlusion: time against error", findings, charts, [table])
+    return Result("occlusion", "Occlusion: time against error", SOURCES, findings, charts, [table])
 
 
 def error_charts(light_name: str, points: Points, quick: bool, rounds: int) -> list[Chart]:
@@ -104,22 +104,14 @@ def error_charts(light_name: str, points: Points, quick: bool, rounds: int) -> l
     with torch.no_grad():
         errors = {key: [rms(a - b) for a, b in zip(call(), true)] for key, call in calls.items()}
         times = interleaved(calls, rounds)
-    charts = []
-    for k, factor in enumerate(("o_d", f"o_s at roughness {ROUGHNESS:g}")):
-        dots = [
-            Point(*key, 1e3 * times[key].seconds, errors[key][k], 1e3 * times[key].low, 1e3 * times[key].high,
-                  key == ("bits", f"k = {preset('cpu').occlusion.directions}"))
-            for key in calls
-        ]  # fmt: skip
-        charts.append(
-            Chart(
-                f"{factor}, {light_name} light",
-                f"ms for {len(points.positions)} points, both factors",
-                "RMS error",
-                dots,
-            )
+    cost, default = f"ms for {len(points.positions)} points, both factors", f"k = {preset('cpu').occlusion.directions}"
+    return [
+        chart_of(
+            f"{factor}, {light_name} light", cost, "RMS error", times, {key: pair[k] for key, pair in errors.items()},
+            {("bits", default)},
         )
-    return charts
+        for k, factor in enumerate(("o_d", f"o_s at roughness {ROUGHNESS:g}"))
+    ]  # fmt: skip
 
 
 class EnvironmentOf:
@@ -172,8 +164,7 @@ def ray_rates(name: str, points: Points, quick: bool, rounds: int) -> tuple[list
         if call is None:
             continue
         differing = float((torch.from_numpy(np.asarray(call(), bool)) == seen).float().mean())
-        if differing > DISAGREEMENT:
-            raise CheckFailed(f"{tracer} and trace_visibility disagree on {differing:.2%} of the rays")
+        check("share of the rays that trace_visibility answers otherwise", {tracer: differing}, DISAGREEMENT)
         calls[tracer] = call
     times = interleaved(calls, rounds)
     ours = "splitnerf occlusion_factors"

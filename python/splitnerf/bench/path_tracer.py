@@ -14,15 +14,13 @@ import numpy as np
 import torch
 
 from splitnerf import _core
-from splitnerf.bench.charts import Chart, Point, Result
+from splitnerf.bench.charts import Result
+from splitnerf.bench.harness import Timing, chart_of, check, interleaved, rms
 from splitnerf.bench.lights import data_folder, lights
-from splitnerf.bench.measures import rms
 from splitnerf.bench.meshes import bumpy_sphere
 from splitnerf.bench.peers import drjit_ready, peer
-from splitnerf.bench.timing import Timing, interleaved
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.gltf import read_asset
-from splitnerf.errors import CheckFailed
 from splitnerf.synth.cameras import orbit
 
 SCATTERINGS = 5
@@ -31,6 +29,7 @@ POSE = orbit(9, distance=3.0, elevation=25.0, start=1.0)[0]
 BATCH = 256  # samples a pixel at a time: a wavefront of all of them would not fit into memory
 APART = 0.05  # RMS between two converged images: more is not a matter of details
 SEEDS = 3  # images that an error is the mean of
+SOURCES = ("cpp/*path_tracer*", "cpp/*principled*", "cpp/*environment_sampler*", "cpp/*texture*", "cpp/*scene*")
 INSIDE = 0.99  # alpha of what counts as foreground
 
 Render = Callable[[int, int], tuple[np.ndarray, np.ndarray]]  # samples a pixel, seed -> radiance and alpha
@@ -60,32 +59,30 @@ def run(quick: bool, rounds: int) -> Result:
     image, inside = (np.clip(means["splitnerf"][0], 0, 1), means["splitnerf"][1] > INSIDE)
     for way in (w for w in renderers if w != "splitnerf"):
         apart = rms((np.clip(means[way][0], 0, 1) - image)[inside & (means[way][1] > INSIDE)])
-        if apart > APART:
-            raise CheckFailed(f"path tracer: its converged image is {apart:.3f} from {way}'s")
+        check("path tracer: RMS from its converged image", {way: apart}, APART)
         findings.append(f"converged images of splitnerf and {way} are {apart:.4f} apart (RMS)")
     errors = {
-        (way, n): float(np.mean([error_of(render(n, seed), means[way]) for seed in range(SEEDS)]))
+        (way, f"{n} spp"): float(np.mean([error_of(render(n, seed), means[way]) for seed in range(SEEDS)]))
         for way, render in renderers.items() for n in samples
     }  # fmt: skip
     # One renderer after the other: Mitsuba's variants are switched for the whole process, which takes time.
-    times: dict[tuple[str, int], Timing] = {}
+    times: dict[tuple[str, str], Timing] = {}
     for way, render in renderers.items():
-        found = interleaved({n: lambda n=n, r=render: r(n, SEEDS) for n in samples}, max(3, rounds // 3))
-        times |= {(way, n): found[n] for n in samples}
+        calls = {(way, f"{n} spp"): lambda n=n, r=render: r(n, SEEDS) for n in samples}
+        found = interleaved(calls, max(3, rounds // 3))
+        times |= {key: found[key] for key in calls}
     most = samples[-1]
     for way in (w for w in renderers if w != "splitnerf"):
-        ours, theirs = ([(times[w, n].seconds, errors[w, n]) for n in samples] for w in ("splitnerf", way))
+        ours, theirs = (
+            [(times[key].seconds, error) for key, error in errors.items() if key[0] == w] for w in ("splitnerf", way)
+        )
         ratio = time_to(theirs, ours[-1][1]) / ours[-1][0]
         findings.append(f"{way} takes {ratio:.2f}x the time of splitnerf to the error that this has at {most} spp")
-    paths = most * size * size / times["splitnerf", most].seconds
+    paths = most * size * size / times["splitnerf", f"{most} spp"].seconds
     findings.insert(0, f"{paths / 1e6:.2f} M paths a second of up to {SCATTERINGS} scattering events")
-    points = [
-        Point(way, f"{n} spp", times[way, n].seconds, error, times[way, n].low, times[way, n].high,
-              way == "splitnerf" and n == 64)
-        for (way, n), error in errors.items()
-    ]  # fmt: skip
-    chart = Chart(f"{asset.name}, {name} light, {size} x {size}", "s", "RMS error of radiance", points)
-    return Result("path_tracer", "Path tracer: time against error", findings, [chart])
+    title = f"{asset.name}, {name} light, {size} x {size}"
+    chart = chart_of(title, "s", "RMS error of radiance", times, errors, {("splitnerf", "64 spp")}, scale=1)
+    return Result("path_tracer", "Path tracer: time against error", SOURCES, findings, [chart])
 
 
 def time_to(curve: list[tuple[float, float]], error: float) -> float:

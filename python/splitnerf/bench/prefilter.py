@@ -10,9 +10,9 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf import _core
-from splitnerf.bench.charts import Chart, Point, Result
+from splitnerf.bench.charts import Chart, Result
+from splitnerf.bench.harness import chart_of, interleaved
 from splitnerf.bench.lights import MapLight, cell_means, lights, pyramid_of
-from splitnerf.bench.timing import interleaved
 from splitnerf.config import Config, preset
 from splitnerf.ops import (
     fibonacci_directions,
@@ -30,6 +30,8 @@ TRUTH_CHUNK = 1 << 22
 QUADRATURE_FROM = 0.1  # roughness
 HARMONIC_RESOLUTION, ZONAL_ROWS = 64, 129
 HARMONICS = "spherical harmonics"
+SOURCES = ("cpp/*prefilter*", "cpp/*light*", "python/splitnerf/ops/light.py", "python/splitnerf/ops/light_pyramid.py",
+           "python/splitnerf/fields/light_pyramid.py")  # fmt: skip
 NARROWEST = 0.1  # roughness that the harmonics are asked for
 
 Estimate = Callable[[Tensor, Tensor], Tensor]
@@ -174,19 +176,13 @@ def run(quick: bool, rounds: int) -> Result:
             able = {key: e for key, e in methods.items() if key[0] != HARMONICS or rho >= NARROWEST}
             calls = {key: lambda e=e: e(axes, roughness) for key, e in able.items()}
             with torch.no_grad():
-                errors = {key: relative_rms([call() for _ in range(3)], true) for key, call in calls.items()}
+                errors = {key: 100 * relative_rms([call() for _ in range(3)], true) for key, call in calls.items()}
                 times = interleaved(calls, rounds)
-            points = [
-                Point(*key, 1e3 * times[key].seconds, 100 * errors[key], 1e3 * times[key].low, 1e3 * times[key].high,
-                      key in defaults(shipped, rho))
-                for key in calls
-            ]  # fmt: skip
-            chart = Chart(
-                f"{name} light, roughness {rho:g}", f"ms for {n_queries} queries", "relative error, % RMS", points
-            )
+            named = f"{name} light, roughness {rho:g}", f"ms for {n_queries} queries", "relative error, % RMS"
+            chart = chart_of(*named, times, errors, defaults(shipped, rho))
             charts.append(chart)
             findings.append(finding(chart))
-    return Result("prefilter", "The pre-integrated light: time against error", findings, charts)
+    return Result("prefilter", "The pre-integrated light: time against error", SOURCES, findings, charts)
 
 
 def defaults(config: Config, rho: float) -> list[tuple[str, str]]:

@@ -8,15 +8,16 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf.bench import eager
-from splitnerf.bench.charts import Chart, Point, Result
-from splitnerf.bench.timing import Times, interleaved
-from splitnerf.errors import CheckFailed
+from splitnerf.bench import reference
+from splitnerf.bench.charts import Result
+from splitnerf.bench.harness import chart_of, check, interleaved, with_gradients
 from splitnerf.notes import note
 from splitnerf.ops import brdf_lut, fibonacci_directions, prefilter_light, split_sum_shade
 
 TOLERANCE = 1e-3  # of results and gradients, of the largest value
 FLOATS_A_POINT = 23 + 3  # read forward and written
+SOURCES = ("cpp/*split_sum*", "cpp/*shad*", "cpp/*prefilter*", "python/splitnerf/ops/shading.py",
+           "python/splitnerf/ops/light.py")  # fmt: skip
 FLOATS_BACK = 26 + 23  # read backward and written
 
 
@@ -38,7 +39,9 @@ def run(quick: bool, rounds: int) -> Result:
     for title, (n, (calls, errors)) in subjects.items():
         extra = {"copy": copy_of(n * FLOATS_A_POINT)} if n else {}
         times = interleaved(calls | extra, rounds)
-        charts.append(chart_of(title, times, errors))
+        keyed = {(name, ""): error for name, error in errors.items()}
+        named = title, "ms forward and backward", "largest relative RMS error"
+        charts.append(chart_of(*named, {key: times[key[0]] for key in keyed}, keyed, {("splitnerf", "")}))
         findings += [
             f"{title}: {times.ratio(name, 'splitnerf')} as fast as {name}" for name in calls if name != "splitnerf"
         ]
@@ -48,7 +51,7 @@ def run(quick: bool, rounds: int) -> Result:
             findings.append(
                 f"{title}: {rate / 1e9:.1f} GB/s of inputs, results and gradients, {rate / copy_rate:.0%} of what a copy moves"
             )
-    return Result("shading", "Shading and pre-integration: time against error", findings, charts)
+    return Result("shading", "Shading and pre-integration: time against error", SOURCES, findings, charts)
 
 
 def shading_calls(n: int, compiled: bool) -> tuple[dict[str, Callable[[], object]], dict[str, float]]:
@@ -56,7 +59,7 @@ def shading_calls(n: int, compiled: bool) -> tuple[dict[str, Callable[[], object
     lut = brdf_lut()
 
     def plain(*leaves: Tensor) -> Tensor:
-        return eager.split_sum_shade(*leaves, lut.to(leaves[0].dtype), 0, True)
+        return reference.split_sum_shade(*leaves, lut, 0, True)
 
     def ours(*leaves: Tensor) -> Tensor:
         return split_sum_shade(*leaves, compensate=True)
@@ -80,7 +83,7 @@ def prefilter_calls(n_queries: int, n_lights: int) -> tuple[dict[str, Callable[[
     light = (torch.rand(n_lights, 3),)
 
     def plain(light: Tensor) -> Tensor:
-        return eager.prefilter_light(*(t.to(light.dtype) for t in (queries, roughness, directions)), light)
+        return reference.prefilter_light(*(t.to(light.dtype) for t in (queries, roughness, directions)), light)
 
     def ours(light: Tensor) -> Tensor:
         return prefilter_light(queries, roughness, directions, light)
@@ -109,37 +112,10 @@ def checked(
         calls[name] = with_gradients(way, inputs, cotangent)
         apart = [(a - b).square().mean().sqrt() / b.square().mean().sqrt() for a, b in zip(calls[name](), exact)]
         errors[name] = float(max(apart))
-        if not errors[name] < TOLERANCE:
-            raise CheckFailed(f"{name} is {errors[name]:.1e} from float64")
+    check("relative to float64", errors, TOLERANCE)
     return calls, errors
-
-
-def with_gradients(way: Callable[..., Tensor], inputs: tuple[Tensor, ...], cotangent: Tensor) -> Callable[[], tuple]:
-    leaves = tuple(x.clone().requires_grad_() for x in inputs)
-
-    def call() -> tuple[Tensor, ...]:
-        out = way(*leaves)
-        return out.detach(), *torch.autograd.grad(out, leaves, cotangent)
-
-    return call
 
 
 def copy_of(n_floats: int) -> Callable[[], object]:
     source, target = torch.rand(n_floats), torch.empty(n_floats)
     return lambda: target.copy_(source)
-
-
-def chart_of(title: str, times: Times, errors: dict[str, float]) -> Chart:
-    points = [
-        Point(
-            name,
-            "",
-            1e3 * times[name].seconds,
-            errors[name],
-            1e3 * times[name].low,
-            1e3 * times[name].high,
-            name == "splitnerf",
-        )
-        for name in errors
-    ]
-    return Chart(title, "ms forward and backward", "largest relative RMS error", points)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from splitnerf.bench.provenance import header, provenance
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import over_background
@@ -28,6 +29,7 @@ SKIPS: dict[str, tuple[str, ...]] = {
     "light moved every few steps": ("light_step_every",),
 }
 BASELINE, ALL = "nothing skipped", "all"
+SOURCES = ("cpp", "python/splitnerf")
 NEVER = 10**7  # steps that no run reaches
 
 
@@ -73,6 +75,7 @@ def skip_table(
     plain = full.replace(UNSKIPPED)
     baseline, steps = other() if other else run_line(BASELINE, plain, minutes, None, training, views, out / "baseline")
     lines = [baseline]
+    show(header(provenance(SOURCES)))
     show(HEADER)
     show(baseline.text(baseline))
     alone = {name: plain.replace({key: full[key] for key in keys}) for name, keys in SKIPS.items()}

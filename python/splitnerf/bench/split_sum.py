@@ -12,8 +12,8 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.bench.charts import Chart, Point, Result
+from splitnerf.bench.harness import rms
 from splitnerf.bench.lights import MapLight, lights
-from splitnerf.bench.measures import rms
 from splitnerf.bench.prefilter import Truth
 from splitnerf.ops import (
     QUERIES,
@@ -35,6 +35,8 @@ N_NORMALS = 64
 GROUPS = 4  # of samples of the truth
 LAMP_SHARE = 5e-4  # of the texels, the brightest, count as lamps
 PARTS = 4  # of a lamp's texel along its edge
+SOURCES = ("cpp/*split_sum*", "cpp/*brdf_lut*", "cpp/*monte_carlo*", "python/splitnerf/ops/shading.py",
+           "python/splitnerf/ops/monte_carlo.py")  # fmt: skip
 NOISE = "noise"
 KARIS = "Karis 2014, fit"
 
@@ -80,7 +82,7 @@ def run(quick: bool, rounds: int) -> Result:
         f"the table of {shipped[0].variant} over sqrt(n.v): RMS error {shipped[0].error:.1g} of F1 and F2, {shipped[1].error:.1g} "
         f"of chi; Karis' fit, which was made for another shadowing term: {fit.error:.1g}"
     )
-    return Result("split_sum", "The split sum: what it costs in error", findings, charts, tables)
+    return Result("split_sum", "The split sum: what it costs in error", SOURCES, findings, charts, tables)
 
 
 class SplitLight:

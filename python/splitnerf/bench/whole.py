@@ -26,6 +26,7 @@ SWITCHES: dict[str, dict[str, object]] = {
     "normals by finite differences": {"normals": "finite_difference"},
 }
 NAMES = (PUBLISHED, *SWITCHES)
+SOURCES = ("cpp", "python/splitnerf")
 MEASURES = {"novel_view": "novel views", "albedo": "albedo", "relight": "relit views"}
 
 
@@ -60,7 +61,7 @@ def whole(
         charts += [chart for key in MEASURES if (chart := chart_of(scene, key, scores)).points]
     names = [scene.name for scene in scenes]
     title = f"The whole program on {' and '.join(names)}: wall time against error"
-    return Result("_".join(["whole", *names]), title, findings(charts), charts)
+    return Result("_".join(["whole", *names]), title, SOURCES, findings(charts), charts)
 
 
 def configurations(names: Sequence[str], settings: dict[str, object]) -> dict[str, Config]:

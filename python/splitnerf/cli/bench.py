@@ -7,30 +7,41 @@ import math
 import tempfile
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE, FAILED, INTERRUPTED
+from splitnerf.cli.exit_codes import DONE, INTERRUPTED
 from splitnerf.errors import InputError
 
-# Modules of splitnerf.bench, each with run(quick, rounds).
-BENCHMARKS = ("prefilter", "split_sum", "hash_grid", "normals", "shading", "occlusion", "path_tracer")
+# Modules of splitnerf.bench, each with run(quick, rounds), and what they compare.
+OPERATORS = {
+    "prefilter": "estimators of the light's integral over a lobe: time against error",
+    "split_sum": "the split sum and its table against the integral: error alone",
+    "hash_grid": "the encoding beside plain torch, Dr.Jit and the machine's gathers",
+    "normals": "analytic normals beside finite differences: time against angle",
+    "shading": "split-sum shading and the light's integral beside plain and compiled torch",
+    "occlusion": "traced rays beside cached bits, and beside Open3D, trimesh and Mitsuba",
+    "path_tracer": "error against time beside Mitsuba",
+}
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "bench", help="measure run time against error",
-        description="Without BENCHMARK: checks the operators, times them beside plain torch and whatever peers are installed "
-        "(drjit, open3d, mitsuba), and writes a table, a CSV file and a picture each. Measured maps and meshes are taken from "
-        "the folder SPLITNERF_DATA, else procedural ones.",
+        description=f"Without BENCHMARK: {', '.join(OPERATORS)}. Each checks the operators, times them beside plain "
+        "torch and the peers that are installed (drjit, open3d, mitsuba), and writes a table, a CSV file and a picture. "
+        "Measured maps and meshes are taken from the folder SPLITNERF_DATA, else procedural ones.",
     )  # fmt: skip
-    parser.add_argument(
-        "--quick", action="store_true", help="small inputs: a few minutes, to run before and after a change"
-    )
-    parser.add_argument(
-        "--only", action="append", default=[], metavar="NAME", choices=BENCHMARKS,
-        help=f"only this one of {', '.join(BENCHMARKS)}; may be repeated",
-    )  # fmt: skip
-    add_out(parser)
+    add_quick(parser, default=False)
+    add_out(parser, default=None)
     parser.set_defaults(execute=run_operators)
     benchmarks = parser.add_subparsers(dest="benchmark", metavar="BENCHMARK")
+    for name, what in OPERATORS.items():
+        operator = benchmarks.add_parser(name, help=what, description=f"Measures {what}.")
+        add_quick(operator)
+        add_out(operator)
+    add_skip(benchmarks)
+    add_whole(benchmarks)
+
+
+def add_skip(benchmarks: argparse._SubParsersAction) -> None:
     skip = benchmarks.add_parser(
         "skip", help="what it is worth to leave out what a scene does not need",
         description="Trains on DATA without any skip, with one at a time, and with all, for M minutes and for as many steps as "
@@ -47,6 +58,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all runs"
     )
     skip.set_defaults(execute=run_skip)
+
+
+def add_whole(benchmarks: argparse._SubParsersAction) -> None:
     whole = benchmarks.add_parser(
         "whole", help="error of novel views, albedo and relit views against wall time",
         description="Trains on each DATA for each of the times, with the preset cpu, with the preset paper, and with one setting "
@@ -65,25 +79,16 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     add_out(whole)
     whole.set_defaults(execute=run_whole)
-    stability = benchmarks.add_parser(
-        "stability", help="how far each operator is from the truth on inputs made to break it",
-        description="Compares every operator in float32 with float64 on adversarial inputs, searches for the worst of them, asks "
-        "these again in 50 digits, and writes the worst errors and their inputs. Exits with 1 where one breaks its promise.",
-    )  # fmt: skip
-    stability.add_argument(
-        "--cases", type=int, default=10**7, metavar="N", help="inputs of an operator (default: 10^7)"
-    )
-    stability.add_argument(
-        "--op", action="append", default=[], metavar="NAME", help="only this operator; may be repeated"
-    )
-    stability.add_argument("--seed", type=int, default=0, metavar="S", help="of the inputs (default: 0)")
-    add_out(stability)
-    stability.set_defaults(execute=run_stability)
 
 
-def add_out(parser: argparse.ArgumentParser) -> None:
+def add_quick(parser: argparse.ArgumentParser, default: object = argparse.SUPPRESS) -> None:
+    where = "small inputs: a few minutes, to run before and after a change"
+    parser.add_argument("--quick", action="store_true", default=default, help=where)
+
+
+def add_out(parser: argparse.ArgumentParser, default: object = argparse.SUPPRESS) -> None:
     where = "folder of the files (default: docs/benchmarks in a checkout, else here)"
-    parser.add_argument("--out", type=Path, metavar="DIR", help=where)
+    parser.add_argument("--out", type=Path, default=default, metavar="DIR", help=where)
 
 
 def default_folder() -> Path:
@@ -91,9 +96,10 @@ def default_folder() -> Path:
 
 
 def run_operators(args: argparse.Namespace) -> int:
-    from splitnerf.bench.operators import run_benchmarks
+    from splitnerf.bench.harness import run_benchmarks
 
-    for path in run_benchmarks(args.only or BENCHMARKS, args.quick, args.out or default_folder(), print_now):
+    names = [args.benchmark] if args.benchmark else list(OPERATORS)
+    for path in run_benchmarks(names, args.quick, args.out or default_folder(), print_now):
         print(path)
     return DONE
 
@@ -152,20 +158,6 @@ def run_whole(args: argparse.Namespace) -> int:
     except Interrupted:
         print(f"stopped; the state is in {args.runs}. To go on, repeat the command.")
         return INTERRUPTED
-    out = args.out or default_folder()
-    out.mkdir(parents=True, exist_ok=True)
-    for path in write_result(result, out):
+    for path in write_result(result, args.out or default_folder()):
         print(path)
     return DONE
-
-
-def run_stability(args: argparse.Namespace) -> int:
-    if args.cases < 1:
-        raise InputError(f"--cases must be positive, got {args.cases}")
-    from splitnerf.bench.stability.table import chosen, run_all, write
-
-    out = args.out or default_folder()
-    results, verdicts = run_all(chosen(args.op), args.cases, args.seed, print_now)
-    for path in write(results, verdicts, args.seed, out):
-        print(path)
-    return DONE if all(x.holds for x in (*results, *verdicts)) else FAILED

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from splitnerf.bench.machine import describe_machine
-from splitnerf.bench.stability import fields, light, losses, optimiser, properties, rays, shading
-from splitnerf.bench.stability.entry import Entry, Rows
-from splitnerf.bench.stability.properties import Property, Verdict, verify
-from splitnerf.bench.stability.search import Result, run
+from splitnerf.bench.charts import table as table_lines
+from splitnerf.bench.charts import write_csv
+from splitnerf.bench.provenance import header, provenance
+from stability import fields, light, losses, optimiser, properties, rays, shading
+from stability.entry import Entry, Rows
+from stability.properties import Property, Verdict, verify
+from stability.search import Result, run
 from splitnerf.errors import InputError
 
 ENTRIES: tuple[Entry, ...] = (
@@ -18,6 +19,7 @@ ENTRIES: tuple[Entry, ...] = (
 )
 PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
 NAME = "stability"
+SOURCES = ("cpp", "python/splitnerf/ops")
 COLUMNS = (
     "operator",
     "inputs",
@@ -117,50 +119,32 @@ def inputs_of(results: Iterable[Result], verdicts: Iterable[Verdict]) -> list[tu
     return lines + [(v.claim.name, "broken", input_text(v.worst)) for v in verdicts if not v.holds]
 
 
-def write(results: list[Result], verdicts: list[Verdict], seed: int, folder: Path) -> tuple[Path, Path]:
+def write(results: list[Result], verdicts: list[Verdict], command: str, folder: Path) -> tuple[Path, Path]:
     """Writes stability.md and stability.csv, with machine, versions and commit in their heads."""
     folder.mkdir(parents=True, exist_ok=True)
     markdown, table = folder / f"{NAME}.md", folder / f"{NAME}.csv"
-    head = describe_machine() | {"seed": str(seed)}
-    markdown.write_text(markdown_text(results, verdicts, head))
-    with table.open("w", newline="") as file:
-        file.writelines(f"# {key}: {value}\n" for key, value in head.items())
-        writer = csv.writer(file)
-        writer.writerow((*COLUMNS, "worst forward input", "worst gradient input"))
-        for r in results:
-            writer.writerow((*row_of(r), input_text(r.worst_forward), input_text(r.worst_gradient)))
-        for v in verdicts:
-            blank = ["-"] * 9
-            writer.writerow(
-                (
-                    v.claim.name,
-                    v.cases,
-                    *blank,
-                    v.broken,
-                    "yes" if v.holds else "NO",
-                    v.claim.statement,
-                    input_text(v.worst),
-                    "",
-                )
-            )
+    facts = provenance(SOURCES, command)
+    markdown.write_text(markdown_text(results, verdicts, facts))
+    write_csv(table, facts, csv_rows(results, verdicts))
     return markdown, table
 
 
-def markdown_text(results: list[Result], verdicts: list[Verdict], head: dict[str, str]) -> str:
-    lines = [
-        "# Worst errors of the operators",
-        "",
-        *(f"- {key}: {value}" for key, value in head.items()),
-        "",
-        INTRODUCTION,
-        "",
-    ]
-    lines += ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
-    lines += ["| " + " | ".join(row_of(r)) + " |" for r in results]
-    lines += ["", "| operator | cases | broken | what must hold |", "|---|---|---|---|"]
-    lines += [f"| {v.claim.name} | {v.cases} | {v.broken} | {v.claim.statement} |" for v in verdicts]
-    lines += ["", "## Inputs of the worst errors", "", "| operator | of | input |", "|---|---|---|"]
-    lines += [f"| {name} | {which} | {text} |" for name, which, text in inputs_of(results, verdicts)]
+def csv_rows(results: list[Result], verdicts: list[Verdict]) -> Iterator[list[object]]:
+    yield [*COLUMNS, "worst forward input", "worst gradient input"]
+    for r in results:
+        yield [*row_of(r), input_text(r.worst_forward), input_text(r.worst_gradient)]
+    for v in verdicts:
+        holds = "yes" if v.holds else "NO"
+        yield [v.claim.name, v.cases, *["-"] * 9, v.broken, holds, v.claim.statement, input_text(v.worst), ""]
+
+
+def markdown_text(results: list[Result], verdicts: list[Verdict], facts: dict[str, str]) -> str:
+    lines = ["# Worst errors of the operators", "", header(facts), "", INTRODUCTION, ""]
+    lines += table_lines(COLUMNS, [row_of(r) for r in results])
+    claims = [[v.claim.name, v.cases, v.broken, v.claim.statement] for v in verdicts]
+    lines += ["", *table_lines(["operator", "cases", "broken", "what must hold"], claims)]
+    lines += ["", "## Inputs of the worst errors", ""]
+    lines += table_lines(["operator", "of", "input"], inputs_of(results, verdicts))
     return "\n".join(lines) + "\n"
 
 

@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from splitnerf.bench.stability.entry import Rows
-from splitnerf.bench.stability.precise import mp, vector
+from stability.entry import Rows
+from stability.precise import mp, vector
 
 DEGREE = 12
 RESOLUTIONS, NODES = (16, 8, 4), ("0.1", "0.2", "0.35", "0.5")

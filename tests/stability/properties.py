@@ -15,8 +15,8 @@ import torch
 from torch import Tensor
 
 from splitnerf import ops
-from splitnerf.bench.stability.cases import Draw, unit
-from splitnerf.bench.stability.entry import Rows
+from stability.cases import Draw, unit
+from stability.entry import Rows
 
 HALF = 0.75  # half the edge of the cube that is traced
 CORNERS = ((-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1))

@@ -9,7 +9,7 @@ from splitnerf.errors import InputError
 try:
     from mpmath import MPContext
 except ImportError as error:
-    raise InputError("the stability benchmark needs mpmath: pip install 'splitnerf[bench]'") from error
+    raise InputError("arithmetic of 50 digits needs mpmath: pip install 'splitnerf[test]'") from error
 
 mp = MPContext()
 mp.dps = 50

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from splitnerf import ops
-from splitnerf.bench.stability import exact_rays
-from splitnerf.bench.stability.cases import Draw, unit
-from splitnerf.bench.stability.entry import Entry, Rows
+from stability import exact_rays
+from stability.cases import Draw, unit
+from stability.entry import Entry, Rows
 
 SAMPLES = 8  # of a ray
 LONG = 10_000  # samples of a long ray

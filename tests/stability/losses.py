@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from splitnerf import ops
-from splitnerf.bench.stability import exact_losses
-from splitnerf.bench.stability.cases import Draw
-from splitnerf.bench.stability.entry import Entry, Rows
+from stability import exact_losses
+from stability.cases import Draw
+from stability.entry import Entry, Rows
 
 BATCH, PAIRS, POINTS = 48, 6, 24
 BY_CONDITION = "a few roundings of each term, times its condition; sums in float64"

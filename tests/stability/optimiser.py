@@ -6,9 +6,9 @@ import numpy as np
 import torch
 
 from splitnerf import ops
-from splitnerf.bench.stability.cases import Draw
-from splitnerf.bench.stability.entry import Entry, Rows
-from splitnerf.bench.stability.precise import mp, vector
+from stability.cases import Draw
+from stability.entry import Entry, Rows
+from stability.precise import mp, vector
 
 NAMES = ("param", "grad", "exp_avg", "exp_avg_sq")
 SETTINGS = dict(lr=0.01, beta1=0.9, beta2=0.99, eps=1e-15, weight_decay=0.01)

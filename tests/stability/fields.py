@@ -9,9 +9,9 @@ from functools import lru_cache
 import torch
 
 from splitnerf import ops
-from splitnerf.bench.stability import exact_fields
-from splitnerf.bench.stability.cases import Draw
-from splitnerf.bench.stability.entry import Entry, Rows
+from stability import exact_fields
+from stability.cases import Draw
+from stability.entry import Entry, Rows
 from splitnerf.ops.hash_grid import rounded
 
 SPEC = ops.HashGridSpec(n_levels=6, n_features=2, base_resolution=4, growth=2.0, log2_table_size=9)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from splitnerf.bench.stability.entry import Rows
-from splitnerf.bench.stability.precise import mp, vector
+from stability.entry import Rows
+from stability.precise import mp, vector
 from splitnerf.ops import brdf_lut
 
 NODES = 31  # intervals of the table along both axes

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from splitnerf.bench.stability.entry import Entry, Rows
+from stability.entry import Entry, Rows
 
 LARGEST = 3.0e38  # true values beyond it have no float32
 CHANGE = 2.0**-22  # relative, of the inputs, by which the condition is found

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from splitnerf import ops
-from splitnerf.bench.stability import exact_light
-from splitnerf.bench.stability.cases import Draw, unit
-from splitnerf.bench.stability.entry import Entry, Rows
+from stability import exact_light
+from stability.cases import Draw, unit
+from stability.entry import Entry, Rows
 
 LIGHTS = 96
 RESOLUTIONS, NODES, ZONAL_ROWS = (16, 8, 4), (0.1, 0.2, 0.35, 0.5), 33

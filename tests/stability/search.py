@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from splitnerf.bench.stability.cases import Draw
-from splitnerf.bench.stability.entry import Entry, Rows
-from splitnerf.bench.stability.measure import MANY_PROBES, Errors, cast, conditions, measure, row_error
+from stability.cases import Draw
+from stability.entry import Entry, Rows
+from stability.measure import MANY_PROBES, Errors, cast, conditions, measure, row_error
 
 KEPT = 1000  # worst rows
 SEARCH_SHARE = 0.2  # of all cases go to the search

@@ -6,9 +6,9 @@ import torch
 from torch import Tensor
 
 from splitnerf import ops
-from splitnerf.bench.stability import exact_shading
-from splitnerf.bench.stability.cases import Draw, unit
-from splitnerf.bench.stability.entry import Entry, Rows
+from stability import exact_shading
+from stability.cases import Draw, unit
+from stability.entry import Entry, Rows
 from splitnerf.ops._library import lib
 
 UNITS = ("normals", "view_dirs", "light_dirs")

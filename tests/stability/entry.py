@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from torch import Tensor
 
-from splitnerf.bench.stability.cases import Draw
+from stability.cases import Draw
 
 Rows = dict[str, Tensor]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from splitnerf.bench.stability.entry import Rows
-from splitnerf.bench.stability.precise import mp, vector
+from stability.entry import Rows
+from stability.precise import mp, vector
 
 PAIRS = 6
 

@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 
-from splitnerf.bench.stability.entry import Rows
-from splitnerf.bench.stability.precise import mp, vector
+from stability.entry import Rows
+from stability.precise import mp, vector
 
 PRIMES = (1, 2654435761, 805459861)  # Teschner et al. 2003
 LEVELS, BASE, TABLE_SIZE = 6, 4, 2**9  # resolutions double

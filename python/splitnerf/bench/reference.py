@@ -1,0 +1,382 @@
+"""Operators in plain torch, one function each, as one would write them without this library.
+
+Tests hold the operators against these functions, benchmarks time the operators beside them, and
+``tests/bench/plain_torch.py`` makes a whole training step of them. Each takes what ``torch.ops.splitnerf.NAME`` takes,
+in float32 or float64, and returns its results, without those that only the backward pass reads.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE
+
+PRIMES = (1, 2654435761, 805459861)  # Teschner et al. 2003
+NEIGHBOURS = 16  # vertices that answer for a point
+BITS = 32  # of a word
+BLACK_LIGHT = 1e-4  # added to the light that a share is taken of, so that there is one in the dark too
+
+# ---- distance field ----
+
+
+def hash_encode(
+    positions: Tensor, table: Tensor, n_levels: int, base: int, growth: float, log2_size: int, n_active: int
+) -> Tensor:
+    """Trilinear interpolation at all levels and corners: one gather, and so one gradient of the table's size."""
+    levels = torch.arange(n_active)
+    resolution = torch.floor(base * torch.tensor(growth, dtype=torch.float64) ** levels + 1e-6).long()
+    nodes = resolution + 1
+    dense = nodes**3 <= 2**log2_size
+    size = torch.where(dense, nodes**3, 2**log2_size)
+    scaled = positions.clamp(0, 1)[:, None, :] * resolution[:, None]
+    cell = torch.minimum(scaled.detach().floor().long(), resolution[:, None] - 1)
+    corners = torch.tensor([[c & 1, c >> 1 & 1, c >> 2] for c in range(8)])
+    share = (scaled - cell)[:, :, None, :]
+    weight = torch.where(corners.bool(), share, 1 - share).prod(-1, keepdim=True)  # [n, levels, 8, 1]
+    i, j, k = (cell[:, :, None, :] + corners).unbind(-1)
+    side = nodes[:, None]
+    row_major, hashed = (i * side + j) * side + k, (i * PRIMES[0] ^ j * PRIMES[1] ^ k * PRIMES[2]) % 2**log2_size
+    index = (size.cumsum(0) - size)[:, None] + torch.where(dense[:, None], row_major, hashed)
+    features = (weight * F.embedding(index, table)).sum(2).flatten(1)
+    return F.pad(features, (0, (n_levels - n_active) * table.shape[1]))
+
+
+def layer_outputs(
+    positions: Tensor, features: Tensor, hidden: Tensor, hidden_bias: Tensor, out: Tensor, out_bias: Tensor, beta: float
+) -> Tensor:
+    """One layer of softplus units over positions and features; torch's own threshold of 20 costs e^-20 of a slope."""
+    units = F.softplus(F.linear(torch.cat([positions, features], 1), hidden, hidden_bias), beta, threshold=50)
+    return F.linear(units, out, out_bias)
+
+
+def sdf_layer(positions, features, jacobian, hidden, hidden_bias, out, out_bias, beta, box) -> tuple[Tensor, Tensor]:
+    """The layer's outputs, and the gradient of the first by the chain rule."""
+    slopes = torch.sigmoid(beta * F.linear(torch.cat([positions, features], 1), hidden, hidden_bias))
+    by_input = (slopes * out[0]) @ hidden
+    gradient = by_input[:, :3] + (jacobian * by_input[:, None, 3:]).sum(-1) / (2 * box)
+    return layer_outputs(positions, features, hidden, hidden_bias, out, out_bias, beta), gradient
+
+
+# ---- rays ----
+
+
+def march_rays(rays_o, rays_d, jitter, cells, box, step, max_samples) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Rays, starts, ends and offsets: every point of the lattice along a ray, of which the occupied ones stay."""
+    inverse = 1 / torch.where(rays_d == 0, 1e-12, rays_d)
+    a, b = (-box - rays_o) * inverse, (box - rays_o) * inverse
+    near, far = torch.minimum(a, b).amax(1).clamp(min=0), torch.maximum(a, b).amin(1)
+    k = torch.arange(int(2 * math.sqrt(3) * box / step) + 2)
+    starts = near[:, None] + (k + jitter[:, None] - 1) * step
+    middles = starts + 0.5 * step
+    n = len(cells)
+    points = rays_o[:, None] + rays_d[:, None] * middles[..., None]
+    x, y, z = ((points + box) * (n / (2 * box))).long().clamp(0, n - 1).unbind(-1)
+    inside = (middles > near[:, None]) & (middles < far[:, None])
+    state = torch.where(inside, cells[x, y, z], 0)
+    taken = (state == CELL_OCCUPIED) & ((state == CELL_OPAQUE).cumsum(1) == 0)
+    taken = taken & (taken.cumsum(1) <= max_samples)
+    rays, which = taken.nonzero(as_tuple=True)
+    offsets = F.pad(taken.sum(1).cumsum(0), (1, 0))
+    return rays, starts[rays, which], starts[rays, which] + step, offsets
+
+
+def ray_indices(offsets: Tensor) -> Tensor:
+    """The ray of each sample."""
+    return torch.repeat_interleave(torch.arange(len(offsets) - 1), offsets.diff())
+
+
+def neus_weights(f_prev, f_next, s, offsets, min_transmittance) -> tuple[Tensor, Tensor]:
+    """w = alpha T and its sum, alpha = (Phi(s f_prev) - Phi(s f_next))+ / Phi(s f_prev) as one minus a ratio of
+    sigmoids; 0 behind a transmittance below the least."""
+    passing = (F.logsigmoid(s * f_next) - F.logsigmoid(s * f_prev)).clamp(max=0)  # log(1 - alpha)
+    rays = ray_indices(offsets)
+    counts = offsets.diff()
+    padded = passing.new_zeros(len(counts), int(counts.max()) if len(counts) else 0)
+    places = rays, torch.arange(len(rays)) - offsets[rays]
+    padded = padded.index_put(places, passing)
+    before = (padded.cumsum(1) - padded)[places]
+    weights = torch.where(before.detach().exp() >= min_transmittance, before.exp() * -torch.expm1(passing), 0)
+    return weights, torch.zeros(len(counts), dtype=weights.dtype).index_add(0, rays, weights)
+
+
+def surface_weights(
+    sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Unit normals, weights and their sum: the interval of a sample by its slope along the ray, annealed."""
+    squared = (gradient * gradient).sum(1, keepdim=True)
+    gradient = torch.where(squared < 1e-6, gradient.detach(), gradient)
+    normals = gradient * torch.rsqrt((gradient * gradient).sum(1, keepdim=True) + 1e-12)
+    cosine = (rays_d[ray_indices(offsets)] * normals).sum(1)
+    half = 0.5 * step * -(torch.relu(0.5 - 0.5 * cosine) * (1 - anneal) + torch.relu(-cosine) * anneal)
+    return normals, *neus_weights(sdf - half, sdf + half, s, offsets, min_transmittance)
+
+
+def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:
+    """sum w v along each ray."""
+    sums = torch.zeros(len(offsets) - 1, values.shape[1], dtype=values.dtype)
+    return sums.index_add(0, ray_indices(offsets), weights[:, None] * values)
+
+
+# ---- shading ----
+
+
+def brdf_table(lut: Tensor, n_dot_v: Tensor, roughness: Tensor) -> Tensor:
+    """[n, 3] F1, F2, chi: bilinear in roughness and sqrt(n.v), [n, 1] both."""
+    lut, n = lut.to(roughness.dtype), len(lut) - 1
+    x, y = n_dot_v.clamp(1e-4, 1).sqrt() * n, roughness.clamp(0, 1) * n
+    x0, y0 = x.detach().long().clamp(max=n - 1), y.detach().long().clamp(max=n - 1)
+    fx, fy = x - x0, y - y0
+    x0, y0 = x0[:, 0], y0[:, 0]
+    top, bottom = (torch.lerp(lut[row, x0], lut[row, x0 + 1], fx) for row in (y0, y0 + 1))
+    return torch.lerp(top, bottom, fy)
+
+
+def facing(normals: Tensor, view_dirs: Tensor) -> tuple[Tensor, Tensor]:
+    """Normals turned towards the viewer, and their cosine."""
+    cosine = (normals * view_dirs).sum(1, keepdim=True)
+    return torch.where(cosine < 0, -normals, normals), cosine.abs()
+
+
+def query_direction(normals, view_dirs, roughness, lut, mean) -> Tensor:
+    """The mirrored view, or the mean direction of the lobe around it."""
+    normals, cosine = facing(normals, view_dirs)
+    mirror = 2 * cosine * normals - view_dirs
+    if not mean:
+        return mirror
+    t = ((roughness - 0.3) / 0.1).clamp(0, 1)
+    k = 1 + t * t * (3 - 2 * t) * (brdf_table(lut, cosine, roughness)[:, 2:] - 1)
+    return F.normalize((1 - k) * normals + k * mirror, dim=1)
+
+
+def split_sum_shade(
+    normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d, lut, mode, compensate
+) -> Tensor:
+    """o_d (1 - metallic) (1 - E) albedo L_d + o_s E L_s, E = F F1 + F2; F by the mode: exact, paper or code."""
+    _, cosine = facing(normals, view_dirs)
+    f1, f2, _ = brdf_table(lut, cosine, roughness).split(1, 1)
+    fresnel = f0 = 0.04 * (1 - metallic) + metallic * albedo
+    if mode:
+        edge = 1 - roughness if mode == 1 else torch.maximum(1 - roughness, f0)
+        fresnel = f0 + (edge - f0) * (1 - cosine) ** 5
+    energy = fresnel * f1 + f2
+    if compensate:
+        energy = energy * (1 + fresnel * (1 / (f1 + f2) - 1))
+    kept = 1 - (fresnel if mode else energy)
+    return occlusion_d * (1 - metallic) * kept * albedo * diffuse + occlusion_s * energy * specular
+
+
+def shade_sums(normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, lut, compensate) -> Tensor:
+    """What is reflected of sums over the light, of which `grazing` is the part that Fresnel's term alone reflects."""
+    _, cosine = facing(normals, view_dirs)
+    f1, f2, _ = brdf_table(lut, cosine, roughness).split(1, 1)
+    f0 = 0.04 * (1 - metallic) + metallic * albedo
+    gain = 1 + f0 * (1 / (f1 + f2) - 1) if compensate else torch.ones_like(f0)
+    energy = (f0 * f1 + f2) * gain
+    return gain * (f0 * (specular - grazing) + grazing) + (1 - metallic) * (1 - energy) * albedo * diffuse
+
+
+def monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance) -> Tensor:
+    """[n, 3, 3]: means over directions of D V (n.l) L / p, the same times (1 - v.h)^5, and (n.l) L / (pi p)."""
+    normals, n_v = facing(normals, view_dirs)
+    n_v = n_v.clamp(min=1e-4)
+    a2 = (roughness**2).clamp(min=2e-3) ** 2
+    half = F.normalize(light_dirs + view_dirs[:, None], dim=-1)
+    n_l = (light_dirs * normals[:, None]).sum(-1).clamp(min=0)
+    v_h = (half * view_dirs[:, None]).sum(-1)
+    apart = (normals[:, None] - half).square().sum(-1)
+    d = a2 / (math.pi * (a2 + (1 - a2) * apart * (1 - apart / 4)) ** 2)
+    smith = n_l * torch.sqrt(n_v**2 * (1 - a2) + a2) + n_v * torch.sqrt(n_l**2 * (1 - a2) + a2)
+    lobe = 0.5 * d / smith * n_l
+    weights = torch.stack([lobe, lobe * (1 - v_h).clamp(0, 1) ** 5, n_l / math.pi], 1)
+    share = torch.where(pdf > 0, 1 / (light_dirs.shape[1] * pdf), 0)
+    return weights @ (radiance * share[..., None])
+
+
+def summed_light(normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent) -> Tensor:
+    """The same over directions that all points share, whose densities follow from their solid angles."""
+    n, k = visible.shape
+    incoming = visible[..., None] * radiance
+    incoming = incoming + sent if len(sent) else incoming
+    pdf = (1 / (k * solid_angles)).expand(n, k)
+    return monte_carlo_light(normals, view_dirs, roughness, directions.expand(n, k, 3), pdf, incoming)
+
+
+def linear_to_srgb(linear: Tensor) -> Tensor:
+    power = 1.055 * linear.clamp(min=0.0031308) ** (1 / 2.4) - 0.055
+    return torch.where(linear <= 0.0031308, 12.92 * linear.clamp(min=0), power)
+
+
+# ---- light ----
+
+
+def ggx_lobe(cosine: Tensor, a2: Tensor) -> Tensor:
+    """D (w.w_s)+ by the cosine of w and w_s, D with half the angle between them."""
+    return a2 / (math.pi * ((1 + cosine) / 2 * (a2 - 1) + 1).square()) * cosine.clamp(min=0)
+
+
+def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, light: Tensor) -> Tensor:
+    """The light's mean under the lobe, by the whole matrix of weights at once."""
+    weight = ggx_lobe(query_dirs @ light_dirs.T, roughness.square().clamp(min=1e-4).square())
+    return weight @ light / weight.sum(1, keepdim=True)
+
+
+def sparse_product(
+    offsets, columns, weights, transposed_offsets, transposed_columns, transposed_weights, values
+) -> Tensor:
+    """A sparse matrix, by rows and by columns, of which torch takes the rows, times a dense one."""
+    shape = (len(offsets) - 1, len(transposed_offsets) - 1)
+    return torch.sparse_csr_tensor(offsets, columns.long(), weights, shape) @ values
+
+
+def octahedral_texels(w: Tensor, n: int) -> tuple[Tensor, Tensor]:
+    """Indices [4, k] and weights [4, k] of the texels around directions; an edge is continued by itself, mirrored."""
+    p = w / w.abs().sum(1, keepdim=True)
+    sign = torch.where(p < 0, -1.0, 1.0).to(p.dtype)
+    folded = (1 - p[:, :2].flip(1).abs()) * sign[:, :2]
+    x = (torch.where(p[:, 2:] >= 0, p[:, :2], folded) + 1) * (n / 2) - 0.5
+    x0 = x.detach().floor().clamp(-1, n - 1)
+    f, x0 = x - x0, x0.long()
+    indices, shares = [], []
+    for k in range(4):
+        i, j = x0[:, 0] + (k & 1), x0[:, 1] + (k >> 1)
+        out = (i < 0) | (i >= n)
+        j, i = torch.where(out, n - 1 - j, j), i.clamp(0, n - 1)
+        out = (j < 0) | (j >= n)
+        i, j = torch.where(out, n - 1 - i, i), j.clamp(0, n - 1)
+        indices.append(j * n + i)
+        shares.append((f[:, 0] if k & 1 else 1 - f[:, 0]) * (f[:, 1] if k >> 1 else 1 - f[:, 1]))
+    return torch.stack(indices), torch.stack(shares)
+
+
+def spherical_harmonics(w: Tensor, degree: int) -> Tensor:
+    """[k, (degree + 1)^2] real spherical harmonics, by the recurrence in the degree for each order m."""
+    x, y, z = w.unbind(1)
+    rows: dict[tuple[int, int], Tensor] = {}
+    cosine, sine = torch.ones_like(x), torch.zeros_like(x)
+    diagonal = 0.5 / math.sqrt(math.pi)
+    for m in range(degree + 1):
+        if m:
+            diagonal *= math.sqrt((2 * m + 1) / (2 * m)) * (math.sqrt(2) if m == 1 else 1)
+        before, p = torch.zeros_like(z), torch.full_like(z, diagonal)
+        for l in range(m, degree + 1):  # noqa: E741
+            rows[l, m], rows[l, -m] = p * cosine, p * (sine if m else cosine)
+            span = (l + 1 - m) * (l + 1 + m)
+            a = math.sqrt((2 * l + 3) * (2 * l + 1) / span)
+            b = math.sqrt((2 * l + 3) * (l - m) * (l + m) / ((2 * l - 1) * span)) if l > m else 0.0
+            before, p = p, a * z * p - b * before
+        cosine, sine = cosine * x - sine * y, sine * x + cosine * y
+    return torch.stack([rows[l, m] for l in range(degree + 1) for m in range(-l, l + 1)], 1)
+
+
+def light_lookup(directions, roughness, levels, sh, resolutions, nodes, zonal) -> Tensor:
+    """Maps between the nodes of roughness, and spherical harmonics from the last of them on."""
+    nodes = nodes.to(roughness.dtype)
+    maps, start = [], 0
+    for n in resolutions.tolist():
+        index, share = octahedral_texels(directions, n)
+        maps.append((levels[start + index] * share[..., None]).sum(0))
+        start += n * n
+    degree = math.isqrt(len(sh)) - 1
+    place = (roughness - nodes[-1]) * ((len(zonal) - 1) / (1 - nodes[-1]))
+    row = place.detach().long().clamp(0, len(zonal) - 2)
+    factors = torch.lerp(zonal[row[:, 0]], zonal[row[:, 0] + 1], (place - row).clamp(0, 1))
+    bands = torch.repeat_interleave(torch.arange(degree + 1), torch.arange(1, 2 * degree + 2, 2))
+    x = (spherical_harmonics(directions, degree) * factors[:, bands]) @ sh
+    floor = (sh[0] * 1e-3 * 0.5 / math.sqrt(math.pi)).clamp(min=1e-20)  # bent below it, so that no light is negative
+    maps.append(torch.where(x < floor, floor * torch.exp((x / floor).clamp(max=1) - 1), x))
+    stacked = torch.stack(maps)
+    k = torch.searchsorted(nodes, roughness.detach(), right=True).clamp(1, len(nodes) - 1)
+    share = ((roughness - nodes[k - 1]) / (nodes[k] - nodes[k - 1])).clamp(0, 1)
+    rows = torch.arange(len(directions))
+    return torch.lerp(stacked[k[:, 0] - 1, rows], stacked[k[:, 0], rows], share)
+
+
+# ---- visibility cached at vertices ----
+
+
+def neighbours(positions, normals, vertices, vertex_normals, radius: float, n_levels: int) -> tuple[Tensor, Tensor]:
+    """The heaviest vertices [n, k] that answer for points, and their shares: those that face the same way within the
+    radius, where there are none within twice the radius, and so on."""
+    distance, cosine = torch.cdist(positions, vertices), (normals @ vertex_normals.T).clamp(min=0)
+    weight, left = torch.zeros_like(distance), torch.arange(len(positions))
+    for level in range(n_levels):
+        relative = distance[left] / (radius * 2**level)
+        found = ((1 - relative).clamp(min=0) / (relative + 0.05)) ** 2 * cosine[left] ** 4
+        weight[left] = torch.where(found > 1e-6, found, 0)
+        left = left[(weight[left] == 0).all(1)]
+    weight, near = weight.topk(min(NEIGHBOURS, len(vertices)), 1)
+    return near, weight / weight.sum(1, keepdim=True).clamp(min=1e-9)
+
+
+def cached_visibility(
+    positions, normals, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions
+) -> tuple[Tensor, Tensor]:
+    """Open shares [n, directions] and the mesh's own light [n, directions, 3] from there."""
+    near, weight = neighbours(positions, normals, vertices, vertex_normals, radius, len(starts))
+    places = torch.arange(BITS, dtype=torch.int32)
+    known = (bits[near][..., None] >> places & 1).flatten(-2).to(weight.dtype) * weight[..., None, None]
+    opened, blocked = known.sum(1).unbind(1)  # of [n, k, 2, directions]
+    total = opened + blocked
+    above = normals @ directions.T > 0
+    covered = ((blocked > 0) & above).any(1, keepdim=True)  # elsewhere all is open
+    visible = torch.where(covered & (total > 0), opened / total.clamp(min=1e-9), 1)
+    if not hits.shape[1]:  # nothing is known of what the mesh sends
+        return visible, visible.new_zeros(*visible.shape, 3)
+    sent = (radiance[hits[near].clamp(min=0)] * known[:, :, 1, :, None]).sum(1)
+    return visible, sent * (above / total.clamp(min=1e-9))[..., None]
+
+
+def cached_occlusion(
+    positions, normals, lobe_dirs, roughness, vertices, vertex_normals, starts, order, radius, bits, hits, radiance,
+    directions, light,
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:  # fmt: skip
+    """Shares of the light and means of the mesh's own under the cosine and under the lobe, [n, 3] each."""
+    visible, sent = cached_visibility(
+        positions, normals, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions
+    )
+    cosine = (normals @ directions.T).clamp(min=0)
+    ggx_alpha = roughness.square().clamp(min=math.sqrt(2 / 3 / len(directions)))
+    lobe = ggx_lobe(lobe_dirs @ directions.T, ggx_alpha.square()) * (cosine > 0)
+    kernels, light = (cosine, lobe), light + BLACK_LIGHT
+    shares = [((visible * k) @ light / (k @ light)).clamp(max=1) for k in kernels]
+    means = [(sent * k[..., None]).sum(1) / k.sum(1, keepdim=True).clamp(min=1e-9) for k in kernels]
+    return *shares, *means
+
+
+# ---- losses ----
+
+
+def pixel_losses(mean, opacity, target, background, linear: bool) -> tuple[Tensor, Tensor]:
+    """Squared error over a background, from below only where the photo is clipped, and cross entropy of the mask."""
+    colour = linear_to_srgb(mean) if linear else mean
+    colour = torch.where(target[:, :3] >= 254 / 255, colour.clamp(max=1), colour)
+    o, a = opacity[:, None], target[:, 3:]
+    error = colour * o + background * (1 - o) - (target[:, :3] * a + background * (1 - a))
+    mask = F.binary_cross_entropy(opacity.clamp(1e-3, 1 - 1e-3), target[:, 3])
+    return error.square().mean(), mask
+
+
+def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple[Tensor, Tensor]:
+    """(|g| - 1)^2, and the distance of unit normals of neighbours that face the same way."""
+    eikonal = (torch.sqrt(gradients.square().sum(-1) + 1e-24) - 1).square().mean()
+    here, there = (F.normalize(g, dim=1) for g in (gradients[beside], gradients[len(gradients) - len(beside) :]))
+    apart = (there - here).square().sum(1)
+    counts = weights[beside] * (apart.detach() < 2)
+    return eikonal, (counts * torch.sqrt(apart + 1e-24)).sum() / counts.sum().clamp(min=1e-8)
+
+
+def material_losses(albedo, metallic, shares, smooth_l1: bool) -> tuple[Tensor, Tensor, Tensor]:
+    """Weighted means of m^2 (or its smooth L1), m (1 - m), and m times the darkness of the albedo."""
+    m, shares = metallic[:, 0], shares / shares.sum()
+    metal = F.smooth_l1_loss(m, torch.zeros_like(m), reduction="none") if smooth_l1 else m.square()
+    darkness = (1 - albedo.detach().amax(1) / 0.4).clamp(min=0)
+    return shares @ metal, shares @ (m * (1 - m)), shares @ (m * darkness)
+
+
+def quadratic_entropy(x: Tensor) -> Tensor:
+    """-log of the mean over all pairs of exp(-|x_i - x_j|^2 / 4)."""
+    return -torch.log(torch.exp(-0.25 * (x[:, None] - x[None]).square().sum(-1)).mean())

@@ -1,0 +1,66 @@
+"""Every plain reference beside its operator in float64: results, and gradients where the operator has them."""
+
+from __future__ import annotations
+
+import inspect
+
+import numpy as np
+import pytest
+import torch
+from op_cases import CASES, truth
+from op_checks import as_tuple, generator, grad_leaves, lib
+
+from splitnerf.bench import reference
+from splitnerf.bench.hash_grid import SPEC
+
+# The inputs of each operator to which there is a gradient.
+DIFFERENTIABLE = {
+    "hash_encode": (0, 1), "sdf_layer": range(1, 7), "march_rays": (), "neus_weights": (0, 1, 2), "surface_weights": (0, 1, 3),
+    "composite": (0, 1), "query_direction": (0, 1, 2), "split_sum_shade": range(9), "shade_sums": range(8),
+    "monte_carlo_light": (0, 2, 5), "summed_light": (0, 2, 5), "linear_to_srgb": (0,), "prefilter_light": (3,),
+    "sparse_product": (6,), "light_lookup": (0, 1, 2, 3), "cached_visibility": (), "cached_occlusion": (),
+    "pixel_losses": (0, 1), "gradient_losses": (0,), "material_losses": (1,), "quadratic_entropy": (0,),
+}  # fmt: skip
+TOLERANCE = {"cached_occlusion": 2e-7}  # its directions have unit length in float32; of the others: 1e-9
+LOSSES = ("pixel_losses", "gradient_losses", "material_losses")  # whose operators return all terms in one tensor
+
+
+def as_the_operator_reads(inputs: tuple) -> tuple:
+    """Numbers such as a step's length are float32 inside of some operators."""
+    return tuple(float(np.float32(x)) if isinstance(x, float) else x for x in inputs)
+
+
+def results(op: str, inputs: tuple) -> list[torch.Tensor]:
+    got = as_tuple(getattr(lib, op)(*inputs))
+    return list(got[0].unbind()) if op in LOSSES else list(got)
+
+
+@pytest.mark.parametrize("op", DIFFERENTIABLE)
+def test_operator_and_reference_agree(op):
+    inputs = as_the_operator_reads(truth(CASES[op](torch.float64)))
+    ours, theirs = (grad_leaves(inputs, DIFFERENTIABLE[op]) for _ in range(2))
+    expected = as_tuple(getattr(reference, op)(*theirs))
+    got = results(op, ours)[: len(expected)]
+    for a, b in zip(got, expected, strict=True):
+        torch.testing.assert_close(a, b, rtol=TOLERANCE.get(op, 1e-9), atol=1e-10)
+    if not DIFFERENTIABLE[op]:
+        return
+    for outputs in (got, expected):
+        cotangents = [torch.randn(x.shape, generator=generator(i), dtype=x.dtype) for i, x in enumerate(outputs)]
+        sum((c * x).sum() for c, x in zip(cotangents, outputs)).backward()
+    for i in DIFFERENTIABLE[op]:
+        torch.testing.assert_close(ours[i].grad, theirs[i].grad, rtol=1e-7, atol=1e-9)
+        assert theirs[i].grad.abs().max() > 0
+
+
+def test_every_reference_of_an_operator_is_compared():
+    functions = {name for name, _ in inspect.getmembers(reference, inspect.isfunction)}
+    assert functions & set(CASES) == set(DIFFERENTIABLE)
+
+
+def test_the_grid_of_the_benchmark_is_the_operator():
+    """2^19 entries a level: hashes of large coordinates."""
+    x = torch.rand(200, 3, generator=generator(), dtype=torch.float64)
+    table = torch.randn(SPEC.n_entries, SPEC.n_features, generator=generator(1), dtype=torch.float64)
+    inputs = x, table, *SPEC.arguments(SPEC.n_levels)
+    torch.testing.assert_close(reference.hash_encode(*inputs), lib.hash_encode(*inputs), rtol=1e-9, atol=1e-12)
