@@ -63,7 +63,7 @@ def test_fifty_steps_are_those_of_torch(device, decay):
         run(optimiser, range(50))
     close(everything(double), everything(exact), 1e-12)
     close(everything(ours), everything(exact), 3e-6)
-    close(everything(ours), everything(theirs), 3e-6)
+    close(everything(ours), everything(theirs), 3e-6 if device == "cpu" else 1e-5)  # torch rounds more on a GPU
 
 
 @each_device
