@@ -1,6 +1,7 @@
 # make demo   installs what is missing, builds, and reconstructs an embedded scene
 # make test   installs, builds, and runs gtest and pytest
 # make sanitize   builds gtest with AddressSanitizer and UndefinedBehaviorSanitizer and runs it
+# make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
 # make fuzz   feeds each reader damaged files for FUZZ_SECONDS, in four parts: tracing takes memory with every run
 VENV ?= .venv
 PYTHON ?= python3
@@ -11,7 +12,7 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 FUZZ_SECONDS ?= 600
 READERS := json png exr hdr glb checkpoint
 
-.PHONY: demo test test-slow install system gtest sanitize fuzz pytest clean
+.PHONY: demo test test-slow install system gtest sanitize fuzz pytest mutants clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -34,7 +35,11 @@ fuzz: install
 	  $(BIN)/python tests/fuzz/fuzz_readers.py $$reader -max_total_time=$$(($(FUZZ_SECONDS) / 4)); done; done
 
 pytest: install
-	$(BIN)/python -m pytest -q
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS)
+
+mutants: install
+	$(BIN)/python -m pip install --quiet -e '.[mutants]' --no-build-isolation
+	$(BIN)/python tests/mutants.py $(MUTANTS)
 
 test-slow: install
 	$(BIN)/python -m pytest -q -m slow

@@ -164,9 +164,9 @@ def test_recorded_steps_keep_their_number_of_rays_while_the_budget_is_nearly_met
     config = Config().replace({"target_samples": 30_000, "max_rays": 100_000, "cuda_graphs": True})
     for samples, kept in ((30_000 / 1.09, True), (30_000 / 0.91, True), (30_000 / 1.11, False), (30_000 / 0.89, False)):
         assert (next_ray_count(1000, samples, config) == 1000) == kept, samples
-    for n in range(64, 5000, 37):
-        count = next_ray_count(n, n * 30_000 / (1.2 * n), config)
-        assert count % (2 ** (count.bit_length() - 1) // 16) == 0 and count <= 1.25 * n
+    taken = {next_ray_count(n, n * 30_000 / (1.2 * n), config) for n in range(64, 5000)}
+    for size in (128, 1024, 2048):  # between a power of 2 and the next
+        assert {n for n in taken if size <= n < 2 * size} == set(range(size, 2 * size, size // 16))
 
 
 # ---- the light ----

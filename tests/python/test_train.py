@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import time
 import numpy as np
 import pytest
 import torch
-from tiny_runs import SMALL, tiny, train
+from tiny_runs import SMALL, as_options, tiny, train
 
 from splitnerf.training.checkpoint import config_of, load_checkpoint
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
@@ -220,7 +221,17 @@ def _stop_after(steps: int, run) -> None:
 
 def test_ctrl_c_saves_and_exits_with_130(data, tmp_path):
     run = tmp_path / "run"
-    command = [sys.executable, "-m", "splitnerf.train", str(data), "--out", str(run), *SMALL, "--steps", "100000"]
+    command = [
+        sys.executable,
+        "-m",
+        "splitnerf.train",
+        str(data),
+        "--out",
+        str(run),
+        *as_options(SMALL),
+        "--steps",
+        "100000",
+    ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 120
     while not ((run / "metrics.jsonl").exists() and (run / "metrics.jsonl").stat().st_size):
@@ -328,11 +339,18 @@ def test_evaluate_repeats_the_result_of_training(data, tmp_path):
 
 def test_the_paper_preset_takes_steps(data, tmp_path):
     """The published widths and levels, with few samples: every one of its switches runs."""
-    run = tmp_path / "run"
-    options = ["--set", "target_samples=2048", "--set", "initial_rays=32", "--set", "light_samples=128", "--set",
-               "light_queries=64", "--set", "mesh_resolution=32", "--set", "export_resolution=32", "--set",
-               "grid_resolution=32", "--set", "log2_table_size=14", "--set", "mesh_every=0.3"]  # fmt: skip
-    assert main(["train", str(data), "--out", str(run), "--preset", "paper", "--steps", "6", *options]) == DONE
+    run, scene = tmp_path / "run", shutil.copytree(data, tmp_path / "data")
+    (scene / "mesh.ply").unlink()  # far from the sphere that it begins with
+    settings = dict(
+        target_samples=2048, initial_rays=32, light_samples=128, light_queries=64, mesh_resolution=32, export_resolution=32,
+        grid_resolution=32, log2_table_size=14, mesh_every=0.3, preview_every=1.0, export_texture_size=64, export_faces=500,
+        export_environment_height=16,
+    )  # fmt: skip
+    assert (
+        main(["train", str(scene), "--out", str(run), "--preset", "paper", "--steps", "6", *as_options(settings)])
+        == DONE
+    )
+    assert (run / "evaluation.json").stat().st_size > 0 and list((run / "previews").iterdir())
     assert Config.read(run / "config.toml").fresnel_mode == "paper"
 
 
