@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = Path("python/splitnerf")
 # The fast tests of each file, by the longest beginning of its path that is listed.
 TESTS = {
-    "config.py": "test_settings.py test_schedule.py",
+    "config.py": "test_config.py test_schedule.py",
     "evaluate/": "test_evaluate.py test_metrics.py",
     "export/": "test_export.py test_bake.py test_meshing.py test_tangents.py",
     "fields/": "test_scene.py test_shading_model.py",
@@ -37,7 +37,7 @@ TESTS = {
     "training/meshes.py": "test_meshes.py",
     "training/optimiser.py": "test_schedule.py",
     "training/schedule.py": "test_schedule.py",
-    "training/step.py": "test_step.py test_schedule.py",
+    "training/step.py": "test_schedule.py test_train.py",
 }
 # Of each kind of operator one replacement is enough; a bar stands in annotations, which nobody evaluates.
 LEFT_OUT = [r"core/ReplaceBinaryOperator_(?!Add_Sub|Sub_Add|Mul_Div|Div_Mul|Pow_Mul|FloorDiv_Div|Mod_Mul|MatMul_Mul)",
