@@ -88,6 +88,27 @@ def test_each_part_has_its_rate_and_its_decay(light, sparse):
         assert sparsely[id(parameter)] == (sparse and name == "sdf_field.grid.table"), name
 
 
+@pytest.mark.parametrize("dtype", ["float32", "float16"])
+@pytest.mark.parametrize("sparse", [False, True])
+def test_sparse_steps_leave_entries_without_a_gradient_alone(sparse, dtype):
+    """A step moves the one entry that has a gradient; others decay, lr wd of themselves, but not with sparse steps. What is read
+    of a table of 16 bits is that of the table as it stands after the step."""
+    config = tiny(sparse_steps=sparse, table_dtype=dtype, learning_rate=0.01, weight_decay=0.5)
+    model = SceneModel(config)
+    grid = model.sdf_field.grid
+    with torch.no_grad():
+        grid.table.fill_(0.25)
+    grid.stored()
+    grid.table.grad = torch.zeros_like(grid.table)
+    grid.table.grad[3] = 1.0
+    make_optimiser(model, config).step()
+    assert grid.table[3].tolist() == pytest.approx([0.25 * (1 - 0.005) - 0.01] * 2, rel=1e-5)
+    others = torch.cat([grid.table[:3], grid.table[4:]])
+    torch.testing.assert_close(others, torch.full_like(others, 0.25 if sparse else 0.25 * (1 - 0.005)))
+    if dtype == "float16":
+        assert torch.equal(grid.stored(), grid.table.detach().half())
+
+
 def test_all_rates_follow_one_factor():
     config = tiny(steps=100, warmup_steps=10, final_learning_rate=0.25, **RATES)
     optimiser = make_optimiser(SceneModel(config), config)
@@ -158,6 +179,7 @@ def test_rays_have_bounds():
     config = Config().replace({"target_samples": 30_000, "max_rays": 900})
     assert converged(256, 1.0, config)[-1] == 900 and converged(256, 1e5, config)[-1] == 64
     assert next_ray_count(256, 0, config) == int(1.25 * 256)  # all rays missed
+    assert next_ray_count(100, 1, config.replace({"target_samples": 1})) == 100
 
 
 def test_recorded_steps_keep_their_number_of_rays_while_the_budget_is_nearly_met():
