@@ -3,6 +3,7 @@
 # make sanitize   builds gtest with AddressSanitizer and UndefinedBehaviorSanitizer and runs it
 # make stability   asks each operator STABILITY_CASES times and writes docs/benchmarks/stability.md; more in STABILITY_OPTIONS
 # make tables   says which tables under docs/ are stale
+# make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
 # make fuzz   feeds each reader damaged files for FUZZ_SECONDS, in four parts: tracing takes memory with every run
 VENV ?= .venv
 PYTHON ?= python3
@@ -15,7 +16,7 @@ STABILITY_CASES ?= 10000000
 STABILITY_OPTIONS ?=
 READERS := json png exr hdr glb checkpoint
 
-.PHONY: demo test test-slow install system gtest sanitize fuzz stability tables pytest clean
+.PHONY: demo test test-slow install system gtest sanitize fuzz stability tables pytest mutants clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -44,7 +45,11 @@ tables: install
 	@$(BIN)/python tests/bench/tables.py
 
 pytest: install
-	$(BIN)/python -m pytest -q
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS)
+
+mutants: install
+	$(BIN)/python -m pip install --quiet -e '.[mutants]' --no-build-isolation
+	$(BIN)/python tests/mutants.py $(MUTANTS)
 
 test-slow: install
 	$(BIN)/python -m pytest -q -m slow

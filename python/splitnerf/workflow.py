@@ -12,7 +12,7 @@ import numpy as np
 import torch
 import trimesh
 
-from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_model, restored_occupancy
+from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_model, restored_grid
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
@@ -181,7 +181,7 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     SurfaceMesh(model).restore(content)
     grid = make_grid(config)
     if config.sampling.occupancy == "average":  # a mean over time, unlike the distance
-        grid.values = restored_occupancy(grid.values, content, run / "checkpoint.pt")
+        grid.values, _ = restored_grid(grid, content, run / "checkpoint.pt")
     grid.update(model.sdf_field.sdf, model.s_value)
     return model, grid, content
 

@@ -80,17 +80,17 @@ def test_a_light_texel_that_is_not_finite_stops_the_run(data, begun, monkeypatch
 
 def test_light_that_is_infinite_is_named(data, begun, monkeypatch):
     """One sample of the light on its way to the pixels."""
-    from splitnerf.fields import LightPyramid
+    from splitnerf.fields.light_pyramid import FilteredLight
 
     run, before = begun
-    original = LightPyramid.forward
+    original = FilteredLight.__call__
 
     def planting(self, directions, roughness):
         radiance = original(self, directions, roughness)
         return radiance.index_fill(0, torch.tensor([0]), torch.inf) if torch.is_grad_enabled() else radiance
 
     with monkeypatch.context() as patch:
-        patch.setattr(LightPyramid, "forward", planting)
+        patch.setattr(FilteredLight, "__call__", planting)
         with pytest.raises(Diverged, match=r"loss is not finite .*first not finite: rendered radiance"):
             trainer.train(load_dataset(data), tiny(steps=20), run, resume=True)
     goes_on(data, run, before)

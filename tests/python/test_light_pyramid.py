@@ -238,8 +238,7 @@ def test_the_light_of_cells_carries_its_gradient_on(kind):
         else:
             (bits.cell_light(light).radiance.square().sum() + bits.cell_light(light).radiance.exp().sum()).backward()
         grads.append(torch.cat([p.grad.flatten() for p in light.parameters()]))
-    assert grads[1].abs().sum() > 0
-    torch.testing.assert_close(*grads)
+    assert grads[1].abs().sum() > 0 and (grads[0] - grads[1]).norm() < 1e-5 * grads[1].norm()
 
 
 def test_settings_choose_the_light_and_its_rate():

@@ -70,6 +70,8 @@ def test_neutral_light_loss_measures_chroma_alone():
     assert losses.neutral_light_loss(Sky([3.0, 3.0, 3.0], 0.0), config, generator).item() == pytest.approx(
         0.0, abs=1e-9
     )
+    coloured = Sky([math.exp(0.5), 1.0, math.exp(-0.5)], 0.0)  # the same from everywhere: (.5^2 + 0 + .5^2) / 3
+    assert losses.neutral_light_loss(coloured, config, generator).item() == pytest.approx(0.5 / 3, rel=1e-4)
     tinted = losses.neutral_light_loss(Sky([1.0, 1.0, 1.0], 0.6), config, generator).item()
     assert tinted == pytest.approx(2.0 / 3.0 * 0.36 / 3.0, rel=0.03)
 

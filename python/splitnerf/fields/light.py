@@ -32,6 +32,14 @@ class LightSamples:
         self.variance += rate * (noise * n - self.variance)
         self.squared_error += rate * (squared_error - self.squared_error)
 
+    def state(self) -> Tensor:
+        """[2] float64, what a checkpoint keeps."""
+        return torch.tensor([self.variance, self.squared_error], dtype=torch.float64)
+
+    def restore(self, state: Sequence[float]) -> None:
+        """Goes on from what :meth:`state` returned."""
+        self.variance, self.squared_error = state
+
     def count(self, share: float, most: int) -> int:
         """Directions of the next step for noise of this share, 64 to ``most``; before the first step the most."""
         if not self.squared_error:
@@ -140,7 +148,7 @@ class Light(nn.Module, abc.ABC):
     Attributes:
         needs_consistency_loss: Whether only ``losses.light_loss`` ties g(w, rho) to g(w, 0). False where
             that holds by construction.
-        loss_samples: How many light directions that loss takes. Not part of a checkpoint.
+        loss_samples: How many light directions that loss takes.
 
     Source: SplitNeRF Eq. (8)-(11).
     """

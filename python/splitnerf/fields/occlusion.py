@@ -124,6 +124,14 @@ class OcclusionModel(nn.Module, abc.ABC):
     def set_light(self, light: EvaluatedLight) -> None:
         """Takes the light that weighs the factors, where they do not come from a network."""
 
+    def cached_light(self) -> dict[str, Tensor | None]:
+        """The light that weighs the factors and the light that the mesh sends, where they are kept: what a checkpoint needs
+        beside the mesh to go on with the same bits."""
+        return {}
+
+    def restore_light(self, cached: dict[str, Tensor | None]) -> None:
+        """Puts back what :meth:`cached_light` returned, on a mesh like that of then."""
+
     def refresh(self, shade: Callable[[Tensor, Tensor], Tensor]) -> None:
         """Shades the cached mesh anew, where one is: ``shade(positions, normals)`` is its radiance [n, 3] along the normals."""
 

@@ -84,6 +84,15 @@ class VisibilityBits(OcclusionModel):
         """Takes the light that weighs the factors, its mean over each direction's cell."""
         self.light.copy_((light.cells or self.cell_light(light.maps)).radiance)
 
+    def cached_light(self) -> dict[str, Tensor | None]:
+        """The sky's light of each direction [k, 3], and what each vertex sends out [n, 3] or None."""
+        return {"sky": self.light, "sent": self.radiance}
+
+    def restore_light(self, cached: dict[str, Tensor | None]) -> None:
+        """Puts back what :meth:`cached_light` returned, on a mesh of as many vertices."""
+        self.light.copy_(cached["sky"])
+        self.radiance = None if cached["sent"] is None else cached["sent"].to(self.light.device)
+
     def cell_light(self, light: LightMaps) -> CellLight:
         """The light's mean over each direction's cell, differentiable in the light."""
         radiance = light(self._texels, torch.full_like(self._solid_angle, self._texel_roughness))

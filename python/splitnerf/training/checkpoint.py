@@ -15,6 +15,7 @@ from splitnerf.config import Config
 from splitnerf.data.images import atomic_path
 from splitnerf.errors import InputError
 from splitnerf.ops.hash_grid import HashGridSpec
+from splitnerf.render.occupancy import OccupancyGrid
 
 FORMAT = 1
 GLOBALS = {"torch._utils _rebuild_tensor_v2", "collections OrderedDict"}  # and the kinds of storage
@@ -125,15 +126,16 @@ def restore_generator(generator: torch.Generator, content: dict, path: Path) -> 
         raise InputError(f"{path}: its random generators cannot be restored ({error}); train anew") from None
 
 
-def restored_occupancy(values: Tensor, content: dict, path: Path) -> Tensor:
-    """What the checkpoint keeps of each cell, for a grid that has ``values`` [r^3] of them.
+def restored_grid(grid: OccupancyGrid, content: dict, path: Path) -> tuple[Tensor, Tensor]:
+    """What the checkpoint keeps of each cell of a grid, [r^3], and its cells [r, r, r], on the grid's device.
 
     Raises:
         InputError: It has another number of cells.
     """
-    if content["occupancy"].shape != values.shape:
+    stored = content["occupancy"], content["cells"]
+    if stored[0].shape != grid.values.shape or stored[1].shape != grid.cells.shape:
         raise InputError(f"{path}: its occupancy grid does not fit the settings; leave grid_resolution as it was")
-    return content["occupancy"].to(values.device)
+    return stored[0].to(grid.device), stored[1].to(grid.device)
 
 
 def _check_container(path: Path) -> None:
@@ -186,7 +188,10 @@ def _check_content(content: dict) -> None:
         raise ValueError(f"device is {content.get('device')!r}")
     for key in ("generator", "torch_generator"):
         _check_tensor(key, content.get(key), (-1,), torch.uint8)
-    _check_tensor("occupancy", content.get("occupancy"), (config.sampling.grid_resolution**3,), torch.float32)
+    resolution = config.sampling.grid_resolution
+    _check_tensor("occupancy", content.get("occupancy"), (resolution**3,), torch.float32)
+    _check_tensor("cells", content.get("cells"), (resolution,) * 3, torch.uint8)
+    _check_light(config, content)
     _check_sizes(config, content["model"])
     _check_tensor("box_from_world", content.get("box_from_world"), (4, 4), torch.float64)
     vertices, faces = content.get("mesh_vertices"), content.get("mesh_faces")
@@ -195,6 +200,21 @@ def _check_content(content: dict) -> None:
         _check_tensor("mesh_faces", faces, (-1, 3), torch.int32, torch.int64)
         if not (faces.numel() and 0 <= int(faces.min()) and int(faces.max()) < len(vertices)):
             raise ValueError("mesh_faces is empty or names vertices that are none")
+
+
+def _check_light(config: Config, content: dict) -> None:
+    """Raises ValueError where the light that is kept beside the parameters is not what the trainer writes."""
+    _check_tensor("light_noise", content.get("light_noise"), (2,), torch.float64)
+    height, cached, vertices = config.occlusion.environment_height, content.get("occlusion_light"), content.get("mesh_vertices")
+    if content.get("environment") is not None:
+        _check_tensor("environment", content["environment"], (height, 2 * height, 3), torch.float32)
+    if not isinstance(cached, dict) or cached.keys() != ({"sky", "sent"} if config.occlusion.kind == "bits" else set()):
+        raise ValueError("occlusion_light is missing or of another kind")
+    if cached:
+        _check_tensor("the sky's light", cached["sky"], (config.occlusion.directions, 3), torch.float32)
+    if cached.get("sent") is not None:
+        n = len(vertices) if isinstance(vertices, Tensor) else 0
+        _check_tensor("the light that the mesh sends", cached["sent"], (n, 3), torch.float32)
 
 
 def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:

@@ -29,7 +29,7 @@ from splitnerf.training.checkpoint import (
     restore_generator,
     restore_model,
     restore_optimiser,
-    restored_occupancy,
+    restored_grid,
     save_checkpoint,
 )
 from splitnerf.training.finite import GradientWatch, check_state, explain_loss
@@ -144,7 +144,7 @@ class Training:
         self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.sampling.initial_rays, 0.0
         self.psnr_mean: float | None = None
         self.started = self.saved_at = time.monotonic()
-        self.first = True  # step of this process
+        self.first = True  # step of the run
 
     def restore(self) -> None:
         """Goes on from the run's checkpoint."""
@@ -154,11 +154,17 @@ class Training:
         restore_model(self.model, content, path)
         restore_optimiser(self.optimiser, content, path)
         restore_generator(self.generator, content, path)
-        self.grid.values = restored_occupancy(self.grid.values, content, path)
+        self.grid.values, self.grid.cells = restored_grid(self.grid, content, path)
+        self.model.light.loss_samples.restore(content["light_noise"].tolist())
+        if content["environment"] is not None:
+            self.environment = content["environment"].to(self.grid.device)
         for name in ("step", "seconds", "n_rays", "previewed_at"):
             setattr(self, name, content[name])
         self.model.open_levels(self.progress)
         self.mesh.restore(content)
+        if content["occlusion_light"]:
+            self.model.occlusion.restore_light(content["occlusion_light"])
+        self.first = self.step == 0
         self.started = time.monotonic() - self.seconds
 
     def save(self) -> None:
@@ -170,7 +176,8 @@ class Training:
                 step=self.step, seconds=self.seconds, n_rays=self.n_rays, previewed_at=self.previewed_at,
                 model=self.model.state_dict(), optimiser=self.optimiser.state_dict(), device=self.generator.device.type,
                 generator=self.generator.get_state(), torch_generator=torch.get_rng_state(), occupancy=self.grid.values,
-                box_from_world=torch.from_numpy(self.dataset.box_from_world), **self.mesh.state(),
+                cells=self.grid.cells, environment=self.environment, light_noise=self.model.light.loss_samples.state(),
+                occlusion_light=self.model.occlusion.cached_light(), box_from_world=torch.from_numpy(self.dataset.box_from_world), **self.mesh.state(),
             ),
         )  # fmt: skip
         self.saved_at = time.monotonic()
@@ -273,7 +280,8 @@ class Training:
         if finished and self.config.occlusion.kind == "bits":
             self.mesh.request(1.0)
             self.mesh.poll(wait=True)
-        self.grid.update(self.model.sdf_field.sdf, self.model.s_value)
+        if finished:
+            self.grid.update(self.model.sdf_field.sdf, self.model.s_value)
         self.save()
 
     def result(self) -> TrainedScene:

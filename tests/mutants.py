@@ -1,0 +1,112 @@
+"""Mutation testing: changes a source file in one place after the other and runs the fast tests that concern it each time.
+
+    python tests/mutants.py python/splitnerf/training/schedule.py ...
+
+A change that no test sees is printed as a diff. What is left over after tests were added is explained in docs/mutants.md.
+cosmic-ray writes each change into the file itself and takes it back; so the file must have no changes that are not committed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = Path("python/splitnerf")
+# The fast tests of each file, by the longest beginning of its path that is listed.
+TESTS = {
+    "config.py": "test_config.py test_schedule.py",
+    "evaluate/": "test_evaluate.py test_metrics.py",
+    "export/": "test_export.py test_bake.py test_meshing.py test_tangents.py",
+    "fields/": "test_scene.py test_shading_model.py",
+    "fields/light": "test_light_pyramid.py test_shading_model.py test_scene.py",
+    "fields/visibility.py": "test_visibility.py test_summed_light.py",
+    "render/": "test_scene.py test_shading_model.py",
+    "render/model.py": "test_shading_model.py test_scene.py test_summed_light.py test_schedule.py",
+    "render/path_traced.py": "test_path_traced.py",
+    "render/rays.py": "test_pixel_rays.py",
+    "training/checkpoint.py": "test_hostile_files.py",
+    "training/finite.py": "test_finite.py",
+    "training/graphs.py": "test_graphs.py",
+    "training/losses.py": "test_physics.py test_shading_model.py test_scene.py",
+    "training/meshes.py": "test_meshes.py",
+    "training/optimiser.py": "test_schedule.py",
+    "training/schedule.py": "test_schedule.py",
+    "training/step.py": "test_schedule.py test_train.py",
+}
+# Of each kind of operator one replacement is enough; a bar stands in annotations, which nobody evaluates.
+LEFT_OUT = [r"core/ReplaceBinaryOperator_(?!Add_Sub|Sub_Add|Mul_Div|Div_Mul|Pow_Mul|FloorDiv_Div|Mod_Mul|MatMul_Mul)",
+            r"core/ReplaceUnaryOperator_.*_(Invert|Not)$", r"core/ReplaceComparisonOperator_.*_Is(Not)?$", r"core/ExceptionReplacer", r"core/RemoveDecorator"]  # fmt: skip
+SECONDS = 300  # of the tests with one mutant
+
+
+def tests_of(path: Path) -> list[str]:
+    """The test files that concern a source file."""
+    name = path.relative_to(PACKAGE).as_posix()
+    known = [start for start in TESTS if name.startswith(start)]
+    if not known:
+        sys.exit(f"{path}: no tests are listed for it in {Path(__file__).name}; add a line to TESTS")
+    names = TESTS[max(known, key=len)].split()
+    return [f"tests/python/{name}" for name in names if (ROOT / "tests/python" / name).is_file()]
+
+
+def cosmic_ray(*arguments: object) -> str:
+    """Runs it in the repository's root; returns what it printed."""
+    beside = Path(sys.executable).with_name("cosmic-ray")
+    program = str(beside) if beside.is_file() else shutil.which("cosmic-ray")
+    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run([program, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, env=environment)
+    if done.returncode:
+        sys.exit(f"cosmic-ray {arguments[0]}: {done.stderr or done.stdout}")
+    return done.stdout
+
+
+def mutate(path: Path) -> tuple[int, int, list[str]]:
+    """How many mutants there are, how many were killed, and the others as diffs."""
+    if subprocess.run(["git", "diff", "--quiet", "HEAD", "--", str(path)], cwd=ROOT).returncode:
+        sys.exit(f"{path}: has changes that are not committed; commit them first")
+    folder = ROOT / "build" / "mutants" / path.stem
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    command = " ".join([sys.executable, "-m pytest -q -x -p no:cacheprovider", *tests_of(path)])
+    lines = ["[cosmic-ray]", f'module-path = "{path.as_posix()}"', f"timeout = {SECONDS}.0", "excluded-modules = []",
+             f'test-command = "{command}"', "[cosmic-ray.distributor]", 'name = "local"',
+             "[cosmic-ray.filters.operators-filter]", f"exclude-operators = {json.dumps(LEFT_OUT)}"]  # fmt: skip
+    settings, session = folder / "settings.toml", folder / "session.sqlite"
+    settings.write_text("\n".join(lines) + "\n")
+    try:
+        cosmic_ray("baseline", settings)
+        cosmic_ray("init", settings, session)
+        subprocess.run([Path(shutil.which("cr-filter-operators") or Path(sys.executable).with_name("cr-filter-operators")),
+                        str(session), str(settings)], cwd=ROOT, check=True)  # fmt: skip
+        cosmic_ray("exec", settings, session)
+    finally:
+        subprocess.run(["git", "checkout", "--quiet", "--", str(path)], cwd=ROOT, check=True)
+    results = [json.loads(line)[1] for line in cosmic_ray("dump", session).splitlines()]
+    run = [result for result in results if result and result["worker_outcome"] == "normal"]
+    left = [changed_lines(result["diff"]) for result in run if result["test_outcome"] == "survived"]
+    return len(run), len(run) - len(left), left
+
+
+def changed_lines(diff: str) -> str:
+    """Where a diff begins and its lines that begin with - or +."""
+    at = re.search(r"^@@ -(\d+)", diff, re.M)
+    lines = [line for line in diff.splitlines() if re.match(r"[-+](?![-+]{2})", line)]
+    return "\n".join([f"  near line {at[1] if at else '?'}", *(f"  {line}" for line in lines)])
+
+
+def main(files: list[str]) -> None:
+    if not files:
+        sys.exit("which files? for example: make mutants MUTANTS=python/splitnerf/training/schedule.py")
+    for file in files:
+        n, killed, left = mutate(Path(file))
+        print("\n".join([f"{file}: {n} mutants, {killed} killed, {n - killed} survived", *left]), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
