@@ -1,6 +1,6 @@
-"""What each CUDA kernel takes, as the compiler says: registers, spills and shared memory, as a table for docs/cuda.md.
+"""What each CUDA kernel takes, as the compiler says: registers, spills and shared memory, as a table.
 
-    python tests/bench/kernel_resources.py --arch sm_90
+    python tests/bench/kernel_resources.py --arch sm_90 >docs/benchmarks/kernel_resources.csv
 
 Needs nvcc and no GPU.
 """
@@ -8,13 +8,18 @@ Needs nvcc and no GPU.
 from __future__ import annotations
 
 import argparse
+import csv
 import os
 import re
 import subprocess
+import sys
+import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
+COLUMNS = "file,kernel,registers,stack_bytes,spill_store_bytes,spill_load_bytes,static_shared_bytes".split(",")
+AS_ON_THE_CPU = ("spread.cu", "bodies_rays.h.cu")  # built without fused multiply-adds
 
 
 class Kernel(NamedTuple):
@@ -60,18 +65,28 @@ def kernels(text: str) -> list[Kernel]:
     return sorted(found)
 
 
+def sources(folder: Path) -> list[Path]:
+    """The files of kernels, and, written into a folder as the build does, one for each header of bodies."""
+    template = (ROOT / "cpp/cuda/bodies.cu.in").read_text()
+    written = []
+    for header in sorted((ROOT / "cpp/include/splitnerf/bodies").glob("*.h")):
+        written.append(folder / f"bodies_{header.name}.cu")
+        written[-1].write_text(template.replace("@header@", header.name))
+    return [*sorted((ROOT / "cpp/cuda").glob("*.cu")), *written]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--arch", default="sm_90")
+    parser.add_argument("--only", default="", metavar="TEXT", help="files whose names hold this text")
     arguments = parser.parse_args()
-    print(
-        "| file | kernel | registers | stack, bytes | spilled, bytes (stores / loads) | static shared memory, bytes |"
-    )
-    print("|---|---|---|---|---|---|")
-    for source in sorted((ROOT / "cpp/cuda").glob("*.cu")):
-        flags = ["-fmad=false"] if source.name == "rays.cu" else []
-        for k in kernels(compiler_says(source, arguments.arch, flags)):
-            print(f"| {source.name} | `{k.name}` | {k.registers} | {k.stack} | {k.stored} / {k.loaded} | {k.shared} |")
+    table = csv.writer(sys.stdout, lineterminator="\n")
+    table.writerow(COLUMNS)
+    with tempfile.TemporaryDirectory() as folder:
+        for source in sources(Path(folder)):
+            if arguments.only in source.name:
+                flags = ["-fmad=false"] if source.name in AS_ON_THE_CPU else []
+                table.writerows((source.name, *kernel) for kernel in kernels(compiler_says(source, arguments.arch, flags)))
 
 
 if __name__ == "__main__":
