@@ -147,7 +147,7 @@ def measure(case: Case, dtype: str, world: World, clock: Clock, device: str, rat
     n_bytes, operations = bytes_moved(case, world.sizes, there, got), case.operations(world.sizes, got)
     alike = case.op in ROUNDED_ALIKE or case.op.startswith("hash_encode_jacobian")  # a Jacobian jumps at a cell's face
     error = difference(got, as_tuple(op(*(inputs if alike else truth(inputs)))))
-    finite, kept = [x for x in got if x.is_floating_point()], len(got[0])
+    finite, kept = all(bool(x.isfinite().all()) for x in got), got[0].numel()
     del got
     cold, warm = clock(lambda: op(*there), True), clock(lambda: op(*there), False)
     notes, eager_ms = [], ""
@@ -159,7 +159,7 @@ def measure(case: Case, dtype: str, world: World, clock: Clock, device: str, rat
             notes.append(f"eager: {first_line(failure)}")
     by_bytes, by_operations = n_bytes / rates[0], (0.0 if math.isnan(operations) else operations) / rates[1]
     floor = max(by_bytes, by_operations)
-    if case.op == "sample_rays" and math.isnan(error) and all(bool(x.isfinite().all()) for x in finite):
+    if case.op == "sample_rays" and math.isnan(error) and finite:
         notes.append(f"the network's roundings decide which samples are kept: {kept} of them here")
     elif math.isnan(error):
         notes.append("failed: results differ in shape or are not finite")
