@@ -6,7 +6,7 @@
 #   PYTHON=python3          has torch
 #   GPU_WORK=DIR            keeps environment, build, data and runs, and goes on from them (default: removed at the end)
 #   GPU_SECONDS=530         of the whole; parts that find no time left are left out
-#   GPU_PARTS="fast paper"  of tests, operators, fast, profile, graphs, paper and relight only these (default: all)
+#   GPU_PARTS="fast paper"  of tests, operators, fast, profile, eager, paper and relight only these (default: all)
 #   SPLITNERF_DATA=DIR      a data set to train on, or a folder of some (default: the demo scene, 200 x 200)
 #   GPU_DRY=1               the same on the CPU with small sizes: tries the script, measures nothing
 set -u
@@ -24,10 +24,10 @@ export PATH="$work/venv/bin:$PATH:/usr/local/cuda/bin" PYTHONPYCACHEPREFIX="$wor
 export LD_LIBRARY_PATH="$work/embree/usr/lib/$(uname -m)-linux-gnu${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 run_python=$work/venv/bin/python
 
-device=cuda cuda=ON fast_minutes=2.2 paper_minutes=1.2 profile_steps=600 graph_steps=2000 paper_steps=2000 slower=1
+device=cuda cuda=ON fast_minutes=2.2 paper_minutes=1.2 profile_steps=600 eager_steps=2000 paper_steps=2000 slower=1
 picture="size=200" ops="--seconds .1 --minutes 1.6" small=() paper=(--set export_resolution=256 --set preview_every=1.0)
 if [ -n "$dry" ]; then
-  device=cpu cuda=OFF profile_steps=60 graph_steps=60 paper_steps=20 slower=10
+  device=cpu cuda=OFF profile_steps=60 eager_steps=60 paper_steps=20 slower=10
   picture="size=24, n_train=6, n_test=2, spp=4" ops="--tiny --seconds .002 --minutes 9"
   small=(--set target_samples=256 --set max_rays=64 --set log2_table_size=10 --set grid_resolution=16 --set mesh_resolution=24
     --set export_resolution=32 --set export_texture_size=64 --set export_faces=500 --set light_resolution=16)
@@ -129,8 +129,8 @@ if part info 30 bash -c 'set -o pipefail; splitnerf info | paste -sd ";" | sed "
     [ -z "$dry" ] || steps=60
     part profile 60 "${train[@]}" "$scene" --out "$work/runs/profile" --preset fast --device $device --steps $profile_steps \
       --profile "$out/profile.md" "${small[@]}"
-    part graphs 45 "${train[@]}" "$scene" --out "$work/runs/graphs" --preset fast --device $device --steps $graph_steps \
-      --set cuda_graphs=true --set export_resolution=128 --set preview_every=1.0 "${small[@]}"
+    part eager 45 "${train[@]}" "$scene" --out "$work/runs/eager" --preset fast --device $device --steps $eager_steps \
+      --set cuda_graphs=false --set export_resolution=128 --set preview_every=1.0 "${small[@]}"
     # shellcheck disable=SC2086  # words
     part operators 125 "$run_python" tests/bench/gpu_ops.py --out "$out" --device $device $ops
     part fast 220 "${train[@]}" "$scene" --out "$work/runs/fast" --preset fast --device $device --steps "${steps:-20000}" \

@@ -147,7 +147,7 @@ SETTINGS = {
 
 # Where preset `fast` differs from `cpu`.
 FAST = {
-    "run.preset": "fast", "run.steps": 20000, "surface.n_levels": 16, "surface.growth": 1.3195079,
+    "run.preset": "fast", "run.steps": 20000, "run.cuda_graphs": True, "surface.n_levels": 16, "surface.growth": 1.3195079,
     "surface.log2_table_size": 19, "surface.table_dtype": "float16", "mesh.resolution": 192, "mesh.background": True,
     "sampling.initial_rays": 4096, "sampling.max_rays": 16384, "sampling.target_samples": 32768,
     "sampling.grid_resolution": 128, "losses.eikonal_points": 2048, "losses.smoothness_points": 4096,

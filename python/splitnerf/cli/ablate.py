@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     minutes = 6.0 if args.minutes is None and args.steps is None else args.minutes
     settings = dict(parse_setting(text) for text in args.settings) | budget(args.steps, minutes)
     names = None if args.rows is None else [name.strip() for name in args.rows.split(";") if name.strip()]
-    rows = make_rows(preset(args.preset).replace(settings), names)
+    rows = make_rows(preset(args.preset).replace({"run.cuda_graphs": False} | settings), names)  # not all rows can
     for name in names or []:
         if all(row.name != name for row in rows):
             print(f"{name}: changes nothing here, left out", file=sys.stderr)

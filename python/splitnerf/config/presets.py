@@ -46,7 +46,7 @@ PAPER = dict(
 
 # The CPU's method with the samples, the levels and the meshes of a GPU.
 FAST = dict(
-    run=dict(preset="fast", steps=20000),
+    run=dict(preset="fast", steps=20000, cuda_graphs=True),
     surface=dict(n_levels=16, growth=1.3195079, log2_table_size=19, table_dtype="float16"),  # 16 to 1024 cells
     mesh=dict(resolution=192, background=True),
     sampling=dict(initial_rays=4096, max_rays=16384, target_samples=32768, grid_resolution=128),
