@@ -208,9 +208,10 @@ class SceneModel(nn.Module):
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
         """The difference between the radiance by quadrature and that by the split sum.
 
-        The quadrature sums BRDF times light over the directions of the visibility bits. It replaces the split sum with a
-        smooth transition in roughness, where the directions resolve the lobe: with 256 directions the transition is from
-        roughness 0.3 to 0.45. Narrower lobes are not corrected.
+        The quadrature sums BRDF times light over the directions of the visibility bits. It replaces the split sum with
+        a
+        smooth transition in roughness, where the directions resolve the lobe: with 256 directions the transition is
+        from roughness 0.3 to 0.45. Narrower lobes are not corrected.
 
         Args:
             light: The evaluated light.

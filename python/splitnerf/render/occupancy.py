@@ -82,8 +82,8 @@ class OccupancyGrid:
 class AveragedGrid(OccupancyGrid):
     """The released code's grid: a cell is occupied while the decaying maximum of its opacity exceeds min(mean, .001).
 
-    It gives no guarantee: a cell may become empty when its random point misses a thin part. The opacity of a cell is that
-    of one sample whose ray meets the surface head-on.
+    It gives no guarantee: a cell may become empty when its random point misses a thin part. The opacity of a cell is
+    that of one sample whose ray meets the surface head-on.
 
     Source: Instant NGP (Mueller et al. 2022), as nerfacc, which SplitNeRF's released code uses, describes it.
     """
@@ -98,7 +98,8 @@ class AveragedGrid(OccupancyGrid):
     def update(
         self, sdf: Callable[[Tensor], Tensor], s: float, *, first: bool = True, step: int = 0, use_hull: bool = False
     ) -> None:
-        """Evaluates all cells in the first 256 steps; later a random quarter of all, and as many of the occupied ones."""
+        """Evaluates all cells in the first 256 steps; later a random quarter of all, and as many of the occupied
+        ones."""
         n = len(self.values)
         due = torch.arange(n, device=self.device)
         if not first and step >= ALL_CELLS_UNTIL:

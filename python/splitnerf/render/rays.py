@@ -39,7 +39,8 @@ def pixel_matrix(pose: Tensor, intrinsics: Tensor) -> Tensor:
 
 
 def through_pixels(matrix: Tensor, x: Tensor, y: Tensor) -> Tensor:
-    """[n, 3] unit directions through image points x, y [n]; the matrices [n, 3, 3] or [3, 3] are :func:`pixel_matrix`'s."""
+    """[n, 3] unit directions through image points x, y [n]; the matrices [n, 3, 3] or [3, 3] are
+    :func:`pixel_matrix`'s."""
     points = torch.stack([x, y, torch.ones_like(x)], dim=-1)
     return F.normalize((matrix * points[..., None, :]).sum(-1), dim=-1)
 

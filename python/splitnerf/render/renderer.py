@@ -74,7 +74,7 @@ class FoundSamples(NamedTuple):
 
 @dataclass
 class RenderedRays:
-    """The rendering of one batch of rays: n samples with padding, n_shaded of them shaded.
+    """The rendering of one batch of rays: n samples with the padding, of which n_shaded are shaded.
 
     Attributes:
         mean: [n_rays, 3] colour of the object alone, un-premultiplied, not clipped above 1.
@@ -191,7 +191,8 @@ def render_rays(
         shades_per_ray: The approximate number of shaded samples per ray; the values of the other samples are
             interpolated. 0 shades all.
         capacity: The capacity for shaded samples and segments, see :func:`splitnerf.ops.spread_samples`; with None the
-            host waits for the GPU's counts. If ``sizes`` of the result exceeds the capacity, the colours have no meaning.
+            host waits for the GPU's counts. If ``sizes`` of the result exceeds the capacity, the colours have no
+            meaning.
 
     Source: SplitNeRF Eq. (1)-(2), (17).
     """
@@ -213,7 +214,7 @@ def render_rays(
     spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step, capacity)
     shaded = spread.shaded
     positions, view_dirs = found.positions[shaded], -found.directions[shaded]
-    # On a GPU the gradient of index_select is an atomic sum; the gradient of indexing sorts first.
+    # The gradient of index_select adds directly; the gradient of indexing sorts first on a GPU.
     normals, outputs, features = (x.index_select(0, shaded) for x in (normals, field.outputs, field.features))
     sdf = outputs[:, 0]
     segments = RaySegments(spread.leaders, spread.stretch)

@@ -235,7 +235,8 @@ def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:
 
 
 def _check_tensor(name: str, value: object, shape: tuple[int, ...] | None, *dtypes: torch.dtype) -> None:
-    """Raises ValueError where a value is no tensor of this shape and dtype. Shape None allows any shape, -1 any size."""
+    """Raises ValueError where a value is no tensor of this shape and dtype. Shape None allows any shape, -1 any
+    size."""
     fits = type(value) is Tensor and value.dtype in dtypes and value.is_contiguous()
     if fits and shape is not None:
         fits = len(shape) == value.dim() and all(a in (-1, b) for a, b in zip(shape, value.shape))

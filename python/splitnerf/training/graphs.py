@@ -67,14 +67,15 @@ class GraphedStep(Step):
         self._counts: tuple[float, float] | None = None  # shaded samples and segments of the last step
         self._used: tuple[int, int] | None = None  # capacity of the last step
         self._seen: set[Hashable] = set()
-        self._has_loaded = False  # whether every kernel of a step with a capacity was loaded
+        self._has_loaded = False  # whether all kernels of a step with a capacity are loaded
         self._graphs: dict[Hashable, Recorded] = {}
         self._stream = torch.cuda.Stream(model.device)
         self._pool = torch.cuda.graph_pool_handle()
 
     @contextmanager
     def stream(self) -> Iterator[None]:
-        """Runs the block's work in the CUDA stream that graphs are recorded in; autograd ties gradients to that stream."""
+        """Runs the block's work in the CUDA stream that graphs are recorded in; autograd ties gradients to that
+        stream."""
         outside = torch.cuda.current_stream(self.model.device)
         self._stream.wait_stream(outside)
         try:
@@ -155,8 +156,8 @@ class GraphedStep(Step):
         return recorded.outputs
 
     def is_complete(self, n_shaded: float, n_segments: float) -> bool:
-        """Whether the last step's capacity was enough for its counts. If not, its results have no meaning, and all graphs
-        are dropped."""
+        """Whether the last step's capacity was enough for its counts. If not, its results have no meaning, and all
+        graphs are dropped."""
         self._counts = n_shaded, n_segments
         complete = self._used is None or has_room(self._used, self._counts)
         if not complete:

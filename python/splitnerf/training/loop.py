@@ -196,7 +196,8 @@ class Training:
         return self.step % light_period(self.config) == 0
 
     def refresh(self) -> None:
-        """Updates what steps share: open levels, learning rates, occupied cells, the mesh, and the light on the mesh."""
+        """Updates what steps share: open levels, learning rates, occupied cells, the mesh, and the light on the
+        mesh."""
         c, model, step, progress = self.config, self.model, self.step, self.progress
         model.open_levels(progress)
         set_learning_rate(self.optimiser, c, step, progress)
@@ -220,7 +221,8 @@ class Training:
             model.refresh_indirect(self.light)
 
     def advance(self, log: TextIO, bar: Progress) -> None:
-        """Makes one step: draws rays, takes gradients, moves parameters; writes logs, previews and checkpoints when due."""
+        """Makes one step: draws rays, takes gradients, moves parameters; writes logs, previews and checkpoints when
+        due."""
         c, light = self.config, self.light
         batch = draw_batch(self.source, self.n_rays, c)
         ray, terms = self.take_step(batch, light, self.environment, self.step, self.progress)
@@ -273,7 +275,8 @@ class Training:
         }  # fmt: skip
 
     def finish(self) -> None:
-        """Updates grid and mesh to the final surface, unless the run was interrupted, and writes the last checkpoint."""
+        """Updates grid and mesh to the final surface, unless the run was interrupted, and writes the last
+        checkpoint."""
         self.optimiser.zero_grad(set_to_none=True)
         check_state(self.step, self.model, self.optimiser)
         finished = self.progress >= 1.0

@@ -44,9 +44,9 @@ def _seed(weight: float, device: torch.device) -> Tensor:
 
 
 def backward(terms: dict[str, Term]) -> None:
-    """Takes the gradients of the weighted sum of the terms. The weights seed the backward pass, so that the weighted sum
-    itself is never computed."""
-    seeds = [_seed(term.weight, term.value.device) for term in terms.values()]  # made for all terms, so that later steps find them
+    """Takes the gradients of the weighted sum of the terms. The weights seed the backward pass, so that the weighted
+    sum itself is never computed."""
+    seeds = [_seed(term.weight, term.value.device) for term in terms.values()]  # cached at first use
     values = [(term.value, seed) for term, seed in zip(terms.values(), seeds) if term.value.requires_grad]
     torch.autograd.backward(*map(list, zip(*values)))
 
@@ -120,7 +120,8 @@ def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.G
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:
     """Quadratic entropy of the materials of surface points, -ln mean exp(-|x_i - x_j|^2 / 4) over all pairs.
 
-    Images do not determine how bright a side of the object is and how bright its light is. This loss prefers the split in
+    Images do not determine how bright a side of the object is and how bright its light is. This loss prefers the split
+    in
     which the object has few materials: points of similar colour and gloss attract each other, and dissimilar points do
     not. x holds log albedo, roughness and metallic, each divided by the width within which points count as similar.
 
