@@ -176,7 +176,7 @@ template <class T, class S> HashGridView<T, S> field_grid(const SdfField<T>& fie
   return make_view<T>(field.shape, field.n_active, nullptr, table);
 }
 
-// Points of a tile of so many rows, and the shared memory that it takes; the kernel is told to allow it.
+// The number of points of a tile with this number of rows, and its shared memory, which the kernel is set to allow.
 struct TileSize {
   int points, bytes;
 };

@@ -1,4 +1,4 @@
-"""Where tensors are."""
+"""Devices of tensors."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from splitnerf.errors import InputError
 
 
 def choose_device(name: str) -> torch.device:
-    """The device of that name, ``cpu`` or ``cuda``.
+    """The device with this name, ``cpu`` or ``cuda``.
 
     Raises:
-        InputError: It is not there, or this build has no kernels for it.
+        InputError: The machine has no such device, or this build has no kernels for it.
     """
     if name == "cpu":
         return torch.device("cpu")
@@ -30,8 +30,10 @@ def choose_device(name: str) -> torch.device:
 
 @contextmanager
 def tensor_cores(on: bool) -> Iterator[None]:
-    """Has a GPU's products of float32 matrices go through its tensor cores within the block, where ``on``: factors are
-    rounded to 10 bits (TF32), sums are float32. The CPU's are what they were."""
+    """Sets whether a GPU multiplies float32 matrices on its tensor cores within the block.
+
+    Tensor cores round the factors to 10 bits (TF32) and add in float32. Products on the CPU do not change.
+    """
     products = torch.backends.cuda.matmul
     before = products.fp32_precision
     products.fp32_precision = "tf32" if on else "ieee"

@@ -1,4 +1,4 @@
-"""What the user should know though the work goes on."""
+"""Notes to the user that do not stop the work."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ import sys
 
 
 def note(text: str) -> None:
-    """One line on stderr: what was repaired or left out, and of which file."""
+    """Writes one line to stderr, which names a file and the values that were repaired or left out."""
     print(f"splitnerf: note: {text}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""What a run leaves for its user: previews, meshes, the environment, the evaluation and the report."""
+"""The outputs of a run: previews, meshes, the environment, the evaluation and the report."""
 
 from __future__ import annotations
 
@@ -56,13 +56,13 @@ def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Da
 
 @dataclass(frozen=True)
 class Exported:
-    """What an export made.
+    """The result of an export.
 
     Attributes:
         mesh: The mesh before decimation, in the data's world.
-        n_faces: Of the textured mesh; of `mesh` where no format with textures was asked for.
-        watertight: Whether that mesh is closed.
-        n_dropped: Floating components that were left out.
+        n_faces: The number of faces of the textured mesh; that of `mesh` where no format has textures.
+        watertight: Whether the mesh of `n_faces` is closed.
+        n_dropped: The number of removed floating components.
     """
 
     mesh: trimesh.Trimesh
@@ -83,15 +83,16 @@ def write_assets(
 ) -> Exported:
     """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as asked, environment.exr and environment.hdr.
 
-    All stand in the data's own world frame; GLB, OBJ and USDZ are decimated, textured and y up. The PLY holds the mesh
-    as extracted, with vertex colours.
+    All files are in the data's own world frame; GLB, OBJ and USDZ are decimated, textured and y up. The PLY holds the
+    extracted mesh with vertex colours.
 
     Args:
         out: The folder.
         model: The scene.
         box_from_world: [4, 4], see :class:`splitnerf.data.dataset.Dataset`.
-        formats: Of :data:`FORMATS`.
-        resolution, n_faces, texture_size: None for the settings export_resolution, export_faces, export_texture_size.
+        formats: The names of the formats, out of :data:`FORMATS`.
+        resolution, n_faces, texture_size: The sizes of grid, mesh and textures; None for the values of the group
+            `export`.
 
     Raises:
         EmptyMesh: The surface is empty.
@@ -128,7 +129,8 @@ def write_assets(
 
 
 def surface_of(model: SceneModel) -> Surface:
-    """The scene's fields as functions of points in the internal frame, on the CPU; they are asked where the model is."""
+    """The scene's fields as functions of points in the internal frame, on the CPU; the model's device evaluates
+    them."""
 
     def from_cpu(field: Callable[[Tensor], Tensor | tuple]) -> Callable[[Tensor], Tensor | tuple]:
         def asked(points: Tensor) -> Tensor | tuple:

@@ -39,20 +39,20 @@ REPORT_VIEWS = 4
 
 
 def load_splits(data: Path, downscale: int) -> tuple[Dataset, Dataset | None]:
-    """The train split, and the test split where the data have one.
+    """The train split, and the test split or None.
 
     Raises:
-        InputError: Something about the data cannot be used.
+        InputError: The data cannot be used.
     """
     test = load_dataset(data, "test", downscale) if has_test_split(data) else None
     return load_dataset(data, "train", downscale), test
 
 
 def prepare_run(run: Path, *, resume: bool, overwrite: bool) -> None:
-    """Makes the run's folder, or refuses one that holds a run.
+    """Makes the run's folder.
 
     Raises:
-        InputError: A run stands there, or something that is no folder.
+        InputError: The folder holds a run, or the path is not a folder.
     """
     if run.exists() and not run.is_dir():
         raise InputError(f"{run}: is a file; give --out a folder")
@@ -149,7 +149,7 @@ def write_run_report(
 
 
 def headline(evaluation: dict) -> dict[str, float]:
-    """The scores that a reader looks for first; what the data hold no truth for is left out."""
+    """The most important scores; scores without truth in the data are left out."""
     novel_view, relight, albedo = (evaluation[key] or {} for key in ("novel_view", "relight", "albedo"))
     scores = {
         "novel views, PSNR dB": novel_view.get("psnr"),
@@ -180,7 +180,7 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     model.open_levels(1.0)
     SurfaceMesh(model).restore(content)
     grid = make_grid(config)
-    if config.sampling.occupancy == "average":  # a mean over time, unlike the distance
+    if config.sampling.occupancy == "average":  # averages over the training cannot be recomputed
         grid.values, _ = restored_grid(grid, content, run / "checkpoint.pt")
     grid.update(model.sdf_field.sdf, model.s_value)
     return model, grid, content
@@ -190,10 +190,10 @@ def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = N
     """Renders a run's test views again from its checkpoint, and relit views of its mesh.glb, and scores them.
 
     Args:
-        run: The run's folder; its meshes and environment stay as they are.
-        data: The data that it was trained on.
-        protocol: Views and lights.
-        out: The json file for the scores; None for evaluation.json and report.html in the run's folder.
+        run: The run's folder; its meshes and environment do not change.
+        data: The dataset of the run.
+        protocol: The views and lights.
+        out: The json file for the scores; None writes evaluation.json and report.html in the run's folder.
 
     Raises:
         InputError: The run or the data cannot be used.

@@ -8,13 +8,14 @@
 
 namespace splitnerf {
 
-// A cell of the occupancy grid. Opaque: so deep inside that nothing behind it can be seen; a ray
-// that reaches one ends there.
+// The state of a cell of the occupancy grid. An opaque cell is so deep inside that nothing behind it is visible; a ray
+// ends at such a cell.
 enum class Cell : uint8_t { kEmpty = 0, kOccupied = 1, kOpaque = 2 };
 
 inline constexpr int kBlockCells = 8;  // along an edge of a block of cells
 
-// Cells [x][y][z], and which blocks of them hold one that is not empty: the others are crossed in one go.
+// Cells [x][y][z], and a flag for each block of cells that contains a cell that is not empty: rays cross the other
+// blocks in one step.
 struct OccupancyView {
   const uint8_t *cells, *blocks;
   int resolution, n_blocks;  // along an edge
@@ -102,8 +103,8 @@ template <class T> struct RayLattice {
   SPLITNERF_HD Vec3<T> middle(int64_t k) const { return origin + direction * (start(k) + T(0.5) * step); }
 };
 
-// What stands at the midpoint of one sample: an occupied cell, nothing, or the ray's end. Where it is nothing, empty blocks
-// and cells are crossed in one go: `next` is the first midpoint behind the exit.
+// The state at the midpoint of one sample: an occupied cell, an empty cell, or the end of the ray. Empty blocks and
+// cells are crossed in one step: `next` is the first midpoint behind the exit.
 struct MarchStep {
   Cell cell;  // kOpaque: the ray ends before this sample
   int64_t next;
@@ -137,7 +138,7 @@ SPLITNERF_HD MarchStep march_step(const RayLattice<T>& ray, const OccupancyView&
           max_of(k + 1, static_cast<int64_t>(std::ceil((t_exit - ray.lattice) * ray.inverse_step - T(0.5))))};
 }
 
-// The first sample from k on whose midpoint stands in an occupied cell; -1 where the ray ends before.
+// The first sample from k on whose midpoint lies in an occupied cell; -1 if the ray ends before.
 template <class T>
 SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView& grid, const MarchOptions& options,
                                    int64_t k) {
@@ -149,8 +150,9 @@ SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView
   }
 }
 
-// Calls emit(i, t_start, t_end) for each sample in an occupied cell, i its number, front to back; returns how many there
-// are. Each thread of the group looks at one sample of as many neighbours; those that count are packed by their order.
+// Calls emit(i, t_start, t_end) for each sample in an occupied cell, front to back; i counts them. Returns their
+// number.
+// Each thread of the group tests one of as many neighbouring samples; the occupied ones are packed in order.
 template <class T, class Group, class Emit>
 SPLITNERF_HD int64_t march_ray(const Group& group, Vec3<T> o, Vec3<T> d, T jitter, const OccupancyView& grid,
                                const MarchOptions& options, Emit emit) {

@@ -17,7 +17,8 @@ template <class T> SPLITNERF_HD T softplus(T x) { return max_of(x, T(0)) + std::
 //   1 - alpha = Phi(f_next) / Phi(f_prev) = 1 / (1 + X),   X = expm1(d) sigmoid(-x),
 // so tau = log1p(X); for d > 20, where expm1 would overflow, tau = softplus(-s f_next) - softplus(-x).
 // Source: NeuS Eq. (13); the published form adds 1e-5 to both sides of the fraction.
-// apart = f_prev - f_next comes on its own: who knows it better than the rounded difference says so.
+// apart = f_prev - f_next is an argument of its own, since some callers know it more exactly than the rounded
+// difference.
 template <class T> SPLITNERF_HD T neus_optical_depth(T f_prev, T f_next, T apart, T s) {
   const T d = s * apart;
   if (!(d > T(0))) return d <= T(0) ? T(0) : d;  // a NaN goes on to the caller
@@ -39,7 +40,7 @@ SPLITNERF_HD OpticalDepthGrad<T> neus_optical_depth_backward(T f_prev, T f_next,
   return {grad_tau * s * p, -grad_tau * s * n, grad_tau * (apart * p - f_next * rise), -grad_tau * s * rise};
 }
 
-// One sample of a ray: the distances at its ends, and what it falls by.
+// One sample of a ray: the distances at its two ends, and their difference.
 template <class T> struct NeusInterval {
   T f_prev, f_next, apart;
 };
@@ -56,7 +57,7 @@ template <class T> struct NeusEnds {
   }
 };
 
-// Optical depth behind which a sample counts for nothing.
+// The optical depth behind which samples get weight 0.
 template <class T> SPLITNERF_HD T neus_depth_limit(T min_transmittance) {
   return min_transmittance > T(0) ? -std::log(min_transmittance) : T(INFINITY);
 }
@@ -84,10 +85,10 @@ SPLITNERF_HD T neus_ray_weights(const Group& group, const At& at, T s, int64_t n
 }
 
 // d w_i / d tau_i = T_{i+1};  d w_j / d tau_i = -w_j for j > i;  d A / d tau_i = 1 - A.
-// 1 - A is what passes all samples, exp(-sum tau). Walks from the last sample to the first, so that sum_{j > i} grad_j w_j is a running sum. The depth
-// behind each sample waits in depths [n] until then: subtracting tau again would lose the small depths in
-// front of a deep one. Calls keep(i, OpticalDepthGrad) for each sample, after the last use of depths[i]; returns the
-// gradient to s.
+// 1 - A is the transmittance of all samples, exp(-sum tau). The loop runs from the last sample to the first, so that
+// sum_{j > i} grad_j w_j is a running sum. depths [n] stores the depth behind each sample: subtracting tau again would
+// lose the small depths in front of a deep one. Calls keep(i, OpticalDepthGrad) for each sample, after the last use of
+// depths[i]; returns the gradient of s.
 template <class T, class Group, class At, class Keep>
 SPLITNERF_HD T neus_ray_weights_backward(const Group& group, const At& at, T s, int64_t n, T min_transmittance,
                                          const T* weights, const T* grad_weights, T grad_opacity, T* depths,
@@ -127,7 +128,7 @@ SPLITNERF_HD T neus_ray_weights_backward(const Group& group, const At& at, T s, 
 
 // ---- from the field at a sample to its normal and its interval --------------------------------
 
-// The gradient's direction; below a length of 1e-3 it has none to speak of, and no gradient flows back.
+// The direction of the gradient. Below a length of 1e-3 the direction is not reliable, and no gradient flows back.
 inline constexpr double kMinGradientSquared = 1e-6;
 template <class T> SPLITNERF_HD Vec3<T> unit_normal(Vec3<T> gradient) {
   return gradient * (T(1) / std::sqrt(dot(gradient, gradient) + T(1e-12)));
@@ -152,8 +153,8 @@ template <class T> SPLITNERF_HD AnnealedCosine<T> annealed_cosine(T cosine, T t)
 struct SampleRange {
   int64_t first, n;
 };
-// Samples of many rays in one array, ray after ray. On the GPU nobody has looked at the offsets, which would mean waiting for
-// it: whatever they are, no sample outside the n_samples there are is touched.
+// Samples of many rays in one array, ray after ray. On the GPU the offsets are not checked, since the host would have
+// to wait: for any offsets, no access leaves the n_samples samples.
 struct PackedRays {
   int64_t n_rays, n_samples;
   const int64_t* offsets;  // [n_rays + 1]
@@ -162,21 +163,22 @@ struct PackedRays {
     const int64_t first = clamp<int64_t>(offsets[ray], 0, n_samples);
     return {first, clamp<int64_t>(offsets[ray + 1], first, n_samples) - first};
   }
-  // The samples that are of a ray.
+  // The samples of one ray.
   SPLITNERF_HD int64_t n_owned() const {
     if (n_rays == 0) return 0;
     const SampleRange last = samples_of(n_rays - 1);
     return last.first + last.n;
   }
-  // Calls clear(i) for this ray's share of the samples behind those of the last ray, which are of none.
+  // Calls clear(i) for this ray's share of the padding: the samples behind those of the last ray, which belong to no
+  // ray.
   template <class Group, class Clear>
   SPLITNERF_HD void for_each_unowned(const Group& group, int64_t ray, Clear clear) const {
     for (int64_t i = n_owned() + ray * Group::size + group.lane(); i < n_samples; i += n_rays * Group::size) clear(i);
   }
 };
 
-// Samples of a surface: distance and gradient in their middles, for which the distance is taken as linear over a
-// sample's length `step`, seen under the annealed cosine.
+// Samples of a surface, given by distance and gradient at their midpoints. The distance is taken as linear over the
+// sample's length `step`, with the annealed cosine as its slope.
 template <class T> struct SurfaceSamples {
   PackedRays rays;
   const T *sdf, *gradient, *directions;  // [n], [n, 3], [n_rays, 3] unit
@@ -184,7 +186,8 @@ template <class T> struct SurfaceSamples {
   T min_transmittance;
 };
 
-// The distances at both ends of a sample and what it falls by; seen grazing that is less than the roundings of both ends.
+// The distances at both ends of a sample, and their difference; at grazing angles the difference is smaller than the
+// rounding errors of the two distances.
 template <class T> SPLITNERF_HD NeusInterval<T> surface_interval(T sdf, T cosine, T step, T anneal) {
   const T half = T(0.5) * step * annealed_cosine(cosine, anneal).value;
   return {sdf - half, sdf + half, T(-2) * half};

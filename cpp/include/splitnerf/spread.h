@@ -1,4 +1,4 @@
-// Which samples of a ray are shaded, and between which of these each sample lies.
+// The choice of a ray's shaded samples, and the two shaded neighbours of every sample.
 #pragma once
 
 #include <cstdint>
@@ -7,10 +7,11 @@
 
 namespace splitnerf {
 
-// Calls draw(i) for the samples on which one of `per_ray` evenly spaced marks falls when the weights are laid end to end,
-// ascending: systematic sampling. One of more than 1 / per_ray of all weight is always drawn. phase in [0, 1): where the
-// marks begin. Samples farther than `gap` apart along the ray may be of two surfaces: of each stretch without such a gap the
-// heaviest sample is drawn if no mark falls there. per_ray = 0 draws all.
+// Systematic sampling: the weights are laid end to end with `per_ray` evenly spaced marks on them, and draw(i) is
+// called, ascending, for each sample that a mark falls on. A sample with more than 1 / per_ray of all weight is always
+// drawn. phase in [0, 1) is the position of the first mark. Neighbouring samples more than `gap` apart along the ray
+// may lie on two surfaces, so the ray is split there into segments; if no mark falls on a segment, its heaviest sample
+// is drawn. per_ray = 0 draws all samples.
 template <class T, class Draw>
 SPLITNERF_HD void spread_by_weight(const T* weights, const T* t, int64_t n, T gap, int per_ray, double phase,
                                    Draw draw) {
@@ -35,12 +36,12 @@ SPLITNERF_HD void spread_by_weight(const T* weights, const T* t, int64_t n, T ga
   }
 }
 
-// How far t is on the way from t_first to t_second, in [0, 1].
+// The position of t between t_first and t_second, in [0, 1].
 template <class T> SPLITNERF_HD T share_between(T t, T t_first, T t_second) {
   return t_second > t_first ? clamp((t - t_first) / (t_second - t_first), T(0), T(1)) : T(0);
 }
 
-// A ray's samples [begin, end) of all, and which of them are shaded: positions [at, at + drawn) in `shaded`, drawn > 0.
+// A ray's samples [begin, end), and its shaded samples: positions [at, at + drawn) in `shaded`, drawn > 0.
 template <class T> struct SpreadRay {
   const T *weights, *t;
   int64_t begin, end;
@@ -56,8 +57,9 @@ template <class T> SPLITNERF_HD int64_t heaviest_drawn(const SpreadRay<T>& ray) 
   return heaviest;
 }
 
-// Places the ray's samples between those that are shaded: fills first, second and share of the samples, stretch of the drawn
-// ones, counted from n_before, and the leader of each stretch. Returns how many stretches there are, at most as many as are drawn.
+// Finds the shaded neighbours of the ray's samples. Fills first, second and share of all samples, stretch (the segment,
+// counted from n_before) of the shaded samples, and the leader of each segment. Returns the number of segments, which
+// is at most the number of shaded samples.
 template <class T>
 SPLITNERF_HD int64_t arrange_spread(const SpreadRay<T>& ray, T gap, int64_t n_before, int64_t* first, int64_t* second,
                                     T* share, int64_t* leaders, int64_t* stretch) {

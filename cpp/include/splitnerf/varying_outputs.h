@@ -1,4 +1,4 @@
-// Outputs whose sizes an operator finds out on the way: it calls back for room.
+// Outputs whose sizes are known only while the operator runs: it calls back to allocate them.
 #pragma once
 
 #include <cstdint>
@@ -25,13 +25,13 @@ struct Spread {
   int64_t* stretch;   // [shaded] the stretch of each
   SpreadSizes room;   // of these arrays
 
-  // For so many shaded samples and stretches; of rays with samples there are no more than rays.
+  // Capacity for shaded samples and for segments; the number of rays with samples is at most the number of rays.
   SPLITNERF_HD bool has_room(int64_t n_shaded, int64_t n_stretches) const {
     return n_shaded <= room.shaded && n_stretches <= room.leaders;
   }
 };
 
-// Makes room for what was counted, or, where `fixed` is set, for as many whatever was counted.
+// Allocates the outputs for the counted sizes or, where `fixed` is set, for these fixed sizes.
 struct SpreadAllocator {
   std::function<Spread(const SpreadSizes& sizes)> allocate;
   const SpreadSizes* fixed = nullptr;

@@ -1,1 +1,1 @@
-"""What each part of the method is worth: one run per part, with it taken out or exchanged."""
+"""Ablation: the gain of each part of the method, by one run in which the part is removed or replaced."""

@@ -1,4 +1,4 @@
-"""Runs an ablation: trains and scores each row on each scene, and goes on where it was interrupted."""
+"""Runs an ablation: trains and scores each row on each scene, and continues an interrupted ablation."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from splitnerf.workflow import evaluate_run, reconstruct
 
 @dataclass(frozen=True)
 class Plan:
-    """What to run.
+    """The plan of an ablation.
 
     Attributes:
-        scenes: Datasets.
-        rows: The first is the full method.
-        seeds: Seeds of rows within `CLOSE` of what they are compared with; others get one.
-        protocol: How runs are scored.
-        out: Folder of the runs, a folder per scene.
+        scenes: The folders of the datasets.
+        rows: The rows; the first is the full method.
+        seeds: The number of seeds of rows within `CLOSE` of their reference; other rows get one seed.
+        protocol: The views and lights by which runs are scored.
+        out: The folder of the runs, with one folder per scene.
     """
 
     scenes: list[Path]
@@ -39,15 +39,15 @@ class Interrupted(Exception):
 
 
 def ablate(plan: Plan, show: Callable[[list[Score]], None]) -> list[Score]:
-    """Trains and scores what is not done yet.
+    """Trains and scores the runs that are not finished yet.
 
     Args:
-        plan: What to run.
-        show: Called with all scores so far after each run.
+        plan: The plan.
+        show: A function called after each run with all scores so far.
 
     Raises:
         InputError: The data or a run's folder cannot be used.
-        Interrupted: To be continued by the same call.
+        Interrupted: Ctrl-C ended a training; the same call continues it.
     """
     scores: list[Score] = []
 
@@ -69,7 +69,7 @@ def ablate(plan: Plan, show: Callable[[list[Score]], None]) -> list[Score]:
 
 
 def run_row(plan: Plan, scene: Path, row: Row, seed: int) -> dict:
-    """The evaluation of one run, made now unless it stands already."""
+    """The evaluation of one run; trains it unless it is finished."""
     config = row.config.replace({"run.seed": seed})
     run = plan.out / scene.resolve().name / (row.slug if seed == 0 else f"{row.slug}_seed{seed}")
     scores = run / "scores.json"

@@ -10,7 +10,7 @@ from splitnerf.errors import InputError
 
 FULL = "full"
 
-# What the switches of the split sum and of predicted occlusion need; preset `paper` has it, and then a row changes one thing.
+# The settings that split sum and predicted occlusion need; preset `paper` has them, so that a row changes one setting.
 SPLIT: dict[str, object] = {"shading": "split"}
 BY_MLP = SPLIT | {"occlusion": "mlp"}
 SUMMED: dict[str, object] = {"shading": "summed", "occlusion": "bits", "compositing": "linear", "fresnel_mode": "exact"}
@@ -46,7 +46,7 @@ SWITCHES: dict[str, dict[str, object]] = {
     "metals by halves": {"binary_metal_weight": 0.0},
     "no metal loss at all": {"metal_regulariser": False, "binary_metal_weight": 0.0, "dark_metal_weight": 0.0},
 }
-# What rows are compared with that differ from the full method in more than what they are called by.
+# The references of rows that differ from the full method in more settings than the one that they are named after.
 REFERENCES = {
     "split sum, occlusion by MLP, no occlusion loss": "split sum, occlusion by MLP",
     "split sum, occlusion by MLP, of position alone": "split sum, occlusion by MLP",
@@ -59,9 +59,9 @@ class Row:
     """One line of the table.
 
     Attributes:
-        name: What it is called.
-        config: All settings of its runs, but for the seed.
-        reference: The row that it is compared with.
+        name: The row's name.
+        config: All settings of the row's runs, except the seed.
+        reference: The name of the row that it is compared with.
     """
 
     name: str
@@ -70,17 +70,17 @@ class Row:
 
     @property
     def slug(self) -> str:
-        """The name as a folder's."""
+        """The row's name as the name of a folder."""
         return "".join(c if c.isalnum() else "_" for c in self.name.lower())
 
 
 def make_rows(base: Config, names: list[str] | None = None) -> list[Row]:
-    """The full method and its variations; one that changes nothing about `base` is left out, and the row that another is
-    compared with comes along.
+    """The full method and its variations, with the references of the variations. A variation that equals `base` is left
+    out.
 
     Args:
-        base: The full method.
-        names: The variations to take; None for all.
+        base: The settings of the full method.
+        names: The names of the variations; None for all.
 
     Raises:
         InputError: A name is unknown.

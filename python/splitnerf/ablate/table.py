@@ -11,7 +11,7 @@ import numpy as np
 
 from splitnerf.ablate.rows import FULL
 
-CLOSE = 0.3  # dB: a smaller difference of single runs says nothing
+CLOSE = 0.3  # dB: a smaller difference of single runs is not significant
 COLUMNS = (
     ("relight", "relight, dB", "{:.2f}"),
     ("albedo", "albedo, dB", "{:.2f}"),
@@ -26,8 +26,8 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Score:
-    """One run's scores; None where the data hold no truth. Units as in the column titles. `reference` names the row
-    that it is compared with."""
+    """One run's scores, None where the data have no truth; the column titles give the units. `reference` names the row
+    that the run is compared with."""
 
     scene: str
     row: str
@@ -45,12 +45,12 @@ class Score:
 
 @dataclass(frozen=True)
 class Difference:
-    """A row against its reference in its scene: relit views, or novel views where none are known.
+    """The difference of a row's PSNR from its reference in one scene, over relit views or, without any, novel views.
 
     Attributes:
-        row: Its name.
-        mean: dB, over the seeds that both have; positive is better than the reference.
-        error: Standard error of the mean, None with one seed.
+        row: The name of the row.
+        mean: The mean difference in dB over the seeds that both have; positive is better than the reference.
+        error: The standard error of the mean in dB; None with one seed.
     """
 
     row: str
@@ -58,7 +58,7 @@ class Difference:
     error: float | None
 
     def verdict(self) -> str:
-        """In words: a number, or that there is no difference."""
+        """The difference in words: a number, or "no difference" if it is too small."""
         if self.error is None:
             return "no difference" if abs(self.mean) < CLOSE else f"{self.mean:+.2f} dB"
         text = f"{self.mean:+.2f} ± {self.error:.2f} dB"

@@ -1,1 +1,1 @@
-"""Benchmarks that a user can run: time against error of operators and of whole runs, and how exact the operators are."""
+"""Benchmarks that a user can run: time against error of operators and of whole runs, and the operators' accuracy."""

@@ -1,4 +1,4 @@
-"""Charts of cost against error: their points, the Pareto front, and the files that they become."""
+"""Charts of cost against error: points, Pareto front, and their files."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from splitnerf.data.images import atomic_path
 from splitnerf.errors import InputError
 
 COLUMNS = 3  # charts in a row of a picture
-MARGIN = 1.3  # of the axis of errors beyond its points, a factor
+MARGIN = 1.3  # factor by which the error axis extends beyond its points
 COLOURS = ("#1f6fb4", "#d9822b", "#3f9d63", "#b5539a", "#6f5fc0", "#c2524a", "#1f9c9c", "#8a7a2a", "#555555", "#a0522d")
 
 
 @dataclass(frozen=True)
 class Point:
-    """One way of doing the work.
+    """One method's cost and error.
 
     Attributes:
-        series: The method, or whose it is.
-        variant: Its setting, such as ``n = 64``; may be empty.
-        cost: Of the chart's unit.
-        error: Of the chart's unit.
-        low, high: Quartiles of the cost; equal to it where it is exact.
-        default: Whether it is what the library does unless told otherwise.
+        series: The method or the library.
+        variant: The method's setting, such as ``n = 64``; may be empty.
+        cost: The cost, in the chart's unit.
+        error: The error, in the chart's unit.
+        low, high: The quartiles of the cost; equal to the cost where it is exact.
+        default: Whether this is the library's default.
     """
 
     series: str
@@ -67,15 +67,15 @@ class Chart:
 
 @dataclass(frozen=True)
 class Result:
-    """What one benchmark found.
+    """The result of one benchmark.
 
     Attributes:
-        name: The name of its files.
+        name: The name of the result's files.
         title: The heading.
-        sources: Git's patterns of the files that are measured.
-        findings: Sentences with ratios, the first things to read.
-        charts: Cost against error.
-        tables: Further tables: title, heads, rows.
+        sources: Git patterns of the measured source files.
+        findings: Sentences with ratios, which summarise the result.
+        charts: The charts of cost against error.
+        tables: Further tables, each with title, heads and rows.
     """
 
     name: str
@@ -108,7 +108,7 @@ def write_result(result: Result, out: Path) -> list[Path]:
 
 
 def write_csv(path: Path, facts: dict[str, str], rows: Iterable[Sequence[object]]) -> None:
-    """A file of rows, the first of them names, with the facts as comments above."""
+    """Writes rows to a CSV file, with the facts as comments above; the first row holds the columns' names."""
     with atomic_path(path) as temporary, open(temporary, "w", newline="") as file:
         file.writelines(f"# {key}: {value}\n" for key, value in facts.items())
         csv.writer(file).writerows(rows)
@@ -153,7 +153,7 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:
 
 
 def error_range(chart: Chart) -> tuple[float, float]:
-    """Of the axis: at least a decade, so that equal errors look equal."""
+    """The range of the error axis: at least a decade, so that equal errors look equal."""
     low, high = min(p.error for p in chart.points), max(p.error for p in chart.points)
     middle, half = math.sqrt(low * high), max(math.sqrt(high / low) * MARGIN, math.sqrt(10))
     return middle / half, middle * half

@@ -1,4 +1,4 @@
-"""What all benchmarks do: check the ways to do a piece of work, time them in turns, and make a chart of both."""
+"""Shared by all benchmarks: checks the methods, times them in turns, and makes charts of time against error."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from splitnerf.errors import CheckFailed
 
 ROUNDS, QUICK_ROUNDS = 15, 7
 SHORTEST = 0.005  # seconds of one measurement; faster calls are repeated within it
-SETTLING = 0.004  # seconds before each: what ran before has threads that go on looking for work
+SETTLING = 0.004  # seconds of pause before each measurement, since threads of the call before still spin
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Ratio:
-    """How many times as long one call takes as another: the median over rounds in which both ran, and the quartiles."""
+    """The ratio of two calls' times: the median over rounds in which both ran, and the quartiles."""
 
     value: float
     low: float
@@ -53,12 +53,12 @@ class Times:
         return Timing(*_median_and_quartiles(self.seconds[name]))
 
     def ratio(self, slow: Hashable, fast: Hashable) -> Ratio:
-        """How many times as long `slow` takes as `fast`, round by round."""
+        """The ratio of the times of `slow` to those of `fast`, round by round."""
         return Ratio(*_median_and_quartiles([a / b for a, b in zip(self.seconds[slow], self.seconds[fast])]))
 
 
 def interleaved(calls: Mapping[Hashable, Callable[[], object]], rounds: int) -> Times:
-    """Runs every call once to warm up, then all of them in turns, so that all meet the same load.
+    """Runs every call once to warm up, then times all calls in turns, so that all run under the same load.
 
     Args:
         calls: The calls by name.
@@ -94,7 +94,7 @@ def rms(values: ArrayLike) -> float:
 
 
 def with_gradients(way: Callable[..., Tensor], inputs: tuple[Tensor, ...], cotangent: Tensor) -> Callable[[], tuple]:
-    """A call that gives a function's result and its gradients to all inputs."""
+    """A call that returns a function's result and the gradients of all inputs."""
     leaves = tuple(x.clone().requires_grad_() for x in inputs)
 
     def call() -> tuple[Tensor, ...]:
@@ -105,7 +105,7 @@ def with_gradients(way: Callable[..., Tensor], inputs: tuple[Tensor, ...], cotan
 
 
 def check(subject: str, errors: Mapping[Hashable, float], limit: float) -> None:
-    """Refuses work that is wrong, before it is timed.
+    """Checks a method's errors before it is timed.
 
     Raises:
         CheckFailed: An error is not below the limit.
@@ -123,10 +123,10 @@ def chart_of(
     """Times against errors.
 
     Args:
-        title, cost, error: As of :class:`splitnerf.bench.charts.Chart`.
+        title, cost, error: The texts of :class:`splitnerf.bench.charts.Chart` with these names.
         times: Seconds by series and variant.
         errors: Errors by series and variant, in the order of the table.
-        default: The keys of what the library does unless told otherwise.
+        default: The keys of the library's defaults.
         scale: The number of units of cost in a second.
     """
     points = []
@@ -140,10 +140,10 @@ def run_benchmarks(names: Sequence[str], quick: bool, out: Path, show: Callable[
     """Checks and times the operators, writes the charts, and shows the findings as they come.
 
     Args:
-        names: Modules beside this one, each with ``run(quick, rounds)``.
-        quick: Small inputs and few rounds: minutes in all.
-        out: A folder; made where it is missing.
-        show: A call with each line.
+        names: The names of modules in this package, each with ``run(quick, rounds)``.
+        quick: Whether to use small inputs and few rounds, which takes minutes in all.
+        out: The folder of the results; created if missing.
+        show: A function called with each line.
 
     Raises:
         CheckFailed: An operator's results are wrong.

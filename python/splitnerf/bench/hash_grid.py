@@ -17,7 +17,7 @@ from splitnerf.bench.peers import DrJitHashGrid, drjit_ready
 from splitnerf.ops import HashGridSpec, hash_encode
 
 SPEC = HashGridSpec(n_levels=16, n_features=2, base_resolution=32, growth=1.3195079, log2_table_size=19)
-TOLERANCE = 1e-3  # between ours and plain torch, of the largest value
+TOLERANCE = 1e-3  # difference between ours and plain torch, relative to the largest value
 CORNERS = 8
 SOURCES = ("cpp/*hash*", "python/splitnerf/ops/hash_grid.py")
 
@@ -26,11 +26,11 @@ def run(quick: bool, rounds: int) -> Result:
     """Forward and backward of 16 levels x 2 features, 2^19 entries a level, on random points.
 
     Args:
-        quick: Fewer points, and no Dr.Jit, which takes a minute to compile.
-        rounds: Of timing.
+        quick: Whether to use fewer points and leave out Dr.Jit, which takes a minute to compile.
+        rounds: The number of timing rounds.
 
     Raises:
-        CheckFailed: One of them is wrong.
+        CheckFailed: A result is wrong.
     """
     torch.manual_seed(0)
     n = 1 << (15 if quick else 17)
@@ -60,7 +60,7 @@ def run(quick: bool, rounds: int) -> Result:
         peers = {storage: DrJitHashGrid(SPEC, storage, x, cotangent) for storage in ("Float32", "Float16")}
         calls |= {("Dr.Jit", storage.lower()): peer.forward_backward for storage, peer in peers.items()}
     entries = 1 << SPEC.log2_table_size
-    # Written, so that it has memory of its own: pages of np.zeros are all the same one until then.
+    # The array is written once: until then all pages of np.zeros share one page of memory.
     one_level, gathers = np.ones((entries, 2), np.float32), n * SPEC.n_levels * CORNERS
     limit = ("gathers", "one level")
     times = interleaved(calls | {limit: lambda: _core.random_gathers(one_level, gathers)}, rounds)
@@ -84,5 +84,5 @@ def run(quick: bool, rounds: int) -> Result:
 
 
 def relative(a: Tensor, true: Tensor) -> float:
-    """Largest difference, of the largest true value."""
+    """The largest difference, relative to the largest true value."""
     return float((a.double() - true).abs().max() / true.abs().max())

@@ -1,4 +1,4 @@
-"""Environment maps to measure under, and the same light in the forms that estimators take."""
+"""Environment maps for measurements, and the same light in the forms that estimators read."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ SUBDIVISION, FINEST = 4, 512  # samples along the edge of a texel that its mean 
 
 
 def data_folder() -> Path:
-    """Where measured maps and meshes lie: SPLITNERF_DATA, or ../shared/data."""
+    """The folder of measured maps and meshes: SPLITNERF_DATA, or ../shared/data."""
     return Path(os.environ.get("SPLITNERF_DATA", "../shared/data"))
 
 
 def lights() -> dict[str, np.ndarray]:
-    """[h, 2h, 3] maps by name: measured ones where the data folder has them, else a procedural sky without and with a sun."""
+    """Maps [h, 2h, 3] by name: measured ones if the data folder has them, else a procedural sky without and with a
+    sun."""
     files = {name: data_folder() / "hdri" / file for name, file in MEASURED.items()}
     if all(path.is_file() for path in files.values()):
         return {name: read_environment(path) for name, path in files.items()}
@@ -33,7 +34,8 @@ def lights() -> dict[str, np.ndarray]:
 
 
 def procedural_sky(height: int, sun: float) -> np.ndarray:
-    """A gradient of blue over brown ground, two soft boxes, and a sun of 2 degrees and so many times the zenith."""
+    """A blue gradient over brown ground, two soft boxes, and a sun of 2 degrees with `sun` times the zenith's
+    radiance."""
     polar = (np.arange(height) + 0.5) / height * np.pi
     azimuth = np.pi - (np.arange(2 * height) + 0.5) / height * np.pi
     d = np.stack(np.broadcast_arrays(
@@ -50,7 +52,8 @@ def procedural_sky(height: int, sun: float) -> np.ndarray:
 
 
 class MapLight:
-    """Radiance of an equirectangular map from any direction: bilinear, with the map's means beneath for a filtered lookup."""
+    """Radiance of an equirectangular map from any direction: bilinear, with the map's means beneath for a filtered
+    lookup."""
 
     def __init__(self, radiance: np.ndarray):
         self.levels = [torch.from_numpy(np.ascontiguousarray(radiance))]
@@ -72,7 +75,8 @@ class MapLight:
         return F.grid_sample(image, grid, padding_mode="border", align_corners=False)[0, :, 0].T
 
     def filtered(self, directions: Tensor, solid_angles: Tensor) -> Tensor:
-        """As above, averaged over about these solid angles [n]: linear between the two levels whose texels they are."""
+        """Radiance [n, 3] averaged over about these solid angles [n] (sr), by linear interpolation of two mip
+        levels."""
         texel = 4 * math.pi / self.levels[0][..., 0].numel()
         lod = (0.5 * torch.log2(solid_angles / texel)).clamp(0, len(self.levels) - 1.001)
         below, share = lod.floor().long(), lod.frac()[:, None]

@@ -1,4 +1,4 @@
-"""Meshes to measure on."""
+"""Meshes for measurements."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Normals of a distance field: its analytic gradient beside finite differences, time against angle.
+"""Normals of a distance field: the analytic gradient beside finite differences, time against angle.
 
-The field is fitted to a surface whose normals are known, so that two errors can be told: against the gradient of the field
-itself, in float64, and against the surface that it stands for.
+The field is fitted to a surface with known normals, so that two errors can be measured: that against the field's own
+gradient in float64, and that against the fitted surface.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def run(quick: bool, rounds: int) -> Result:
     backward pass.
 
     Args:
-        quick: Fewer points and a rougher fit.
-        rounds: Of timing.
+        quick: Whether to use fewer points and a rougher fit.
+        rounds: The number of timing rounds.
 
     Raises:
         CheckFailed: The analytic gradient is wrong.
@@ -116,7 +116,7 @@ def finite_differences(field: SdfField, positions: Tensor, cells: float) -> Tens
 
 
 def timed(way: Gradient, field: SdfField, positions: Tensor, training: bool) -> Callable[[], object]:
-    """A call that finds the gradients, and those of the eikonal loss to the field where it trains."""
+    """A call that computes the field's gradients and, with `training`, the eikonal loss's backward pass."""
     parameters = tuple(field.parameters())
 
     def render() -> Tensor:

@@ -31,7 +31,8 @@ LARGE = 500  # columns and rows of the mesh of 500k triangles
 
 
 class Points:
-    """Points on a mesh's faces with interpolated normals, mirror directions about random views, and the light over them."""
+    """Points on a mesh's faces with interpolated normals, mirror directions of random views, and the light above
+    them."""
 
     def __init__(self, mesh: trimesh.Trimesh, n: int, environment: np.ndarray):
         self.vertices = torch.from_numpy(mesh.vertices.astype(np.float32))
@@ -60,11 +61,11 @@ def run(quick: bool, rounds: int) -> Result:
     """Error of the factors against time, then rays a second, on one mesh of 100k and one of 500k triangles.
 
     Args:
-        quick: One light, fewer points, and no other tracer but Open3D.
-        rounds: Of timing.
+        quick: Whether to use one light and fewer points, with Open3D as the only other tracer.
+        rounds: The number of timing rounds.
 
     Raises:
-        CheckFailed: A tracer answers otherwise.
+        CheckFailed: The tracers disagree.
     """
     torch.manual_seed(0)
     mesh = armadillo()
@@ -87,7 +88,7 @@ def run(quick: bool, rounds: int) -> Result:
 
 
 def error_charts(light_name: str, points: Points, quick: bool, rounds: int) -> list[Chart]:
-    """o_d and o_s of rays and of bits against many rays."""
+    """Charts of the errors of o_d and o_s by rays and by bits, against a reference with many rays."""
     n_true = 1024 if quick else 4096
     true = [torch.stack([points.traced(n_true, n_true, seed)[k] for seed in range(2)]).mean(0) for k in (0, 1)]
     calls: dict[tuple[str, str], Callable[[], tuple[Tensor, Tensor]]] = {}
@@ -115,7 +116,7 @@ def error_charts(light_name: str, points: Points, quick: bool, rounds: int) -> l
 
 
 class EnvironmentOf:
-    """A map as the light that the bits are weighed with."""
+    """A map as the light that weighs the visibility bits."""
 
     leaves: tuple[Tensor, ...] = ()
 
@@ -144,7 +145,7 @@ def independent(points: Points, n: int) -> tuple[Tensor, Tensor]:
 
 
 def ray_rates(name: str, points: Points, quick: bool, rounds: int) -> tuple[list[str], list[list[object]]]:
-    """Mrays/s of our factors, rays made and summed included, beside tracers that are handed rays of the same lobes."""
+    """Mrays/s of our factors, with the making and summing of rays, beside tracers that get rays of the same lobes."""
     n, half = len(points.positions), preset("cpu").occlusion.rays
     cosine = F.normalize(points.normals[:, None] + F.normalize(torch.randn(n, half, 3), dim=-1), dim=-1)
     lobes = sample_ggx_lobe(points.axes, points.roughness, half, seed=0)

@@ -1,8 +1,9 @@
 """The path tracer: time against error, beside Mitsuba 3, on one textured asset.
 
-Both trace the same triangles, textures (base colour, roughness, metallic; no normal map), light and camera, with next-event
-estimation, multiple importance sampling and paths of up to 5 scattering events. Mitsuba's BSDF is ``principled``, whose
-details differ, so that each is held against its own converged image; how far those are apart is a finding of its own.
+Both trace the same triangles, textures (base colour, roughness, metallic; no normal map), light and camera, with
+next-event estimation, multiple importance sampling and paths of up to 5 scattering events. Mitsuba's BSDF is
+``principled``, whose details differ. So each renderer is compared with its own converged image; the difference of these
+images is reported too.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from splitnerf.synth.cameras import orbit
 SCATTERINGS = 5
 ANGLE_X = 0.69  # radians
 POSE = orbit(9, distance=3.0, elevation=25.0, start=1.0)[0]
-BATCH = 256  # samples a pixel at a time: a wavefront of all of them would not fit into memory
-APART = 0.05  # RMS between two converged images: more is not a matter of details
-SEEDS = 3  # images that an error is the mean of
+BATCH = 256  # samples per pixel at a time: a wavefront of all samples would not fit into memory
+APART = 0.05  # largest RMS difference of two converged images that details of the BSDFs may explain
+SEEDS = 3  # images whose errors are averaged
 SOURCES = ("cpp/*path_tracer*", "cpp/*principled*", "cpp/*environment_sampler*", "cpp/*texture*", "cpp/*scene*")
-INSIDE = 0.99  # alpha of what counts as foreground
+INSIDE = 0.99  # least alpha of the foreground
 
 Render = Callable[[int, int], tuple[np.ndarray, np.ndarray]]  # samples a pixel, seed -> radiance and alpha
 
@@ -39,8 +40,8 @@ def run(quick: bool, rounds: int) -> Result:
     """Root mean square error of linear radiance, clipped to [0, 1], over the foreground, by samples a pixel.
 
     Args:
-        quick: A smaller image, fewer samples, and Mitsuba left out.
-        rounds: Of timing.
+        quick: Whether to use a smaller image and fewer samples, without Mitsuba.
+        rounds: The number of timing rounds.
 
     Raises:
         CheckFailed: Two renderers converge to different images.
@@ -86,7 +87,7 @@ def run(quick: bool, rounds: int) -> Result:
 
 
 def time_to(curve: list[tuple[float, float]], error: float) -> float:
-    """When a renderer with these times and errors reaches an error: by the power law of its last two points."""
+    """The time at which a renderer reaches an error, by the power law through the last two points of its curve."""
     (t0, e0), (t1, e1) = curve[-2:]
     return t1 * (error / e1) ** (np.log(t1 / t0) / np.log(e1 / e0))
 

@@ -1,4 +1,4 @@
-"""Other libraries at the same work. Each is optional: what is not installed is left out, and said to be."""
+"""Other libraries for the same work. Each is optional: a missing library is left out, with a note on stderr."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ def drjit_ready() -> bool:
 class DrJitHashGrid:
     """Dr.Jit's encoding of a grid of the same shape, with a random table of its own.
 
-    It places nodes half a cell aside, so that its features are not ours and only its time compares.
+    Its nodes are shifted by half a cell, so that its features differ from ours and only times can be compared.
 
     Args:
-        spec: Shape of the grid.
-        storage: ``Float16`` or ``Float32``: of the table and the features.
-        positions: [n, 3].
-        cotangent: [n, C], what the features' gradient is.
+        spec: The shape of the grid.
+        storage: The type of table and features, ``Float16`` or ``Float32``.
+        positions: [n, 3] points in [0, 1].
+        cotangent: [n, C] gradient of the features.
     """
 
     def __init__(self, spec: HashGridSpec, storage: str, positions: Tensor, cotangent: Tensor):

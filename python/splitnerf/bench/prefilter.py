@@ -32,18 +32,19 @@ HARMONIC_RESOLUTION, ZONAL_ROWS = 64, 129
 HARMONICS = "spherical harmonics"
 SOURCES = ("cpp/*prefilter*", "cpp/*light*", "python/splitnerf/ops/light.py", "python/splitnerf/ops/light_pyramid.py",
            "python/splitnerf/fields/light_pyramid.py")  # fmt: skip
-NARROWEST = 0.1  # roughness that the harmonics are asked for
+NARROWEST = 0.1  # least roughness at which the harmonics are measured
 
 Estimate = Callable[[Tensor, Tensor], Tensor]
 
 
 class Truth:
-    """gbar of a light, from a quadrature over the sphere or, where its nodes would miss the lobe, from many samples of it.
+    """gbar of a light, from a quadrature over the sphere or, where its nodes would miss the lobe, from many samples of
+    it.
 
     Args:
         light: The light.
-        height: Rows of the quadrature, twice as many columns.
-        n: Samples of a lobe.
+        height: The number of rows of the quadrature; it has twice as many columns.
+        n: The number of samples of a lobe.
     """
 
     def __init__(self, light: MapLight, height: int, n: int):
@@ -68,7 +69,7 @@ class Truth:
 
 
 def uniform(light: MapLight, n: int, with_queries: bool) -> Estimate:
-    """Independent directions, as published; as in its code, the queries are directions too."""
+    """Independent directions, as published; `with_queries` adds the queries to them, as in the released code."""
 
     def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
         directions = F.normalize(torch.randn(n, 3), dim=1)
@@ -95,7 +96,7 @@ def own_lobe(light: MapLight, n: int) -> Estimate:
 
 
 def filtered_importance(light: MapLight, n: int) -> Estimate:
-    """Each sample of the lobe stands for the solid angle 1 / (n pdf) around it (Krivanek and Colbert 2008)."""
+    """Samples of the lobe, each averaged over the solid angle 1 / (n pdf) around it (Krivanek and Colbert 2008)."""
 
     def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
         directions = sample_ggx_lobe(axes, roughness, n, int(torch.randint(1 << 30, ())))
@@ -158,8 +159,8 @@ def run(quick: bool, rounds: int) -> Result:
     """Error against time for batches of queries of one roughness, light by light.
 
     Args:
-        quick: Few bands, one light and coarser truth.
-        rounds: Of timing.
+        quick: Whether to use few bands, one light and a coarser truth.
+        rounds: The number of timing rounds.
     """
     torch.manual_seed(0)
     shipped = preset("cpu")
@@ -186,7 +187,8 @@ def run(quick: bool, rounds: int) -> Result:
 
 
 def defaults(config: Config, rho: float) -> list[tuple[str, str]]:
-    """What the settings take for a roughness: the pyramid, and what holds the MLP honest where `light = mlp`."""
+    """The library's defaults at a roughness: the pyramid, and the consistency loss's estimate for `light.kind =
+    mlp`."""
     narrow = ("own lobe", f"n = {config.losses.light_lobe_samples}")
     wide = ("Fibonacci", f"n = {config.losses.light_samples}")
     resolution = f"{config.light.resolution} x {config.light.resolution}"
@@ -194,13 +196,14 @@ def defaults(config: Config, rho: float) -> list[tuple[str, str]]:
 
 
 def relative_rms(estimates: list[Tensor], true: Tensor) -> float:
-    """Root of the mean squared error over that of the truth."""
+    """Root mean square error, divided by the truth's root mean square."""
     squared = torch.stack([(e - true).square().mean() for e in estimates]).mean()
     return float((squared / true.square().mean()).sqrt())
 
 
 def finding(chart: Chart) -> str:
-    """The defaults beside the best that takes no longer than the pyramid, and the published estimator."""
+    """A comparison of the defaults with the best method not slower than the pyramid and with the published
+    estimator."""
     mlp, own = sorted((p for p in chart.points if p.default), key=lambda p: p.series == "pyramid")
     rivals = [p for p in chart.points if not p.default and p.series != own.series and p.cost <= own.high]
     best = min(rivals, key=lambda p: p.error, default=None)

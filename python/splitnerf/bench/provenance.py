@@ -1,4 +1,4 @@
-"""Where numbers come from: machine, commit, date, command, and which sources they measure."""
+"""The provenance of numbers: machine, commit, date, command and measured sources."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ import torch
 import splitnerf
 from splitnerf import _core
 
-ROOT = Path(__file__).parents[3]  # of the checkout, where the package stands in one
+ROOT = Path(__file__).parents[3]  # root of the checkout, if the package is in one
 
 
 def processor_name(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
-    """The name that Linux gives it, else that of Python's platform module."""
+    """The processor's name from Linux, else from Python's platform module."""
     try:
         lines = cpuinfo.read_text().splitlines()
     except OSError:
@@ -29,7 +29,7 @@ def processor_name(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
 
 
 def git(root: Path, *words: str) -> str | None:
-    """What git says in a folder; None where it cannot."""
+    """The output of git in a folder; None where git fails."""
     try:
         done = subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, timeout=10)
     except (OSError, subprocess.TimeoutExpired):
@@ -38,7 +38,7 @@ def git(root: Path, *words: str) -> str | None:
 
 
 def commit(sources: Sequence[str] = (), root: Path = ROOT) -> str:
-    """The checkout's commit, with a + where the sources have changes beside it; "unknown" outside of a checkout."""
+    """The checkout's commit, with a + if the sources have uncommitted changes; "unknown" outside of a checkout."""
     if not (root / ".git").exists() or (number := git(root, "rev-parse", "--short", "HEAD")) is None:
         return "unknown"
     changes = git(root, "status", "--porcelain", "--untracked-files=no", "--", *sources)
@@ -46,7 +46,7 @@ def commit(sources: Sequence[str] = (), root: Path = ROOT) -> str:
 
 
 def command_line() -> str:
-    """The command as it was typed, of an installed program and of absolute paths the last part alone."""
+    """The command as it was typed; an installed program and absolute paths are shortened to their last part."""
     program = Path(sys.argv[0])
     first = str(program) if program.suffix == ".py" and not program.is_absolute() else program.name
     return shlex.join([first, *(Path(word).name if word.startswith("/") else word for word in sys.argv[1:])])
@@ -56,8 +56,8 @@ def provenance(sources: Sequence[str], command: str | None = None, root: Path = 
     """Processor, versions, commit, date, command and sources, for the head of a table.
 
     Args:
-        sources: Git's patterns of the files whose change makes the numbers stale.
-        command: The command that repeats them (default: this process's own).
+        sources: Git patterns of the files whose change makes the numbers stale.
+        command: The command that repeats the numbers (default: this process's own).
         root: The checkout.
     """
     return {
@@ -70,5 +70,5 @@ def provenance(sources: Sequence[str], command: str | None = None, root: Path = 
 
 
 def header(facts: dict[str, str]) -> str:
-    """The facts as a line of a page."""
+    """The facts as one line of text."""
     return "; ".join(f"{key} {value}" for key, value in facts.items()) + "."

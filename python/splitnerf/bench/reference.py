@@ -1,8 +1,8 @@
-"""Operators in plain torch, one function each, as one would write them without this library.
+"""The operators in plain torch, one function each, as one would write them without this library.
 
-Tests hold the operators against these functions, benchmarks time the operators beside them, and
-``tests/bench/plain_torch.py`` makes a whole training step of them. Each takes what ``torch.ops.splitnerf.NAME`` takes,
-in float32 or float64, and returns its results, without those that only the backward pass reads.
+Tests compare the operators with these functions, benchmarks time both, and ``tests/bench/plain_torch.py`` makes a whole
+training step of them. Each function has the arguments of ``torch.ops.splitnerf.NAME``, in float32 or float64, and
+returns its results, except those that only the backward pass reads.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from torch.nn import functional as F
 from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE
 
 PRIMES = (1, 2654435761, 805459861)  # Teschner et al. 2003
-NEIGHBOURS = 16  # vertices that answer for a point
-BITS = 32  # of a word
-BLACK_LIGHT = 1e-4  # added to the light that a share is taken of, so that there is one in the dark too
+NEIGHBOURS = 16  # vertices that a point's visibility is averaged over
+BITS = 32  # bits in a word
+BLACK_LIGHT = 1e-4  # added to the light, so that its share is defined in the dark too
 
 # ---- distance field ----
 
@@ -26,7 +26,8 @@ BLACK_LIGHT = 1e-4  # added to the light that a share is taken of, so that there
 def hash_encode(
     positions: Tensor, table: Tensor, n_levels: int, base: int, growth: float, log2_size: int, n_active: int
 ) -> Tensor:
-    """Trilinear interpolation at all levels and corners: one gather, and so one gradient of the table's size."""
+    """Trilinear interpolation at all levels and corners with a single gather, so that one gradient has the table's
+    size."""
     levels = torch.arange(n_active)
     resolution = torch.floor(base * torch.tensor(growth, dtype=torch.float64) ** levels + 1e-6).long()
     nodes = resolution + 1
@@ -48,7 +49,7 @@ def hash_encode(
 def layer_outputs(
     positions: Tensor, features: Tensor, hidden: Tensor, hidden_bias: Tensor, out: Tensor, out_bias: Tensor, beta: float
 ) -> Tensor:
-    """One layer of softplus units over positions and features; torch's own threshold of 20 costs e^-20 of a slope."""
+    """One layer of softplus units over positions and features; torch's threshold of 20 changes a slope by e^-20."""
     units = F.softplus(F.linear(torch.cat([positions, features], 1), hidden, hidden_bias), beta, threshold=50)
     return F.linear(units, out, out_bias)
 
@@ -65,7 +66,7 @@ def sdf_layer(positions, features, jacobian, hidden, hidden_bias, out, out_bias,
 
 
 def march_rays(rays_o, rays_d, jitter, cells, box, step, max_samples) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Rays, starts, ends and offsets: every point of the lattice along a ray, of which the occupied ones stay."""
+    """Rays, starts, ends and offsets: makes every point of the lattice along a ray and keeps the occupied ones."""
     inverse = 1 / torch.where(rays_d == 0, 1e-12, rays_d)
     a, b = (-box - rays_o) * inverse, (box - rays_o) * inverse
     near, far = torch.minimum(a, b).amax(1).clamp(min=0), torch.maximum(a, b).amin(1)
@@ -90,8 +91,8 @@ def ray_indices(offsets: Tensor) -> Tensor:
 
 
 def neus_weights(f_prev, f_next, s, offsets, min_transmittance) -> tuple[Tensor, Tensor]:
-    """w = alpha T and its sum, alpha = (Phi(s f_prev) - Phi(s f_next))+ / Phi(s f_prev) as one minus a ratio of
-    sigmoids; 0 behind a transmittance below the least."""
+    """w = alpha T and its sum, with alpha = (Phi(s f_prev) - Phi(s f_next))+ / Phi(s f_prev) as one minus a ratio of
+    sigmoids; w is 0 where the transmittance is below the least."""
     passing = (F.logsigmoid(s * f_next) - F.logsigmoid(s * f_prev)).clamp(max=0)  # log(1 - alpha)
     rays = ray_indices(offsets)
     counts = offsets.diff()
@@ -170,7 +171,7 @@ def split_sum_shade(
 
 
 def shade_sums(normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, lut, compensate) -> Tensor:
-    """What is reflected of sums over the light, of which `grazing` is the part that Fresnel's term alone reflects."""
+    """Radiance reflected from sums over the light; `grazing` is the sum with Schlick's factor (1 - v.h)^5."""
     _, cosine = facing(normals, view_dirs)
     f1, f2, _ = brdf_table(lut, cosine, roughness).split(1, 1)
     f0 = 0.04 * (1 - metallic) + metallic * albedo
@@ -180,7 +181,7 @@ def shade_sums(normals, view_dirs, albedo, roughness, metallic, specular, grazin
 
 
 def monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance) -> Tensor:
-    """[n, 3, 3]: means over directions of D V (n.l) L / p, the same times (1 - v.h)^5, and (n.l) L / (pi p)."""
+    """[n, 3, 3] means over directions: D V (n.l) L / p, D V (n.l) L (1 - v.h)^5 / p, and (n.l) L / (pi p)."""
     normals, n_v = facing(normals, view_dirs)
     n_v = n_v.clamp(min=1e-4)
     a2 = (roughness**2).clamp(min=2e-3) ** 2
@@ -197,7 +198,7 @@ def monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance) 
 
 
 def summed_light(normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent) -> Tensor:
-    """The same over directions that all points share, whose densities follow from their solid angles."""
+    """The sums of :func:`monte_carlo_light` over shared directions, whose densities follow from their solid angles."""
     n, k = visible.shape
     incoming = visible[..., None] * radiance
     incoming = incoming + sent if len(sent) else incoming
@@ -214,12 +215,12 @@ def linear_to_srgb(linear: Tensor) -> Tensor:
 
 
 def ggx_lobe(cosine: Tensor, a2: Tensor) -> Tensor:
-    """D (w.w_s)+ by the cosine of w and w_s, D with half the angle between them."""
+    """D (w.w_s)+ from the cosine of w and w_s; D is taken at half the angle between them."""
     return a2 / (math.pi * ((1 + cosine) / 2 * (a2 - 1) + 1).square()) * cosine.clamp(min=0)
 
 
 def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, light: Tensor) -> Tensor:
-    """The light's mean under the lobe, by the whole matrix of weights at once."""
+    """The light's mean under the lobe, with the whole matrix of weights in memory."""
     weight = ggx_lobe(query_dirs @ light_dirs.T, roughness.square().clamp(min=1e-4).square())
     return weight @ light / weight.sum(1, keepdim=True)
 
@@ -227,13 +228,14 @@ def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, l
 def sparse_product(
     offsets, columns, weights, transposed_offsets, transposed_columns, transposed_weights, values
 ) -> Tensor:
-    """A sparse matrix, by rows and by columns, of which torch takes the rows, times a dense one."""
+    """The product of a sparse matrix, given by rows and by columns, with a dense one; torch uses the rows."""
     shape = (len(offsets) - 1, len(transposed_offsets) - 1)
     return torch.sparse_csr_tensor(offsets, columns.long(), weights, shape) @ values
 
 
 def octahedral_texels(w: Tensor, n: int) -> tuple[Tensor, Tensor]:
-    """Indices [4, k] and weights [4, k] of the texels around directions; an edge is continued by itself, mirrored."""
+    """Indices [4, k] and weights [4, k] of the texels around directions; each edge continues at its own mirror
+    image."""
     p = w / w.abs().sum(1, keepdim=True)
     sign = torch.where(p < 0, -1.0, 1.0).to(p.dtype)
     folded = (1 - p[:, :2].flip(1).abs()) * sign[:, :2]
@@ -273,7 +275,7 @@ def spherical_harmonics(w: Tensor, degree: int) -> Tensor:
 
 
 def light_lookup(directions, roughness, levels, sh, resolutions, nodes, zonal) -> Tensor:
-    """Maps between the nodes of roughness, and spherical harmonics from the last of them on."""
+    """Radiance from maps between the nodes of roughness, and from spherical harmonics above the last node."""
     nodes = nodes.to(roughness.dtype)
     maps, start = [], 0
     for n in resolutions.tolist():
@@ -286,7 +288,7 @@ def light_lookup(directions, roughness, levels, sh, resolutions, nodes, zonal) -
     factors = torch.lerp(zonal[row[:, 0]], zonal[row[:, 0] + 1], (place - row).clamp(0, 1))
     bands = torch.repeat_interleave(torch.arange(degree + 1), torch.arange(1, 2 * degree + 2, 2))
     x = (spherical_harmonics(directions, degree) * factors[:, bands]) @ sh
-    floor = (sh[0] * 1e-3 * 0.5 / math.sqrt(math.pi)).clamp(min=1e-20)  # bent below it, so that no light is negative
+    floor = (sh[0] * 1e-3 * 0.5 / math.sqrt(math.pi)).clamp(min=1e-20)  # smaller sums are bent to stay positive
     maps.append(torch.where(x < floor, floor * torch.exp((x / floor).clamp(max=1) - 1), x))
     stacked = torch.stack(maps)
     k = torch.searchsorted(nodes, roughness.detach(), right=True).clamp(1, len(nodes) - 1)
@@ -299,8 +301,8 @@ def light_lookup(directions, roughness, levels, sh, resolutions, nodes, zonal) -
 
 
 def neighbours(positions, normals, vertices, vertex_normals, radius: float, n_levels: int) -> tuple[Tensor, Tensor]:
-    """The heaviest vertices [n, k] that answer for points, and their shares: those that face the same way within the
-    radius, where there are none within twice the radius, and so on."""
+    """The vertices [n, k] of the largest weights around points, and their shares. They face the same way and lie within
+    the radius; if there are none, the radius is doubled, up to `n_levels` times."""
     distance, cosine = torch.cdist(positions, vertices), (normals @ vertex_normals.T).clamp(min=0)
     weight, left = torch.zeros_like(distance), torch.arange(len(positions))
     for level in range(n_levels):
@@ -315,16 +317,16 @@ def neighbours(positions, normals, vertices, vertex_normals, radius: float, n_le
 def cached_visibility(
     positions, normals, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions
 ) -> tuple[Tensor, Tensor]:
-    """Open shares [n, directions] and the mesh's own light [n, directions, 3] from there."""
+    """Open shares [n, directions], and the mesh's light [n, directions, 3] from each direction."""
     near, weight = neighbours(positions, normals, vertices, vertex_normals, radius, len(starts))
     places = torch.arange(BITS, dtype=torch.int32)
     known = (bits[near][..., None] >> places & 1).flatten(-2).to(weight.dtype) * weight[..., None, None]
-    opened, blocked = known.sum(1).unbind(1)  # of [n, k, 2, directions]
+    opened, blocked = known.sum(1).unbind(1)  # from [n, k, 2, directions]
     total = opened + blocked
     above = normals @ directions.T > 0
-    covered = ((blocked > 0) & above).any(1, keepdim=True)  # elsewhere all is open
+    covered = ((blocked > 0) & above).any(1, keepdim=True)  # elsewhere all directions are open
     visible = torch.where(covered & (total > 0), opened / total.clamp(min=1e-9), 1)
-    if not hits.shape[1]:  # nothing is known of what the mesh sends
+    if not hits.shape[1]:  # the mesh's light is unknown
         return visible, visible.new_zeros(*visible.shape, 3)
     sent = (radiance[hits[near].clamp(min=0)] * known[:, :, 1, :, None]).sum(1)
     return visible, sent * (above / total.clamp(min=1e-9))[..., None]
@@ -334,7 +336,7 @@ def cached_occlusion(
     positions, normals, lobe_dirs, roughness, vertices, vertex_normals, starts, order, radius, bits, hits, radiance,
     directions, light,
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:  # fmt: skip
-    """Shares of the light and means of the mesh's own under the cosine and under the lobe, [n, 3] each."""
+    """Shares of the light and means of the mesh's light, under the cosine and under the lobe, [n, 3] each."""
     visible, sent = cached_visibility(
         positions, normals, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions
     )
@@ -351,7 +353,7 @@ def cached_occlusion(
 
 
 def pixel_losses(mean, opacity, target, background, linear: bool) -> tuple[Tensor, Tensor]:
-    """Squared error over a background, from below only where the photo is clipped, and cross entropy of the mask."""
+    """Squared error over a background, one-sided where the photo is clipped, and cross entropy of the mask."""
     colour = linear_to_srgb(mean) if linear else mean
     colour = torch.where(target[:, :3] >= 254 / 255, colour.clamp(max=1), colour)
     o, a = opacity[:, None], target[:, 3:]

@@ -1,4 +1,5 @@
-"""Split-sum shading and the pre-integration operator beside torch eager and torch.compile, and the memory's bandwidth."""
+"""Split-sum shading and the pre-integration operator beside torch eager and torch.compile, and the memory's
+bandwidth."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ from splitnerf.bench.harness import chart_of, check, interleaved, with_gradients
 from splitnerf.notes import note
 from splitnerf.ops import brdf_lut, fibonacci_directions, prefilter_light, split_sum_shade
 
-TOLERANCE = 1e-3  # of results and gradients, of the largest value
+TOLERANCE = 1e-3  # error of results and gradients, relative to the largest value
 FLOATS_A_POINT = 23 + 3  # read forward and written
 SOURCES = ("cpp/*split_sum*", "cpp/*shad*", "cpp/*prefilter*", "python/splitnerf/ops/shading.py",
            "python/splitnerf/ops/light.py")  # fmt: skip
@@ -22,14 +23,14 @@ FLOATS_BACK = 26 + 23  # read backward and written
 
 
 def run(quick: bool, rounds: int) -> Result:
-    """Times forward and backward, after holding results and gradients against float64.
+    """Times forward and backward passes, after a comparison of results and gradients with float64.
 
     Args:
-        quick: Fewer points and directions, and no torch.compile.
-        rounds: Of timing.
+        quick: Whether to use fewer points and directions, without torch.compile.
+        rounds: The number of timing rounds.
 
     Raises:
-        CheckFailed: One of them is wrong.
+        CheckFailed: A result or a gradient is wrong.
     """
     torch.manual_seed(0)
     charts, findings = [], []
@@ -71,7 +72,7 @@ def shading_calls(n: int, compiled: bool) -> tuple[dict[str, Callable[[], object
         try:
             with_gradients(fast, inputs, torch.ones(n, 3))()
             ways["torch.compile"] = fast
-        except Exception as error:  # whatever its compiler says
+        except Exception as error:  # its compiler raises many types
             note(f"torch.compile does not work here ({str(error).splitlines()[0]}): it is left out")
     return checked(ways, plain, inputs)
 
@@ -100,10 +101,10 @@ def shading_inputs(n: int) -> tuple[Tensor, ...]:
 def checked(
     ways: dict[str, Callable[..., Tensor]], true: Callable[..., Tensor], inputs: tuple[Tensor, ...]
 ) -> tuple[dict[str, Callable[[], object]], dict[str, float]]:
-    """Calls with gradients to all inputs, and their root mean square error against `true` in float64.
+    """Calls with gradients of all inputs, and their root mean square errors against `true` in float64.
 
     Raises:
-        CheckFailed: One of them is wrong.
+        CheckFailed: A result or a gradient is wrong.
     """
     cotangent = torch.randn_like(true(*inputs))
     exact = with_gradients(true, tuple(x.double() for x in inputs), cotangent.double())()

@@ -1,4 +1,4 @@
-"""What each skip is worth: steps a second, and the error at equal steps and at equal time."""
+"""The gain of each skip: steps per second, and the error at equal steps and at equal time."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from splitnerf.evaluate.metrics import psnr
 from splitnerf.outputs import render_maps
 from splitnerf.training.loop import train
 
-# What stands where a skip is off.
+# The settings that turn each skip off.
 UNSKIPPED: dict[str, object] = {"sample_above": 0.0, "shades_per_ray": 0, "light_step_every": 1, "open_below": 0.0}
-# The settings that each skip alone has as in the full configuration.
+# The settings that belong to each skip.
 SKIPS: dict[str, tuple[str, ...]] = {
     "samples found without gradients": ("sample_above",),
     "few shaded samples a ray": ("shades_per_ray",),
@@ -38,10 +38,10 @@ class Line:
     """One line of the table.
 
     Attributes:
-        name: Of the skip.
-        steps_per_second: Of the run of equal time, all its work included.
-        psnr_equal_steps: Mean over the test views, dB, after as many steps as the baseline made.
-        psnr_equal_time: The same after as many minutes.
+        name: The name of the skip.
+        steps_per_second: The steps per second of the run of equal time, with all its work.
+        psnr_equal_steps: The mean PSNR of the test views in dB, after the number of steps of the baseline.
+        psnr_equal_time: The mean PSNR of the test views in dB, after the minutes of the baseline.
     """
 
     name: str
@@ -65,12 +65,13 @@ def skip_table(
 
     Args:
         full: The configuration with all skips.
-        minutes: Of each run of equal time.
-        training: What is trained on.
-        views: What is scored.
-        out: Folder of the runs.
-        other: The baseline's line and number of steps by another build; None: nothing skipped in this one.
-        show: Called with each line.
+        minutes: The length of each run of equal time.
+        training: The train split.
+        views: The views that are scored.
+        out: The folder of the runs.
+        other: A function that returns the baseline's line and number of steps from another build; None: the baseline is
+            this build without any skip.
+        show: A function called with each line.
     """
     plain = full.replace(UNSKIPPED)
     baseline, steps = other() if other else run_line(BASELINE, plain, minutes, None, training, views, out / "baseline")
@@ -89,7 +90,7 @@ def skip_table(
 def run_line(
     name: str, config: Config, minutes: float, steps: int | None, training: Dataset, views: Dataset, out: Path
 ) -> tuple[Line, int]:
-    """Trains for the minutes, and for the baseline's steps where they are known; the line and the steps made."""
+    """Trains for the minutes and, if given, for the baseline's steps; returns the line and the number of steps."""
     timed = config.replace({"max_minutes": minutes, "steps": NEVER})
     rate, by_time, made = train_and_score(timed, training, views, out / "equal_time")
     if steps is None:
@@ -113,10 +114,10 @@ def train_and_score(config: Config, training: Dataset, views: Dataset, run: Path
 
 
 def run_other(executable: Path, data: Path, minutes: float, downscale: int, run: Path) -> tuple[Line, int]:
-    """The same by another build of this program through its command line: a baseline from before.
+    """The line and the number of steps of another build of this program, run through its command line.
 
     Raises:
-        InputError: It cannot be run, or fails.
+        InputError: The other build cannot be run, or fails.
     """
     command = [
         str(executable), "train", str(data), "--out", str(run), "--max-minutes", str(minutes), "--downscale", str(downscale),

@@ -1,4 +1,4 @@
-"""The split sum itself: how far it is from the integral that it splits, and its table from what it tabulates."""
+"""The errors of the split sum against the integral that it splits, and of its table against quadrature."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ ROUGHNESS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
 COSINES = (0.1, 0.5, 0.9)  # n.v
 MATERIALS = {"metal": (1.0, 1.0), "dielectric": (0.0, 0.5)}  # metallic, albedo
 FINEST = 256  # quadrature points of a table's entry
-CHECKED = 41  # roughnesses and cosines that tables are held against
+CHECKED = 41  # roughnesses and cosines at which tables are compared
 N_NORMALS = 64
-GROUPS = 4  # of samples of the truth
-LAMP_SHARE = 5e-4  # of the texels, the brightest, count as lamps
-PARTS = 4  # of a lamp's texel along its edge
+GROUPS = 4  # groups of samples of the truth
+LAMP_SHARE = 5e-4  # share of the texels, the brightest ones, that count as lamps
+PARTS = 4  # parts of a lamp's texel along its edge
 SOURCES = ("cpp/*split_sum*", "cpp/*brdf_lut*", "cpp/*monte_carlo*", "python/splitnerf/ops/shading.py",
            "python/splitnerf/ops/monte_carlo.py")  # fmt: skip
 NOISE = "noise"
@@ -45,8 +45,8 @@ def run(quick: bool, rounds: int) -> Result:
     """Errors against sums over many samples of the BSDF; nothing is timed.
 
     Args:
-        quick: Few roughnesses and fewer samples.
-        rounds: Not used: time plays no part.
+        quick: Whether to use few roughnesses and fewer samples.
+        rounds: Not used, since nothing is timed.
     """
     torch.manual_seed(0)
     tables, findings = [], []
@@ -86,7 +86,7 @@ def run(quick: bool, rounds: int) -> Result:
 
 
 class SplitLight:
-    """A map as two that add up to it: lamps, which quadrature over their texels integrates, and the rest, which samples do.
+    """A map as the sum of two: lamps, integrated by quadrature over their texels, and the rest, integrated by samples.
 
     Args:
         radiance: [h, w, 3].
@@ -120,13 +120,13 @@ def views_at(normals: Tensor, across: Tensor, cosine: float) -> Tensor:
 def split_errors(
     light: SplitLight, truth: Truth, normals: Tensor, views: Tensor, rho: float, metallic: float, albedo: float, n: int
 ) -> dict[str, float]:
-    """Relative RMS error over the normals by the direction at which g is asked, and of the truth itself.
+    """Relative RMS error over the normals, by the query direction of g, and that of the truth itself.
 
     Args:
         light, truth: The light, and its pre-integral.
         normals, views: [k, 3].
-        rho, metallic, albedo: Of the material.
-        n: Samples of the BSDF in each of `GROUPS` groups, whose spread tells the noise of their mean.
+        rho, metallic, albedo: The roughness, metallic and albedo of the material, each in [0, 1].
+        n: The number of BSDF samples in each of `GROUPS` groups; the spread of the groups measures the noise.
     """
     count, column = len(normals), torch.ones(len(normals), 1)
     roughness, metal, colour = rho * column, metallic * column, albedo * torch.ones(count, 3)
@@ -154,7 +154,7 @@ def split_errors(
 
 
 def furnace() -> tuple[str, list[str], list[list[str]]]:
-    """What a white metal reflects of constant light, at normal incidence: 1, had it lost nothing."""
+    """The share of constant light that a white metal reflects at normal incidence; 1 would be free of loss."""
     rows = []
     axis, ones = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(1, 3)
     for rho in ROUGHNESS:
@@ -169,7 +169,7 @@ def furnace() -> tuple[str, list[str], list[list[str]]]:
 
 
 def table_charts(sizes: tuple[int, ...]) -> list[Chart]:
-    """F1 and F2, and chi, of tables by size and spacing, and of an analytic fit, against quadrature."""
+    """Charts of the errors of F1, F2 and chi against quadrature: tables by size and spacing, and an analytic fit."""
     rho, cosine = np.linspace(0.02, 1, CHECKED), np.linspace(0.02, 1, CHECKED)
     true = np.array([[_core.integrate_brdf(c, r, FINEST) for c in cosine] for r in rho])
     spacings: dict[str, tuple[Callable, Callable]] = {

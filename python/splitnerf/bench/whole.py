@@ -1,4 +1,4 @@
-"""The whole program: error of what it recovers against wall time, for the presets and for switches that trade the two."""
+"""The whole program: errors of the recovered scene against wall time, for the presets and for other settings."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ def whole(
     scenes: Sequence[Path], configs: dict[str, Config], minutes: Sequence[float], protocol: Protocol, runs: Path,
     show: Callable[[str], None],
 ) -> Result:  # fmt: skip
-    """Trains each configuration on each scene for each time, or takes the runs that stand already.
+    """Trains each configuration on each scene for each time; finished runs are reused.
 
     Args:
-        scenes: Datasets.
-        configs: By name, from :func:`configurations`.
-        minutes: Of training; each is a run of its own, for schedules depend on their length.
-        protocol: How runs are scored.
-        runs: Their folder.
-        show: Called with a line for each run.
+        scenes: The folders of the datasets.
+        configs: The configurations by name, from :func:`configurations`.
+        minutes: The lengths of training; each is a run of its own, because schedules depend on the length.
+        protocol: The views and lights by which runs are scored.
+        runs: The folder of the runs.
+        show: A function called with a line for each run.
 
     Raises:
         InputError: The data or a run's folder cannot be used.
-        Interrupted: To be continued by the same call.
+        Interrupted: Ctrl-C ended a training; the same call continues it.
     """
     plan = Plan(list(scenes), [], 1, protocol, runs)
     charts = []
@@ -65,11 +65,11 @@ def whole(
 
 
 def configurations(names: Sequence[str], settings: dict[str, object]) -> dict[str, Config]:
-    """The preset ``cpu``, and what is called by the names (of `NAMES`).
+    """The preset ``cpu`` and the named configurations, by name.
 
     Args:
-        names: Which.
-        settings: Changes to all of them.
+        names: The names of configurations, out of `NAMES`.
+        settings: Changes to all configurations.
     """
     base = preset("cpu").replace(settings)
     return {BASE: base} | {
@@ -78,7 +78,7 @@ def configurations(names: Sequence[str], settings: dict[str, object]) -> dict[st
 
 
 def chart_of(scene: Path, measure: str, scores: dict[tuple[str, float], dict]) -> Chart:
-    """One measure on one scene; no points where the data hold no truth of it."""
+    """The chart of one measure on one scene; without points where the data have no truth for it."""
     points = []
     for (name, length), found in scores.items():
         if found.get(measure) and found.get("seconds"):

@@ -31,8 +31,8 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def main(argv: list[str] | None = None) -> int:
-    # torch's OpenMP threads spin for milliseconds before they sleep; on a machine that others use too, each
-    # barrier would then wait for a whole time slice. A short spin costs nothing where the machine is ours.
+    # torch's OpenMP threads spin for milliseconds before they sleep; on a shared machine each barrier would then wait
+    # for a whole time slice. A short spin costs nothing on an idle machine.
     os.environ.setdefault("GOMP_SPINCOUNT", "30000")
     args = build_parser().parse_args(argv)
     try:

@@ -94,7 +94,7 @@ def check_usage(args: argparse.Namespace) -> None:
     """Refuses options that do not go together.
 
     Raises:
-        InputError: Which, and what to do.
+        InputError: Two options exclude each other; the message names them.
     """
     given = [name for name in NEEDS_DATA if getattr(args, name) is not None]
     if not args.data and given:
@@ -111,7 +111,7 @@ def check_usage(args: argparse.Namespace) -> None:
 
 
 def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
-    """Scores one run or file, writes what was asked for, and returns the scores."""
+    """Scores one run or file, writes the requested files, and returns the scores."""
     from splitnerf.data.json_files import write_json
     from splitnerf.evaluate.jobs import Protocol, evaluate_asset, evaluation_path, is_asset
     from splitnerf.workflow import evaluate_run
@@ -134,6 +134,6 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
 
 
 def scene_name(target: Path) -> str:
-    """What a table calls a run or a file."""
+    """The name of a run or a file in tables."""
     target = target.resolve()
     return f"{target.parent.name}/{target.name}" if target.is_file() else target.name

@@ -1,3 +1,3 @@
-"""What the commands return to the shell."""
+"""The exit codes of the commands."""
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130

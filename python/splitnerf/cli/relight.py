@@ -71,10 +71,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check_ranges(args: argparse.Namespace) -> None:
-    """Refuses numbers that no picture can be made with.
+    """Checks the ranges of numbers.
 
     Raises:
-        InputError: One of them.
+        InputError: A number is out of its range; the message names it.
     """
     limits = (
         ("--spp", args.spp, 1, 1 << 20), ("--bounces", args.bounces, 0, 64), ("--fps", args.fps, 0.1, 50),

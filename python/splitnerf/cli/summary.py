@@ -1,4 +1,4 @@
-"""What a command prints of an evaluation."""
+"""The printed summary of an evaluation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def print_summary(run: Path, evaluation: dict, step: int | None = None, seconds: float | None = None) -> None:
-    """The errors against whatever truth the data hold, and where the results lie."""
+    """Prints the errors against the truth in the data, and the path of the results."""
     if step is not None and seconds is not None:
         print(f"{step} steps in {seconds:.0f} s")
     print_scores(evaluation)

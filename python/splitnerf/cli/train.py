@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def budget(steps: int | None, minutes: float | None) -> dict[str, object]:
-    """The settings that end a run: of steps and minutes what was asked for alone counts, both count together."""
+    """The settings that end a run: the given one of steps and minutes; both together if both are given."""
     if minutes is None:
         return {} if steps is None else {"run.steps": steps, "run.max_minutes": 0.0}
     return {"run.steps": UNLIMITED_STEPS if steps is None else steps, "run.max_minutes": minutes}

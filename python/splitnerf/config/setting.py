@@ -7,20 +7,20 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-LARGEST_INT = 1 << 24  # where a setting names no bound of its own
+LARGEST_INT = 1 << 24  # bound of a setting without its own
 LARGEST_FLOAT = 1e30
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The values that a setting may take, beside being of its type.
+    """The allowed values of a setting, within its type.
 
     Attributes:
-        low, high: Bounds of a number; None for what is no number.
-        without_low, without_high: Whether the bound itself is left out.
-        choices: The only values; empty where the bounds decide, or nothing.
-        multiple_of: A divisor of the number, or 0.
-        power_of_2: Whether the number is one.
+        low, high: The bounds of a number; None for other types.
+        without_low, without_high: Whether the bound itself is excluded.
+        choices: The only allowed values; empty if there is no such list.
+        multiple_of: A number that must divide the value, or 0.
+        power_of_2: Whether the value must be a power of 2.
     """
 
     low: float | None = None
@@ -32,7 +32,7 @@ class Limits:
     power_of_2: bool = False
 
     def allow(self, value: object) -> bool:
-        """Whether the value, which is of the right type, is one of them. NaN never is."""
+        """Whether a value of the right type is allowed. NaN never is."""
         if self.choices:
             return value in self.choices
         if self.low is None:
@@ -43,7 +43,7 @@ class Limits:
         return above and below and not uneven
 
     def __str__(self) -> str:
-        """As in "must be ..."; empty where all values of the type are allowed."""
+        """The words that follow "must be" in a message; empty where all values of the type are allowed."""
         if self.choices:
             return f"one of {', '.join(map(str, self.choices))}"
         if self.low is None:
@@ -62,12 +62,12 @@ def setting(
 
     Args:
         default: The value in the preset ``cpu``.
-        meaning: What it sets, a noun phrase.
-        unit: The unit of a number, where it has one.
-        choices: The only values; without them any value within the bounds.
-        at_least, above: The lower bound of a number with or without the bound itself (default: at least 0).
-        at_most, below: The upper bound likewise (default: `LARGEST_INT`, `LARGEST_FLOAT`).
-        multiple_of, power_of_2: What an integer has to be, too.
+        meaning: The meaning of the setting, a noun phrase.
+        unit: The unit of a number, or "".
+        choices: The only allowed values; without them all values within the bounds are allowed.
+        at_least, above: The lower bound of a number, with or without the bound itself (default: at least 0).
+        at_most, below: The upper bound, with or without the bound itself (default: `LARGEST_INT`, `LARGEST_FLOAT`).
+        multiple_of, power_of_2: Further conditions on an integer, see :class:`Limits`.
     """
     limits = Limits(choices=tuple(choices))
     if type(default) in (int, float) and not limits.choices:

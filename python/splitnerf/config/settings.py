@@ -91,7 +91,7 @@ class Config:
                 raise InputError(message)
 
     def __getitem__(self, name: str) -> object:
-        """The value of a setting by its name, ``group.name`` or as it was before there were groups."""
+        """The value of a setting by its name: ``group.name``, or its older name without a group."""
         group, _, key = OLD_NAMES.get(name, name).partition(".")
         return getattr(getattr(self, group), key)
 
@@ -99,10 +99,10 @@ class Config:
         """A copy with some settings changed.
 
         Args:
-            settings: Values by ``group.name``, by the name before there were groups, or as a table for a group.
+            settings: Values by ``group.name`` or by the older name without a group, or a table of values by group.
 
         Raises:
-            InputError: A name is unknown, or a value cannot be.
+            InputError: A name is unknown, or a value is not allowed.
         """
         changes: dict[str, dict[str, object]] = {}
         for name, value in _flat(settings):

@@ -14,7 +14,7 @@ class Material:
     Textures are float32 with the top row first, sampled bilinearly at `Asset.uv`, and repeat.
 
     Attributes:
-        name: As the file names it.
+        name: The material's name in the file.
         albedo: (3,) linear factor in [0, 1].
         roughness: Perceptual factor in [0, 1].
         metallic: Factor in [0, 1].
@@ -41,7 +41,7 @@ class Asset:
     """A triangle mesh with materials, in a world with z up.
 
     Attributes:
-        name: What to call it.
+        name: The asset's name.
         vertices: [n, 3] float32.
         triangles: [m, 3] int32, counter-clockwise seen from outside.
         normals: [n, 3] float32 unit shading normals.

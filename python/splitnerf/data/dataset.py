@@ -77,7 +77,7 @@ class Dataset:
         return poses
 
     def select(self, views: Sequence[int]) -> Dataset:
-        """The same split with these views alone, in this order."""
+        """The split reduced to these views, in this order."""
         views = list(views)
         return replace(
             self,
@@ -112,7 +112,7 @@ def load_dataset(root: str | os.PathLike, split: str = "train", downscale: int =
         The split as a `Dataset`.
 
     Raises:
-        InputError: Anything about the folder, its json, images, masks or poses that cannot be used.
+        InputError: The folder, its json, an image, a mask or a pose cannot be used.
     """
     root = Path(root)
     if split not in ("train", "test"):
@@ -154,7 +154,7 @@ def dataset_fingerprint(dataset: Dataset) -> str:
         dataset: A loaded split.
 
     Returns:
-        16 hexadecimal digits; the same folder, split and downscale give the same ones wherever the folder lies.
+        16 hexadecimal digits, which depend on the folder's content, split and downscale but not on its path.
     """
     digest = hashlib.sha256()
     digest.update(json.dumps([dataset.split, dataset.frame_names, list(dataset.images.shape)]).encode())

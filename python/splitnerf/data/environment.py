@@ -1,4 +1,4 @@
-"""Environment maps that a user hands over."""
+"""Environment maps given by the user."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from splitnerf.errors import InputError
 from splitnerf.notes import note
 
 ASPECT_TOLERANCE = 0.02
-NEGATIVE_SHARE = 1e-3  # of the map's sum: what resampling and compression leave behind
+NEGATIVE_SHARE = 1e-3  # largest share of the map's sum; resampling and compression leave so much
 
 
 def read_environment(path: str | os.PathLike) -> np.ndarray:
     """Reads an equirectangular map of linear radiance, u = 0.5 - atan2(y, x)/(2 pi), v = acos(z)/pi from the top.
 
-    Negative pixels that sum to at most a thousandth of the map are set to 0 and said on stderr.
+    Negative pixels that sum to at most a thousandth of the map are set to 0, with a note on stderr.
 
     Args:
         path: An EXR or HDR file, twice as wide as high.
@@ -55,7 +55,7 @@ def sample_environment(radiance: np.ndarray, directions: np.ndarray) -> np.ndarr
 
     Args:
         radiance: [h, w, 3] equirectangular.
-        directions: [..., 3] of any non-zero length.
+        directions: [..., 3] directions, of any length above 0.
 
     Returns:
         [..., 3] float32.

@@ -1,4 +1,4 @@
-"""The frames of a posed image set: which images, from where, through which lens.
+"""The frames of a posed image set: images, poses and lenses.
 
 Layouts:
     NeRF-Blender   `transforms_train.json`, `transforms_test.json`; `file_path` without extension, `camera_angle_x`;
@@ -23,8 +23,8 @@ from splitnerf.errors import InputError
 
 TEST_STRIDE = 8
 RIGID_TOLERANCE = 1e-3
-SMALLEST_LENS, LARGEST_LENS = 1e-6, 1e9  # of any of a lens's numbers
-FARTHEST = 1e9  # from the origin, in the data's units
+SMALLEST_LENS, LARGEST_LENS = 1e-6, 1e9  # bounds of a lens's numbers
+FARTHEST = 1e9  # largest distance from the origin, in the data's units
 
 
 @dataclass
@@ -32,11 +32,11 @@ class Frame:
     """One posed image.
 
     Attributes:
-        name: What to call it: the file's stem, or the folder's name where each view has its own.
-        image_path: The image.
-        mask_path: The mask that stands for its alpha, or None.
+        name: The frame's name: the file's stem, or the folder's name where each view has its own folder.
+        image_path: The image file.
+        mask_path: The mask file that replaces the image's alpha, or None.
         pose: [4, 4] float64 camera-to-world, OpenGL axes, in the data's world.
-        lens: Of `camera_angle_x` (radians), `fl_x fl_y cx cy w h` (pixels) what the data give.
+        lens: The lens's numbers that the data give: `camera_angle_x` (radians), `fl_x fl_y cx cy w h` (pixels).
     """
 
     name: str
@@ -84,7 +84,7 @@ def read_camera_path(path: Path) -> list[tuple[np.ndarray, dict]]:
             each frame or for all.
 
     Returns:
-        Of each frame the pose [4, 4] float64 and the lens, as in `Frame`.
+        The pose [4, 4] float64 and the lens of each frame, as in `Frame`.
 
     Raises:
         InputError: The file has no frame, or one of them no usable pose or no lens.
@@ -96,7 +96,7 @@ def read_camera_path(path: Path) -> list[tuple[np.ndarray, dict]]:
 
 
 def has_test_split(root: Path) -> bool:
-    """Whether the data have test views; for a folder of no layout true, so that reading it says what is wrong."""
+    """Whether the data have test views; true for a folder of unknown layout, so that reading it raises the error."""
     if (root / "transforms_train.json").exists():
         return (root / "transforms_test.json").exists()
     if (root / "transforms.json").exists() or not view_folders.present(root):

@@ -27,7 +27,7 @@ VALUES_PER_BYTE = 4096  # of a file; an image of one colour has a quarter of the
 def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     """Yields a temporary name beside `path` that takes its place when the block succeeds.
 
-    On any error the temporary file is removed and what stood at `path` stays untouched.
+    On any error the temporary file is removed and the old file at `path` stays.
 
     Args:
         path: The file to write; missing parent folders are made.
@@ -51,7 +51,7 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
 
 
 def read_image(path: str | os.PathLike) -> np.ndarray:
-    """Reads a PNG, JPEG, WebP, EXR or HDR image, told by its content.
+    """Reads a PNG, JPEG, WebP, EXR or HDR image; the content decides the format.
 
     Alpha is kept as the file stores it: straight in PNG, associated in EXR.
 
@@ -71,17 +71,17 @@ def read_image(path: str | os.PathLike) -> np.ndarray:
 
 
 def decode_image(data: bytes, name: str) -> np.ndarray:
-    """Decodes an image file that lies in memory: PNG, JPEG, WebP, EXR or HDR, told by its content.
+    """Decodes an image file in memory: PNG, JPEG, WebP, EXR or HDR; the content decides the format.
 
     Args:
         data: The file's bytes.
-        name: What to call it in a message.
+        name: The name of the file for messages.
 
     Returns:
-        As `read_image`.
+        [H, W, C] float32, see `read_image`.
 
     Raises:
-        InputError: Unreadable, truncated, of another format or too large.
+        InputError: The data are unreadable, truncated, of another format or too large.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "image"
@@ -108,7 +108,7 @@ def read_hdr(path: str | os.PathLike) -> np.ndarray:
 
 
 def read_radiance(path: str | os.PathLike) -> np.ndarray:
-    """As `read_hdr`, but negative pixels are left as they are.
+    """Reads linear radiance [H, W, 3] float32 like `read_hdr`, but allows negative pixels.
 
     Raises:
         InputError: The file is unreadable, or holds NaN or infinite pixels.
@@ -184,7 +184,7 @@ def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
 
 
 def area_average(pixels: np.ndarray, factor: int) -> np.ndarray:
-    """Averages blocks of factor x factor pixels; what fills no block is cropped at the bottom and right.
+    """Averages blocks of factor x factor pixels; incomplete blocks at the bottom and right are cropped.
 
     Args:
         pixels: [H, W] or [H, W, C].
@@ -259,7 +259,7 @@ def _read(path: Path, name: str) -> np.ndarray:
 
 
 def _reason(source) -> str:
-    """The first line of what OpenImageIO, or one of its readers or writers, has to say."""
+    """The first line of the error message of OpenImageIO or of one of its readers or writers."""
     try:
         lines = source.geterror().strip().splitlines()
     except UnicodeDecodeError:  # it repeats bytes of the file

@@ -14,10 +14,10 @@ def read_json(path: Path, key: str) -> dict:
 
     Args:
         path: The file.
-        key: What the object must hold, for the message; not checked here.
+        key: A key that the object must have; only the message uses it.
 
     Raises:
-        InputError: It is missing, no valid json, or holds no object.
+        InputError: The file is missing, is not valid json, or does not hold an object.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file; check the path")

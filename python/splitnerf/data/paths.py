@@ -1,4 +1,4 @@
-"""Files that other files name."""
+"""Paths that come from other files."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def is_file(path: Path) -> bool:
-    """Whether a file stands there; false for names that none can have, such as ones too long."""
+    """Whether a file exists at the path; false for impossible names, such as names that are too long."""
     try:
         return path.is_file()
     except OSError:

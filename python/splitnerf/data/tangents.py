@@ -11,7 +11,7 @@ def vertex_tangents(vertices: np.ndarray, triangles: np.ndarray, normals: np.nda
     A triangle's tangent is the direction of growing u on it. At each of its vertices it is projected on the plane of
     the vertex normal, normalised and weighted with the corner's angle, the edges projected likewise. The bitangent,
     sign * cross(normal, tangent), points where v shrinks: up in the texture, whose (0, 0) is the top left in glTF.
-    Triangles without area in the texture have no say; where nothing has, any tangent does.
+    Triangles without area in the texture do not count; a vertex with no other triangles gets an arbitrary tangent.
 
     Args:
         vertices: [n, 3] positions.

@@ -111,7 +111,7 @@ def load_view_truths(dataset: Dataset) -> list[ViewTruth]:
 def decode_clipped_normals(encoded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Restores normals whose negative components were clipped to 0 before sRGB encoding.
 
-    Where exactly one component is 0 it is -sqrt(1 - the others squared); where more are, the normal is unknown.
+    A single component of 0 is restored as -sqrt(1 - sum of the others' squares); with more zeros the normal is unknown.
 
     Args:
         encoded: [..., 3] float32 in [0, 1], sRGB-encoded.
@@ -134,7 +134,7 @@ def read_map(image_path: Path, path: Path, channels: int, dataset: Dataset) -> n
     Args:
         image_path: The view's image.
         path: The map's file.
-        channels: How many it needs at least.
+        channels: The least number of channels.
         dataset: The split, whose images the map must fit.
 
     Returns:

@@ -1,1 +1,1 @@
-"""The embedded demo: a small scene that is built and rendered on the spot."""
+"""The embedded demo: a small scene that is built in memory and rendered by the program."""

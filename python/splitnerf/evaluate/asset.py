@@ -21,7 +21,7 @@ def environment_beside(path: Path) -> Path | None:
 def asset_predictions(
     renderer: AssetRenderer, dataset: Dataset, environment: np.ndarray | None, spp: int
 ) -> list[dict[str, np.ndarray]]:
-    """Renders the asset's material and normal maps, and its look where the light is known.
+    """Renders the asset's material and normal maps and, where the light is known, its image.
 
     Args:
         renderer: The asset, in the data's world frame.
@@ -30,8 +30,8 @@ def asset_predictions(
         spp: Paths a pixel.
 
     Returns:
-        Per view what :func:`splitnerf.evaluate.protocol.evaluate_maps` reads: `alpha`, `albedo`, `roughness`,
-        `metallic`, `normal` (without the normal map, as the truth is) and, given the light, `rgb`.
+        The maps of each view for :func:`splitnerf.evaluate.protocol.evaluate_maps`: `alpha`, `albedo`, `roughness`,
+        `metallic`, `normal` (without the normal map, like the truth) and, with a light, `rgb`.
     """
     predictions = []
     for index in range(len(dataset)):

@@ -18,8 +18,8 @@ def psnr(prediction: np.ndarray, truth: np.ndarray) -> float:
     """-10 log10(MSE) in dB, data range 1; equal images give 100 dB.
 
     Args:
-        prediction: Any shape.
-        truth: The same shape.
+        prediction: The values, any shape.
+        truth: The true values, with the shape of `prediction`.
     """
     mse = np.mean((np.asarray(prediction, np.float64) - truth) ** 2)
     return float(-10 * np.log10(max(mse, MSE_FLOOR)))
@@ -68,7 +68,7 @@ def lsq_scale(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | N
 
 
 def lsq_sums(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-    """What `lsq_scale` needs of some pixels, [2, C] float64 (sum w x y, sum w x^2); sums of parts add up."""
+    """The sums [2, C] float64 (sum w x y, sum w x^2) of some pixels for `lsq_scale`; sums of parts can be added."""
     x, y = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
     w = np.ones(len(x)) if weights is None else weights
     return np.stack([(w[:, None] * x * y).sum(axis=0), (w[:, None] * x * x).sum(axis=0)])
@@ -100,14 +100,14 @@ def balanced_accuracy(prediction: np.ndarray, truth: np.ndarray, threshold: floa
     Args:
         prediction: [m] in [0, 1].
         truth: [m] in [0, 1].
-        threshold: Above it is metal, in both.
+        threshold: The value above which a pixel counts as metal, in both.
     """
     predicted, actual = np.asarray(prediction) > threshold, np.asarray(truth) > threshold
     return float(np.mean([(predicted == actual)[actual == c].mean() for c in (False, True) if (actual == c).any()]))
 
 
 def light_psnr(light: np.ndarray, truth: np.ndarray) -> float:
-    """PSNR of an environment map after the scale that albedo and light share was taken out.
+    """PSNR of an environment map after removing the scale that albedo and light share.
 
     Both are brought to 256 x 128, the prediction is scaled per channel by least squares, both are divided by the
     truth's 99th percentile and clipped to [0, 1]; pixels weigh by their solid angle.
@@ -141,8 +141,8 @@ def mesh_distances(
     Args:
         mesh: The reconstruction.
         truth: The true mesh, in the same frame.
-        samples: Points on each.
-        seed: Fixes the points.
+        samples: The number of points on each surface.
+        seed: The seed of the points.
 
     Returns:
         The mean of both directions' mean nearest distance, in units of the meshes, and the harmonic mean of the shares

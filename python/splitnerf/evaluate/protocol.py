@@ -45,7 +45,7 @@ def evaluate_maps(
         mesh: The reconstruction in the data's world frame.
         mesh_truth: The true mesh.
         seconds: Training time to record.
-        relight: What :func:`splitnerf.evaluate.relight.relight_scores` gave, to record.
+        relight: The scores of :func:`splitnerf.evaluate.relight.relight_scores`, to record; or None.
         distance: The LPIPS distance, or None.
 
     Returns:

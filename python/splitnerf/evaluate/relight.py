@@ -22,10 +22,10 @@ FIRST_SEED = 1 << 31  # data are rendered with smaller ones, so that prediction 
 
 @dataclass
 class RelitViews:
-    """What was rendered.
+    """The rendered relit views.
 
     Attributes:
-        images: Per map, per view of `dataset`, [H, W, 4] uint8, sRGB, straight alpha.
+        images: The images [H, W, 4] uint8, sRGB with straight alpha, by map and by view of `dataset`.
         dataset: The views.
         spp: Paths a pixel.
     """
@@ -35,7 +35,7 @@ class RelitViews:
     spp: int
 
     def views(self) -> Iterator[ScaledView]:
-        """Each image beside its truth, which is read when asked for, grouped by map."""
+        """Each image with its truth, grouped by map; a truth image is read when its turn comes."""
         for name, images in self.images.items():
             for i in range(len(images)):
                 yield self.view(name, i)
@@ -50,7 +50,7 @@ class RelitViews:
 
 
 def straight_srgb(maps: dict[str, np.ndarray]) -> np.ndarray:
-    """[H, W, 3] sRGB in [0, 1], straight, of a rendering's premultiplied `radiance` and `alpha`."""
+    """[H, W, 3] straight sRGB colours in [0, 1] from a rendering's premultiplied `radiance` and `alpha`."""
     straight = maps["radiance"] / np.maximum(maps["alpha"], 1e-8)[..., None]
     return np.clip(linear_to_srgb(straight), 0, 1)
 

@@ -59,7 +59,8 @@ def picture_grid(heads: Sequence[str], rows: Sequence[tuple[str, Sequence[np.nda
 
     Args:
         heads: A text above each column.
-        rows: A text before each row and its pictures, [h, w, 3] sRGB in [0, 1], all of one size; small ones are enlarged.
+        rows: A text before each row, and the row's pictures [h, w, 3] sRGB in [0, 1], all of one size; small ones are
+            enlarged.
     """
     height, width = rows[0][1][0].shape[:2]
     factor = -(-PANEL_WIDTH // width)

@@ -1,4 +1,4 @@
-"""How alike two sets of images are: PSNR, SSIM and LPIPS over sRGB on white, with or without a free scale."""
+"""The similarity of two sets of images: PSNR, SSIM and LPIPS over sRGB on white, with or without a free scale."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ScaledView:
     """A prediction that is known up to one factor per channel, beside its truth.
 
     Attributes:
-        group: What to average the scores over beside all views, such as the light's name.
+        group: The group whose scores are averaged in addition to those of all views, such as the light's name.
         prediction: [H, W, 3] linear, straight.
         alpha: [H, W] coverage of the prediction.
         truth: [H, W, 3] linear, straight.
@@ -46,13 +46,14 @@ def image_scores(image: np.ndarray, truth: np.ndarray, distance: Distance | None
 
 
 def mean_scores(scores: Sequence[dict]) -> dict:
-    """The means of what `image_scores` gave for each of at least one image."""
+    """The means of the results of `image_scores` for at least one image."""
     missing = scores[0]["lpips"] is None
     return {key: None if key == "lpips" and missing else float(np.mean([s[key] for s in scores])) for key in SCORES}
 
 
 def on_white(linear: np.ndarray, alpha: np.ndarray, scale: np.ndarray | float = 1.0) -> np.ndarray:
-    """A straight linear image as the protocol compares it: scaled, sRGB, clipped, over white; [H, W, 3]."""
+    """The image [H, W, 3] that the protocol compares: a straight linear image, scaled, in sRGB, clipped and on
+    white."""
     return over_background(np.clip(linear_to_srgb(linear * scale), 0, 1), alpha)
 
 
@@ -61,11 +62,11 @@ def scaled_scores(
 ) -> tuple[dict, dict[str, dict]]:
     """Scores predictions with one free factor per channel for all views together.
 
-    The factor is fitted in linear light over the foreground of all views, alpha > 0.9 in prediction and truth: `raw` is
-    without, `lsq` by least squares (the headline), `median` the median of truth / prediction.
+    The factor is fitted in linear light over the foreground of all views, alpha > 0.9 in prediction and truth. `raw`
+    has no factor, `lsq` that of least squares (the headline), `median` the median of truth / prediction.
 
     Args:
-        views: Gives the views anew each time it is called, at least one; they are gone through twice.
+        views: A function that returns an iterator over the views, at least one; it is called twice.
         distance: The LPIPS distance, or None.
 
     Returns:

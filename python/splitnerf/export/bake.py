@@ -70,7 +70,7 @@ class Texels:
     weights: np.ndarray
 
     def interpolate(self, values: np.ndarray, faces: np.ndarray) -> np.ndarray:
-        """[k, c] float32 of per-vertex values [n, c], not normalised."""
+        """Values [k, c] float32 at the texels, interpolated from per-vertex values [n, c] and not normalised."""
         corners = faces[self.triangle]
         return sum(self.weights[:, i, None] * values[corners[:, i]] for i in range(3))
 
@@ -93,17 +93,17 @@ def rasterise(uv: np.ndarray, faces: np.ndarray, size: int) -> Texels:
 
 
 def bake(mesh: UnwrappedMesh, surface: Surface, size: int, *, reach: float, offset: float) -> Textures:
-    """Asks the fields at each texel's point, brought onto the zero level set along the mesh's normal.
+    """Evaluates the fields at each texel's point, which is first moved onto the zero level set along the mesh's normal.
 
     Args:
-        mesh: In the frame of the surface.
+        mesh: The mesh, in the frame of the surface.
         surface: The fields.
-        size: Texels along an edge.
-        reach: How far the level set may lie from the mesh.
-        offset: Occlusion rays start this far off the mesh along its normal.
+        size: The number of texels along an edge.
+        reach: The largest distance between mesh and level set, in the surface's units.
+        offset: The distance of an occlusion ray's start from the mesh along its normal, in the surface's units.
 
     Returns:
-        The maps; texels outside the charts have the value of the nearest inside.
+        The maps; a texel outside the charts has the value of the nearest texel inside.
 
     Raises:
         RuntimeError: The texture is too small for the mesh, or the materials are not finite.
@@ -125,7 +125,8 @@ def bake(mesh: UnwrappedMesh, surface: Surface, size: int, *, reach: float, offs
 
 
 def bake_occlusion(mesh: UnwrappedMesh, size: int, offset: float) -> np.ndarray:
-    """[size, size] share of the cosine-weighted hemisphere that the mesh leaves open, baked at a quarter of the size."""
+    """[size, size] share of the cosine-weighted hemisphere that the mesh leaves open, baked at a quarter of the
+    size."""
     small = max(1, size // OCCLUSION_SHRINK)
     texels = rasterise(mesh.uv, mesh.faces, small)
     if len(texels.index) == 0:
@@ -164,7 +165,7 @@ def to_tangent_space(world: np.ndarray, normals: np.ndarray, tangents: np.ndarra
 
 
 class Spread:
-    """Makes maps of values at some texels: the others take the value of the nearest, so that no seam shows in a mip map.
+    """Makes maps from values at some texels; the others get the nearest value, so that mip maps show no seams.
 
     Args:
         index: [k] row * size + column of the texels that have values.
@@ -179,7 +180,7 @@ class Spread:
         self._rows = row_of.reshape(size, size)[tuple(nearest)]
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
-        """[size, size] or [size, size, c] float32 of [k] or [k, c]."""
+        """The map [size, size] or [size, size, c] float32 of values [k] or [k, c]."""
         return values.astype(np.float32)[self._rows]
 
 

@@ -24,9 +24,9 @@ def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | Non
     Occlusion, roughness and metallic share one image, as glTF proposes. Without textures there are the factors alone.
 
     Args:
-        path: Ends in .glb.
-        asset: With one material.
-        occlusion: [h, w] in [0, 1], 1 = open, beside a roughness-metallic texture of the same size; or None.
+        path: The file, with the suffix .glb.
+        asset: The asset, with one material.
+        occlusion: [h, w] occlusion in [0, 1], 1 = open, with the size of the roughness-metallic texture; or None.
 
     Raises:
         RuntimeError: See :func:`splitnerf.export.maps.encode_maps`.
@@ -54,7 +54,8 @@ def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | Non
         mesh.vertex_attributes["_TANGENT"] = tangents.astype(np.float32)
 
     def finish(tree: dict) -> None:
-        """What trimesh leaves out: exact factors, TANGENT's name, one image for two uses, what the buffers are for."""
+        """Adds to the file what trimesh omits: exact factors, the name TANGENT, one image for two uses, buffer
+        targets."""
         tree["asset"]["generator"] = "SplitNeRF"
         primitive = tree["meshes"][0]["primitives"][0]
         attributes, pbr = primitive["attributes"], tree["materials"][0]["pbrMetallicRoughness"]

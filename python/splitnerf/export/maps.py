@@ -1,4 +1,4 @@
-"""What the writers of textured files share: axes, and an asset's textures in 8 bit."""
+"""Shared by the writers of textured files: the change of axes, and an asset's textures in 8 bit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from splitnerf.data.images import linear_to_srgb, to_uint8
 
 @dataclass(frozen=True)
 class Maps:
-    """An asset's textures as files hold them, uint8, or None where it has only a factor.
+    """An asset's textures in the encoding of files, uint8; None where the asset has only a factor.
 
     Attributes:
         albedo: [h, w, 3] sRGB.
@@ -30,8 +30,8 @@ def encode_maps(path: object, asset: Asset, occlusion: np.ndarray | None) -> Map
 
     Args:
         path: The file to be written, for messages.
-        asset: With uv where it has textures.
-        occlusion: [h, w] in [0, 1], 1 = open, of the size of the roughness texture; or None.
+        asset: The asset, with uv if it has textures.
+        occlusion: [h, w] occlusion in [0, 1], 1 = open, with the size of the roughness texture; or None.
 
     Raises:
         RuntimeError: The asset has several materials, textures without uv, or something is not finite or of wrong size.
@@ -63,5 +63,5 @@ def encode_maps(path: object, asset: Asset, occlusion: np.ndarray | None) -> Map
 
 
 def y_up(vectors: np.ndarray) -> np.ndarray:
-    """(x, y, z) -> (x, z, -y) of [n, 3] vectors: from the program's axes to glTF's."""
+    """Vectors [n, 3] in glTF's axes, from the program's axes: (x, y, z) -> (x, z, -y)."""
     return np.column_stack([vectors[:, 0], vectors[:, 2], -vectors[:, 1]])

@@ -16,13 +16,13 @@ def write_mesh_ply(
     """Writes a binary PLY in the frame of the vertices, atomically.
 
     Args:
-        path: Ends in .ply.
+        path: The file, with the suffix .ply.
         vertices: [n, 3] in the data's world, z up.
-        faces: [m, 3] vertex indices; turned outward where the signed volume is negative.
+        faces: [m, 3] vertex indices; their order is reversed where the signed volume is negative.
         colors: [n, 3] linear in [0, 1], stored sRGB-encoded in 8 bit as viewers expect; None for none.
 
     Raises:
-        RuntimeError: Degenerate or empty mesh.
+        RuntimeError: The mesh is degenerate or empty.
         OSError: The file cannot be written.
     """
     vertices, faces = _checked(path, vertices, faces)

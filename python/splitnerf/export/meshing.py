@@ -12,9 +12,9 @@ from torch import Tensor
 from splitnerf import _core
 
 BLOCK = _core.MESH_BLOCK
-COARSEST = 8  # blocks along the edge of the cubes that are looked at first
+COARSEST = 8  # blocks along the edge of the cubes that are classified first
 LIPSCHITZ = 1.5
-CHUNK = 1 << 16  # points that the field is asked at a time
+CHUNK = 1 << 16  # points evaluated at a time
 
 
 class EmptyMesh(RuntimeError):
@@ -26,22 +26,22 @@ def extract_mesh(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Marching cubes over [-box, box]^3, closed at the border, with outward faces.
 
-    From coarse to fine: a cube of nodes whose centre is farther from zero than 1.5 times its half diagonal holds no
-    surface and takes its centre's sign, the others are halved down to blocks of 4^3 nodes, whose nodes are all
-    evaluated. Then blocks without values that the surface runs into are evaluated too until there are none, so that the
-    mesh is that of the dense grid wherever each of its components was met once.
+    The grid is refined from coarse to fine. A cube of nodes contains no surface if the distance at its centre is larger
+    than 1.5 times its half diagonal; all its nodes get the centre's sign. Other cubes are halved, down to blocks of 4^3
+    nodes whose nodes are all evaluated. Then further blocks are evaluated as long as the surface runs into them. So the
+    mesh equals that of the dense grid, except for components of which no block was found.
 
     Args:
-        sdf: [n, 3] -> [n], negative inside.
-        box: Half size of the cube, scene units.
-        resolution: Nodes along an edge.
-        dense: Evaluate all nodes.
+        sdf: A function from points [n, 3] to signed distances [n], negative inside.
+        box: The half size of the cube, scene units.
+        resolution: The number of nodes along an edge.
+        dense: Whether to evaluate all nodes.
 
     Returns:
         vertices [n, 3] float32 and faces [m, 3] int32.
 
     Raises:
-        EmptyMesh: Nothing is inside.
+        EmptyMesh: No node is inside the surface.
         RuntimeError: The field is not finite.
     """
     grid = _NodeGrid(sdf, box, resolution)
@@ -109,7 +109,7 @@ class _NodeGrid:
         return signs
 
     def all_blocks(self) -> np.ndarray:
-        """As :meth:`near_blocks`, every block."""
+        """The result of :meth:`near_blocks` if every block might contain surface."""
         return np.zeros((self.n_blocks,) * 3, np.int32)
 
     def block_values(self, blocks: np.ndarray) -> np.ndarray:

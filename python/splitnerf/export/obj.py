@@ -18,8 +18,8 @@ def write_obj(path: str | os.PathLike, asset: Asset) -> list[Path]:
     The MTL holds the widespread PBR extension: map_Kd (sRGB), map_Pr, map_Pm (linear), norm.
 
     Args:
-        path: Ends in .obj.
-        asset: With one material.
+        path: The file, with the suffix .obj.
+        asset: The asset, with one material.
 
     Returns:
         The files.

@@ -1,4 +1,4 @@
-"""From an extracted mesh to a light one: floaters out, fewer faces, still closed where it was."""
+"""Simplifies an extracted mesh: removes floaters and reduces the number of faces; a closed mesh stays closed."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-MIN_COMPONENT = 0.01  # of the faces of the largest one
-# The quadric simplification pinches thin parts now and then; another aggressiveness or target does not.
+MIN_COMPONENT = 0.01  # share of the largest component's faces
+# The quadric simplification sometimes pinches thin parts; then another aggressiveness or target is tried.
 AGGRESSIVENESS, SHARES = (5, 3, 7), (1.0, 0.97, 0.94)
 
 
@@ -18,7 +18,7 @@ def drop_floaters(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
     """Removes connected components with less than 1 % of the largest one's faces.
 
     Returns:
-        vertices, faces and the number of components that went.
+        vertices, faces and the number of removed components.
     """
     n = len(vertices)
     edges = np.concatenate([faces[:, :2], faces[:, 1:]])
@@ -31,7 +31,7 @@ def drop_floaters(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
 
 
 def is_closed(faces: np.ndarray) -> bool:
-    """Whether each directed edge occurs once, and once the other way."""
+    """Whether each directed edge occurs exactly once, and its reverse exactly once."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     span = int(faces.max()) + 1
     there, back = (np.unique(edges[:, a] * span + edges[:, b]) for a, b in ((0, 1), (1, 0)))
@@ -39,12 +39,12 @@ def is_closed(faces: np.ndarray) -> bool:
 
 
 def decimate(vertices: np.ndarray, faces: np.ndarray, n_faces: int) -> tuple[np.ndarray, np.ndarray]:
-    """Collapses edges by quadric error until about n_faces are left; a closed mesh stays closed if any way is found.
+    """Collapses edges by quadric error until about n_faces are left; tries several ways to keep a closed mesh closed.
 
     Args:
         vertices: [n, 3].
         faces: [m, 3].
-        n_faces: Faces to keep; 0, or no fewer than there are, keeps all.
+        n_faces: The number of faces to keep; 0, or a number not below m, keeps all.
 
     Returns:
         vertices [k, 3] float32 and faces [l, 3] int32.
@@ -64,12 +64,12 @@ def decimate(vertices: np.ndarray, faces: np.ndarray, n_faces: int) -> tuple[np.
 
 
 def split_pinches(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gives each fan of faces its own copy of a vertex, where parts of the surface touch in a vertex or an edge.
+    """Gives each fan of faces its own copy of a vertex where parts of the surface touch in a vertex or an edge.
 
     Two faces belong to one fan of a vertex if they share an edge there that no third face shares.
     """
     corners = np.arange(3 * len(faces)).reshape(-1, 3)
-    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()  # of each directed edge, as corners
+    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()  # corners of each directed edge
     vertex = faces.ravel()
     keys = np.sort(np.stack([vertex[start], vertex[end]], axis=1), axis=1)
     _, edge, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
@@ -89,7 +89,7 @@ def split_pinches(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _without_fins(faces: np.ndarray) -> np.ndarray:
-    """Without the pairs of faces that have the same three vertices: a sheet without volume."""
+    """The faces without pairs that share all three vertices; such a pair is a sheet without volume."""
     _, group, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
     return faces[count[group.reshape(-1)] == 1]
 

@@ -1,4 +1,4 @@
-"""The surface that is exported, as functions of points, and how points are brought onto it."""
+"""The exported surface as functions of points, and the projection of points onto it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-CHUNK = 1 << 15  # points that the fields are asked at a time
-STEPS = 4  # along a line, each by one value of the field
-TOLERANCE = 1e-4  # of the reach, below which a value counts as zero
-MIN_SLOPE = 0.2  # of the field along a line, below which a point moves no further
+CHUNK = 1 << 15  # points evaluated at a time
+STEPS = 4  # steps along a line, each with one evaluation of the field
+TOLERANCE = 1e-4  # share of the reach below which a value counts as zero
+MIN_SLOPE = 0.2  # least slope of the field along a line; below it the point stops
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,10 @@ class Surface:
     """A signed distance field with materials, in one frame. All functions take points [n, 3].
 
     Attributes:
-        sdf: -> [n], negative inside.
-        gradient: -> sdf [n] and its gradient [n, 3].
-        materials: -> albedo [n, 3] linear, roughness [n, 1], metallic [n, 1] and unit normals [n, 3].
+        sdf: A function that returns signed distances [n], negative inside.
+        gradient: A function that returns signed distances [n] and their gradients [n, 3].
+        materials: A function that returns albedo [n, 3] linear, roughness [n, 1], metallic [n, 1] and unit normals [n,
+            3].
     """
 
     sdf: Callable[[Tensor], Tensor]
@@ -55,20 +56,20 @@ def surface_materials(surface: Surface, points: np.ndarray) -> tuple[np.ndarray,
 def to_level_set(
     surface: Surface, points: np.ndarray, reach: float, directions: np.ndarray | None = None
 ) -> np.ndarray:
-    """Moves points along lines onto the zero level set, as far as it lies within reach.
+    """Moves points along lines onto the zero level set where it is within reach.
 
-    The first step takes the field for a distance, the others are secant steps, each cut off at the reach; they end
-    where the field hardly rises along the line. Of all places tried the one nearest to zero stands, so that no point
-    ends farther from the surface than it began.
+    The first step treats the field's value as a distance; the others are secant steps. Each step is clamped to the
+    reach. A point stops where the field hardly rises along the line. The result is the visited position with the
+    smallest absolute value, so that no point ends farther from the surface than it began.
 
     Args:
         surface: The field.
         points: [n, 3] float32.
-        reach: How far a point may move, in the points' units.
-        directions: [n, 3] unit; the field's own gradients if None.
+        reach: The largest distance that a point may move, in the points' units.
+        directions: [n, 3] unit directions of the lines; None uses the field's gradients.
 
     Returns:
-        [n, 3] float32.
+        [n, 3] float32 moved points.
     """
     moved = []
     for rows in (slice(start, start + CHUNK) for start in range(0, len(points), CHUNK)):

@@ -1,4 +1,4 @@
-"""From a full-resolution mesh and the fields behind it to a light textured asset."""
+"""Makes a small textured asset from a full-resolution mesh and the fields that it was extracted from."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from splitnerf.export.simplify import decimate, is_closed
 from splitnerf.export.surface import Surface, surface_normals, to_level_set
 from splitnerf.export.unwrap import unwrap
 
-MIN_AGREEMENT = 0.2  # cosine between a vertex's two normals, below which that of the faces stands
+MIN_AGREEMENT = 0.2  # least cosine between the field's and the faces' normal; below it the faces' normal is used
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class TexturedAsset:
     """A mesh with baked textures.
 
     Attributes:
-        asset: In the surface's frame, with albedo, roughness-metallic and normal textures.
+        asset: The mesh in the surface's frame, with albedo, roughness-metallic and normal textures.
         occlusion: [h, w] texture in [0, 1], 1 = open.
         watertight: Whether the mesh was closed before the charts cut it.
     """
@@ -43,16 +43,17 @@ def textured_asset(
     spacing: float,
     occlusion_offset: float,
 ) -> TexturedAsset:
-    """Decimates a mesh, brings its vertices back onto the surface, unwraps it and bakes its textures.
+    """Decimates a mesh, moves its vertices back onto the surface, unwraps it and bakes its textures.
 
     Args:
-        name: Of the asset.
+        name: The name of the asset.
         vertices, faces: The zero level set, [n, 3] and [m, 3], in the surface's frame.
         surface: The fields.
-        n_faces: Faces to keep, 0 for all.
-        texture_size: Texels along an edge.
-        spacing: Of the grid that the mesh comes from: vertices and texels move by at most two.
-        occlusion_offset: Occlusion rays start this far off the mesh.
+        n_faces: The number of faces to keep; 0 keeps all.
+        texture_size: The number of texels along an edge.
+        spacing: The spacing of the grid that the mesh was extracted from, in the surface's units; vertices and texels
+            move by at most twice as much.
+        occlusion_offset: The distance of an occlusion ray's start from the mesh, in the surface's units.
 
     Raises:
         RuntimeError: The texture is too small, or a field is not finite.
@@ -88,7 +89,7 @@ def textured_asset(
 
 
 def vertex_normals(surface: Surface, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """[n, 3] float32 unit gradients of the field; the faces' normals where the two do not agree."""
+    """[n, 3] float32 unit gradients of the field at the vertices; the faces' normals where the two disagree."""
     fine = surface_normals(surface, vertices)
     coarse = np.asarray(trimesh.Trimesh(vertices, faces, process=False).vertex_normals, dtype=np.float32)
     agree = (fine * coarse).sum(axis=1, keepdims=True) > MIN_AGREEMENT

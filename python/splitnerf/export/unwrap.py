@@ -7,7 +7,7 @@ import trimesh
 import xatlas
 
 PADDING = 4  # texels between charts
-CHARTS = 64  # no chart has a larger share of the surface: the time to grow one rises with the square of its faces
+CHARTS = 64  # no chart has more than 1 / CHARTS of the surface: its time rises with the square of its faces
 
 
 def unwrap(vertices: np.ndarray, faces: np.ndarray, texture_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -26,7 +26,7 @@ def unwrap(vertices: np.ndarray, faces: np.ndarray, texture_size: int) -> tuple[
     atlas.add_mesh(vertices, faces.astype(np.uint32))
     options = xatlas.PackOptions()
     options.resolution = texture_size
-    options.padding = 2 * PADDING  # the packed area comes out up to twice as large as asked for
+    options.padding = 2 * PADDING  # the packed area is up to twice as large as requested
     options.bilinear = True
     charts = xatlas.ChartOptions()
     charts.max_chart_area = float(trimesh.Trimesh(vertices, faces, process=False).area) / CHARTS

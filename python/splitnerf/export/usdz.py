@@ -26,9 +26,9 @@ def write_usdz(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | No
     """Writes one mesh with one UsdPreviewSurface, y up, textures as PNG inside, atomically.
 
     Args:
-        path: Ends in .usdz.
-        asset: With one material.
-        occlusion: [h, w] in [0, 1], 1 = open, beside a roughness-metallic texture of the same size; or None.
+        path: The file, with the suffix .usdz.
+        asset: The asset, with one material.
+        occlusion: [h, w] occlusion in [0, 1], 1 = open, with the size of the roughness-metallic texture; or None.
 
     Raises:
         InputError: usd-core is not installed.

@@ -22,10 +22,10 @@ def relu_mlp(n_inputs: int, width: int, n_layers: int, n_outputs: int) -> nn.Seq
 
 
 class MaterialHead(nn.Module):
-    """Albedo (linear), roughness (perceptual) and metallic of a point, each in [0, 1] by a sigmoid; roughness from
-    ``min_roughness``.
+    """Predicts albedo (linear), roughness (perceptual) and metallic of a point, each in [0, 1] by a sigmoid.
 
-    The bias of metallic starts at -2: most of the world is no metal. That is ours, the paper says nothing of it.
+    Roughness is rescaled to [``min_roughness``, 1]. The bias of metallic starts at -2, since most surfaces are not
+    metal; this choice is ours, the paper does not give one.
 
     Source: SplitNeRF's material network; width and depth from its supplement.
     """
@@ -39,7 +39,7 @@ class MaterialHead(nn.Module):
         share = min(max((initial_roughness - min_roughness) / (1.0 - min_roughness), 1e-3), 1.0 - 1e-3)
         with torch.no_grad():
             self.net[-1].bias[3] = math.log(share / (1.0 - share))
-            self.net[-1].bias[4] = -2.0  # most of the world is no metal
+            self.net[-1].bias[4] = -2.0  # most surfaces are not metal
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """features [n, n_inputs] -> albedo [n, 3], roughness [n, 1], metallic [n, 1]."""

@@ -1,4 +1,4 @@
-"""What every model of the light offers, and the light as it stands at one moment."""
+"""The interface of all light models, and the evaluated light that steps share."""
 
 from __future__ import annotations
 
@@ -12,46 +12,52 @@ from torch import Tensor, nn
 
 from splitnerf import _core
 
-SAMPLES_RATE = 0.03  # of the running means that decide how many directions the light loss takes
+SAMPLES_RATE = 0.03  # update rate of the running means that decide the light loss's number of directions
 FEWEST_SAMPLES = 64
 
 
 class LightSamples:
-    """How many directions the light's consistency loss takes: as many as keep the noise of its integrals at a given share of
-    the squared error that the loss measures.
+    """Chooses the number of directions for the light's consistency loss: the noise of the loss's integrals is kept at a
+    given share of the squared error that the loss measures.
 
-    Both are running means, as a lamp that few directions meet is seen in few steps.
+    Noise and error are running means, because in many steps no direction hits a small lamp.
     """
 
     def __init__(self) -> None:
         self.variance = self.squared_error = 0.0
 
     def learn(self, noise: float, squared_error: float, n: int) -> None:
-        """Takes the variance of one step's integrals over n directions, and the squared error."""
+        """Updates the running means with one step: the variance of its integrals over n directions, and its squared
+        error."""
         rate = SAMPLES_RATE if self.squared_error else 1.0
         self.variance += rate * (noise * n - self.variance)
         self.squared_error += rate * (squared_error - self.squared_error)
 
     def state(self) -> Tensor:
-        """[2] float64, what a checkpoint keeps."""
+        """The two running means [2] float64, for a checkpoint."""
         return torch.tensor([self.variance, self.squared_error], dtype=torch.float64)
 
     def restore(self, state: Sequence[float]) -> None:
-        """Goes on from what :meth:`state` returned."""
+        """Restores the running means that :meth:`state` returned."""
         self.variance, self.squared_error = state
 
     def count(self, share: float, most: int) -> int:
-        """Directions of the next step for noise of this share, 64 to ``most``; before the first step the most."""
+        """The number of directions for the next step, in [64, ``most``]; ``most`` before the first step.
+
+        Args:
+            share: The target ratio of noise to squared error, positive.
+            most: The largest number of directions.
+        """
         if not self.squared_error:
             return most
         return int(min(most, max(FEWEST_SAMPLES, self.variance / (share * self.squared_error))))
 
 
 class LightMaps(Protocol):
-    """The light g(w, rho) as it stands, until its parameters move.
+    """The light g(w, rho) in a form ready for lookups, valid until its parameters move.
 
     Attributes:
-        leaves: Tensors at which the gradients of lookups gather; () where every backward pass reaches the parameters.
+        leaves: Tensors that accumulate the gradients of lookups; () where every backward pass reaches the parameters.
     """
 
     leaves: tuple[Tensor, ...]
@@ -60,19 +66,20 @@ class LightMaps(Protocol):
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
 
     def backward(self) -> None:
-        """Hands the gradients that have gathered at the leaves to the parameters, once."""
+        """Passes the accumulated gradients from the leaves on to the parameters; call it once."""
 
     def with_leaves(self, leaves: Sequence[Tensor]) -> LightMaps:
         """The same light, read from other leaves."""
 
 
 class CellLight(NamedTuple):
-    """The environment as a fixed set of directions sees it, each of which stands for a cell of the sphere.
+    """The environment reduced to k directions, each of which represents one cell of the sphere.
 
     Attributes:
-        radiance: [k, 3], the mean over a direction's cell.
-        directions: [k, 3] unit, the cell's centre of power: a small lamp shines from where it is.
-        solid_angles: [k] sr; they sum to 4 pi.
+        radiance: [k, 3] mean linear radiance of each cell.
+        directions: [k, 3] unit, the power-weighted mean direction of each cell, so that a small lamp keeps its
+            position.
+        solid_angles: [k] solid angles of the cells, sr; they sum to 4 pi.
     """
 
     radiance: Tensor
@@ -81,19 +88,19 @@ class CellLight(NamedTuple):
 
 
 class EvaluatedLight:
-    """The light as it stands, shared by all that read it until its parameters move.
+    """The evaluated light, shared by all steps until its parameters move.
 
-    Calls look the light up. Gradients gather at :attr:`leaves`, over as many steps as share this value, until
-    :meth:`backward` hands them to the light's parameters.
+    A call looks up the radiance. Gradients accumulate at :attr:`leaves` over all steps that share this object, until
+    :meth:`backward` passes them on to the light's parameters.
 
     Args:
-        maps: What lookups read.
-        cells: The light of the cells, computed from the maps; None where nobody sums over cells.
+        maps: The maps that lookups read.
+        cells: The light of the cells, computed from the maps; None where no sum over cells is needed.
     """
 
     def __init__(self, maps: LightMaps, cells: CellLight | None = None):
         self.maps, self.cells = maps, cells
-        self._cell_root: Tensor | None = None  # what the leaf of the cells stands for
+        self._cell_root: Tensor | None = None  # the computed radiance that the cells' leaf copies
         self._cell_leaves: tuple[Tensor, ...] = ()
         if cells is not None and maps.leaves:
             self._cell_root, leaf = cells.radiance, leaf_of(cells.radiance)
@@ -105,16 +112,16 @@ class EvaluatedLight:
 
     @property
     def leaves(self) -> tuple[Tensor, ...]:
-        """Tensors at which gradients gather, () where they reach the parameters at once."""
+        """Tensors that accumulate gradients; () where gradients reach the parameters directly."""
         return (*self.maps.leaves, *self._cell_leaves)
 
     @property
     def constants(self) -> tuple[Tensor, ...]:
-        """Tensors that are read and have no gradient."""
+        """Tensors that lookups read but that have no gradient."""
         return () if self.cells is None else self.cells[1:]
 
     def with_tensors(self, leaves: Sequence[Tensor], constants: Sequence[Tensor]) -> EvaluatedLight:
-        """The same light, read from other leaves and constants; its gradients gather there and go no farther."""
+        """A copy that reads other leaves and constants; its gradients accumulate at those leaves and stop there."""
         n = len(self.maps.leaves)
         copy = EvaluatedLight(self.maps.with_leaves(leaves[:n]))
         copy._cell_leaves = tuple(leaves[n:])
@@ -123,19 +130,19 @@ class EvaluatedLight:
         return copy
 
     def backward(self) -> None:
-        """Hands the gradients that have gathered to the light's parameters. Call it once, before they move."""
+        """Passes the accumulated gradients on to the light's parameters. Call it once, before the parameters move."""
         if self._cell_root is not None and self.cells.radiance.grad is not None:
             self._cell_root.backward(self.cells.radiance.grad)
         self.maps.backward()
 
     def zero_grad(self) -> None:
-        """Drops the gradients that have gathered."""
+        """Drops the accumulated gradients."""
         for leaf in self.leaves:
             leaf.grad = None
 
 
 def leaf_of(value: Tensor) -> Tensor:
-    """The same numbers as a leaf, at which gradients stop."""
+    """A leaf tensor with the same values; gradients accumulate there and stop."""
     return value.detach().requires_grad_()
 
 
@@ -143,12 +150,14 @@ class Light(nn.Module, abc.ABC):
     """The pre-integrated light g(w, rho): the environment filtered by the lobe of roughness rho.
 
     g(w, 0) is the environment itself and g(n, 1) the irradiance over pi. A subclass defines :meth:`forward`, which is
-    differentiable in its parameters, in directions and in roughness, and :meth:`evaluate`, what of it steps can share.
+    differentiable in its parameters, in directions and in roughness. It may override :meth:`evaluate`, which returns
+    the part of the computation that steps can share.
 
     Attributes:
-        needs_consistency_loss: Whether only ``losses.light_loss`` ties g(w, rho) to g(w, 0). False where
-            that holds by construction.
-        loss_samples: How many light directions that loss takes.
+        leaves: See :class:`LightMaps`; () here.
+        needs_consistency_loss: Whether g(w, rho) agrees with g(w, 0) only through ``losses.light_loss``. False where
+            they agree by construction.
+        loss_samples: The choice of the number of light directions for that loss.
 
     Source: SplitNeRF Eq. (8)-(11).
     """
@@ -166,11 +175,11 @@ class Light(nn.Module, abc.ABC):
     leaves: tuple[Tensor, ...] = ()
 
     def evaluate(self) -> LightMaps:
-        """The light as it stands: here the module itself, whose every backward pass reaches the parameters."""
+        """The light ready for lookups: here the module itself, since every backward pass reaches its parameters."""
         return self
 
     def backward(self) -> None:
-        """Does nothing: no gradients gather here."""
+        """Does nothing: no gradients accumulate here."""
 
     def with_leaves(self, leaves: Sequence[Tensor]) -> LightMaps:
         """The module itself, which has no leaves."""
@@ -191,6 +200,9 @@ def panorama_directions(height: int, device: torch.device | str = "cpu") -> Tens
 
 
 def lobe_roughness(solid_angle: Tensor | float) -> Tensor | float:
-    """Roughness whose pre-integration lobe has this effective solid angle, 4 pi a^2 for narrow ones; at most 1."""
+    """The roughness, at most 1, whose pre-integration lobe has this effective solid angle (sr).
+
+    A narrow lobe with ggx_alpha = a has the solid angle 4 pi a^2.
+    """
     roughness = (solid_angle / (4.0 * math.pi)) ** 0.25
     return roughness.clamp(max=1.0) if isinstance(roughness, Tensor) else min(roughness, 1.0)

@@ -14,13 +14,14 @@ from splitnerf.fields.light import Light
 class LightMlp(Light):
     """g(w, rho): radiance of the environment filtered by the lobe of roughness rho, never negative.
 
-    g(w, 0) is the environment itself and g(n, 1) the irradiance over pi. The direction enters by sines
-    and cosines of 2^k w, the roughness by those of 2^k rho, and both again before the output layer.
+    g(w, 0) is the environment itself and g(n, 1) the irradiance over pi. The inputs are sines and cosines of 2^k w and
+    of 2^k rho; the output layer reads them again beside the last hidden layer.
 
     Args:
-        width, n_layers: Hidden ReLU layers.
-        direction_frequencies, roughness_frequencies: Octaves of the encodings.
-        activation: ``softplus`` (the paper) or ``exp`` (clamped to [-12, 12]; bright lamps need few units).
+        width, n_layers: The units of a hidden ReLU layer, and the number of these layers.
+        direction_frequencies, roughness_frequencies: The numbers of octaves k of the two encodings.
+        activation: The output's activation: ``softplus`` (the paper) or ``exp`` of a value clamped to [-12, 12], with
+            which few units represent bright lamps.
 
     Source: SplitNeRF Eq. (8)-(9) and its supplement.
     """

@@ -1,4 +1,4 @@
-"""The pre-integrated light g(w, rho) as texels: filtered maps and spherical harmonics of one environment."""
+"""The pre-integrated light g(w, rho) from texels: filtered maps and spherical harmonics of one environment map."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ from splitnerf.ops import (
     zonal_factors,
 )
 
-CHAIN = (0.1, 0.15, 0.2, 0.3, 0.4)  # roughness of the filtered maps, but for lobes narrower than a texel
-BASE_NODE = 0.05  # up to this roughness the texels stand unfiltered
-LOBE_WIDTH = 2.57  # of ggx_alpha
-SH_NODE = 0.5  # from it on spherical harmonics
+CHAIN = (0.1, 0.15, 0.2, 0.3, 0.4)  # roughness of the filtered maps whose lobe is wider than a texel
+BASE_NODE = 0.05  # up to this roughness the texels are read unfiltered
+LOBE_WIDTH = 2.57  # full width of the lobe at half its height, in units of ggx_alpha
+SH_NODE = 0.5  # spherical harmonics from this roughness on
 TEXELS_PER_ALPHA = 5.0  # a map of resolution m = TEXELS_PER_ALPHA / ggx_alpha resolves its own lobe
-SH_RESOLUTION = 64  # of the averages that the harmonics are taken from, at most
+SH_RESOLUTION = 64  # largest resolution of the averages that the harmonics are computed from
 ZONAL_ROWS = 129
 LOG_LIMIT = 12.0
 
 
 class PyramidFilters(NamedTuple):
-    """The fixed linear maps of one resolution, shared by all lights that have it.
+    """The fixed linear maps of one resolution, shared by all lights of that resolution.
 
     Attributes:
-        sum_of_levels: Parameters to log-radiance of the texels.
-        averages: Texels to texels and averages.
-        lobes: Averages to the filtered maps.
-        projection: [169, m^2], averages of resolution m to spherical harmonics.
-        projected: Rows of the averages that the projection reads.
-        resolutions, nodes, zonal: What :func:`splitnerf.ops.light_lookup` takes.
+        sum_of_levels: The map from parameters to the texels' log-radiance.
+        averages: The map from texels to the texels followed by their averages.
+        lobes: The map from these averages to the filtered maps.
+        projection: [169, m^2], the map from averages of resolution m to spherical harmonics.
+        projected: The rows of the averages that the projection reads.
+        resolutions, nodes, zonal: The arguments of :func:`splitnerf.ops.light_lookup` with these names.
     """
 
     sum_of_levels: SparseMap
@@ -55,7 +55,7 @@ class PyramidFilters(NamedTuple):
     zonal: Tensor
 
     def to(self, device: torch.device) -> PyramidFilters:
-        """Copies on a device; resolutions and nodes stay on the CPU, where the lookup wants them."""
+        """A copy on a device; resolutions and nodes stay on the CPU, as the lookup requires."""
         sparse = (SparseMap(*(part.to(device) for part in matrix)) for matrix in self[:3])
         return PyramidFilters(
             *sparse, self.projection.to(device), self.projected, self.resolutions, self.nodes, self.zonal.to(device)
@@ -64,21 +64,21 @@ class PyramidFilters(NamedTuple):
 
 @functools.lru_cache(maxsize=4)
 def filters_on(resolution: int, device: torch.device) -> PyramidFilters:
-    """:func:`pyramid_filters` on a device, copied once."""
+    """The result of :func:`pyramid_filters` on a device, copied there once."""
     with torch.inference_mode(False):
         return pyramid_filters(resolution).to(device)
 
 
 @functools.lru_cache(maxsize=2)
 def pyramid_filters(resolution: int) -> PyramidFilters:
-    """The maps for ``resolution`` texels along the edge, a power of 2 >= 16. Computed once, in double precision.
+    """The linear maps for ``resolution`` texels along the edge, a power of 2 >= 16; computed once, in double precision.
 
     Raises:
-        ValueError: It is another number.
+        ValueError: The resolution is not a power of 2 or is below 16.
     """
     if resolution < 16 or resolution & (resolution - 1):
         raise ValueError(f"LightPyramid: resolution must be a power of 2, at least 16, got {resolution}")
-    with torch.inference_mode(False):  # whoever asks first, autograd may keep them later
+    with torch.inference_mode(False):  # a first call in inference mode must not make inference tensors
         chain = [(chain_resolution(resolution, rho), rho) for rho in CHAIN if is_resolved(resolution, rho)]
         side, skipped = resolution, 0
         while side > SH_RESOLUTION:
@@ -93,29 +93,29 @@ def pyramid_filters(resolution: int) -> PyramidFilters:
 
 
 def chain_resolution(resolution: int, roughness: float) -> int:
-    """The power of 2 that resolves the lobe, at most the texels' own resolution."""
+    """The smallest power of 2 that resolves the lobe, at most the texels' own resolution."""
     wanted = TEXELS_PER_ALPHA / roughness**2
     return min(resolution, 1 << math.ceil(math.log2(wanted)))
 
 
 def is_resolved(resolution: int, roughness: float) -> bool:
-    """Whether the lobe, 2.57 ggx_alpha wide at half its height, spans a texel of sqrt(4 pi) / n on average."""
+    """Whether the lobe, 2.57 ggx_alpha wide at half its height, is wider than a texel, sqrt(4 pi) / n on average."""
     return LOBE_WIDTH * roughness**2 * resolution >= math.sqrt(4.0 * math.pi)
 
 
 class LightPyramid(Light):
-    """g(w, rho) = the environment's texels, filtered by the exact lobe. Consistent by construction.
+    """g(w, rho) as the environment's texels filtered with the exact lobe, so that it is consistent by construction.
 
-    The environment is an octahedral map of n^2 texels whose log-radiance is a sum of levels 4^2, 8^2, ...,
-    n^2, clamped to [-12, 12]. Maps for those of rho = .1, .15, .2, .3, .4 whose lobe spans a texel, and
-    spherical harmonics of degree 12 for rho >= .5, are fixed linear maps of the texels' radiance. Between
-    nodes g is linear in rho; up to .05 the texels stand unfiltered.
+    The environment is an octahedral map of n^2 texels. Its log-radiance is a sum of levels of 4^2, 8^2, ..., n^2
+    texels, clamped to [-12, 12]. Filtered maps exist for rho = .1, .15, .2, .3, .4 where the lobe is wider than a
+    texel, and spherical harmonics of degree 12 for rho >= .5; all are fixed linear maps of the texels' radiance.
+    Between these nodes g is linear in rho; up to rho = .05 the texels are read unfiltered.
 
     Args:
-        resolution: n, a power of 2 >= 16; 64 resolves 3 degrees.
-        start: Radiance at the start.
+        resolution: Texels along an edge, n: a power of 2 >= 16; 64 resolves 3 degrees.
+        start: The radiance of all texels before training.
 
-    Source: SplitNeRF Eq. (8)-(11), with the paper's mip-map ablation in mind.
+    Source: SplitNeRF Eq. (8)-(11); compare the paper's mip-map ablation.
     """
 
     needs_consistency_loss = False
@@ -129,39 +129,40 @@ class LightPyramid(Light):
 
     @property
     def filters(self) -> PyramidFilters:
-        """The linear maps, where the texels are."""
+        """The linear maps, on the texels' device."""
         return filters_on(self.resolution, self.texels.device)
 
     def radiance(self) -> Tensor:
-        """[n^2, 3] radiance of the texels."""
+        """[n^2, 3] linear radiance of the texels."""
         return torch.exp(sparse_product(self.filters.sum_of_levels, self.texels).clamp(-LOG_LIMIT, LOG_LIMIT))
 
     def chain(self) -> tuple[Tensor, Tensor]:
-        """All maps [texels, 3] and the harmonics' coefficients [169, 3], as they follow from the parameters now."""
+        """All maps [texels, 3] and the harmonics' coefficients [169, 3], computed from the current parameters."""
         radiance = self.radiance()
         averages = sparse_product(self.filters.averages, radiance)
         levels = torch.cat([radiance, sparse_product(self.filters.lobes, averages)])
-        # Three rows times a matrix, forward and backward: several times faster than the matrix times three columns.
+        # Three rows times the matrix: several times faster, forward and backward, than the matrix times three columns.
         with tensor_cores(False):
             sh = averages[self.filters.projected].T.contiguous() @ self.filters.projection.T
         return levels, sh.T.contiguous()
 
     def evaluate(self) -> FilteredLight:
-        """The filtered maps as they stand; their gradients gather until they are handed back in one pass."""
+        """The filtered maps of the current parameters; they accumulate gradients and pass them on in one backward
+        pass."""
         return FilteredLight(self.filters, *self.chain())
 
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
-        """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0. Computes all maps for this one call."""
+        """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0. Each call computes all maps."""
         return lookup(self.filters, self.chain(), directions, roughness)
 
 
 class FilteredLight:
-    """The filtered maps of one moment, see :class:`splitnerf.fields.light.LightMaps`.
+    """The filtered maps of one state of the parameters, see :class:`splitnerf.fields.light.LightMaps`.
 
     Args:
         filters: The fixed linear maps of the resolution.
-        levels: [texels, 3] the filtered maps.
-        harmonics: [169, 3] coefficients for the rough end.
+        levels: [texels, 3] linear radiance of the filtered maps, one after the other.
+        harmonics: [169, 3] coefficients of the spherical harmonics for rough lobes.
     """
 
     def __init__(self, filters: PyramidFilters, levels: Tensor, harmonics: Tensor):
@@ -183,5 +184,6 @@ class FilteredLight:
 
 
 def lookup(filters: PyramidFilters, chain: Sequence[Tensor], directions: Tensor, roughness: Tensor) -> Tensor:
-    """Radiance [n, 3] >= 0 of filtered maps and harmonics, for directions [n, 3] unit and roughness [n, 1] in [0, 1]."""
+    """Radiance [n, 3] >= 0 from filtered maps and harmonics, at directions [n, 3] unit and roughness [n, 1] in [0,
+    1]."""
     return light_lookup(directions, roughness, *chain, filters.resolutions, filters.nodes, filters.zonal)

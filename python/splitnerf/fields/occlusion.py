@@ -1,4 +1,4 @@
-"""Occlusion factors: what every kind of them answers, and the paper's network."""
+"""Occlusion factors: the interface of all kinds of occlusion, and the paper's network."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from splitnerf.ops import MeshScene, VisibilityCache
 
 
 class OcclusionQuery(NamedTuple):
-    """Points whose occlusion factors are asked for; each kind reads what it needs.
+    """The points of a lookup of occlusion factors; each kind of occlusion reads the values that it needs.
 
     Attributes:
-        inputs: [n, n_inputs], what the heads read.
-        positions: [n, 3] on the surface.
-        normals: [n, 3] unit, out of the surface.
-        lobe_dirs: [n, 3] unit, axis of the specular lobe.
-        roughness: [n, 1].
+        inputs: [n, n_inputs] inputs of the occlusion head.
+        positions: [n, 3] positions on the surface, scene units.
+        normals: [n, 3] unit normals, on the viewer's side.
+        lobe_dirs: [n, 3] unit axes of the specular lobe.
+        roughness: [n, 1] perceptual roughness in [0, 1].
     """
 
     inputs: Tensor
@@ -33,10 +33,10 @@ class OcclusionQuery(NamedTuple):
 
 
 class RaySegments(NamedTuple):
-    """Stretches of rays, each on one surface, and which points are on which.
+    """Segments of rays, each on one surface, and the segment of each point.
 
     Attributes:
-        leaders: [k] int64, the point of each segment that speaks for it.
+        leaders: [k] int64, the point that represents each segment.
         segment: [n] int64, the segment of each point.
     """
 
@@ -45,11 +45,12 @@ class RaySegments(NamedTuple):
 
 
 class Occlusion(NamedTuple):
-    """Which share of the light arrives, and what arrives from the object itself.
+    """The share of the environment's light that arrives at points, and the light that arrives from the object itself.
 
     Attributes:
-        diffuse, specular: o_d and o_s, [n, 1] or [n, 3], 1 = open.
-        indirect_diffuse, indirect_specular: [n, 3] linear, in the normalisation of g(n, 1) and g(d, rho), or None.
+        diffuse, specular: The factors o_d and o_s, [n, 1] or [n, 3] in [0, 1], 1 = open.
+        indirect_diffuse, indirect_specular: [n, 3] linear light from the object, in the normalisation of g(n, 1) and
+            g(d, rho); or None.
     """
 
     diffuse: Tensor
@@ -59,11 +60,11 @@ class Occlusion(NamedTuple):
 
 
 class TracedBits(NamedTuple):
-    """What the vertices of a mesh see.
+    """The traced visibility of a mesh's vertices.
 
     Attributes:
-        cache: The bits, on the CPU.
-        is_unoccluded: Whether hardly anything is blocked: the surface is convex, near enough.
+        cache: The visibility bits, on the CPU.
+        is_unoccluded: Whether the mesh blocks so little that it counts as convex.
     """
 
     cache: VisibilityCache
@@ -71,17 +72,18 @@ class TracedBits(NamedTuple):
 
 
 class OcclusionModel(nn.Module, abc.ABC):
-    """What every kind of occlusion answers. Before its first mesh everything is open: all factors are 1.
+    """The interface of all kinds of occlusion. Before the first mesh, and without occlusion, all factors are 1.
 
-    A mesh goes one way: :meth:`trace` computes from it what the kind keeps, :meth:`use` takes that over, and calls read it.
+    The way of a mesh: :meth:`trace` computes the bits that the kind keeps, :meth:`use` stores them, and calls read
+    them.
 
     Args:
         n_channels: 1 averages the factors over the colour channels, 3 keeps them.
 
     Attributes:
-        needs_mesh: Whether meshes change what this kind answers.
-        ready: Whether the first mesh was taken over.
-        is_unoccluded: Whether the mesh in use is convex, near enough: nothing is looked up, all factors are 1.
+        needs_mesh: Whether the factors of this kind depend on meshes.
+        ready: Whether a mesh is in use.
+        is_unoccluded: Whether the mesh in use counts as convex: all factors are 1 without a lookup.
     """
 
     needs_mesh = True
@@ -92,11 +94,11 @@ class OcclusionModel(nn.Module, abc.ABC):
         self.n_channels, self.ready = n_channels, False
 
     def forward(self, query: OcclusionQuery, segments: RaySegments | None = None) -> Occlusion:
-        """The factors at surface points; the geometry gets no gradient.
+        """The factors at surface points; no gradient flows into the geometry.
 
         Args:
             query: The points.
-            segments: The stretches of rays that the points are on, where one answer may serve a whole stretch.
+            segments: The ray segments of the points, where one lookup may serve a whole segment; None: one lookup each.
         """
         if not self.ready or self.is_unoccluded:
             ones = torch.ones_like(query.roughness).expand(-1, self.n_channels)
@@ -105,39 +107,47 @@ class OcclusionModel(nn.Module, abc.ABC):
 
     @abc.abstractmethod
     def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:
-        """:meth:`forward` with a mesh."""
+        """The factors of :meth:`forward` where they are not all 1."""
 
     def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> TracedBits | None:
-        """What this kind keeps of a mesh, on the CPU; None where that is nothing. Another thread may call it: nothing changes here.
+        """The visibility of a mesh that this kind keeps, on the CPU; None where it keeps none.
+
+        The method changes nothing in the module, so that another thread may call it.
 
         Args:
-            scene: The mesh below.
+            scene: The mesh, ready to be traced.
             vertices: [n, 3], scene units, on the CPU.
-            faces: [m, 3].
+            faces: [m, 3] int32.
         """
         return None
 
     def use(self, traced: TracedBits | None) -> None:
-        """Answers from this mesh from now on."""
+        """Switches to this mesh."""
         self.ready = self.needs_mesh
 
     def set_light(self, light: EvaluatedLight) -> None:
-        """Takes the light that weighs the factors, where they do not come from a network."""
+        """Stores the light that weighs the factors, where they do not come from a network."""
 
     def cached_light(self) -> dict[str, Tensor | None]:
-        """The light that weighs the factors and the light that the mesh sends, where they are kept: what a checkpoint needs
-        beside the mesh to go on with the same bits."""
+        """The stored light that weighs the factors, and the stored radiance of the mesh.
+
+        A checkpoint needs them in addition to the mesh, so that a resumed run has the same bits.
+        """
         return {}
 
     def restore_light(self, cached: dict[str, Tensor | None]) -> None:
-        """Puts back what :meth:`cached_light` returned, on a mesh like that of then."""
+        """Restores the result of :meth:`cached_light`, on a mesh with the same vertices."""
 
     def refresh(self, shade: Callable[[Tensor, Tensor], Tensor]) -> None:
-        """Shades the cached mesh anew, where one is: ``shade(positions, normals)`` is its radiance [n, 3] along the normals."""
+        """Shades the cached mesh again, if any.
+
+        Args:
+            shade: A function from positions [n, 3] and normals [n, 3] to the radiance [n, 3] along the normals.
+        """
 
 
 class NoOcclusion(OcclusionModel):
-    """Everything is open (``occlusion = off``)."""
+    """No occlusion: all factors are 1 (``occlusion.kind = off``)."""
 
     needs_mesh = False
 
@@ -148,9 +158,8 @@ class NoOcclusion(OcclusionModel):
 class OcclusionHead(OcclusionModel):
     """Occlusion factors o_d and o_s of a point, 1 = open, predicted by a network.
 
-    With ``directional`` the specular factor also reads the lobe's axis and width, so that it is a
-    function of the reflection; without it the head is the paper's, which depends on position alone. The biases start at +2,
-    mostly open: that is ours.
+    With ``directional`` the specular factor also depends on the lobe's axis and width. Without it the head is the
+    paper's, which depends on position alone. The output biases start at +2, mostly open; this choice is ours.
 
     Source: SplitNeRF Eq. (12)-(15).
     """
@@ -163,7 +172,7 @@ class OcclusionHead(OcclusionModel):
             self.net[-1].bias.fill_(2.0)  # mostly open
 
     def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:
-        """o_d and o_s, [n, n_channels] each, of every point by itself."""
+        """The factors o_d and o_s, [n, n_channels] each, for every point; segments are not used."""
         features = query.inputs
         if self.directional:
             x, y, z = query.lobe_dirs.unbind(-1)

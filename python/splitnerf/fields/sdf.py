@@ -19,7 +19,7 @@ class SdfSample(NamedTuple):
     """The field at a batch of points.
 
     Attributes:
-        outputs: [n, 13], the first of which is the signed distance (scene units, negative inside).
+        outputs: [n, n_outputs]; the first output is the signed distance (scene units, negative inside).
         features: [n, C] hash-grid features.
         gradient: [n, 3] d sdf / d position.
     """
@@ -36,18 +36,19 @@ class SdfSample(NamedTuple):
 class SdfField(nn.Module):
     """sdf(x) = W2 softplus_100(W1 [x, hash(x)] + b1) + b2, with weight normalisation.
 
-    One hidden layer has its gradient in closed form, so normals need a single backward pass; the hash grid's part goes
-    through its Jacobian (:func:`splitnerf.ops.sdf_layer`).
+    The gradient of one hidden layer has a closed form, so that a loss on normals needs a single backward pass. The hash
+    grid contributes through its Jacobian (:func:`splitnerf.ops.sdf_layer`).
 
     Args:
         spec: Shape of the hash grid.
         box: Half size of the cube that the grid covers, scene units.
-        width: Hidden units.
-        n_outputs: Outputs, the distance included.
-        radius: The field starts as a sphere of this radius, scene units.
-        table_dtype: The type in which the hash table is read, see :class:`splitnerf.ops.HashGrid`.
+        width: The number of hidden units.
+        n_outputs: The number of outputs, with the distance.
+        radius: The radius of the sphere that the field starts as, scene units.
+        table_dtype: The dtype in which the hash table is read, see :class:`splitnerf.ops.HashGrid`.
 
-    Source: NeuS (Wang et al. 2021) on a hash grid (Mueller et al. 2022), with the sizes of SplitNeRF's supplement; sphere
+    Source: NeuS (Wang et al. 2021) on a hash grid (Mueller et al. 2022), with the sizes of SplitNeRF's supplement;
+    sphere
     initialisation: Atzmon and Lipman 2020.
     """
 
@@ -91,7 +92,7 @@ class SdfField(nn.Module):
         return F.linear(h, out[:n_outputs], self.out_bias[:n_outputs])
 
     def forward(self, positions: Tensor) -> Tensor:
-        """outputs [n, n_outputs] at positions [n, 3], scene units."""
+        """The outputs [n, n_outputs] at positions [n, 3], scene units."""
         return self._outputs(self._inputs(positions, self.grid(self._to_unit(positions))))
 
     def sdf(self, positions: Tensor) -> Tensor:
@@ -102,7 +103,7 @@ class SdfField(nn.Module):
 
     @torch.no_grad()
     def network(self) -> SdfNetwork:
-        """The field's numbers as they stand, for operators that ask for distances on their own."""
+        """The field's current numbers, for operators that evaluate distances themselves."""
         hidden, out = self._weights()
         stored, biases = self.grid.stored(), (self.hidden_bias.detach(), self.out_bias.detach())
         table = self.grid.table.detach() if stored is None else stored
@@ -123,18 +124,18 @@ class SdfField(nn.Module):
         return SdfSample(outputs, features, gradient)
 
     def sample_finite_difference(self, positions: Tensor, cells: float = 1.0) -> SdfSample:
-        """As :meth:`sample` with the gradient by six taps.
+        """The values of :meth:`sample`, with the gradient by central differences (six evaluations).
 
         Args:
             positions: [n, 3], scene units.
-            cells: eps of the differences, in cells of the finest open level.
+            cells: The step eps of the differences, in cells of the finest open level.
 
         Source: Neuralangelo (Li et al. 2023), section 3.1; SplitNeRF's released code does the same.
         """
         resolution = self.grid.spec.levels()[max(0, self.grid.n_active - 1)][0]
         eps = cells * 2.0 * self.box / resolution
         steps = eps * torch.cat([torch.eye(3), -torch.eye(3)]).to(positions)
-        with tensor_cores(False):  # their differences are small
+        with tensor_cores(False):  # rounding to TF32 would exceed the differences
             taps = self.sdf((positions[:, None, :] + steps).reshape(-1, 3)).view(-1, 2, 3)
         features = self.grid(self._to_unit(positions))
         outputs = self._outputs(self._inputs(positions, features))
@@ -142,5 +143,5 @@ class SdfField(nn.Module):
 
 
 def sharpness(variance: Tensor) -> Tensor:
-    """s = exp(10 v) of the NeuS density Phi(f) = sigmoid(s f), exponent clamped to [0, 9]."""
+    """The sharpness s = exp(10 v) of the NeuS density, where Phi(f) = sigmoid(s f); 10 v is clamped to [0, 9]."""
     return torch.exp(torch.clamp(10.0 * variance, 0.0, 9.0))

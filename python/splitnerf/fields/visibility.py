@@ -16,30 +16,32 @@ from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, lobe_ro
 from splitnerf.fields.occlusion import Occlusion, OcclusionModel, OcclusionQuery, RaySegments, TracedBits
 from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility
 
-TEXELS_PER_CELL = 8  # of the light, for its mean over a direction's cell
-LOBE_DIRECTIONS = 15  # within the lobe that a sum over the directions resolves
+TEXELS_PER_CELL = 8  # texels of the light per direction, for the mean over the direction's cell
+LOBE_DIRECTIONS = 15  # fewest directions within a lobe that a sum over the directions resolves
 SHADED_CHUNK = 1 << 15  # vertices shaded at a time
 
 
 def bit_counts(words: Tensor) -> Tensor:
-    """How many bits of [n, k] int32 words are set, [n]."""
+    """The number of set bits [n] in each row of int32 words [n, k]."""
     bits = np.unpackbits(words.contiguous().numpy().view(np.uint8).reshape(len(words), -1), axis=1)
     return torch.from_numpy(bits.sum(axis=1, dtype=np.int64))
 
 
 class VisibilityBits(OcclusionModel):
-    """o_d and o_s from what each mesh vertex sees in a fixed set of directions, and the light of what it does not see.
+    """Occlusion factors from the traced visibility of each mesh vertex, and indirect light from the blocked directions.
 
-    Nothing is learned here and nothing is part of the state: :meth:`use` takes the cache of a traced mesh, :meth:`set_light`
-    the current light, :meth:`refresh` the light that the vertices send out. No gradient flows through the factors.
+    The module has no parameters and no state_dict: :meth:`use` stores the cache of a traced mesh, :meth:`set_light` the
+    current light, :meth:`refresh` the radiance of the vertices. No gradient flows through the factors.
 
     Args:
-        n_directions: Fibonacci directions over the sphere, a multiple of 32.
-        offset: Rays start this far off a vertex along its normal, scene units.
+        n_directions: The number of Fibonacci directions over the sphere, a multiple of 32.
+        offset: The distance of a ray's start from its vertex along the normal, scene units.
         n_channels: 1 averages the factors over the colour channels, 3 keeps them.
-        indirect: Keep which vertex each blocked ray meets.
-        open_below: A mesh none of whose vertices has a larger share of its directions blocked is taken to see the whole sky:
-            its factors are 1, and nothing is looked up. 0: never.
+        indirect: Whether the cache records the vertex that each blocked ray hits.
+        open_below: A threshold on the blocked share of a vertex's directions. A mesh whose vertices are all below it
+            counts as unoccluded: its factors are 1 without a lookup. 0 disables this.
+
+    Source: SplitNeRF Eq. (12)-(15) as sums over fixed directions.
     """
 
     def __init__(self, n_directions: int, offset: float, n_channels: int, indirect: bool, open_below: float = 0.0):
@@ -54,7 +56,7 @@ class VisibilityBits(OcclusionModel):
             "light": torch.ones_like(directions),
             "_texels": texels,
             "_cell": torch.cat([(part @ directions.T).argmax(1) for part in texels.split(4096)]),
-            "_solid_angle": (1.0 - texels[:, 2:] ** 2).clamp(min=0.0).sqrt(),  # up to a factor
+            "_solid_angle": (1.0 - texels[:, 2:] ** 2).clamp(min=0.0).sqrt(),  # up to a common factor
         }
         for name, value in constants.items():
             self.register_buffer(name, value, persistent=False)
@@ -62,7 +64,7 @@ class VisibilityBits(OcclusionModel):
         self.radiance: Tensor | None = None
 
     def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> TracedBits:
-        """What every vertex of a mesh sees, traced on the CPU; see :meth:`OcclusionModel.trace`."""
+        """The visibility of every vertex of a mesh, traced on the CPU; see :meth:`OcclusionModel.trace`."""
         mesh = trimesh.Trimesh(vertices.numpy(), faces.numpy(), process=False)
         normals = torch.from_numpy(np.array(mesh.vertex_normals, dtype=np.float32))
         cache = VisibilityCache.trace(
@@ -74,22 +76,22 @@ class VisibilityBits(OcclusionModel):
         return TracedBits(cache, len(blocked) > 0 and blocked.max().item() < self.open_below)
 
     def use(self, traced: TracedBits) -> None:
-        """Reads from these bits from now on. What the vertices send out is unknown until :meth:`refresh`."""
+        """Switches to these bits. The radiance of the vertices is unknown until :meth:`refresh`."""
         super().use(traced)
         self.cache, self.is_unoccluded = traced.cache.to(self.directions.device), traced.is_unoccluded
         self.radiance = None
 
     @torch.no_grad()
     def set_light(self, light: EvaluatedLight) -> None:
-        """Takes the light that weighs the factors, its mean over each direction's cell."""
+        """Stores the light that weighs the factors: its mean over each direction's cell."""
         self.light.copy_((light.cells or self.cell_light(light.maps)).radiance)
 
     def cached_light(self) -> dict[str, Tensor | None]:
-        """The sky's light of each direction [k, 3], and what each vertex sends out [n, 3] or None."""
+        """The environment's radiance of each direction [k, 3], and the radiance of each vertex [n, 3] or None."""
         return {"sky": self.light, "sent": self.radiance}
 
     def restore_light(self, cached: dict[str, Tensor | None]) -> None:
-        """Puts back what :meth:`cached_light` returned, on a mesh of as many vertices."""
+        """Restores the result of :meth:`cached_light`, on a mesh with the same number of vertices."""
         self.light.copy_(cached["sky"])
         self.radiance = None if cached["sent"] is None else cached["sent"].to(self.light.device)
 
@@ -105,22 +107,26 @@ class VisibilityBits(OcclusionModel):
 
     @property
     def summed_from(self) -> float:
-        """Roughness from which a sum over the directions resolves the lobe, whose effective number of them is 3 k a^2
-        (see :func:`splitnerf.ops.cached_occlusion`)."""
+        """The smallest roughness at which a sum over the k directions resolves the lobe.
+
+        A lobe of ggx_alpha = a effectively contains 3 k a^2 directions (see :func:`splitnerf.ops.cached_occlusion`).
+        """
         return (LOBE_DIRECTIONS / (3.0 * len(self.directions))) ** 0.25
 
     def visibility(self, positions: Tensor, normals: Tensor) -> tuple[Tensor, Tensor | None]:
-        """The share [n, k] of the light from each direction that arrives at points, and what the mesh sends from there,
-        [n, k, 3] or None. Below the horizon both mean nothing."""
+        """The share [n, k] in [0, 1] of the environment's light that arrives at points from each direction, and the
+        light [n, k, 3] that the mesh sends from that direction, or None. Below the horizon both have no meaning."""
         if self.is_unoccluded:
             return positions.new_ones(len(positions), len(self.directions)), None
         return cached_visibility(self.cache, positions, normals, self.radiance)
 
     @torch.no_grad()
     def refresh(self, shade: Callable[[Tensor, Tensor], Tensor]) -> None:
-        """Shades the vertices anew: ``shade(positions, normals)`` is their radiance [n, 3] along the normal.
+        """Shades the vertices again. The shading reads the radiance of the refresh before, so that each call adds a
+        bounce.
 
-        The shading itself reads the radiance of the former refresh: a bounce is added each time.
+        Args:
+            shade: A function from positions [n, 3] and normals [n, 3] to the radiance [n, 3] along the normals.
         """
         if self.indirect and self.cache is not None and not self.is_unoccluded:
             parts = zip(self.cache.vertices.split(SHADED_CHUNK), self.cache.normals.split(SHADED_CHUNK))
@@ -129,7 +135,7 @@ class VisibilityBits(OcclusionModel):
 
     @torch.no_grad()
     def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:
-        """The factors at points, or those of the leaders for the whole of their segments."""
+        """The factors at points; with segments, those of each segment's leader for all of its points."""
         if segments is not None:
             leaders = self.answer(OcclusionQuery(*(part[segments.leaders] for part in query)), None)
             return Occlusion(*(None if part is None else part[segments.segment] for part in leaders))

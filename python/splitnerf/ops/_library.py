@@ -1,4 +1,4 @@
-"""Loads the operator library and holds what every wrapper needs to register one operator."""
+"""Loads the operator library; helpers with which the wrappers register their operators."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from splitnerf import _core
 
 
 def _load() -> None:
-    """Loads the operators into torch; their library stands beside the compiled module."""
+    """Loads the operators into torch, from the library beside the compiled module."""
     folder = Path(_core.__file__).parent
     found = sorted(folder.glob("libsplitnerf_ops.*"))
     if not found:
@@ -25,7 +25,7 @@ lib = torch.ops.splitnerf
 
 
 def refuse_gradients(ctx, op: str, **arguments: int) -> None:
-    """Raises where a gradient is asked to one of these arguments (name = position), for which none is defined."""
+    """Raises RuntimeError where an argument without a defined gradient requires one; ``arguments``: name = position."""
     for name, position in arguments.items():
         if ctx.needs_input_grad[position]:
             raise RuntimeError(f"{op}: no gradient to {name} is defined; see the table in docs/ops.md")
@@ -34,7 +34,7 @@ def refuse_gradients(ctx, op: str, **arguments: int) -> None:
 def register(name: str, *, fake, backward=None, setup_context=None) -> None:
     """Registers the fake implementation and the gradient of ``splitnerf::name``.
 
-    An operator without ``backward`` raises when a gradient is asked of it; it never returns zeros.
+    An operator without ``backward`` raises in a backward pass; it never returns a gradient of zeros.
     """
     qualified = f"splitnerf::{name}"
     torch.library.register_fake(qualified, fake)

@@ -1,4 +1,4 @@
-"""AdamW with one operator a tensor, on the CPU and the GPU, which can leave rows without gradient alone.
+"""AdamW with one operator call per tensor, on the CPU and the GPU. It can skip rows without a gradient.
 
 Source: Loshchilov and Hutter 2019, Algorithm 2; rows without gradient: Mueller et al. 2022, section 4.
 """
@@ -23,20 +23,22 @@ def adamw_step_(
     ``m = beta1 m + (1 - beta1) g``, ``v = beta2 v + (1 - beta2) g^2``,
     ``p = p (1 - lr weight_decay) - lr (m / (1 - beta1^step)) / (sqrt(v / (1 - beta2^step)) + eps)``.
 
-    A gradient that is NaN makes its number and both moments NaN. One whose square, times 1 - beta2, exceeds the dtype makes v
-    infinite, and its number is moved by weight decay alone from then on. One whose square vanishes counts as 0 in v.
+    A NaN gradient makes its parameter and both moments NaN. A gradient whose square times 1 - beta2 overflows the dtype
+    makes v infinite; from then on only weight decay moves its parameter. A gradient whose square underflows counts as 0
+    in v.
 
     Args:
-        param: Any shape, float32 or float64, contiguous.
-        grad: Like param.
-        exp_avg, exp_avg_sq: Like param, contiguous: the moments m and v; 0 before the first step.
-        lr: Learning rate, at least 0.
-        beta1, beta2: In [0, 1).
-        eps: At least 0.
-        weight_decay: At least 0, decoupled.
-        step: Steps taken, this one included; at least 1.
-        sparse: Leaves rows (of the last dimension) whose gradients are all exactly 0 as they are: param and both moments.
-        copy: Like param, float16 or bfloat16, contiguous, equal to param but for rounding: is written as well, rounded as by
+        param: The parameter p, any shape, float32 or float64, contiguous.
+        grad: The gradient g, with param's shape and dtype.
+        exp_avg, exp_avg_sq: The moments m and v, with param's shape and dtype, contiguous; 0 before the first step.
+        lr: The learning rate, at least 0.
+        beta1, beta2: The decay rates of the moments, in [0, 1).
+        eps: The stabiliser of the division, at least 0.
+        weight_decay: The decoupled weight decay, at least 0.
+        step: The number of steps with this one, at least 1.
+        sparse: Whether to skip rows (of the last dimension) whose gradients are all exactly 0: param and both moments
+            do not change there.
+        copy: A rounded copy of param in float16 or bfloat16, contiguous, that the step also writes; it is rounded as by
             :func:`splitnerf.ops.hash_grid.rounded`.
 
     Raises:
@@ -49,16 +51,16 @@ def adamw_step_(
 
 
 class AdamW(torch.optim.Optimizer):
-    """torch.optim.AdamW by :func:`adamw_step_`; a state_dict of either loads into the other.
+    """torch.optim.AdamW with :func:`adamw_step_`; each class loads the other's state_dict.
 
     Args:
-        params: Tensors, or groups of them with settings of their own, all contiguous.
-        lr, betas, eps, weight_decay, sparse: As of :func:`adamw_step_`.
-        copies: Copies of parameters that a step writes as well, as ``{grid.table: grid.copy}`` of a
-            :class:`splitnerf.ops.HashGrid` with a table_dtype. Without it the grid renews its copy on its own.
+        params: Contiguous tensors, or groups of them with their own settings.
+        lr, betas, eps, weight_decay, sparse: The arguments of :func:`adamw_step_` with these names.
+        copies: Rounded copies that a step also writes, by parameter: ``{grid.table: grid.copy}`` of a
+            :class:`splitnerf.ops.HashGrid` with a table_dtype. Without it the grid renews its copy itself.
 
     Raises:
-        ValueError: In a step, where a setting, a parameter or a gradient does not fit.
+        ValueError: A setting, a parameter or a gradient does not fit; raised in a step.
 
     Example:
         >>> table = torch.nn.Parameter(torch.zeros(4, 2))
@@ -69,7 +71,7 @@ class AdamW(torch.optim.Optimizer):
         tensor([-0.1000,  0.0000])
     """
 
-    counts_versions = True  # tells TableCopy that its steps are seen without a hook
+    counts_versions = True  # tells TableCopy that it needs no hook to notice the steps
 
     def __init__(
         self,
@@ -86,10 +88,11 @@ class AdamW(torch.optim.Optimizer):
         self._copies = dict(copies or {})
 
     def load_state_dict(self, state_dict: dict) -> None:
-        """Takes over the moments and settings of this class or of torch.optim.AdamW, whose groups keep their ``sparse``.
+        """Loads moments and settings of this class or of torch.optim.AdamW; with the latter, groups keep their
+        ``sparse``.
 
         Raises:
-            ValueError: The other one maximises or is AMSGrad.
+            ValueError: The stored optimiser maximises or uses AMSGrad.
         """
         if any(group.get("maximize") or group.get("amsgrad") for group in state_dict["param_groups"]):
             raise ValueError("AdamW: a state with maximize or amsgrad cannot be gone on from")
@@ -108,7 +111,7 @@ class AdamW(torch.optim.Optimizer):
 
     @torch.no_grad()
     def step(self, closure: Callable[[], Tensor] | None = None) -> Tensor | None:
-        """One step of every parameter that has a gradient; the closure, if any, is called before and its loss returned."""
+        """Moves every parameter that has a gradient; first calls the closure, if any, and returns its loss."""
         loss = None
         if closure is not None:
             with torch.enable_grad():

@@ -1,6 +1,6 @@
 """Multiresolution hash grid encoding, with the Jacobian as an output.
 
-Gradients that exist (a missing one raises):
+Defined gradients (any other raises RuntimeError):
 
 ===========================  =======  ===========  ================  ===============
 function                     to table to positions second order      note
@@ -9,8 +9,8 @@ function                     to table to positions second order      note
 ``hash_encode_jacobian``     yes      yes          no                features and Jacobian
 ===========================  =======  ===========  ================  ===============
 
-A float32 table may be read from a 16-bit copy of it (``stored``): half the memory to gather from, while everything is still
-computed in float32 and the gradient arrives in float32 at the table itself. docs/ops.md has the errors.
+The operators can read a 16-bit copy (``stored``) of a float32 table: lookups gather half the memory, all computation is
+in float32, and the table itself gets its gradient in float32. docs/ops.md lists the errors.
 
 With the Jacobian as an output, an SDF normal is a product of two tensors, and a loss on it needs one
 backward pass instead of two.
@@ -37,14 +37,15 @@ class HashGridSpec:
     """Shape of a hash grid.
 
     Attributes:
-        n_levels: Levels, 1 to 32.
-        n_features: Features of one level: 1, 2, 4 or 8.
-        base_resolution: Cells along an edge of the coarsest level.
-        growth: Factor between the resolutions of neighbouring levels, at least 1.
-        log2_table_size: A level holds at most ``2**log2_table_size`` entries; finer levels share them by hashing.
+        n_levels: The number of levels, 1 to 32.
+        n_features: The number of features per level: 1, 2, 4 or 8.
+        base_resolution: The number of cells along an edge of the coarsest level.
+        growth: The factor between the resolutions of neighbouring levels, at least 1.
+        log2_table_size: The base-2 logarithm of the largest number of entries per level; finer levels share their
+            entries by hashing.
 
     Raises:
-        ValueError: No grid can have this shape; the message names the number.
+        ValueError: A number is out of its range; the message names it.
     """
 
     n_levels: int = 16
@@ -57,20 +58,20 @@ class HashGridSpec:
         self.levels()
 
     def levels(self) -> list[tuple[int, int, int, bool]]:
-        """(resolution, first entry, number of entries, dense) of each level."""
+        """The tuple (resolution, first entry, number of entries, is dense) of each level."""
         return _core.hash_grid_levels(
             self.n_levels, self.n_features, self.base_resolution, self.growth, self.log2_table_size
         )
 
     @property
     def n_entries(self) -> int:
-        """Rows of the table."""
+        """The number of rows of the table."""
         _, offset, n, _ = self.levels()[-1]
         return offset + n
 
     @property
     def n_outputs(self) -> int:
-        """Columns of the encoding."""
+        """The number of columns of the encoding."""
         return self.n_levels * self.n_features
 
     def arguments(self, n_active: int) -> tuple[int, int, float, int, int]:
@@ -84,21 +85,23 @@ def hash_encode(
     """Encodes points of the unit cube by trilinear interpolation on every open level.
 
     Args:
-        positions: [n, 3], float32 or float64, in [0, 1]; outside, the nearest point of the cube is encoded
-            and the gradient along that axis is 0. A NaN coordinate gives NaN features.
-        table: [spec.n_entries, spec.n_features], same dtype; or, where no gradient to it is asked, float16 or bfloat16
-            beside float32 positions.
-        spec: Shape of the grid.
-        n_active: Open levels, coarsest first; the columns of closed ones are 0 and cost nothing. Default: all.
-        stored: Like table, float16 or bfloat16: is read in place of a float32 table, each entry turned into float32.
+        positions: [n, 3] points, float32 or float64, in [0, 1]. A point outside is moved to the nearest point of the
+            cube, and its gradient along the clamped axes is 0. A NaN coordinate gives NaN features.
+        table: [spec.n_entries, spec.n_features] entries in the dtype of positions; or, if it needs no gradient, float16
+            or bfloat16 with float32 positions.
+        spec: The shape of the grid.
+        n_active: The number of open levels, coarsest first; the columns of closed levels are 0 and cost nothing.
+            Default: all.
+        stored: A copy of the float32 table in float16 or bfloat16, which is read instead of the table and converted to
+            float32; or None.
 
     Returns:
-        [n, spec.n_outputs] in the dtype of positions. Differentiable twice in positions and table. The gradient to table has
-        its dtype and is summed in it, float32 with `stored`: rounding counts as the identity.
+        [n, spec.n_outputs] features in the dtype of positions. Differentiable twice in positions and table. The
+        gradient of table has the table's dtype and is summed in it; with `stored` the rounding counts as the identity.
 
     Raises:
         ValueError: A shape, dtype or level count does not fit; the message names it.
-        RuntimeError: In the backward pass, where a gradient to `stored` or to a 16-bit table is asked for.
+        RuntimeError: `stored` or a 16-bit table requires a gradient; raised in the backward pass.
     """
     return lib.hash_encode(positions, table, *spec.arguments(spec.n_levels if n_active is None else n_active), stored)
 
@@ -106,9 +109,9 @@ def hash_encode(
 def hash_encode_jacobian(
     positions: Tensor, table: Tensor, spec: HashGridSpec, n_active: int | None = None, stored: Tensor | None = None
 ) -> tuple[Tensor, Tensor]:
-    """Encodes points and returns the derivative of the features in one pass over the table.
+    """Encodes points and computes the features' derivatives in the same pass over the table.
 
-    Args and Raises: as :func:`hash_encode`.
+    For arguments and errors see :func:`hash_encode`.
 
     Returns:
         features [n, C] and jacobian [n, 3, C], ``jacobian[i, a, c] = d features[i, c] / d positions[i, a]``,
@@ -120,13 +123,15 @@ def hash_encode_jacobian(
 
 
 def rounded(table: Tensor, dtype: torch.dtype) -> Tensor:
-    """The table in 16 bits, to nearest even; what is beyond the largest number of dtype (float16: 65504) becomes that number,
-    never infinite. NaN stays NaN."""
+    """The table in 16 bits, rounded to nearest even.
+
+    A value beyond the largest number of the dtype (float16: 65504) becomes that number, never infinite. NaN stays NaN.
+    """
     largest = torch.finfo(dtype).max
     return table.detach().clamp(-largest, largest).to(dtype)
 
 
-_optimiser_steps = [0]  # of this process
+_optimiser_steps = [0]  # steps of all optimisers of this process
 
 
 @register_optimizer_step_post_hook
@@ -136,16 +141,17 @@ def _count_step(optimiser, *_) -> None:
 
 
 class TableCopy:
-    """A 16-bit copy of a float32 table, renewed by :func:`rounded` once the table may have been written to.
+    """A 16-bit copy of a float32 table. :func:`rounded` renews the copy when the table may have changed.
 
-    That is noticed by torch's version counter and, since torch's fused optimisers leave the counter as it is, by any optimiser's
-    step. What goes through ``table.data``, or through an optimiser's function without its class, is not seen.
+    Two signs tell of a change: torch's version counter, and the step of any optimiser, since torch's fused optimisers
+    do not increase the counter. A write through ``table.data`` or by an optimiser's function without its class is not
+    noticed.
 
     Args:
-        dtype: torch.float16 or torch.bfloat16.
+        dtype: The dtype of the copy, torch.float16 or torch.bfloat16.
 
     Raises:
-        ValueError: Another dtype.
+        ValueError: The dtype is another one.
     """
 
     def __init__(self, dtype: torch.dtype):
@@ -156,17 +162,19 @@ class TableCopy:
         self._of: tuple | None = None
 
     def of(self, table: Tensor) -> Tensor:
-        """The copy, of the table as it stands; in its shape and on its device. It is renewed in place: a backward pass through
-        an older state of it raises."""
+        """The current copy of the table, with its shape and on its device.
+
+        The copy is renewed in place: a backward pass through an older state of it raises RuntimeError.
+        """
         if self._state(table) != self._of:
-            with torch.inference_mode(False):  # whoever asks first, autograd may keep it later
+            with torch.inference_mode(False):  # a first call in inference mode must not make an inference tensor
                 values, kept = rounded(table, self.dtype), self._values
                 alike = kept is not None and (kept.shape, kept.device) == (values.shape, values.device)
                 self._values, self._of = kept.copy_(values) if alike else values, self._state(table)
         return self._values
 
     def was_written(self, table: Tensor) -> None:
-        """Tells that the values of :meth:`of` have been changed as the table has."""
+        """Declares the copy up to date after its values were written together with the table's."""
         self._of = self._state(table)
 
     @staticmethod
@@ -178,14 +186,15 @@ class HashGrid(nn.Module):
     """A hash grid with a learnable table.
 
     Args:
-        spec: Shape of the grid.
-        init_scale: The table starts uniform in [-init_scale, init_scale].
-        table_dtype: torch.float16 or torch.bfloat16: the parameter stays float32 and receives float32 gradients, and a copy in
-            this dtype is read in its place; it is renewed when the parameter has changed and is no part of state_dict. Entries
-            beyond the dtype's largest number (float16: 65504) are read as that number. Default: none, the parameter is read.
+        spec: The shape of the grid.
+        init_scale: The bound of the table's first values, which are uniform in [-init_scale, init_scale].
+        table_dtype: The dtype of a copy that is read instead of the parameter, torch.float16 or torch.bfloat16; None
+            reads the parameter. The parameter and its gradient stay float32. The copy is renewed when the parameter has
+            changed and is not part of state_dict. Entries beyond the dtype's largest number (float16: 65504) are read
+            as that number.
 
     Raises:
-        ValueError: Another table_dtype.
+        ValueError: table_dtype is another dtype.
 
     Example:
         >>> grid = HashGrid(HashGridSpec(n_levels=4, log2_table_size=12))
@@ -201,7 +210,7 @@ class HashGrid(nn.Module):
         self.table = nn.Parameter((torch.rand(spec.n_entries, spec.n_features) * 2 - 1) * init_scale)
 
     def stored(self) -> Tensor | None:
-        """The table's copy of 16 bits as it stands; None without `table_dtype`."""
+        """The table's current 16-bit copy; None without `table_dtype`."""
         return None if self.copy is None else self.copy.of(self.table)
 
     def forward(self, positions: Tensor) -> Tensor:
@@ -221,7 +230,7 @@ _NO_GRID = (None,) * 5
 
 
 def _keep_encoded(ctx, inputs, output):
-    """Saves positions, table and, where there is one, the table's copy; between them stand the grid's numbers."""
+    """Saves positions, table and, if given, the table's copy; the grid's numbers are between them in ``inputs``."""
     positions, table, *grid, stored = inputs
     ctx.save_for_backward(positions, table, *([] if stored is None else [stored]))
     ctx.grid = grid
@@ -233,7 +242,7 @@ def _keep_scattered(ctx, inputs, output):
 
 
 def _refuse_rounded_gradients(ctx, op: str, table: Tensor, stored: list[Tensor]) -> None:
-    """To what is 16 bits itself: autograd would round the gradient, and small ones vanish in it."""
+    """Raises where a 16-bit tensor requires a gradient: autograd would round it, and small gradients would vanish."""
     if stored:
         refuse_gradients(ctx, op, stored=7)
     if ctx.needs_input_grad[1] and table.dtype in (torch.float16, torch.bfloat16):
@@ -255,7 +264,8 @@ def _encode_backward(ctx, grad):
 
 
 def _scatter_backward(ctx, grad_grad_table):
-    """grad_table = sum_p w(p) grad_features(p) is linear in both: its adjoint encodes with grad_grad_table."""
+    """The gradients of grad_table = sum_p w(p) grad_features(p): it is linear, so its adjoint encodes
+    grad_grad_table."""
     positions, grad_features = ctx.saved_tensors
     grad_positions = grad_grad_features = None
     if ctx.needs_input_grad[0]:
@@ -311,5 +321,5 @@ register(
 
 
 def growth_for(base_resolution: int, finest_resolution: int, n_levels: int) -> float:
-    """Growth that leads from the base to the finest resolution over ``n_levels`` levels."""
+    """The growth factor with which ``n_levels`` levels reach from the base to the finest resolution."""
     return math.exp(math.log(finest_resolution / base_resolution) / max(1, n_levels - 1))

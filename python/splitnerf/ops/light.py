@@ -18,17 +18,17 @@ def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, l
     """Estimates gbar(w_s, rho) from light samples that all queries share.
 
     ``gbar = sum_i D(w_i, w_s, rho) L_i (w_i.w_s)+ / sum_i D (w_i.w_s)+``. The light directions should
-    cover the sphere uniformly (:func:`fibonacci_directions` with a random rotation). Each pair's
-    weight is computed where it is used: memory is O(s + n), never O(s n).
+    cover the sphere uniformly (:func:`fibonacci_directions` with a random rotation). The weights of the
+    s n pairs are never stored: memory is O(s + n).
 
     Args:
-        query_dirs: [s, 3] unit.
-        roughness: [s, 1], in [0, 1].
-        light_dirs: [n, 3] unit, n > 0.
-        light: [n, 3] radiance at rho = 0.
+        query_dirs: [s, 3] unit directions w_s.
+        roughness: [s, 1] perceptual roughness in [0, 1].
+        light_dirs: [n, 3] unit directions w_i, n > 0.
+        light: [n, 3] radiance L_i at rho = 0.
 
     Returns:
-        [s, 3] radiance; 0 for a query above whose horizon no light direction stands.
+        [s, 3] radiance; 0 for a query with no light direction above its horizon.
 
     Raises:
         ValueError: A shape or dtype does not fit.
@@ -37,9 +37,10 @@ def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, l
 
 
 def fibonacci_directions(n: int, generator: torch.Generator | None = None, dtype=torch.float32) -> Tensor:
-    """[n, 3] uniform lattice on the sphere under a random rotation (Haar measure).
+    """[n, 3] directions of a uniform lattice on the sphere under a random rotation (Haar measure).
 
-    At equal n its error in gbar is 2 to 10 times below that of independent directions. They are on the generator's device.
+    At equal n the error of gbar is 2 to 10 times smaller than with independent directions. The result is on the
+    generator's device.
     """
     device = torch.device("cpu") if generator is None else generator.device
     lattice = torch.from_numpy(_core.fibonacci_sphere(n)).to(device=device, dtype=dtype)
@@ -49,16 +50,16 @@ def fibonacci_directions(n: int, generator: torch.Generator | None = None, dtype
 
 
 def sample_ggx_lobe(axes: Tensor, roughness: Tensor, n_samples: int, seed: int = 0) -> Tensor:
-    """Directions with density proportional to D(w)(w.axis)+, for narrow lobes that a shared set would miss.
+    """Directions with density proportional to D(w)(w.axis)+, for lobes so narrow that a shared set would miss them.
 
-    The plain mean of the light over them estimates gbar: sampling is exact, so no weights are left.
-    A random shift by axis and seed makes the mean unbiased. No gradient.
+    The plain mean of the light over the directions estimates gbar, because the density is exact. Each axis
+    gets a random shift by the seed, so that the mean is unbiased. No gradient.
 
     Args:
-        axes: [s, 3] unit.
-        roughness: [s, 1], in [0, 1].
-        n_samples: Directions an axis.
-        seed: Of the random shifts.
+        axes: [s, 3] unit axes of the lobes.
+        roughness: [s, 1] perceptual roughness in [0, 1].
+        n_samples: The number of directions per axis.
+        seed: The seed of the random shifts.
 
     Returns:
         [s, n_samples, 3] unit directions.

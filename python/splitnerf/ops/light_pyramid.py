@@ -24,10 +24,10 @@ class SparseMap(NamedTuple):
     """A sparse matrix by rows, and its transpose by rows for the backward pass.
 
     Attributes:
-        offsets: [rows + 1] int64, where each row's entries begin.
-        columns: [entries] int32.
-        weights: [entries].
-        transposed_offsets, transposed_columns, transposed_weights: The same of the transpose.
+        offsets: [rows + 1] int64, the index of each row's first entry.
+        columns: [entries] int32 column indices.
+        weights: [entries] values.
+        transposed_offsets, transposed_columns, transposed_weights: The offsets, columns and weights of the transpose.
     """
 
     offsets: Tensor
@@ -39,7 +39,7 @@ class SparseMap(NamedTuple):
 
 
 def sparse_map(parts: list[tuple], dtype: torch.dtype = torch.float32) -> SparseMap:
-    """Stacks matrices (offsets, columns, weights, n_columns) of one width, as ``_core`` hands them over."""
+    """Stacks matrices of equal width, given as ``_core`` returns them: (offsets, columns, weights, n_columns)."""
     n_columns = parts[0][3]
     starts = np.cumsum([0] + [len(columns) for _, columns, _, _ in parts])
     offsets = np.concatenate([[0]] + [part[0][1:] + start for part, start in zip(parts, starts)])
@@ -56,24 +56,25 @@ def sparse_map(parts: list[tuple], dtype: torch.dtype = torch.float32) -> Sparse
 
 
 def light_sum_of_levels(resolution: int) -> SparseMap:
-    """[n^2, 4^2 + 8^2 + ... + n^2]: levels of log-radiance, coarse to fine, interpolated bilinearly and added."""
+    """The [n^2, 4^2 + 8^2 + ... + n^2] matrix that adds bilinearly interpolated levels of log-radiance, coarse to
+    fine."""
     return sparse_map([_core.light_sum_of_levels(resolution)])
 
 
 def light_averages(resolution: int) -> SparseMap:
-    """[n^2 + (n/2)^2 + ... + 8^2, n^2]: the texels and their averages by solid angle."""
+    """The [n^2 + (n/2)^2 + ... + 8^2, n^2] matrix from texels to the texels and their averages by solid angle."""
     return sparse_map([_core.light_averages(resolution)])
 
 
 def light_filters(resolution: int, targets: list[tuple[int, float]]) -> SparseMap:
-    """gbar(w, rho) at the texel centres of octahedral maps, from the averages of :func:`light_averages`.
+    """The matrix from the averages of :func:`light_averages` to gbar(w, rho) at the texel centres of octahedral maps.
 
-    Each row is the integral of ``D (w.w_s)+`` over cells that grow where the lobe varies slowly, divided by
-    its sum: a constant light stays itself. Nothing of the lobe is cut.
+    Each row holds the integrals of ``D (w.w_s)+`` over cells, divided by their sum, so that a constant light is
+    preserved. Cells are larger where the lobe varies slowly. The lobe is not truncated.
 
     Args:
-        resolution: n of the texels, a power of 2 >= 8.
-        targets: (m, rho) of each map: m^2 rows.
+        resolution: Texels along an edge, n: a power of 2 >= 8.
+        targets: The resolution m and the roughness rho of each map, which has m^2 rows.
 
     Source: SplitNeRF Eq. (11).
     """
@@ -81,19 +82,22 @@ def light_filters(resolution: int, targets: list[tuple[int, float]]) -> SparseMa
 
 
 def sh_projection(resolution: int, cells: bool) -> Tensor:
-    """[169, n^2] float32: spherical harmonics of a light bilinear between texels or (``cells``) constant in each."""
+    """The [169, n^2] float32 matrix from texels to spherical harmonics.
+
+    The light is bilinear between the texels' centres or, with ``cells``, constant in each texel.
+    """
     return torch.from_numpy(_core.sh_projection(resolution, cells)).to(torch.float32)
 
 
 def zonal_factors(start: float, n_rows: int) -> Tensor:
-    """[n_rows, 13] float32: what the lobe D cos leaves of each degree, for roughness ``start`` to 1."""
+    """[n_rows, 13] float32 factors by which the lobe D cos scales each degree, for roughness ``start`` to 1."""
     return torch.from_numpy(_core.zonal_factors(start, n_rows)).to(torch.float32)
 
 
 def sparse_product(matrix: SparseMap, values: Tensor) -> Tensor:
-    """matrix times values [columns, 3] -> [rows, 3]. Differentiable in ``values``, any number of times.
+    """The product of a matrix with values [columns, 3] -> [rows, 3]. Differentiable in ``values``, any number of times.
 
-    Column indices are trusted: they come from the maps above.
+    Column indices are not checked: they come from the functions above.
 
     Raises:
         ValueError: A shape or dtype does not fit.
@@ -106,21 +110,21 @@ def light_lookup(
 ) -> Tensor:
     """g(w, rho) from filtered maps and spherical harmonics.
 
-    Below ``nodes[0]`` the first map, between nodes their maps linearly in rho, from the last node on
-    ``g = sum_lm zonal_l(rho) sh_lm Y_lm(w)``. Maps are read bilinearly, across the seams of the
-    octahedron as within. Where the harmonics' sum x falls below a thousandth e of the mean light (they
-    ring around strong lamps) it is e exp(x/e - 1), with that form's gradient.
+    Below ``nodes[0]`` g is the first map; between nodes g is linear in rho between their maps; from the last node on
+    ``g = sum_lm zonal_l(rho) sh_lm Y_lm(w)``. Maps are read bilinearly, also across the seams of the octahedron.
+    Spherical harmonics ring around strong lamps: where their sum x is below e, a thousandth of the mean light, it is
+    replaced by e exp(x/e - 1), and so is its gradient.
 
     Differentiable once in directions (tangentially in the maps), roughness, levels and sh.
 
     Args:
-        directions: [n, 3] unit.
-        roughness: [n, 1] perceptual; above 1 as 1.
-        levels: [sum of r_k^2, 3] radiance, the maps one after the other.
-        sh: [169, 3], coefficient l^2 + l + m of radiance.
-        resolutions: [K] int64, r_k. On the CPU, whatever the device of the others.
-        nodes: [K + 1] float64 ascending: the maps' roughness, then the harmonics'. On the CPU.
-        zonal: [rows, 13] factors at roughness nodes[K] to 1.
+        directions: [n, 3] unit directions w.
+        roughness: [n, 1] perceptual roughness; values above 1 count as 1.
+        levels: [sum of r_k^2, 3] radiance of the maps, one after the other.
+        sh: [169, 3] spherical harmonics of the radiance; the coefficient of (l, m) is in row l^2 + l + m.
+        resolutions: [K] int64 resolutions r_k of the maps; always on the CPU.
+        nodes: [K + 1] float64, ascending: the roughness of each map, then that of the harmonics; always on the CPU.
+        zonal: [rows, 13] factors of the degrees at roughness nodes[K] to 1, evenly spaced.
 
     Returns:
         [n, 3] radiance. A NaN direction or roughness gives NaN.

@@ -1,6 +1,6 @@
-"""Terms of the training loss, each found together with its gradient in one pass over the pixels, points or pairs.
+"""Terms of the training loss, each computed together with its gradient in one pass over the pixels, points or pairs.
 
-All are differentiable once, in what the docstrings name; a gradient to anything else raises.
+All are differentiable once, in the arguments that the docstrings name; a gradient to any other argument raises.
 """
 
 from __future__ import annotations
@@ -14,20 +14,22 @@ from splitnerf.ops._library import lib, refuse_gradients, register
 def pixel_losses(
     mean: Tensor, opacity: Tensor, target: Tensor, background: Tensor, *, linear: bool = True
 ) -> tuple[Tensor, Tensor]:
-    """Mean squared sRGB error of pixels against photos, both over one background, and the cross entropy with their masks.
+    """Mean squared sRGB error of pixels against photos over the same background, and the cross entropy with their
+    masks.
 
-    A channel that the photo clipped says only that the truth is at least as bright: there, and only there, the prediction
-    is clipped too.
+    Where a photo's channel is clipped, the true value is at least 1. There, and only there, the prediction is clipped
+    too.
 
     Args:
-        mean: [n, 3] colour of the object alone, not premultiplied.
-        opacity: [n] in [0, 1].
-        target: [n, 4] sRGB, straight alpha.
-        background: [n, 3] sRGB.
-        linear: Whether ``mean`` is linear, or sRGB already.
+        mean: [n, 3] colours of the object alone, not premultiplied.
+        opacity: [n] opacities in [0, 1].
+        target: [n, 4] sRGB values of the photos in [0, 1], straight alpha.
+        background: [n, 3] sRGB colours in [0, 1].
+        linear: Whether ``mean`` is linear; otherwise it is sRGB.
 
     Returns:
-        colour [] and mask [], means over values and pixels; 0 without any. Differentiable in mean and opacity.
+        colour [], the mean over channels and pixels, and mask [], the mean over pixels; 0 without pixels.
+        Differentiable in mean and opacity.
 
     Raises:
         ValueError: A shape or dtype does not fit.
@@ -39,20 +41,22 @@ def pixel_losses(
 
 
 def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple[Tensor, Tensor]:
-    """What a distance field's gradients should be: of length 1 everywhere, and of one direction with their neighbours'.
+    """The eikonal loss and the smoothness loss of a distance field's gradients.
 
-    Of the surfaces that explain the images the second prefers the one that wavers least: the distance of the unit normals
-    adds up to the same along a smooth bend and along a sharp edge, so that edges stay. Neighbours on the other side of a
-    thin part, whose normals are more than 90 degrees off, do not count, nor gradients shorter than 1e-3.
+    The eikonal loss asks for gradients of length 1. The smoothness loss asks for equal directions at neighbouring
+    points: among the surfaces that explain the images it prefers the one with the least variation of normals. It sums
+    distances of unit normals, which are equal for a smooth bend and for a sharp edge, so that edges survive. It leaves
+    out neighbours whose normals differ by more than 90 degrees (they lie on the other side of a thin part) and
+    gradients shorter than 1e-3.
 
     Args:
-        gradients: [n, 3], those of k samples first and those of m neighbours last.
+        gradients: [n, 3] gradients of the field: the first k belong to samples, the last m to neighbours.
         weights: [k] rendering weights of the samples.
-        beside: [m] int64, the samples that the last gradients are neighbours of.
+        beside: [m] int64, the sample beside each neighbour.
 
     Returns:
-        eikonal [], the mean of (|g| - 1)^2, and smoothness [], the mean distance of unit normals by the weights; 0 without
-        any. Differentiable in the gradients.
+        eikonal [], the mean of (|g| - 1)^2, and smoothness [], the weighted mean distance of unit normals; 0 without
+        points. Differentiable in the gradients.
 
     Raises:
         ValueError: A shape, dtype or index does not fit.
@@ -66,35 +70,36 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple
 def material_losses(
     albedo: Tensor, metallic: Tensor, shares: Tensor, *, smooth_l1: bool = False
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """How unlikely metals are: that a point is one at all, by halves, or a dark one.
+    """Three penalties on metallic m: for metals, for values between 0 and 1, and for dark metals.
 
     Args:
-        albedo: [n, 3] linear; taken as given.
-        metallic: [n, 1] in [0, 1].
-        shares: [n] by which the points count.
-        smooth_l1: Of the first: m^2 / 2, as the smooth L1 loss has it.
+        albedo: [n, 3] linear albedo in [0, 1]; no gradient.
+        metallic: [n, 1] metallic m in [0, 1].
+        shares: [n] weights of the points.
+        smooth_l1: Whether the first penalty is m^2 / 2, the smooth L1 loss, instead of m^2.
 
     Returns:
-        Means [] of m^2, m (1 - m) and m (1 - F0 / .4)+, F0 the brightest channel; 0 without any. Differentiable in metallic.
+        metal, binary_metal and dark_metal, each []: weighted means of m^2, of m (1 - m) and of m (1 - F0 / .4)+, where
+        F0 is the brightest channel of the albedo; 0 without points. Differentiable in metallic.
 
     Raises:
         ValueError: A shape or dtype does not fit.
 
-    Source: SplitNeRF Eq. (18), over all samples, not a tenth. A dark metal and a black dielectric of F0 = .04 look nearly
-    alike, and there are no dark metals (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
+    Source: SplitNeRF Eq. (18), over all samples instead of a tenth. A dark metal and a black dielectric with F0 = .04
+    look nearly alike, but no dark metals exist (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
     """
     metal, binary, dark = lib.material_losses(albedo, metallic, shares, smooth_l1)[0].unbind()
     return metal, binary, dark
 
 
 def quadratic_entropy(x: Tensor) -> Tensor:
-    """-ln of the mean of exp(-|x_i - x_j|^2 / 4) over all pairs of points, those with themselves included.
+    """The entropy -ln mean exp(-|x_i - x_j|^2 / 4) over all pairs of points, with i = j.
 
     Args:
-        x: [n, c], n > 0, in widths within which points count as alike.
+        x: [n, c] points, n > 0; coordinates divided by the width within which points count as similar.
 
     Returns:
-        [], from 0 (all alike) to ln n. Differentiable.
+        [] entropy, from 0 (all points equal) to ln n. Differentiable in x.
 
     Raises:
         ValueError: A shape or dtype does not fit, or there is no point.

@@ -1,7 +1,7 @@
-"""Monte Carlo shading: directions from the BSDF, the sums over the light that comes from them, and what is reflected.
+"""Monte Carlo shading: directions from the BSDF, sums over their incoming light, and the reflected radiance.
 
-``monte_carlo_light`` is differentiable once in normals, roughness and radiance, ``shade_sums`` once in all; a gradient to
-the rest raises.
+``monte_carlo_light`` is differentiable once in normals, roughness and radiance, ``shade_sums`` once in all; a gradient
+to the rest raises.
 
 Source: the rendering equation, SplitNeRF Eq. (4)-(6), without the split.
 """
@@ -17,12 +17,13 @@ from splitnerf.ops.shading import brdf_lut
 
 
 class LightSums(NamedTuple):
-    """Incoming light weighed by the lobes of a point, [n, 3] each.
+    """Integrals of incoming light over the lobes of points, [n, 3] each.
 
     Attributes:
-        specular: Over the GGX lobe without Fresnel: integral of D V L (n.l) dl.
-        grazing: The same times Schlick's (1 - v.h)^5, so that F0 (specular - grazing) + grazing is the reflected light.
-        diffuse: Irradiance over pi.
+        specular: The integral of D V L (n.l) over directions l: the GGX lobe without the Fresnel term.
+        grazing: The integral of D V L (n.l) (1 - v.h)^5, with Schlick's factor, so that the lobe reflects
+            F0 (specular - grazing) + grazing.
+        diffuse: The irradiance over pi.
     """
 
     specular: Tensor
@@ -33,17 +34,17 @@ class LightSums(NamedTuple):
 def sample_bsdf(
     normals: Tensor, view_dirs: Tensor, roughness: Tensor, n_samples: int, seed: int = 0
 ) -> tuple[Tensor, Tensor]:
-    """Directions for the light of points: half follow the cosine, half the visible normals. No gradient.
+    """Samples light directions for points: one half by the cosine, the other by the visible normals. No gradient.
 
     Args:
-        normals, view_dirs: [n, 3] unit; a normal that faces away is turned.
-        roughness: [n, 1], in [0, 1]; a narrower lobe than ggx_alpha = .002 is sampled as that.
-        n_samples: Directions a point, from one lattice, shifted at random by point and seed.
-        seed: Of the shifts.
+        normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
+        roughness: [n, 1] perceptual roughness in [0, 1]; lobes below ggx_alpha = .002 are sampled with that width.
+        n_samples: The number of directions per point; they form a lattice with a random shift for each point.
+        seed: The seed of the shifts.
 
     Returns:
-        directions [n, n_samples, 3] unit and the density of both halves together [n, n_samples], sr^-1, 0 where a
-        direction lies below the horizon.
+        directions [n, n_samples, 3] unit, and the density of the mixture of both halves [n, n_samples], sr^-1; 0 for a
+        direction below the horizon.
 
     Raises:
         ValueError: A shape, dtype or count does not fit.
@@ -59,10 +60,13 @@ def monte_carlo_light(
     """Estimates the integrals of incoming light over the specular and the diffuse lobe.
 
     Args:
-        normals, view_dirs: [n, 3] unit; a normal that faces away is turned.
-        roughness: [n, 1].
-        light_dirs, pdf: [n, k, 3] and [n, k] of :func:`sample_bsdf`; they count as given.
-        radiance: [n, k, 3] from there, 0 where the way is blocked.
+        normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
+        roughness: [n, 1] perceptual roughness in [0, 1].
+        light_dirs, pdf: [n, k, 3] directions and [n, k] densities from :func:`sample_bsdf`; no gradient.
+        radiance: [n, k, 3] incoming radiance from the directions, 0 where the ray is blocked.
+
+    Returns:
+        LightSums; differentiable in normals, roughness and radiance.
 
     Raises:
         ValueError: A shape or dtype does not fit.
@@ -74,16 +78,16 @@ def summed_light(
     normals: Tensor, view_dirs: Tensor, roughness: Tensor, directions: Tensor, solid_angles: Tensor, radiance: Tensor,
     visible: Tensor, sent: Tensor | None = None,
 ) -> LightSums:  # fmt: skip
-    """As :func:`monte_carlo_light` for one fixed set of directions that all points share, each for its solid angle.
+    """The integrals of :func:`monte_carlo_light` by quadrature over fixed directions that all points share.
 
     Args:
-        normals, view_dirs: [n, 3] unit; a normal that faces away is turned.
-        roughness: [n, 1].
-        directions: [k, 3] unit.
-        solid_angles: [k] sr.
-        radiance: [k, 3] of the light from there.
-        visible: [n, k] in [0, 1], the share of it that arrives.
-        sent: [n, k, 3], what arrives beside it, or None.
+        normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
+        roughness: [n, 1] perceptual roughness in [0, 1].
+        directions: [k, 3] unit directions.
+        solid_angles: [k] solid angles of the directions' cells, sr.
+        radiance: [k, 3] radiance of the environment from each direction.
+        visible: [n, k] share of the environment's radiance that arrives at each point, in [0, 1].
+        sent: [n, k, 3] additional radiance that arrives at each point, or None.
 
     Returns:
         LightSums; differentiable in normals, roughness and radiance.
@@ -107,17 +111,17 @@ def shade_sums(
     sums: LightSums,
     compensate: bool = False,
 ) -> Tensor:
-    """Outgoing linear radiance of points from their sums over incoming light, Schlick's Fresnel term inside the sums.
+    """Outgoing linear radiance of points from integrals of incoming light that contain Schlick's Fresnel term.
 
-    ``L = gain (F0 (specular - grazing) + grazing) + (1 - m)(1 - E) albedo diffuse``, with F0, E and the gain of multiple
-    scattering as in :func:`splitnerf.ops.split_sum_shade` in its ``exact`` mode.
+    ``L = gain (F0 (specular - grazing) + grazing) + (1 - m)(1 - E) albedo diffuse``, with F0, E and the gain of
+    multiple scattering as in :func:`splitnerf.ops.split_sum_shade` in its ``exact`` mode.
 
     Args:
-        normals, view_dirs: [n, 3] unit; the normal is turned towards the viewer.
+        normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
         albedo: [n, 3] linear, in [0, 1].
         roughness, metallic: [n, 1], in [0, 1].
-        sums: Of the light at the points, from :func:`monte_carlo_light`.
-        compensate: Multiple-scattering compensation (Turquin 2019).
+        sums: The integrals of the light at the points, from :func:`monte_carlo_light` or :func:`summed_light`.
+        compensate: Whether to compensate for multiple scattering (Turquin 2019).
 
     Returns:
         [n, 3] linear radiance.

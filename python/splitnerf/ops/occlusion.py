@@ -1,9 +1,9 @@
 """Visibility and occlusion factors by tracing a triangle mesh.
 
-The mesh is traced on the CPU. Tensors on another device are copied there, and what was found is copied back: the caller
-waits for both.
+The mesh is traced on the CPU. Tensors on another device are copied to the CPU, and the results are copied back; the
+caller waits for both copies.
 
-Neither operator has a gradient: its outputs are targets. Asking for one raises.
+Neither operator has a gradient, since its outputs are targets of the training; a backward pass raises.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from splitnerf.ops._library import lib, register
 
 
 class MeshScene:
-    """A triangle mesh ready to be traced; ``handle`` is what the operators take.
+    """A triangle mesh ready to be traced; the operators take its ``handle``.
 
-    A changed mesh needs a new scene. The acceleration structure lives as long as the object.
+    The acceleration structure lives as long as the object. A changed mesh needs a new object.
 
     Args:
         vertices: [n, 3] float32, scene units.
@@ -39,16 +39,16 @@ class MeshScene:
 
 
 def trace_visibility(scene: MeshScene, origins: Tensor, directions: Tensor, t_far: float = math.inf) -> Tensor:
-    """True where a ray meets no triangle.
+    """Whether each ray meets no triangle.
 
     Args:
         scene: The mesh.
-        origins, directions: [n, 3] float32; neighbours in the arrays should be neighbours in space, since
-            rays are traced in packets of 16.
-        t_far: Length of the rays in multiples of ``directions``.
+        origins, directions: [n, 3] float32, origins in scene units. Neighbours in the arrays should be neighbours in
+            space, since rays are traced in packets of 16.
+        t_far: The length of the rays in multiples of ``directions``.
 
     Returns:
-        [n] bool, True = open.
+        [n] bool, True where the ray is open.
 
     Raises:
         ValueError: A shape or dtype does not fit.
@@ -72,22 +72,22 @@ def occlusion_factors(
     seed: int = 0,
     n_channels: int = 1,
 ) -> tuple[Tensor, Tensor]:
-    """Shares of the diffuse and specular light that reach points past the mesh.
+    """The shares of the diffuse and of the specular light that reach points without meeting the mesh.
 
-    ``o_d = sum L_i V_i / sum L_i`` over cosine-weighted directions about the normal; o_s the same over the
-    lobe D(w)(w.d)+ about ``lobe_dirs``. Samples, traces, weighs and sums point by point: no
-    [points, rays] array exists. Black light falls back to the geometric share.
+    ``o_d = sum L_i V_i / sum L_i`` over cosine-weighted directions about the normal; o_s is the same ratio over
+    directions of the lobe D(w)(w.d)+ about ``lobe_dirs``. Each point is sampled, traced and summed by itself, so that
+    no [points, rays] array exists. Where the light is black, the factors are the shares of open directions.
 
     Args:
         scene: The mesh.
-        positions, normals: [n, 3]; normals unit.
-        lobe_dirs: [n, 3] unit: the axis of the specular lobe (:func:`splitnerf.ops.query_direction`).
-        roughness: [n, 1].
+        positions, normals: [n, 3] positions (scene units) and unit normals.
+        lobe_dirs: [n, 3] unit axes of the specular lobe (:func:`splitnerf.ops.query_direction`).
+        roughness: [n, 1] perceptual roughness in [0, 1].
         environment: [height, width, 3] radiance, equirectangular (z up, centre column along +x).
-        n_diffuse_rays, n_specular_rays: Rays a point.
-        offset: Rays start this far off the point, scene units.
-        along_ray: They start along themselves, not along the normal.
-        seed: The rays' lattice is shifted at random by point and seed.
+        n_diffuse_rays, n_specular_rays: The numbers of rays per point.
+        offset: The distance of a ray's start from its point, scene units.
+        along_ray: Whether the start is moved along the ray instead of along the normal.
+        seed: The seed of the random shift that each point's lattice of rays gets.
         n_channels: 1 averages the factors over the colour channels, 3 keeps them.
 
     Returns:

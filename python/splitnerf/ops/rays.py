@@ -1,9 +1,10 @@
 """Packed samples along rays: marching, NeuS weights and compositing.
 
-Samples of all rays lie in one array, ray after ray; ``offsets`` [n_rays + 1] says where each begins.
-``neus_weights`` is differentiable once in f_prev, f_next and s, ``surface_weights`` in sdf, gradient and s; ``composite``
-once in weights and values, ``Spread.interpolate`` once in values; a second derivative raises. ``march_rays`` and ``spread_samples`` have no
-gradient.
+The samples of all rays are in one array, ray after ray; ``offsets`` [n_rays + 1] holds the first sample of each ray.
+
+Differentiable once: ``neus_weights`` in f_prev, f_next and s, ``surface_weights`` in sdf, gradient and s, ``composite``
+in weights and values, ``ShadingSubset.interpolate`` in values. A second derivative raises. ``march_rays`` and
+``spread_samples`` have no gradient.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ class PackedSamples(NamedTuple):
 
     Attributes:
         ray_indices: [n] int64, the ray of each sample.
-        t_starts, t_ends: [n] distances along the ray, scene units.
-        offsets: [n_rays + 1] int64, samples of ray r are offsets[r] to offsets[r + 1].
+        t_starts, t_ends: [n] distances along the ray to the start and the end of each sample, scene units.
+        offsets: [n_rays + 1] int64; the samples of ray r have the indices offsets[r] to offsets[r + 1] - 1.
     """
 
     ray_indices: Tensor
@@ -36,11 +37,11 @@ class PackedSamples(NamedTuple):
 
     @property
     def middles(self) -> Tensor:
-        """[n] distances along the ray."""
+        """[n] distances along the ray to the samples' midpoints, scene units."""
         return 0.5 * (self.t_starts + self.t_ends)
 
     def extended(self, n: int) -> PackedSamples:
-        """The same with n more samples behind them that are of no ray, though ``ray_indices`` says 0."""
+        """These samples followed by n samples of padding, which belong to no ray; their ``ray_indices`` are 0."""
         return self if n == 0 else PackedSamples(*(F.pad(x, (0, n)) for x in self[:3]), self.offsets)
 
 
@@ -50,16 +51,16 @@ def march_rays(
     """Steps rays through an occupancy grid and keeps the samples in occupied cells.
 
     Args:
-        rays_o, rays_d: [n_rays, 3]; directions unit. Origins may stand outside the box.
-        jitter: [n_rays] in [0, 1): shifts each ray's lattice of samples by a fraction of the step.
-        cells: [r, r, r] uint8 over [x, y, z]: CELL_EMPTY is skipped, CELL_OCCUPIED sampled, CELL_OPAQUE (so deep
-            inside that nothing behind it is seen) ends the ray.
-        box: Half size of the cube that the cells cover.
-        step: Length of a sample, scene units.
-        max_samples: Of one ray.
+        rays_o, rays_d: [n_rays, 3] origins (scene units) and unit directions. Origins may lie outside the box.
+        jitter: [n_rays] offsets of each ray's lattice of samples in [0, 1), as shares of the step.
+        cells: [r, r, r] uint8 over [x, y, z]: CELL_EMPTY is skipped, CELL_OCCUPIED is sampled, CELL_OPAQUE ends the ray
+            (it is so deep inside that nothing behind it is visible).
+        box: The half size of the cube that the cells cover, scene units.
+        step: The length of a sample, scene units.
+        max_samples: The largest number of samples of one ray.
 
     Returns:
-        PackedSamples, front to back.
+        PackedSamples, front to back along each ray.
 
     Raises:
         ValueError: A shape, dtype or size does not fit.
@@ -76,10 +77,11 @@ def neus_weights(
     ``tau = log1p(expm1(d) sigmoid(-s f_prev))``, ``d = s (f_prev - f_next)+``; the transmittance is a sum of tau.
 
     Args:
-        f_prev, f_next: [n] signed distance at the start and the end of each sample.
-        s: [] sharpness, positive.
-        offsets: [n_rays + 1] int64.
-        min_transmittance: Samples behind less than this get weight 0; the pixel's error is at most this.
+        f_prev, f_next: [n] signed distances at the start and the end of each sample, scene units.
+        s: [] sharpness of the density, positive.
+        offsets: [n_rays + 1] int64, see :class:`PackedSamples`.
+        min_transmittance: The transmittance below which samples get weight 0, in [0, 1); it also bounds the error of a
+            pixel.
 
     Returns:
         weights [n] and opacity [n_rays], the sum of a ray's weights.
@@ -103,19 +105,20 @@ def surface_weights(
     anneal: float | Tensor = 1.0,
     min_transmittance: float = 0.0,
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Normals and rendering weights of samples that know the distance and its gradient in their middles.
+    """Normals and rendering weights of samples, from the distance and its gradient at the samples' midpoints.
 
-    ``n = gradient / |gradient|``, ``half = step / 2 c(d . n)`` and :func:`neus_weights` of ``sdf -+ half``, where
-    ``c(x) = -(relu(1/2 - x/2)(1 - anneal) + relu(-x) anneal)``. Where the gradient is shorter than .001 none flows back to it.
+    ``n = gradient / |gradient|``, ``half = step / 2 c(d . n)``; the weights are :func:`neus_weights` of ``sdf - half``
+    and ``sdf + half``, where ``c(x) = -(relu(1/2 - x/2)(1 - anneal) + relu(-x) anneal)``. A field gradient shorter than
+    .001 gets no gradient in the backward pass.
 
     Args:
-        sdf, gradient: [n], [n, 3].
-        rays_d: [n_rays, 3] unit.
-        s: [] sharpness, positive.
-        offsets: [n_rays + 1] int64.
-        step: Length of a sample, scene units; a number or a tensor [].
-        anneal: Of the cosine, 0 at the start of a training, 1 when done; a number or a tensor [].
-        min_transmittance: As of :func:`neus_weights`.
+        sdf, gradient: [n] signed distances (scene units) and their gradients [n, 3].
+        rays_d: [n_rays, 3] unit directions.
+        s: [] sharpness of the density, positive.
+        offsets: [n_rays + 1] int64, see :class:`PackedSamples`.
+        step: The length of a sample, scene units; a number or a tensor [].
+        anneal: The annealing of the cosine: 0 at the start of a training, 1 when done; a number or a tensor [].
+        min_transmittance: The transmittance below which samples get weight 0, see :func:`neus_weights`.
 
     Returns:
         normals [n, 3], weights [n] and opacity [n_rays]. Differentiable once in sdf, gradient and s.
@@ -135,17 +138,20 @@ def _as_tensor(value: float | Tensor, like: Tensor) -> Tensor:
 
 
 class ShadingSubset(NamedTuple):
-    """Which samples are shaded, and between which of them each sample lies.
+    """The subset of m samples that are shaded, and the interpolation from it to all n samples.
+
+    A ray consists of segments, see :func:`spread_samples`.
 
     Attributes:
-        shaded: [m] int64, ascending indices of samples; every ray with samples has one.
-        first, second: [n] int64 positions in ``shaded``: the neighbours of each sample within its stretch of the ray, equal
-            beyond the ends.
-        share: [n] of the second, in [0, 1], by the distance along the ray.
-        heaviest: [rays with samples] int64 positions in ``shaded``: the largest weight among these.
-        leaders: [stretches] int64 positions in ``shaded``: the largest weight among those of a stretch.
-        stretch: [m] int64, which stretch each of ``shaded`` is of.
-        sizes: [3] int64, how many shaded samples, rays with samples and stretches there are.
+        shaded: [m] int64, ascending indices of the shaded samples; every ray with samples has at least one.
+        first, second: [n] int64 positions in ``shaded``: the shaded neighbours of each sample within its segment, equal
+            beyond the segment's first and last shaded sample.
+        share: [n] weight of the second neighbour in [0, 1], linear in the distance along the ray.
+        heaviest: [rays with samples] int64 positions in ``shaded``: the shaded sample of the largest weight on each
+            ray.
+        leaders: [segments] int64 positions in ``shaded``: the shaded sample of the largest weight on each segment.
+        stretch: [m] int64, the segment of each shaded sample.
+        sizes: [3] int64, the numbers of shaded samples, of rays with samples and of segments.
     """
 
     shaded: Tensor
@@ -158,11 +164,12 @@ class ShadingSubset(NamedTuple):
     sizes: Tensor
 
     def interpolate(self, values: Tensor) -> Tensor:
-        """Values [m, c] at the shaded samples -> [n, c] at all."""
+        """Interpolates values [m, c] at the shaded samples to values [n, c] at all samples."""
         return lib.interpolate(values, self.first, self.second, self.share)
 
     def gather(self, weights: Tensor) -> Tensor:
-        """The transpose: what [m] the shaded samples count for where all samples count for weights [n]. No gradient."""
+        """The transpose of :meth:`interpolate`: weights [n] of all samples -> weights [m] of the shaded ones. No
+        gradient."""
         return lib.interpolate_backward(weights[:, None], self.first, self.second, self.share, self.shaded)[:, 0]
 
 
@@ -170,21 +177,23 @@ def spread_samples(
     weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor, gap: float | Tensor = math.inf,
     capacity: tuple[int, int] | None = None,
 ) -> ShadingSubset:  # fmt: skip
-    """Draws samples of each ray in proportion to their weights, for what is asked at few of them.
+    """Draws the samples of each ray that are shaded, in proportion to their weights.
 
-    The weights of a ray are laid end to end, and a sample is drawn where one of `per_ray` evenly spaced marks falls on it:
-    one of more than 1 / per_ray of the ray's weight always is. Samples more than `gap` apart may be of two surfaces: each
-    stretch of the ray without such a gap has a sample drawn, and is interpolated on its own.
+    The weights of a ray are laid end to end, with `per_ray` evenly spaced marks on them; a sample is drawn when a mark
+    falls on it. So a sample with more than 1 / per_ray of the ray's weight is always drawn. Neighbouring samples more
+    than `gap` apart may lie on two surfaces, so a ray is split there into segments. Each segment gets at least one
+    drawn sample and is interpolated by itself.
 
     Args:
-        weights: [n].
+        weights: [n] rendering weights.
         samples: The packed samples.
-        per_ray: Marks on a ray; 0 draws all samples.
-        phase: [n_rays] in [0, 1), where the marks begin.
-        gap: Along the ray, scene units, positive; a number or a tensor [].
-        capacity: Lengths of the result, for shaded samples and for stretches, whatever their number, so that the host need
-            not wait for a GPU; ``heaviest`` then is [n_rays]. Entries past the count are in range and weigh nothing. Where a
-            count exceeds its capacity, ``sizes`` tells so; the other results are then in range but have no meaning.
+        per_ray: The number of marks on a ray; 0 draws all samples.
+        phase: [n_rays] position of each ray's first mark in [0, 1), as a share of the marks' spacing.
+        gap: The distance along the ray at which segments are split, scene units, positive; a number or a tensor [].
+        capacity: Fixed lengths of the results for shaded samples and for segments, so that the host need not wait for a
+            GPU's counts; ``heaviest`` is then [n_rays]. Entries past the counts are valid indices with weight 0. If a
+            count exceeds its capacity, as ``sizes`` shows, all other results are in range but have no meaning. None:
+            exact lengths.
 
     Raises:
         ValueError: A shape, dtype or number does not fit.
@@ -201,12 +210,12 @@ def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:
     """Weighted sum of the samples' values along each ray.
 
     Args:
-        weights: [n].
-        values: [n, c].
-        offsets: [n_rays + 1] int64.
+        weights: [n] rendering weights.
+        values: [n, c] values of the samples.
+        offsets: [n_rays + 1] int64, see :class:`PackedSamples`.
 
     Returns:
-        [n_rays, c]; 0 for a ray without samples.
+        [n_rays, c] sums; 0 for a ray without samples. Differentiable once in weights and values.
 
     Raises:
         ValueError: A shape, dtype or the order of the offsets does not fit.

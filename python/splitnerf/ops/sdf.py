@@ -1,7 +1,7 @@
-"""The distance field: its layer over hash-grid features, and the whole of it asked for without gradients, at points and
-along rays to find the samples that count.
+"""The distance field: its layer over hash-grid features, its values at points, and the search for samples along rays.
 
-``sdf_layer`` is differentiable once in features, jacobian and weights; the other two have no gradient.
+``sdf_layer`` is differentiable once in features, jacobian and weights; ``sdf_values`` and ``sample_rays`` have no
+gradient.
 """
 
 from __future__ import annotations
@@ -17,17 +17,19 @@ from splitnerf.ops.rays import PackedSamples
 
 
 class SdfNetwork(NamedTuple):
-    """The numbers of a field ``outputs(x) = out softplus(hidden [x, features(x)] + hidden_bias) + out_bias``, the first of
-    which is the signed distance.
+    """The numbers of a field ``outputs(x) = out softplus(hidden [x, features(x)] + hidden_bias) + out_bias``.
+
+    The first output is the signed distance.
 
     Attributes:
-        spec: Shape of the hash grid that gives the features.
-        n_active: Its open levels.
-        table: [spec.n_entries, spec.n_features], of the dtype of the others; or float16 or bfloat16 beside float32.
-        hidden, hidden_bias: [width, 3 + spec.n_outputs], [width].
-        out, out_bias: [m, width], [m].
-        beta: softplus(y) = log(1 + exp(beta y)) / beta.
-        box: Half size of the cube that the grid covers, scene units.
+        spec: The shape of the hash grid that computes the features.
+        n_active: The number of open levels.
+        table: [spec.n_entries, spec.n_features] entries in the dtype of the other tensors; or in float16 or bfloat16
+            where the others are float32.
+        hidden, hidden_bias: [width, 3 + spec.n_outputs] weights and [width] biases of the hidden layer.
+        out, out_bias: [m, width] weights and [m] biases of the output layer.
+        beta: The sharpness of the activation softplus(y) = log(1 + exp(beta y)) / beta, positive.
+        box: The half size of the cube that the grid covers, scene units.
     """
 
     spec: HashGridSpec
@@ -41,11 +43,11 @@ class SdfNetwork(NamedTuple):
     box: float
 
     def snapshot(self) -> SdfNetwork:
-        """A copy that later steps of a training do not change."""
+        """A copy in memory of its own, which later training steps do not change."""
         return SdfNetwork(*(x.clone() if isinstance(x, Tensor) else x for x in self))
 
     def arguments(self) -> tuple:
-        """As the operators take them."""
+        """The arguments that the operators take for a network."""
         return (
             self.table, self.hidden, self.hidden_bias, self.out, self.out_bias, self.beta,
             *self.spec.arguments(self.n_active), self.box,
@@ -63,21 +65,21 @@ def sdf_layer(
     beta: float,
     box: float,
 ) -> tuple[Tensor, Tensor]:
-    """The layer of a distance field and the distance's gradient, in one pass.
+    """The network of a distance field and the distance's gradient, in one pass.
 
     ``a = hidden [positions, features] + hidden_bias``, ``outputs = out softplus(a) + out_bias``, and by the chain rule
     ``d outputs[0] / d positions = q[:3] + jacobian q[3:] / (2 box)`` with ``q = (out[0] softplus'(a)) hidden``.
 
     Args:
         positions: [n, 3], scene units in [-box, box].
-        features, jacobian: [n, C], [n, 3, C] of :func:`hash_encode_jacobian` at ``positions / (2 box) + 1/2``.
-        hidden, hidden_bias: [width, 3 + C], [width].
-        out, out_bias: [m, width], [m].
-        beta: softplus(y) = log(1 + exp(beta y)) / beta.
-        box: Half size of the cube that the grid covers.
+        features, jacobian: [n, C] and [n, 3, C] from :func:`hash_encode_jacobian` at ``positions / (2 box) + 1/2``.
+        hidden, hidden_bias: [width, 3 + C] weights and [width] biases of the hidden layer.
+        out, out_bias: [m, width] weights and [m] biases of the output layer.
+        beta: The sharpness of the activation softplus(y) = log(1 + exp(beta y)) / beta, positive.
+        box: The half size of the cube that the grid covers, scene units.
 
     Returns:
-        outputs [n, m] and gradient [n, 3].
+        outputs [n, m] and gradient [n, 3] of the first output.
 
     Raises:
         ValueError: A shape, dtype or number does not fit.
@@ -110,29 +112,29 @@ def sample_rays(
     lipschitz: float,
     max_samples: int = 1024,
 ) -> tuple[PackedSamples, Tensor]:
-    """Those samples of :func:`march_rays` that a pixel is made of: the distance is asked for on the way.
+    """The samples of :func:`march_rays` that contribute to a pixel; the search evaluates the distance along the rays.
 
-    Two neighbouring samples are kept where either may have a rendering weight above `min_weight`: by
-    :func:`surface_weights` with the slope between their middles, or for what may lie between the middles. The ray ends
-    where less than `min_transmittance` of the light gets through. At distance f from the surface the samples within
-    ``(|f| - reach) / lipschitz`` are left out.
+    Two neighbouring samples are kept where one of them may have a rendering weight above `min_weight`. The weight is
+    that of :func:`surface_weights` with the slope between their midpoints, or a bound for a surface between the
+    midpoints. The ray ends where the transmittance is below `min_transmittance`. After a sample at distance f the
+    search skips the samples within ``(|f| - reach) / lipschitz``.
 
     Args:
-        rays_o, rays_d: [n_rays, 3]; directions unit.
-        jitter: [n_rays] in [0, 1).
-        cells: [r, r, r] uint8, as of :func:`march_rays`; they cover the network's box.
+        rays_o, rays_d: [n_rays, 3] origins (scene units) and unit directions.
+        jitter: [n_rays] offsets of each ray's lattice of samples in [0, 1), as shares of the step.
+        cells: [r, r, r] uint8 cells as in :func:`march_rays`; they cover the network's box.
         network: The distance field.
-        step: Length of a sample, scene units.
-        s: Sharpness of the density, positive.
-        anneal: Of the cosine, in [0, 1], as of :func:`surface_weights`.
-        min_weight: In [0, 1).
-        min_transmittance: In [0, 1).
-        reach: Distance outside the surface beyond which there is no density, scene units.
-        lipschitz: Bound of the field's gradient.
-        max_samples: Distances of one ray at most.
+        step: The length of a sample, scene units.
+        s: The sharpness of the density, positive.
+        anneal: The annealing of the cosine in [0, 1], see :func:`surface_weights`.
+        min_weight: The rendering weight above which samples are kept, in [0, 1).
+        min_transmittance: The transmittance at which a ray ends, in [0, 1).
+        reach: The distance outside the surface beyond which the density vanishes, scene units.
+        lipschitz: The bound on the length of the field's gradient.
+        max_samples: The largest number of evaluated distances of one ray.
 
     Returns:
-        The kept samples, and [n_rays] int64 at how many points each ray asked for the distance.
+        The kept samples, and [n_rays] int64, the number of evaluated points per ray.
 
     Raises:
         ValueError: A shape, dtype or number does not fit.

@@ -1,4 +1,4 @@
-"""Split-sum shading: where the pre-integrated light is asked, and the radiance that follows.
+"""Split-sum shading: the query direction of the pre-integrated light, and the outgoing radiance.
 
 Both operators are differentiable once in every floating input (``view_dirs`` included, the table
 excluded); a second derivative raises.
@@ -22,7 +22,7 @@ QUERIES = ("mean", "reflection")
 
 @functools.lru_cache(maxsize=8)
 def _brdf_lut(device: torch.device) -> Tensor:
-    with torch.inference_mode(False):  # whoever asks first, autograd may keep the table later
+    with torch.inference_mode(False):  # a first call in inference mode must not make an inference tensor
         return torch.from_numpy(_core.brdf_lut()).to(device)
 
 
@@ -36,16 +36,16 @@ def brdf_lut(device: torch.device | str = "cpu") -> Tensor:
 
 
 def query_direction(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean") -> Tensor:
-    """Direction at which the pre-integrated light is asked for the specular lobe.
+    """The direction at which the pre-integrated light is looked up for the specular lobe.
 
     ``d = normalize((1 - k) n + k w_r)``, w_r the mirror direction, ``k = lerp(1, chi(n.v, rho),
-    smoothstep(.3, .4, rho))``; the normal is first turned towards the viewer.
+    smoothstep(.3, .4, rho))``; a normal that faces away from the viewer is negated first.
 
     Args:
         normals: [n, 3] unit.
         view_dirs: [n, 3] unit, from the surface to the camera.
-        roughness: [n, 1] perceptual, in [0, 1].
-        query: ``mean`` (above) or ``reflection`` (w_r itself, the paper's form).
+        roughness: [n, 1] perceptual roughness in [0, 1].
+        query: The kind of direction: ``mean`` (d above) or ``reflection`` (w_r, the paper's form).
 
     Returns:
         [n, 3] unit directions.
@@ -77,15 +77,16 @@ def split_sum_shade(
     ``F0 = .04 (1 - m) + m albedo``. g(n, 1) is irradiance / pi, so no further pi appears.
 
     Args:
-        normals, view_dirs: [n, 3] unit; the normal is turned towards the viewer.
+        normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
         albedo: [n, 3] linear, in [0, 1].
         roughness, metallic: [n, 1], in [0, 1].
-        specular: [n, 3] g(d, rho), radiance; d from :func:`query_direction`.
-        diffuse: [n, 3] g(n, 1), radiance.
-        occlusion_s, occlusion_d: [n, 1] or [n, 3] occlusion factors, 1 = open.
-        fresnel_mode: ``exact``, ``paper`` or ``code`` (the latter two count Fresnel's term twice, as published).
-        compensate: Multiple-scattering compensation ``E [1 + F0 (1/(F1 + F2) - 1)]`` (Turquin 2019), as
-            Blender's Principled BSDF has it.
+        specular: [n, 3] radiance g(d, rho); d from :func:`query_direction`.
+        diffuse: [n, 3] radiance g(n, 1).
+        occlusion_s, occlusion_d: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open.
+        fresnel_mode: The form of the Fresnel term: ``exact``, ``paper`` or ``code`` (the last two apply it twice, as
+            published).
+        compensate: Whether to compensate for multiple scattering: ``E [1 + F0 (1/(F1 + F2) - 1)]`` (Turquin 2019), as
+            in Blender's Principled BSDF.
 
     Returns:
         [n, 3] linear radiance.

@@ -1,4 +1,4 @@
-"""The curve between linear values and those of an image."""
+"""The sRGB curve between linear values and values of an image."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from splitnerf.ops._library import lib, register
 
 
 def linear_to_srgb(linear: Tensor) -> Tensor:
-    """Encodes linear values of any shape; not clipped above 1, values below 0 count as 0. Differentiable once.
+    """Encodes linear values of any shape. Values below 0 count as 0; values above 1 are not clipped. Differentiable
+    once.
 
-    The slope is finite everywhere, 12.92 at 0.
+    The slope is finite everywhere; at 0 it is 12.92.
 
     Raises:
         ValueError: The dtype does not fit.
@@ -21,7 +22,7 @@ def linear_to_srgb(linear: Tensor) -> Tensor:
 
 
 def srgb_to_linear(srgb: Tensor) -> Tensor:
-    """Decodes values >= 0 of any shape, not clipped above 1. No gradient.
+    """Decodes sRGB values >= 0 of any shape. Values above 1 are not clipped. No gradient.
 
     Raises:
         ValueError: The dtype does not fit.

@@ -1,9 +1,9 @@
-"""Visibility bits cached on a mesh: occlusion factors and one bounce of light without a ray in the step.
+"""Visibility bits cached on a mesh: occlusion factors and one bounce of light without tracing rays in a training step.
 
-The bits are traced on the CPU (:func:`visibility_bits`, :meth:`VisibilityCache.trace`); what reads them runs wherever
-:meth:`VisibilityCache.to` has put them.
+The bits are traced on the CPU (:func:`visibility_bits`, :meth:`VisibilityCache.trace`); the lookups run on the device
+that :meth:`VisibilityCache.to` copied them to.
 
-No operator here has a gradient: asking for one raises.
+No operator here has a gradient; a backward pass raises.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from torch import Tensor
 from splitnerf.ops._library import lib, register
 from splitnerf.ops.occlusion import MeshScene
 
-GRID_LEVELS = 4  # the search widens to 8 times its first radius
+GRID_LEVELS = 4  # levels of the search; the last has 8 times the radius of the first
 RADIUS_IN_SPACINGS = 1.5
 
 
@@ -24,18 +24,18 @@ def visibility_bits(
     scene: MeshScene, positions: Tensor, normals: Tensor, directions: Tensor, offset: float = 0.0125, *,
     with_hits: bool = False,
 ) -> tuple[Tensor, Tensor]:  # fmt: skip
-    """Traces the same directions from every vertex of a mesh and keeps what became of each ray.
+    """Traces the same directions from every vertex of a mesh and records whether each ray is blocked.
 
     Args:
         scene: The mesh.
-        positions, normals: [n, 3] float32, vertices of the mesh and their unit normals.
-        directions: [k, 3] float32 unit; k a multiple of 32.
-        offset: Rays start this far off the vertex along its normal, scene units.
-        with_hits: Also say what was hit.
+        positions, normals: [n, 3] float32 vertices of the mesh (scene units) and their unit normals.
+        directions: [k, 3] float32 unit directions; k is a multiple of 32.
+        offset: The distance of a ray's start from its vertex along the normal, scene units.
+        with_hits: Whether to record the vertices that were hit.
 
     Returns:
-        bits: [n, 2, k / 32] int32; bit j of word i stands for direction 32 i + j. Row 0 marks the open directions,
-            row 1 the blocked ones; those below the vertex's own horizon, which are not traced, stand in neither.
+        bits: [n, 2, k / 32] int32; bit j of word i belongs to direction 32 i + j. Row 0 marks the open directions,
+            row 1 the blocked ones. Directions below the vertex's own horizon are not traced and are marked in neither.
         hits: [n, k] int32, the vertex with the largest barycentric weight of the triangle that was hit, -1 where the
             direction is not blocked; [n, 0] without ``with_hits``.
 
@@ -48,14 +48,14 @@ def visibility_bits(
 
 @dataclass(frozen=True)
 class VisibilityCache:
-    """What :func:`cached_occlusion` reads: the vertices, how to find them, and what each sees.
+    """The input of :func:`cached_occlusion`: the vertices, hash grids to find them, and the visibility of each.
 
     Attributes:
-        vertices, normals: [n, 3] float32.
-        directions: [k, 3] float32 unit.
-        bits, hits: See :func:`visibility_bits`.
-        radius: Of the first search for vertices around a point: 1.5 times sqrt(area / vertices).
-        starts, order: Hash grids over the vertices; level l reaches radius * 2^l.
+        vertices, normals: [n, 3] float32 vertices (scene units) and their unit normals.
+        directions: [k, 3] float32 unit directions.
+        bits, hits: The results of :func:`visibility_bits`.
+        radius: The radius of the first search for vertices around a point, 1.5 sqrt(area / n), scene units.
+        starts, order: Hash grids over the vertices; the search of level l has the radius ``radius * 2^l``.
     """
 
     vertices: Tensor
@@ -72,7 +72,7 @@ class VisibilityCache:
         scene: MeshScene, vertices: Tensor, normals: Tensor, area: float, directions: Tensor, *, offset: float = 0.0125,
         with_hits: bool = False,
     ) -> VisibilityCache:  # fmt: skip
-        """Fills the cache of a mesh of the given area (scene units squared)."""
+        """Traces the cache of a mesh with the given surface area (scene units squared); see :func:`visibility_bits`."""
         bits, hits = visibility_bits(scene, vertices, normals, directions, offset, with_hits=with_hits)
         radius = RADIUS_IN_SPACINGS * (area / len(vertices)) ** 0.5
         return VisibilityCache(
@@ -80,7 +80,7 @@ class VisibilityCache:
         )
 
     def to(self, device: torch.device | str) -> VisibilityCache:
-        """A copy on a device; itself where it is there."""
+        """A copy on a device; the cache itself where it already is on that device."""
         moved = (getattr(self, field.name) for field in fields(self))
         return VisibilityCache(*(x.to(device) if isinstance(x, Tensor) else x for x in moved))
 
@@ -93,24 +93,28 @@ def cached_occlusion(
     cache: VisibilityCache, positions: Tensor, normals: Tensor, lobe_dirs: Tensor, roughness: Tensor, light: Tensor,
     radiance: Tensor | None = None,
 ) -> tuple[Tensor, Tensor, Tensor | None, Tensor | None]:  # fmt: skip
-    """Occlusion factors, and the light that the mesh itself sends, from the cached bits.
+    """Occlusion factors of points, and the light that the mesh itself sends to them, from the cached bits.
 
-    With V_i the open share among the vertices around the point, weighted by distance and by agreement of normals (a
-    vertex says nothing of directions below its own horizon; where none says anything, V_i = 1),
-    ``o_d = sum V_i L_i (w_i.n)+ / sum L_i (w_i.n)+``; o_s the same with D(w_i, d)(w_i.d)+ [w_i.n > 0] for the cosine,
-    D no narrower than about two directions. With ``radiance``, C_i the radiance of the vertex that direction i meets,
-    ``i_d = sum (1 - V_i) C_i (w_i.n)+ / sum (w_i.n)+`` and i_s the same over the lobe: they add to o_d g(n, 1) and
-    o_s g(d, rho). Where no vertex is near, or all that are near see
-    all of the sky above the horizon, the factors are exactly 1 and the added light 0. Black light falls back to the
-    geometric share. A number that is not finite gives NaN.
+    V_i is the open share of direction i among the vertices around the point, weighted by distance and by agreement of
+    normals. A vertex does not count for directions below its own horizon; if no vertex counts, V_i = 1. Then
+    ``o_d = sum V_i L_i (w_i.n)+ / sum L_i (w_i.n)+``. o_s is the same ratio with D(w_i, d)(w_i.d)+ [w_i.n > 0] in place
+    of the cosine, where D is at least about two directions wide.
+
+    With ``radiance``, C_i is the radiance of the vertex that direction i hits:
+    ``i_d = sum (1 - V_i) C_i (w_i.n)+ / sum (w_i.n)+``, and i_s is the same mean over the lobe. They are added to
+    o_d g(n, 1) and o_s g(d, rho).
+
+    Where no vertex is near, or all near vertices are open in all directions above the horizon, the factors are exactly
+    1 and the added light is 0. Where the light is black, the factors are the shares of open directions. Input that is
+    not finite gives NaN.
 
     Args:
         cache: The mesh's bits; with hits where ``radiance`` is given.
-        positions, normals: [n, 3] float32; normals unit.
-        lobe_dirs: [n, 3] float32 unit, the axis of the specular lobe (:func:`splitnerf.ops.query_direction`).
-        roughness: [n, 1] float32.
-        light: [k, 3] float32, the light's mean over the cell of each of the cache's directions.
-        radiance: [vertices, 3] float32 that each vertex sends out, or None.
+        positions, normals: [n, 3] float32 positions (scene units) and unit normals n.
+        lobe_dirs: [n, 3] float32 unit axes d of the specular lobe (:func:`splitnerf.ops.query_direction`).
+        roughness: [n, 1] float32 perceptual roughness in [0, 1].
+        light: [k, 3] float32 mean radiance L_i of the environment over the cell of each of the cache's directions.
+        radiance: [vertices, 3] float32 outgoing radiance of each vertex, or None.
 
     Returns:
         o_d, o_s [n, 3] in [0, 1], 1 = open; i_d, i_s [n, 3] or None, in the normalisation of g (irradiance / pi).
@@ -131,15 +135,16 @@ def cached_occlusion(
 def cached_visibility(
     cache: VisibilityCache, positions: Tensor, normals: Tensor, radiance: Tensor | None = None
 ) -> tuple[Tensor, Tensor | None]:
-    """What arrives at points from each of the cache's directions: which share of the environment, and what the mesh
-    itself sends. Incoming light is then ``visible[..., None] * light + arriving``.
+    """The visibility of each of the cache's k directions from points, and the light that the mesh sends from there.
+
+    The incoming light is ``visible[..., None] * light + arriving``.
 
     Args:
         cache, positions, normals, radiance: See :func:`cached_occlusion`.
 
     Returns:
-        visible: [n, k] V_i in [0, 1], 1 where nothing is known.
-        arriving: [n, k, 3] (1 - V_i) C_i, 0 below the horizon; None without ``radiance``.
+        visible: [n, k] open shares V_i in [0, 1]; 1 where no vertex counts.
+        arriving: [n, k, 3] light (1 - V_i) C_i from the mesh, 0 below the horizon; None without ``radiance``.
 
     Raises:
         ValueError: A shape or dtype does not fit.

@@ -1,4 +1,4 @@
-"""What stands behind the object, and putting it there."""
+"""Backgrounds, and compositing renderings over them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Background:
 
         Args:
             view: The camera.
-            environment: [h, w, 3], the light as it stands for this view.
+            environment: [h, w, 3] linear radiance of the light in this view.
             exposure: Factor on the light; white and images stay as they are.
         """
         if self.transparent:
@@ -90,7 +90,7 @@ def compose(images: dict[str, np.ndarray], behind: np.ndarray | None, exposure: 
     Args:
         images: `radiance` [h, w, 3] premultiplied by `alpha` [h, w], and with a catcher `shadow` [h, w], the opacity
             of its black shadow, alpha + shadow <= 1; see `AssetRenderer.render`.
-        behind: [h, w, 3] linear, or None for none.
+        behind: [h, w, 3] linear background, or None.
         exposure: Factor on the rendering.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Where the pictures are taken from."""
+"""The cameras of relit pictures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from splitnerf.data.images import read_image
 from splitnerf.errors import InputError
 
 DEFAULT_SIZE = 512
-HALF_FIELD = np.radians(19.8)  # of the shorter side; a 50 mm lens before a sensor 36 mm wide
+HALF_FIELD = np.radians(19.8)  # half field of view of the shorter side: a 50 mm lens on a 36 mm wide sensor
 MARGIN = 1.1
 FRONT_AZIMUTH = -90.0  # glTF's front, +z of the file, is -y here
 
@@ -26,7 +26,7 @@ class View:
         pose: [4, 4] float64 camera-to-world, OpenGL axes.
         intrinsics: (fx, fy, cx, cy) in pixels, pixel centres at +0.5.
         width, height: Pixels.
-        light_degrees: How far the light is turned about z, counter-clockwise seen from above.
+        light_degrees: The rotation of the light about z in degrees, counter-clockwise seen from above.
     """
 
     pose: np.ndarray
@@ -40,7 +40,7 @@ def parse_size(text: str) -> tuple[int, int | None]:
     """(width, height or None) of "W" or "WxH".
 
     Raises:
-        InputError: Anything else, or a side below 1 or above 16384.
+        InputError: The text has another form, or a side is below 1 or above 16384.
     """
     parts = text.lower().split("x")
     if len(parts) > 2 or not all(part.isascii() and part.isdigit() and 1 <= int(part) <= 16384 for part in parts):
@@ -49,7 +49,7 @@ def parse_size(text: str) -> tuple[int, int | None]:
 
 
 def bounding_sphere(asset: Asset) -> tuple[np.ndarray, float]:
-    """Centre [3] of the bounding box and the greatest distance from it, of the vertices in use; float64."""
+    """Centre [3] of the bounding box of the used vertices, and their largest distance from it; float64."""
     points = asset.vertices[np.unique(asset.triangles)].astype(np.float64)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return centre, float(np.linalg.norm(points - centre, axis=1).max())
@@ -58,14 +58,14 @@ def bounding_sphere(asset: Asset) -> tuple[np.ndarray, float]:
 def turntable(
     asset: Asset, count: int, *, elevation: float = 20.0, rotate: str = "camera", size: tuple[int, int | None] | None
 ) -> list[View]:
-    """Cameras on a circle about the object's bounding sphere, which fills the picture but for a margin of 10 %.
+    """Cameras on a circle around the object; its bounding sphere fills the picture except for a margin of 10 %.
 
     Args:
         asset: The object.
-        count: Pictures in a full turn, at least 1; the first one is the front.
-        elevation: Of the camera above the horizon, degrees in (-90, 90).
-        rotate: "camera", or "light" where the camera stays and the light turns, counter-clockwise from above.
-        size: As from `parse_size`; None for 512x512, without a height square.
+        count: The number of pictures in a full turn, at least 1; the first shows the front.
+        elevation: The elevation of the camera above the horizon, degrees in (-90, 90).
+        rotate: "camera", or "light" to keep the camera and turn the light, counter-clockwise seen from above.
+        size: The result of `parse_size`; without a height the picture is square, and None means 512x512.
 
     Returns:
         `count` views.
@@ -102,7 +102,7 @@ def look_at(centre: np.ndarray, azimuth: float, elevation: float, distance: floa
 
 
 def data_views(root: Path, split: str, size: tuple[int, int | None] | None) -> list[View]:
-    """The cameras of a data set's split, in the data's own world, the size the images' unless given.
+    """The cameras of a data set's split, in the data's own world; the images' size is the default.
 
     Raises:
         InputError: The data cannot be used, or the size has another shape than the images.
@@ -134,7 +134,7 @@ def path_views(path: Path, size: tuple[int, int | None] | None) -> list[View]:
 def _lens_view(
     pose: np.ndarray, lens: dict, size: tuple[int, int | None] | None, name: str, own: tuple[int, int] | None
 ) -> View:
-    """A view through a lens, scaled from its own (width, height) to the size asked for."""
+    """A view through a lens, scaled from the lens's own (width, height) to the requested size."""
     width, height = size or own or (DEFAULT_SIZE, None)
     if height is None:
         height = max(1, round(width * own[1] / own[0])) if own else width

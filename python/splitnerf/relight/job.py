@@ -1,4 +1,4 @@
-"""The loop: every light, every frame, picture by picture to disk."""
+"""The loop over lights and frames; each picture is written at once."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ class Settings:
     """How the pictures are rendered and written.
 
     Attributes:
-        spp: Paths a pixel.
-        bounces: Scattering events after the first.
-        seed: Of the first frame; each frame has its own.
-        rotate_env: Degrees by which every map is turned about z, counter-clockwise seen from above.
-        exposure: Stops, in powers of two on the light.
-        background: See `Background`.
+        spp: The number of paths per pixel.
+        bounces: The number of scattering events after the first.
+        seed: The seed of the first frame; each frame has its own seed.
+        rotate_env: The rotation of every map about z in degrees, counter-clockwise seen from above.
+        exposure: The exposure in stops: the light is multiplied by 2^exposure.
+        background: The background, see `Background`.
         shadow_catcher: Whether an invisible ground at the object's lowest point shows its shadow.
-        gif, mp4: Whether to write them too.
-        fps: Of GIF and MP4.
+        gif, mp4: Whether to write a GIF and an MP4.
+        fps: The frames per second of GIF and MP4.
     """
 
     spp: int = 128
@@ -66,21 +66,21 @@ def relight(
     source: Path, maps: list[Path], views_of: Callable[[Asset], list[View]], out: Path, settings: Settings,
     *, overwrite: bool = False,
 ) -> list[Path]:  # fmt: skip
-    """Renders an asset under environment maps into NNN.png and NNN.exr, and GIF or MP4 where asked for.
+    """Renders an asset under environment maps into NNN.png and NNN.exr and, if requested, GIF or MP4.
 
     Args:
         source: A run's folder or a glTF file.
-        maps: Environment maps; with several each has a folder of its name below `out`.
+        maps: The environment maps; with several maps, each gets a folder with its name below `out`.
         views_of: The views of the asset, at least one.
         out: The folder.
-        settings: See there.
-        overwrite: Whether frames that stand there are replaced.
+        settings: How to render and write the pictures.
+        overwrite: Whether to replace existing frames.
 
     Returns:
         The folder of each map.
 
     Raises:
-        InputError: Anything given cannot be used; nothing was written or removed then.
+        InputError: An argument cannot be used; then nothing was written or removed.
         OSError: A file cannot be written.
     """
     folders = [out] if len(maps) == 1 else [out / path.stem for path in maps]
@@ -128,5 +128,5 @@ def _check_animation(views: list[View], settings: Settings) -> None:
 
 
 def _lowest(asset: Asset) -> float:
-    """z of the lowest point, lowered by a millionth of the size lest the ground cut into a flat bottom."""
+    """z of the lowest point, lowered by a millionth of the size so that the ground does not cut into a flat bottom."""
     return float(asset.vertices[asset.triangles][..., 2].min()) - 1e-6 * bounding_sphere(asset)[1]

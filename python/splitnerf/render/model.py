@@ -1,4 +1,4 @@
-"""The scene as one module: surface, materials, occlusion and light, and how they make radiance."""
+"""The scene as one module: surface, materials, occlusion and light, and the shading that combines them."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from splitnerf.fields.occlusion import TracedBits
 from splitnerf.fields.sdf import SdfSample, sharpness
 from splitnerf.ops import HashGridSpec, query_direction, shade_sums, split_sum_shade, summed_light
 
-START_BOUNCES = 3  # of indirect light on a new mesh
-SUMMED_BAND = 0.15  # of roughness, in which the sum over directions takes the split sum's place
+START_BOUNCES = 3  # bounces of indirect light on a new mesh
+SUMMED_BAND = 0.15  # width in roughness of the transition from the split sum to the sum over directions
 
 
 class ShadedPoints(NamedTuple):
-    """Materials, occlusion and outgoing light of points.
+    """Materials, occlusion and outgoing radiance of points.
 
     Attributes:
-        radiance: [n, 3] linear, towards the camera.
-        albedo: [n, 3] linear.
-        roughness, metallic: [n, 1].
-        occlusion_d, occlusion_s: [n, 1] or [n, 3], 1 = open.
-        facing: [n, 3] the normals, turned to the viewer.
-        lobe_dirs: [n, 3], where the light was asked for the specular lobe.
+        radiance: [n, 3] linear radiance towards the camera.
+        albedo: [n, 3] linear, in [0, 1].
+        roughness, metallic: [n, 1] in [0, 1]; the roughness is perceptual.
+        occlusion_d, occlusion_s: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open.
+        facing: [n, 3] unit normals, on the viewer's side.
+        lobe_dirs: [n, 3] unit query directions of the specular light.
     """
 
     radiance: Tensor
@@ -53,7 +53,7 @@ class ShadedPoints(NamedTuple):
 
 
 def make_light(config: Config) -> Light:
-    """The light that the configuration names."""
+    """The light that the setting ``light.kind`` names."""
     if config.light.kind == "pyramid":
         return LightPyramid(config.light.resolution)
     return LightMlp(
@@ -81,7 +81,7 @@ def make_occlusion(config: Config, n_inputs: int) -> OcclusionModel:
 
 
 def face_forward(normals: Tensor, view_dirs: Tensor) -> Tensor:
-    """Normals [n, 3] on the viewer's side."""
+    """Normals [n, 3], negated where they point away from the viewer at ``view_dirs`` [n, 3]."""
     side = (normals.detach() * view_dirs).sum(-1, keepdim=True)
     return normals * torch.copysign(torch.ones_like(side), side)
 
@@ -121,12 +121,12 @@ class SceneModel(nn.Module):
 
     @property
     def device(self) -> torch.device:
-        """Where the parameters are."""
+        """The device of the parameters."""
         return self.variance.device
 
     @property
     def s(self) -> Tensor:
-        """Sharpness of the NeuS density."""
+        """Sharpness s [] of the NeuS density, 1 / scene units."""
         return sharpness(self.variance)
 
     @property
@@ -135,7 +135,7 @@ class SceneModel(nn.Module):
         return float(self.s.detach())
 
     def open_levels(self, progress: float) -> None:
-        """Opens hash-grid levels one after the other until ``levels_open_by`` of the run."""
+        """Opens the hash-grid levels of this progress: one after the other until ``levels_open_by`` of the run."""
         c = self.config
         share = min(1.0, progress / c.surface.levels_open_by) if c.surface.levels_open_by > 0 else 1.0
         self.sdf_field.grid.n_active = min(
@@ -143,7 +143,7 @@ class SceneModel(nn.Module):
         )
 
     def surface(self, positions: Tensor) -> SdfSample:
-        """The SDF, its features and gradient at positions [n, 3]."""
+        """The SDF's outputs, hash features and gradient at positions [n, 3], scene units."""
         if self.config.surface.normals == "analytic":
             return self.sdf_field.sample(positions)
         return self.sdf_field.sample_finite_difference(positions)
@@ -154,7 +154,7 @@ class SceneModel(nn.Module):
         return torch.cat([outputs, positions, features], dim=1)
 
     def evaluate_light(self) -> EvaluatedLight:
-        """The light as it stands, for all that reads it until its parameters move."""
+        """The evaluated light, valid until its parameters move."""
         maps = self.light.evaluate()
         return EvaluatedLight(maps, self.occlusion.cell_light(maps) if self.config.shading.method == "summed" else None)
 
@@ -171,11 +171,12 @@ class SceneModel(nn.Module):
         """Outgoing radiance of points towards the camera.
 
         Args:
-            light: The light as it stands.
-            positions: [n, 3].
-            outputs, features: [n, 13] and [n, C], the SDF's outputs and hash features there.
+            light: The evaluated light.
+            positions: [n, 3], scene units.
+            outputs, features: [n, 13] and [n, C], the SDF's outputs and hash features at the positions.
             normals, view_dirs: [n, 3] unit; view_dirs point to the camera.
-            segments: The stretches of rays whose cached visibility is looked up once; None: every point's is.
+            segments: The ray segments of the points; the cached visibility is looked up once per segment. None: it is
+                looked up for every point.
 
         Source: SplitNeRF Eq. (6)-(10), (17).
         """
@@ -205,23 +206,26 @@ class SceneModel(nn.Module):
         self, light: EvaluatedLight, on_surface: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints,
         candidates: Tensor, n_candidates: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
-        """Radiance without the split less that of the split sum: the BRDF summed over the light from the bits' directions.
+        """The difference between the radiance by quadrature and that by the split sum.
 
-        The sum takes the split sum's place smoothly where lobes are wide enough for so few directions: at 256 of them
-        between a roughness of .3 and .45. Narrower lobes are not corrected.
+        The quadrature sums BRDF times light over the directions of the visibility bits. It replaces the split sum with
+        a
+        smooth transition in roughness, where the directions resolve the lobe: with 256 directions the transition is
+        from roughness 0.3 to 0.45. Narrower lobes are not corrected.
 
         Args:
-            light: The light as it stands.
-            on_surface: [n, 3].
-            normals, view_dirs: [n, 3] unit.
-            points: The points as :meth:`shade` returned them.
-            candidates: [k] int64, the points that may be corrected.
-            n_candidates: [] int64, how many of the candidates count; the correction of the others is 0, and the result is
-                [k], so that the host need not wait for a GPU. None: all count, and those of narrow lobes are left out.
+            light: The evaluated light.
+            on_surface: [n, 3] positions on the surface, scene units.
+            normals, view_dirs: [n, 3] unit; view_dirs point to the camera.
+            points: The result of :meth:`shade` for the points.
+            candidates: [k] int64, the indices of points that may be corrected.
+            n_candidates: [] int64, the number of leading candidates that count. The others get a correction of 0, and
+                m = k, so that the host need not wait for a GPU. None: all candidates count, and candidates with narrow
+                lobes are left out of the result.
 
         Returns:
-            at: [m] int64, the points that are corrected.
-            correction: [m, 3].
+            at: [m] int64, the indices of the corrected points.
+            correction: [m, 3] linear radiance to add.
 
         Source: SplitNeRF Eq. (4)-(6), by quadrature.
         """
@@ -245,15 +249,15 @@ class SceneModel(nn.Module):
 
     @property
     def sums_light(self) -> bool:
-        """Whether :meth:`quadrature_correction` applies: once there is a mesh."""
+        """Whether :meth:`quadrature_correction` applies: with ``shading.method = summed``, from the first mesh on."""
         return self.config.shading.method == "summed" and self.occlusion.ready
 
     @torch.no_grad()
     def use_mesh(self, traced: TracedBits | None) -> None:
-        """Answers occlusion from this mesh from now on; its light bounces a few times.
+        """Switches the occlusion to a new mesh and computes a few bounces of indirect light on it.
 
         Args:
-            traced: What :meth:`splitnerf.fields.OcclusionModel.trace` returned for it.
+            traced: The result of :meth:`splitnerf.fields.OcclusionModel.trace` for the mesh.
         """
         self.occlusion.use(traced)
         light = self.evaluate_light()
@@ -263,7 +267,10 @@ class SceneModel(nn.Module):
 
     @torch.no_grad()
     def refresh_indirect(self, light: EvaluatedLight) -> None:
-        """Shades the cached mesh anew, by the split sum, with the light that it sent so far. The view is the normal's."""
+        """Shades the cached mesh again with the split sum, under the light and the mesh's radiance of the last refresh.
+
+        Each vertex is viewed along its normal.
+        """
 
         def shade(positions: Tensor, normals: Tensor) -> Tensor:
             field = self.surface(positions)

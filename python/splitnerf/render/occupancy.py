@@ -1,4 +1,4 @@
-"""The occupancy grid: which cells a ray must sample, may skip, or ends in."""
+"""The occupancy grid: a ray samples occupied cells, skips empty ones and ends in opaque ones."""
 
 from __future__ import annotations
 
@@ -12,28 +12,29 @@ from torch.nn.functional import logsigmoid
 from splitnerf.config import Config
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
 
-DENSITY_CUTOFF = 7.0  # beyond |f| = cutoff / s the NeuS density is below e^-7 of its peak
-LIPSCHITZ = 1.25  # bound of |grad f| that the eikonal loss keeps in practice
-REFRESHED_SHARE = 0.1  # of the cells far from the surface
+DENSITY_CUTOFF = 7.0  # where |f| > cutoff / s, the NeuS density is below e^-7 of its peak
+LIPSCHITZ = 1.25  # bound on |grad f|; the eikonal loss keeps it in practice
+REFRESHED_SHARE = 0.1  # share of the cells far from the surface that an update evaluates
 DECAY, MIN_CELL_OPACITY, ALL_CELLS_UNTIL = 0.95, 1e-3, 256
 
 
 class OccupancyGrid:
     """Cells of the box, classed by the signed distance at their centres.
 
-    With |grad f| <= L a cell of half diagonal h holds no point with |f| < cutoff/s if |f(centre)| > L h +
-    cutoff/s: outside it is empty, inside it is opaque (the transmittance there is below e^-cutoff).
-    A visual hull, while given, stays occupied whatever the field says.
+    With |grad f| <= L, a cell of half diagonal h contains no point with |f| < cutoff/s if |f(centre)| > L h +
+    cutoff/s. Outside the surface such a cell is empty, inside it is opaque (transmittance below e^-cutoff).
+    An update with ``use_hull`` keeps the cells of the visual hull occupied, for any values of the field.
 
     Args:
-        resolution: Cells along an edge.
-        box: Half size of the cube.
-        hull: [r, r, r] bool or None.
-        device: Of the cells, and of the points that the field is asked at.
+        resolution: Cells along an edge, r.
+        box: Half size of the cube, scene units.
+        hull: [r, r, r] bool, the visual hull, or None.
+        device: The device of the cells and of the points at which the field is evaluated.
 
     Attributes:
-        values: [r^3] what is kept of each cell, part of a checkpoint: its signed distance.
-        cells: [r, r, r] uint8.
+        values: [r^3] float32 signed distance at each cell's centre (a subclass may keep other values); stored in
+            checkpoints.
+        cells: [r, r, r] uint8 over [x, y, z]: CELL_EMPTY, CELL_OCCUPIED or CELL_OPAQUE.
     """
 
     def __init__(self, resolution: int, box: float, hull: Tensor | None = None, device: torch.device | str = "cpu"):
@@ -51,14 +52,14 @@ class OccupancyGrid:
     def update(
         self, sdf: Callable[[Tensor], Tensor], s: float, *, first: bool = True, step: int = 0, use_hull: bool = False
     ) -> None:
-        """Evaluates the field anew and classes all cells.
+        """Evaluates the field again and classes all cells.
 
         Args:
-            sdf: Signed distance [n] of points [n, 3].
-            s: Sharpness of the density.
-            first: Evaluate all cells; later the ones near the surface and a random share of the rest do.
-            step: Of the training.
-            use_hull: Keep the visual hull occupied.
+            sdf: A function from points [n, 3] to signed distances [n], scene units.
+            s: Sharpness of the NeuS density, positive.
+            first: Whether to evaluate all cells; otherwise the cells near the surface and a random tenth of all cells.
+            step: The number of the training step.
+            use_hull: Whether the cells of the visual hull stay occupied.
         """
         bound = LIPSCHITZ * self.half_diagonal + DENSITY_CUTOFF / s
         if first:
@@ -81,8 +82,8 @@ class OccupancyGrid:
 class AveragedGrid(OccupancyGrid):
     """The released code's grid: a cell is occupied while the decaying maximum of its opacity exceeds min(mean, .001).
 
-    It gives no bound: a cell whose point was drawn beside a thin part may be dropped. Opacity is that of a sample of
-    length ``step`` seen head-on.
+    It gives no guarantee: a cell may become empty when its random point misses a thin part. The opacity of a cell is
+    that of one sample whose ray meets the surface head-on.
 
     Source: Instant NGP (Mueller et al. 2022), as nerfacc, which SplitNeRF's released code uses, describes it.
     """
@@ -97,7 +98,8 @@ class AveragedGrid(OccupancyGrid):
     def update(
         self, sdf: Callable[[Tensor], Tensor], s: float, *, first: bool = True, step: int = 0, use_hull: bool = False
     ) -> None:
-        """All cells during the first 256 steps; then a quarter at random and a quarter of the cells from the occupied."""
+        """Evaluates all cells in the first 256 steps; later a random quarter of all, and as many of the occupied
+        ones."""
         n = len(self.values)
         due = torch.arange(n, device=self.device)
         if not first and step >= ALL_CELLS_UNTIL:
@@ -122,16 +124,16 @@ def make_grid(config: Config, hull: Tensor | None = None, device: torch.device |
 
 
 def evaluate(sdf: Callable[[Tensor], Tensor], points: Tensor) -> Tensor:
-    """The field at points [n, 3], in chunks."""
+    """The field's values [n] at points [n, 3], evaluated in chunks."""
     return torch.cat([sdf(chunk) for chunk in points.split(1 << 16)]) if len(points) else points[:, 0]
 
 
 def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intrinsics: Tensor) -> Tensor:
-    """[r, r, r] bool: cells whose centre, give or take a cell, falls into every mask that sees it.
+    """[r, r, r] bool: the cells whose centre, within about a cell, projects into the mask of every view that sees it.
 
     Args:
         resolution: Cells along an edge.
-        box: Half size of the cube.
+        box: Half size of the cube, scene units.
         masks: [n, H, W] in [0, 1].
         poses: [n, 4, 4] camera-to-world, OpenGL axes.
         intrinsics: [n, 4] fx, fy, cx, cy in pixels.
@@ -145,7 +147,7 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
         camera = (centres[inside] - poses[i, :3, 3]) @ poses[i, :3, :3]
         depth = -camera[:, 2]
         x, y = cx + fx * camera[:, 0] / depth, cy - fy * camera[:, 1] / depth
-        # One cell's size in pixels widens the mask, so that thin parts keep their cells.
+        # The mask is widened by a cell's size in pixels, so that thin parts keep their cells.
         radius = int(math.ceil(fx * cell / max(1e-3, float(depth.median())))) if len(depth) else 0
         wide = torch.nn.functional.max_pool2d(masks[i : i + 1, None], 2 * radius + 1, stride=1, padding=radius)[0, 0]
         column, row = x.floor().long(), y.floor().long()

@@ -14,7 +14,7 @@ class AssetRenderer:
     """An asset with its acceleration structure, ready for any number of views and lights.
 
     Args:
-        asset: What to render; its arrays are used as they are and must not change meanwhile.
+        asset: The asset to render; its arrays are not copied and must not change while the renderer exists.
 
     Raises:
         ValueError: The asset's arrays do not fit together.
@@ -62,19 +62,21 @@ class AssetRenderer:
             height: Pixels.
             spp: Paths a pixel.
             bounces: Scattering events after the first one; 0 is direct light only.
-            seed: Of the random numbers.
-            clamp_indirect: Largest channel of one indirect contribution, against specks of caustics; 0 is unbiased.
+            seed: The seed of the random numbers.
+            clamp_indirect: The largest value of a channel in one indirect contribution, to suppress fireflies; 0 does
+                not clamp and is unbiased.
             pixel_filter: "blackman-harris" (1.5 pixels wide, Blender's default) or "box".
             catcher_height: z of an invisible ground plane that shows the shadow of the direct light; None for none.
 
         Returns:
-            float32 maps: `radiance` [height, width, 3] linear, premultiplied by `alpha` [height, width]; of the first
-            hit, straight, 0 where there is none, `albedo` [height, width, 3] linear, `roughness`, `metallic`, `normal`
-            (world space, normal texture included) and `smooth_normal` (without it), `depth` along the ray; with a
-            catcher `shadow`, the opacity of its black shadow (alpha + shadow <= 1).
+            float32 maps by name. `radiance` [height, width, 3] is linear and premultiplied by `alpha` [height, width].
+            Maps of the first hit are not premultiplied, and 0 where a ray hits nothing: `albedo` [height, width, 3]
+            linear, `roughness`, `metallic`, `normal` (world space, with the normal texture), `smooth_normal` (without
+            the normal texture) and `depth` along the ray. With a catcher, `shadow` is the opacity of its black shadow
+            (alpha + shadow <= 1).
 
         Raises:
-            ValueError: A map, a pose or a size that cannot be used.
+            ValueError: A map, a pose or a size cannot be used.
         """
         fx, fy, cx, cy = (float(value) for value in intrinsics)
         images = _core.render(

@@ -19,14 +19,18 @@ def pixel_rays(pose: Tensor, intrinsics: Tensor, x: Tensor, y: Tensor) -> tuple[
         x, y: [n] pixels; the centre of pixel (column, row) is (column + 0.5, row + 0.5).
 
     Returns:
-        origins and unit directions, [n, 3] each.
+        origins and unit directions, [n, 3] each, in the world's units.
     """
     directions = through_pixels(pixel_matrix(pose, intrinsics), x, y)
     return pose[..., :3, 3].expand_as(directions).contiguous(), directions
 
 
 def pixel_matrix(pose: Tensor, intrinsics: Tensor) -> Tensor:
-    """[..., 3, 3] from (x, y, 1) of an image point to its direction in the world, up to length; of :func:`pixel_rays`."""
+    """[..., 3, 3] matrices that map an image point (x, y, 1) to its world direction, not normalised.
+
+    Args:
+        pose, intrinsics: See :func:`pixel_rays`.
+    """
     fx, fy, cx, cy = intrinsics.unbind(-1)
     zero, one = torch.zeros_like(fx), torch.ones_like(fx)
     rows = [1 / fx, zero, -cx / fx, zero, -1 / fy, cy / fy, zero, zero, -one]
@@ -35,7 +39,8 @@ def pixel_matrix(pose: Tensor, intrinsics: Tensor) -> Tensor:
 
 
 def through_pixels(matrix: Tensor, x: Tensor, y: Tensor) -> Tensor:
-    """[n, 3] unit directions through image points x, y [n], by matrices [n, 3, 3] or [3, 3]."""
+    """[n, 3] unit directions through image points x, y [n]; the matrices [n, 3, 3] or [3, 3] are
+    :func:`pixel_matrix`'s."""
     points = torch.stack([x, y, torch.ones_like(x)], dim=-1)
     return F.normalize((matrix * points[..., None, :]).sum(-1), dim=-1)
 
@@ -52,8 +57,8 @@ class PixelSource:
 
     Args:
         dataset: The train split.
-        foreground_share: Share of the rays drawn within a few pixels of a mask.
-        generator: Draws the pixels. Images and cameras are kept on its device.
+        foreground_share: Share of the rays, in [0, 1], that are drawn within a few pixels of a mask.
+        generator: The random generator of the pixels; images and cameras are kept on its device.
     """
 
     def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator):
@@ -70,7 +75,7 @@ class PixelSource:
         self.foreground = near.reshape(-1).nonzero().squeeze(1)
 
     def draw(self, n: int) -> tuple[Tensor, Tensor, Tensor]:
-        """rays_o [n, 3], rays_d [n, 3] and the pixels [n, 4] (sRGB, straight alpha)."""
+        """Draws n rays: origins [n, 3], unit directions [n, 3] and pixels [n, 4] (sRGB in [0, 1], straight alpha)."""
         n_near = int(n * self.share) if len(self.foreground) else 0
         draw = {"generator": self.generator, "device": self.device}
         near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), **draw)]

@@ -26,16 +26,16 @@ from splitnerf.render.rays import image_rays
 
 MIN_OPACITY = 1e-4
 PHASES = 1024.0
-SURFACE_GAP = 2.5  # samples farther apart, in steps, may be of two surfaces
+SURFACE_GAP = 2.5  # in steps; two samples farther apart may lie on two surfaces
 
 
 class ProbePoints(NamedTuple):
-    """Points at which the field is asked for along with the samples of the rays, in one go.
+    """Points at which the field is evaluated together with the samples of the rays.
 
     Attributes:
-        anywhere: [k, 3].
-        chosen: [m] in [0, 1), which of the samples get a neighbour.
-        shifts: [m, 3] from there to the neighbour.
+        anywhere: [k, 3] points of the box, scene units.
+        chosen: [m] in [0, 1), random numbers that select the samples with a neighbour: sample floor(n chosen) of n.
+        shifts: [m, 3] offsets from a sample to its neighbour, scene units.
     """
 
     anywhere: Tensor
@@ -44,21 +44,21 @@ class ProbePoints(NamedTuple):
 
 
 class FoundSamples(NamedTuple):
-    """The samples of a batch of rays, and all that follows from where they are.
+    """The samples of a batch of rays, with all values that depend on their positions alone.
 
-    n is at least the capacity that was asked for. Samples past those of the last ray belong to no ray; in their place
-    `positions` repeats the first ones, so that the field is finite there.
+    n, the number of samples, is at least the requested capacity. The samples behind those of the last ray are padding:
+    they belong to no ray, and their `positions` repeat those of the first samples, so that the field is finite there.
 
     Attributes:
-        packed: Where on the rays they are.
-        rays_d: [n_rays, 3] unit.
-        phase: [n_rays] in [0, 1), random: where the marks begin by which samples are drawn to be shaded.
-        positions: [n + k + m, 3] of the n samples in their middles, and of the probes.
-        directions: [n, 3] of their rays.
-        beside: [m] the samples whose neighbours the last m are.
+        packed: The distances of the samples along their rays.
+        rays_d: [n_rays, 3] unit directions.
+        phase: [n_rays] in [0, 1), random offset of the marks that :func:`splitnerf.ops.spread_samples` draws with.
+        positions: [n + k + m, 3] the midpoints of the n samples, then the k + m probes, scene units.
+        directions: [n, 3] unit directions of the samples' rays.
+        beside: [m] int64, the samples whose neighbours the last m positions are.
         step: [] length of a sample, scene units.
-        anneal: [] of the cosine by which they were chosen.
-        evaluated: [n_rays] int64, points at which the distance was asked for to find them.
+        anneal: [] annealing of the cosine, in [0, 1], at which the samples were chosen.
+        evaluated: [n_rays] int64, the number of points per ray at which the search evaluated the distance.
     """
 
     packed: PackedSamples
@@ -74,26 +74,26 @@ class FoundSamples(NamedTuple):
 
 @dataclass
 class RenderedRays:
-    """What one batch of rays leaves behind.
+    """The rendering of one batch of rays: n samples with the padding, of which n_shaded are shaded.
 
     Attributes:
         mean: [n_rays, 3] colour of the object alone, un-premultiplied, not clipped above 1.
-        linear: Whether that is linear, or sRGB.
-        opacity: [n_rays].
+        linear: Whether `mean` is linear; otherwise it is sRGB.
+        opacity: [n_rays] in [0, 1].
         samples: The packed samples.
-        evaluated: [n_rays] int64, points at which the distance was asked for.
-        weights: [n].
-        values: [n, 3] what is composited: radiance of the split sum, linear or sRGB as `compositing` says. With `shading =
-            summed` the colour has, beside their composite, what the sum adds at each ray's heaviest sample.
-        gradients: [n + k + m, 3] d sdf / d position of all samples and probes.
-        beside: [m] the samples whose neighbours the last m are.
-        shaded: [m] indices of the samples that were shaded.
-        sizes: [3] int64, how many samples were shaded, rays have samples, stretches of rays share what is seen from them.
-        shares: [m] how much of their ray's colour they are, no gradient.
-        positions: [m, 3] of the shaded samples, on the level set through the sample.
-        normals: [m, 3].
-        sdf: [m].
-        points: Their materials and light.
+        evaluated: [n_rays] int64, the number of points per ray at which the search evaluated the distance.
+        weights: [n] rendering weights.
+        values: [n, 3] composited values: radiance of the split sum, linear or sRGB by the setting `compositing`. With
+            `shading.method = summed`, `mean` also contains the quadrature correction at each ray's heaviest sample.
+        gradients: [n + k + m, 3] d sdf / d position at all samples and probes.
+        beside: [m] int64, the samples whose neighbours the last m gradients belong to.
+        shaded: [n_shaded] int64, indices of the shaded samples.
+        sizes: [3] int64, the numbers of shaded samples, of rays with samples and of ray segments.
+        shares: [n_shaded] rendering weight that each shaded sample stands for, no gradient.
+        positions: [n_shaded, 3] midpoints of the shaded samples, scene units.
+        normals: [n_shaded, 3] unit normals of the field.
+        sdf: [n_shaded] signed distances, scene units.
+        points: Materials, occlusion and radiance of the shaded samples.
     """
 
     mean: Tensor
@@ -115,12 +115,12 @@ class RenderedRays:
 
     @property
     def colour(self) -> Tensor:
-        """[n_rays, 3] the same in sRGB."""
+        """[n_rays, 3] `mean` in sRGB."""
         return linear_to_srgb(self.mean) if self.linear else self.mean
 
 
 def sample_step(config: Config, s: float) -> float:
-    """Length of a sample: it follows the width 1/s of the density, within the configured bounds."""
+    """Length of a sample in scene units: proportional to the width 1/s of the density, within the configured bounds."""
     return min(
         max(config.sampling.step_scale / s, config.sampling.min_step),
         max(config.sampling.max_step, config.sampling.min_step),
@@ -138,16 +138,16 @@ def find_samples(
     probes: ProbePoints | None = None,
     capacity: int = 0,
 ) -> FoundSamples:
-    """The samples that pixels are made of, by the field as it stands.
+    """Finds the samples of rays that contribute to their pixels, with the current field.
 
     Args:
         model: The scene.
-        cells: [r, r, r] uint8 occupancy.
-        rays_o, rays_d: [n_rays, 3]; directions unit.
-        jitter: [n_rays] in [0, 1).
-        anneal: Of the cosine, 0 at the start, 1 when done.
-        probes: More points at which the field will be wanted.
-        capacity: The fewest samples of the result; what is missing is filled with samples of no ray.
+        cells: [r, r, r] uint8 cells of the occupancy grid.
+        rays_o, rays_d: [n_rays, 3] origins (scene units) and unit directions.
+        jitter: [n_rays] in [0, 1), offsets of the samples as shares of a sample's length.
+        anneal: The annealing of the cosine: 0 at the start of a training, 1 when done.
+        probes: Additional points at which the field will be evaluated, or None.
+        capacity: The minimum number of samples in the result; padding fills it up. Without probes it has no effect.
     """
     c, s = model.config, model.s_value
     step = sample_step(c, s)
@@ -173,7 +173,7 @@ def find_samples(
             which = torch.arange(n_more, device=positions.device) % max(n, 1)
             again = [positions[which] if n else positions.new_zeros(n_more, 3)]
         positions = torch.cat([positions, *again, probes.anywhere, neighbours])
-    phase = (PHASES * jitter) % 1.0  # where samples stand shall not decide which are shaded
+    phase = (PHASES * jitter) % 1.0  # the choice of shaded samples must not depend on their positions
     numbers = (positions.new_full((), x) for x in (step, anneal))
     return FoundSamples(packed, rays_d, phase, positions, directions, beside, *numbers, evaluated)
 
@@ -186,11 +186,13 @@ def render_rays(
 
     Args:
         model: The scene.
-        light: Its light as it stands.
-        found: The samples; the field may have moved a little since.
-        shades_per_ray: Samples of a ray that are shaded, about; others are interpolated. 0 shades all.
-        capacity: See :func:`splitnerf.ops.spread_samples`; None waits for a GPU to count. Where it is exceeded ``sizes`` tells
-            so, and the colours have no meaning.
+        light: The evaluated light.
+        found: The samples; the field may have changed slightly since the search.
+        shades_per_ray: The approximate number of shaded samples per ray; the values of the other samples are
+            interpolated. 0 shades all.
+        capacity: The capacity for shaded samples and segments, see :func:`splitnerf.ops.spread_samples`; with None the
+            host waits for the GPU's counts. If ``sizes`` of the result exceeds the capacity, the colours have no
+            meaning.
 
     Source: SplitNeRF Eq. (1)-(2), (17).
     """
@@ -212,7 +214,7 @@ def render_rays(
     spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step, capacity)
     shaded = spread.shaded
     positions, view_dirs = found.positions[shaded], -found.directions[shaded]
-    # The gradient of index_select is a sum; that of indexing sorts on a GPU.
+    # The gradient of index_select adds directly; the gradient of indexing sorts first on a GPU.
     normals, outputs, features = (x.index_select(0, shaded) for x in (normals, field.outputs, field.features))
     sdf = outputs[:, 0]
     segments = RaySegments(spread.leaders, spread.stretch)
@@ -244,6 +246,14 @@ def render_view(
     model: SceneModel, cells: Tensor, pose: Tensor, intrinsics: Tensor, height: int, width: int, chunk: int = 8192
 ) -> dict[str, Tensor]:
     """Renders a whole view with its maps.
+
+    Args:
+        model: The scene.
+        cells: [r, r, r] uint8 cells of the occupancy grid.
+        pose: [4, 4] camera-to-world, OpenGL axes, internal frame.
+        intrinsics: [4] fx, fy, cx, cy in pixels.
+        height, width: The image's size in pixels.
+        chunk: Rays rendered at a time.
 
     Returns:
         rgb [H, W, 3] sRGB un-premultiplied in [0, 1], alpha [H, W], albedo [H, W, 3] linear, roughness, metallic,

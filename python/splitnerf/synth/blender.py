@@ -20,8 +20,8 @@ class BlenderRenderer:
 
     Args:
         path: The file.
-        centre: [3] of the file's world, z up, brought to the origin.
-        scale: Then applied.
+        centre: [3] the point of the file's world, z up, that is moved to the origin.
+        scale: The scale that is applied after the move.
 
     Raises:
         InputError: `bpy` is not installed, or the file holds nothing to render.
@@ -95,7 +95,7 @@ class BlenderRenderer:
         spp: int,
         seed: int,
     ) -> dict[str, np.ndarray]:
-        """Renders one view; arguments and maps as of `AssetRenderer.render`, of which it gives `radiance`, `alpha`,
+        """Renders one view; for the arguments see `AssetRenderer.render`. Returns its maps `radiance`, `alpha`,
         `albedo`, `roughness`, `metallic` and `smooth_normal`. The principal point must be the image's centre.
 
         Raises:

@@ -1,4 +1,4 @@
-"""Where the cameras of a rendered data set stand: on a sphere about the origin, which they look at."""
+"""The cameras of a rendered data set: they are on a sphere around the origin and look at the origin."""
 
 from __future__ import annotations
 

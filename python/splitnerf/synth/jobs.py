@@ -22,14 +22,14 @@ from splitnerf.synth.placed import write_placed_glb
 from splitnerf.synth.writer import LAYOUTS, SceneWriter
 
 RENDERERS = ("project", "blender")
-CAMERA_ANGLE_X = 0.6911112070083618  # of the NeRF Blender scenes
+CAMERA_ANGLE_X = 0.6911112070083618  # radians, as in the NeRF Blender scenes
 CAMERA_DISTANCE = 3.0233467  # three quarters of theirs: it frames the unit sphere
 TRAIN_ELEVATIONS, TEST_ELEVATION, TEST_SWING = (-20.0, 78.0), 30.0, 20.0
 MAP_SIZE = (256, 512)
 
 
 class ViewRenderer(Protocol):
-    """What renders the views: :class:`splitnerf.render.path_traced.AssetRenderer`, or Blender."""
+    """The interface of renderers: :class:`splitnerf.render.path_traced.AssetRenderer`, or Blender."""
 
     def render(
         self, environment: np.ndarray, pose: np.ndarray, intrinsics: tuple[float, float, float, float],
@@ -48,7 +48,7 @@ class SynthSettings:
         spp: Paths a pixel.
         layout: One of :data:`splitnerf.synth.writer.LAYOUTS`.
         renderer: "project" for the path tracer, "blender" for Blender's Cycles.
-        seed: Of the renderings and of the first camera's azimuth.
+        seed: The seed of the renderings and of the first camera's azimuth.
     """
 
     size: int = 200
@@ -75,8 +75,8 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
     """Renders a dataset with truth.
 
     The asset is moved and scaled so that its bounding box is centred at the origin and its farthest vertex lies on the
-    unit sphere; its emission is left out, since the environment is taken to be the only light. A GLB file is copied so
-    placed to `asset.glb`.
+    unit sphere; its emission is left out, so that the environment is the only light. A GLB file is copied to
+    `asset.glb` with the same placement.
 
     Args:
         asset: A glTF file.

@@ -17,13 +17,13 @@ def write_placed_glb(source: Path, target: Path, centre: np.ndarray, scale: floa
     """Writes the asset with a node above its scene that applies (x - centre) scale, and without emission.
 
     Args:
-        source: A file that `read_asset` has read.
-        target: Ends in .glb.
-        centre: [3] of the source's world, z up.
-        scale: Then applied.
+        source: A file that `read_asset` accepts.
+        target: The new file, with the suffix .glb.
+        centre: [3] the point of the source's world, z up, that is moved to the origin.
+        scale: The scale that is applied after the move.
 
     Returns:
-        Whether it was written: a .gltf, whose data lie in other files, is not copied.
+        Whether the file was written; a .gltf is not copied, since its data are in other files.
 
     Raises:
         OSError: The file cannot be written.

@@ -68,7 +68,7 @@ class SceneWriter:
             split: "train" or "test".
             index: Number of the view in its split.
             pose: [4, 4] camera-to-world, OpenGL axes.
-            maps: As `AssetRenderer.render` gives them: `radiance`, `alpha`, and where truth is written `albedo`,
+            maps: The maps of `AssetRenderer.render`: `radiance` and `alpha`; where truth is written also `albedo`,
                 `roughness`, `metallic` and `smooth_normal`.
         """
         image = self._image_path(split, index)
@@ -84,11 +84,12 @@ class SceneWriter:
             self._write_truth(image, maps)
 
     def relit(self, split: str, index: int, name: str, maps: Maps) -> None:
-        """Writes a view that was given to `view` before, as map `name` lights it; `maps` as there."""
+        """Writes a relit view under map `name`, after a call of :meth:`view` for it; `maps` are those of that
+        method."""
         write_image(relit_path(self._image_path(split, index), name), _rgba(maps))
 
     def close(self) -> None:
-        """Writes the poses, without which the folder is no dataset."""
+        """Writes the poses, which complete the dataset."""
         for split, views in self._views.items():
             if self.layout == "blender":
                 content = {"camera_angle_x": self.camera_angle_x, "frames": [entry for _, entry in views]}

@@ -13,14 +13,14 @@ from splitnerf.render.renderer import ProbePoints
 
 
 class Batch(NamedTuple):
-    """Rays of one step, and what they shall look like.
+    """The rays of one step, and the photos' values at their pixels.
 
     Attributes:
-        rays_o, rays_d: [n, 3].
-        target: [n, 4] sRGB, straight alpha.
-        background: [n, 3] sRGB behind both.
-        jitter: [n] in [0, 1), of the samples.
-        probes: Other points that the losses look at.
+        rays_o, rays_d: [n, 3] origins (scene units) and unit directions.
+        target: [n, 4] sRGB values of the photos in [0, 1], straight alpha.
+        background: [n, 3] random sRGB colours in [0, 1), behind the photo and the rendering alike.
+        jitter: [n] offsets of each ray's samples in [0, 1), as shares of a sample's length.
+        probes: Other points that the losses evaluate.
     """
 
     rays_o: Tensor
@@ -37,7 +37,7 @@ class Batch(NamedTuple):
 
 
 def draw_batch(source: PixelSource, n_rays: int, config: Config) -> Batch:
-    """Rays through random pixels, by the source's generator."""
+    """Rays through ``n_rays`` random pixels, drawn by the source's generator."""
     g = source.generator
     rays_o, rays_d, target = source.draw(n_rays)
     background, jitter = (torch.rand(*shape, generator=g, device=g.device) for shape in ((n_rays, 3), (n_rays,)))
@@ -45,7 +45,7 @@ def draw_batch(source: PixelSource, n_rays: int, config: Config) -> Batch:
 
 
 def draw_probes(config: Config, generator: torch.Generator) -> ProbePoints:
-    """Where the eikonal loss and that of the normals' smoothness look beside the samples."""
+    """Random points for the eikonal loss and for the smoothness loss, in addition to the samples of the rays."""
     c = config
     n_beside = c.losses.smoothness_points if c.losses.smoothness_weight else 0
     draw = {"generator": generator, "device": generator.device}

@@ -18,29 +18,29 @@ from splitnerf.ops.hash_grid import HashGridSpec
 from splitnerf.render.occupancy import OccupancyGrid
 
 FORMAT = 1
-GLOBALS = {"torch._utils _rebuild_tensor_v2", "collections OrderedDict"}  # and the kinds of storage
+GLOBALS = {"torch._utils _rebuild_tensor_v2", "collections OrderedDict"}  # STORAGES holds the storage types
 STORAGES = {f"torch {kind}Storage" for kind in ("Float", "Double", "Long", "Int", "Byte", "Bool")}
-LONGEST_PICKLE = 1 << 22  # bytes; ours have some ten thousand
+LONGEST_PICKLE = 1 << 22  # bytes; a checkpoint of a run has about ten thousand
 LARGEST = {"step": 1e12, "seconds": 1e12, "meshed_at": 1.0, "previewed_at": 1.0}
 MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
 def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict) -> None:
-    """Writes the checkpoint beside the old one and then takes its place, so that one of them is always whole.
+    """Writes a new file and then renames it over the old checkpoint, so that a complete checkpoint always exists.
 
     Raises:
-        OSError: The disk is full or the folder cannot be written; the old checkpoint stands.
+        OSError: The disk is full or the folder cannot be written; the old checkpoint is kept.
     """
     with atomic_path(path) as temporary:
         try:
             content = {"format": FORMAT, "config": dataclasses.asdict(config), "fingerprint": fingerprint, **state}
             torch.save(on_cpu(content), temporary)
-        except RuntimeError as error:  # torch reports a full disk so
+        except RuntimeError as error:  # torch raises this when the disk is full
             raise OSError(f"{path}: the checkpoint could not be written ({error})") from error
 
 
 def on_cpu(content: object) -> object:
-    """The same dictionaries and lists with all tensors on the CPU, so that any machine can read them."""
+    """A copy of nested dictionaries and lists with all tensors on the CPU, so that any machine can read them."""
     if isinstance(content, Tensor):
         return content.cpu()
     if isinstance(content, dict):
@@ -49,14 +49,15 @@ def on_cpu(content: object) -> object:
 
 
 def load_checkpoint(path: Path) -> dict:
-    """Reads a checkpoint with torch's restricted unpickler, whoever wrote it.
+    """Reads a checkpoint from any source with torch's restricted unpickler.
 
-    Before, the container is looked at: nothing in it is compressed, and its pickle names nothing but tensors. So a file
-    takes about as much memory as it is long. After, every value has the type, shape and range that the trainer writes.
+    The container is checked first: nothing in it is compressed, and its pickle names only tensors. So reading takes
+    about as much memory as the file has bytes. Then every value is checked: its type, shape and range are those that
+    the trainer writes.
 
     Raises:
-        InputError: The file is missing, truncated, of another format, holds anything but what the trainer writes, or
-            numbers that are not finite.
+        InputError: The file is missing, truncated or of another format, or it holds values that the trainer does not
+            write or numbers that are not finite.
     """
     if not path.is_file():
         raise InputError(f"{path}: no checkpoint there; train without --resume first")
@@ -64,7 +65,7 @@ def load_checkpoint(path: Path) -> dict:
         _check_container(path)
         content = torch.load(path, map_location="cpu", weights_only=True)
         found = content["format"]
-    except Exception as error:  # zipfile and torch raise whatever a damaged file makes them meet
+    except Exception as error:  # zipfile and torch raise many types for a damaged file
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise InputError(f"{path}: not a readable checkpoint ({reason}); use another, or train anew") from None
     if found != FORMAT:
@@ -85,7 +86,7 @@ def restore_model(model: nn.Module, content: dict, path: Path) -> None:
     """Puts the parameters of a checkpoint into a model.
 
     Raises:
-        InputError: The model has others: the settings are not those of the checkpoint.
+        InputError: The model has other parameters: the settings differ from those of the checkpoint.
     """
     ours, stored = model.state_dict(), content["model"]
     for name in [*ours, *stored]:
@@ -98,7 +99,7 @@ def restore_optimiser(optimiser: torch.optim.Optimizer, content: dict, path: Pat
     """Puts the moments of a checkpoint into an AdamW; rates and decay stay those of the settings.
 
     Raises:
-        InputError: They are not those of its parameters.
+        InputError: The moments do not fit the optimiser's parameters.
     """
     parameters = [parameter for group in optimiser.param_groups for parameter in group["params"]]
     stored = content["optimiser"]["state"]
@@ -110,11 +111,13 @@ def restore_optimiser(optimiser: torch.optim.Optimizer, content: dict, path: Pat
 
 
 def restore_generator(generator: torch.Generator, content: dict, path: Path) -> None:
-    """Puts the states of the run's random generator and of torch's own back. A run that goes on on another device cannot:
-    its generator begins anew, from the seed and the step. The numbers that the occupancy grid draws on a GPU do so there too.
+    """Restores the state of the run's random generator and of torch's own CPU generator.
+
+    A generator's state does not fit another device: a run that continues on one seeds its generator anew, from the seed
+    and the step. So does torch's generator on a GPU, which the occupancy grid draws from.
 
     Raises:
-        InputError: They are no states of generators.
+        InputError: The stored values are not states of generators.
     """
     try:
         if content["device"] == generator.device.type:
@@ -127,10 +130,10 @@ def restore_generator(generator: torch.Generator, content: dict, path: Path) -> 
 
 
 def restored_grid(grid: OccupancyGrid, content: dict, path: Path) -> tuple[Tensor, Tensor]:
-    """What the checkpoint keeps of each cell of a grid, [r^3], and its cells [r, r, r], on the grid's device.
+    """The stored values [r^3] and classes [r, r, r] of a grid's cells, on the grid's device.
 
     Raises:
-        InputError: It has another number of cells.
+        InputError: The checkpoint has another number of cells.
     """
     stored = content["occupancy"], content["cells"]
     if stored[0].shape != grid.values.shape or stored[1].shape != grid.cells.shape:
@@ -139,7 +142,7 @@ def restored_grid(grid: OccupancyGrid, content: dict, path: Path) -> tuple[Tenso
 
 
 def _check_container(path: Path) -> None:
-    """Raises ValueError where the file could take more memory than it is long, or names other things than tensors."""
+    """Raises ValueError where reading could take more memory than the file has bytes, or names more than tensors."""
     with zipfile.ZipFile(path) as archive:
         entries = archive.infolist()
         if any(
@@ -203,7 +206,7 @@ def _check_content(content: dict) -> None:
 
 
 def _check_light(config: Config, content: dict) -> None:
-    """Raises ValueError where the light that is kept beside the parameters is not what the trainer writes."""
+    """Raises ValueError where the cached light, stored in addition to the parameters, does not fit the settings."""
     _check_tensor("light_noise", content.get("light_noise"), (2,), torch.float64)
     height, cached, vertices = config.occlusion.environment_height, content.get("occlusion_light"), content.get("mesh_vertices")
     if content.get("environment") is not None:
@@ -218,7 +221,7 @@ def _check_light(config: Config, content: dict) -> None:
 
 
 def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:
-    """Raises ValueError where the settings ask for more than the file holds: they are about to be allocated."""
+    """Raises ValueError where the settings need larger tensors than the file holds; the model is allocated next."""
     c = config
     grid = HashGridSpec(
         c.surface.n_levels, c.surface.n_features, c.surface.base_resolution, c.surface.growth, c.surface.log2_table_size
@@ -232,7 +235,8 @@ def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:
 
 
 def _check_tensor(name: str, value: object, shape: tuple[int, ...] | None, *dtypes: torch.dtype) -> None:
-    """Shape None is any, -1 any size."""
+    """Raises ValueError where a value is no tensor of this shape and dtype. Shape None allows any shape, -1 any
+    size."""
     fits = type(value) is Tensor and value.dtype in dtypes and value.is_contiguous()
     if fits and shape is not None:
         fits = len(shape) == value.dim() and all(a in (-1, b) for a, b in zip(shape, value.shape))

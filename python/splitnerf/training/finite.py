@@ -1,4 +1,4 @@
-"""What a run does about numbers that are not finite: the rule, and where they came from."""
+"""The rule for numbers that are not finite, its checks, and the search for where such numbers came from."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ LARGEST = 1e18  # value of a gradient; the optimiser squares it, in single preci
 
 
 class Diverged(RuntimeError):
-    """A run met numbers that are not finite and stopped. Its last checkpoint stands.
+    """The error of a run that stopped because of numbers that are not finite. Its last checkpoint is kept.
 
     The rule:
         - Images whose pixels are NaN, infinite or outside [0, 1] are refused when they are read.
         - A loss that is not finite stops the run before the parameters move. The message names the loss's terms and
-          the first that is not finite of what they come from: images, cameras, parameters, rendered rays.
-        - A gradient that is not finite, or too large to be squared, skips the step: parameters and optimiser stay as
-          they are. It is said on stderr, and metrics.jsonl counts such steps as ``skipped``. The tenth in a row stops
-          the run.
-        - Parameters are looked at with every line of metrics.jsonl, before a mesh is made of them and before they are
+          the first of their inputs that is not finite: images, cameras, parameters, rendered rays.
+        - A gradient that is not finite, or too large to be squared, skips the step: parameters and optimiser do not
+          change. A message on stderr tells so, and metrics.jsonl counts such steps as ``skipped``. The tenth in a row
+          stops the run.
+        - Parameters are checked with every line of metrics.jsonl, before a mesh is made from them and before they are
           saved. Where one is not finite the run stops and no checkpoint is written.
         - A checkpoint whose numbers are not finite is refused when it is read.
     """
@@ -39,7 +39,7 @@ class GradientWatch:
     """Decides whether a step may be taken.
 
     Attributes:
-        skipped: Steps that were not, so far.
+        skipped: The number of steps that were skipped so far.
     """
 
     def __init__(self, parameters: Iterable[Tensor]):
@@ -47,14 +47,14 @@ class GradientWatch:
         self.skipped = self._in_a_row = 0
 
     def largest(self) -> Tensor:
-        """[] the largest magnitude among all gradients; reads each of them once."""
+        """The largest magnitude [] among all gradients; reads each gradient once."""
         return get_total_norm([p.grad for p in self.parameters if p.grad is not None], torch.inf)
 
     def allows(self, step: int, largest: float) -> bool:
-        """Whether gradients are finite whose largest magnitude this is.
+        """Whether the step may be taken: ``largest``, the largest magnitude of its gradients, can be squared.
 
         Raises:
-            Diverged: They were not in ten steps in a row.
+            Diverged: Ten steps in a row may not be taken.
         """
         if largest < LARGEST:
             self._in_a_row = 0
@@ -70,9 +70,9 @@ class GradientWatch:
 
 
 def first_not_finite(values: Iterable[tuple[str, Tensor]]) -> str | None:
-    """Name and count of the first of these tensors that has NaN or infinite values; None where all are finite."""
+    """Name and count of bad values of the first tensor that has NaN or infinite values; None where all are finite."""
     for name, tensor in values:
-        if math.isfinite(tensor.sum().item()):  # several times faster than to look at each
+        if math.isfinite(tensor.sum().item()):  # several times faster than a test of each value
             continue
         n = tensor.numel() - int(tensor.isfinite().sum())
         if n:
@@ -81,13 +81,13 @@ def first_not_finite(values: Iterable[tuple[str, Tensor]]) -> str | None:
 
 
 def check_state(step: int, model: SceneModel, optimiser: torch.optim.Optimizer) -> None:
-    """Looks at all parameters, and at what the optimiser keeps of them.
+    """Checks all parameters and the optimiser's moments.
 
     Raises:
-        Diverged: One is not finite.
+        Diverged: A parameter or a moment is not finite.
     """
     state = list(_state(model, optimiser))
-    if math.isfinite(torch.stack([value.sum() for _, value in state]).sum().item()):  # one number to wait for
+    if math.isfinite(torch.stack([value.sum() for _, value in state]).sum().item()):  # waits for the device once
         return
     found = first_not_finite(state)
     if found:
@@ -97,13 +97,13 @@ def check_state(step: int, model: SceneModel, optimiser: torch.optim.Optimizer) 
 def explain_loss(
     step: int, terms: dict[str, float], dataset: Dataset, batch: Batch, model: SceneModel, ray: RenderedRays
 ) -> Diverged:
-    """The error for a loss that is not finite: its terms, and the first in the order of the data flow that is not.
+    """The error for a loss that is not finite: it names the terms and, in order of the data flow, the first bad input.
 
     Args:
-        step: The step.
-        terms: The loss by name.
-        dataset: What is trained on.
-        batch, ray: The rays of the step, and as they were rendered.
+        step: The number of the step.
+        terms: The values of the loss's terms by name.
+        dataset: The train split.
+        batch, ray: The rays of the step, and their rendering.
         model: The scene.
     """
     bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term))

@@ -19,28 +19,28 @@ from splitnerf.training.losses import Term
 from splitnerf.training.schedule import light_moves, light_period
 from splitnerf.training.step import Step
 
-MOST_GRAPHS = 4  # kept; they share work memory, but each has the gradients that it leaves
-SAMPLE_SLACK = 1.15  # capacity over the samples that are aimed at
-SHADING_SLACK = 1.25  # capacity over what was last counted
+MOST_GRAPHS = 4  # graphs kept; they share work memory, but each has its own gradients
+SAMPLE_SLACK = 1.15  # capacity for samples, over the target of a step
+SHADING_SLACK = 1.25  # capacity for shaded samples and segments, over the last count
 CAPACITY_UNIT = 256
 
 
 class Graph(Protocol):
-    """Recorded work."""
+    """A recorded sequence of GPU work."""
 
     def replay(self) -> None:
-        """Does it again, with what its tensors hold now."""
+        """Runs the work again on the current values of its tensors."""
 
 
 class Recorded(NamedTuple):
     """A recorded step.
 
     Attributes:
-        graph: The work.
-        batch, found, light: The inputs that it reads, in memory of their own.
-        outputs: Its rays and the terms of its loss.
-        grads: The gradients of the model's parameters, in memory that each replay writes.
-        capacity: The numbers of shaded samples and of segments for which it has room.
+        graph: The recorded work.
+        batch, found, light: The graph's inputs, in memory of their own.
+        outputs: The rendered rays and the terms of the loss.
+        grads: The gradients of the model's parameters, in memory that each replay overwrites.
+        capacity: The largest numbers of shaded samples and of segments that the graph can hold.
     """
 
     graph: Graph
@@ -53,28 +53,29 @@ class Recorded(NamedTuple):
 
 
 class GraphedStep(Step):
-    """A step whose rendering, losses and backward pass are one launch where shapes allow; see :class:`Step`.
+    """A step whose rendering, losses and backward pass are one launch where shapes repeat; see :class:`Step`.
 
-    A graph repeats what the host decided when it was recorded: sizes, numbers, memory. So samples are padded to a fixed
-    capacity, and all else that the host decides is the key of the graph. The first step with a key is made as it is, the
-    next is recorded. What one step returns is overwritten by the next. Parameters and caches of the model keep their memory
-    as long as keys are the same.
+    A graph repeats the host's decisions at the time of recording: sizes, numbers, addresses of memory. So samples are
+    padded to a fixed capacity, and all other decisions of the host form the key of the graph. The first step with a key
+    runs without a graph, the next one is recorded. Each step overwrites the results of the step before. Parameters and
+    caches of the model must stay at the same addresses while the key stays the same.
     """
 
     def __init__(self, model: SceneModel, *parts: Any):
         super().__init__(model, *parts)
         self.capacity = round_up(SAMPLE_SLACK * model.config.sampling.target_samples)
         self._counts: tuple[float, float] | None = None  # shaded samples and segments of the last step
-        self._used: tuple[int, int] | None = None  # its capacity
+        self._used: tuple[int, int] | None = None  # capacity of the last step
         self._seen: set[Hashable] = set()
-        self._has_loaded = False  # every kernel of a step with a capacity
+        self._has_loaded = False  # whether all kernels of a step with a capacity are loaded
         self._graphs: dict[Hashable, Recorded] = {}
         self._stream = torch.cuda.Stream(model.device)
         self._pool = torch.cuda.graph_pool_handle()
 
     @contextmanager
     def stream(self) -> Iterator[None]:
-        """All work of the block goes to the queue in which graphs are recorded, to which their gradients are tied."""
+        """Runs the block's work in the CUDA stream that graphs are recorded in; autograd ties gradients to that
+        stream."""
         outside = torch.cuda.current_stream(self.model.device)
         self._stream.wait_stream(outside)
         try:
@@ -95,7 +96,7 @@ class GraphedStep(Step):
         if len(found.directions) != self.capacity or key not in self._seen or self._counts is None:
             self._seen.add(key)
             return differentiate(batch, found, light, None)
-        self.model.sdf_field.grid.stored()  # a copy in 16 bits is made before, not by the graph
+        self.model.sdf_field.grid.stored()  # makes the 16-bit copy before the graph, not in it
         if key in self._graphs and not has_room(self._graphs[key].capacity, self._counts, slack=1.1):
             del self._graphs[key]
         if key not in self._graphs:
@@ -109,7 +110,7 @@ class GraphedStep(Step):
         return self._replayed(self._graphs[key], batch, found, light)
 
     def _decided(self, step: int, progress: float) -> tuple:
-        """What the host decides about a step, but for sizes: steps that agree in it do the same to their tensors."""
+        """The host's decisions about a step, except sizes: steps with equal decisions run the same work."""
         c, model = self.model.config, self.model
         since = step % light_period(c) + 1 if light_moves(c, step) else 0
         return (
@@ -128,7 +129,7 @@ class GraphedStep(Step):
         light = light.with_tensors(leaves, [x.clone() for x in light.constants])
 
         def work() -> tuple[RenderedRays, dict[str, Term]]:
-            light.zero_grad()  # gradients of one step, not of all
+            light.zero_grad()  # a replay adds the gradients of one step only
             return function(batch, found, light, capacity)
 
         graph, outputs = record(work, self._pool, self.generator)
@@ -142,7 +143,7 @@ class GraphedStep(Step):
         old = [*tree_leaves((recorded.batch, recorded.found)), *recorded.light.leaves, *recorded.light.constants]
         new = [*tree_leaves((batch, found)), *light.leaves, *light.constants]
         with torch.no_grad():
-            for dtype in {x.dtype for x in new}:  # one launch for all of a type
+            for dtype in {x.dtype for x in new}:  # one launch for all tensors of a type
                 torch._foreach_copy_(
                     [x for x in old if x.dtype == dtype], [x.detach() for x in new if x.dtype == dtype]
                 )
@@ -155,7 +156,7 @@ class GraphedStep(Step):
         return recorded.outputs
 
     def is_complete(self, n_shaded: float, n_segments: float) -> bool:
-        """Whether the last step had room for as many as it counted. Where it had not, its results have no meaning, and all
+        """Whether the last step's capacity was enough for its counts. If not, its results have no meaning, and all
         graphs are dropped."""
         self._counts = n_shaded, n_segments
         complete = self._used is None or has_room(self._used, self._counts)
@@ -166,22 +167,22 @@ class GraphedStep(Step):
 
 
 def record(function: Callable[[], Any], pool: Any, generator: torch.Generator) -> tuple[Graph, Any]:
-    """A graph of what a function does on the current stream, and what it returned; nothing is done yet.
+    """Records the work of a function without running it; returns the graph and the function's result.
 
     Args:
-        function: Work without an answer to wait for, called once.
-        pool: Memory that graphs share. None of them may need what another has left.
-        generator: Random numbers that the function draws.
+        function: Work that never waits for a result of the GPU; called once.
+        pool: The memory that graphs share. No graph may rely on values that another graph left there.
+        generator: The random generator that the function draws from.
     """
     graph = torch.cuda.CUDAGraph()
     graph.register_generator_state(generator)
     collects = gc.isenabled()
-    gc.disable()  # what it would free within the recording would be part of it
-    graph.capture_begin(pool=pool, capture_error_mode="thread_local")  # meshes are made by another thread
+    gc.disable()  # memory freed during the recording would become part of the graph
+    graph.capture_begin(pool=pool, capture_error_mode="thread_local")  # another thread makes meshes meanwhile
     try:
         outputs = function()
     except BaseException:
-        with suppress(RuntimeError):  # the first error is the one to tell
+        with suppress(RuntimeError):  # the first error is the one to report
             graph.capture_end()
         raise
     finally:
@@ -192,10 +193,10 @@ def record(function: Callable[[], Any], pool: Any, generator: torch.Generator) -
 
 
 def has_room(capacity: tuple[int, int], counts: tuple[float, float], slack: float = 1.0) -> bool:
-    """Whether the capacity is enough for so many, times `slack`."""
+    """Whether the capacity is at least ``slack`` times the counts."""
     return all(slack * n <= room for n, room in zip(counts, capacity))
 
 
 def round_up(n: float) -> int:
-    """To a multiple of the unit of capacities."""
+    """The smallest multiple of the capacities' unit that is at least n."""
     return -(-int(n) // CAPACITY_UNIT) * CAPACITY_UNIT

@@ -1,4 +1,4 @@
-"""The training loop: from posed images to a surface, its materials and the light. Reads top to bottom."""
+"""The training loop: from posed images to a surface, its materials and the light."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ from splitnerf.training.repeatable import same_bits
 from splitnerf.training.schedule import light_moves, light_period, next_ray_count
 from splitnerf.training.step import Step
 
-LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first ones are logged one by one
+LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps are all logged
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion
 
 
 @dataclass
 class TrainedScene:
-    """What a finished (or interrupted) training leaves in memory."""
+    """The scene that a finished or interrupted training leaves in memory."""
 
     model: SceneModel
     grid: OccupancyGrid
@@ -59,10 +59,10 @@ class TrainedScene:
 
 
 class StepNumbers(NamedTuple):
-    """What the host reads of a step, in one go.
+    """The numbers that the host reads from one step, in one transfer.
 
     Attributes:
-        values: The terms of the loss without their weights, by name, the colour's first.
+        values: The terms of the loss without their weights, by name; the colour's term comes first.
         loss: The weighted sum.
         largest_gradient: The largest magnitude among all gradients.
         n_samples, n_evaluated, n_shaded: Samples composited, points evaluated to find them, samples shaded.
@@ -83,22 +83,23 @@ def train(
 ) -> TrainedScene:
     """Trains a scene and keeps a checkpoint, a log and previews in the run's folder.
 
-    The schedule (learning rate, levels, annealing, meshes) follows the progress: the share of steps
-    done or of minutes used, whichever is more. Ctrl-C ends the run with a checkpoint, after the current step or when
-    the light moves next.
+    The schedule (learning rate, levels, annealing, meshes) follows the progress in [0, 1]: the larger of the share of
+    steps done and the share of minutes used. Ctrl-C ends the run with a checkpoint at the next step after which no
+    gradients of the light are pending.
 
     Args:
         dataset: The train split.
-        config: Settings; with ``resume`` those of the checkpoint are meant to be passed.
-        run: The run's folder, which exists.
-        device: Where images, fields and samples are; meshes are made and traced on the CPU.
-        resume: Continue from ``run/checkpoint.pt``, whatever device wrote it.
+        config: The run's settings; with ``resume`` pass those of the checkpoint.
+        run: The run's folder; it must exist.
+        device: The device of images, fields and samples; meshes are extracted and traced on the CPU.
+        resume: Whether to continue from ``run/checkpoint.pt``, which any device may have written.
 
     Raises:
-        InputError: The checkpoint belongs to another scene or cannot be read, or the device cannot repeat its bits.
-        splitnerf.training.finite.Diverged: Numbers are no longer finite, by the rule that stands there; the last checkpoint
-            stands.
-        OSError: The disk is full; the last checkpoint stands.
+        InputError: The checkpoint belongs to another scene or cannot be read, or the settings ask for equal bits on a
+            device that cannot repeat them.
+        splitnerf.training.finite.Diverged: Numbers are no longer finite, by the rule in that class; the last checkpoint
+            is kept.
+        OSError: The disk is full; the last checkpoint is kept.
     """
     check_repeatable(config, device)
     training = Training(dataset, config, run, torch.device(device))
@@ -116,7 +117,7 @@ def train(
 
 
 class Training:
-    """A training and all that a checkpoint keeps of it.
+    """A training: its scene, optimiser and schedule, with the state that a checkpoint stores.
 
     Args:
         dataset, config, run, device: See :func:`train`.
@@ -139,7 +140,7 @@ class Training:
         step = GraphedStep if c.run.cuda_graphs and device.type == "cuda" else Step
         self.take_step = step(self.model, self.grid, self.mesh, self.generator)
         self.watch = GradientWatch(self.model.parameters())
-        self.light: EvaluatedLight | None = None  # as it stands, until it moves
+        self.light: EvaluatedLight | None = None  # evaluated; None after its parameters moved
         self.environment: Tensor | None = None  # the light that weighs traced occlusion
         self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.sampling.initial_rays, 0.0
         self.psnr_mean: float | None = None
@@ -147,7 +148,7 @@ class Training:
         self.first = True  # step of the run
 
     def restore(self) -> None:
-        """Goes on from the run's checkpoint."""
+        """Restores the state from the run's checkpoint."""
         path = self.run / "checkpoint.pt"
         content = load_checkpoint(path)
         check_same_scene(content, self.fingerprint, self.run)
@@ -184,18 +185,19 @@ class Training:
 
     @property
     def progress(self) -> float:
-        """Where the schedule stands, in [0, 1]."""
+        """The progress of the schedule, in [0, 1]."""
         c = self.config
         by_time = self.seconds / (60.0 * c.run.max_minutes) if c.run.max_minutes > 0 else 0.0
         return min(1.0, max(self.step / c.run.steps, by_time))
 
     @property
     def may_stop(self) -> bool:
-        """Whether no gradients wait for the light to move."""
+        """Whether no gradients of the light are pending."""
         return self.step % light_period(self.config) == 0
 
     def refresh(self) -> None:
-        """Brings up to date what steps share: levels, rates, occupied cells, the mesh, and the light that it sees and sends."""
+        """Updates what steps share: open levels, learning rates, occupied cells, the mesh, and the light on the
+        mesh."""
         c, model, step, progress = self.config, self.model, self.step, self.progress
         model.open_levels(progress)
         set_learning_rate(self.optimiser, c, step, progress)
@@ -219,7 +221,8 @@ class Training:
             model.refresh_indirect(self.light)
 
     def advance(self, log: TextIO, bar: Progress) -> None:
-        """Makes one step: rays, gradients, parameters; then what is written from time to time."""
+        """Makes one step: draws rays, takes gradients, moves parameters; writes logs, previews and checkpoints when
+        due."""
         c, light = self.config, self.light
         batch = draw_batch(self.source, self.n_rays, c)
         ray, terms = self.take_step(batch, light, self.environment, self.step, self.progress)
@@ -250,7 +253,7 @@ class Training:
             self.save()
 
     def read(self, ray: RenderedRays, terms: dict[str, Term]) -> StepNumbers:
-        """Waits for the step, once."""
+        """Waits for the step once and reads its numbers."""
         numbers = torch.stack([*(term.value.detach() for term in terms.values()), self.watch.largest()])
         counts = torch.cat([ray.samples.offsets[-1:], ray.evaluated.sum()[None], ray.sizes])
         *values, largest, n_samples, n_evaluated, n_shaded, _, n_segments = torch.cat([numbers, counts]).tolist()
@@ -259,7 +262,7 @@ class Training:
         return StepNumbers(dict(zip(terms, values)), loss, largest, n_samples, n_evaluated, n_shaded, is_complete)
 
     def line(self, batch: Batch, terms: dict[str, Term], numbers: StepNumbers) -> dict[str, object]:
-        """A line of metrics.jsonl."""
+        """The values of one line of metrics.jsonl, by name."""
         evaluated = max(1, numbers.n_evaluated)
         return {
             "step": self.step, "seconds": round(self.seconds, 3), "progress": self.progress, "loss": numbers.loss,
@@ -272,7 +275,8 @@ class Training:
         }  # fmt: skip
 
     def finish(self) -> None:
-        """Ends with a checkpoint; a finished run renders from here on with the final surface."""
+        """Updates grid and mesh to the final surface, unless the run was interrupted, and writes the last
+        checkpoint."""
         self.optimiser.zero_grad(set_to_none=True)
         check_state(self.step, self.model, self.optimiser)
         finished = self.progress >= 1.0
@@ -285,12 +289,12 @@ class Training:
         self.save()
 
     def result(self) -> TrainedScene:
-        """What the training leaves in memory."""
+        """The scene as the training leaves it in memory."""
         return TrainedScene(self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0)
 
 
 def check_repeatable(config: Config, device: torch.device | str) -> None:
-    """Raises InputError where a run shall have the same bits on a device that adds in any order."""
+    """Raises InputError where the settings ask for equal bits on a device whose sums have no fixed order."""
     if config.run.deterministic and torch.device(device).type != "cpu":
         raise InputError("a deterministic run needs the CPU, as a GPU adds in any order; leave out --device")
 

@@ -22,15 +22,15 @@ from splitnerf.ops import (
 )
 from splitnerf.render.renderer import RenderedRays
 
-ALBEDO_FLOOR = 0.01  # below it albedos count as one black
+ALBEDO_FLOOR = 0.01  # albedos below it count as the same black
 
 
 class Term(NamedTuple):
     """One term of the loss.
 
     Attributes:
-        weight: Of it.
-        value: [] the term without.
+        weight: The factor of the term in the loss.
+        value: [] the term without its weight.
     """
 
     weight: float
@@ -44,25 +44,26 @@ def _seed(weight: float, device: torch.device) -> Tensor:
 
 
 def backward(terms: dict[str, Term]) -> None:
-    """Takes the gradient of the weighted sum of the terms to all that they come from. The weights are where the backward
-    pass begins, so that no product or sum of them is computed."""
-    seeds = [_seed(term.weight, term.value.device) for term in terms.values()]  # all, that later steps find them made
+    """Takes the gradients of the weighted sum of the terms. The weights seed the backward pass, so that the weighted
+    sum itself is never computed."""
+    seeds = [_seed(term.weight, term.value.device) for term in terms.values()]  # cached at first use
     values = [(term.value, seed) for term, seed in zip(terms.values(), seeds) if term.value.requires_grad]
     torch.autograd.backward(*map(list, zip(*values)))
 
 
 def penalty(error: Tensor, form: str) -> Tensor:
-    """Elementwise error^2 (`square`), or half of it that turns linear at 1 (`smooth_l1`)."""
+    """Elementwise error^2 (`square`), or error^2 / 2 below 1 and |error| - 1/2 above (`smooth_l1`)."""
     return error.square() if form == "square" else F.smooth_l1_loss(error, torch.zeros_like(error), reduction="none")
 
 
 def light_loss(light: Light, config: Config, generator: torch.Generator, seed: int) -> Tensor:
     """Distance of g(w, rho) from the Monte Carlo integral of g(w, 0), for random directions and roughness.
 
-    Half of the queries ask at rho = 1, the rest uniformly in [0, 1]. Broad lobes share one set of light directions, a
-    rotated lattice or, as published, random ones (``light_set``); those below ``light_lobe_below`` sample their own lobe
-    exactly. The gradient flows into both sides. With ``light_noise`` the set is two of half its size, and how far their
-    integrals are apart decides its size in the steps to come.
+    Half of the queries have rho = 1, the others a uniform rho in [0, 1]. Broad lobes share one set of light directions:
+    a rotated lattice or, as published, random directions (``light_set``). A lobe below the roughness
+    ``light_lobe_below`` samples its own directions from its density. The gradient flows into both sides. With
+    ``light_noise`` the set
+    consists of two halves; the difference of their two integrals decides the size of the set in later steps.
 
     Source: SplitNeRF Eq. (11); the size of the set is our addition.
     """
@@ -104,10 +105,10 @@ def light_directions(config: Config, n: int, queries: Tensor, generator: torch.G
 
 
 def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.Generator) -> Tensor:
-    """Mean squared log chroma of the diffuse light g(n, 1): how far its channels are from their geometric mean.
+    """Mean squared log chroma of the diffuse light g(n, 1): the distance of its log channels from their mean.
 
-    Images of a diffuse object leave it open whether a colour is the object's or the light's. This prefers a
-    light without colour where nothing speaks against it.
+    Images of a diffuse object do not determine whether a colour is the object's or the light's. This loss prefers a
+    light without colour where the images allow it.
     """
     normals = F.normalize(
         torch.randn(config.losses.neutral_queries, 3, generator=generator, device=generator.device), dim=1
@@ -119,9 +120,10 @@ def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.G
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:
     """Quadratic entropy of the materials of surface points, -ln mean exp(-|x_i - x_j|^2 / 4) over all pairs.
 
-    Images leave open how bright a side of the object is and how bright its light. This prefers the split in which few
-    materials make up the object: points alike in colour and gloss draw together, and those far apart do not. x holds log
-    albedo, roughness and metallic, each over the width within which points count as alike.
+    Images do not determine how bright a side of the object is and how bright its light is. This loss prefers the split
+    in
+    which the object has few materials: points of similar colour and gloss attract each other, and dissimilar points do
+    not. x holds log albedo, roughness and metallic, each divided by the width within which points count as similar.
 
     Source: Barron and Malik 2015 (SIRFS), section 4.2, for reflectance; the gloss is our addition.
     """
@@ -129,7 +131,7 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
     weights = ray.shares
     if len(weights) == 0:
         return weights.new_zeros(())
-    weights = weights.nan_to_num(0.0, 0.0, 0.0) + 1e-12  # the loss tells of what is not finite
+    weights = weights.nan_to_num(0.0, 0.0, 0.0) + 1e-12  # a loss that is not finite is reported by the loss itself
     chosen = torch.multinomial(weights, c.losses.entropy_points, replacement=True, generator=generator)
     taken = points.albedo, points.roughness, points.metallic
     albedo, roughness, metallic = (x.index_select(0, chosen) for x in taken)
@@ -143,8 +145,8 @@ def occlusion_loss(
 ) -> Tensor:
     """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples.
 
-    The specular lobe is that about the light's direction, or, without ``occlusion.directional``, that about the normal,
-    as published.
+    The specular lobe's axis is the query direction of the specular light or, without ``occlusion.directional``, the
+    normal, as published.
 
     Source: SplitNeRF Eq. (12)-(16).
     """

@@ -1,4 +1,4 @@
-"""The surface of a training as a mesh: made anew from time to time, at once or beside the training."""
+"""The surface of a training as a mesh, renewed from time to time, in the training's thread or in another."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class TracedMesh(NamedTuple):
     Attributes:
         scene: The mesh below.
         vertices, faces: [n, 3] float32 and [m, 3] int32, on the CPU.
-        bits: What the vertices see; None where occlusion is not cached.
+        bits: The visibility of the vertices; None where occlusion is not cached.
     """
 
     scene: MeshScene
@@ -36,14 +36,14 @@ class SurfaceMesh:
     """The newest mesh of a model's surface.
 
     Args:
-        model: Uses each mesh as soon as it is there.
-        background: Whether a thread of its own makes the meshes while the caller goes on. The thread reads a copy of the field
-            and traces on the processor's cores; :meth:`poll` takes the mesh over. The thread ends with the program.
+        model: The scene; it uses each mesh as soon as the mesh is ready.
+        background: Whether a thread makes the meshes while the caller continues. The thread reads a copy of the field
+            and traces on the CPU; :meth:`poll` takes over the mesh. The thread ends with the program.
 
     Attributes:
         current: The mesh in use; None before the first.
-        made_at: The progress of the training whose surface that is.
-        asked_at: The same of the newest that was asked for.
+        made_at: The training's progress in [0, 1] at the request for the mesh in use.
+        asked_at: The training's progress in [0, 1] at the newest request.
     """
 
     def __init__(self, model: SceneModel, *, background: bool = False):
@@ -53,12 +53,12 @@ class SurfaceMesh:
 
     @property
     def scene(self) -> MeshScene | None:
-        """What rays are traced through."""
+        """The scene that rays are traced through; None before the first mesh."""
         return self.current.scene if self.current else None
 
     def request(self, progress: float) -> None:
-        """Makes a mesh of the surface as it is now; beside the caller's work where that was asked for, unless one is
-        being made. The old one stays while the field has no surface.
+        """Makes a mesh of the current surface. With ``background`` the thread makes it, unless it is still busy with an
+        earlier mesh. The old mesh stays in use while the field has no surface.
 
         Raises:
             RuntimeError: The field is not finite.
@@ -70,12 +70,12 @@ class SurfaceMesh:
             self._use(make_mesh(self.model, network))
             return
         network = network.snapshot()
-        wait_for(self.model.device)  # the thread's work has a queue of its own
+        wait_for(self.model.device)  # the thread works in another CUDA stream
         self._made = Future()
         threading.Thread(target=fulfil, args=(self._made, make_mesh, self.model, network), daemon=True).start()
 
     def poll(self, wait: bool = False) -> None:
-        """Uses a mesh that was made beside the caller's work, if it is done, or waits for it.
+        """Uses the mesh of the thread if it is ready; with ``wait``, waits for it.
 
         Raises:
             RuntimeError: The field was not finite.
@@ -91,7 +91,7 @@ class SurfaceMesh:
         self._use(None if stored[0] is None else traced(self.model, *stored))
 
     def state(self) -> dict[str, Tensor | float | None]:
-        """What a checkpoint keeps of it."""
+        """The part of the state that a checkpoint stores."""
         _, vertices, faces, _ = self.current or (None,) * 4
         return {"mesh_vertices": vertices, "mesh_faces": faces, "meshed_at": self.made_at}
 
@@ -103,15 +103,15 @@ class SurfaceMesh:
 
 
 def fulfil(future: Future, function: Callable, *args: object) -> None:
-    """Calls a function for somebody who waits for what it returns or raises."""
+    """Calls a function and stores its result or its exception in a future."""
     try:
         future.set_result(function(*args))
-    except BaseException as error:  # is raised where it is waited for
+    except BaseException as error:  # the thread that waits for the future raises it
         future.set_exception(error)
 
 
 def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
-    """The zero level set of a field, traced; None where it is empty. Of the model only constants are read.
+    """The zero level set of a field, traced; None where it is empty. Only constants of the model are read.
 
     Raises:
         RuntimeError: The field is not finite.
@@ -124,11 +124,11 @@ def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
 
 
 def traced(model: SceneModel, vertices: Tensor, faces: Tensor) -> TracedMesh:
-    """A mesh with what the model's occlusion keeps of it."""
+    """A mesh with the visibility that the model's occlusion caches for it."""
     scene = MeshScene(vertices.numpy(), faces.numpy())
     return TracedMesh(scene, vertices, faces, model.occlusion.trace(scene, vertices, faces))
 
 
 def distances(network: SdfNetwork) -> Callable[[Tensor], Tensor]:
-    """The field as a function of points [n, 3] on the CPU, wherever it is computed."""
+    """The field, on any device, as a function from points [n, 3] to distances [n], both on the CPU."""
     return lambda points: sdf_values(points.to(network.table.device), network).cpu()

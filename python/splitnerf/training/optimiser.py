@@ -10,7 +10,7 @@ from splitnerf.render.model import SceneModel
 
 
 def make_optimiser(model: SceneModel, config: Config) -> torch.optim.Optimizer:
-    """AdamW with the released code's settings; the sharpness and the texels of a light have rates of their own and no decay."""
+    """AdamW with the released code's settings; sharpness and light texels have their own rates and no decay."""
     c, grid = config, model.sdf_field.grid
     texels = [model.light.texels] if c.light.kind == "pyramid" else []
     table = [grid.table] if c.optimiser.sparse_steps else []

@@ -1,4 +1,4 @@
-"""What a long run shows and hears: its progress, and Ctrl-C."""
+"""The display of a long run's progress, and its handling of Ctrl-C."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import time
 
 from tqdm import tqdm
 
-LINE_EVERY = 10.0  # seconds between lines where the output is no terminal
+LINE_EVERY = 10.0  # seconds between lines where the output is not a terminal
 
 
 class Interrupt:
@@ -29,7 +29,8 @@ class Interrupt:
 
 
 class Progress:
-    """Share done, time left, PSNR of the batch and samples a ray: a bar on a terminal, elsewhere a line every ten seconds."""
+    """Shows the share done, the time left, the batch's PSNR in dB and the samples per ray: as a bar on a terminal,
+    elsewhere as a line every ten seconds."""
 
     def __init__(self, start: float):
         self._is_terminal = sys.stderr.isatty()

@@ -10,16 +10,16 @@ import torch
 
 @contextmanager
 def same_bits(on: bool) -> Iterator[None]:
-    """Has torch add in a fixed order within the block, where ``on``; the program's own operators always do.
+    """With ``on``, makes torch add in a fixed order within the block; the program's own operators always do so.
 
-    Threads that scatter into one tensor otherwise add in the order in which they come. Sums still depend on how many
-    threads there are, and on what the processor can do.
+    Without it, threads that scatter into one tensor add in the order in which they arrive. Sums still depend on the
+    number of threads and on the processor's instruction set.
     """
     before = torch.are_deterministic_algorithms_enabled(), torch.utils.deterministic.fill_uninitialized_memory
     try:
         if on:
             torch.use_deterministic_algorithms(True)
-            torch.utils.deterministic.fill_uninitialized_memory = False  # nothing reads what it has not written
+            torch.utils.deterministic.fill_uninitialized_memory = False  # no code reads memory before it writes it
         yield
     finally:
         torch.use_deterministic_algorithms(before[0])

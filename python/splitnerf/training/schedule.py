@@ -1,31 +1,31 @@
-"""What changes in the course of a training, and when."""
+"""The schedule of a training: what changes with the progress, and when."""
 
 from __future__ import annotations
 
 from splitnerf.config import Config
 
-NEARLY = 0.1  # of the budget of samples
-RAY_UNITS = 16  # numbers of rays between a power of 2 and the next that `cuda_graphs` takes
+NEARLY = 0.1  # share of the sample budget within which the ray count stays
+RAY_UNITS = 16  # `cuda_graphs` uses this many ray counts between one power of 2 and the next
 
 
 def cosine_anneal(config: Config, progress: float) -> float:
-    """0 at the start, 1 from ``cos_anneal_by`` of the run."""
+    """The annealing of the cosine at this progress: 0 at the start, 1 from ``cos_anneal_by`` of the run on."""
     return min(1.0, progress / config.surface.cos_anneal_by) if config.surface.cos_anneal_by > 0 else 1.0
 
 
 def light_period(config: Config) -> int:
-    """Steps that share one pass through the light's maps."""
+    """The number of steps that share one evaluation of the light's maps."""
     return config.optimiser.light_step_every if config.light.kind == "pyramid" else 1
 
 
 def light_moves(config: Config, step: int) -> bool:
-    """Whether the light takes its gradients in this step."""
+    """Whether the light's parameters move in this step."""
     return (step + 1) % light_period(config) == 0 or step + 1 == config.run.steps
 
 
 def next_ray_count(n_rays: int, n_samples: float, config: Config) -> int:
-    """As many rays as fill the budget of samples, moving by at most a factor of 1.25 a step; with ``cuda_graphs`` as many as
-    before while the budget is nearly met, so that sizes repeat."""
+    """The number of rays that fills the sample budget. It changes by a factor in [0.8, 1.25] a step. With
+    ``cuda_graphs`` it does not change while the samples are within 10 % of the budget, so that sizes repeat."""
     wanted = n_rays * config.sampling.target_samples / max(1, n_samples)
     if config.run.cuda_graphs and abs(wanted / n_rays - 1.0) < NEARLY:
         return n_rays

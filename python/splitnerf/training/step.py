@@ -1,4 +1,4 @@
-"""What one training step computes: rays as they are rendered now, the terms of the loss, and their gradients."""
+"""One training step: it renders rays, computes the terms of the loss and takes their gradients."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ CHANNELS = 3
 
 
 class Step:
-    """One training step up to the gradients, which it leaves at the model's parameters and the light's leaves.
+    """One training step up to the gradients, which it stores at the model's parameters and the light's leaves.
 
     Args:
-        model, grid, mesh: The scene, where it is occupied, and its newest mesh.
+        model, grid, mesh: The scene, its occupancy grid and its newest mesh.
         generator: Random numbers for the losses' subsets.
     """
 
@@ -41,12 +41,12 @@ class Step:
 
         Args:
             batch: The rays.
-            light: The light as it stands.
-            environment: [h, 2h, 3], the light that weighs the traced occlusion; None: none is traced.
-            step, progress: Where the training stands.
+            light: The evaluated light.
+            environment: [h, 2h, 3] linear radiance that weighs the traced occlusion; None: no occlusion is traced.
+            step, progress: The number of the step, and the training's progress in [0, 1].
 
         Returns:
-            The rays as they were rendered, and the terms of the loss by name, the colour's first.
+            The rendered rays, and the terms of the loss by name; the colour's term comes first.
         """
         return self.differentiate(batch, self.find(batch, progress), light, environment, step, progress)
 
@@ -59,7 +59,8 @@ class Step:
         self, batch: Batch, found: FoundSamples, light: EvaluatedLight, environment: Tensor | None, step: int,
         progress: float, capacity: tuple[int, int] | None = None,
     ) -> tuple[RenderedRays, dict[str, Term]]:  # fmt: skip
-        """Renders found samples and takes the gradients; ``capacity`` as in :func:`splitnerf.render.renderer.render_rays`."""
+        """Renders found samples and takes the gradients; for ``capacity`` see
+        :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
         ray = render_rays(self.model, light, found, shades_per_ray=c.sampling.shades_per_ray, capacity=capacity)
         terms = loss_terms(self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress)
@@ -68,11 +69,11 @@ class Step:
         return ray, terms
 
     def is_complete(self, n_shaded: float, n_segments: float) -> bool:
-        """Whether the last step's results hold all that was counted; here they always do."""
+        """Whether the last step's results hold all samples and segments that were counted; here they always do."""
         return True
 
     def stream(self) -> AbstractContextManager[None]:
-        """The block in which steps are made."""
+        """The context in which steps run."""
         return nullcontext()
 
 
@@ -80,15 +81,17 @@ def loss_terms(
     model: SceneModel, light: EvaluatedLight, batch: Batch, ray: RenderedRays, scene: MeshScene | None,
     environment: Tensor | None, generator: torch.Generator, step: int, progress: float,
 ) -> dict[str, Term]:  # fmt: skip
-    """The terms of the loss by name, the colour's first.
+    """The terms of the loss by name; the colour's term comes first.
 
     Args:
-        model, light: The scene, and its light as it stands.
-        batch, ray: The rays, and how they are rendered now.
-        scene: The surface as a mesh, once there is one.
-        environment: [h, 2h, 3], the light that weighs the traced occlusion; None: none is traced.
-        generator: Random numbers for subsets.
-        step, progress: Where the training stands.
+        model, light: The scene, and its evaluated light.
+        batch, ray: The rays, and their rendering.
+        scene: The surface as a mesh; None before the first mesh.
+        environment: [h, 2h, 3] linear radiance that weighs the traced occlusion; None: no occlusion is traced.
+        generator: Random numbers for the losses' subsets.
+        step, progress: The number of the step, and the training's progress in [0, 1].
+
+    Source: SplitNeRF Eq. (3), (11), (18) and the losses named in :mod:`splitnerf.training.losses`.
     """
     c = model.config
     colour, mask = pixel_losses(ray.mean, ray.opacity, batch.target, batch.background, linear=ray.linear)
@@ -96,13 +99,13 @@ def loss_terms(
     metal, binary_metal, dark_metal = material_losses(
         ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.losses.metal_form == "smooth_l1"
     )
-    # SplitNeRF Eq. (3) sums the channels, of which `colour` is the mean.
+    # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
     terms = {"colour": Term(CHANNELS * c.losses.colour_weight, colour), "eikonal": Term(c.losses.eikonal_weight, eikonal)}
     if c.losses.mask_weight:
         terms["mask"] = Term(c.losses.mask_weight, mask)
     if model.light.needs_consistency_loss and c.losses.light_weight and step % c.losses.light_every == 0:
         terms["light"] = Term(c.losses.light_weight, losses.light_loss(model.light, c, generator, step))
-    if c.losses.neutral_weight and light_moves(c, step):  # for all steps since it moved
+    if c.losses.neutral_weight and light_moves(c, step):  # once for all steps since the light last moved
         since = step % light_period(c) + 1
         terms["neutral"] = Term(c.losses.neutral_weight * since, losses.neutral_light_loss(light, c, generator))
     if c.losses.smoothness_weight:

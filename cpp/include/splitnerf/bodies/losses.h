@@ -1,4 +1,4 @@
-// Losses with their gradients, one item a call; what a loss adds up over items goes to `sums`, in double.
+// Losses with their gradients, one item per call; the sums over items are added to `sums`, in double.
 #pragma once
 
 #include "splitnerf/accumulate.h"
@@ -73,7 +73,7 @@ template <class T> struct NormalPairsBody {
   double* scale;
 
   SPLITNERF_HD void operator()(int64_t j, double* sums) const {
-    // The CPU has checked the numbers in `beside`; whatever they are elsewhere, nothing outside the arrays is touched.
+    // On the CPU `beside` has been checked. On the GPU it has not; any value keeps all accesses inside the arrays.
     const int64_t here = clamp<int64_t>(beside[j], 0, n_weights - 1), there = n - m + j;
     const T weight = weights[here];
     const auto pair = normal_distance(load3(gradients + 3 * here), load3(gradients + 3 * there));

@@ -67,7 +67,7 @@ template <class T> struct DrawnLight {
   }
 };
 
-// What of a light that all points share arrives at one of them.
+// The part of a shared light that arrives at one point.
 template <class T> struct ArrivingLight {
   SharedLight<T> light;
 

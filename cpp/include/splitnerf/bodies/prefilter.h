@@ -38,11 +38,11 @@ template <class T> struct LobeScatter {
   }
 };
 
-// A query above whose horizon no light stands is black.
+// A query with no light above its horizon is black.
 template <class T> SPLITNERF_HD T inverse_total(T total) { return total == T(0) ? T(0) : T(1) / total; }
 
-// Into how many parts the list is cut that every item is held against, so that a GPU of any size is filled. A matter of the
-// sizes alone: the sums have the same bits on every one.
+// The number of parts that the list of all items is cut into, so that it fills a GPU of any size. It depends on the
+// sizes alone, so that the sums have the same bits on every GPU.
 inline int lobe_parts(int64_t n_items, int64_t n_sources) {
   constexpr int64_t kWanted = int64_t{1} << 18, kShortest = 256;  // threads; sources of a part
   const int64_t useful = clamp<int64_t>(kWanted / max_of<int64_t>(n_items, 1), 1, 64);

@@ -44,7 +44,8 @@ template <class T> struct MarchFillBody {
 };
 SPLITNERF_ON_GPU(MarchFillBody);
 
-// blocks [n_blocks^3]: whether a block of kBlockCells^3 cells holds one that is not empty; a group of threads a block.
+// blocks [n_blocks^3]: whether a block of kBlockCells^3 cells contains a cell that is not empty; one group of threads
+// per block.
 struct OccupiedBlocksBody {
   const uint8_t* cells;
   int resolution, n_blocks;
@@ -104,7 +105,7 @@ template <class T> struct NeusWeightsBackwardBody {
 };
 SPLITNERF_ON_GPU(NeusWeightsBackwardBody);
 
-// The samples of one ray of a surface, their intervals worked out when they are asked for.
+// The samples of one ray of a surface. Each call computes the interval of a sample.
 template <class T> struct SurfaceIntervals {
   const SurfaceSamples<T>& in;
   int64_t first;
@@ -136,7 +137,7 @@ template <class T> struct SurfaceWeightsBody {
 };
 SPLITNERF_ON_GPU(SurfaceWeightsBody);
 
-// grad_sdf [n] holds the depths meanwhile.
+// grad_sdf [n] stores the optical depths until its own values are written.
 template <class T> struct SurfaceWeightsBackwardBody {
   SurfaceSamples<T> in;
   const T *weights, *grad_normals, *grad_weights, *grad_opacity;
@@ -209,7 +210,7 @@ template <class T> struct CompositeBackwardBody {
 };
 SPLITNERF_ON_GPU(CompositeBackwardBody);
 
-// counts of a ray's shaded samples, of its stretches and of itself, if it has samples; one call a ray.
+// Per ray: the number of its shaded samples, the number of its segments, and 1 if it has samples; one call per ray.
 template <class T> struct SpreadCountBody {
   PackedRays rays;
   const T *weights, *t, *phase;
@@ -228,7 +229,7 @@ template <class T> struct SpreadCountBody {
   }
 };
 
-// The sums of those counts, as SpreadSizes has them; one call.
+// The sums of these counts over all rays, in the order of SpreadSizes; one call.
 struct SpreadSizesBody {
   const int64_t *drawn, *filled, *stretches;
   int64_t* sizes;
@@ -236,8 +237,8 @@ struct SpreadSizesBody {
   SPLITNERF_HD void operator()(int64_t) const { sizes[0] = *drawn, sizes[1] = *filled, sizes[2] = *stretches; }
 };
 
-// What stands where nothing else will. Samples from `cleared` on lie at the first shaded one; unused entries, which count for
-// nothing, are spread over what is in range, so that their gradients, which are 0, are not all added to one number.
+// Fills the entries that no ray writes. Samples from `cleared` on get the first shaded sample. Unused entries have
+// weight 0; they get indices spread over the valid range, so that their zero gradients are not all added to one number.
 template <class T> struct SpreadUnusedBody {
   PackedRays rays;
   int64_t cleared;
@@ -257,8 +258,8 @@ template <class T> struct SpreadUnusedBody {
   SPLITNERF_HD static int64_t within(int64_t i, int64_t n) { return n > 0 ? i % n : 0; }
 };
 
-// The sums of those counts [n_rays + 1] -> what Spread holds, and first, second, share [n]. A ray for which there is no room
-// leaves all as it is.
+// From the running sums of these counts [n_rays + 1]: the entries of Spread, and first, second, share [n]. A ray that
+// exceeds the capacity writes nothing.
 template <class T> struct SpreadFillBody {
   PackedRays rays;
   const T *weights, *t, *phase;
@@ -301,7 +302,7 @@ template <class T> struct PackSamplesBody {
   }
 };
 
-// interpolated [n, n_channels]; one call a value. Positions outside [0, m) count as the nearest inside, see PackedRays.
+// interpolated [n, n_channels]; one call per value. Positions outside [0, m) are clamped, see PackedRays.
 template <class T> struct InterpolateBody {
   int64_t m, n_channels;
   const int64_t *first, *second;
@@ -328,7 +329,7 @@ template <class T> struct InterpolateBackwardBody {
     const int64_t i = at / n_channels, c = at % n_channels;
     const int64_t a = clamp<int64_t>(first[i], 0, m - 1), b = clamp<int64_t>(second[i], 0, m - 1);
     const T g = grad_interpolated[at];
-    if (g == T(0)) return;  // samples of no ray are all of one
+    if (g == T(0)) return;  // padding samples all point at one entry
     add_to(grad_values + a * n_channels + c, g * (T(1) - share[i]));
     add_to(grad_values + b * n_channels + c, g * share[i]);
   }

@@ -1,5 +1,5 @@
-// The distance field's network on a tile of points, a point a thread and kSdfUnits hidden units at a time: a tile's numbers
-// stand in memory that its threads share, the weights are the same for all of them.
+// The distance field's network on a tile of points: one point per thread, kSdfUnits hidden units at a time. A tile's
+// numbers are in memory that its threads share; all threads read the same weights.
 //
 // x: inputs; h = softplus(W x + b); outputs = V h + c; steepness = W^T (slope v_0), v_0 the distance's row of V.
 #pragma once
@@ -28,7 +28,7 @@ template <class T> struct SdfTile {
   SPLITNERF_HD T& steepness(int k, int p) const { return at(n_inputs + k, p); }   // later the gradient to the inputs
   SPLITNERF_HD T& output(int m, int p) const { return at(2 * n_inputs + m, p); }  // or the gradient to it
   SPLITNERF_HD T& grad_steepness(int k, int p) const { return at(2 * n_inputs + n_outputs + k, p); }
-  // Of the units that are worked on: slope v_0, the gradient to W x + b, h, and what slope v_0 adds to v_0's gradient.
+  // Values of the current units: slope v_0, the gradient of W x + b, h, and the term of slope v_0 in v_0's gradient.
   SPLITNERF_HD T& unit(int what, int u, int p) const { return at(3 * n_inputs + n_outputs + what * kSdfUnits + u, p); }
 };
 enum SdfUnit { kWeighted, kGradSum, kHidden, kGradFirstRow };
@@ -67,7 +67,7 @@ template <class T> SPLITNERF_HD T sdf_value(const SdfLayer<T>& layer, const SdfT
   return sum;
 }
 
-// Adds what kSdfUnits numbers `of` count for over the rows of W^T.
+// Adds the product of W^T's rows with the kSdfUnits numbers `of`.
 template <class T>
 SPLITNERF_HD void add_to_inputs(const SdfLayer<T>& layer, const SdfTile<T>& tile, int first, int p,
                                 const Pack<T, kSdfUnits>& of) {
@@ -129,7 +129,8 @@ SPLITNERF_HD void sdf_gradient_backward(const SdfLayer<T>& layer, const SdfTile<
   }
 }
 
-// Units [first, first + kSdfUnits): adds to the gradient to the inputs and leaves in the tile what the weights' gradients ask for.
+// Units [first, first + kSdfUnits): adds to the gradient of the inputs and stores in the tile the values that the
+// gradients of the weights need.
 template <class T>
 SPLITNERF_HD void sdf_units_backward(const SdfLayer<T>& layer, const SdfTile<T>& tile, int first, int p) {
   const SdfUnits<T> units = sdf_units(layer, tile, first, p);
@@ -162,7 +163,7 @@ SPLITNERF_HD void sdf_units_backward(const SdfLayer<T>& layer, const SdfTile<T>&
 template <class T> SPLITNERF_HD int64_t sdf_weight_count(const SdfLayer<T>& layer) {
   return (layer.n_inputs + 1 + layer.n_outputs) * layer.width_columns + layer.n_outputs;
 }
-// Row of the list that holds the gradients to what feeds from, or into, the units; and how many there are.
+// The row of this list with the gradients of the weights from, or into, the units; and the number of rows.
 template <class T> SPLITNERF_HD int sdf_weight_rows(const SdfLayer<T>& layer) {
   return static_cast<int>(layer.n_inputs + 1 + layer.n_outputs);
 }
@@ -201,8 +202,8 @@ SPLITNERF_HD void load_field_inputs(const HashGridView<T, S>& grid, T scale, Vec
   }
 }
 
-// Follows a ray through the field to its end; keep(t_start) takes the samples to be kept. Returns how often the distance was
-// asked for.
+// Follows a ray through the field to its end and calls keep(t_start) for each kept sample. Returns the number of
+// evaluated distances.
 template <int F, class T, class S, class Keep>
 SPLITNERF_HD int64_t walk_ray(const HashGridView<T, S>& grid, const SdfLayer<T>& layer, const SdfTile<T>& tile, int p,
                               const RayLattice<T>& lattice, const OccupancyView& cells, const MarchOptions& march,
@@ -215,7 +216,7 @@ SPLITNERF_HD int64_t walk_ray(const HashGridView<T, S>& grid, const SdfLayer<T>&
   return walk.n_evaluated;
 }
 
-// At most so many samples are kept of a ray: no more than steps fit into the box.
+// The largest number of samples kept on a ray: the number of steps that fit into the box.
 template <class T> int64_t most_samples(const MarchOptions& march) {
   const double steps = std::ceil(2 * 1.7320508 * double(march.box) / double(march.step)) + 3;
   return max_of<int64_t>(static_cast<int64_t>(min_of(steps, double(march.max_samples))), 1);

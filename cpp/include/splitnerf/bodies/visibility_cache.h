@@ -1,4 +1,4 @@
-// Reading the visibility cache, a group of threads a point: each looks at some of the fixed directions.
+// Lookups in the visibility cache, one group of threads per point: each thread handles some of the fixed directions.
 #pragma once
 
 #include "splitnerf/group.h"
@@ -8,7 +8,7 @@
 
 namespace splitnerf {
 
-// What the neighbours of a point know of one direction.
+// The visibility of one direction from the neighbours of a point.
 template <class T> struct DirectionShares {
   T known, open;     // sums of the neighbours' weights
   uint32_t blocked;  // bit k: neighbour k sees it blocked
@@ -31,7 +31,7 @@ SPLITNERF_HD DirectionShares<T> direction_shares(const VisibilityCache<T>& cache
   return shares;
 }
 
-// Whether no neighbour has a blocked direction above the point's horizon; so without neighbours.
+// Whether no neighbour has a blocked direction above the point's horizon; true without neighbours.
 template <class T, class Group>
 SPLITNERF_HD bool sees_all(const Group& group, const VisibilityCache<T>& cache, const Neighbours<T>& near,
                            Vec3<T> normal) {
@@ -104,7 +104,7 @@ template <class T> struct CachedOcclusionBody {
     for (int c = 0; c < 3; ++c) o[c] = below[c] > T(0) ? min_of(above[c] / below[c], T(1)) : T(1);
     return o;
   }
-  // The same for both factors.
+  // One result for both factors.
   template <class Group> SPLITNERF_HD void keep(const Group& group, int64_t p, Vec3<T> occlusion, T indirect) const {
     if (group.lane() > 0) return;
     store3(occlusion_d + 3 * p, occlusion), store3(occlusion_s + 3 * p, occlusion);

@@ -54,10 +54,10 @@ class Document:
         self._earn(len(data))
 
     def spend(self, n_values: int) -> None:
-        """Counts numbers that are about to be unpacked; few bytes may stand for endlessly many.
+        """Counts numbers before they are unpacked, since few bytes can expand to very many numbers.
 
         Raises:
-            InputError: They are more than files of this size hold.
+            InputError: The total is larger than files of this size can hold.
         """
         self._left -= n_values
         if self._left < 0:
@@ -71,13 +71,13 @@ class Document:
         """Decodes one accessor.
 
         Args:
-            index: The accessor's.
+            index: The accessor's index.
 
         Returns:
             [count, components], float64 where the file stores floats or normalised integers, else int64.
 
         Raises:
-            InputError: It reaches beyond its buffer, or a file is missing.
+            InputError: The accessor reaches beyond its buffer, or a file is missing.
         """
         accessor = self.json["accessors"][index]
         dtype, width = np.dtype(COMPONENTS[accessor["componentType"]]), WIDTHS[accessor["type"]]
@@ -104,7 +104,7 @@ class Document:
         return values.astype(np.int64)
 
     def image(self, index: int) -> tuple[bytes, str]:
-        """The encoded bytes of an image, and how to call it in a message."""
+        """The encoded bytes of an image, and its name for messages."""
         image = self.json["images"][index]
         name = f"{self.path}: image {index}" + (f" '{image['name']}'" if "name" in image else "")
         return (self._view(image["bufferView"]) if "bufferView" in image else self._resource(image["uri"])), name

@@ -126,7 +126,7 @@ def _local_matrix(node: dict) -> np.ndarray:
 def _skin_matrices(
     document: Document, label: str, skin: int, attributes: dict, matrices: dict[int, np.ndarray]
 ) -> np.ndarray:
-    """[n, 4, 4]: of each vertex the mean of joint * inverse bind matrix by its weights; the node's own has no say."""
+    """[n, 4, 4] weighted means of joint * inverse bind matrix for each vertex; the node's own matrix does not count."""
     joints = document.json["skins"][skin]["joints"]
     missing = [joint for joint in joints if joint not in matrices]
     if missing or "JOINTS_0" not in attributes or "WEIGHTS_0" not in attributes:
@@ -167,7 +167,7 @@ def _read_part(document: Document, label: str, primitive: dict, placement: np.nd
     triangles = _triangles(label, indices, primitive.get("mode", TRIANGLES))
     if len(triangles) == 0:
         return None
-    if "NORMAL" not in arrays:  # glTF asks for flat shading then, and that file tangents be ignored
+    if "NORMAL" not in arrays:  # then glTF prescribes flat shading and ignores the file's tangents
         arrays = {name: values[triangles.reshape(-1)] for name, values in arrays.items() if name != "TANGENT"}
         placement = placement if len(placement) == 1 else placement[triangles.reshape(-1)]
         triangles = np.arange(triangles.size).reshape(-1, 3)
@@ -214,7 +214,7 @@ def _crosses(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def _inverse(triangles: np.ndarray) -> np.ndarray:
-    """Of each vertex the corner that names it, where each is named once."""
+    """The corner that names each vertex, where each vertex is named exactly once."""
     corners = np.empty(triangles.size, dtype=np.int64)
     corners[triangles.reshape(-1)] = np.arange(triangles.size)
     return corners

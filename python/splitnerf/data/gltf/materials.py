@@ -40,7 +40,7 @@ def read_material(document: Document, index: int | None) -> TexturedMaterial:
 
     Args:
         document: The file.
-        index: The material's; None stands for the default one that glTF prescribes (white, rough, metallic).
+        index: The material's index; None means glTF's default material (white, rough, metallic).
 
     Returns:
         The material; alpha and occlusion are left out.
@@ -82,7 +82,7 @@ def read_material(document: Document, index: int | None) -> TexturedMaterial:
 
 
 class _Slots:
-    """Reads a material's textures and sees to it that all of them are looked up at the same coordinates."""
+    """Reads a material's textures and checks that all of them use the same coordinates."""
 
     def __init__(self, document: Document, name: str):
         self.document, self.name = document, name

@@ -19,7 +19,8 @@ from splitnerf.notes import note
 def read_asset(path: str | os.PathLike) -> Asset:
     """Reads a glTF 2.0 file: all primitives of its scene as one mesh, y up turned to z up, (x, y, z) -> (x, -z, y).
 
-    What the file has and the program does not draw (transparency, animation, unknown extensions) is said on stderr.
+    A note on stderr names features of the file that the program does not draw (transparency, animation, unknown
+    extensions).
 
     Args:
         path: A .glb, or a .gltf with its files beside it.
@@ -28,12 +29,12 @@ def read_asset(path: str | os.PathLike) -> Asset:
         The mesh with its materials.
 
     Raises:
-        InputError: Anything about the file that cannot be drawn.
+        InputError: The file cannot be read or drawn.
     """
     path = Path(path)
     document = Document(path)
     try:
-        with np.errstate(over="ignore", invalid="ignore"):  # what comes out is checked
+        with np.errstate(over="ignore", invalid="ignore"):  # the results are checked
             return _read(document)
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError) as error:
         raise InputError(f"{path}: is not valid glTF ({type(error).__name__}: {error}); export it again") from None
