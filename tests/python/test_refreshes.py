@@ -13,6 +13,7 @@ from splitnerf.fields import VisibilityBits
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.training import loop
+from splitnerf.training.schedule import next_ray_count
 
 
 def calls(monkeypatch, kind: type, name: str, note) -> list:
@@ -92,10 +93,10 @@ def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkey
 
     monkeypatch.setattr(loop.Training, "__init__", noted)
     config = tiny(
-        steps=40, mesh_every=0.2, preview_every=2.0, occlusion="mlp", shading="split", environment_height=8, occlusion_rays=4
+        steps=40, mesh_every=0.2, preview_every=2.0, occlusion="mlp", shading="split", environment_height=12, occlusion_rays=4
     )
     loop.train(load_dataset(data), config, tmp_path)
-    assert heights == [(8, 8), (16, 8), (32, 8)] and training["it"].environment.shape == (8, 16, 3)
+    assert heights == [(8, 12), (16, 12), (32, 12)] and training["it"].environment.shape == (12, 24, 3)
 
 
 def test_all_that_a_run_draws_follows_its_seed(data, tmp_path):
@@ -131,3 +132,14 @@ def test_previews_and_checkpoints_come_from_time_to_time(data, tmp_path, monkeyp
     config = tiny(steps=20, preview_every=0.25, checkpoint_minutes=1e-9, light_step_every=8, mesh_every=2.0)
     loop.train(load_dataset(data), config, tmp_path)
     assert previews == [5, 10, 15, 20] and saved == [8, 16, 20]
+
+
+def test_the_number_of_rays_follows_that_of_the_samples(data, tmp_path):
+    """The samples composited, not those shaded or looked at."""
+    config = tiny(steps=20, target_samples=3000, initial_rays=64, max_rays=400)
+    loop.train(load_dataset(data), config, tmp_path)
+    lines = lines_of(tmp_path)
+    rays = [line["rays"] for line in lines]
+    samples = [line["kept"] * line["samples_per_ray"] * line["rays"] for line in lines]
+    assert rays[0] == 64 and rays[-1] > 100
+    assert rays[1:] == [next_ray_count(a, round(n), config) for a, n in zip(rays, samples[:-1])]
