@@ -96,9 +96,10 @@ def test_light_psnr_is_judged_up_to_the_99th_percentile_of_the_truth():
     truth, light = np.ones((128, 256, 3)), np.ones((128, 256, 3))
     truth[60:64, :40], light[60:64, :40] = 3.0, 2.0  # 160 of 32,768 texels
     light[:30] = 0.5
+    light *= 0.8  # of no matter, as the scale is free
     scale = (weights * light[..., 0] * truth[..., 0]).sum() / (weights * light[..., 0] ** 2).sum()
     error = np.minimum(scale * light[..., 0], 1.0) - np.minimum(truth[..., 0], 1.0)
-    assert 1.0 < scale < 1.1
+    assert 1.25 < scale < 1.375
     assert metrics.light_psnr(light, truth) == pytest.approx(-10 * np.log10((weights * error**2).sum() / weights.sum()), abs=1e-4)
 
 

@@ -12,6 +12,7 @@ from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.truth import ViewTruth
 from splitnerf.evaluate import metrics
 from splitnerf.evaluate.protocol import evaluate_maps
+from splitnerf.evaluate.similarity import image_scores
 
 SIZE = 12
 PREDICTED, TRUE = np.zeros((2, SIZE, SIZE), bool)
@@ -96,3 +97,8 @@ def test_the_distance_is_asked_for_views_and_for_albedo():
         [prediction], dataset(picture(0.5, 1.0)), [truth], distance=lambda image, truth: 0.25 + image.mean() - truth.mean()
     )
     assert [scores[key]["lpips"] for key in ("novel_view", "albedo")] == pytest.approx([0.25, 0.25], abs=1e-5)
+
+
+def test_a_prediction_is_clipped_before_it_is_scored():
+    """What is brighter than white looks white."""
+    assert image_scores(np.full((SIZE, SIZE, 3), 1.5), np.ones((SIZE, SIZE, 3)))["psnr"] == 100
