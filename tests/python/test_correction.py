@@ -120,9 +120,9 @@ def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
 
     light, found = model.evaluate_light(), find_samples(model, cells, *rays)
     monkeypatch.setattr(model, "quadrature_correction", lambda *args: (torch.zeros(0, dtype=torch.int64), torch.zeros(0, 3)))
-    without = render_rays(model, light, found).mean
+    without = render_rays(model, light, found, shades_per_ray=2).mean
     monkeypatch.setattr(model, "quadrature_correction", added)
-    ray = render_rays(model, light, found)
+    ray = render_rays(model, light, found, shades_per_ray=2)
     torch.testing.assert_close(ray.mean - without, torch.tensor([1.0, 0.0, 3.0])[:, None].expand(3, 3))
     assert ray.samples.ray_indices[ray.shaded[asked["candidates"]]].tolist() == [0, 2]
     assert ray.sdf.abs().max() > 0.01
