@@ -25,11 +25,11 @@ from splitnerf.outputs import write_assets
 from splitnerf.training.loop import train
 
 CENTRE, RADIUS = np.array([0.9, -0.6, 0.4]), 0.8
-RED, BLUE = (
-    np.array([0.65, 0.12, 0.08]),
-    np.array([0.08, 0.15, 0.6]),
-)  # linear albedo where x is above and below the centre's
+RED, BLUE = np.array([0.65, 0.12, 0.08]), np.array([0.08, 0.15, 0.6])  # linear albedo, along and against TO_RED
 LAMP = np.array([0.35, 0.75, 0.56]) / np.linalg.norm([0.35, 0.75, 0.56])
+# Across the lamp's direction: both halves see as much of the lamp. Each colour of the light is best known from the half that
+# reflects it; with one half nearer to the lamp red and blue light would be off to either side, and their sum with them.
+TO_RED = np.array([0.75, -0.35, 0.0]) / np.linalg.norm([0.75, -0.35, 0.0])
 SIZE, ANGLE, DISTANCE, N_VIEWS = 24, 0.7, 3.2, 14
 FINER = 4  # rays along an edge of a pixel
 
@@ -65,7 +65,7 @@ def picture(pose: np.ndarray) -> np.ndarray:
     inside = b * b - off @ off + RADIUS**2
     t = -b - np.sqrt(np.maximum(inside, 0))
     normals = (off + t[:, None] * rays) / RADIUS
-    albedo = np.where(normals[:, :1] > 0, RED, BLUE)
+    albedo = np.where(normals @ TO_RED[:, None] > 0, RED, BLUE)
     linear = np.where(inside[:, None] > 0, albedo * reflected(normals)[:, None], 0.0)
     both = np.c_[linear, inside > 0].reshape(SIZE, FINER, SIZE, FINER, 4).mean((1, 3))
     straight = np.clip(both[..., :3] / np.maximum(both[..., 3:], 1e-6), 0, 1)
@@ -133,7 +133,7 @@ def test_the_ball_is_where_it_is_and_as_large(result):
 
 
 def test_its_red_side_is_red_and_its_blue_side_blue(result):
-    side = z_up(result.vertices)[:, 0] - CENTRE[0]
+    side = (z_up(result.vertices) - CENTRE) @ TO_RED
     red, blue = result.albedo[side > 0.25].mean(0), result.albedo[side < -0.25].mean(0)
     assert red[0] > 2.5 * red[2] and red[0] > 2.5 * red[1] and blue[2] > 2.5 * blue[0] and blue[2] > 2 * blue[1]
 
@@ -147,4 +147,4 @@ def test_the_lamp_shines_from_where_it_is(result):
     power = (result.light.mean(-1) * np.sin(polar))[..., None]
     found = (power * directions).sum((0, 1))
     angle = math.degrees(math.acos(found @ LAMP / np.linalg.norm(found)))
-    assert angle < 12
+    assert angle < 8  # 1 to 5 with other seeds

@@ -83,3 +83,76 @@ def test_the_light_is_summed_over_channels_and_averaged_over_queries(monkeypatch
 
     loss = losses.light_loss(Off(), config, generator(), 0)
     assert loss.item() == pytest.approx(off.square().sum().item(), rel=1e-4)
+
+
+# ---- all terms at once, each with a weight of its own ----
+
+WEIGHTS = {
+    "colour_weight": 0.11, "eikonal_weight": 0.13, "mask_weight": 0.17, "light_weight": 0.19, "neutral_weight": 0.23,
+    "smoothness_weight": 0.29, "entropy_weight": 0.31, "metal_weight": 0.37, "binary_metal_weight": 0.41, "dark_metal_weight": 0.43,
+    "occlusion_weight": 0.47,
+}  # fmt: skip
+DUE = {"priors_from": 0.5, "light_every": 4}
+FIXED = {"light": 2.0, "neutral": 3.0, "entropy": 5.0, "occlusion": 7.0}
+
+
+@pytest.fixture
+def every_term(rendered, monkeypatch):
+    """Makes the terms of a step, by weight and value, with settings changed; the terms that draw numbers stand for themselves."""
+    from splitnerf.training import losses
+
+    config, batch, ray, _ = rendered
+    asked = {}
+
+    def fixed(name: str):
+        return lambda *args: asked.update({name: args}) or torch.tensor(FIXED[name])
+
+    for name in FIXED:
+        function = {"light": "light_loss", "neutral": "neutral_light_loss", "entropy": "material_entropy_loss"}.get(name, f"{name}_loss")
+        monkeypatch.setattr(losses, function, fixed(name))
+
+    def terms(step: int = 8, progress: float = 0.5, **settings):
+        asked.clear()
+        model = SceneModel(config.replace({f"losses.{name}": x for name, x in (DUE | WEIGHTS | settings).items()}))
+        g = generator(5)
+        found = loss_terms(model, model.light, batch, ray, "scene", torch.ones(1), g, step, progress)
+        return {name: (term.weight, term.value.item()) for name, term in found.items()}, asked, g
+
+    return terms
+
+
+def test_each_term_has_its_own_weight_and_its_own_value(rendered, every_term):
+    """Colours three times, for their channels; masks by cross entropy, metals by weighted means over shaded samples."""
+    _, batch, ray, _ = rendered
+    found, _, _ = every_term(metal_form="square")
+    opacity, mask = ray.opacity.clamp(1e-3, 1 - 1e-3), batch.target[:, 3]
+    w, m = ray.shares / ray.shares.sum(), ray.points.metallic[:, 0]
+    f0 = ray.points.albedo.amax(1)
+    expected = {
+        "eikonal": (0.13, (ray.gradients.norm(dim=1) - 1).square().mean().item()),
+        "mask": (0.17, -(mask * opacity.log() + (1 - mask) * (1 - opacity).log()).mean().item()),
+        "metal": (0.37, (w @ m.square()).item()),
+        "binary_metal": (0.41, (w @ (m * (1 - m))).item()),
+        "dark_metal": (0.43, (w @ (m * (1 - f0 / 0.4).clamp(min=0))).item()),
+        "light": (0.19, 2.0), "neutral": (0.23, 3.0), "entropy": (0.31, 5.0), "occlusion": (0.47, 7.0),
+    }  # fmt: skip
+    assert found["colour"][0] == pytest.approx(3 * 0.11) and found["smoothness"] == (0.29, 0.0)
+    assert set(found) == {*expected, "colour", "smoothness"}
+    for name, (weight, value) in expected.items():
+        assert found[name] == (weight, pytest.approx(value, rel=2e-2 if name == "mask" else 1e-4)), name
+    assert every_term(metal_form="smooth_l1")[0]["metal"][1] == pytest.approx(0.5 * expected["metal"][1], rel=1e-4)
+
+
+def test_terms_come_when_they_are_due(every_term):
+    """The light's with every fourth step, priors from the half of the run; what has no weight is not computed."""
+    assert "light" in every_term(step=8)[0] and "light" not in every_term(step=9)[0]
+    assert {"entropy", "binary_metal"}.isdisjoint(every_term(progress=0.49)[0])
+    assert not every_term(**dict.fromkeys(WEIGHTS, 0.0), metal_regulariser=False)[0].keys() - {"colour", "eikonal", "occlusion"}
+
+
+def test_terms_that_draw_numbers_draw_others_with_each_step(every_term):
+    """By the run's generator, and by the step's number as the seed of what has no generator."""
+    for step in (8, 12):
+        _, asked, g = every_term(step=step)
+        assert asked["light"][-2:] == asked["occlusion"][-2:] == (g, step)
+        assert asked["neutral"][-1] is asked["entropy"][-1] is g

@@ -65,6 +65,10 @@ def test_balanced_accuracy():
     assert metrics.balanced_accuracy(np.array([0.1, 0.9]), np.array([0, 0])) == pytest.approx(0.5)
 
 
+def test_what_is_no_more_than_the_threshold_is_no_metal():
+    assert metrics.balanced_accuracy(np.array([0.5, 0.6]), np.array([0.5, 0.6])) == 1.0
+
+
 def test_solid_angle_weights():
     # Two rows, hemispheres of equal size; four rows: (1 - cos 45) / 2 at the poles.
     assert metrics.solid_angle_weights(2) == pytest.approx([0.5, 0.5])
@@ -84,6 +88,19 @@ def test_light_psnr_weighs_rows_by_solid_angle():
     truth[:16] = 0
     w = (1 - np.cos(np.pi / 8)) / 2
     assert metrics.light_psnr(np.ones((128, 256, 3)), truth) == pytest.approx(-10 * np.log10(w * (1 - w)), abs=1e-6)
+
+
+def test_light_psnr_is_judged_up_to_the_99th_percentile_of_the_truth():
+    """A lamp on less than a hundredth of the map counts as white, however bright; half of it is white as well."""
+    weights = np.repeat(metrics.solid_angle_weights(128), 256).reshape(128, 256)
+    truth, light = np.ones((128, 256, 3)), np.ones((128, 256, 3))
+    truth[60:64, :40], light[60:64, :40] = 3.0, 2.0  # 160 of 32,768 texels
+    light[:30] = 0.5
+    light *= 0.8  # of no matter, as the scale is free
+    scale = (weights * light[..., 0] * truth[..., 0]).sum() / (weights * light[..., 0] ** 2).sum()
+    error = np.minimum(scale * light[..., 0], 1.0) - np.minimum(truth[..., 0], 1.0)
+    assert 1.25 < scale < 1.375
+    assert metrics.light_psnr(light, truth) == pytest.approx(-10 * np.log10((weights * error**2).sum() / weights.sum()), abs=1e-4)
 
 
 def test_resize_environment_wraps_around_and_keeps_constants():
@@ -107,6 +124,20 @@ def test_mesh_distances():
     chamfer, f_score = metrics.mesh_distances(far, square)
     assert chamfer == pytest.approx(0.5, rel=0.01) and f_score == 0
     assert metrics.mesh_distances(far, square) == (chamfer, f_score)
+
+
+def test_mesh_distances_go_both_ways():
+    """A square and another one 10 above it against the first: half of the points are 10 off, and all of it is found.
+    Shares are of a hundredth of the truth's diagonal, .014: what is .02 off is not found, however large the mesh."""
+    square = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    above, beside = square.copy(), square.copy()
+    above.apply_translation([0, 0, 10])
+    beside.apply_translation([0, 0, 0.02])
+    chamfer, f_score = metrics.mesh_distances(trimesh.util.concatenate([square, above]), square, 20_000)
+    assert chamfer == pytest.approx(2.5, rel=0.03) and f_score == pytest.approx(2 / 3, abs=0.01)
+    chamfer, f_score = metrics.mesh_distances(square, trimesh.util.concatenate([square, above]), 20_000)
+    assert chamfer == pytest.approx(2.5, rel=0.03) and f_score == pytest.approx(2 / 3, abs=0.01)
+    assert metrics.mesh_distances(trimesh.util.concatenate([beside, above]), square, 20_000)[1] == 0
 
 
 def make_inputs():

@@ -1,0 +1,216 @@
+"""What the sum over directions puts in the split sum's place, and when; what a model hands on to its parts."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+import trimesh
+from mesh_shapes import scene_of
+from op_checks import generator, unit
+from test_shading_model import K, Given, TwoLights, points_of, shade
+from test_views import ball
+from tiny_runs import tiny
+
+from splitnerf.ops import split_sum_shade
+from splitnerf.render.model import SUMMED_BAND, SceneModel, ShadedPoints
+from splitnerf.render.occupancy import make_grid
+from splitnerf.render.renderer import find_samples, render_rays
+from splitnerf.training.batches import Batch, draw_probes
+from splitnerf.training.meshes import SurfaceMesh
+from splitnerf.training.step import Step
+
+
+def bowl() -> trimesh.Trimesh:
+    ball = trimesh.creation.icosphere(2, 0.5)
+    return trimesh.Trimesh(ball.vertices, ball.faces[ball.triangles_center[:, 2] < 0][:, ::-1])
+
+
+def with_mesh(mesh: trimesh.Trimesh, **settings: object) -> SceneModel:
+    torch.manual_seed(0)
+    model = SceneModel(tiny(n_levels=2, shading="summed", open_below=0.0, **settings))
+    with torch.no_grad():
+        model.light.texels.zero_()
+    assert not model.sums_light
+    model.use_mesh(model.occlusion.trace(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces)))
+    assert model.sums_light
+    return model
+
+
+def points_at(roughness: torch.Tensor, split: float) -> tuple:
+    """Where they are, their normals and views, and the points, whose radiance by the split sum is said to be this."""
+    n, g = len(roughness), generator(2)
+    normals = unit(torch.randn(n, 3, generator=g))
+    views = unit(normals + 0.5 * unit(torch.randn(n, 3, generator=g)))
+    one = torch.ones(n, 1)
+    points = ShadedPoints(torch.full((n, 3), split), torch.full((n, 3), 0.5), roughness, 0 * one, one, one, normals, views)
+    return 0.5 * normals, normals, views, points
+
+
+def test_the_sum_comes_in_smoothly_over_its_band():
+    """By t^2 (3 - 2 t), t from 0 to 1 about the roughness that the directions resolve: twice, for split sums of 0 and 1, whose
+    corrections differ by that. Candidates may be any points; those past their number, and narrow lobes, are not corrected."""
+    model = with_mesh(trimesh.creation.icosphere(2, 0.5))
+    t = torch.tensor([-0.5, 0.0, 0.1, 0.25, 0.5, 0.8, 1.0, 1.7])
+    roughness = (model.occlusion.summed_from + (t - 0.5) * SUMMED_BAND)[:, None]
+    light, candidates = model.evaluate_light(), torch.tensor([6, 3, 0, 5, 2, 7, 4])
+    expected = (t * t * (3 - 2 * t)).where(t > 0, 0).where(t < 1, 1)
+    for n in (None, 7, 4):
+        found = []
+        for split in (0.0, 1.0):
+            at, correction = model.quadrature_correction(
+                light, *points_at(roughness, split), candidates, None if n is None else torch.tensor(n)
+            )
+            found.append(torch.zeros(8, 3).index_add(0, at, correction))
+        share = (found[0] - found[1])[:, 0]
+        counted = torch.zeros(8).index_fill(0, candidates[: n or 7], 1.0)
+        torch.testing.assert_close(share, expected * counted, rtol=0, atol=1e-5)
+
+
+def test_the_sum_holds_what_the_mesh_sends():
+    """In a bowl that sends out 1, as the sky does, all is lit by 1: less where the mesh is taken to be dark."""
+    model = with_mesh(bowl())
+    bits = model.occlusion
+    x, n = bits.cache.vertices[::5], bits.cache.normals[::5]
+    inner = x[:, 2] < -0.1
+    one = torch.ones(len(x), 1)
+    points = ShadedPoints(torch.zeros(len(x), 3), torch.ones(len(x), 3), one, 0 * one, one, one, n, n)
+    light, found = model.evaluate_light(), []
+    for sent in (torch.ones_like(bits.cache.vertices), None):
+        bits.radiance = sent
+        found.append(model.quadrature_correction(light, x, n, n, points, torch.arange(len(x)))[1])
+    torch.testing.assert_close(found[0][inner], torch.ones(int(inner.sum()), 3), rtol=0, atol=0.05)
+    assert (found[1][inner] < 0.75).all()
+
+
+def test_visibility_is_asked_on_the_viewers_side():
+    model = with_mesh(trimesh.creation.icosphere(2, 0.5))
+    asked, visibility = [], model.occlusion.visibility
+    model.occlusion.visibility = lambda positions, normals: asked.append((positions, normals)) or visibility(positions, normals)
+    on_surface, normals, views, points = points_at(torch.full((6, 1), 0.9), 0.0)
+    at = torch.tensor([4, 1, 2])
+    model.quadrature_correction(model.evaluate_light(), on_surface, -normals, views, points, at)
+    assert torch.equal(asked[0][0], on_surface[at]) and torch.equal(asked[0][1], normals[at])
+
+
+def test_a_new_mesh_is_lit_and_its_light_bounces_three_times(monkeypatch):
+    """By the light of now, before its first bounce."""
+    asked = []
+    monkeypatch.setattr(SceneModel, "refresh_indirect", lambda self, light: asked.append(self.occlusion.light.clone()))
+    torch.manual_seed(0)
+    model = SceneModel(tiny(n_levels=2))
+    with torch.no_grad():
+        model.light.texels[:16] = torch.tensor(3.0).log()
+    mesh = bowl()
+    model.use_mesh(model.occlusion.trace(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces)))
+    assert len(asked) == 3
+    torch.testing.assert_close(asked[0], torch.full_like(asked[0], 3.0), rtol=1e-4, atol=1e-4)
+
+
+def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
+    """Asked on the surface, about each ray's heaviest sample; here it adds the ray's number to its colour."""
+    model, cells = ball()
+    model.config = model.config.replace({"shading": "summed"})
+    model.occlusion.ready = model.occlusion.is_unoccluded = True
+    rays = torch.tensor([[4.0, 0.3, 0], [4.0, 5.0, 0], [4.0, -0.2, 0.2]]), torch.tensor([[-1.0, 0, 0]] * 3), torch.full((3,), 0.5)
+    asked = {}
+
+    def added(light, on_surface, normals, views, points, candidates, *_):
+        asked.update(on_surface=on_surface, candidates=candidates)
+        return candidates, torch.tensor([[1.0] * 3, [3.0] * 3])
+
+    light, found = model.evaluate_light(), find_samples(model, cells, *rays)
+    monkeypatch.setattr(model, "quadrature_correction", lambda *args: (torch.zeros(0, dtype=torch.int64), torch.zeros(0, 3)))
+    without = render_rays(model, light, found, shades_per_ray=2).mean
+    monkeypatch.setattr(model, "quadrature_correction", added)
+    ray = render_rays(model, light, found, shades_per_ray=2)
+    torch.testing.assert_close(ray.mean - without, torch.tensor([1.0, 0.0, 3.0])[:, None].expand(3, 3))
+    assert ray.samples.ray_indices[ray.shaded[asked["candidates"]]].tolist() == [0, 2]
+    assert ray.sdf.abs().max() > 0.01
+    torch.testing.assert_close(asked["on_surface"], ray.positions - ray.normals * ray.sdf[:, None])
+
+
+def test_rays_are_weighed_by_the_cosine_they_are_told():
+    """Oblique rays, whose weights change while the cosine is annealed, of the same samples."""
+    model, cells = ball()
+    rays = torch.tensor([[4.0, 0.5, 0]]), torch.tensor([[-1.0, 0, 0]]), torch.tensor([0.5])
+    found, light = find_samples(model, cells, *rays), model.evaluate_light()
+    weights = [render_rays(model, light, found._replace(anneal=torch.tensor(x))).weights for x in (0.0, 1.0)]
+    assert (weights[0] - weights[1]).abs().max() > 0.01
+
+
+@pytest.mark.parametrize("variance", [0.2, 0.4])
+def test_samples_that_are_left_out_weigh_next_to_nothing(variance):
+    """Broad densities reach far: what is found covers a ray as all samples of it do."""
+    opacities = []
+    for sample_above in (0.0, 1e-3):
+        model, _ = ball(sample_above=sample_above)
+        with torch.no_grad():
+            model.variance.fill_(variance)
+        grid = make_grid(model.config)
+        grid.update(model.sdf_field.sdf, model.s_value)
+        rays = torch.tensor([[4.0, y, 0] for y in (0.0, 0.5, 0.7)]), torch.tensor([[-1.0, 0, 0]] * 3), torch.full((3,), 0.5)
+        opacities.append(render_rays(model, model.evaluate_light(), find_samples(model, grid.cells, *rays)).opacity)
+    torch.testing.assert_close(opacities[0], opacities[1], rtol=0, atol=0.02)
+
+
+def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
+    model, cells = ball(shades_per_ray=1, smoothness_points=40, eikonal_points=30)
+    grid = make_grid(model.config)
+    grid.cells = cells
+    step, g = Step(model, grid, SurfaceMesh(model), generator(3)), generator(4)
+    rays = torch.tensor([[4.0, 0.01 * i, 0] for i in range(30)]), torch.tensor([[-1.0, 0, 0]] * 30)
+    batch = Batch(*rays, torch.rand(30, 4, generator=g), torch.rand(30, 3, generator=g), torch.rand(30, generator=g), draw_probes(model.config, g))
+    gradients = []
+    for _ in range(2):
+        ray, _ = step(batch, model.evaluate_light(), None, 1, 0.0)
+        gradients.append(model.sdf_field.hidden_direction.grad.clone())
+    torch.testing.assert_close(*gradients)
+    n = len(ray.weights)
+    assert len(ray.beside) == 40 and len(ray.gradients) == n + 30 + 40
+    assert len(ray.shaded) < 0.5 * n
+
+
+# ---- settings ----
+
+
+@pytest.mark.parametrize("compensate", [True, False])
+def test_scattered_light_is_compensated_where_that_is_set(compensate):
+    light, materials = TwoLights(2.0, 3.0), points_of(1.0, roughness=0.9)
+    found = shade(light, materials, compensate=compensate).radiance
+    g = generator(4)
+    normals = unit(torch.randn(K, 3, generator=g))
+    views = unit(normals + 0.97 * unit(torch.randn(K, 3, generator=g)))
+    white, one = torch.ones(K, 3), torch.ones(K, 1)
+    expected = {
+        x: split_sum_shade(normals, views, *materials, 3 * white, 2 * white, one, one, "exact", x) for x in (True, False)
+    }  # fmt: skip
+    torch.testing.assert_close(found, expected[compensate])
+    assert (expected[True] - expected[False]).abs().max() > 0.1
+
+
+@pytest.mark.parametrize("name", ["analytic", "finite_difference"])
+def test_normals_are_taken_as_set(name):
+    torch.manual_seed(0)
+    model = SceneModel(tiny(normals=name, shading="split"))
+    with torch.no_grad():
+        model.sdf_field.grid.table.normal_(std=0.02)
+    x = torch.rand(50, 3) - 0.5
+    gradients = {"analytic": model.sdf_field.sample(x).gradient, "finite_difference": model.sdf_field.sample_finite_difference(x).gradient}
+    assert torch.equal(model.surface(x).gradient, gradients[name])
+    assert (gradients["analytic"] - gradients["finite_difference"]).abs().max() > 0.01
+
+
+def test_the_bits_are_made_as_they_are_set():
+    bits = SceneModel(tiny(occlusion_offset=0.03, open_below=0.4, indirect=False, occlusion_directions=288)).occlusion
+    assert (bits.offset, bits.open_below, bits.indirect, len(bits.directions)) == (0.03, 0.4, False, 288)
+
+
+def test_without_a_mesh_and_where_nothing_is_blocked_factors_have_their_channels():
+    for channels in (1, 3):
+        model = SceneModel(tiny(occlusion_channels=channels, shading="split"))
+        model.light, model.material = TwoLights(1.0, 1.0), Given(points_of(0.0))
+        g = generator(4)
+        normals = unit(torch.randn(K, 3, generator=g))
+        features = torch.zeros(K, model.sdf_field.grid.spec.n_outputs)
+        shaded = model.shade(model.evaluate_light(), torch.zeros(K, 3), torch.zeros(K, 13), features, normals, normals)
+        assert shaded.occlusion_d.shape == shaded.occlusion_s.shape == (K, channels)

@@ -1,0 +1,135 @@
+"""Parts of the export one by one: strips of a raster, where a small map stands in a large one, normals to fall back on, factors."""
+
+from __future__ import annotations
+
+import json
+import struct
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.tangents import vertex_tangents
+from splitnerf.export import bake
+from splitnerf.export.bake import UnwrappedMesh, bake_occlusion, rasterise, to_tangent_space
+from splitnerf.export.glb import write_glb
+from splitnerf.export.maps import encode_maps
+from splitnerf.export.surface import Surface
+from splitnerf.export.textured import textured_asset, vertex_normals
+
+
+def square() -> UnwrappedMesh:
+    """The unit square, z up, over the whole texture: x to the right, y down."""
+    vertices = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    faces, normals, uv = np.int32([[0, 1, 2], [0, 2, 3]]), np.float32([[0, 0, 1]] * 4), vertices[:, :2].copy()
+    return UnwrappedMesh(vertices, faces, normals, vertex_tangents(vertices, faces, normals, uv), uv)
+
+
+def test_strips_of_a_raster_make_the_whole(monkeypatch):
+    uv, faces = np.float32([[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]]), np.int32([[0, 1, 2]])
+    whole = rasterise(uv, faces, 64)
+    monkeypatch.setattr(bake, "RAY_ROWS", 64 * 7)
+    strips = rasterise(uv, faces, 64)
+    assert np.array_equal(whole.index, strips.index) and np.array_equal(whole.weights, strips.weights)
+
+
+def test_occlusion_baked_small_stands_where_it_belongs(monkeypatch):
+    """A share that is x at x: at each texel's centre, but for the outer ones, which repeat what is next to them."""
+
+    def factors(scene, points, *args, **kwargs):
+        return points[:, :1], None
+
+    monkeypatch.setattr(bake, "occlusion_factors", factors)
+    found = bake_occlusion(square(), 64, 0.01)
+    x = (np.arange(64) + 0.5) / 64
+    np.testing.assert_allclose(found[:, 2:-2], np.broadcast_to(x[2:-2], (64, 60)), atol=1e-3)
+
+
+def test_occlusion_is_traced_off_the_surface_along_its_normal(monkeypatch):
+    asked = {}
+    factors = bake.occlusion_factors
+
+    def noted(scene, points, normals, *args, **kwargs):
+        asked.update(normals=normals, **kwargs)
+        return factors(scene, points, normals, *args, **kwargs)
+
+    monkeypatch.setattr(bake, "occlusion_factors", noted)
+    assert (bake_occlusion(square(), 32, 0.037) == 1).all() and asked["offset"] == 0.037
+    assert (asked["normals"] == torch.tensor([0.0, 0.0, 1.0])).all()
+
+
+def test_raised_normals_are_of_length_one():
+    normals = np.float32([[0, 0, 1]] * 3)
+    tangents = np.float32([[1, 0, 0, 1]] * 3)
+    world = np.float32([[0, 0, -1], [0.8, 0, -0.6], [1, 0, 0]])
+    local = to_tangent_space(world, normals, tangents)
+    assert np.linalg.norm(local, axis=1) == pytest.approx(1.0, abs=1e-6) and (local[:, 2] > 0).all()
+
+
+def ball(radius: float = 0.8, sign: float = 1.0) -> Surface:
+    """|x| - radius; its gradient with a sign, and tilted towards +x."""
+
+    def field(x):
+        return x.norm(dim=1) - radius
+
+    def gradient(x):
+        return field(x), sign * torch.nn.functional.normalize(x + torch.tensor([0.3, 0.0, 0.0]), dim=1)
+
+    def materials(x):
+        half = torch.full((len(x), 1), 0.5)
+        return half.expand(-1, 3), half, half, torch.nn.functional.normalize(x, dim=1)
+
+    return Surface(field, gradient, materials)
+
+
+def test_normals_are_the_fields_where_they_agree_with_the_faces():
+    """Tilted ones are taken, opposite ones are not: those of the faces stand."""
+    mesh = trimesh.creation.icosphere(2, 0.8)
+    vertices, faces = np.float32(mesh.vertices), np.int32(mesh.faces)
+    tilted = vertices + np.float32([0.3, 0, 0])
+    tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
+    np.testing.assert_allclose(vertex_normals(ball(), vertices, faces), tilted, atol=1e-5)
+    np.testing.assert_allclose(vertex_normals(ball(sign=-1.0), vertices, faces), mesh.vertex_normals, atol=1e-5)
+
+
+def test_textures_stand_without_factors():
+    """A factor multiplies its texture: both are 1. The offset of occlusion's rays is handed on."""
+    mesh = trimesh.creation.icosphere(2, 0.8)
+    found = textured_asset(
+        "ball", np.float32(mesh.vertices), np.int32(mesh.faces), ball(), n_faces=0, texture_size=64, spacing=0.05,
+        occlusion_offset=0.01,
+    )  # fmt: skip
+    material = found.asset.materials[0]
+    assert material.roughness == material.metallic == 1.0 and tuple(material.albedo) == (1.0, 1.0, 1.0)
+    assert found.watertight and np.abs(np.linalg.norm(found.asset.vertices, axis=1) - 0.8).max() < 1e-4
+
+
+def textured() -> Asset:
+    mesh = square()
+    texture = np.full((4, 4, 2), 0.25, np.float32)
+    material = Material("paint", roughness_metallic_texture=texture)
+    return Asset("square", mesh.vertices, mesh.faces, mesh.normals, np.zeros(2, np.int32), [material], mesh.uv, mesh.tangents)
+
+
+def test_without_occlusion_all_is_open_and_what_is_not_finite_is_refused():
+    asset = textured()
+    assert (encode_maps("a", asset, None).orm[..., 0] == 255).all()
+    assert (encode_maps("a", asset, np.zeros((4, 4))).orm[..., 0] == 0).all()
+    asset.materials[0].roughness_metallic_texture[0, 0, 0] = np.nan
+    with pytest.raises(RuntimeError, match="finite"):
+        encode_maps("a", asset, None)
+
+
+def test_buffers_of_a_glb_say_what_they_are_for(tmp_path):
+    """34963 for indices, 34962 for vertices."""
+    write_glb(tmp_path / "a.glb", textured())
+    content = (tmp_path / "a.glb").read_bytes()
+    document = json.loads(content[20 : 20 + struct.unpack("<I", content[12:16])[0]])
+    primitive = document["meshes"][0]["primitives"][0]
+
+    def target(accessor: int) -> int:
+        return document["bufferViews"][document["accessors"][accessor]["bufferView"]]["target"]
+
+    assert target(primitive["indices"]) == 34963 and {target(a) for a in primitive["attributes"].values()} == {34962}

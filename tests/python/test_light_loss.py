@@ -1,0 +1,169 @@
+"""The light's consistency loss by lights whose integrals are known, and what the other terms draw."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from test_physics import entropy, rays
+from tiny_runs import tiny
+
+from splitnerf.fields.light import LightSamples
+from splitnerf.training import losses
+from splitnerf.training.losses import Term
+
+LOOSE = {"light_noise": 0.0, "light_lobe_below": 0.0, "losses.light_form": "square"}
+
+
+def generator(seed: int = 0) -> torch.Generator:
+    return torch.Generator().manual_seed(seed)
+
+
+class Slope:
+    """2 + z where sharp, and where diffuse the integral of that over the cosine: 2 + 2 z / 3. Remembers what it was asked."""
+
+    def __init__(self):
+        self.loss_samples = LightSamples()
+
+    def __call__(self, directions, roughness):
+        self.roughness = roughness[:, 0]
+        z = directions[:, 2:]
+        return torch.where(roughness < 0.5, 2 + z, 2 + 2 * z / 3).expand(-1, 3)
+
+
+@pytest.fixture
+def sharp_or_diffuse(monkeypatch):
+    """Roughness that is drawn is below .05: all queries are nearly mirrors or at 1."""
+    rand = torch.rand
+    monkeypatch.setattr(torch, "rand", lambda *size, **kwargs: 0.05 * rand(*size, **kwargs))
+
+
+@pytest.mark.parametrize("light_set", ["fibonacci", "uniform"])
+def test_a_consistent_light_costs_nothing(sharp_or_diffuse, light_set):
+    """Mirrors by samples of their own lobes, diffuse light by the shared set: 2 + 2 z / 3 of each direction z."""
+    config = tiny(light_set=light_set, light_noise=0.0, light_lobe_below=0.2, light_samples=8192, light_queries=64)
+    loss = losses.light_loss(Slope(), config, generator(), 0).item()
+    assert loss < (1e-4 if light_set == "fibonacci" else 5e-3)
+
+
+def test_noise_is_what_a_consistent_light_is_off_by(sharp_or_diffuse):
+    """All of its squared error is noise, in the mean over steps: the variance of the mean of both sets, summed over queries."""
+    light = Slope()
+    config = tiny(light_set="uniform", light_noise=0.1, light_lobe_below=0.2, light_samples=256, light_queries=32)
+    learned = []
+    light.loss_samples.learn = lambda *numbers: learned.append(numbers)
+    g = generator(1)
+    for step in range(150):
+        losses.light_loss(light, config, g, step)
+    noise, error, n = (sum(x) / len(learned) for x in zip(*learned))
+    assert n == 256 and noise == pytest.approx(error, rel=0.2) and error > 1e-3
+
+
+def test_half_of_the_queries_are_diffuse_and_the_set_is_as_large_as_set():
+    """16 of 32 at 1; 128 shared directions in one set or two, and 8 more of each lobe narrower than .4."""
+    for settings, n_shared in ((LOOSE, 128), (LOOSE | {"light_noise": 0.2}, 128)):
+        light = Slope()
+        losses.light_loss(light, tiny(light_samples=128, light_queries=32, **settings), generator(), 0)
+        queries = light.roughness[n_shared:]
+        assert (light.roughness[:n_shared] == 0).all() and len(queries) == 32
+        assert (queries == 1).sum() == 16 and 0.2 < queries[queries < 1].mean() < 0.8
+    light = Slope()
+    settings = LOOSE | {"light_lobe_below": 0.4, "light_lobe_samples": 8}
+    losses.light_loss(light, tiny(light_samples=128, light_queries=32, **settings), generator(), 0)
+    queries = light.roughness[-32:]
+    assert (light.roughness == 0).sum() == 128 + 8 * (queries < 0.4).sum() > 128
+
+
+def test_narrow_lobes_are_sampled_anew_with_each_seed():
+    class Stripes(Slope):
+        def __call__(self, directions, roughness):
+            return (2 + (20 * directions[:, :1]).sin()).expand(-1, 3)
+
+    config = tiny(light_queries=16, **LOOSE | {"light_lobe_below": 0.9, "light_lobe_samples": 4})
+    first, again, other = (losses.light_loss(Stripes(), config, generator(), seed).item() for seed in (1, 1, 2))
+    assert first == again != other
+
+
+@pytest.mark.parametrize("below", [0.0, 0.5])
+def test_the_gradient_of_the_light_loss_goes_to_both_sides(below):
+    """g(w, 0) = a and g(w, rho > 0) = b: 3 (b - a)^2, whose slopes are -6 (b - a) and 6 (b - a)."""
+    levels = torch.tensor([1.0, 1.5], requires_grad=True)
+
+    def light(directions, roughness):
+        return levels[(roughness[:, 0] > 0).long()][:, None].expand(-1, 3)
+
+    config = tiny(light_queries=64, **LOOSE | {"light_lobe_below": below})
+    losses.light_loss(light, config, generator(), 0).backward()
+    assert levels.grad.tolist() == pytest.approx([-3.0, 3.0], rel=1e-3)
+
+
+def test_the_number_of_directions_is_learned_from_broad_lobes_alone():
+    """Off by 1 in each channel: 3 for each of the queries that are broad, of sets of 128 together."""
+
+    class Off(Slope):
+        def __call__(self, directions, roughness):
+            self.roughness = roughness[:, 0]
+            return 1.0 + (roughness > 0).float().expand(-1, 3)
+
+    light, learned = Off(), []
+    light.loss_samples.learn = lambda *numbers: learned.append(numbers)
+    config = tiny(light_samples=128, light_queries=32, light_noise=0.2, light_lobe_below=0.5)
+    losses.light_loss(light, config, generator(), 0)
+    noise, error, n = learned[0]
+    broad = (light.roughness[-32:] >= 0.5).sum().item()
+    assert broad < 32 and n == 128 and error == pytest.approx(3.0 * broad, rel=1e-3) and noise < 1e-6
+
+
+def test_neutral_light_is_asked_about_diffuse_light():
+    def light(directions, roughness):
+        return torch.where(roughness == 1, torch.ones(3), torch.tensor([4.0, 1.0, 0.25]))
+
+    assert losses.neutral_light_loss(light, tiny(), generator()).item() == pytest.approx(0.0, abs=1e-9)
+
+
+# ---- sums, and what is drawn ----
+
+
+def test_the_gradient_is_that_of_the_weighted_sum():
+    """Of 2 x^2 + 5 x - 3 c at x = 3: 17; a term without a gradient is left out."""
+    x = torch.tensor(3.0, requires_grad=True)
+    losses.backward({"a": Term(2.0, x * x), "b": Term(5.0, x), "c": Term(-3.0, torch.tensor(1.0))})
+    assert x.grad.item() == pytest.approx(17.0)
+
+
+def test_materials_differ_in_being_metal_as_well(monkeypatch):
+    """ln 2 for halves that are and are not; drawn by the run's own generator; what is not finite does not stop the draw."""
+    config = tiny(entropy_points=2000)
+    ray = rays([1.0, 1.0], [0.0, 1.0])
+    ray.points.albedo, ray.points.roughness = torch.full((2, 3), 0.4), torch.full((2, 1), 0.5)
+    found = []
+    for seed in range(2):
+        torch.manual_seed(seed)
+        found.append(losses.material_entropy_loss(ray, config, generator()).item())
+    assert found[0] == found[1] == pytest.approx(0.693, abs=0.01)
+    ray.shares = torch.tensor([1.0, float("nan")])
+    assert losses.material_entropy_loss(ray, config, generator()).item() == pytest.approx(0.0, abs=1e-6)
+    assert entropy([0.02, 0.9], weights=[1.0, 0.0]) == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_occlusion_is_traced_for_its_share_as_it_is_set(monkeypatch, channels):
+    """A fifth of the samples, off the surface by the offset, by the step's seed; all off by .1 and .3 cost .1 in each channel."""
+    asked, n = {}, 2000
+
+    def factors(scene, positions, *args, **kwargs):
+        asked.update(n=len(positions), **kwargs)
+        return torch.full((len(positions), channels), 0.5), torch.full((len(positions), channels), 0.5)
+
+    monkeypatch.setattr(losses, "occlusion_factors", factors)
+    ray = rays([1.0] * n, [0.0] * n)
+    ray.positions = ray.normals = ray.points.lobe_dirs = torch.zeros(n, 3)
+    ray.sdf, ray.points.roughness = torch.zeros(n), torch.ones(n, 1)
+    ray.points.occlusion_d, ray.points.occlusion_s = torch.full((n, channels), 0.6), torch.full((n, channels), 0.2)
+    config = tiny(
+        occlusion_share=0.2, occlusion_channels=channels, occlusion_offset=0.037, occlusion_rays=5, occlusion_loss_form="square"
+    )
+    loss = losses.occlusion_loss(ray, None, None, config, generator(), 9)
+    assert loss.item() == pytest.approx(0.1, rel=1e-4) and asked.pop("n") == pytest.approx(0.2 * n, rel=0.15)
+    assert asked == dict(
+        n_diffuse_rays=5, n_specular_rays=5, offset=0.037, along_ray=False, seed=9, n_channels=channels
+    )

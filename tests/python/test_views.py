@@ -1,0 +1,254 @@
+"""What views are made of: lengths of samples, maps channel by channel, the hull of masks, and what a model asks its occlusion."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from op_checks import generator, unit
+from tiny_runs import tiny
+
+from splitnerf.config import preset
+from splitnerf.fields import EvaluatedLight, Occlusion, RaySegments
+from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED
+from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
+from splitnerf.render.renderer import ProbePoints, find_samples, render_rays, render_view, sample_step
+
+RADIUS, SIZE = 0.6, 24
+POSE = torch.tensor([[0.0, 0, 1, 4], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # from +x towards the origin, z up
+LENS = torch.tensor([40.0, 40.0, 12.0, 12.0])
+
+
+class Given(torch.nn.Module):
+    """Answers each point alike, and remembers what it was asked."""
+
+    needs_mesh, ready, is_unoccluded = False, False, False
+
+    def __init__(self, answer):
+        super().__init__()
+        self.answer, self.asked = answer, ()
+
+    def forward(self, *inputs):
+        self.asked = inputs
+        return self.answer(*inputs)
+
+
+def ball(**settings: object) -> tuple[SceneModel, torch.Tensor]:
+    """A model whose field is a ball, nearly, under constant light of 1, and its cells."""
+    torch.manual_seed(0)
+    model = SceneModel(tiny(start_levels=4, sdf_width=512, sphere_radius=RADIUS, shading="split", **settings))
+    with torch.no_grad():
+        model.variance.fill_(0.5)
+        model.light.texels.zero_()
+    grid = make_grid(model.config)
+    grid.update(model.sdf_field.sdf, model.s_value)
+    return model, grid.cells
+
+
+@pytest.mark.parametrize(("s", "length"), [(1.0, 0.05), (50.0, 0.04), (80.0, 0.025), (400.0, 0.01)])
+def test_samples_are_as_long_as_the_density_is_wide_within_bounds(s, length):
+    config = tiny(step_scale=2.0, min_step=0.01, max_step=0.05)
+    assert sample_step(config, s) == pytest.approx(length)
+
+
+def test_each_map_of_a_view_shows_what_it_is_called():
+    model, cells = ball(occlusion_channels=3)
+    colour = torch.tensor([0.2, 0.4, 0.7])
+    model.material = Given(lambda x: (colour.expand(len(x), 3), torch.full((len(x), 1), 0.3), torch.full((len(x), 1), 0.6)))
+    share = torch.tensor([0.7, 0.8, 0.9])
+    model.occlusion = Given(lambda query, _: Occlusion(share.expand(len(query.normals), 3), 0.5 * share.expand(len(query.normals), 3)))
+    maps = render_view(model, cells, POSE, LENS, SIZE, SIZE)
+    inside = maps["alpha"] > 0.01
+    assert 0.1 < inside.float().mean() < 0.9
+    for name, value in (("roughness", 0.3), ("metallic", 0.6), ("occlusion_d", 0.8), ("occlusion_s", 0.4)):
+        torch.testing.assert_close(maps[name][inside], torch.full_like(maps[name][inside], value), rtol=1e-4, atol=1e-4)
+    torch.testing.assert_close(maps["albedo"][inside], colour.expand(int(inside.sum()), 3), rtol=1e-4, atol=1e-4)
+    torch.testing.assert_close(maps["normal"][inside].norm(dim=1), torch.ones(int(inside.sum())))
+    # x to the viewer, y to the right, z up
+    row, column = 12, 12
+    assert maps["normal"][row, column, 0] > 0.9 and maps["normal"][row, column + 4, 1] > 0.2 and maps["normal"][row - 4, column, 2] > 0.2
+    assert (maps["rgb"] >= 0).all() and (maps["rgb"] <= 1).all()
+
+
+def test_colours_of_a_view_do_not_fade_with_its_coverage_and_end_at_white():
+    """A white ball under constant light sends out that light, at its edge as well: straight alpha."""
+    for light in (0.5, 4.0):
+        model, cells = ball()
+        model.material = Given(lambda x: (torch.ones(len(x), 3), torch.ones(len(x), 1), torch.zeros(len(x), 1)))
+        with torch.no_grad():
+            model.light.texels[:16] = math.log(light)
+        maps = render_view(model, cells, POSE, LENS, SIZE, SIZE)
+        edge = (maps["alpha"] > 0.02) & (maps["alpha"] < 0.9)
+        expected = min(1.0, 1.055 * light ** (1 / 2.4) - 0.055)
+        assert edge.any() and maps["rgb"].max() <= 1.0
+        torch.testing.assert_close(maps["rgb"][edge], torch.full((int(edge.sum()), 3), expected), rtol=0, atol=0.01)
+
+
+def test_maps_are_means_by_what_their_samples_weigh():
+    """Roughness that rises along the ray: the mean over the samples by their shares of the colour."""
+    model, cells = ball(shades_per_ray=0)
+    model.head_inputs = lambda positions, outputs, features: positions
+    model.material = Given(lambda x: (torch.full((len(x), 3), 0.5), torch.sigmoid(20 * (x[:, :1] - RADIUS)), torch.zeros(len(x), 1)))
+    maps = render_view(model, cells, POSE, LENS, SIZE, SIZE)
+    rays = torch.tensor([[4.0, 0, 0]]), unit(torch.tensor([[-40.0, 0.5, -0.5]])), torch.tensor([0.5])
+    ray = render_rays(model, model.evaluate_light(), find_samples(model, cells, *rays))
+    expected = (ray.shares @ ray.points.roughness[:, 0] / ray.shares.sum()).item()
+    assert len(ray.shares) > 5 and ray.points.roughness.std() > 0.02 and not ray.shares.requires_grad
+    assert abs(ray.points.roughness.mean().item() - expected) > 0.01
+    assert maps["roughness"][12, 12].item() == pytest.approx(expected, abs=1e-3)
+
+
+def test_in_srgb_no_sample_is_brighter_than_white():
+    """Of what is composited each sample is clipped by itself, as published."""
+    model, cells = ball(compositing="srgb")
+    model.material = Given(lambda x: (torch.ones(len(x), 3), torch.ones(len(x), 1), torch.zeros(len(x), 1)))
+    with torch.no_grad():
+        model.light.texels[:16] = math.log(5.0)
+    rays = torch.tensor([[4.0, 0, 0]]), torch.tensor([[-1.0, 0, 0]]), torch.tensor([0.5])
+    ray = render_rays(model, model.evaluate_light(), find_samples(model, cells, *rays))
+    assert not ray.linear and ray.values.max() == 1.0
+    torch.testing.assert_close(ray.mean, torch.ones(1, 3), rtol=0, atol=1e-3)
+    torch.testing.assert_close(ray.colour, ray.mean)
+
+
+@pytest.mark.parametrize("min_weight", [0.0, 1e-3])
+def test_samples_stand_in_their_middles_and_probes_behind_them(min_weight):
+    """The k points from anywhere come first, then each chosen sample with its shift."""
+    model, cells = ball(sample_above=min_weight)
+    rays = torch.tensor([[4.0, 0, 0], [4.0, 0.1, 0]]), torch.tensor([[-1.0, 0, 0]] * 2), torch.tensor([0.2, 0.9])
+    anywhere, shifts = torch.rand(3, 3), 0.1 * torch.randn(2, 3)
+    found = find_samples(model, cells, *rays, probes=ProbePoints(anywhere, torch.tensor([0.0, 0.99]), shifts))
+    n = len(found.directions)
+    distance = 4.0 - found.positions[:n, 0]
+    torch.testing.assert_close(distance, found.packed.middles)
+    torch.testing.assert_close(found.positions[n : n + 3], anywhere)
+    assert found.beside.tolist() == [0, int(0.99 * n)]
+    torch.testing.assert_close(found.positions[n + 3 :], found.positions[found.beside] + shifts)
+    counts = found.packed.offsets.diff()
+    assert (found.evaluated >= counts).all() and (min_weight > 0 or torch.equal(found.evaluated, counts))
+
+
+# ---- what the model asks ----
+
+
+def asked_by_shade(**settings) -> tuple:
+    model = SceneModel(tiny(shading="split", **settings))
+    model.occlusion = Given(lambda query, _: Occlusion(torch.full((40, 1), 0.5), torch.full((40, 1), 0.25)))
+    g = generator(1)
+    normals, views = (unit(torch.randn(40, 3, generator=g)) for _ in range(2))
+    positions, outputs = torch.randn(40, 3, generator=g), torch.randn(40, 13, generator=g)
+    features = torch.randn(40, model.sdf_field.grid.spec.n_outputs, generator=g)
+    segments = RaySegments(torch.tensor([0]), torch.zeros(40, dtype=torch.int64))
+    light = EvaluatedLight(model.light.evaluate())
+    points = model.shade(light, positions, outputs, features, normals, views, segments)
+    return points, model.occlusion.asked, segments, normals, views, positions, outputs, features
+
+
+def test_occlusion_is_asked_on_the_surface_on_the_viewers_side():
+    """At x - n f(x), whichever way the normal looks, about the viewer's side of it and the lobe's axis, once a stretch."""
+    points, (query, given), segments, normals, views, positions, outputs, _ = asked_by_shade()
+    torch.testing.assert_close(query.positions, positions - normals * outputs[:, :1])
+    side = (normals * views).sum(1, keepdim=True).sign()
+    assert (side < 0).any() and given is segments
+    for facing in (query.normals, points.facing):
+        torch.testing.assert_close(facing, side * normals)
+    assert torch.equal(query.lobe_dirs, points.lobe_dirs) and torch.equal(query.roughness, points.roughness)
+    assert not torch.allclose(points.lobe_dirs, points.facing)
+    assert (points.occlusion_d == 0.5).all() and (points.occlusion_s == 0.25).all()
+
+
+def test_heads_read_what_is_set():
+    for inputs in ("outputs", "grid"):
+        _, (query, _), *_, positions, outputs, features = asked_by_shade(head_inputs=inputs)
+        expected = outputs if inputs == "outputs" else torch.cat([outputs, positions, features], 1)
+        assert torch.equal(query.inputs, expected)
+
+
+@pytest.mark.parametrize("name", ["reflection", "mean"])
+def test_the_lobe_is_asked_about_where_it_is_set(name):
+    """The mirror direction of the view, or the mean direction of the lobe, which leans to the normal."""
+    points, _, _, normals, views, *_ = asked_by_shade(query=name, initial_roughness=0.95)
+    mirror = 2 * (normals * views).sum(1, keepdim=True) * normals - views
+    off = (points.lobe_dirs - mirror).norm(dim=1)
+    assert off.max() < 1e-5 if name == "reflection" else off.mean() > 0.05
+
+
+def test_a_model_begins_as_it_is_set():
+    """Roughness, its least value, sharpness, radius; nothing is metal, or hardly."""
+    models = []
+    for radius, roughness in ((0.4, 0.7), (0.6, 0.3)):
+        torch.manual_seed(0)
+        config = tiny(sphere_radius=radius, initial_roughness=roughness, min_roughness=0.2, initial_variance=0.45)
+        models.append(SceneModel(config))
+        inputs = torch.zeros(1, models[-1].material.net[0].in_features)
+        _, found, metallic = models[-1].material(inputs)
+        assert found.item() == pytest.approx(roughness, abs=1e-5) and metallic.item() == pytest.approx(1 / (1 + math.exp(2)))
+        with torch.no_grad():
+            models[-1].material.net[-1].bias.fill_(-50.0)
+        assert models[-1].material(inputs)[1].item() == pytest.approx(0.2)
+        assert models[-1].s_value == pytest.approx(math.exp(4.5), rel=1e-5)
+    points = torch.rand(20, 3)
+    torch.testing.assert_close(models[0].sdf_field.sdf(points) - models[1].sdf_field.sdf(points), torch.full((20,), 0.2))
+    torch.manual_seed(0)
+    assert SceneModel(tiny(table_dtype="float16")).sdf_field.grid.stored().dtype == torch.float16
+
+
+# ---- the hull of masks ----
+
+
+def test_the_hull_is_what_every_mask_that_sees_it_allows():
+    """One camera off its axis and a mask in one corner: cells in the mask stay, those two cells beside it go, and what is
+    not in the image, or behind the camera, stays."""
+    height, width, resolution, box = 60, 80, 20, 1.5
+    mask = torch.zeros(1, height, width)
+    mask[:, 4:22, 40:70] = 1.0
+    pose = torch.eye(4)
+    pose[:3, :3] = torch.linalg.qr(torch.randn(3, 3, generator=generator(2)))[0]
+    pose[:3, :3] *= pose[:3, :3].det().sign()
+    pose[:3, 3] = pose[:3, 2] * 1.2  # within the box: some cells are behind
+    fx, fy, cx, cy = 45.0, 60.0, 50.0, 24.0
+    hull = visual_hull(resolution, box, mask, pose[None], torch.tensor([[fx, fy, cx, cy]])).reshape(-1)
+    centres = OccupancyGrid(resolution, box).centres()
+    right, up, back = ((centres - pose[:3, 3]) @ pose[:3, i] for i in range(3))
+    x, y = cx - fx * right / back, cy + fy * up / back
+    seen = (back < 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    assert seen.any() and (~seen).any() and (back > 0).any() and hull[~seen].all()
+    inside = seen & (x > 41) & (x < 69) & (y > 5) & (y < 21)
+    beside = torch.stack([40 - x, x - 70, 4 - y, y - 22]).amax(0)
+    pixels = 2 * 1.5 / resolution * fx / (-back[seen]).median()  # a cell's, about
+    assert inside.sum() > 20 and hull[inside].all()
+    assert (seen & (beside > 2 * pixels)).sum() > 20 and not hull[seen & (beside > 2 * pixels)].any()
+    near = seen & (beside > 0) & (beside < 0.8 * pixels)
+    assert near.any() and hull[near].all()
+
+
+@pytest.mark.parametrize("name", ["cpu", "paper"])
+def test_a_hull_holds_its_cells_while_it_is_used(name):
+    """Whatever the field says: here that nothing is there."""
+    hull = torch.zeros(16, 16, 16, dtype=torch.bool)
+    hull[3, 5, 7] = True
+    grid = make_grid(preset(name).replace({"grid_resolution": 16}), hull)
+    for use_hull in (True, False, True):
+        grid.update(lambda x: torch.full_like(x[:, 0], 9.0), 100.0, use_hull=use_hull)
+        assert torch.equal(grid.cells == CELL_OCCUPIED, hull & use_hull)
+        assert (grid.cells[~hull] == CELL_EMPTY).all()
+
+
+def test_cells_far_from_the_surface_are_asked_now_and_then_and_near_ones_always():
+    asked = []
+
+    def field(x):
+        asked.append(x)
+        return x[:, 2]
+
+    grid = OccupancyGrid(24, 1.5)
+    grid.update(field, 200.0)
+    grid.update(field, 200.0, first=False)
+    near = grid.centres()[:, 2].abs() < 2 * (1.25 * math.sqrt(3) * 1.5 / 24 + 7 / 200)
+    z = asked[1][:, 2].abs()
+    n_near = (z < 2 * (1.25 * math.sqrt(3) * 1.5 / 24 + 7 / 200)).sum()
+    assert n_near == near.sum() and len(z) - n_near == pytest.approx(0.1 * (~near).sum().item(), rel=0.15)
+    rows = grid.centres().view(24, 24, 24, 3)
+    assert torch.equal(rows[5, 6, 7], torch.tensor([5.5, 6.5, 7.5]) * 0.125 - 1.5)
