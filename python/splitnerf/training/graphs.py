@@ -185,10 +185,11 @@ def record(function: Callable[[], Any], pool: Any, generator: torch.Generator) -
         with suppress(RuntimeError):  # the first error is the one to report
             graph.capture_end()
         raise
+    else:
+        graph.capture_end()
     finally:
         if collects:
             gc.enable()
-    graph.capture_end()
     return graph, outputs
 
 
