@@ -55,7 +55,15 @@ class Fake(GraphedStep):
         value.backward()
         return value.detach(), {"value": value.detach()}
 
-    def taken(self, n_rays: int = 5, step: int = 0, progress: float = 0.0, counts: tuple | None = COUNTS, light=None, target=1.0):
+    def taken(
+        self,
+        n_rays: int = 5,
+        step: int = 0,
+        progress: float = 0.0,
+        counts: tuple | None = COUNTS,
+        light=None,
+        target=1.0,
+    ):
         """One step and its counts; returns what it gave, how it was taken, and whether it was complete."""
         before, known = len(self.calls), list(self._graphs.values())
         light = self.model.evaluate_light() if light is None else light
@@ -73,7 +81,7 @@ def step(monkeypatch) -> Fake:
     monkeypatch.setattr(torch.cuda, "graph_pool_handle", lambda: None)
     torch.manual_seed(0)
     config = tiny(
-        target_samples=1000, light_step_every=LIGHT_PERIOD, priors_from=PRIORS_FROM, shading="summed", occlusion_directions=256,
+        target_samples=1000, light_step_every=LIGHT_PERIOD, priors_from=PRIORS_FROM, shading="summed",
         table_dtype="float16", steps=100,
     )  # fmt: skip
     return Fake(SceneModel(config))
@@ -88,7 +96,7 @@ def ways(taker: Fake, n: int, **settings) -> list[str]:
 
 
 def test_a_step_is_called_and_then_recorded_and_then_repeated(step):
-    """The first has room for all there is; the very first with a capacity is called as well, so that kernels are loaded."""
+    """The first has room for all there is; the very first with a capacity is called too, so that kernels are loaded."""
     assert step.capacity == PADDED
     assert ways(step, 5) == ["called", "called", "recorded", "repeated", "repeated"]
     assert step.calls == [None, ROOM, ROOM]
@@ -116,7 +124,9 @@ def decide(step: Fake, what: str) -> dict:
         step.mesh.made_at = 0.25
     elif what == "occlusion":
         step.model.occlusion.ready = True
-    return {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}.get(what, {})
+    return {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}.get(
+        what, {}
+    )
 
 
 @pytest.mark.parametrize("what", ["levels", "mesh", "occlusion", "light", "priors", "rays"])
@@ -129,7 +139,9 @@ def test_another_decision_is_another_graph(step, what):
 def test_steps_that_decide_alike_share_a_graph(step):
     """The light moves with the 4th, the 8th and the last step, for which it stands for 4, 4 and one steps."""
     ways(step, 3)
-    assert [step.taken(step=k, progress=p).how for k, p in ((1, 0.1), (2, 0.3), (6, PRIORS_FROM - 0.01))] == ["repeated"] * 3
+    assert [step.taken(step=k, progress=p).how for k, p in ((1, 0.1), (2, 0.3), (6, PRIORS_FROM - 0.01))] == [
+        "repeated"
+    ] * 3
     assert [step.taken(step=3).how for _ in range(2)] == ["called", "recorded"]
     assert step.taken(step=7).how == step.taken(step=95).how == "repeated"
     assert step.taken(step=99).how == "repeated" and step.taken(step=98).how == "repeated"
@@ -181,7 +193,7 @@ def gradients(step: Fake) -> list[Tensor | None]:
 
 
 def test_a_repeated_step_is_that_of_its_own_inputs(step):
-    """Rays, samples, light, and the cells of the light; its gradients are at the parameters and the light given, where they add up."""
+    """Rays, samples, light and its cells; gradients are at the parameters and at the light given, where they add up."""
     ways(step, 4)
     model = step.model
     for k in range(1, 4):
@@ -272,7 +284,9 @@ def work(monkeypatch):
 def test_nothing_is_collected_while_recording(work, collects):
     (gc.enable if collects else gc.disable)()
     seen = []
-    graph, result = graphs.record(lambda: seen.append((gc.isenabled(), list(work.last.asked))) or "result", "pool", "generator")
+    graph, result = graphs.record(
+        lambda: seen.append((gc.isenabled(), list(work.last.asked))) or "result", "pool", "generator"
+    )
     begun = [("generator", "generator"), ("begin", {"pool": "pool", "capture_error_mode": "thread_local"})]
     assert result == "result" and graph is work.last and seen == [(False, begun)]
     assert graph.asked == [*begun, "end"] and gc.isenabled() == collects

@@ -72,7 +72,13 @@ def query_of(n: int = 40, n_inputs: int = 7) -> OcclusionQuery:
     """Points of which each number may have a gradient."""
     g = generator(3)
     normals, lobes = (unit(torch.randn(n, 3, generator=g)) for _ in range(2))
-    parts = torch.randn(n, n_inputs, generator=g), torch.randn(n, 3, generator=g), normals, lobes, torch.rand(n, 1, generator=g)
+    parts = (
+        torch.randn(n, n_inputs, generator=g),
+        torch.randn(n, 3, generator=g),
+        normals,
+        lobes,
+        torch.rand(n, 1, generator=g),
+    )
     return OcclusionQuery(*(part.requires_grad_() for part in parts))
 
 
@@ -107,7 +113,9 @@ def test_all_is_open_before_the_first_mesh_without_occlusion_and_where_nothing_i
     head.is_unoccluded = True
     found.append(head(query_of()))
     for occlusion in found:
-        assert torch.equal(occlusion.diffuse, torch.ones(40, channels)) and torch.equal(occlusion.specular, torch.ones(40, channels))
+        assert torch.equal(occlusion.diffuse, torch.ones(40, channels)) and torch.equal(
+            occlusion.specular, torch.ones(40, channels)
+        )
 
 
 def test_the_gradient_goes_into_what_the_head_reads_of_the_field_and_not_into_the_geometry():
@@ -129,7 +137,7 @@ def test_a_kind_of_occlusion_is_told_the_segments_of_the_points():
 
 
 def test_a_directional_head_reads_the_lobe_by_functions_that_differ_over_the_sphere():
-    """Its axis, the five harmonics of degree 2, which have no mean and nothing in common, the cube of z, and its width."""
+    """Its axis, the five harmonics of degree 2, without a mean or anything in common, the cube of z, and its width."""
     directions = torch.from_numpy(_core.fibonacci_sphere(4096)).float()
     head = OcclusionHead(7, 8, 1, 1, directional=True)
     head.use(None)

@@ -73,7 +73,11 @@ def evaluated(light: Light) -> EvaluatedLight:
 
 def use(light: EvaluatedLight) -> torch.Tensor:
     """Something that reads all parts of a light."""
-    return light(W, RHO).square().sum() + (light.cells.radiance.square() * light.cells.solid_angles[:, None]).sum() + light.cells.directions[:, 0].sum()
+    return (
+        light(W, RHO).square().sum()
+        + (light.cells.radiance.square() * light.cells.solid_angles[:, None]).sum()
+        + light.cells.directions[:, 0].sum()
+    )
 
 
 def test_a_light_may_read_other_tensors_and_leaves_its_gradients_there():
@@ -117,7 +121,7 @@ def test_a_light_without_cells_has_none_with_other_tensors_either():
 
 @pytest.mark.parametrize("read", ["lookups", "cells", "both"])
 def test_what_gathers_is_handed_on_whatever_was_read(read):
-    """The gradient of maps alone, of the cells alone, and of both, is that of a light that is evaluated for this one step."""
+    """The gradient of maps alone, of the cells alone, and of both, is that of a light evaluated for this one step."""
     light, grads = light_of("pyramid"), []
 
     def loss(shared, cells) -> torch.Tensor:

@@ -104,7 +104,7 @@ def with_images(dataset: Dataset, images: np.ndarray) -> Dataset:
 
 @pytest.mark.parametrize(("share", "n_near"), [(0.0, 0), (0.75, 7), (1.0, 10)])
 def test_as_many_rays_are_drawn_as_asked(dataset, share, n_near):
-    """Ten, three quarters of which are seven, all within the masks where all pixels but one view's are far from them."""
+    """Ten, three quarters of which are seven: these are all from the only view that has a mask."""
     images = dataset.images.copy()
     images[1:, ..., 3] = 0.0
     source = PixelSource(with_images(dataset, images), share, generator())
@@ -113,23 +113,23 @@ def test_as_many_rays_are_drawn_as_asked(dataset, share, n_near):
     assert (pixels[:n_near, 2] == 0).all()
 
 
-def test_rays_follow_the_generator_they_were_given(dataset):
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_rays_follow_the_generator_they_were_given(dataset, share):
     """And nothing else: not what others draw."""
     found = []
     for seed, other in ((1, 0), (1, 5), (2, 0)):
         torch.manual_seed(other)
-        found.append(PixelSource(dataset, 0.5, generator(seed)).draw(50)[2])
+        found.append(PixelSource(dataset, share, generator(seed)).draw(50)[2])
     assert torch.equal(found[0], found[1]) and not torch.equal(found[0], found[2])
 
 
 def test_without_masks_rays_come_from_anywhere(dataset):
+    """From each of the 1,920 pixels, about as often from each view."""
     images = dataset.images.copy()
     images[..., 3] = 0.0
-    pixels = PixelSource(with_images(dataset, images), 0.9, generator()).draw(5000)[2]
-    view, column, row = (pixels[:, i] * n for i, n in ((2, 3), (0, WIDTH), (1, HEIGHT)))
-    for value, n in ((view, 3), (column, WIDTH), (row, HEIGHT)):
-        counts = torch.bincount(value.round().long(), minlength=n)
-        assert len(counts) == n and counts.min() > 0.6 * 5000 / n
+    pixels = PixelSource(with_images(dataset, images), 0.9, generator()).draw(40_000)[2]
+    assert len(pixels.unique(dim=0)) == 3 * HEIGHT * WIDTH
+    assert (pixels[:, 2] * 3).round().long().bincount().min() > 0.9 * 40_000 / 3
 
 
 def test_masks_reach_a_fiftieth_of_the_width_and_are_there_where_they_are_thin(dataset):

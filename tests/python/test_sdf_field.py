@@ -118,8 +118,8 @@ def test_differences_are_not_rounded_to_tensor_cores():
 
 
 def test_it_starts_as_the_distance_to_a_sphere():
-    """|x| - r in the mean, up to the bend of softplus: sqrt(pi k) E[softplus(|x| sqrt(2 / k) z)] for normal z; what the hash
-    grid says does not count, and the other outputs are small."""
+    """|x| - r in the mean, up to the bend of softplus: sqrt(pi k) E[softplus(|x| sqrt(2 / k) z)] for normal z; what the
+    hash grid says does not count, and the other outputs are small."""
     k = 2048
     for radius in (0.3, 0.7):
         torch.manual_seed(0)
@@ -142,7 +142,10 @@ def test_it_starts_as_the_distance_to_a_sphere():
         assert outputs[1:].std().item() == pytest.approx(math.sqrt(1 / k), rel=0.05)
         assert 1e-5 < outputs[0].std() < 1e-3 and not field.out_bias[1:].any() and not field.hidden_bias.any()
         assert field.hidden_direction[:, :3].std().item() == pytest.approx(math.sqrt(2 / k), rel=0.05)
-        for direction, length in ((field.hidden_direction, field.hidden_length), (field.out_direction, field.out_length)):
+        for direction, length in (
+            (field.hidden_direction, field.hidden_length),
+            (field.out_direction, field.out_length),
+        ):
             torch.testing.assert_close(length, direction.norm(dim=1, keepdim=True))
 
 
@@ -151,4 +154,7 @@ def test_the_sharpness_is_an_exponential_between_its_bounds():
     s = sharpness(v)
     assert s.tolist() == pytest.approx([math.exp(x) for x in (0, 0, 3, 8, 9, 9)], rel=1e-5)
     (slope,) = torch.autograd.grad(s.sum(), v)
-    assert slope[[2, 3]].tolist() == pytest.approx([10 * math.exp(3), 10 * math.exp(8)], rel=1e-5) and not slope[[0, 5]].any()
+    assert (
+        slope[[2, 3]].tolist() == pytest.approx([10 * math.exp(3), 10 * math.exp(8)], rel=1e-5)
+        and not slope[[0, 5]].any()
+    )

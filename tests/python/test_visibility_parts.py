@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from mesh_shapes import OFFSET, between, corners, grid_mesh, scene_of
+from mesh_shapes import OFFSET, between, corners, grid_mesh, lattice, scene_of
 from op_checks import generator, unit
 from torch.nn import functional as F
 
@@ -66,7 +66,8 @@ def test_the_numbers_of_set_bits():
 
 @pytest.mark.parametrize("indirect", [True, False])
 def test_what_is_kept_of_a_mesh_is_what_its_vertices_see(indirect):
-    """Along the normals, from the offset, as many vertices as came, though two are in one place; what they hit where it counts."""
+    """Along the normals, from the offset, as many vertices as came, though two are in one place; what they hit where
+    it counts."""
     mesh = dented()
     vertices, faces = corners(mesh)[0], faces_of(mesh)
     vertices, faces = torch.cat([vertices, vertices[faces[-1]]]), faces.clone()
@@ -75,9 +76,8 @@ def test_what_is_kept_of_a_mesh_is_what_its_vertices_see(indirect):
     traced = VisibilityBits(256, 0.03, 3, indirect).trace(scene_of(mesh), vertices, faces)
     normals = torch.tensor(np.array(again.vertex_normals)).float()
     expected = VisibilityCache.trace(
-        scene_of(mesh), vertices, normals, float(again.area), VisibilityBits(256, 0.03, 3, False).directions, offset=0.03,
-        with_hits=True,
-    )  # fmt: skip
+        scene_of(mesh), vertices, normals, float(again.area), lattice(256), offset=0.03, with_hits=True
+    )
     assert torch.equal(traced.cache.vertices, vertices) and torch.equal(traced.cache.normals, normals)
     assert torch.equal(traced.cache.bits, expected.bits) and traced.cache.radius == expected.radius
     assert (traced.cache.hits is not None and torch.equal(traced.cache.hits, expected.hits)) == indirect
@@ -112,7 +112,7 @@ def test_a_new_mesh_takes_the_place_of_the_one_before():
 
 
 def test_light_is_averaged_over_the_texels_that_are_nearest_to_a_direction():
-    """By solid angle, asked as rough as a texel is wide, 8 texels or more a direction; its direction is that of its power."""
+    """By solid angle, as rough as a texel is wide, 8 texels or more a direction; its direction is that of its power."""
     bits, light = VisibilityBits(64, OFFSET, 3, True), Painted()
     cells = bits.cell_light(light)
     rows = math.isqrt(len(light.roughness) // 2)
@@ -163,7 +163,7 @@ def test_light_that_was_kept_comes_back():
 
 @pytest.mark.parametrize("chunk", [1 << 15, 50])
 def test_each_vertex_sends_what_it_is_shaded_with(monkeypatch, chunk):
-    """Asked at the vertices along their normals, in parts; a second time in the same memory, after the first was read."""
+    """Asked at the vertices along their normals, in parts; again in the same memory, after the first was read."""
     monkeypatch.setattr(visibility, "SHADED_CHUNK", chunk)
     bits, seen = bits_on(dented()), []
 
@@ -189,9 +189,8 @@ def test_light_of_the_mesh_is_not_asked_for_where_it_does_not_count():
     def shade(x: torch.Tensor, n: torch.Tensor) -> torch.Tensor:
         raise AssertionError("is not asked")
 
-    for bits in (
-        bits_on(dented(), indirect=False), VisibilityBits(64, OFFSET, 3, True), bits_on(trimesh.creation.icosphere(2), open_below=0.02),
-    ):  # fmt: skip
+    ball = bits_on(trimesh.creation.icosphere(2), open_below=0.02)
+    for bits in (bits_on(dented(), indirect=False), VisibilityBits(64, OFFSET, 3, True), ball):
         bits.refresh(shade)
         assert bits.radiance is None
 
