@@ -22,7 +22,7 @@ class Noting(TorchFunctionMode):
 
 
 def precisions(function: Callable[[], object]) -> dict[str, set[str]]:
-    """The settings, "tf32" or "ieee", with which each function of torch is called, by its name; "tf32" is set outside."""
+    """The settings, "tf32" or "ieee", with which each function of torch is called; "tf32" is set outside."""
     products = torch.backends.cuda.matmul
     before, products.fp32_precision = products.fp32_precision, "tf32"
     try:

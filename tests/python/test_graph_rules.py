@@ -42,10 +42,12 @@ class Fake(GraphedStep):
         super().__init__(model, None, mesh, torch.Generator().manual_seed(0))
         self.calls: list[tuple[int, int] | None] = []
         self.n_found, self.scale = PADDED, 1.0
+        self.given: tuple[Rays, Found] | None = None  # the inputs of the last step
 
     def find(self, batch: Rays, progress: float, capacity: int) -> Found:
         assert capacity == PADDED
-        return Found(torch.full((self.n_found, 3), self.scale), torch.tensor([7]))
+        self.given = batch, Found(torch.full((self.n_found, 3), self.scale), torch.tensor([7]))
+        return self.given[1]
 
     def differentiate(self, batch, found, light, environment, step, progress, capacity):
         self.calls.append(capacity)
@@ -206,9 +208,7 @@ def test_a_repeated_step_is_that_of_its_own_inputs(step):
             repeated = step.taken(light=light, target=0.3 * k + number)
             assert repeated.how == "repeated"
             found, own = gradients(step), model.variance.grad
-            called = step.differentiate(
-                Rays(torch.full((5, 3), 0.3 * k + number)), step.find(None, 0.0, PADDED), again, None, 0, 0.0, None
-            )
+            called = step.differentiate(*step.given, again, None, 0, 0.0, None)
             assert repeated.value == pytest.approx(called[0].item(), rel=1e-6)
             for a, b in zip(found, gradients(step), strict=True):
                 assert (a is None and b is None) or torch.equal(a, b)
@@ -224,6 +224,19 @@ def test_the_directions_of_the_cells_are_handed_on_too(step):
     light = step.model.evaluate_light()
     changed = light.with_tensors(light.leaves, [x * 3.0 for x in light.constants])
     assert step.taken(light=light).value != pytest.approx(step.taken(light=changed).value, rel=1e-3)
+
+
+def test_a_graph_leaves_its_callers_tensors_alone(step):
+    """Those that it was recorded with: other steps' numbers go into memory of its own."""
+    ways(step, 2)
+    light, other = step.model.evaluate_light(), step.model.evaluate_light()
+    assert step.taken(light=light).how == "recorded"
+    tensors = [*step.given[0], *step.given[1], *light.leaves, *light.constants]
+    before = [x.detach().clone() for x in tensors]
+    step.scale = 3.0
+    changed = other.with_tensors([2.0 * x.detach() for x in other.leaves], [x + 1.0 for x in other.constants])
+    assert step.taken(light=changed, target=5.0).how == "repeated"
+    assert all(torch.equal(a, b) for a, b in zip(tensors, before, strict=True))
 
 
 def test_the_copy_of_16_bits_is_made_outside_of_a_graph(step):
