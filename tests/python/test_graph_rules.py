@@ -46,14 +46,17 @@ class Fake(GraphedStep):
 
     def find(self, batch: Rays, progress: float, capacity: int) -> Found:
         assert capacity == PADDED
-        self.given = batch, Found(torch.full((self.n_found, 3), self.scale), torch.tensor([7]))
+        self.given = batch, Found(torch.full((self.n_found, 3), self.scale), torch.tensor([int(7 * self.scale)]))
         return self.given[1]
 
     def differentiate(self, batch, found, light, environment, step, progress, capacity):
         self.calls.append(capacity)
         self.model.zero_grad(set_to_none=True)
         looked_up = light(*LOOKUP).sum() + (light.cells.radiance * light.cells.solid_angles[:, None]).mean()
-        value = batch.target.sum() * found.directions.mean() * self.model.variance + found.number.sum() * looked_up
+        value = (
+            batch.target.sum() * found.directions.mean() * self.model.variance
+            + batch.target.mean() * found.number.sum() * looked_up
+        )
         value.backward()
         return value.detach(), {"value": value.detach()}
 
@@ -97,11 +100,13 @@ def ways(taker: Fake, n: int, **settings) -> list[str]:
 # ---- when ----
 
 
-def test_a_step_is_called_and_then_recorded_and_then_repeated(step):
+def test_a_step_is_called_and_then_recorded_and_then_repeated(step, monkeypatch):
     """The first has room for all there is; the very first with a capacity is called too, so that kernels are loaded."""
     assert step.capacity == PADDED
+    replays, replay = [], pretend_graphs.PretendGraph.replay
+    monkeypatch.setattr(pretend_graphs.PretendGraph, "replay", lambda self: replays.append(self) or replay(self))
     assert ways(step, 5) == ["called", "called", "recorded", "repeated", "repeated"]
-    assert step.calls == [None, ROOM, ROOM]
+    assert step.calls == [None, ROOM, ROOM] and len(replays) == 3 and replays[0] is replays[1] is replays[2]
     assert ways(step, 3, n_rays=6) == ["called", "recorded", "repeated"] and step.calls[3:] == [None, ROOM]
     assert ways(step, 1) == ["repeated"]
 
