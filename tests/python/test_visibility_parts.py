@@ -242,6 +242,9 @@ def test_directions_are_seen_as_the_cache_has_them():
         expected = cached_visibility(bits.cache, q.positions, q.normals, bits.radiance)
         assert torch.equal(visible, expected[0]) and 0.01 < (visible < 1).float().mean() < 0.9
         assert (sent is None and not sends) or torch.equal(sent, expected[1])
+    bits.is_unoccluded = True
+    visible, sent = bits.visibility(q.positions, q.normals)
+    assert torch.equal(visible, torch.ones(80, 256)) and sent is None
 
 
 def test_no_gradient_flows_through_the_factors():
