@@ -14,6 +14,7 @@ from splitnerf.fields import EvaluatedLight, Light, LightMlp, LightPyramid, Visi
 from splitnerf.fields.light import LightSamples, lobe_roughness, panorama_directions
 from splitnerf.fields import light_pyramid
 from splitnerf.fields.light_pyramid import chain_resolution, is_resolved, pyramid_filters
+from splitnerf.ops import sh_projection
 
 
 # ---- the number of directions ----
@@ -243,6 +244,8 @@ def test_harmonics_are_those_of_the_averages_where_maps_are_large(monkeypatch):
     filters = pyramid_filters.__wrapped__(32)
     monkeypatch.setattr(light_pyramid, "filters_on", lambda *_: filters)
     assert filters.projected == slice(32 * 32, 32 * 32 + 16 * 16) and filters.projection.shape == (169, 256)
+    assert torch.equal(filters.projection, sh_projection(16, cells=True))  # averages are constant in their cells
+    assert torch.equal(pyramid_filters(32).projection, sh_projection(32, cells=False))  # as texels are read: bilinearly
     light, z = LightPyramid(32), octahedral_directions(32)[:, 2:].float()
     with torch.no_grad():
         light.texels.zero_()
