@@ -208,6 +208,7 @@ def test_maps_are_as_fine_as_their_lobes(resolution, maps, nodes):
     than one of its own map."""
     filters = pyramid_filters(resolution)
     assert filters.resolutions.tolist() == maps and filters.nodes.tolist() == pytest.approx(nodes)
+    assert torch.equal(filters.projection, sh_projection(resolution, cells=False))  # as texels are read: bilinearly
     for rho in (0.1, 0.15, 0.2, 0.3, 0.4):
         assert is_resolved(resolution, rho) == (2.57 * rho**2 >= math.sqrt(4 * math.pi) / resolution)
         m = chain_resolution(1 << 12, rho)
@@ -220,6 +221,7 @@ def test_the_light_starts_as_it_is_told_and_its_texels_stay_in_bounds():
         light = LightPyramid(16, start)
         torch.testing.assert_close(light.radiance(), torch.full((256, 3), start))
         assert not light.texels[16:].any()
+    assert LightMlp.needs_consistency_loss and not light.needs_consistency_loss  # lobes are integrals of the texels
     light = LightPyramid(16, 1.0)
     with torch.no_grad():
         light.texels[-256:] = torch.linspace(-21, 21, 256)[:, None]
@@ -245,7 +247,6 @@ def test_harmonics_are_those_of_the_averages_where_maps_are_large(monkeypatch):
     monkeypatch.setattr(light_pyramid, "filters_on", lambda *_: filters)
     assert filters.projected == slice(32 * 32, 32 * 32 + 16 * 16) and filters.projection.shape == (169, 256)
     assert torch.equal(filters.projection, sh_projection(16, cells=True))  # averages are constant in their cells
-    assert torch.equal(pyramid_filters(32).projection, sh_projection(32, cells=False))  # as texels are read: bilinearly
     light, z = LightPyramid(32), octahedral_directions(32)[:, 2:].float()
     with torch.no_grad():
         light.texels.zero_()
