@@ -48,7 +48,6 @@ def test_without_smoothness_no_neighbours_are_drawn():
 
 def test_the_same_generator_draws_the_same():
     first, again, other = drawn(), drawn(), drawn(1)
-    for part in ("background", "jitter"):
-        assert torch.equal(getattr(first, part), getattr(again, part)) and not torch.equal(getattr(first, part), getattr(other, part))
-    for a, b, c in zip(first.probes, again.probes, other.probes):
+    drawn_parts = [(batch.background, batch.jitter, *batch.probes) for batch in (first, again, other)]
+    for a, b, c in zip(*drawn_parts):
         assert torch.equal(a, b) and not torch.equal(a, c)

@@ -89,14 +89,28 @@ def test_a_disk_that_is_full_keeps_the_old_file(content, tmp_path, monkeypatch):
 
 MESH = {"mesh_vertices": torch.zeros(4, 3), "mesh_faces": torch.tensor([[0, 1, 3]])}
 SKY = torch.zeros(256, 3)  # of as many directions as the bits have
+
+
+def sent(n: int) -> dict:
+    """Cached light, with that of n vertices."""
+    return {"sky": SKY, "sent": torch.zeros(n, 3)}
+
+
+def gaps(texels: torch.Tensor) -> torch.Tensor:
+    """The same shape in memory with gaps."""
+    return texels.repeat(1, 2)[:, ::2]
+
+
 ALLOWED = {
     "the most rays": lambda c: c.update(n_rays=8192),
-    "more rays at first than later": lambda c: c["config"]["sampling"].update(initial_rays=20000) or c.update(n_rays=20000),
+    "more rays at first than later": lambda c: c.update(
+        n_rays=20000, config=c["config"] | {"sampling": c["config"]["sampling"] | {"initial_rays": 20000}}
+    ),
     "parameters whose sum is too large": lambda c: c["model"]["light.texels"].fill_(3e38),
     "the largest progress": lambda c: c.update(meshed_at=1.0, previewed_at=1.0, seconds=0.0, step=0),
     "a mesh": lambda c: c.update(MESH),
     "a mesh of smaller numbers": lambda c: c.update(MESH, mesh_faces=MESH["mesh_faces"].int()),
-    "light that a mesh sends": lambda c: c.update(MESH, occlusion_light={"sky": SKY, "sent": torch.zeros(4, 3)}),
+    "light that a mesh sends": lambda c: c.update(MESH, occlusion_light=sent(4)),
     "light that weighs rays": lambda c: c.update(environment=torch.zeros(32, 64, 3)),
     "a GPU": lambda c: c.update(device="cuda", generator=torch.zeros(16, dtype=torch.uint8)),
 }  # fmt: skip
@@ -107,18 +121,18 @@ REFUSED = {
     "one ray too many": (lambda c: c.update(n_rays=8193), "n_rays is 8193"),
     "no fingerprint": (lambda c: c.update(fingerprint=None), "fingerprint is missing or of another type"),
     "a sky of other directions": (lambda c: c["occlusion_light"].update(sky=SKY[1:]), "the sky's light is missing"),
-    "light of other vertices": (
-        lambda c: c.update(MESH, occlusion_light={"sky": SKY, "sent": torch.zeros(5, 3)}), "the light that the mesh sends",
-    ),
+    "light of other vertices": (lambda c: c.update(MESH, occlusion_light=sent(5)), "the light that the mesh sends"),
     "light of no mesh": (
-        lambda c: c.update(occlusion_light={"sky": SKY, "sent": torch.zeros(4, 3)}, mesh_vertices=None, mesh_faces=None),
-        "the light that the mesh sends",
+        lambda c: c.update(occlusion_light=sent(4), mesh_vertices=None, mesh_faces=None), "the light that the mesh sends",
     ),
     "no light of the occlusion": (lambda c: c.update(occlusion_light={}), "occlusion_light is missing"),
     "light of an occlusion without any": (
-        lambda c: c["config"].update(occlusion={"kind": "off"}, shading={"method": "split"}), "occlusion_light is missing",
+        lambda c: c["config"].update(occlusion={"kind": "off"}, shading={"method": "split"}),
+        "occlusion_light is missing",
     ),
-    "light that weighs rays, turned": (lambda c: c.update(environment=torch.zeros(64, 32, 3)), "environment is missing"),
+    "light that weighs rays, turned": (
+        lambda c: c.update(environment=torch.zeros(64, 32, 3)), "environment is missing",
+    ),
     "light's noise of one number": (lambda c: c.update(light_noise=torch.zeros(1).double()), "light_noise is missing"),
     "light's noise of NaN": (lambda c: c["light_noise"].fill_(torch.nan), "light_noise has NaN"),
     "a frame of single precision": (lambda c: c.update(box_from_world=torch.eye(4)), "box_from_world is missing"),
@@ -127,17 +141,21 @@ REFUSED = {
     "too few values of cells": (lambda c: c.update(occupancy=c["occupancy"][1:]), "occupancy is missing"),
     "a generator of numbers": (lambda c: c.update(generator=torch.zeros(5056)), "generator is missing"),
     "no generator of torch": (lambda c: c.pop("torch_generator"), "torch_generator is missing"),
-    "vertices without faces": (lambda c: c.update(mesh_vertices=torch.zeros(4, 3), mesh_faces=None), "mesh_faces is missing"),
+    "vertices without faces": (lambda c: c.update(MESH, mesh_faces=None), "mesh_faces is missing"),
     "faces without vertices": (lambda c: c.update(MESH, mesh_vertices=None), "mesh_vertices is missing"),
-    "vertices of double precision": (lambda c: c.update(MESH, mesh_vertices=torch.zeros(4, 3).double()), "mesh_vertices is missing"),
+    "vertices of double precision": (
+        lambda c: c.update(MESH, mesh_vertices=torch.zeros(4, 3).double()), "mesh_vertices is missing",
+    ),
     "flat vertices": (lambda c: c.update(MESH, mesh_vertices=torch.zeros(4, 2)), "mesh_vertices is missing"),
-    "a face one too far": (lambda c: c.update(MESH, mesh_faces=torch.tensor([[0, 1, 4]])), "names vertices that are none"),
+    "a face one too far": (
+        lambda c: c.update(MESH, mesh_faces=torch.tensor([[0, 1, 4]])), "names vertices that are none",
+    ),
     "moments without their steps": (lambda c: first(c).pop("step"), "the optimiser's step is missing"),
     "a parameter that leaves out places": (
-        lambda c: c["model"].update({"light.texels": c["model"]["light.texels"].repeat(1, 2)[:, ::2]}), "light.texels is missing",
+        lambda c: c["model"].update({"light.texels": gaps(c["model"]["light.texels"])}), "light.texels is missing",
     ),
     "a light of more texels": (
-        lambda c: c["model"].update({"light.texels": torch.zeros(3, 3)}), "parameter light.texels does not fit the settings",
+        lambda c: c["model"].update({"light.texels": torch.zeros(3, 3)}), "light.texels does not fit the settings",
     ),
 }  # fmt: skip
 

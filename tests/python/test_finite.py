@@ -230,25 +230,29 @@ def test_parameters_whose_sum_is_too_large_are_finite(stepped):
 
 def test_the_first_bad_input_is_named_in_order_of_the_data_flow():
     """Whatever comes first, all that follows from it is bad as well."""
-    names = ["image a", "pose of a", "intrinsics of a", "image b", "pose of b", "intrinsics of b", "rays' rays_o", "rays' rays_d",
-             "rays' target", "rays' background", "parameter weight", "rendered sdf", "rendered gradients", "rendered normals",
-             "rendered weights", "rendered albedo", "rendered radiance", "rendered mean", "rendered opacity"]  # fmt: skip
+    names = [f"{part} {frame}" for frame in "ab" for part in ("image", "pose of", "intrinsics of")]
+    names += [f"rays' {name}" for name in ("rays_o", "rays_d", "target", "background")] + ["parameter weight"]
+    points = ("albedo", "radiance")
+    names += [f"rendered {x}" for x in ("sdf", "gradients", "normals", "weights", *points, "mean", "opacity")]
 
     def explained(first_bad: int) -> str:
+        def of(start: str) -> dict[str, torch.Tensor]:
+            return {name.removeprefix(start): x for name, x in values.items() if name.startswith(start)}
+
         values = {name: torch.full((3,), torch.nan if i >= first_bad else 1.0) for i, name in enumerate(names)}
         arrays = {
             part: [values[f"{prefix} {frame}"].numpy() for frame in "ab"]
             for part, prefix in (("images", "image"), ("poses", "pose of"), ("intrinsics", "intrinsics of"))
         }
-        of = lambda start: {name.removeprefix(start): values[name] for name in names if name.startswith(start)}  # noqa: E731
         model = torch.nn.Module()
         model.weight = torch.nn.Parameter(values["parameter weight"])
-        shaded = {"albedo": values["rendered albedo"], "radiance": values["rendered radiance"]}
+        shaded = {name: values[f"rendered {name}"] for name in points}
         ray = SimpleNamespace(**of("rendered "), points=SimpleNamespace(_asdict=lambda: shaded))
         dataset = SimpleNamespace(frame_names=["a", "b"], **arrays)
         terms = {"colour": 1.0, "mask": torch.inf, "metal": torch.nan}
         return str(explain_loss(8, terms, dataset, SimpleNamespace(**of("rays' ")), model, ray))
 
     for i, name in enumerate(names):
-        assert f"step 8: the loss is not finite (mask, metal); first not finite: {name} (3 of 3 values); " in explained(i)
+        message = f"step 8: the loss is not finite (mask, metal); first not finite: {name} (3 of 3 values); "
+        assert explained(i).startswith(message)
     assert "first not finite: none of what it comes from; " in explained(len(names))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 import torch
 from test_physics import entropy, rays
@@ -167,3 +169,89 @@ def test_occlusion_is_traced_for_its_share_as_it_is_set(monkeypatch, channels):
     assert asked == dict(
         n_diffuse_rays=5, n_specular_rays=5, offset=0.037, along_ray=False, seed=9, n_channels=channels
     )
+
+
+def occlusion_rays(n: int) -> SimpleNamespace:
+    """Samples whose number stands in all that belongs to them; factors are off .5 by .002 and -.004 of it."""
+    number = torch.arange(float(n))
+    column = number[:, None]
+    points = SimpleNamespace(
+        lobe_dirs=column + torch.tensor([0.0, 0.0, 0.5]), roughness=column, occlusion_d=0.5 + 0.002 * column,
+        occlusion_s=0.5 - 0.004 * column,
+    )  # fmt: skip
+    return SimpleNamespace(
+        shaded=torch.arange(n), shares=1.0 + number, positions=column.expand(-1, 3), sdf=torch.zeros(n),
+        normals=column + torch.tensor([0.0, 0.5, 0.0]), points=points,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("form", "factor"), [("square", 1.0), ("smooth_l1", 0.5)])
+def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch, form, factor):
+    """About 60 of 200, drawn by the run's own generator: w (.002^2 + .004^2) i^2 over the sum of w; half by smooth_l1."""
+    asked = []
+
+    def factors(scene, positions, normals, lobes, roughness, environment, **_):
+        asked.append((positions, normals, lobes, roughness[:, 0]))
+        return torch.full((len(positions), 1), 0.5), torch.full((len(positions), 1), 0.5)
+
+    monkeypatch.setattr(losses, "occlusion_factors", factors)
+    config = tiny(occlusion_share=0.3, occlusion_channels=1, occlusion_loss_form=form)
+    found = []
+    for seed in range(2):
+        torch.manual_seed(seed)
+        found.append(losses.occlusion_loss(occlusion_rays(200), None, None, config, generator(), 0).item())
+    positions, normals, lobes, number = asked[0]
+    assert 30 < len(number) < 90 and number.unique().equal(number)
+    for part, own in ((positions, [0.0, 0.0, 0.0]), (normals, [0.0, 0.5, 0.0]), (lobes, [0.0, 0.0, 0.5])):
+        assert torch.equal(part, number[:, None] + torch.tensor(own))
+    w = 1.0 + number
+    expected = factor * (w @ ((0.002**2 + 0.004**2) * number.square()) / w.sum()).item()
+    assert found[0] == found[1] == pytest.approx(expected, rel=1e-4)
+
+
+def test_rays_that_meet_nothing_cost_nothing():
+    """No sample is shaded; none is chosen."""
+    ray = occlusion_rays(0)
+    ray.points.albedo, ray.points.metallic = torch.zeros(0, 3), torch.zeros(0, 1)
+    for loss in (
+        losses.material_entropy_loss(ray, tiny(), generator()),
+        losses.occlusion_loss(ray, None, None, tiny(), generator(), 0),
+        losses.occlusion_loss(occlusion_rays(9), None, None, tiny(occlusion_share=0.0), generator(), 0),
+    ):
+        assert loss.shape == () and loss.item() == 0.0
+
+
+@pytest.mark.parametrize("light_set", ["fibonacci", "uniform"])
+def test_the_light_is_asked_by_the_runs_own_generator(light_set):
+    """About unit directions on all sides."""
+    asked = []
+
+    class Asked(Slope):
+        def __call__(self, directions, roughness):
+            asked.append((directions, roughness))
+            return super().__call__(directions, roughness)
+
+    config = tiny(light_set=light_set, light_samples=512, light_queries=256, neutral_queries=256, light_noise=0.0)
+    for seed in range(2):
+        torch.manual_seed(seed)
+        losses.light_loss(Asked(), config, generator(), 0)
+        losses.neutral_light_loss(Asked(), config, generator())
+    for first, again in zip(asked[0] + asked[1], asked[2] + asked[3]):
+        assert torch.equal(first, again)
+    queries, normals = asked[0][0][-256:], asked[1][0]
+    for directions in (asked[0][0][:512], queries, normals):
+        torch.testing.assert_close(directions.norm(dim=1), torch.ones(len(directions)))
+        assert directions.mean(0).norm() < 0.2
+    assert len(normals) == 256 and (asked[1][1] == 1).all()
+
+
+def test_narrow_lobes_sample_themselves_and_broad_ones_share(monkeypatch):
+    """Each query is one or the other, by its own roughness."""
+    narrow, broad = [], []
+    sample, prefilter = losses.sample_ggx_lobe, losses.prefilter_light
+    monkeypatch.setattr(losses, "sample_ggx_lobe", lambda *args: narrow.append(args) or sample(*args))
+    monkeypatch.setattr(losses, "prefilter_light", lambda *args: broad.append(args) or prefilter(*args))
+    losses.light_loss(Slope(), tiny(light_queries=64, **LOOSE | {"light_lobe_below": 0.6}), generator(), 0)
+    (axes, roughness, n, _), (others, rest, *_) = narrow[0], broad[0]
+    assert 5 < len(axes) < 32 and (roughness < 0.6).all() and n == 16
+    assert len(axes) + len(others) == 64 and (rest >= 0.6).all() and (rest < 1).sum() > 2
