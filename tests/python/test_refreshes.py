@@ -294,3 +294,12 @@ def test_the_hull_is_that_of_the_runs_box_and_cells(data, tmp_path):
     hull = training.grid.hull.flatten()
     assert torch.equal(hull, visual_hull(16, 1.2, *cameras).flatten())
     assert not torch.equal(hull, visual_hull(16, 1.5, *cameras).flatten())
+
+
+def test_without_indirect_light_nothing_is_refreshed_between_two_meshes(data, tmp_path, monkeypatch):
+    """Each of the two is told to the occlusion, which leaves the light out."""
+    at = steps_of(monkeypatch)
+    indirect = calls(monkeypatch, SceneModel, "refresh_indirect", lambda *_: at[0])
+    config = tiny(steps=6, mesh_every=0.5, indirect=False, indirect_every=1, preview_every=2.0)
+    loop.train(load_dataset(data), config, tmp_path)
+    assert indirect == [3] * 3 + [5] * 3
