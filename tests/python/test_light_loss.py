@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import pytest
@@ -96,6 +97,17 @@ def test_the_gradient_of_the_light_loss_goes_to_both_sides(below):
     config = tiny(light_queries=64, **LOOSE | {"light_lobe_below": below})
     losses.light_loss(light, config, generator(), 0).backward()
     assert levels.grad.tolist() == pytest.approx([-3.0, 3.0], rel=1e-3)
+
+
+@pytest.mark.parametrize(("form", "expected"), [("square", 3 * 0.25), ("smooth_l1", 3 * 0.125)])
+def test_the_error_of_the_light_has_its_form(form, expected):
+    """Off by a half in each channel."""
+
+    def light(directions, roughness):
+        return 1.0 + 0.5 * (roughness > 0).float().expand(-1, 3)
+
+    config = tiny(light_queries=64, **LOOSE | {"losses.light_form": form})
+    assert losses.light_loss(light, config, generator(), 0).item() == pytest.approx(expected, rel=1e-3)
 
 
 def test_the_number_of_directions_is_learned_from_broad_lobes_alone():
@@ -255,3 +267,39 @@ def test_narrow_lobes_sample_themselves_and_broad_ones_share(monkeypatch):
     (axes, roughness, n, _), (others, rest, *_) = narrow[0], broad[0]
     assert 5 < len(axes) < 32 and (roughness < 0.6).all() and n == 16
     assert len(axes) + len(others) == 64 and (rest >= 0.6).all() and (rest < 1).sum() > 2
+
+
+# ---- where the slopes go ----
+
+
+def test_similar_materials_attract_each_other():
+    """Two halves whose roughness, metallic or log albedo differ by d widths: the slope of -ln(1/2 + e^(-d^2/4) / 2), d = 1."""
+    attraction = 0.5 * math.exp(-0.25) / (1 + math.exp(-0.25))
+    for name, values in (("roughness", [[0.4], [0.6]]), ("metallic", [[0.4], [0.6]]), ("albedo", [[0.29], [0.39]])):
+        ray = rays([1.0, 1.0], [0.5, 0.5])
+        ray.points.albedo, ray.points.roughness = torch.full((2, 3), 0.4), torch.full((2, 1), 0.5)
+        columns = 3 if name == "albedo" else 1
+        leaf = torch.tensor(values).repeat(1, columns).requires_grad_()
+        setattr(ray.points, name, leaf)
+        width = math.sqrt(3) * math.log(0.40 / 0.30) if name == "albedo" else 0.2
+        config = tiny(entropy_points=4000, gloss_width=0.2, albedo_width=width)
+        losses.material_entropy_loss(ray, config, generator()).backward()
+        by_width = [1 / 0.3, 1 / 0.4] if name == "albedo" else [1.0, 1.0]
+        for slope, sign, x in zip(leaf.grad, (-1, 1), by_width):
+            expected = sign * attraction * x / width / math.sqrt(columns)
+            assert slope.tolist() == pytest.approx([expected] * columns, rel=0.05), name
+
+
+def test_factors_are_drawn_to_the_traced_ones_and_diffuse_light_to_grey(monkeypatch):
+    """By 2 w (o - traced) over the sum of w; light of one tint by the slope of its chroma."""
+    monkeypatch.setattr(losses, "occlusion_factors", lambda *args, **_: (torch.full((4, 1), 0.5),) * 2)
+    ray = occlusion_rays(4)
+    factors = [x.requires_grad_() for x in (ray.points.occlusion_d, ray.points.occlusion_s)]
+    config = tiny(occlusion_share=1.1, occlusion_channels=1, occlusion_loss_form="square")
+    losses.occlusion_loss(ray, None, None, config, generator(), 0).backward()
+    for factor in factors:
+        expected = 2 * ray.shares * (factor[:, 0].detach() - 0.5) / ray.shares.sum()
+        torch.testing.assert_close(factor.grad[:, 0], expected)
+    tint = torch.tensor([0.5, 0.0, -0.5], requires_grad=True)
+    losses.neutral_light_loss(lambda x, _: tint.exp().expand(len(x), 3), tiny(), generator()).backward()
+    assert tint.grad.tolist() == pytest.approx([2 * 0.5 / 3, 0.0, -2 * 0.5 / 3], abs=1e-4)
