@@ -14,9 +14,16 @@ from tiny_runs import tiny
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
 from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import make_grid
 from splitnerf.training import checkpoint
 from splitnerf.training import loop as trainer
-from splitnerf.training.checkpoint import LONGEST_PICKLE, load_checkpoint, restore_generator, restore_optimiser
+from splitnerf.training.checkpoint import (
+    LONGEST_PICKLE,
+    load_checkpoint,
+    restore_generator,
+    restore_optimiser,
+    restored_grid,
+)
 from splitnerf.training.optimiser import make_optimiser
 
 
@@ -134,6 +141,7 @@ REFUSED = {
         lambda c: c.update(environment=torch.zeros(64, 32, 3)), "environment is missing",
     ),
     "light's noise of one number": (lambda c: c.update(light_noise=torch.zeros(1).double()), "light_noise is missing"),
+    "light's noise in a column": (lambda c: c.update(light_noise=c["light_noise"][:, None]), "light_noise is missing"),
     "light's noise of NaN": (lambda c: c["light_noise"].fill_(torch.nan), "light_noise has NaN"),
     "a frame of single precision": (lambda c: c.update(box_from_world=torch.eye(4)), "box_from_world is missing"),
     "an unknown device": (lambda c: c.update(device="tpu"), "device is 'tpu'"),
@@ -194,11 +202,18 @@ def test_moments_come_back_and_rates_are_those_of_the_settings(content):
 def test_moments_of_no_parameter_are_refused(content, index):
     settings = tiny()
     optimiser = make_optimiser(SceneModel(settings), settings)
-    if index == "count":
-        index = sum(len(group["params"]) for group in optimiser.param_groups)
-    content["optimiser"]["state"][index] = first(content)
+    count = sum(len(group["params"]) for group in optimiser.param_groups)
+    state = content["optimiser"]["state"]
+    state[count if index == "count" else index] = state[count - 1]  # which would fit the last parameter
     with pytest.raises(InputError, match="its optimiser does not fit the settings"):
         restore_optimiser(optimiser, content, Path("checkpoint.pt"))
+
+
+def test_cells_come_back_by_their_values_and_by_their_classes(content):
+    values, cells = restored_grid(make_grid(tiny()), content, Path("checkpoint.pt"))
+    assert torch.equal(values, content["occupancy"]) and torch.equal(cells, content["cells"])
+    with pytest.raises(InputError, match="its occupancy grid does not fit the settings"):
+        restored_grid(make_grid(tiny(grid_resolution=20)), content, Path("checkpoint.pt"))
 
 
 def test_generators_go_on_where_they_stopped_or_begin_with_seed_and_step(content):
