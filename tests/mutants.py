@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = Path("python/splitnerf")
 # The fast tests of each file, by the longest beginning of its path that is listed.
 TESTS = {
-    "config.py": "test_config.py test_schedule.py",
+    "config/": "test_config.py",
     "evaluate/": "test_evaluate.py test_metrics.py test_protocol.py",
     "export/": "test_export.py test_export_parts.py test_bake.py test_meshing.py test_tangents.py",
     "fields/": "test_heads.py test_scene.py test_shading_model.py",
@@ -32,7 +32,7 @@ TESTS = {
     "render/model.py": "test_views.py test_correction.py test_shading_model.py test_scene.py test_summed_light.py test_schedule.py",
     "render/path_traced.py": "test_path_traced.py",
     "render/rays.py": "test_pixel_rays.py",
-    "training/checkpoint.py": "test_hostile_files.py",
+    "training/checkpoint.py": "test_checkpoint.py test_hostile_files.py",
     "training/finite.py": "test_finite.py",
     "training/graphs.py": "test_graph_rules.py test_graphs.py",
     "training/batches.py": "test_batches.py",
@@ -40,6 +40,8 @@ TESTS = {
     "training/losses.py": "test_light_loss.py test_loss_terms.py test_physics.py test_shading_model.py test_scene.py",
     "training/meshes.py": "test_meshes.py",
     "training/optimiser.py": "test_schedule.py",
+    "training/progress.py": "test_progress.py",
+    "training/repeatable.py": "test_train.py",
     "training/schedule.py": "test_schedule.py",
     "training/step.py": "test_loss_terms.py test_correction.py test_schedule.py test_train.py",
 }

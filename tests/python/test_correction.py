@@ -154,7 +154,7 @@ def test_samples_that_are_left_out_weigh_next_to_nothing(variance):
 
 
 def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
-    model, cells = ball(shades_per_ray=1, smoothness_points=40, eikonal_points=30)
+    model, cells = ball(shades_per_ray=1, smoothness_points=40, eikonal_points=30, entropy_points=20)
     grid = make_grid(model.config)
     grid.cells = cells
     step, g = Step(model, grid, SurfaceMesh(model), generator(3)), generator(4)
@@ -168,6 +168,13 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     n = len(ray.weights)
     assert len(ray.beside) == 40 and len(ray.gradients) == n + 30 + 40
     assert len(ray.shaded) < 0.5 * n
+    assert step.is_complete(1e9, 1e9)  # it has no capacity
+    entropies = []
+    for seed in range(2):
+        torch.manual_seed(seed)
+        step = Step(model, grid, SurfaceMesh(model), generator(3))
+        entropies.append(step(batch, model.evaluate_light(), None, 1, 0.9)[1]["entropy"].value.item())
+    assert entropies[0] == entropies[1] > 0
 
 
 # ---- settings ----
