@@ -92,6 +92,17 @@ def test_a_lens_has_two_lengths_and_a_centre():
     np.testing.assert_array_equal(maps["alpha"], expected)
 
 
+def test_a_camera_stands_as_its_pose_says():
+    """Turned about its axis: right in the image is +y of the world, up is -x. The square lies further along +x."""
+    asset = square(Material())
+    asset.vertices[:, 0] += 0.5
+    pose = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 4.0]])
+    maps = AssetRenderer(asset).render(np.ones((4, 8, 3), np.float32), pose, (16.0, 16.0, 8, 8), 16, 16, spp=4, pixel_filter="box")
+    expected = np.zeros((16, 16), np.float32)
+    expected[6:14, 4:12] = 1
+    np.testing.assert_array_equal(maps["alpha"], expected)
+
+
 def test_triangles_have_their_own_materials_and_normals_their_tilt():
     asset = square(Material(albedo=(1.0, 0.0, 0.0)))
     asset.materials.append(Material(albedo=(0.0, 1.0, 0.0)))

@@ -17,9 +17,9 @@ FULL = torch.full((16, 16, 16), CELL_OCCUPIED, dtype=torch.uint8)
 
 
 def oblique(n: int = 20, dtype: torch.dtype = torch.float32) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Rays from +x that meet the ball, the first ones near its rim, and their jitters."""
+    """Rays from +x past the rim of the ball and then through it, and their jitters."""
     g = generator(7)
-    offsets = unit(torch.randn(n, 2, generator=g)) * torch.linspace(0.95, 0.2, n)[:, None] * RADIUS
+    offsets = unit(torch.randn(n, 2, generator=g)) * torch.linspace(1.03, 0.2, n)[:, None] * RADIUS
     origins = torch.cat([torch.full((n, 1), 4.0), offsets], 1)
     return origins.to(dtype), torch.tensor([[-1.0, 0, 0]], dtype=dtype).expand(n, 3), torch.rand(n, generator=g).to(dtype)
 
@@ -57,17 +57,20 @@ def test_gradients_of_a_picture_are_its_derivatives():
                 p.add_(shift * along)
                 sides.append(loss().item())
                 p.sub_(shift * along)
-        assert (p.grad * along).sum().item() == pytest.approx((sides[0] - sides[1]) / (2 * eps), rel=1e-5, abs=1e-6), name
+        assert (p.grad * along).sum().item() == pytest.approx((sides[0] - sides[1]) / (2 * eps), rel=1e-4, abs=1e-5), name
 
 
 # ---- samples ----
 
 
+@pytest.mark.parametrize(("variance", "share"), [(0.3, 1.0), (0.5, 0.3)])
 @pytest.mark.parametrize("anneal", [0.0, 1.0])
-def test_no_sample_of_weight_is_missed_and_few_points_are_asked(anneal):
-    """Of the whole lattice those that weigh more than the least weight and a half are found, by a field that is asked at less than
-    half of it."""
+def test_no_sample_of_weight_is_missed_and_few_points_are_asked(anneal, variance, share):
+    """Of the whole lattice those that weigh more than the least weight and a half are found, broad as the density may be; of a sharp
+    one the field is asked at less than a third of the lattice."""
     model, _ = ball(sample_above=1e-3)
+    with torch.no_grad():
+        model.variance.fill_(variance)
     rays = oblique()
     found = find_samples(model, FULL, *rays, anneal)
     model.config = model.config.replace({"sample_above": 0.0})
@@ -77,8 +80,8 @@ def test_no_sample_of_weight_is_missed_and_few_points_are_asked(anneal):
     here, there = (torch.stack([100.0 * p.ray_indices, p.t_starts], 1) for p in (whole.packed, found.packed))
     apart = torch.cdist(here[heavy], there).amin(1)
     assert heavy.sum() > 60 and apart.max() < 1e-3
-    assert found.evaluated.sum() < 0.5 * len(weights) and torch.equal(whole.evaluated, whole.packed.offsets.diff())
-    assert len(found.directions) < 0.5 * len(whole.directions)
+    assert found.evaluated.sum() < share * len(weights) and torch.equal(whole.evaluated, whole.packed.offsets.diff())
+    assert len(found.directions) < share * len(whole.directions)
 
 
 @pytest.mark.parametrize("sample_above", [0.0, 1e-3])
@@ -186,9 +189,9 @@ def test_walls_behind_each_other_are_segments_of_their_own(monkeypatch, capacity
     n = 4
     rays = torch.tensor([[4.0, 0.1, 0.2]]).repeat(n, 1), torch.tensor([[-1.0, 0, 0]]).repeat(n, 1), torch.rand(n, generator=generator(3))
     rays[0][2, 1] = 9.0  # beside the box
-    ray = rendered(model, find_samples(model, cells, *rays), shades_per_ray=1, capacity=capacity)
+    ray = rendered(model, find_samples(model, cells, *rays), shades_per_ray=6, capacity=capacity)
     m, n_rays, n_segments = ray.sizes.tolist()
-    assert n_rays == n - 1 and n_segments == 2 * (n - 1) and ray.opacity[0] > 0.8
+    assert n_rays == n - 1 and n_segments == 2 * (n - 1) < m and ray.opacity[0] > 0.8
     _, segments = model.occlusion.asked
     x = ray.positions[:, 0]
     torch.testing.assert_close(x[segments.leaders[:n_segments]].abs(), torch.full((n_segments,), 0.5), rtol=0, atol=0.05)
@@ -208,7 +211,7 @@ def test_a_view_is_made_of_the_rays_of_its_pixels():
     maps = render_view(model, cells, POSE, lens, height, width)
     parts = render_view(model, cells, POSE, lens, height, width, chunk=37)
     for name in maps:
-        assert torch.equal(maps[name], parts[name]), name
+        assert torch.equal(maps[name], parts[name]) and maps[name].shape[:2] == (height, width), name
     fx, fy, cx, cy = lens.tolist()
     row, column = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
     local = torch.stack([(column + 0.5 - cx) / fx, -(row + 0.5 - cy) / fy, -torch.ones(height, width)], -1).reshape(-1, 3)
