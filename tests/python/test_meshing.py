@@ -134,6 +134,14 @@ def test_small_components_go_and_are_counted():
     assert faces.max() == len(vertices) - 1
 
 
+def test_faces_that_share_any_vertex_are_one_component():
+    """150 that meet in their last corner, and one for itself."""
+    pairs = np.arange(300).reshape(-1, 2)
+    faces = np.concatenate([np.column_stack([pairs, np.full(150, 300)]), [[301, 302, 303]]])
+    vertices, kept, n_dropped = drop_floaters(np.zeros((304, 3), np.float32), faces)
+    assert n_dropped == 1 and len(kept) == 150 and len(vertices) == 301
+
+
 def test_decimation_keeps_a_thin_shape_closed():
     def handle(x):
         return torch.hypot(torch.hypot(x[:, 0], x[:, 1]) - 0.9, x[:, 2]) - 0.045
