@@ -129,8 +129,10 @@ def test_obj_reads_back(tmp_path, asset):
         assert line in text.splitlines()
     stored = asset.materials[0]
     assert read_image(tmp_path / "a_albedo.png") == pytest.approx(linear_to_srgb(stored.albedo_texture), abs=0.51 / 255)
-    roughness = read_image(tmp_path / "a_roughness.png")[..., 0]
-    assert roughness == pytest.approx(stored.roughness_metallic_texture[..., 0], abs=0.51 / 255)
+    for i, name in enumerate(("roughness", "metallic")):
+        values = read_image(tmp_path / f"a_{name}.png")[..., 0]
+        assert values == pytest.approx(stored.roughness_metallic_texture[..., i], abs=0.51 / 255)
+    assert {"Kd 0.5 0.25 1", "Pr 0.9", "Pm 0.8"} < set(text.splitlines())
 
 
 def test_usdz_passes_usd_s_own_validators(tmp_path, asset):

@@ -99,7 +99,8 @@ def test_normals_are_the_fields_where_they_agree_with_the_faces():
     vertices, faces = np.float32(mesh.vertices), np.int32(mesh.faces)
     tilted = vertices + np.float32([0.3, 0, 0])
     tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
-    np.testing.assert_allclose(vertex_normals(ball(), vertices, faces), tilted, atol=1e-5)
+    for slope in (1.0, 3.0):
+        np.testing.assert_allclose(vertex_normals(ball(sign=slope), vertices, faces), tilted, atol=1e-5)
     np.testing.assert_allclose(vertex_normals(ball(sign=-1.0), vertices, faces), mesh.vertex_normals, atol=1e-5)
     more, field = np.concatenate([vertices, np.float32([[0, 0.9, 0]])]), np.float32([0.3, 0.9, 0]) / 0.9**0.5
     assert vertex_normals(ball(), more, faces)[-1] == pytest.approx(field, abs=1e-5)  # of no face
