@@ -92,11 +92,11 @@ def test_the_light_is_scaled_to_the_truth_and_judged_by_the_truths_white():
 
 def test_the_distance_is_asked_for_views_and_for_albedo():
     truth = ViewTruth("a", albedo=np.full((SIZE, SIZE, 3), 0.3, np.float32))
-    prediction = {"rgb": picture(0.5, 1.0)[..., :3], "alpha": np.ones((SIZE, SIZE)), "albedo": truth.albedo}
+    prediction = {"rgb": picture(0.6, 1.0)[..., :3], "alpha": np.ones((SIZE, SIZE)), "albedo": truth.albedo}
     scores = evaluate_maps(
         [prediction], dataset(picture(0.5, 1.0)), [truth], distance=lambda image, truth: 0.25 + image.mean() - truth.mean()
     )
-    assert [scores[key]["lpips"] for key in ("novel_view", "albedo")] == pytest.approx([0.25, 0.25], abs=1e-5)
+    assert [scores[key]["lpips"] for key in ("novel_view", "albedo")] == pytest.approx([0.35, 0.25], abs=1e-5)
 
 
 def test_a_prediction_is_clipped_before_it_is_scored():
