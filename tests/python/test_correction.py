@@ -129,6 +129,18 @@ def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
     torch.testing.assert_close(asked["on_surface"], ray.positions - ray.normals * ray.sdf[:, None])
 
 
+def test_a_corrected_picture_moves_all_its_parts():
+    """Visibility has no gradient and needs none: those to the field, the materials and the light are there and finite."""
+    model = with_mesh(trimesh.creation.icosphere(2, 0.7), initial_roughness=0.8)
+    rays = torch.tensor([[4.0, 0.3, 0], [4.0, -0.2, 0.2]]), torch.tensor([[-1.0, 0, 0]] * 2), torch.full((2,), 0.5)
+    cells = make_grid(model.config).cells
+    light = model.evaluate_light()
+    render_rays(model, light, find_samples(model, cells, *rays)).mean.sum().backward()
+    light.backward()
+    for name, p in model.named_parameters():
+        assert p.grad.isfinite().all() and (p.grad != 0).any(), name
+
+
 def test_rays_are_weighed_by_the_cosine_they_are_told():
     """Oblique rays, whose weights change while the cosine is annealed, of the same samples."""
     model, cells = ball()
