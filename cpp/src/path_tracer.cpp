@@ -148,7 +148,7 @@ class PathTracer {
       if (bounce == 0) *first = {true, point};
       radiance += limited(throughput * point.emission, bounce > 0);
       const Frame<float> frame(point.shading_normal);
-      const PrincipledBsdf<float> bsdf(tables_, point.albedo, point.roughness, point.metallic,
+      const PrincipledBsdf<float> bsdf(lut_, point.albedo, point.roughness, point.metallic,
                                        frame.to_local(-direction));
       const Vec start = point.position + point.geometric_normal * ray_offset_;
       const int pair = 1 + kPairsPerBounce * bounce;
@@ -230,7 +230,7 @@ class PathTracer {
   EnvironmentSampler light_;
   const Camera& camera_;
   const PathTracerParams& params_;
-  PrincipledTables tables_;
+  const float* lut_ = brdf_lut();
   PixelFilterSampler filter_;
   SamplePattern pattern_;
   float ray_offset_;  // start of secondary rays above the surface, in scene units
