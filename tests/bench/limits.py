@@ -34,7 +34,8 @@ from splitnerf.evaluate import metrics
 from splitnerf.evaluate.asset import asset_predictions, environment_beside
 from splitnerf.evaluate.jobs import Protocol, choose_views, relit_scores
 from splitnerf.evaluate.protocol import evaluate_maps
-from splitnerf.evaluate.similarity import ScaledView, scaled_scores
+from splitnerf.evaluate.relight import RelitViews, relight
+from splitnerf.evaluate.similarity import ScaledView, on_white, scaled_scores
 from splitnerf.export.bake import Spread, Texels, rasterise, to_tangent_space
 from splitnerf.export.unwrap import unwrap
 from splitnerf.relight.job import asset_of
@@ -54,8 +55,10 @@ SAMPLES = 400_000  # points on a surface, in which the nearest triangle is looke
 CANDIDATES = 4  # samples whose triangles are tried
 FACING = 0.01  # in half diagonals: a unit difference of normals counts as much as this distance
 CHUNK = 200_000  # points at a time
+QUIET_FLOOR = 1e-5  # least squared error that is told from noise
 COLUMNS = (
-    ("relit", "relit, dB"), ("relit_raw", "unscaled"), ("novel", "novel, our light"), ("novel_true", "true light"),
+    ("relit", "relit, dB"), ("relit_quiet", "without noise"), ("relit_raw", "without scale"),
+    ("novel", "novel, our light"), ("novel_true", "true light"),
     ("albedo", "albedo, dB"), ("roughness", "roughness"), ("metallic", "metal"), ("shading", "shading normals, deg"),
     ("smooth", "mesh's normals, deg"),
 )  # fmt: skip
@@ -63,7 +66,8 @@ INTRODUCTION = """# What limits the relit images
 
 Parts of reconstructed assets are replaced by the truth at the nearest surface point, and every variant is path traced
 again. Relit: PSNR of the test views under the data's maps with one factor per channel, as `splitnerf evaluate` scores
-it, and without the factor. Novel: PSNR of the photos under our light and under the true one, with one factor per
+it; the same without the noise of the paths, estimated from two renderings (at most 50 dB); and without the factor.
+Novel: PSNR of the photos under our light and under the true one, with one factor per
 channel too, since light and albedo share a scale. Then the errors of the maps against the truth: albedo in dB with one
 factor per channel, roughness as the mean absolute error, metal as the balanced accuracy, normals with and without the
 normal texture in degrees.
@@ -163,20 +167,22 @@ class Canvas:
     """
 
     def __init__(self, asset: Asset, other: Asset, size: int):
-        mesh = asset
-        if asset.tangents is None or not charts_are_apart(asset):
-            origins, triangles, uv = unwrap(asset.vertices, asset.triangles, size)
-            vertices, normals = asset.vertices[origins], asset.normals[origins]
-            tangents = vertex_tangents(vertices, triangles, normals, uv)
-            mesh = Asset(asset.name, vertices, triangles, normals, asset.material_ids, [], uv, tangents)
-        self.mesh = dataclasses.replace(mesh, colors=None, material_ids=np.zeros_like(mesh.material_ids))
+        mesh = dataclasses.replace(asset, colors=None, material_ids=np.zeros_like(asset.material_ids))
+        if asset.uv is None or not charts_are_apart(asset):
+            origins, triangles, uv = unwrap(asset.vertices, asset.triangles, size)  # keeps the order of the triangles
+            mesh = Asset(
+                asset.name, asset.vertices[origins], triangles, asset.normals[origins], mesh.material_ids, uv=uv
+            )
+        if mesh.tangents is None:
+            mesh.tangents = vertex_tangents(mesh.vertices, mesh.triangles, mesh.normals, mesh.uv)
+        self.mesh = mesh
         texels = rasterise(mesh.uv, mesh.triangles, size)
         self._spread = Spread(texels.index, size)
         self._frames = [texels.interpolate(values, mesh.triangles) for values in (mesh.normals, mesh.tangents)]
         nearest = NearestPoints(other)
         facing = unit(self._frames[0])
         triangles, weights = nearest(texels.interpolate(mesh.vertices, mesh.triangles), facing)
-        self.own = surface_values(asset, texels.triangle, texels.weights)  # charts keep the order of the triangles
+        self.own = surface_values(asset, texels.triangle, texels.weights)
         self.others = surface_values(other, triangles, weights)
         turned = (nearest.flat_normals[triangles] * facing).sum(axis=1, keepdims=True) < 0
         self.others["normals"] = np.where(turned, -self.others["normals"], self.others["normals"])
@@ -198,6 +204,29 @@ def charts_are_apart(asset: Asset, size: int = 1024) -> bool:
     """Whether no two triangles share a part of the texture: their areas add up to no more than what they cover."""
     (a, b), (c, d) = np.moveaxis(np.diff(asset.uv[asset.triangles].astype(np.float64), axis=1), 0, -1)
     return 0.5 * np.abs(a * d - b * c).sum() * size**2 < 1.02 * len(rasterise(asset.uv, asset.triangles, size).index)
+
+
+class Reseeded:
+    """A renderer with other random numbers."""
+
+    def __init__(self, renderer: AssetRenderer):
+        self._renderer = renderer
+
+    def render(self, *arguments: object, seed: int, **options: object) -> dict[str, np.ndarray]:
+        return self._renderer.render(*arguments, seed=seed ^ (1 << 30), **options)
+
+
+def quiet_psnr(first: RelitViews, second: RelitViews, scale: list[float]) -> float:
+    """Mean PSNR of relit views without the noise of the paths.
+
+    The squared error is estimated as the product of two renderings' errors, whose noise is independent.
+    """
+    scores = []
+    for a, b in zip(first.views(), second.views()):
+        truth = on_white(a.truth, a.truth_alpha)
+        errors = [on_white(v.prediction, v.alpha, np.array(scale)) - truth for v in (a, b)]
+        scores.append(-10 * np.log10(max(np.mean(errors[0] * errors[1]), QUIET_FLOOR)))
+    return float(np.mean(scores))
 
 
 @dataclass
@@ -223,7 +252,8 @@ class Scene:
     def scores(self, asset: Asset) -> dict[str, float | None]:
         """The columns of the table, None where the data have no truth."""
         renderer = AssetRenderer(asset)
-        relit = relit_scores(renderer, self.views, self.maps, self.spp)[1]
+        relit, relit_part = relit_scores(renderer, self.views, self.maps, self.spp)
+        again = relit and relight(Reseeded(renderer), self.views, self.maps, max(1, self.spp // 2))
         seen = {
             name: asset_predictions(renderer, self.views, light, self.spp)
             for name, light in self.lights.items()
@@ -236,8 +266,9 @@ class Scene:
             for p, (normals, mask) in zip(predictions, self.shading_normals)
         ]
         return {name: self.novel_psnr(maps) for name, maps in seen.items()} | {
-            "relit": relit and relit["psnr"],
-            "relit_raw": relit and relit["raw"]["psnr"],
+            "relit": relit_part and relit_part["psnr"],
+            "relit_quiet": relit_part and quiet_psnr(relit, again, relit_part["lsq"]["scale"]),
+            "relit_raw": relit_part and relit_part["raw"]["psnr"],
             "albedo": errors["albedo"] and errors["albedo"]["psnr"],
             "roughness": errors["roughness_mae"],
             "metallic": errors["metallic_balanced_accuracy"],
