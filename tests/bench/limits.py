@@ -2,8 +2,8 @@
 
     python tests/bench/limits.py RUN SCENE [--views 2] [--spp 32] [--texture 2048] [--downscale 1] [--out table.md]
 
-RUN is a run's folder or a GLB file with the recovered light beside it; SCENE a dataset with the truth as asset.glb and
-relit test views. With --out the scene's table is appended to a page, which is made where it is missing.
+RUN is a run's folder or a GLB file with the recovered light beside it; SCENE a dataset with the truth as asset.glb,
+light.hdr and relit test views. With --out the scene's table is appended to a page, which is made where it is missing.
 
 The first and the last row are the files as they are; between them parts come from the nearest points of the other
 surface (tests/bench/swap.py). `all true` is what noise and the data's own renderer leave of the truth itself.
@@ -45,9 +45,10 @@ ROWS = (
     *((f"all true but {part}", {*PARTS, "mesh"} - {part}) for part in (*PARTS, "mesh")),
     ("all true", (*PARTS, "mesh")),
 )
+SOURCES = ("tests/bench/limits.py", "tests/bench/swap.py", "python/splitnerf/evaluate")
 QUIET_FLOOR = 1e-5  # least squared error that is told from noise
 COLUMNS = (
-    ("relit", "relit, dB"), ("relit_quiet", "without noise"), ("relit_raw", "without scale"),
+    ("relit", "relit, dB"), ("relit_quiet", "less noise"), ("relit_raw", "without scale"),
     ("novel", "novel, our light"), ("novel_true", "true light"),
     ("albedo", "albedo, dB"), ("roughness", "roughness"), ("metallic", "metal"), ("shading", "shading normals, deg"),
     ("smooth", "mesh's normals, deg"),
@@ -56,11 +57,11 @@ INTRODUCTION = """# What limits the relit images
 
 Parts of reconstructed assets are replaced by the truth at the nearest surface point, and every variant is path traced
 again. Relit: PSNR of the test views under the data's maps with one factor per channel, as `splitnerf evaluate` scores
-it; the same without the noise of the paths, estimated from two renderings (at most 50 dB); and without the factor.
-Novel: PSNR of the photos under our light and under the true one, with one factor per channel too, since light and
-albedo share a scale. Then the errors of the maps against the truth: albedo in dB with one factor per channel,
-roughness as the mean absolute error, metal as the balanced accuracy, normals with and without the normal texture in
-degrees.
+it; the same less the noise of the paths, which two renderings tell from errors that they share (but for what clipping
+makes of noise; at most 50 dB); and without the factor. Novel: PSNR of the photos under our light and under the true
+one, with one factor per channel too, since light and albedo share a scale. Then the errors of the maps against the
+truth: albedo in dB with one factor per channel, roughness as the mean absolute error, metal as the balanced accuracy,
+normals with and without the normal texture in degrees.
 """
 
 
@@ -75,9 +76,10 @@ class Reseeded:
 
 
 def quiet_psnr(first: RelitViews, second: RelitViews, scale: list[float]) -> float:
-    """Mean PSNR of relit views without the noise of the paths.
+    """Mean PSNR of relit views with most of the noise of the paths taken out.
 
-    The squared error is estimated as the product of two renderings' errors, whose noise is independent.
+    The squared error is estimated as the product of two renderings' errors, whose noise is independent. What remains
+    is the shift that clipping and the curve of sRGB give to the mean of noisy values.
     """
     scores = []
     for a, b in zip(first.views(), second.views()):
@@ -178,15 +180,13 @@ def section(run: Path, root: Path, protocol: Protocol, texture: int) -> str:
         lines.append(row(name, scene.scores(asset)))
         print(lines[-1], flush=True)
     text = "\n\n".join(lines[:3]) + "\n" + "\n".join(lines[3:])
-    return f"{text}\n\n{header(provenance(['tests/bench/limits.py', 'python/splitnerf/evaluate']))}\n"
+    return f"{text}\n\n{header(provenance(SOURCES))}\n"
 
 
 def row(name: str, scores: dict[str, float | None]) -> str:
     """A line of the table."""
     digits = {"roughness": 3, "metallic": 3}
-    cells = [
-        "" if scores.get(key) is None else f"{scores[key]:.{digits.get(key, 2)}f}" for key, _ in COLUMNS
-    ]
+    cells = ["" if scores.get(key) is None else f"{scores[key]:.{digits.get(key, 2)}f}" for key, _ in COLUMNS]
     return f"| {name} | {' | '.join(cells)} |"
 
 
