@@ -1,0 +1,248 @@
+"""Training's shading with true geometry, materials and light against the path tracer.
+
+    python tests/bench/shading_truth.py SCENE ... [--views 2] [--size 100] [--spp 256] [--faces 0]
+
+A SCENE is a folder with asset.glb, light.hdr and test views, or `spheres:LIGHT.hdr`: a grid of spheres over a plane,
+roughness by rows and metallic by columns, or `spheres:sun`. The first hits of camera rays are shaded as in a training
+with a mesh: by the split sum plus its correction. Two independent halves of samples on each side give the squared error
+without their noise: the mean of (a1 - b1)(a2 - b2), in sRGB, over the pixels that the object fills.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import math
+from pathlib import Path
+
+import fast_simplification
+import numpy as np
+import torch
+import trimesh
+from limits import vertex_materials
+from scipy.spatial import cKDTree
+from torch import Tensor
+from torch.nn import functional as F
+
+from splitnerf import _core
+from splitnerf.config import Config
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.environment import read_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.fields.light_pyramid import LOG_LIMIT
+from splitnerf.fields.sdf import SdfSample
+from splitnerf.ops import MeshScene, linear_to_srgb
+from splitnerf.render.model import SceneModel
+from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.render.rays import image_rays
+
+SPACING = 0.032  # edges of the mesh that visibility is cached on: those of marching cubes with 96 nodes
+BINS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.01)
+JITTERED = 4  # shaded first hits of a pixel, in each half
+CHUNK = 1 << 13
+
+
+def sphere_scene(metals: tuple[float, ...] = (0.0, 1.0)) -> Asset:
+    """Twelve spheres over a plane; each has a material."""
+    plane = trimesh.creation.box((2.0, 1.3, 0.05)).apply_translation((0, 0, -0.025))
+    parts, materials = [plane], [Material("plane", (0.5, 0.5, 0.5), 0.9, 0.0)]
+    for j, metallic in enumerate(metals):
+        for i, roughness in enumerate((0.1, 0.2, 0.3, 0.4, 0.55, 0.8)):
+            ball = trimesh.creation.icosphere(4, 0.13)
+            parts.append(ball.apply_translation((0.32 * i - 0.8, 0.6 * j - 0.3, 0.15)))
+            materials.append(Material(f"ball {i} {j}", (0.8, 0.5, 0.3), roughness, metallic))
+    starts = np.cumsum([0] + [len(p.vertices) for p in parts])
+    normals = [np.asarray(p.vertex_normals) for p in parts]
+    corner = plane.vertices[plane.faces].reshape(-1, 3)  # the plane's faces with normals of their own
+    normals[0] = np.repeat(plane.face_normals, 3, 0)
+    starts[1:] += len(corner) - len(plane.vertices)
+    faces = [np.arange(len(corner)).reshape(-1, 3)] + [p.faces + s for p, s in zip(parts[1:], starts[1:])]
+    ids = np.repeat(np.arange(len(parts)), [len(f) for f in faces])
+    vertices = np.concatenate([corner, *(p.vertices for p in parts[1:])])
+    to32 = lambda x, kind=np.float32: np.ascontiguousarray(x, kind)  # noqa: E731
+    return Asset("spheres", to32(vertices), to32(np.concatenate(faces), np.int32), to32(np.concatenate(normals)),
+                 to32(ids, np.int32), materials)  # fmt: skip
+
+
+def sun_sky(height: int = 256, radius: float = 1.5) -> np.ndarray:
+    """A dim blue sky with a sun of this angular radius, degrees, that has two thirds of the power on a facing plane."""
+    w = _core.equirect_directions(height, 2 * height)
+    sky = np.where(w[..., 2:] > 0, 0.25 * np.array([0.7, 0.9, 1.3]), 0.1)
+    axis = np.array([0.5, -0.35, 0.7]) / np.linalg.norm([0.5, -0.35, 0.7])
+    sun = w @ axis > math.cos(math.radians(radius))
+    area = np.sqrt(np.clip(1 - w[..., 2] ** 2, 0, 1))
+    solid = (area * sun).sum() * 4 * math.pi / area.sum()
+    return (sky + sun[..., None] * np.array([1.1, 1.0, 0.8]) * 1.6 / solid).astype(np.float32)
+
+
+def octahedral_texels(radiance: np.ndarray, n: int, parts: int = 4) -> np.ndarray:
+    """[n^2, 3] mean radiance of an equirectangular map over the texels of an octahedral map."""
+    h, w = radiance.shape[:2]
+    direction = _core.equirect_directions(parts * h, 2 * parts * h).reshape(-1, 3)
+    area = np.sqrt(np.clip(1 - direction[:, 2] ** 2, 0, 1))
+    p = direction[:, :2] / np.abs(direction).sum(1, keepdims=True)
+    folded = (1 - np.abs(p[:, ::-1])) * np.where(p < 0, -1, 1)
+    uv = np.where(direction[:, 2:] >= 0, p, folded)
+    at = np.clip(((uv + 1) * 0.5 * n).astype(int), 0, n - 1)
+    texel = at[:, 1] * n + at[:, 0]
+    values = radiance.repeat(parts, 0).repeat(parts * 2 * h // w, 1).reshape(-1, 3)
+    sums = [np.bincount(texel, area * c, n * n) for c in (*values.T, np.ones(len(area)))]
+    return np.stack(sums[:3], 1) / np.maximum(sums[3], 1e-12)[:, None]
+
+
+class TrueMaterials(torch.nn.Module):
+    """Materials that are set for the next points, or those of the nearest vertex."""
+
+    def __init__(self, asset: Asset):
+        super().__init__()
+        values = vertex_materials(asset, asset.materials)
+        self.tree = cKDTree(asset.vertices)
+        self.nearest = [torch.from_numpy(np.clip(x.reshape(len(x), -1), 0, 1)).float() for x in values.values()]
+        self.given: tuple[Tensor, ...] | None = None
+
+    def forward(self, inputs: Tensor) -> tuple[Tensor, ...]:
+        if self.given is not None:
+            return self.given
+        at = torch.from_numpy(self.tree.query(inputs[:, -3:].numpy())[1])
+        albedo, roughness, metallic = (x[at] for x in self.nearest)
+        return albedo, roughness.clamp(min=0.05), metallic
+
+
+class TrueScene(SceneModel):
+    """The model with true materials, light and mesh; every point lies on the surface."""
+
+    def __init__(self, asset: Asset, environment: np.ndarray, faces: int, settings: dict):
+        super().__init__(Config().replace(settings))
+        self.material = TrueMaterials(asset)
+        texels = octahedral_texels(environment, self.light.resolution)
+        with torch.no_grad():
+            self.light.texels.zero_()
+            finest = torch.from_numpy(np.log(np.clip(texels, math.exp(-LOG_LIMIT), math.exp(LOG_LIMIT)))).float()
+            self.light.texels[-len(texels) :] = finest
+        mesh = trimesh.Trimesh(asset.vertices, asset.triangles, process=False)
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+        if faces and len(mesh.faces) > faces:
+            mesh = trimesh.Trimesh(*fast_simplification.simplify(mesh.vertices, mesh.faces, target_count=faces))
+        mesh = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, SPACING, 20), process=True)
+        self.n_vertices = len(mesh.vertices)
+        vertices, triangles = torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces).int()
+        self.scene = MeshScene(vertices.numpy(), triangles.numpy())
+        self.use_mesh(self.occlusion.trace(self.scene, vertices, triangles))
+
+    def surface(self, positions: Tensor) -> SdfSample:
+        zeros = positions.new_zeros(len(positions), 13)
+        return SdfSample(zeros, positions.new_zeros(len(positions), 0), positions)
+
+    def head_inputs(self, positions: Tensor, outputs: Tensor, features: Tensor) -> Tensor:
+        return torch.cat([outputs, positions], dim=1)
+
+    @torch.no_grad()
+    def radiance(self, x: Tensor, n: Tensor, views: Tensor, materials: tuple[Tensor, ...]) -> Tensor:
+        """[k, 3] radiance of points towards the camera."""
+        light, rows = self.evaluate_light(), []
+        for part in zip(*(t.split(CHUNK) for t in (x, n, views, *materials))):
+            p, normals, toward, *self.material.given = part
+            field = self.surface(p)
+            points = self.shade(light, p, field.outputs, field.features, normals, toward)
+            found = points.radiance
+            if self.sums_light:
+                every = torch.arange(len(p))
+                found = found.index_add(0, *self.quadrature_correction(light, p, normals, toward, points, every))
+            rows.append(found)
+        self.material.given = None
+        return torch.cat(rows)
+
+
+def shaded_view(model: TrueScene, renderer: AssetRenderer, view: dict, seed: int) -> tuple[Tensor, Tensor]:
+    """[H, W, 3] mean radiance of a pixel's first hits as training shades them, and the mean materials [H, W, 2]."""
+    h, w = view["height"], view["width"]
+    origins, directions = image_rays(torch.from_numpy(view["pose"]).float(), torch.tensor(view["intrinsics"]), h, w)
+    total, maps, hits = torch.zeros(h * w, 3), torch.zeros(h * w, 2), torch.zeros(h * w, 1)
+    for k in range(JITTERED):
+        found = renderer.render(np.ones((4, 8, 3), np.float32), **view, spp=1, bounces=0, seed=seed + k)
+        f = {key: torch.from_numpy(np.array(value)).reshape(h * w, -1).float() for key, value in found.items()}
+        at = (f["alpha"][:, 0] > 0).nonzero()[:, 0]
+        x = (origins + directions * f["depth"])[at]
+        materials = f["albedo"][at].clamp(0, 1), f["roughness"][at].clamp(0.05, 1), f["metallic"][at].clamp(0, 1)
+        out = model.radiance(x, F.normalize(f["normal"][at], dim=1), -directions[at], materials)
+        total.index_add_(0, at, out), hits.index_add_(0, at, torch.ones(len(at), 1))
+        maps.index_add_(0, at, torch.cat([f["roughness"], f["metallic"]], 1)[at])
+    count = hits.clamp(min=1)
+    return (total / count).view(h, w, 3), (maps / count).view(h, w, 2)
+
+
+def psnr(errors: Tensor) -> str:
+    """The PSNR of products of errors; the product may be negative where noise is all there is."""
+    mean = errors.mean().item() if len(errors) else math.nan
+    return f"{-10 * math.log10(mean):6.2f}" if mean > 0 else "   -  "
+
+
+def compare(name: str, model: TrueScene, renderer: AssetRenderer, environment: np.ndarray, views: list[dict], spp: int):
+    """Prints a row of PSNR: all pixels, then those of a bin of roughness, dielectric / metal."""
+    products, bins = [], []
+    for view in views:
+        sides = []
+        for half in (0, 1):
+            got, maps = shaded_view(model, renderer, view, 100 * half + 7)
+            true = renderer.render(environment, **view, spp=spp, seed=half + 1)
+            inside = torch.from_numpy(np.array(true["alpha"]) > 0.999)
+            linear = torch.from_numpy(np.array(true["radiance"])).float()
+            sides.append([linear_to_srgb(t.clamp(0, 1)) for t in (got, linear)])
+        products.append(((sides[0][0] - sides[0][1]) * (sides[1][0] - sides[1][1]))[inside])
+        bins.append(maps[inside])
+    product, maps = torch.cat(products), torch.cat(bins)
+    cells = []
+    for metal in (0, 1):
+        for low, high in zip(BINS, BINS[1:]):
+            here = (maps[:, 0] >= low) & (maps[:, 0] < high) & ((maps[:, 1] > 0.5) == bool(metal))
+            cells.append(psnr(product[here]) if here.float().mean() > 0.01 else "   .  ")
+    half = len(BINS) - 1
+    print(f"{name:24} {psnr(product)} | {' '.join(cells[:half])} | {' '.join(cells[half:])}", flush=True)
+
+
+def scene_of(argument: str, size: int, n_views: int) -> tuple[str, Asset, np.ndarray, list[dict]]:
+    """The name, the asset, its light and the views of an argument."""
+    kind, _, light = argument.partition(":")
+    if kind == "spheres":
+        name, asset = f"spheres {Path(light).parent.name or light}", sphere_scene()
+        environment = sun_sky() if light == "sun" else read_environment(light)
+        poses = [_look((1.1, -2.2, 1.9)), _look((-1.5, -1.6, 2.2))][:n_views]
+        intrinsics = (1.2 * size, 1.2 * size, size / 2, size / 2)
+    else:
+        folder = Path(argument)
+        name, asset, environment = folder.name, read_asset(folder / "asset.glb"), read_environment(folder / "light.hdr")
+        bare = [dataclasses.replace(m, emission=(0.0, 0.0, 0.0), emission_texture=None) for m in asset.materials]
+        asset = dataclasses.replace(asset, materials=bare)
+        dataset = load_dataset(folder, "test", 1)
+        poses = dataset.poses[:: len(dataset.poses) // n_views][:n_views]
+        intrinsics = tuple(float(v) for v in dataset.intrinsics[0] * (size / dataset.images.shape[1]))
+    views = [dict(pose=np.asarray(p), intrinsics=intrinsics, width=size, height=size) for p in poses]
+    return name, asset, environment, views
+
+
+def _look(eye: tuple[float, float, float]) -> np.ndarray:
+    z = np.array(eye) / np.linalg.norm(eye)
+    x = np.cross((0, 0, 1), z) / np.linalg.norm(np.cross((0, 0, 1), z))
+    return np.block([[np.stack([x, np.cross(z, x), z], 1), np.array(eye)[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="+")
+    parser.add_argument("--views", type=int, default=2)
+    parser.add_argument("--size", type=int, default=100)
+    parser.add_argument("--spp", type=int, default=256)
+    parser.add_argument("--faces", type=int, default=0, help="the mesh of visibility is simplified to so many; 0: all")
+    args = parser.parse_args()
+    heads = " ".join(f"<{high:4.2f} " for high in BINS[1:])
+    print(f"{'sRGB PSNR, dB':24} {'all':6} | dielectric, roughness: {heads} | metal: {heads}")
+    for argument in args.scenes:
+        name, asset, environment, views = scene_of(argument, args.size, args.views)
+        model = TrueScene(asset, environment, args.faces, {})
+        print(f"# {name}: {model.n_vertices} vertices, open {model.occlusion.is_unoccluded}")
+        compare(name, model, AssetRenderer(asset), environment, views, args.spp)
+
+
+if __name__ == "__main__":
+    main()
