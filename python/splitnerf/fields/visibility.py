@@ -12,11 +12,11 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf import _core
-from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, lobe_roughness
+from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps
 from splitnerf.fields.occlusion import Occlusion, OcclusionModel, OcclusionQuery, RaySegments, TracedBits
 from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility
 
-TEXELS_PER_CELL = 8  # texels of the light per direction, for the mean over the direction's cell
+TEXELS_PER_CELL = 8  # fewest texels per direction of a light without texels of its own
 LOBE_DIRECTIONS = 15  # fewest directions within a lobe that a sum over the directions resolves
 SHADED_CHUNK = 1 << 15  # vertices shaded at a time
 
@@ -48,18 +48,9 @@ class VisibilityBits(OcclusionModel):
         super().__init__(n_channels)
         self.offset, self.indirect, self.open_below = offset, indirect, open_below
         directions = torch.from_numpy(_core.fibonacci_sphere(n_directions)).float()
-        height = math.ceil(math.sqrt(TEXELS_PER_CELL * n_directions / 2))
-        texels = torch.from_numpy(_core.equirect_directions(height, 2 * height)).float().reshape(-1, 3)
-        self._texel_roughness = lobe_roughness(4.0 * math.pi / len(texels))
-        constants = {
-            "directions": directions,
-            "light": torch.ones_like(directions),
-            "_texels": texels,
-            "_cell": torch.cat([(part @ directions.T).argmax(1) for part in texels.split(4096)]),
-            "_solid_angle": (1.0 - texels[:, 2:] ** 2).clamp(min=0.0).sqrt(),  # up to a common factor
-        }
-        for name, value in constants.items():
+        for name, value in (("directions", directions), ("light", torch.ones_like(directions))):
             self.register_buffer(name, value, persistent=False)
+        self._cells: tuple[Tensor, Tensor] | None = None  # the light's texels, and the cell that holds each
         self.cache: VisibilityCache | None = None
         self.radiance: Tensor | None = None
 
@@ -96,14 +87,21 @@ class VisibilityBits(OcclusionModel):
         self.radiance = None if cached["sent"] is None else cached["sent"].to(self.light.device)
 
     def cell_light(self, light: LightMaps) -> CellLight:
-        """The light's mean over each direction's cell, differentiable in the light."""
-        radiance = light(self._texels, torch.full_like(self._solid_angle, self._texel_roughness))
-        weighted = torch.cat([radiance * self._solid_angle, self._solid_angle], dim=1)
-        sums = weighted.new_zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
+        """The light's mean over each direction's cell, differentiable in the light. A texel belongs to one cell, so that
+        the cells have the power of the light."""
+        texels = light.partition(TEXELS_PER_CELL * len(self.directions))
+        cell = self._cell_of(texels.directions)
+        weighted = torch.cat([texels.radiance * texels.solid_angles[:, None], texels.solid_angles[:, None]], dim=1)
+        sums = weighted.new_zeros(len(self.directions), 4).index_add(0, cell, weighted)
         power = weighted[:, :3].detach().sum(1, keepdim=True)
-        centres = torch.zeros_like(self.directions).index_add(0, self._cell, self._texels * power)
-        area = sums[:, 3].detach()
-        return CellLight(sums[:, :3] / sums[:, 3:], F.normalize(centres, dim=1), area * (4.0 * math.pi / area.sum()))
+        centres = torch.zeros_like(self.directions).index_add(0, cell, texels.directions * power)
+        return CellLight(sums[:, :3] / sums[:, 3:], F.normalize(centres, dim=1), sums[:, 3].detach())
+
+    def _cell_of(self, texels: Tensor) -> Tensor:
+        """The cell [t] int64 of each texel's direction [t, 3]: the nearest of the cells' own directions."""
+        if self._cells is None or self._cells[0] is not texels:
+            self._cells = texels, torch.cat([(part @ self.directions.T).argmax(1) for part in texels.split(4096)])
+        return self._cells[1]
 
     @property
     def summed_from(self) -> float:
