@@ -5,7 +5,8 @@
 A SCENE is a folder with asset.glb, light.hdr and test views, or `spheres:LIGHT.hdr`: a grid of spheres over a plane,
 roughness by rows and metallic by columns, or `spheres:sun`. The first hits of camera rays are shaded as in a training
 with a mesh: by the split sum plus its correction. Two independent halves of samples on each side give the squared error
-without their noise: the mean of (a1 - b1)(a2 - b2), in sRGB, over the pixels that the object fills.
+without their noise: the mean of (a1 - b1)(a2 - b2), in sRGB, over the
+pixels that the object fills with its outside.
 """
 
 from __future__ import annotations
@@ -91,20 +92,37 @@ def octahedral_texels(radiance: np.ndarray, n: int, parts: int = 4) -> np.ndarra
     return np.stack(sums[:3], 1) / np.maximum(sums[3], 1e-12)[:, None]
 
 
+def surface_points(asset: Asset, n: int = 300_000) -> Asset:
+    """Random points of a surface as an asset of triangles without area."""
+    mesh = trimesh.Trimesh(asset.vertices, asset.triangles, process=False)
+    points, face = trimesh.sample.sample_surface(mesh, n, seed=0)
+    shares = trimesh.triangles.points_to_barycentric(mesh.triangles[face], points)[..., None]
+    at = lambda x: None if x is None else (x[asset.triangles[face]] * shares).sum(1)  # noqa: E731
+    return dataclasses.replace(
+        asset, vertices=points, triangles=np.arange(n)[:, None].repeat(3, 1), normals=at(asset.normals), uv=at(asset.uv),
+        colors=at(asset.colors), material_ids=asset.material_ids[face],
+    )  # fmt: skip
+
+
 class TrueMaterials(torch.nn.Module):
-    """Materials that are set for the next points, or those of the nearest vertex."""
+    """Materials that are set for the next points, or those of the nearest point of the surface."""
 
     def __init__(self, asset: Asset):
         super().__init__()
-        values = vertex_materials(asset, asset.materials)
-        self.tree = cKDTree(asset.vertices)
+        points = surface_points(asset)
+        values = vertex_materials(points, points.materials)
+        self.tree, self.normals = cKDTree(points.vertices), torch.from_numpy(points.normals).float()
         self.nearest = [torch.from_numpy(np.clip(x.reshape(len(x), -1), 0, 1)).float() for x in values.values()]
         self.given: tuple[Tensor, ...] | None = None
+
+    def at(self, positions: Tensor) -> Tensor:
+        """The nearest point of the surface [n]."""
+        return torch.from_numpy(self.tree.query(positions.numpy())[1])
 
     def forward(self, inputs: Tensor) -> tuple[Tensor, ...]:
         if self.given is not None:
             return self.given
-        at = torch.from_numpy(self.tree.query(inputs[:, -3:].numpy())[1])
+        at = self.at(inputs[:, -3:])
         albedo, roughness, metallic = (x[at] for x in self.nearest)
         return albedo, roughness.clamp(min=0.05), metallic
 
@@ -128,6 +146,7 @@ class TrueScene(SceneModel):
         self.n_vertices = len(mesh.vertices)
         vertices, triangles = torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces).int()
         self.scene = MeshScene(vertices.numpy(), triangles.numpy())
+        self.occlusion.aim(self.evaluate_light())
         self.use_mesh(self.occlusion.trace(self.scene, vertices, triangles))
 
     def surface(self, positions: Tensor) -> SdfSample:
@@ -155,10 +174,11 @@ class TrueScene(SceneModel):
 
 
 def shaded_view(model: TrueScene, renderer: AssetRenderer, view: dict, seed: int) -> tuple[Tensor, Tensor]:
-    """[H, W, 3] mean radiance of a pixel's first hits as training shades them, and the mean materials [H, W, 2]."""
+    """[H, W, 3] mean radiance of a pixel's first hits as training shades them, and the mean materials [H, W, 2] with the
+    share of hits from behind, which no closed surface has."""
     h, w = view["height"], view["width"]
     origins, directions = image_rays(torch.from_numpy(view["pose"]).float(), torch.tensor(view["intrinsics"]), h, w)
-    total, maps, hits = torch.zeros(h * w, 3), torch.zeros(h * w, 2), torch.zeros(h * w, 1)
+    total, maps, hits = torch.zeros(h * w, 3), torch.zeros(h * w, 3), torch.zeros(h * w, 1)
     for k in range(JITTERED):
         found = renderer.render(np.ones((4, 8, 3), np.float32), **view, spp=1, bounces=0, seed=seed + k)
         f = {key: torch.from_numpy(np.array(value)).reshape(h * w, -1).float() for key, value in found.items()}
@@ -167,9 +187,18 @@ def shaded_view(model: TrueScene, renderer: AssetRenderer, view: dict, seed: int
         materials = f["albedo"][at].clamp(0, 1), f["roughness"][at].clamp(0.05, 1), f["metallic"][at].clamp(0, 1)
         out = model.radiance(x, F.normalize(f["normal"][at], dim=1), -directions[at], materials)
         total.index_add_(0, at, out), hits.index_add_(0, at, torch.ones(len(at), 1))
-        maps.index_add_(0, at, torch.cat([f["roughness"], f["metallic"]], 1)[at])
+        outside = model.material.normals[model.material.at(x)]
+        behind = (outside * f["smooth_normal"][at]).sum(1, keepdim=True) < 0
+        maps.index_add_(0, at, torch.cat([f["roughness"][at], f["metallic"][at], behind.float()], 1))
     count = hits.clamp(min=1)
-    return (total / count).view(h, w, 3), (maps / count).view(h, w, 2)
+    return (total / count).view(h, w, 3), (maps / count).view(h, w, 3)
+
+
+def srgb_slope(a: Tensor, b: Tensor) -> Tensor:
+    """(sRGB(a) - sRGB(b)) / (a - b), clipped at 1; it turns differences of noisy values into sRGB without bias."""
+    near = (a - b).abs() < 1e-4
+    a = torch.where(near, b + 1e-4, a)
+    return (linear_to_srgb(a.clamp(0, 1)) - linear_to_srgb(b.clamp(0, 1))) / (a - b)
 
 
 def psnr(errors: Tensor) -> str:
@@ -186,10 +215,12 @@ def compare(name: str, model: TrueScene, renderer: AssetRenderer, environment: n
         for half in (0, 1):
             got, maps = shaded_view(model, renderer, view, 100 * half + 7)
             true = renderer.render(environment, **view, spp=spp, seed=half + 1)
-            inside = torch.from_numpy(np.array(true["alpha"]) > 0.999)
+            inside = torch.from_numpy(np.array(true["alpha"]) > 0.999) & (maps[..., 2] == 0)
             linear = torch.from_numpy(np.array(true["radiance"])).float()
-            sides.append([linear_to_srgb(t.clamp(0, 1)) for t in (got, linear)])
-        products.append(((sides[0][0] - sides[0][1]) * (sides[1][0] - sides[1][1]))[inside])
+            sides.append((got, linear))
+        slope = srgb_slope(*(0.5 * (a + b) for a, b in zip(*sides)))
+        errors = [(got - true) * slope for got, true in sides]
+        products.append((errors[0] * errors[1])[inside])
         bins.append(maps[inside])
     product, maps = torch.cat(products), torch.cat(bins)
     cells = []

@@ -80,9 +80,9 @@ class LightMaps(Protocol):
     def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
 
-    def partition(self, at_least: int) -> LightTexels:
-        """The environment as texels: those that the light consists of, or else at least so many, each the light about
-        its middle. Directions and solid angles depend on ``at_least`` alone; the radiance is differentiable."""
+    def partition(self, at_least: int, device: torch.device) -> LightTexels:
+        """The environment as texels on the light's device: those that the light consists of, or else at least so many,
+        each the light about its middle. The radiance is differentiable; equal calls return the same directions."""
 
     def backward(self) -> None:
         """Passes the accumulated gradients from the leaves on to the parameters; call it once."""
@@ -96,8 +96,7 @@ class CellLight(NamedTuple):
 
     Attributes:
         radiance: [k, 3] mean linear radiance of each cell.
-        directions: [k, 3] unit, the power-weighted mean direction of each cell, so that a small lamp keeps its
-            position.
+        directions: [k, 3] unit, a direction in each cell, which represents it.
         solid_angles: [k] solid angles of the cells, sr; they sum to 4 pi.
     """
 
@@ -197,9 +196,9 @@ class Light(nn.Module, abc.ABC):
         """The light ready for lookups: here the module itself, since every backward pass reaches its parameters."""
         return self
 
-    def partition(self, at_least: int) -> LightTexels:
+    def partition(self, at_least: int, device: torch.device) -> LightTexels:
         """The light about the middles of an equirectangular map's texels, see :class:`LightMaps`."""
-        directions, solid_angles = equirect_texels(math.ceil(math.sqrt(at_least / 2)), next(self.parameters()).device)
+        directions, solid_angles = equirect_texels(math.ceil(math.sqrt(at_least / 2)), device)
         roughness = torch.full_like(solid_angles[:, None], lobe_roughness(4.0 * math.pi / len(directions)))
         return LightTexels(directions, solid_angles, self(directions, roughness))
 

@@ -194,11 +194,11 @@ class FilteredLight:
     def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
         return lookup(self._filters, self.leaves or self._roots, directions, roughness)
 
-    def partition(self, at_least: int) -> LightTexels:
+    def partition(self, at_least: int, device: torch.device) -> LightTexels:
         """The unfiltered texels of the light, however many there are."""
         resolution = int(self._filters.resolutions[0])
         levels = (self.leaves or self._roots)[0]
-        return LightTexels(*octahedral_texels(resolution, levels.device), levels[: resolution * resolution])
+        return LightTexels(*octahedral_texels(resolution, device), levels[: resolution * resolution])
 
     def backward(self) -> None:
         given = [(root, leaf.grad) for root, leaf in zip(self._roots, self.leaves) if leaf.grad is not None]
