@@ -1,6 +1,6 @@
 """Training's shading with true geometry, materials and light against the path tracer.
 
-    python tests/bench/shading_truth.py SCENE ... [--views 2] [--size 100] [--spp 256] [--faces 0]
+    python tests/bench/shading_truth.py SCENE ... [--views 2] [--size 100] [--spp 256]
 
 A SCENE is a folder with asset.glb, light.hdr and test views, or `spheres:LIGHT.hdr`: a grid of spheres over a plane,
 roughness by rows and metallic by columns, or `spheres:sun`. The first hits of camera rays are shaded as in a training
@@ -16,7 +16,6 @@ import dataclasses
 import math
 from pathlib import Path
 
-import fast_simplification
 import numpy as np
 import torch
 import trimesh
@@ -34,6 +33,7 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.fields.light_pyramid import LOG_LIMIT
 from splitnerf.fields.sdf import SdfSample
 from splitnerf.ops import MeshScene, linear_to_srgb
+from splitnerf.relight.cameras import look_at
 from splitnerf.render.model import SceneModel
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.render.rays import image_rays
@@ -41,29 +41,24 @@ from splitnerf.render.rays import image_rays
 SPACING = 0.032  # edges of the mesh that visibility is cached on: those of marching cubes with 96 nodes
 BINS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.01)
 JITTERED = 4  # shaded first hits of a pixel, in each half
-CHUNK = 1 << 13
+CHUNK = 1 << 13  # points shaded at a time
 
 
-def sphere_scene(metals: tuple[float, ...] = (0.0, 1.0)) -> Asset:
-    """Twelve spheres over a plane; each has a material."""
+def sphere_scene() -> Asset:
+    """Twelve spheres over a plane: a row of dielectrics, a row of metals, rougher from left to right."""
     plane = trimesh.creation.box((2.0, 1.3, 0.05)).apply_translation((0, 0, -0.025))
     parts, materials = [plane], [Material("plane", (0.5, 0.5, 0.5), 0.9, 0.0)]
-    for j, metallic in enumerate(metals):
+    for j, metallic in enumerate((0.0, 1.0)):
         for i, roughness in enumerate((0.1, 0.2, 0.3, 0.4, 0.55, 0.8)):
             ball = trimesh.creation.icosphere(4, 0.13)
             parts.append(ball.apply_translation((0.32 * i - 0.8, 0.6 * j - 0.3, 0.15)))
             materials.append(Material(f"ball {i} {j}", (0.8, 0.5, 0.3), roughness, metallic))
-    starts = np.cumsum([0] + [len(p.vertices) for p in parts])
-    normals = [np.asarray(p.vertex_normals) for p in parts]
-    corner = plane.vertices[plane.faces].reshape(-1, 3)  # the plane's faces with normals of their own
-    normals[0] = np.repeat(plane.face_normals, 3, 0)
-    starts[1:] += len(corner) - len(plane.vertices)
-    faces = [np.arange(len(corner)).reshape(-1, 3)] + [p.faces + s for p, s in zip(parts[1:], starts[1:])]
-    ids = np.repeat(np.arange(len(parts)), [len(f) for f in faces])
-    vertices = np.concatenate([corner, *(p.vertices for p in parts[1:])])
-    to32 = lambda x, kind=np.float32: np.ascontiguousarray(x, kind)  # noqa: E731
-    return Asset("spheres", to32(vertices), to32(np.concatenate(faces), np.int32), to32(np.concatenate(normals)),
-                 to32(ids, np.int32), materials)  # fmt: skip
+    plane.unmerge_vertices()  # its faces have normals of their own
+    mesh = trimesh.util.concatenate(parts)
+    normals = np.concatenate([np.repeat(plane.face_normals, 3, 0), *(p.vertex_normals for p in parts[1:])])
+    ids = np.repeat(np.arange(len(parts)), [len(p.faces) for p in parts])
+    arrays = (mesh.vertices, np.float32), (mesh.faces, np.int32), (normals, np.float32), (ids, np.int32)
+    return Asset("spheres", *(np.ascontiguousarray(x, kind) for x, kind in arrays), materials)
 
 
 def sun_sky(height: int = 256, radius: float = 1.5) -> np.ndarray:
@@ -72,8 +67,7 @@ def sun_sky(height: int = 256, radius: float = 1.5) -> np.ndarray:
     sky = np.where(w[..., 2:] > 0, 0.25 * np.array([0.7, 0.9, 1.3]), 0.1)
     axis = np.array([0.5, -0.35, 0.7]) / np.linalg.norm([0.5, -0.35, 0.7])
     sun = w @ axis > math.cos(math.radians(radius))
-    area = np.sqrt(np.clip(1 - w[..., 2] ** 2, 0, 1))
-    solid = (area * sun).sum() * 4 * math.pi / area.sum()
+    solid = 2 * math.pi * (1 - math.cos(math.radians(radius)))
     return (sky + sun[..., None] * np.array([1.1, 1.0, 0.8]) * 1.6 / solid).astype(np.float32)
 
 
@@ -83,8 +77,7 @@ def octahedral_texels(radiance: np.ndarray, n: int, parts: int = 4) -> np.ndarra
     direction = _core.equirect_directions(parts * h, 2 * parts * h).reshape(-1, 3)
     area = np.sqrt(np.clip(1 - direction[:, 2] ** 2, 0, 1))
     p = direction[:, :2] / np.abs(direction).sum(1, keepdims=True)
-    folded = (1 - np.abs(p[:, ::-1])) * np.where(p < 0, -1, 1)
-    uv = np.where(direction[:, 2:] >= 0, p, folded)
+    uv = np.where(direction[:, 2:] >= 0, p, (1 - np.abs(p[:, ::-1])) * np.where(p < 0, -1, 1))
     at = np.clip(((uv + 1) * 0.5 * n).astype(int), 0, n - 1)
     texel = at[:, 1] * n + at[:, 0]
     values = radiance.repeat(parts, 0).repeat(parts * 2 * h // w, 1).reshape(-1, 3)
@@ -99,8 +92,8 @@ def surface_points(asset: Asset, n: int = 300_000) -> Asset:
     shares = trimesh.triangles.points_to_barycentric(mesh.triangles[face], points)[..., None]
     at = lambda x: None if x is None else (x[asset.triangles[face]] * shares).sum(1)  # noqa: E731
     return dataclasses.replace(
-        asset, vertices=points, triangles=np.arange(n)[:, None].repeat(3, 1), normals=at(asset.normals), uv=at(asset.uv),
-        colors=at(asset.colors), material_ids=asset.material_ids[face],
+        asset, vertices=points, triangles=np.arange(n)[:, None].repeat(3, 1), normals=at(asset.normals),
+        uv=at(asset.uv), colors=at(asset.colors), material_ids=asset.material_ids[face],
     )  # fmt: skip
 
 
@@ -110,9 +103,9 @@ class TrueMaterials(torch.nn.Module):
     def __init__(self, asset: Asset):
         super().__init__()
         points = surface_points(asset)
-        values = vertex_materials(points, points.materials)
+        values = vertex_materials(points, points.materials).values()
         self.tree, self.normals = cKDTree(points.vertices), torch.from_numpy(points.normals).float()
-        self.nearest = [torch.from_numpy(np.clip(x.reshape(len(x), -1), 0, 1)).float() for x in values.values()]
+        self.nearest = [torch.from_numpy(np.clip(x.reshape(len(x), -1), 0, 1)).float() for x in values]
         self.given: tuple[Tensor, ...] | None = None
 
     def at(self, positions: Tensor) -> Tensor:
@@ -130,24 +123,18 @@ class TrueMaterials(torch.nn.Module):
 class TrueScene(SceneModel):
     """The model with true materials, light and mesh; every point lies on the surface."""
 
-    def __init__(self, asset: Asset, environment: np.ndarray, faces: int, settings: dict):
-        super().__init__(Config().replace(settings))
+    def __init__(self, asset: Asset, environment: np.ndarray):
+        super().__init__(Config())
         self.material = TrueMaterials(asset)
-        texels = octahedral_texels(environment, self.light.resolution)
+        texels = np.log(octahedral_texels(environment, self.light.resolution).clip(math.exp(-LOG_LIMIT), None))
         with torch.no_grad():
-            self.light.texels.zero_()
-            finest = torch.from_numpy(np.log(np.clip(texels, math.exp(-LOG_LIMIT), math.exp(LOG_LIMIT)))).float()
-            self.light.texels[-len(texels) :] = finest
+            self.light.texels.zero_()[-len(texels) :] = torch.from_numpy(texels).float()
         mesh = trimesh.Trimesh(asset.vertices, asset.triangles, process=False)
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
-        if faces and len(mesh.faces) > faces:
-            mesh = trimesh.Trimesh(*fast_simplification.simplify(mesh.vertices, mesh.faces, target_count=faces))
         mesh = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, SPACING, 20), process=True)
-        self.n_vertices = len(mesh.vertices)
         vertices, triangles = torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces).int()
-        self.scene = MeshScene(vertices.numpy(), triangles.numpy())
         self.occlusion.aim(self.evaluate_light())
-        self.use_mesh(self.occlusion.trace(self.scene, vertices, triangles))
+        self.use_mesh(self.occlusion.trace(MeshScene(vertices.numpy(), triangles.numpy()), vertices, triangles))
 
     def surface(self, positions: Tensor) -> SdfSample:
         zeros = positions.new_zeros(len(positions), 13)
@@ -164,17 +151,15 @@ class TrueScene(SceneModel):
             p, normals, toward, *self.material.given = part
             field = self.surface(p)
             points = self.shade(light, p, field.outputs, field.features, normals, toward)
-            found = points.radiance
-            if self.sums_light:
-                every = torch.arange(len(p))
-                found = found.index_add(0, *self.quadrature_correction(light, p, normals, toward, points, every))
-            rows.append(found)
+            every = torch.arange(len(p))
+            correction = self.quadrature_correction(light, p, normals, toward, points, every)
+            rows.append(points.radiance.index_add(0, *correction))
         self.material.given = None
         return torch.cat(rows)
 
 
 def shaded_view(model: TrueScene, renderer: AssetRenderer, view: dict, seed: int) -> tuple[Tensor, Tensor]:
-    """[H, W, 3] mean radiance of a pixel's first hits as training shades them, and the mean materials [H, W, 2] with the
+    """[H, W, 3] mean radiance of a pixel's first hits as training shades them, and [H, W, 3] mean roughness, metallic and
     share of hits from behind, which no closed surface has."""
     h, w = view["height"], view["width"]
     origins, directions = image_rays(torch.from_numpy(view["pose"]).float(), torch.tensor(view["intrinsics"]), h, w)
@@ -190,14 +175,12 @@ def shaded_view(model: TrueScene, renderer: AssetRenderer, view: dict, seed: int
         outside = model.material.normals[model.material.at(x)]
         behind = (outside * f["smooth_normal"][at]).sum(1, keepdim=True) < 0
         maps.index_add_(0, at, torch.cat([f["roughness"][at], f["metallic"][at], behind.float()], 1))
-    count = hits.clamp(min=1)
-    return (total / count).view(h, w, 3), (maps / count).view(h, w, 3)
+    return tuple((x / hits.clamp(min=1)).view(h, w, 3) for x in (total, maps))
 
 
 def srgb_slope(a: Tensor, b: Tensor) -> Tensor:
     """(sRGB(a) - sRGB(b)) / (a - b), clipped at 1; it turns differences of noisy values into sRGB without bias."""
-    near = (a - b).abs() < 1e-4
-    a = torch.where(near, b + 1e-4, a)
+    a = torch.where((a - b).abs() < 1e-4, b + 1e-4, a)
     return (linear_to_srgb(a.clamp(0, 1)) - linear_to_srgb(b.clamp(0, 1))) / (a - b)
 
 
@@ -216,20 +199,18 @@ def compare(name: str, model: TrueScene, renderer: AssetRenderer, environment: n
             got, maps = shaded_view(model, renderer, view, 100 * half + 7)
             true = renderer.render(environment, **view, spp=spp, seed=half + 1)
             inside = torch.from_numpy(np.array(true["alpha"]) > 0.999) & (maps[..., 2] == 0)
-            linear = torch.from_numpy(np.array(true["radiance"])).float()
-            sides.append((got, linear))
+            sides.append((got, torch.from_numpy(np.array(true["radiance"])).float()))
         slope = srgb_slope(*(0.5 * (a + b) for a, b in zip(*sides)))
         errors = [(got - true) * slope for got, true in sides]
-        products.append((errors[0] * errors[1])[inside])
-        bins.append(maps[inside])
+        products.append((errors[0] * errors[1])[inside]), bins.append(maps[inside])
     product, maps = torch.cat(products), torch.cat(bins)
-    cells = []
-    for metal in (0, 1):
+    row = f"{name:24} {psnr(product)}"
+    for metal in (False, True):
+        row += " |"
         for low, high in zip(BINS, BINS[1:]):
-            here = (maps[:, 0] >= low) & (maps[:, 0] < high) & ((maps[:, 1] > 0.5) == bool(metal))
-            cells.append(psnr(product[here]) if here.float().mean() > 0.01 else "   .  ")
-    half = len(BINS) - 1
-    print(f"{name:24} {psnr(product)} | {' '.join(cells[:half])} | {' '.join(cells[half:])}", flush=True)
+            here = (maps[:, 0] >= low) & (maps[:, 0] < high) & ((maps[:, 1] > 0.5) == metal)
+            row += " " + (psnr(product[here]) if here.float().mean() > 0.01 else "   .  ")
+    print(row, flush=True)
 
 
 def scene_of(argument: str, size: int, n_views: int) -> tuple[str, Asset, np.ndarray, list[dict]]:
@@ -238,7 +219,7 @@ def scene_of(argument: str, size: int, n_views: int) -> tuple[str, Asset, np.nda
     if kind == "spheres":
         name, asset = f"spheres {Path(light).parent.name or light}", sphere_scene()
         environment = sun_sky() if light == "sun" else read_environment(light)
-        poses = [_look((1.1, -2.2, 1.9)), _look((-1.5, -1.6, 2.2))][:n_views]
+        poses = [look_at(np.zeros(3), -1.1 - 1.2 * k, 0.7, 3.1) for k in range(n_views)]
         intrinsics = (1.2 * size, 1.2 * size, size / 2, size / 2)
     else:
         folder = Path(argument)
@@ -252,27 +233,18 @@ def scene_of(argument: str, size: int, n_views: int) -> tuple[str, Asset, np.nda
     return name, asset, environment, views
 
 
-def _look(eye: tuple[float, float, float]) -> np.ndarray:
-    z = np.array(eye) / np.linalg.norm(eye)
-    x = np.cross((0, 0, 1), z) / np.linalg.norm(np.cross((0, 0, 1), z))
-    return np.block([[np.stack([x, np.cross(z, x), z], 1), np.array(eye)[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+")
     parser.add_argument("--views", type=int, default=2)
     parser.add_argument("--size", type=int, default=100)
     parser.add_argument("--spp", type=int, default=256)
-    parser.add_argument("--faces", type=int, default=0, help="the mesh of visibility is simplified to so many; 0: all")
     args = parser.parse_args()
     heads = " ".join(f"<{high:4.2f} " for high in BINS[1:])
     print(f"{'sRGB PSNR, dB':24} {'all':6} | dielectric, roughness: {heads} | metal: {heads}")
     for argument in args.scenes:
         name, asset, environment, views = scene_of(argument, args.size, args.views)
-        model = TrueScene(asset, environment, args.faces, {})
-        print(f"# {name}: {model.n_vertices} vertices, open {model.occlusion.is_unoccluded}")
-        compare(name, model, AssetRenderer(asset), environment, views, args.spp)
+        compare(name, TrueScene(asset, environment), AssetRenderer(asset), environment, views, args.spp)
 
 
 if __name__ == "__main__":

@@ -64,6 +64,23 @@ def test_cells_have_the_power_of_the_light():
     assert cells.solid_angles.sum().item() == pytest.approx(4 * math.pi, rel=1e-5)
 
 
+def test_few_texels_are_divided():
+    """A light of 16 x 16 texels has light for each of 1024 cells, and its power."""
+    light = LightPyramid(16)
+    with torch.no_grad():
+        light.texels.normal_(generator=generator(2))
+    bits = VisibilityBits(1024, OFFSET, 3, True)
+    cells = bits.cell_light(light.evaluate())
+    directions, solid_angles = octahedral_texels(16, torch.device("cpu"))
+    assert cells.solid_angles.min() > 0.3 * 4 * math.pi / 1024 and cells.radiance.isfinite().all()
+    power = (cells.radiance * cells.solid_angles[:, None]).sum(0)
+    torch.testing.assert_close(power, (light.radiance() * solid_angles[:, None]).sum(0), rtol=2e-3, atol=0)
+    assert torch.equal(cells.radiance, bits.cell_light(light).radiance)
+    near = (bits.centres @ directions.T).max(1)
+    at_middle = near.values > math.cos(math.radians(1.0))
+    torch.testing.assert_close(cells.radiance[at_middle], light.radiance()[near.indices[at_middle]], rtol=1e-4, atol=0)
+
+
 def test_a_lamp_lights_its_own_cell_alone():
     bits = VisibilityBits(256, OFFSET, 3, True)
     for number in (7, 100, 201):

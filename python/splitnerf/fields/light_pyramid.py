@@ -173,6 +173,10 @@ class LightPyramid(Light):
         pass."""
         return FilteredLight(self.filters, *self.chain())
 
+    def partition(self, at_least: int, device: torch.device) -> LightTexels:
+        """The unfiltered texels of the light, see :func:`partition`."""
+        return partition(self.radiance(), self.resolution, at_least, device)
+
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0. Each call computes all maps."""
         return lookup(self.filters, self.chain(), directions, roughness)
@@ -195,10 +199,8 @@ class FilteredLight:
         return lookup(self._filters, self.leaves or self._roots, directions, roughness)
 
     def partition(self, at_least: int, device: torch.device) -> LightTexels:
-        """The unfiltered texels of the light, however many there are."""
-        resolution = int(self._filters.resolutions[0])
-        levels = (self.leaves or self._roots)[0]
-        return LightTexels(*octahedral_texels(resolution, device), levels[: resolution * resolution])
+        """The unfiltered texels of the light, see :func:`partition`."""
+        return partition((self.leaves or self._roots)[0], int(self._filters.resolutions[0]), at_least, device)
 
     def backward(self) -> None:
         given = [(root, leaf.grad) for root, leaf in zip(self._roots, self.leaves) if leaf.grad is not None]
@@ -209,6 +211,15 @@ class FilteredLight:
         copy = FilteredLight(self._filters, *(root.detach() for root in self._roots))
         copy.leaves = tuple(leaves)
         return copy
+
+
+def partition(levels: Tensor, resolution: int, at_least: int, device: torch.device) -> LightTexels:
+    """The first map of [texels, 3] levels as texels, divided into equal squares until they are ``at_least`` so many."""
+    radiance, n = levels[: resolution * resolution], resolution
+    while n * n < at_least:
+        radiance = radiance.view(n, 1, n, 1, 3).expand(n, 2, n, 2, 3).reshape(4 * n * n, 3)
+        n *= 2
+    return LightTexels(*octahedral_texels(n, device), radiance)
 
 
 def lookup(filters: PyramidFilters, chain: Sequence[Tensor], directions: Tensor, roughness: Tensor) -> Tensor:

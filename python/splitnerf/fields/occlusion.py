@@ -36,14 +36,16 @@ class Materials(Protocol):
     """Materials of a surface."""
 
     def __call__(self, positions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """positions [n, 3], scene units -> albedo [n, 3] linear, roughness [n, 1] perceptual and metallic [n, 1], all in
-        [0, 1]."""
+        """positions [n, 3], scene units -> albedo [n, 3] linear, roughness [n, 1] perceptual and metallic [n, 1], all
+        in [0, 1]."""
 
 
 class Reflect(Protocol):
     """Reflection at points of a surface."""
 
-    def __call__(self, normals: Tensor, view_dirs: Tensor, materials: Sequence[Tensor], light_s: Tensor, light_d: Tensor):
+    def __call__(
+        self, normals: Tensor, view_dirs: Tensor, materials: Sequence[Tensor], light_s: Tensor, light_d: Tensor
+    ) -> Tensor:
         """The radiance [n, 3] that points reflect towards ``view_dirs`` [n, 3].
 
         Args:

@@ -62,7 +62,7 @@ class VisibilityBits(OcclusionModel):
     current light, :meth:`refresh` the radiance of the senders. No gradient flows through the factors.
 
     Args:
-        n_directions: The number of directions, one in each cell about a point of the Fibonacci sphere; a multiple of 32.
+        n_directions: The number of cells, one about each point of a Fibonacci sphere; a multiple of 32.
         offset: The distance of a ray's start from its vertex along the normal, scene units.
         n_channels: 1 averages the factors over the colour channels, 3 keeps them.
         indirect: Whether the cache records the vertex that each blocked ray hits.
@@ -89,7 +89,8 @@ class VisibilityBits(OcclusionModel):
         """Aims each cell's direction at its light, so that a lamp's shadow falls where the lamp stands."""
         texels = light.maps.partition(TEXELS_PER_CELL * len(self.centres), self.centres.device)
         power = texels.radiance.sum(1, keepdim=True) * texels.solid_angles[:, None]
-        towards = torch.zeros_like(self.centres).index_add(0, self._cell_of(texels.directions), texels.directions * power)
+        cell = self._cell_of(texels.directions)
+        towards = torch.zeros_like(self.centres).index_add(0, cell, texels.directions * power)
         self.aims = F.normalize(towards + DIM * self.centres, dim=1)
 
     def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> TracedBits:
@@ -122,24 +123,24 @@ class VisibilityBits(OcclusionModel):
         self.light.copy_((light.cells or self.cell_light(light.maps)).radiance)
 
     def cached_light(self) -> dict[str, Tensor | None]:
-        """The environment's radiance of each direction [k, 3], the directions of the traced rays [k, 3], and the radiance
-        of each sender [p, 3] or None."""
+        """The environment's radiance of each direction [k, 3], the directions of the traced rays [k, 3], and the
+        radiance of each sender [p, 3] or None."""
         return {"sky": self.light, "aims": self.directions, "sent": self.radiance}
 
     def restore_light(self, cached: dict[str, Tensor | None]) -> None:
         """Restores the result of :meth:`cached_light`, on the same mesh traced in the same directions. The radiance of
         other senders is left out."""
         self.light.copy_(cached["sky"])
-        if cached["sent"] is not None and self.senders is not None and len(cached["sent"]) == len(self.senders.vertices):
-            self.radiance = cached["sent"].to(self.light.device)
+        sent, n = cached["sent"], 0 if self.senders is None else len(self.senders.vertices)
+        self.radiance = sent.to(self.light.device) if sent is not None and len(sent) == n else None
 
     def restore_aims(self, cached: dict[str, Tensor | None]) -> None:
         """Restores the directions in which a mesh is traced from :meth:`cached_light`."""
         self.aims = cached.get("aims", self.centres).to(self.centres.device)
 
     def cell_light(self, light: LightMaps) -> CellLight:
-        """The light's mean over each direction's cell, differentiable in the light. A texel belongs to one cell, so that
-        the cells have the power of the light."""
+        """The light's mean over each direction's cell, differentiable in the light. A texel belongs to one cell, so
+        that the cells have the power of the light."""
         texels = light.partition(TEXELS_PER_CELL * len(self.centres), self.centres.device)
         cell = self._cell_of(texels.directions)
         weighted = torch.cat([texels.radiance * texels.solid_angles[:, None], texels.solid_angles[:, None]], dim=1)

@@ -268,7 +268,8 @@ class SceneModel(nn.Module):
 
     @torch.no_grad()
     def refresh_indirect(self, light: EvaluatedLight) -> None:
-        """Shades the cached mesh again with the split sum, under the light and the mesh's radiance of the last refresh."""
+        """Shades the cached mesh again with the split sum, under the light and the mesh's radiance of the last
+        refresh."""
         c = self.config.shading
 
         def materials(positions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
