@@ -5,8 +5,7 @@
 A SCENE is a folder with asset.glb, light.hdr and test views, or `spheres:LIGHT.hdr`: a grid of spheres over a plane,
 roughness by rows and metallic by columns, or `spheres:sun`. The first hits of camera rays are shaded as in a training
 with a mesh: by the split sum plus its correction. Two independent halves of samples on each side give the squared error
-without their noise: the mean of (a1 - b1)(a2 - b2), in sRGB, over the
-pixels that the object fills with its outside.
+without their noise: the mean of (a1 - b1)(a2 - b2), in sRGB, over the pixels that the object fills with its outside.
 """
 
 from __future__ import annotations
@@ -40,8 +39,7 @@ from splitnerf.render.rays import image_rays
 
 SPACING = 0.032  # edges of the mesh that visibility is cached on: those of marching cubes with 96 nodes
 BINS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.01)
-JITTERED = 4  # shaded first hits of a pixel, in each half
-CHUNK = 1 << 13  # points shaded at a time
+JITTERED, CHUNK = 4, 1 << 13  # shaded first hits of a pixel in each half; points shaded at a time
 
 
 def sphere_scene() -> Asset:
@@ -186,7 +184,7 @@ def srgb_slope(a: Tensor, b: Tensor) -> Tensor:
 
 def psnr(errors: Tensor) -> str:
     """The PSNR of products of errors; the product may be negative where noise is all there is."""
-    mean = errors.mean().item() if len(errors) else math.nan
+    mean = errors.mean().item()
     return f"{-10 * math.log10(mean):6.2f}" if mean > 0 else "   -  "
 
 
