@@ -161,7 +161,7 @@ template <class T> class CacheReader {
     return true;
   }
 
-  // visit(direction, a neighbour's share of those that know it, what the vertex that it meets sends). Few directions above
+  // visit(direction, a neighbour's share of those that know it, what the mesh sends from there). Few directions above
   // the horizon are blocked: they are taken one by one.
   template <class Visit> void for_each_blocked(const Neighbours<T>& near, Visit&& visit) const {
     for (int k = 0; k < near.n; ++k) {
@@ -169,7 +169,7 @@ template <class T> class CacheReader {
       for (int64_t word = 0; word < n_words_; ++word) {
         for (uint32_t blocked = blocked_words(near.vertex[k])[word] & above_[word]; blocked; blocked &= blocked - 1) {
           const int64_t i = word * kBitsPerWord + lowest_bit(blocked);
-          if (hits[i] < 0 || hits[i] >= cache_.grids.n_vertices) continue;
+          if (hits[i] < 0 || hits[i] >= cache_.n_radiance) continue;
           visit(i, near.weight[k] / known_[i], load3(cache_.radiance + 3 * int64_t(hits[i])));
         }
       }

@@ -68,7 +68,7 @@ struct Cache {
         order(checked(op, "order", o, {starts.size(0), vertices.size(0)}, type.with(ScalarType::Int))),
         bits(checked(op, "bits", b, {vertices.size(0), 2, kAny}, type.with(ScalarType::Int))),
         hits(checked(op, "hits", h, {vertices.size(0), kAny}, type.with(ScalarType::Int))),
-        radiance(checked(op, "radiance", c, {indirect() ? vertices.size(0) : 0, 3}, type)),
+        radiance(checked(op, "radiance", c, {kAny, 3}, type)),
         directions(checked(op, "directions", w, {kAny, 3}, type)), radius(r) {
     check_directions(op, n_directions());
     checked(op, "bits", bits, {vertices.size(0), 2, n_directions() / kBitsPerWord}, type.with(ScalarType::Int));
@@ -90,6 +90,7 @@ struct Cache {
             in<uint32_t>(bits),
             indirect() ? in<int32_t>(hits) : nullptr,
             in<T>(radiance),
+            radiance.size(0),
             n_directions(),
             in<T>(directions),
             light};

@@ -170,6 +170,7 @@ struct Ball {
             bits.data(),
             with_hits ? hits.data() : nullptr,
             radiance.data(),
+            n,
             k,
             directions.data(),
             light.data()};

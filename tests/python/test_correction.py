@@ -75,7 +75,7 @@ def test_the_sum_holds_what_the_mesh_sends():
     one = torch.ones(len(x), 1)
     points = ShadedPoints(torch.zeros(len(x), 3), torch.ones(len(x), 3), one, 0 * one, one, one, n, n)
     light, found = model.evaluate_light(), []
-    for sent in (torch.ones_like(bits.cache.vertices), None):
+    for sent in (torch.ones_like(bits.radiance), None):
         bits.radiance = sent
         found.append(model.quadrature_correction(light, x, n, n, points, torch.arange(len(x)))[1])
     torch.testing.assert_close(found[0][inner], torch.ones(int(inner.sum()), 3), rtol=0, atol=0.05)

@@ -12,7 +12,7 @@ from op_checks import generator, unit
 
 from splitnerf import _core
 from splitnerf.config import Config
-from splitnerf.fields import Light, VisibilityBits
+from splitnerf.fields import EvaluatedLight, Light, VisibilityBits
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import monte_carlo_light, prefilter_light, query_direction, shade_sums, split_sum_shade
 from splitnerf.render.model import SceneModel, ShadedPoints
@@ -32,6 +32,7 @@ class Lamp(Light):
 
 def test_the_cells_light_keeps_power_and_place():
     bits, lamp = VisibilityBits(256, OFFSET, 3, True), Lamp((0.3, -0.5, 0.7))
+    bits.aim(EvaluatedLight(lamp))
     light = bits.cell_light(lamp)
     exact = 4 * math.pi * 0.2 + 50.0 * 2 * math.pi / 200.0
     power = light.radiance[:, :1] * light.solid_angles[:, None]
@@ -41,7 +42,7 @@ def test_the_cells_light_keeps_power_and_place():
     def off(w: torch.Tensor) -> float:
         return math.degrees(math.acos((unit((power * w).sum(0, keepdim=True)) @ lamp.axis).item()))
 
-    assert off(light.directions) < 0.7 < 1.0 < off(bits.directions)
+    assert off(bits.aims) < 0.7 < 1.0 < off(bits.centres)
     light.radiance.sum().backward()
     assert lamp.power.grad.item() > 0
 

@@ -76,7 +76,9 @@ def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     before = render_maps(trained.model, trained.grid, dataset, 0)
     model, grid, content = load_run(tmp_path)
     after = render_maps(model, grid, dataset, 0)
-    assert len(content["mesh_vertices"]) == len(model.occlusion.radiance)
+    ours, stored = model.occlusion, trained.model.occlusion
+    assert len(content["mesh_vertices"]) == len(ours.cache.vertices)
+    assert torch.equal(ours.directions, stored.directions) and len(ours.senders.vertices) == len(stored.radiance)
     for name in ("occlusion_d", "occlusion_s", "rgb"):
         np.testing.assert_allclose(before[name], after[name], atol=0.02, err_msg=name)
     assert 0.0 < before["occlusion_d"][before["alpha"] > 0.5].mean() <= 1.0

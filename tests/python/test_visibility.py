@@ -395,11 +395,12 @@ def test_errors():
         (5, "vertex_normals"),
         (9, "bits"),
         (10, "hits"),
-        (11, "radiance"),
         (13, "light"),
     ):
         bad = (*good[:index], good[index][1:], *good[index + 1 :])
         check_error(lambda: lib.cached_occlusion(*bad), "cached_occlusion", part)
+    bad = (*good[:11], good[11][:, :2], *good[12:])
+    check_error(lambda: lib.cached_occlusion(*bad), "cached_occlusion", "radiance")
     short = cached_visibility_inputs(torch.float32)
     check_error(lambda: lib.cached_visibility(short[0], short[1][1:], *short[2:]), "cached_visibility", "normals")
     check_error(lambda: lib.cached_occlusion(*good[:7], good[7] + 1, *good[8:]), "cached_occlusion", "order")

@@ -126,9 +126,9 @@ SPLITNERF_HD Neighbours<T> find_neighbours(const VertexGrids<T>& grids, Vec3<T> 
 template <class T> struct VisibilityCache {
   VertexGrids<T> grids;
   const uint32_t* bits;  // [n_vertices, 2, n_directions / 32], see visibility_bits
-  const int32_t* hits;   // [n_vertices, n_directions], or null: no indirect light
-  const T* radiance;     // [n_vertices, 3] that the vertices send out, with hits
-  int64_t n_directions;
+  const int32_t* hits;   // [n_vertices, n_directions] rows of radiance, below 0: none; or null: no indirect light
+  const T* radiance;     // [n_radiance, 3] that the mesh sends out, with hits
+  int64_t n_radiance, n_directions;
   const T *directions, *light;  // [n_directions, 3]; the light's mean over each direction's cell
 };
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import functools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
@@ -53,6 +54,20 @@ class LightSamples:
         return int(min(most, max(FEWEST_SAMPLES, self.variance / (share * self.squared_error))))
 
 
+class LightTexels(NamedTuple):
+    """The environment as a partition of the sphere into texels.
+
+    Attributes:
+        directions: [t, 3] unit, the middle of each texel.
+        solid_angles: [t] sr; they sum to 4 pi.
+        radiance: [t, 3] mean linear radiance of each texel.
+    """
+
+    directions: Tensor
+    solid_angles: Tensor
+    radiance: Tensor
+
+
 class LightMaps(Protocol):
     """The light g(w, rho) in a form ready for lookups, valid until its parameters move.
 
@@ -64,6 +79,10 @@ class LightMaps(Protocol):
 
     def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
+
+    def partition(self, at_least: int, device: torch.device) -> LightTexels:
+        """The environment as texels on the light's device: those that the light consists of, or else at least so many,
+        each the light about its middle. The radiance is differentiable; equal calls return the same directions."""
 
     def backward(self) -> None:
         """Passes the accumulated gradients from the leaves on to the parameters; call it once."""
@@ -77,8 +96,7 @@ class CellLight(NamedTuple):
 
     Attributes:
         radiance: [k, 3] mean linear radiance of each cell.
-        directions: [k, 3] unit, the power-weighted mean direction of each cell, so that a small lamp keeps its
-            position.
+        directions: [k, 3] unit, a direction in each cell, which represents it.
         solid_angles: [k] solid angles of the cells, sr; they sum to 4 pi.
     """
 
@@ -178,6 +196,12 @@ class Light(nn.Module, abc.ABC):
         """The light ready for lookups: here the module itself, since every backward pass reaches its parameters."""
         return self
 
+    def partition(self, at_least: int, device: torch.device) -> LightTexels:
+        """The light about the middles of an equirectangular map's texels, see :class:`LightMaps`."""
+        directions, solid_angles = equirect_texels(math.ceil(math.sqrt(at_least / 2)), device)
+        roughness = torch.full_like(solid_angles[:, None], lobe_roughness(4.0 * math.pi / len(directions)))
+        return LightTexels(directions, solid_angles, self(directions, roughness))
+
     def backward(self) -> None:
         """Does nothing: no gradients accumulate here."""
 
@@ -197,6 +221,15 @@ class Light(nn.Module, abc.ABC):
 def panorama_directions(height: int, device: torch.device | str = "cpu") -> Tensor:
     """[height, 2 height, 3] unit directions of an equirectangular map's texel centres."""
     return torch.from_numpy(_core.equirect_directions(height, 2 * height)).to(device=device, dtype=torch.float32)
+
+
+@functools.lru_cache(maxsize=4)
+def equirect_texels(height: int, device: torch.device) -> tuple[Tensor, Tensor]:
+    """The middles [2 height^2, 3] and the solid angles [2 height^2] of an equirectangular map's texels."""
+    with torch.inference_mode(False):
+        directions = panorama_directions(height, device).reshape(-1, 3)
+        areas = (1.0 - directions[:, 2] ** 2).clamp(min=0.0).sqrt()
+        return directions, areas * (4.0 * math.pi / areas.sum())
 
 
 def lobe_roughness(solid_angle: Tensor | float) -> Tensor | float:

@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 from splitnerf.devices import tensor_cores
-from splitnerf.fields.light import Light, leaf_of
+from splitnerf.fields.light import Light, LightTexels, leaf_of
 from splitnerf.ops import (
     SparseMap,
     light_averages,
@@ -31,6 +32,7 @@ TEXELS_PER_ALPHA = 5.0  # a map of resolution m = TEXELS_PER_ALPHA / ggx_alpha r
 SH_RESOLUTION = 64  # largest resolution of the averages that the harmonics are computed from
 ZONAL_ROWS = 129
 LOG_LIMIT = 12.0
+TEXEL_PARTS = 4  # parts of a texel along its edge, for its solid angle
 
 
 class PyramidFilters(NamedTuple):
@@ -92,6 +94,26 @@ def pyramid_filters(resolution: int) -> PyramidFilters:
         )  # fmt: skip
 
 
+@functools.lru_cache(maxsize=4)
+def octahedral_texels(resolution: int, device: torch.device) -> tuple[Tensor, Tensor]:
+    """The mean directions [n^2, 3] and the solid angles [n^2] of an octahedral map's texels, in the order of its rows.
+
+    A texel's solid angle is that of its parts, du dv / |p|^3 each, where p is the point of the octahedron.
+    """
+    with torch.inference_mode(False):
+        n = TEXEL_PARTS * resolution
+        axis = (torch.arange(n, dtype=torch.float64) + 0.5) * (2.0 / n) - 1.0
+        v, u = torch.meshgrid(axis, axis, indexing="ij")
+        z = 1.0 - u.abs() - v.abs()
+        folded = [(1.0 - a.abs()) * torch.where(b < 0, -1.0, 1.0) for a, b in ((v, u), (u, v))]
+        point = torch.stack([torch.where(z >= 0, u, folded[0]), torch.where(z >= 0, v, folded[1]), z])
+        length = point.norm(dim=0)
+        parts = torch.cat([point / length, torch.ones_like(z)[None]]) / length**3
+        sums = F.avg_pool2d(parts, TEXEL_PARTS).flatten(1)
+        solid_angles = sums[3] * (4.0 * math.pi / sums[3].sum())
+        return F.normalize(sums[:3].T, dim=1).float().to(device), solid_angles.float().to(device)
+
+
 def chain_resolution(resolution: int, roughness: float) -> int:
     """The smallest power of 2 that resolves the lobe, at most the texels' own resolution."""
     wanted = TEXELS_PER_ALPHA / roughness**2
@@ -151,6 +173,10 @@ class LightPyramid(Light):
         pass."""
         return FilteredLight(self.filters, *self.chain())
 
+    def partition(self, at_least: int, device: torch.device) -> LightTexels:
+        """The unfiltered texels of the light, see :func:`partition`."""
+        return partition(self.radiance(), self.resolution, at_least, device)
+
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0. Each call computes all maps."""
         return lookup(self.filters, self.chain(), directions, roughness)
@@ -172,6 +198,10 @@ class FilteredLight:
     def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
         return lookup(self._filters, self.leaves or self._roots, directions, roughness)
 
+    def partition(self, at_least: int, device: torch.device) -> LightTexels:
+        """The unfiltered texels of the light, see :func:`partition`."""
+        return partition((self.leaves or self._roots)[0], int(self._filters.resolutions[0]), at_least, device)
+
     def backward(self) -> None:
         given = [(root, leaf.grad) for root, leaf in zip(self._roots, self.leaves) if leaf.grad is not None]
         if given:
@@ -181,6 +211,15 @@ class FilteredLight:
         copy = FilteredLight(self._filters, *(root.detach() for root in self._roots))
         copy.leaves = tuple(leaves)
         return copy
+
+
+def partition(levels: Tensor, resolution: int, at_least: int, device: torch.device) -> LightTexels:
+    """The first map of [texels, 3] levels as texels, divided into equal squares until they are ``at_least`` so many."""
+    radiance, n = levels[: resolution * resolution], resolution
+    while n * n < at_least:
+        radiance = radiance.view(n, 1, n, 1, 3).expand(n, 2, n, 2, 3).reshape(4 * n * n, 3)
+        n *= 2
+    return LightTexels(*octahedral_texels(n, device), radiance)
 
 
 def lookup(filters: PyramidFilters, chain: Sequence[Tensor], directions: Tensor, roughness: Tensor) -> Tensor:

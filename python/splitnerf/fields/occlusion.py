@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
 
 import torch
 from torch import Tensor, nn
@@ -30,6 +30,29 @@ class OcclusionQuery(NamedTuple):
     normals: Tensor
     lobe_dirs: Tensor
     roughness: Tensor
+
+
+class Materials(Protocol):
+    """Materials of a surface."""
+
+    def __call__(self, positions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """positions [n, 3], scene units -> albedo [n, 3] linear, roughness [n, 1] perceptual and metallic [n, 1], all
+        in [0, 1]."""
+
+
+class Reflect(Protocol):
+    """Reflection at points of a surface."""
+
+    def __call__(
+        self, normals: Tensor, view_dirs: Tensor, materials: Sequence[Tensor], light_s: Tensor, light_d: Tensor
+    ) -> Tensor:
+        """The radiance [n, 3] that points reflect towards ``view_dirs`` [n, 3].
+
+        Args:
+            normals, view_dirs: [n, 3] unit.
+            materials: The values of :class:`Materials` at the points.
+            light_s, light_d: [n, 3] light that arrives, in the normalisation of g(d, rho) and g(n, 1).
+        """
 
 
 class RaySegments(NamedTuple):
@@ -63,19 +86,41 @@ class TracedBits(NamedTuple):
     """The traced visibility of a mesh's vertices.
 
     Attributes:
-        cache: The visibility bits, on the CPU.
+        cache: The visibility bits, on the CPU. ``hits`` are numbers of senders.
         is_unoccluded: Whether the mesh blocks so little that it counts as convex.
+        senders: The vertices that rays hit, each with the direction that it is hit from; None without indirect light.
     """
 
     cache: VisibilityCache
     is_unoccluded: bool
+    senders: Senders | None
+
+
+class Senders(NamedTuple):
+    """The mesh's vertices as they are seen: one row for each vertex and direction in which rays hit it.
+
+    Attributes:
+        vertices: [p] int64, the vertex.
+        view_dirs: [p, 3] unit, towards where it is seen from.
+        mirrored: [p] int64, the sender that the vertex sees in the mirror direction, -1 where that is open.
+        facing: [p, 1] bool, whether it is seen from the outside.
+    """
+
+    vertices: Tensor
+    view_dirs: Tensor
+    mirrored: Tensor
+    facing: Tensor
+
+    def to(self, device: torch.device | str) -> Senders:
+        """A copy on a device."""
+        return Senders(*(part.to(device) for part in self))
 
 
 class OcclusionModel(nn.Module, abc.ABC):
     """The interface of all kinds of occlusion. Before the first mesh, and without occlusion, all factors are 1.
 
-    The way of a mesh: :meth:`trace` computes the bits that the kind keeps, :meth:`use` stores them, and calls read
-    them.
+    The way of a mesh: :meth:`aim` chooses directions, :meth:`trace` computes the bits that the kind keeps, :meth:`use`
+    stores them, and calls read them.
 
     Args:
         n_channels: 1 averages the factors over the colour channels, 3 keeps them.
@@ -109,6 +154,9 @@ class OcclusionModel(nn.Module, abc.ABC):
     def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:
         """The factors of :meth:`forward` where they are not all 1."""
 
+    def aim(self, light: EvaluatedLight) -> None:
+        """Chooses the directions in which the next mesh is traced: those that this light comes from."""
+
     def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> TracedBits | None:
         """The visibility of a mesh that this kind keeps, on the CPU; None where it keeps none.
 
@@ -138,11 +186,16 @@ class OcclusionModel(nn.Module, abc.ABC):
     def restore_light(self, cached: dict[str, Tensor | None]) -> None:
         """Restores the result of :meth:`cached_light`, on a mesh with the same vertices."""
 
-    def refresh(self, shade: Callable[[Tensor, Tensor], Tensor]) -> None:
+    def restore_aims(self, cached: dict[str, Tensor | None]) -> None:
+        """Restores the directions in which a mesh is traced from :meth:`cached_light`."""
+
+    def refresh(self, light: EvaluatedLight, materials: Materials, reflect: Reflect) -> None:
         """Shades the cached mesh again, if any.
 
         Args:
-            shade: A function from positions [n, 3] and normals [n, 3] to the radiance [n, 3] along the normals.
+            light: The evaluated light.
+            materials: The materials of the mesh.
+            reflect: The light that points with materials reflect.
         """
 
 

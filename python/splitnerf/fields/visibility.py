@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -13,11 +13,21 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, lobe_roughness
-from splitnerf.fields.occlusion import Occlusion, OcclusionModel, OcclusionQuery, RaySegments, TracedBits
-from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility
+from splitnerf.fields.occlusion import (
+    Materials,
+    Occlusion,
+    OcclusionModel,
+    OcclusionQuery,
+    RaySegments,
+    Reflect,
+    Senders,
+    TracedBits,
+)
+from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility, query_direction
 
-TEXELS_PER_CELL = 8  # texels of the light per direction, for the mean over the direction's cell
+TEXELS_PER_CELL = 8  # fewest texels per direction of a light without texels of its own
 LOBE_DIRECTIONS = 15  # fewest directions within a lobe that a sum over the directions resolves
+DIM = 1e-12  # power of a cell, W / m^2, below which its direction is that of its centre
 SHADED_CHUNK = 1 << 15  # vertices shaded at a time
 
 
@@ -27,14 +37,32 @@ def bit_counts(words: Tensor) -> Tensor:
     return torch.from_numpy(bits.sum(axis=1, dtype=np.int64))
 
 
+def senders_of(cache: VisibilityCache) -> tuple[Tensor, Senders]:
+    """The senders of a traced mesh, and the hits [n, k] int32 as numbers of senders in place of vertices."""
+    n_directions = len(cache.directions)
+    vertex, direction = (cache.hits >= 0).nonzero().unbind(1)
+    keys, row = torch.unique(cache.hits[vertex, direction].long() * n_directions + direction, return_inverse=True)
+    rows = torch.full_like(cache.hits, -1)
+    rows[vertex, direction] = row.int()
+    vertices, directions = keys // n_directions, keys % n_directions
+    view_dirs, normals = -cache.directions[directions], cache.normals[vertices]
+    cosine = (normals * view_dirs).sum(1, keepdim=True)
+    mirror = 2.0 * cosine * normals - view_dirs
+    nearest = torch.cat([(part @ cache.directions.T).argmax(1) for part in mirror.split(SHADED_CHUNK)] or [directions])
+    return rows, Senders(vertices, view_dirs, rows[vertices, nearest].long(), cosine > 0)
+
+
 class VisibilityBits(OcclusionModel):
     """Occlusion factors from the traced visibility of each mesh vertex, and indirect light from the blocked directions.
 
+    The sphere is divided into cells, those of the directions nearest to `centres`. The light of a cell, and the rays
+    traced towards it, come from one direction: that of the cell's light when the mesh was made (:meth:`aim`).
+
     The module has no parameters and no state_dict: :meth:`use` stores the cache of a traced mesh, :meth:`set_light` the
-    current light, :meth:`refresh` the radiance of the vertices. No gradient flows through the factors.
+    current light, :meth:`refresh` the radiance of the senders. No gradient flows through the factors.
 
     Args:
-        n_directions: The number of Fibonacci directions over the sphere, a multiple of 32.
+        n_directions: The number of cells, one about each point of a Fibonacci sphere; a multiple of 32.
         offset: The distance of a ray's start from its vertex along the normal, scene units.
         n_channels: 1 averages the factors over the colour channels, 3 keeps them.
         indirect: Whether the cache records the vertex that each blocked ray hits.
@@ -48,37 +76,45 @@ class VisibilityBits(OcclusionModel):
         super().__init__(n_channels)
         self.offset, self.indirect, self.open_below = offset, indirect, open_below
         directions = torch.from_numpy(_core.fibonacci_sphere(n_directions)).float()
-        height = math.ceil(math.sqrt(TEXELS_PER_CELL * n_directions / 2))
-        texels = torch.from_numpy(_core.equirect_directions(height, 2 * height)).float().reshape(-1, 3)
-        self._texel_roughness = lobe_roughness(4.0 * math.pi / len(texels))
-        constants = {
-            "directions": directions,
-            "light": torch.ones_like(directions),
-            "_texels": texels,
-            "_cell": torch.cat([(part @ directions.T).argmax(1) for part in texels.split(4096)]),
-            "_solid_angle": (1.0 - texels[:, 2:] ** 2).clamp(min=0.0).sqrt(),  # up to a common factor
-        }
-        for name, value in constants.items():
-            self.register_buffer(name, value, persistent=False)
+        for name in ("centres", "directions", "aims"):
+            self.register_buffer(name, directions.clone(), persistent=False)
+        self.register_buffer("light", torch.ones_like(directions), persistent=False)
+        self._cells: tuple[Tensor, Tensor] | None = None  # the light's texels, and the cell that holds each
         self.cache: VisibilityCache | None = None
-        self.radiance: Tensor | None = None
+        self.senders: Senders | None = None
+        self.radiance: Tensor | None = None  # of each sender
+
+    @torch.no_grad()
+    def aim(self, light: EvaluatedLight) -> None:
+        """Aims each cell's direction at its light, so that a lamp's shadow falls where the lamp stands."""
+        texels = light.maps.partition(TEXELS_PER_CELL * len(self.centres), self.centres.device)
+        power = texels.radiance.sum(1, keepdim=True) * texels.solid_angles[:, None]
+        cell = self._cell_of(texels.directions)
+        towards = torch.zeros_like(self.centres).index_add(0, cell, texels.directions * power)
+        self.aims = F.normalize(towards + DIM * self.centres, dim=1)
 
     def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor) -> TracedBits:
         """The visibility of every vertex of a mesh, traced on the CPU; see :meth:`OcclusionModel.trace`."""
         mesh = trimesh.Trimesh(vertices.numpy(), faces.numpy(), process=False)
         normals = torch.from_numpy(np.array(mesh.vertex_normals, dtype=np.float32))
         cache = VisibilityCache.trace(
-            scene, vertices.float(), normals, float(mesh.area), self.directions.cpu(), offset=self.offset,
+            scene, vertices.float(), normals, float(mesh.area), self.aims.cpu(), offset=self.offset,
             with_hits=self.indirect,
         )  # fmt: skip
         open_bits, blocked_bits = (bit_counts(cache.bits[:, side]) for side in (0, 1))
         blocked = blocked_bits / (open_bits + blocked_bits).clamp(min=1)
-        return TracedBits(cache, len(blocked) > 0 and blocked.max().item() < self.open_below)
+        is_unoccluded = len(blocked) > 0 and blocked.max().item() < self.open_below
+        if not self.indirect:
+            return TracedBits(cache, is_unoccluded, None)
+        rows, senders = senders_of(cache)
+        return TracedBits(dataclasses.replace(cache, hits=rows), is_unoccluded, senders)
 
     def use(self, traced: TracedBits) -> None:
-        """Switches to these bits. The radiance of the vertices is unknown until :meth:`refresh`."""
+        """Switches to these bits. The radiance of the senders is unknown until :meth:`refresh`."""
         super().use(traced)
         self.cache, self.is_unoccluded = traced.cache.to(self.directions.device), traced.is_unoccluded
+        self.senders = None if traced.senders is None else traced.senders.to(self.directions.device)
+        self.directions.copy_(self.cache.directions)
         self.radiance = None
 
     @torch.no_grad()
@@ -87,23 +123,35 @@ class VisibilityBits(OcclusionModel):
         self.light.copy_((light.cells or self.cell_light(light.maps)).radiance)
 
     def cached_light(self) -> dict[str, Tensor | None]:
-        """The environment's radiance of each direction [k, 3], and the radiance of each vertex [n, 3] or None."""
-        return {"sky": self.light, "sent": self.radiance}
+        """The environment's radiance of each direction [k, 3], the directions of the traced rays [k, 3], and the
+        radiance of each sender [p, 3] or None."""
+        return {"sky": self.light, "aims": self.directions, "sent": self.radiance}
 
     def restore_light(self, cached: dict[str, Tensor | None]) -> None:
-        """Restores the result of :meth:`cached_light`, on a mesh with the same number of vertices."""
+        """Restores the result of :meth:`cached_light`, on the same mesh traced in the same directions. The radiance of
+        other senders is left out."""
         self.light.copy_(cached["sky"])
-        self.radiance = None if cached["sent"] is None else cached["sent"].to(self.light.device)
+        sent, n = cached["sent"], 0 if self.senders is None else len(self.senders.vertices)
+        self.radiance = sent.to(self.light.device) if sent is not None and len(sent) == n else None
+
+    def restore_aims(self, cached: dict[str, Tensor | None]) -> None:
+        """Restores the directions in which a mesh is traced from :meth:`cached_light`."""
+        self.aims = cached.get("aims", self.centres).to(self.centres.device)
 
     def cell_light(self, light: LightMaps) -> CellLight:
-        """The light's mean over each direction's cell, differentiable in the light."""
-        radiance = light(self._texels, torch.full_like(self._solid_angle, self._texel_roughness))
-        weighted = torch.cat([radiance * self._solid_angle, self._solid_angle], dim=1)
-        sums = weighted.new_zeros(len(self.directions), 4).index_add(0, self._cell, weighted)
-        power = weighted[:, :3].detach().sum(1, keepdim=True)
-        centres = torch.zeros_like(self.directions).index_add(0, self._cell, self._texels * power)
-        area = sums[:, 3].detach()
-        return CellLight(sums[:, :3] / sums[:, 3:], F.normalize(centres, dim=1), area * (4.0 * math.pi / area.sum()))
+        """The light's mean over each direction's cell, differentiable in the light. A texel belongs to one cell, so
+        that the cells have the power of the light."""
+        texels = light.partition(TEXELS_PER_CELL * len(self.centres), self.centres.device)
+        cell = self._cell_of(texels.directions)
+        weighted = torch.cat([texels.radiance * texels.solid_angles[:, None], texels.solid_angles[:, None]], dim=1)
+        sums = weighted.new_zeros(len(self.directions), 4).index_add(0, cell, weighted)
+        return CellLight(sums[:, :3] / sums[:, 3:], self.directions, sums[:, 3].detach())
+
+    def _cell_of(self, texels: Tensor) -> Tensor:
+        """The cell [t] int64 of each texel's direction [t, 3]: the nearest of the cells' centres."""
+        if self._cells is None or self._cells[0] is not texels:
+            self._cells = texels, torch.cat([(part @ self.centres.T).argmax(1) for part in texels.split(4096)])
+        return self._cells[1]
 
     @property
     def summed_from(self) -> float:
@@ -121,17 +169,29 @@ class VisibilityBits(OcclusionModel):
         return cached_visibility(self.cache, positions, normals, self.radiance)
 
     @torch.no_grad()
-    def refresh(self, shade: Callable[[Tensor, Tensor], Tensor]) -> None:
-        """Shades the vertices again. The shading reads the radiance of the refresh before, so that each call adds a
-        bounce.
+    def refresh(self, light: EvaluatedLight, materials: Materials, reflect: Reflect) -> None:
+        """Shades the senders again. They receive the radiance of the refresh before, so that each call adds a bounce.
 
-        Args:
-            shade: A function from positions [n, 3] and normals [n, 3] to the radiance [n, 3] along the normals.
+        A sender reflects towards the one direction that it is seen from. Its specular light is the environment's, or
+        that of the sender that it sees in the mirror direction. Seen from behind it is black.
         """
-        if self.indirect and self.cache is not None and not self.is_unoccluded:
-            parts = zip(self.cache.vertices.split(SHADED_CHUNK), self.cache.normals.split(SHADED_CHUNK))
-            radiance = torch.cat([shade(x, n) for x, n in parts])
-            self.radiance = radiance if self.radiance is None else self.radiance.copy_(radiance)
+        if self.senders is None or self.is_unoccluded:
+            return
+        x, n = self.cache.vertices, self.cache.normals
+        at_vertices = [torch.cat(parts) for parts in zip(*map(materials, x.split(SHADED_CHUNK)))]
+        o_d, _, i_d, _ = cached_occlusion(self.cache, x, n, n, at_vertices[1], self.light, self.radiance)
+        diffuse = o_d * light(n, torch.ones_like(n[:, :1])) + (0.0 if i_d is None else i_d)
+        before = x.new_zeros(1, 3) if self.radiance is None else F.pad(self.radiance, (0, 0, 0, 1))
+        blur = lobe_roughness(4.0 * math.pi / len(self.centres)) ** 4  # a ray stands for all of its cell
+        parts = []
+        for vertices, views, mirrored, facing in zip(*(part.split(SHADED_CHUNK) for part in self.senders)):
+            here = [part[vertices] for part in at_vertices]
+            sky = light(query_direction(n[vertices], views, here[1]), (here[1] ** 4 + blur).sqrt().sqrt())
+            seen = before[mirrored.clamp(max=len(before) - 1)]
+            specular = torch.where(mirrored[:, None] < 0, sky, seen)
+            parts.append(reflect(n[vertices], views, here, specular, diffuse[vertices]) * facing)
+        radiance = torch.cat(parts) if parts else x.new_zeros(0, 3)
+        self.radiance = radiance if self.radiance is None else self.radiance.copy_(radiance)
 
     @torch.no_grad()
     def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:

@@ -53,7 +53,7 @@ class VisibilityCache:
     Attributes:
         vertices, normals: [n, 3] float32 vertices (scene units) and their unit normals.
         directions: [k, 3] float32 unit directions.
-        bits, hits: The results of :func:`visibility_bits`.
+        bits, hits: The results of :func:`visibility_bits`; hits may be other numbers, those of rows of a radiance.
         radius: The radius of the first search for vertices around a point, 1.5 sqrt(area / n), scene units.
         starts, order: Hash grids over the vertices; the search of level l has the radius ``radius * 2^l``.
     """
@@ -100,7 +100,7 @@ def cached_occlusion(
     ``o_d = sum V_i L_i (w_i.n)+ / sum L_i (w_i.n)+``. o_s is the same ratio with D(w_i, d)(w_i.d)+ [w_i.n > 0] in place
     of the cosine, where D is at least about two directions wide.
 
-    With ``radiance``, C_i is the radiance of the vertex that direction i hits:
+    With ``radiance``, C_i is its row that ``hits`` names for direction i:
     ``i_d = sum (1 - V_i) C_i (w_i.n)+ / sum (w_i.n)+``, and i_s is the same mean over the lobe. They are added to
     o_d g(n, 1) and o_s g(d, rho).
 
@@ -114,7 +114,7 @@ def cached_occlusion(
         lobe_dirs: [n, 3] float32 unit axes d of the specular lobe (:func:`splitnerf.ops.query_direction`).
         roughness: [n, 1] float32 perceptual roughness in [0, 1].
         light: [k, 3] float32 mean radiance L_i of the environment over the cell of each of the cache's directions.
-        radiance: [vertices, 3] float32 outgoing radiance of each vertex, or None.
+        radiance: [m, 3] float32 radiance that the mesh sends out, or None. A hit past the last row sends nothing.
 
     Returns:
         o_d, o_s [n, 3] in [0, 1], 1 = open; i_d, i_s [n, 3] or None, in the normalisation of g (irradiance / pi).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
@@ -267,13 +268,16 @@ class SceneModel(nn.Module):
 
     @torch.no_grad()
     def refresh_indirect(self, light: EvaluatedLight) -> None:
-        """Shades the cached mesh again with the split sum, under the light and the mesh's radiance of the last refresh.
+        """Shades the cached mesh again with the split sum, under the light and the mesh's radiance of the last
+        refresh."""
+        c = self.config.shading
 
-        Each vertex is viewed along its normal.
-        """
-
-        def shade(positions: Tensor, normals: Tensor) -> Tensor:
+        def materials(positions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
             field = self.surface(positions)
-            return self.shade(light, positions, field.outputs, field.features, normals, normals).radiance
+            return self.material(self.head_inputs(positions, field.outputs, field.features))
 
-        self.occlusion.refresh(shade)
+        def reflect(n: Tensor, view_dirs: Tensor, here: Sequence[Tensor], light_s: Tensor, light_d: Tensor) -> Tensor:
+            one = torch.ones_like(here[1])
+            return split_sum_shade(n, view_dirs, *here, light_s, light_d, one, one, c.fresnel, c.compensate)
+
+        self.occlusion.refresh(light, materials, reflect)

@@ -84,7 +84,8 @@ class RenderedRays:
         evaluated: [n_rays] int64, the number of points per ray at which the search evaluated the distance.
         weights: [n] rendering weights.
         values: [n, 3] composited values: radiance of the split sum, linear or sRGB by the setting `compositing`. With
-            `shading.method = summed`, `mean` also contains the quadrature correction at each ray's heaviest sample.
+            `shading.method = summed`, `mean` also contains the quadrature correction at each ray's heaviest sample, by the
+            share of the weight that the sample's segment carries.
         gradients: [n + k + m, 3] d sdf / d position at all samples and probes.
         beside: [m] int64, the samples whose neighbours the last m gradients belong to.
         shaded: [n_shaded] int64, indices of the shaded samples.
@@ -233,7 +234,10 @@ def render_rays(
             spread.heaviest,
             None if capacity is None else spread.sizes[1],
         )
-        mean = mean.index_add(0, samples.ray_indices[shaded[at]], correction)
+        carried = shares.new_zeros(len(spread.leaders)).index_add(0, spread.stretch, shares)  # weight of each segment
+        ray = samples.ray_indices[shaded[at]]
+        part = carried[spread.stretch[at]] / opacity.detach().clamp(min=MIN_OPACITY)[ray]
+        mean = mean.index_add(0, ray, correction * part[:, None])
     return RenderedRays(
         mean, c.shading.compositing == "linear", opacity, samples, found.evaluated, weights, values, field.gradient,
         found.beside,

@@ -208,16 +208,17 @@ def _check_content(content: dict) -> None:
 def _check_light(config: Config, content: dict) -> None:
     """Raises ValueError where the cached light, stored in addition to the parameters, does not fit the settings."""
     _check_tensor("light_noise", content.get("light_noise"), (2,), torch.float64)
-    height, cached, vertices = config.occlusion.environment_height, content.get("occlusion_light"), content.get("mesh_vertices")
+    height, cached = config.occlusion.environment_height, content.get("occlusion_light")
     if content.get("environment") is not None:
         _check_tensor("environment", content["environment"], (height, 2 * height, 3), torch.float32)
-    if not isinstance(cached, dict) or cached.keys() != ({"sky", "sent"} if config.occlusion.kind == "bits" else set()):
+    keys = {"sky", "sent"} if config.occlusion.kind == "bits" else set()
+    if not isinstance(cached, dict) or cached.keys() - {"aims"} != keys:
         raise ValueError("occlusion_light is missing or of another kind")
     if cached:
-        _check_tensor("the sky's light", cached["sky"], (config.occlusion.directions, 3), torch.float32)
+        for name in cached.keys() - {"sent"}:
+            _check_tensor(f"the {name} of the bits", cached[name], (config.occlusion.directions, 3), torch.float32)
     if cached.get("sent") is not None:
-        n = len(vertices) if isinstance(vertices, Tensor) else 0
-        _check_tensor("the light that the mesh sends", cached["sent"], (n, 3), torch.float32)
+        _check_tensor("the light that the mesh sends", cached["sent"], (-1, 3), torch.float32)
 
 
 def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:

@@ -66,6 +66,8 @@ class SurfaceMesh:
         if self._made is not None:
             return
         self.asked_at, network = progress, self.model.sdf_field.network()
+        with torch.no_grad():
+            self.model.occlusion.aim(self.model.evaluate_light())
         if not self.background:
             self._use(make_mesh(self.model, network))
             return
@@ -88,6 +90,7 @@ class SurfaceMesh:
         """Uses the mesh of a checkpoint, if it has one."""
         self.asked_at = content["meshed_at"]
         stored = content["mesh_vertices"], content["mesh_faces"]
+        self.model.occlusion.restore_aims(content["occlusion_light"])
         self._use(None if stored[0] is None else traced(self.model, *stored))
 
     def state(self) -> dict[str, Tensor | float | None]:

@@ -41,7 +41,7 @@ SPLITNERF_HD bool sees_all(const Group& group, const VisibilityCache<T>& cache, 
   return group.ballot(any) == 0;
 }
 
-// sum of what the mesh's vertices send from direction i, each by its neighbour's share of those that know the direction.
+// sum of what the mesh sends from direction i, each by its neighbour's share of those that know the direction.
 template <class T>
 SPLITNERF_HD Vec3<T> sent_by_mesh(const VisibilityCache<T>& cache, const Neighbours<T>& near,
                                   const DirectionShares<T>& shares, int64_t i) {
@@ -49,7 +49,7 @@ SPLITNERF_HD Vec3<T> sent_by_mesh(const VisibilityCache<T>& cache, const Neighbo
   for (uint32_t left = shares.blocked; left; left &= left - 1) {
     const int k = lowest_bit(left);
     const int32_t hit = cache.hits[int64_t(near.vertex[k]) * cache.n_directions + i];
-    if (hit < 0 || hit >= cache.grids.n_vertices) continue;
+    if (hit < 0 || hit >= cache.n_radiance) continue;
     sent += load3(cache.radiance + 3 * int64_t(hit)) * (near.weight[k] / shares.known);
   }
   return sent;

@@ -1,0 +1,241 @@
+"""The cells of the sky: whose light they hold, where their shadows fall, and what the mesh reflects into them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+import trimesh
+from mesh_shapes import OFFSET, corners, grid_mesh, scene_of
+from op_checks import generator, unit
+from test_correction import with_mesh
+from test_views import ball
+from test_visibility import Field
+
+from splitnerf.fields import EvaluatedLight, LightPyramid, OcclusionQuery, VisibilityBits
+from splitnerf.fields.light_pyramid import octahedral_texels
+from splitnerf.fields.sdf import SdfSample
+from splitnerf.ops import cached_visibility, trace_visibility
+from splitnerf.render.renderer import find_samples, render_rays
+
+
+def pyramid(seed: int) -> LightPyramid:
+    light = LightPyramid(128)
+    with torch.no_grad():
+        light.texels.normal_(generator=generator(seed)).mul_(1.5)
+    return light
+
+
+def lamp(axis: torch.Tensor, radiance: float = 1e4) -> LightPyramid:
+    """A dark sky with one bright texel, that nearest to the axis."""
+    light = LightPyramid(128)
+    with torch.no_grad():
+        light.texels.zero_()
+        light.texels[-(128 * 128) :] = math.log(1e-4)
+        at = (octahedral_texels(128, torch.device("cpu"))[0] @ axis).argmax()
+        light.texels[at - 128 * 128] = math.log(radiance)
+    return light
+
+
+# ---- whose light they hold ----
+
+
+def test_texels_divide_the_sphere():
+    """Their middles lie in their texels: a light that is linear in the direction is read there as it is."""
+    directions, solid_angles = octahedral_texels(64, torch.device("cpu"))
+    assert solid_angles.sum().item() == pytest.approx(4 * math.pi, rel=1e-5)
+    torch.testing.assert_close((directions.T * solid_angles) @ directions, 4 * math.pi / 3 * torch.eye(3), rtol=0, atol=4e-3)
+    light = LightPyramid(64)
+    with torch.no_grad():
+        light.texels.zero_()
+        light.texels[-(64 * 64) :] = (2 + directions).log()
+    found = light(directions, torch.zeros(64 * 64, 1))
+    torch.testing.assert_close(found, 2 + directions, rtol=0, atol=1e-2)
+
+
+def test_cells_have_the_power_of_the_light():
+    """By its harmonics: the constant of degree 0 is the integral over sqrt(4 pi)."""
+    light = pyramid(1)
+    maps = light.evaluate()
+    cells = VisibilityBits(256, OFFSET, 3, True).cell_light(maps)
+    power = (cells.radiance * cells.solid_angles[:, None]).sum(0)
+    torch.testing.assert_close(power, light.chain()[1][0] * math.sqrt(4 * math.pi), rtol=3e-4, atol=0)
+    assert cells.solid_angles.sum().item() == pytest.approx(4 * math.pi, rel=1e-5)
+
+
+def test_few_texels_are_divided():
+    """A light of 16 x 16 texels has light for each of 1024 cells, and its power."""
+    light = LightPyramid(16)
+    with torch.no_grad():
+        light.texels.normal_(generator=generator(2))
+    bits = VisibilityBits(1024, OFFSET, 3, True)
+    cells = bits.cell_light(light.evaluate())
+    directions, solid_angles = octahedral_texels(16, torch.device("cpu"))
+    assert cells.solid_angles.min() > 0.3 * 4 * math.pi / 1024 and cells.radiance.isfinite().all()
+    power = (cells.radiance * cells.solid_angles[:, None]).sum(0)
+    torch.testing.assert_close(power, (light.radiance() * solid_angles[:, None]).sum(0), rtol=2e-3, atol=0)
+    assert torch.equal(cells.radiance, bits.cell_light(light).radiance)
+    near = (bits.centres @ directions.T).max(1)
+    at_middle = near.values > math.cos(math.radians(1.0))
+    torch.testing.assert_close(cells.radiance[at_middle], light.radiance()[near.indices[at_middle]], rtol=1e-4, atol=0)
+
+
+def test_a_lamp_lights_its_own_cell_alone():
+    bits = VisibilityBits(256, OFFSET, 3, True)
+    for number in (7, 100, 201):
+        axis = bits.centres[number]
+        cells = bits.cell_light(lamp(axis).evaluate())
+        assert cells.radiance[:, 0].argmax() == number
+        others = torch.cat([cells.radiance[:number], cells.radiance[number + 1 :]])
+        assert others.max() < 2e-4 and cells.radiance[number].min() > 100
+
+
+# ---- where their shadows fall ----
+
+
+def test_the_shadow_of_a_sphere_falls_where_the_sun_throws_it():
+    """Suns anywhere in their cells; without aim the shadow is up to .07 away."""
+    mesh = trimesh.util.concatenate(
+        [grid_mesh(3.0, 60), trimesh.creation.icosphere(3, 0.25).apply_translation((0, 0, 0.7))]
+    )
+    scene, faces = scene_of(mesh), torch.tensor(mesh.faces)
+    axis = torch.linspace(-1.2, 1.2, 80)
+    x = torch.cat([torch.cartesian_prod(axis, axis), torch.zeros(6400, 1)], 1)
+    up = torch.tensor([[0.0, 0.0, 1.0]]).expand(6400, 3)
+    query = OcclusionQuery(torch.empty(0), x, up, up, torch.ones(6400, 1))
+
+    def place(shade: torch.Tensor) -> torch.Tensor:
+        return (x * shade[:, None]).sum(0) / shade.sum()
+
+    apart = {True: [], False: []}
+    for seed in range(6):
+        sun = unit(torch.tensor([[0.0, 0.0, 1.0]]) + 0.5 * torch.randn(1, 3, generator=generator(seed)).clamp(-1.2, 1.2))[0]
+        sun = unit(sun[None] * torch.tensor([1.0, 1.0, 1.6]))[0]
+        light = lamp(sun)
+        true = octahedral_texels(128, torch.device("cpu"))[0]
+        true = true[(true @ sun).argmax()]
+        shadow = ~trace_visibility(scene, x + OFFSET * up, true.expand(6400, 3))
+        for aims in (True, False):
+            bits = VisibilityBits(256, OFFSET, 1, indirect=False)
+            lit = EvaluatedLight(light.evaluate())
+            if aims:
+                bits.aim(lit)
+            bits.use(bits.trace(scene, corners(mesh)[0], faces))
+            bits.set_light(lit)
+            apart[aims].append((place(1 - bits(query).diffuse[:, 0]) - place(shadow.float())).norm().item())
+    assert max(apart[True]) < 0.01 and max(apart[False]) > 0.03
+
+
+def test_light_and_rays_of_a_cell_have_one_direction():
+    """Aims wait for the next mesh: until then the light stays where the old rays went."""
+    model = with_mesh(trimesh.creation.icosphere(2, 0.5))
+    bits, lit = model.occlusion, EvaluatedLight(lamp(unit(torch.tensor([[0.3, 0.2, 0.8]]))[0]).evaluate())
+    before = bits.directions.clone()
+    bits.aim(lit)
+    assert torch.equal(bits.cell_light(lit.maps).directions, before) and torch.equal(bits.cache.directions, before)
+    mesh = trimesh.creation.icosphere(2, 0.5)
+    traced = bits.trace(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces))
+    assert torch.equal(bits.directions, before)
+    bits.use(traced)
+    assert not torch.equal(bits.directions, before)
+    assert torch.equal(bits.cell_light(lit.maps).directions, bits.cache.directions)
+    assert ((bits.directions @ bits.centres.T).argmax(1) == torch.arange(256)).float().mean() > 0.98
+
+
+# ---- what the mesh reflects into them ----
+
+
+def floor_and_wall() -> trimesh.Trimesh:
+    """A floor about the origin, and a wall at x = .5 that faces it."""
+    floor, wall = grid_mesh(0.4, 8), grid_mesh(3.0, 40)
+    wall.apply_transform(trimesh.transformations.rotation_matrix(-math.pi / 2, (0, 1, 0)))
+    return trimesh.util.concatenate([floor, wall.apply_translation((0.5, 0, 0))])
+
+
+def test_a_mirror_sends_what_stands_in_the_mirror_direction():
+    """A wall of mirrors under a sky of colours: each direction brings the colour that it is mirrored to."""
+    mesh, sky = floor_and_wall(), Field(lambda w: 1.0 + 0.9 * w)
+    bits = VisibilityBits(256, OFFSET, 3, True)
+    bits.use(bits.trace(scene_of(mesh), corners(mesh)[0], torch.tensor(mesh.faces)))
+    lit = EvaluatedLight(sky)
+    bits.set_light(lit)
+
+    def materials(x: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        return torch.ones_like(x), torch.full_like(x[:, :1], 0.05), torch.ones_like(x[:, :1])
+
+    bits.refresh(lit, materials, lambda n, views, here, light_s, light_d: light_s)
+    up = torch.tensor([[0.0, 0.0, 1.0]])
+    visible, sent = cached_visibility(bits.cache, torch.zeros(1, 3), up, bits.radiance)
+    w = bits.directions
+    to_wall = (visible[0] == 0) & (w[:, 2] > 0.05) & (w[:, 0] > 0.3)
+    assert to_wall.sum() > 20
+    mirrored = w * torch.tensor([-1.0, 1.0, 1.0])
+    torch.testing.assert_close(sent[0, to_wall], sky.radiance(mirrored)[to_wall], rtol=0, atol=1e-4)
+
+
+def test_each_refresh_adds_a_mirror():
+    """Between two facing mirrors that reflect half under a sky of 1: what is sent nears 1/2 + 1/4 + ... where the ways out
+    are open, and is never more."""
+    left, right = grid_mesh(2.0, 30), grid_mesh(2.0, 30, 0.5)
+    right.invert()
+    mesh = trimesh.util.concatenate([left, right])
+    bits = VisibilityBits(256, 1e-3, 3, True)
+    bits.use(bits.trace(scene_of(mesh), corners(mesh)[0], torch.tensor(mesh.faces)))
+    lit = EvaluatedLight(Field(torch.ones_like))
+    bits.set_light(lit)
+    levels = []
+    for _ in range(4):
+        bits.refresh(
+            lit, lambda x: (x, 0 * x[:, :1] + 0.05, x[:, :1]), lambda n, views, here, light_s, light_d: 0.5 * light_s
+        )
+        levels.append(bits.radiance.clone())
+    assert bits.radiance.max() <= 0.5 + 1e-6
+    open_ = bits.senders.mirrored < 0
+    assert 0.05 < open_.float().mean() < 0.9
+    torch.testing.assert_close(bits.radiance[open_], torch.full_like(bits.radiance[open_], 0.5))
+    once = (bits.senders.mirrored >= 0) & open_[bits.senders.mirrored.clamp(min=0)]
+    assert (levels[0][once] == 0).all()
+    torch.testing.assert_close(levels[1][once], torch.full_like(levels[1][once], 0.25))
+    assert torch.equal(levels[3][once], levels[1][once])
+
+
+# ---- what is added to a pixel ----
+
+
+def test_a_correction_counts_by_the_weight_of_its_surface(monkeypatch):
+    """Two balls behind one another, the first of which covers part of a pixel: the heavier one is corrected, by its share."""
+    model, cells = ball()
+    model.config = model.config.replace({"shading": "summed"})
+    model.occlusion.ready = model.occlusion.is_unoccluded = True
+    centres, radii = torch.tensor([[0.5, 0, 0], [-0.7, 0, 0]]), torch.tensor([0.3, 0.6])
+
+    def surface(x: torch.Tensor) -> SdfSample:
+        away = x[:, None] - centres
+        distance, nearest = (away.norm(dim=2) - radii).min(1)
+        outputs = torch.cat([distance[:, None], torch.zeros(len(x), 12)], 1)
+        features = torch.zeros(len(x), model.sdf_field.grid.spec.n_outputs)
+        return SdfSample(outputs, features, unit(away[torch.arange(len(x)), nearest]))
+
+    monkeypatch.setattr(model, "surface", surface)
+    middles = (torch.arange(len(cells)) + 0.5) / len(cells) * 3 - 1.5
+    between = (middles > -0.05) & (middles < 0.15)
+    cells = torch.ones_like(cells) * (~between)[:, None, None]
+    heights = torch.tensor([0.26, 0.29, 0.3, 0.31, 0.33])
+    rays = torch.stack([torch.tensor([4.0, y, 0]) for y in heights]), torch.tensor([[-1.0, 0, 0]] * 5), torch.full((5,), 0.5)
+    model.config = model.config.replace({"sample_above": 0.0})
+    found = find_samples(model, cells, *rays)
+    added = {False: 0.0, True: 1.0}
+    means = []
+    for corrected in (False, True):
+        monkeypatch.setattr(
+            model, "quadrature_correction",
+            lambda light, x, n, views, points, candidates, *_: (candidates, added[corrected] * torch.ones(len(candidates), 3)),
+        )  # fmt: skip
+        ray = render_rays(model, model.evaluate_light(), found)
+        means.append(ray.mean)
+    x = found.positions[: len(ray.weights), 0]
+    in_front = torch.zeros(5).index_add(0, ray.samples.ray_indices, ray.weights * (x > 0.05)) / ray.opacity
+    assert ((in_front > 0.1) & (in_front < 0.9)).sum() >= 2
+    share = torch.maximum(in_front, 1 - in_front)
+    torch.testing.assert_close((means[1] - means[0])[:, 0], share, rtol=0, atol=0.02)
