@@ -185,6 +185,29 @@ CHOICES = {
     "losses.light_set": "fibonacci, uniform, uniform_and_queries",
 }  # fmt: skip
 
+# By unit: the settings that have it.
+UNITS = {
+    "steps": "run.steps occlusion.indirect_every sampling.grid_every losses.light_every optimiser.light_step_every "
+    "optimiser.warmup_steps",
+    "share of the run": "run.preview_every surface.levels_open_by surface.cos_anneal_by mesh.every sampling.hull_until "
+    "losses.priors_from",
+    "minutes": "run.max_minutes run.checkpoint_minutes",
+    "scene units": "surface.box surface.sphere_radius occlusion.offset sampling.min_step sampling.max_step "
+    "losses.smoothness_radius",
+    "cells": "surface.base_resolution sampling.grid_resolution",
+    "nodes": "mesh.resolution export.resolution",
+    "texels": "light.resolution occlusion.environment_height export.texture_size export.environment_height",
+    "triangles": "export.faces",
+    "rays": "occlusion.rays sampling.initial_rays sampling.max_rays",
+    "samples": "sampling.target_samples sampling.max_samples_per_ray sampling.shades_per_ray",
+    "points": "losses.entropy_points losses.smoothness_points losses.eikonal_points",
+    "normals": "losses.neutral_queries",
+    "directions": "occlusion.directions losses.light_samples losses.light_queries losses.light_lobe_samples",
+    "share of the samples": "occlusion.share",
+    "share of the directions": "occlusion.open_below",
+    "share of the rays": "sampling.foreground_share",
+}  # fmt: skip
+
 
 def values(config: Config) -> dict[str, object]:
     return {
@@ -217,6 +240,11 @@ def test_every_setting_is_described(name):
     choices = f"one of {CHOICES[name]}" if name in CHOICES else ""
     assert str(limits) == LIMITS.get(name, choices if largest is None else f"in [0, {largest}]")
     assert known.metadata["unit"] == "" or known.type in ("int", "float")
+
+
+def test_units_are_those_of_the_table():
+    found = {name: known.metadata["unit"] for name, known in FIELDS.items() if known.metadata["unit"]}
+    assert found == {name: unit for unit, names in UNITS.items() for name in names.split()}
 
 
 def test_every_group_says_what_it_holds():
@@ -253,7 +281,8 @@ def test_settings_change_by_old_name_by_new_one_and_by_group():
 
 def test_settings_cannot_change_in_place():
     config = Config()
-    for owner, name in ((config, "run"), (config.run, "steps")):
+    firsts = ((getattr(config, group), dataclasses.fields(kind)[0].name) for group, kind in GROUPS.items())
+    for owner, name in ((config, "run"), *firsts):
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(owner, name, 1)
 
@@ -417,5 +446,8 @@ def test_the_table_lists_every_setting_under_its_group(capsys):
     starts = {line.index(FIELDS[line.split(" = ")[0]].metadata["meaning"]) for line in lines}
     assert len(starts) == 1
     for line in lines:
-        known = FIELDS[line.split(" = ")[0]]
-        assert str(known.metadata["limits"]).removeprefix("in ") in line and known.metadata["unit"] in line
+        name, value = line.split("  ")[0].strip().split(" = ")
+        known = FIELDS[name].metadata
+        assert value == str(SETTINGS[name][2]).lower()
+        columns = f"{name} = {value}", str(known["limits"]).removeprefix("in "), known["unit"], known["meaning"]
+        assert re.split(" {2,}", line) == [column for column in columns if column]
