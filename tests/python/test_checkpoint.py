@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+from collections import OrderedDict
 from pathlib import Path
 
 import pytest
@@ -90,6 +91,28 @@ def test_a_disk_that_is_full_keeps_the_old_file(content, tmp_path, monkeypatch):
     with pytest.raises(OSError, match="checkpoint.pt: the checkpoint could not be written .unexpected pos"):
         checkpoint.save_checkpoint(path, config=tiny(), fingerprint="", state={})
     assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
+
+
+class Elsewhere(torch.Tensor):
+    """A tensor of a device that another machine may lack."""
+
+    def cpu(self) -> torch.Tensor:
+        return self.as_subclass(torch.Tensor)
+
+
+def test_tensors_of_any_device_are_stored_as_those_of_the_cpu(tmp_path):
+    """In dictionaries and lists alike; other values stay as they are."""
+    x = torch.arange(3.0)
+    far = x.as_subclass(Elsewhere)
+    path = tmp_path / "checkpoint.pt"
+    state = {"model": OrderedDict(a=far), "optimiser": {"state": {0: {"step": far}}, "groups": [far, 4]}, "sky": far}
+    checkpoint.save_checkpoint(path, config=tiny(), fingerprint="f", state=state)
+    found = torch.load(path, weights_only=True)
+    groups = found["optimiser"]["groups"]
+    for tensor in (found["model"]["a"], found["optimiser"]["state"][0]["step"], groups[0], found["sky"]):
+        assert type(tensor) is torch.Tensor and torch.equal(tensor, x)
+    assert groups[1] == 4 and found["fingerprint"] == "f" and found["format"] == 1
+    assert type(found["model"]) is OrderedDict and found["config"]["run"]["steps"] == tiny().run.steps
 
 
 # ---- what it holds ----
