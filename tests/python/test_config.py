@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from splitnerf.cli import DONE, main
 from splitnerf.config import FIELDS, GROUPS, OLD_NAMES, Config, parse_setting, preset, settings_table
+from splitnerf.config.setting import setting
 from splitnerf.errors import InputError
 from splitnerf.training.checkpoint import config_of
 
@@ -242,6 +243,11 @@ def test_every_setting_is_described(name):
     assert known.metadata["unit"] == "" or known.type in ("int", "float")
 
 
+def test_a_bound_that_is_excluded_is_the_one_that_is_named():
+    limits = setting(1.0, "ratio of two lengths", above=0.5, at_most=2).metadata["limits"]
+    assert str(limits) == "in (0.5, 2]" and [limits.allow(x) for x in (0.25, 0.5, 0.75, 2.0, 2.25)] == [0, 0, 1, 1, 0]
+
+
 def test_units_are_those_of_the_table():
     found = {name: known.metadata["unit"] for name, known in FIELDS.items() if known.metadata["unit"]}
     assert found == {name: unit for unit, names in UNITS.items() for name in names.split()}
@@ -277,6 +283,9 @@ def test_settings_change_by_old_name_by_new_one_and_by_group():
     # What shares its name with a group: a table is the group's, a word the old setting's.
     assert Config().replace({"light": "mlp"}) == Config().replace({"light": {"kind": "mlp"}})
     assert Config().replace({}) == Config()
+    # What was changed before stays, in the same group and in others.
+    again = preset("paper").replace({"surface.n_levels": 5})
+    check_same(values(again), values(preset("paper")) | {"surface.n_levels": 5})
 
 
 def test_settings_cannot_change_in_place():
@@ -292,6 +301,7 @@ def test_settings_cannot_change_in_place():
     [
         ({"surface.n_levls": 4}, "unknown setting 'surface.n_levls'; did you mean surface.n_levels? "),
         ({"light_resolutoin": 4}, "unknown setting 'light_resolutoin'; did you mean light.resolution? "),
+        ({"sdf_widht": 4}, "unknown setting 'sdf_widht'; did you mean surface.width? "),
         ({"export": {"face": 4}}, "unknown setting 'export.face'; did you mean export.faces? "),
         ({"zzz": 4}, "unknown setting 'zzz'; `splitnerf info --settings` lists them"),
         ({3: 4}, "unknown setting 3; "),
@@ -439,7 +449,8 @@ def test_the_table_lists_every_setting_under_its_group(capsys):
     assert main(["info", "--settings", "paper"]) == DONE
     text = capsys.readouterr().out
     assert text.strip() == settings_table(preset("paper"))
-    assert re.findall(r"^\[(\w+)\] \w", text, re.M) == list(GROUPS)
+    titles = [(group, kind.__doc__.splitlines()[0]) for group, kind in GROUPS.items()]
+    assert re.findall(r"^\[(\w+)\] (.+)$", text, re.M) == titles
     lines = [line for line in text.splitlines() if line and not line.startswith("[")]
     assert [line.split(" = ")[0] for line in lines] == list(FIELDS)
     assert "run.steps = 20000 " in text and "shading.compensate = false " in text and " one of mlp, bits, off " in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 import threading
 import time
 from contextlib import nullcontext
@@ -10,6 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 import torch
+from test_train import flat, same
 from tiny_runs import lines_of, tiny
 
 from splitnerf.data.dataset import load_dataset
@@ -21,6 +23,8 @@ from splitnerf.training import loop, meshes
 from splitnerf.training.finite import Diverged
 from splitnerf.training.losses import Term
 from splitnerf.training.schedule import next_ray_count
+
+PLAIN = {"occlusion": "off", "shading": "split", "preview_every": 2.0}  # nothing is traced, nothing shown
 
 
 def calls(monkeypatch, kind: type, name: str, note) -> list:
@@ -49,7 +53,7 @@ def steps_of(monkeypatch) -> list[int]:
 
 @pytest.fixture
 def refreshed(data, tmp_path, monkeypatch):
-    """Runs 40 steps; returns what was trained, and at which step what was brought up to date."""
+    """Runs 20 steps; returns what was trained, and at which step what was brought up to date."""
 
     def run(**settings):
         at = steps_of(monkeypatch)
@@ -57,35 +61,34 @@ def refreshed(data, tmp_path, monkeypatch):
             "grid": calls(monkeypatch, OccupancyGrid, "update", lambda _, *args, **settings: (at[0], settings)),
             "backward": calls(monkeypatch, loop.EvaluatedLight, "backward", lambda *_: at[0]),
         }  # fmt: skip
-        config = tiny(steps=40, mesh_every=2.0, preview_every=2.0, **settings)
+        config = tiny(steps=20, **PLAIN, **settings)
         return loop.train(load_dataset(data), config, tmp_path), seen
 
     return run
 
 
 def test_cells_are_brought_up_to_date_every_few_steps_and_the_hull_counts_at_first(refreshed):
-    """Every 6 steps, all cells at first and at the end; the hull until .4 of the run, which is step 16."""
+    """Every 6 steps, all cells at first and at the end; the hull until .4 of the run, which is step 8."""
     trained, seen = refreshed(grid_every=6, hull_until=0.4)
     assert seen["grid"] == [
-        (step, {"first": step == 0, "step": step, "use_hull": step < 16}) for step in range(0, 40, 6)
-    ] + [(39, {})]
+        (step, {"first": step == 0, "step": step, "use_hull": step < 8}) for step in range(0, 20, 6)
+    ] + [(19, {})]
     assert 0 < trained.grid.hull.float().mean() < 0.6
-    assert not refreshed(hull_until=0.0)[0].grid.hull
 
 
 def test_light_gathers_and_moves_with_its_period(refreshed):
     _, seen = refreshed(light_step_every=4)
-    assert seen["backward"] == [*range(3, 40, 4)]
+    assert seen["backward"] == [*range(3, 20, 4)]
 
 
 def test_a_mesh_is_shaded_and_lit_anew_every_few_steps(data, tmp_path, monkeypatch):
-    """A mesh from the start: light every 16 steps, what it sends every 7; three bounces with each new mesh."""
+    """A mesh from the middle: light every 16 steps, what it sends every 7; three bounces with each new mesh."""
     at = steps_of(monkeypatch)
     light = calls(monkeypatch, VisibilityBits, "set_light", lambda *_: at[0])
     indirect = calls(monkeypatch, SceneModel, "refresh_indirect", lambda *_: at[0])
-    config = tiny(steps=40, mesh_every=0.5, indirect_every=7, preview_every=2.0, open_below=0.0, levels_open_by=0.0)
+    config = tiny(steps=20, mesh_every=0.5, indirect_every=7, preview_every=2.0, open_below=0.0, levels_open_by=0.0)
     trained = loop.train(load_dataset(data), config, tmp_path)
-    assert light == [20, 32, 39] and indirect == [20] * 3 + [21, 28, 35] + [39] * 3
+    assert light == [10, 16, 19] and indirect == [10] * 3 + [14] + [19] * 3
     assert trained.model.occlusion.ready and trained.scene is not None and trained.finished
 
 
@@ -102,10 +105,10 @@ def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkey
 
     monkeypatch.setattr(loop.Training, "__init__", noted)
     config = tiny(
-        steps=40, mesh_every=0.2, preview_every=2.0, occlusion="mlp", shading="split", environment_height=12, occlusion_rays=4
+        steps=20, mesh_every=0.2, preview_every=2.0, occlusion="mlp", shading="split", environment_height=12, occlusion_rays=4
     )
     loop.train(load_dataset(data), config, tmp_path)
-    assert heights == [(8, 12), (16, 12), (32, 12)] and training["it"].environment.shape == (12, 24, 3)
+    assert heights == [(4, 12), (16, 12)] and training["it"].environment.shape == (12, 24, 3)
 
 
 def test_all_that_a_run_draws_follows_its_seed(data, tmp_path):
@@ -121,7 +124,7 @@ def test_all_that_a_run_draws_follows_its_seed(data, tmp_path):
 
 def test_a_line_of_the_log_holds_the_weighted_terms(data, tmp_path):
     """They add up to the loss; psnr follows the mean squared error of colours by a twentieth a step."""
-    config = tiny(steps=5, colour_weight=7.0, neutral_weight=0.0)
+    config = tiny(steps=5, colour_weight=7.0, neutral_weight=0.0, **PLAIN)
     loop.train(load_dataset(data), config, tmp_path)
     lines = lines_of(tmp_path)
     assert [line["step"] for line in lines] == [1, 2, 3, 4, 5]
@@ -143,14 +146,14 @@ def test_previews_and_checkpoints_come_from_time_to_time(data, tmp_path, monkeyp
     monkeypatch.setattr(loop, "write_preview", lambda *args: previews.append(args[-1]))
     save = loop.Training.save
     monkeypatch.setattr(loop.Training, "save", lambda self: saved.append(self.step) or save(self))
-    config = tiny(steps=20, preview_every=0.25, checkpoint_minutes=1e-9, light_step_every=8, mesh_every=2.0)
+    config = tiny(steps=20, checkpoint_minutes=1e-9, light_step_every=8, **PLAIN | {"preview_every": 0.25})
     loop.train(load_dataset(data), config, tmp_path)
     assert previews == [5, 10, 15, 20] and saved == [8, 16, 20]
 
 
 def test_the_number_of_rays_follows_that_of_the_samples(data, tmp_path):
     """The samples composited, not those shaded or looked at."""
-    config = tiny(steps=20, target_samples=3000, initial_rays=64, max_rays=400)
+    config = tiny(steps=20, target_samples=3000, initial_rays=64, max_rays=400, **PLAIN)
     loop.train(load_dataset(data), config, tmp_path)
     lines = lines_of(tmp_path)
     rays = [line["rays"] for line in lines]
@@ -171,8 +174,8 @@ def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(data, tmp_path):
 
 
 def test_the_first_steps_the_last_and_every_twentieth_are_logged(data, tmp_path):
-    loop.train(load_dataset(data), tiny(steps=45, mesh_every=2.0, preview_every=2.0), tmp_path)
-    assert [line["step"] for line in lines_of(tmp_path)] == [*range(1, 21), 40, 45]
+    loop.train(load_dataset(data), tiny(steps=41, target_samples=64, **PLAIN), tmp_path)
+    assert [line["step"] for line in lines_of(tmp_path)] == [*range(1, 21), 40, 41]
 
 
 def test_time_is_counted_in_minutes_and_goes_on_with_the_run(data, tmp_path, monkeypatch):
@@ -181,14 +184,14 @@ def test_time_is_counted_in_minutes_and_goes_on_with_the_run(data, tmp_path, mon
     monkeypatch.setattr(loop.time, "monotonic", lambda: 10.0 * (at[0] + 1) + pause[0])
     save = loop.Training.save
     monkeypatch.setattr(loop.Training, "save", lambda self: saved.append(self.step) or save(self))
-    config = tiny(steps=20, checkpoint_minutes=1.0, light_step_every=1, mesh_every=2.0, preview_every=2.0)
+    config = tiny(steps=16, checkpoint_minutes=1.0, light_step_every=1, **PLAIN)
     loop.train(load_dataset(data), config, tmp_path)
-    assert saved == [7, 14, 20]
+    assert saved == [7, 14, 16]
     pause[0] = 5000.0
-    trained = loop.train(load_dataset(data), config.replace({"steps": 30}), tmp_path, resume=True)
+    trained = loop.train(load_dataset(data), config.replace({"steps": 20}), tmp_path, resume=True)
     lines = lines_of(tmp_path)
-    assert [line["step"] for line in lines] == [*range(1, 21), 30] and trained.step == 30
-    assert [line["seconds"] for line in lines] == [*range(10, 201, 10), 300] and trained.seconds == 300
+    assert [line["step"] for line in lines] == [*range(1, 21)] and trained.step == 20
+    assert [line["seconds"] for line in lines] == [*range(10, 201, 10)] and trained.seconds == 200
 
 
 @pytest.mark.parametrize(
@@ -204,14 +207,47 @@ def test_progress_is_the_larger_share_of_steps_or_minutes(data, tmp_path, step, 
 
 
 def test_a_finished_run_that_is_resumed_stays_as_it_is(data, tmp_path):
-    """All levels are open, so that the mesh is that of the whole field."""
-    config = tiny(steps=24, start_levels=1, levels_open_by=0.5, learning_rate=0.05, warmup_steps=1)
+    """Half of its levels are open, as they were: the mesh is that of the same field."""
+    config = tiny(steps=8, start_levels=1, levels_open_by=2.0, learning_rate=0.05, warmup_steps=1, mesh_every=2.0)
     first = loop.train(load_dataset(data), config, tmp_path)
     again = loop.train(load_dataset(data), config, tmp_path, resume=True)
-    assert again.step == 24 and again.finished and again.model.sdf_field.grid.n_active == 4
+    assert again.step == 8 and again.finished and again.model.sdf_field.grid.n_active == 2
     x = torch.rand(100, 3) - 0.5
     assert torch.equal(again.model.sdf_field.sdf(x), first.model.sdf_field.sdf(x))
     assert torch.equal(again.model.occlusion.cache.vertices, first.model.occlusion.cache.vertices)
+
+
+def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
+    """In a run of another seed; of a mesh that is lit and sends light, and of numbers that no other run has."""
+    dataset, config = load_dataset(data), tiny(steps=8, mesh_every=2.0, preview_every=2.0, open_below=0.0)
+    finished = calls(monkeypatch, loop.Training, "finish", lambda self: self)
+    loop.train(dataset, config, tmp_path)
+    one, other = finished[0], loop.Training(dataset, config.replace({"seed": 8}), tmp_path, torch.device("cpu"))
+    one.model.light.loss_samples.restore([0.25, 0.5])
+    one.step, one.seconds, one.n_rays, one.previewed_at = 5, 12.5, 77, 0.125
+    one.environment, one.mesh.made_at = torch.rand(32, 64, 3), 0.375
+    one.save()
+    kept = loop.load_checkpoint(tmp_path / "checkpoint.pt")
+    torch.manual_seed(9)
+    other.restore()
+    assert not other.first
+    other.save()
+    again, before = flat(loop.load_checkpoint(tmp_path / "checkpoint.pt")), flat(kept)
+    assert again.keys() == before.keys()
+    assert [key for key in before if not same(again[key], before[key])] == ["config.run.seed"]
+    assert kept["occlusion_light"]["sent"].abs().sum() > 0 and kept["meshed_at"] == 0.375 and kept["n_rays"] == 77
+
+
+def test_a_run_that_is_interrupted_ends_when_the_light_has_moved(data, tmp_path, monkeypatch):
+    """In step 5 of 20: it goes on to step 8 and leaves cells and mesh to the run that continues it."""
+    at = steps_of(monkeypatch)
+    cells = calls(monkeypatch, OccupancyGrid, "update", lambda *_, **__: at[0])
+    requests = calls(monkeypatch, meshes.SurfaceMesh, "request", lambda _, progress: progress)
+    calls(monkeypatch, loop.Training, "advance", lambda self, *_: self.step == 5 and signal.raise_signal(signal.SIGINT))
+    config = tiny(steps=20, light_step_every=4, grid_every=3, mesh_every=0.3, preview_every=2.0)
+    trained = loop.train(load_dataset(data), config, tmp_path)
+    assert trained.step == 8 and not trained.finished and cells == [0, 3, 6] and requests == [0.3]
+    assert loop.load_checkpoint(tmp_path / "checkpoint.pt")["step"] == 8
 
 
 @pytest.mark.parametrize("deterministic", [False, True])
@@ -265,7 +301,7 @@ def test_a_run_adds_and_multiplies_as_it_is_set(data, tmp_path, monkeypatch, on)
     cores = []
     monkeypatch.setattr(loop, "tensor_cores", lambda on: cores.append(on) or nullcontext())
     order = calls(monkeypatch, loop.Training, "advance", lambda *_: torch.are_deterministic_algorithms_enabled())
-    config = tiny(steps=2, preview_every=2.0, tensor_cores=not on, deterministic=on)
+    config = tiny(steps=2, tensor_cores=not on, deterministic=on, **PLAIN)
     loop.train(load_dataset(data), config, tmp_path)
     assert cores == [not on] and order == [on, on]
 
@@ -294,6 +330,7 @@ def test_the_hull_is_that_of_the_runs_box_and_cells(data, tmp_path):
     hull = training.grid.hull.flatten()
     assert torch.equal(hull, visual_hull(16, 1.2, *cameras).flatten())
     assert not torch.equal(hull, visual_hull(16, 1.5, *cameras).flatten())
+    assert not loop.Training(load_dataset(data), tiny(hull_until=0.0), tmp_path, torch.device("cpu")).grid.hull
 
 
 def test_without_indirect_light_nothing_is_refreshed_between_two_meshes(data, tmp_path, monkeypatch):
