@@ -64,6 +64,10 @@ struct EnvironmentMap {
   int height, width;
 };
 
+// Throws std::invalid_argument where arrays of the surface or the map do not fit or lie outside their ranges; the materials
+// must have passed check_material.
+SPLITNERF_API void check_surface(const Scene& scene, const Surface& surface, const EnvironmentMap& environment);
+
 struct PathTracerParams {
   int samples_per_pixel = 64;  // paths a pixel, jittered over the pixel's box
   int max_bounces = 4;         // scattering events after the first one; 0: direct light only

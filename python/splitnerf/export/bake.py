@@ -178,6 +178,7 @@ class Spread:
         missing = (row_of < 0).reshape(size, size)
         nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
         self._rows = row_of.reshape(size, size)[tuple(nearest)]
+        self.source = (nearest[0] * size + nearest[1]).reshape(-1)  # the texel that each texel's value is taken from
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """The map [size, size] or [size, size, c] float32 of values [k] or [k, c]."""

@@ -1,0 +1,37 @@
+// The light that arrives at points of an asset: directions drawn by the light and by the material, and what comes from each.
+#pragma once
+
+#include "splitnerf/path_tracer.h"
+
+namespace splitnerf {
+
+// Points of the surface, seen from `views`; normals on the viewer's side.
+struct SurfacePoints {
+  int64_t n;
+  const float *positions, *geometric_normals, *normals, *views;  // [n, 3]
+  const float *albedo, *roughness, *metallic;                    // [n, 3], [n], [n]
+};
+
+struct IncomingLightParams {
+  int n_directions = 32;  // a point; every second one by the light, the others by the material
+  int max_bounces = 3;    // scattering events of the light that the asset itself sends
+  uint32_t seed = 0;      // equal seeds give equal numbers, whatever the number of threads
+  float clamp_indirect = 0;
+};
+
+// The sum over a point's directions of solid_angle * f(direction) * radiance estimates the reflected light, where radiance
+// is the environment's, if it is visible, and else what the asset sends.
+struct IncomingLightTargets {
+  float* directions;    // [n, n_directions, 3] unit
+  float* solid_angles;  // [n, n_directions] one over the density of all directions together (balance heuristic; Veach
+                        // 1997); 0 where a direction does not count
+  float* visible;       // [n, n_directions] 1 where the environment is seen, else 0
+  float* sent;          // [n, n_directions, 3] radiance that the asset sends against the direction
+};
+
+// Throws std::invalid_argument for unusable inputs and std::runtime_error for light that is not finite.
+SPLITNERF_API void incoming_light(const Scene& scene, const Surface& surface, const EnvironmentMap& environment,
+                                  const SurfacePoints& points, const IncomingLightParams& params,
+                                  const IncomingLightTargets& targets);
+
+}  // namespace splitnerf

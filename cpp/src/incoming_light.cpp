@@ -1,0 +1,113 @@
+#include "splitnerf/incoming_light.h"
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "path_integrator.h"
+#include "splitnerf/parallel.h"
+
+namespace splitnerf {
+namespace {
+
+using Vec = Vec3<float>;
+
+constexpr int64_t kPointsPerTask = 16;
+
+class LightGatherer {
+ public:
+  LightGatherer(const Scene& scene, const Surface& surface, const EnvironmentMap& environment,
+                const SurfacePoints& points, const PathTracerParams& path, int n_directions)
+      : scene_(scene), points_(points), n_(n_directions), seed_(path.seed),
+        paths_(scene, surface, environment, path, n_directions) {}
+
+  struct Worker {
+    PathState path;
+    std::vector<Vec> origins, directions;
+    std::vector<Hit> hits;
+    explicit Worker(int n) : origins(n), directions(n), hits(n) {}
+  };
+
+  void gather(int64_t point, Worker& worker, const IncomingLightTargets& out) const {
+    draw(point, worker, out);
+    scene_.trace_closest(&worker.origins[0].x, &worker.directions[0].x, n_, std::numeric_limits<float>::infinity(),
+                         worker.hits.data());
+    paths_.pattern().start_pixel(static_cast<uint32_t>(point), worker.path.offsets);
+    for (int i = 0; i < n_; ++i) {
+      const int64_t at = point * n_ + i;
+      const bool above = dot(worker.directions[i], load3(points_.geometric_normals + 3 * point)) > 0;
+      const bool counts = above && out.solid_angles[at] > 0, hit = worker.hits[i].t >= 0;
+      out.visible[at] = counts && !hit ? 1.f : 0.f;
+      Vec sent{0, 0, 0};
+      if (counts && hit) sent = paths_.radiance(worker.directions[i], worker.hits[i], i, 1, worker.path);
+      if (!std::isfinite(sum(sent))) {
+        throw std::runtime_error("incoming_light: the light at point " + std::to_string(point) + " is not finite");
+      }
+      store3(out.sent + 3 * at, sent);
+    }
+  }
+
+ private:
+  // Directions of a point and the solid angle that each stands for.
+  void draw(int64_t point, Worker& worker, const IncomingLightTargets& out) const {
+    const Vec normal = load3(points_.normals + 3 * point), geometric = load3(points_.geometric_normals + 3 * point);
+    const Frame<float> frame(normal);
+    Vec view = frame.to_local(load3(points_.views + 3 * point));
+    view.z = max_of(view.z, float(kMinNdotV));
+    const PrincipledBsdf<float> bsdf(paths_.tables(), load3(points_.albedo + 3 * point), points_.roughness[point],
+                                     points_.metallic[point], normalize(view));
+    const Vec start = load3(points_.positions + 3 * point) + geometric * paths_.ray_offset();
+    const EnvironmentSampler& light = paths_.light();
+    const auto counter = static_cast<uint32_t>(point);
+    const auto shift = [&](uint32_t k) {
+      return Vec2<float>{random_unit<float>(seed_, counter, k), random_unit<float>(seed_, counter, k + 1)};
+    };
+    const int n_light = light.black() ? 0 : n_ / 2, n_bsdf = n_ - n_light;
+    const Vec2<float> light_shift = shift(0), bsdf_shift = shift(2);
+    const float lobe_shift = random_unit<float>(seed_, counter, 4);
+    for (int i = 0; i < n_; ++i) {
+      Vec direction;
+      float light_pdf;
+      if (i < n_light) {
+        direction = light.sample(fibonacci_lattice<float>(i, n_light, light_shift), &light_pdf);
+      } else {
+        const int k = i - n_light;
+        const Vec2<float> u = fibonacci_lattice<float>(k, n_bsdf, bsdf_shift);
+        const float lobe = wrap_unit(r2_lattice<float>(k).x, lobe_shift);
+        direction = normalize(frame.to_world(bsdf.sample(lobe, u.x, u.y)));
+        light_pdf = n_light ? light.pdf(direction) : 0.f;
+      }
+      const float bsdf_pdf = bsdf.evaluate(frame.to_local(direction)).pdf;
+      const bool counts = bsdf_pdf > 0;
+      worker.origins[i] = start;
+      worker.directions[i] = direction;
+      store3(out.directions + 3 * (point * n_ + i), direction);
+      out.solid_angles[point * n_ + i] = counts ? 1.f / (n_light * light_pdf + n_bsdf * bsdf_pdf) : 0.f;
+    }
+  }
+
+  const Scene& scene_;
+  const SurfacePoints& points_;
+  int n_;
+  uint32_t seed_;
+  PathIntegrator paths_;
+};
+
+}  // namespace
+
+void incoming_light(const Scene& scene, const Surface& surface, const EnvironmentMap& environment,
+                    const SurfacePoints& points, const IncomingLightParams& params,
+                    const IncomingLightTargets& targets) {
+  check_surface(scene, surface, environment);
+  PathTracerParams path;
+  path.max_bounces = params.max_bounces;
+  path.seed = params.seed;
+  path.clamp_indirect = params.clamp_indirect;
+  const LightGatherer gatherer(scene, surface, environment, points, path, params.n_directions);
+  parallel_for(points.n, kPointsPerTask, [&](int64_t begin, int64_t end) {
+    LightGatherer::Worker worker(params.n_directions);
+    for (int64_t point = begin; point < end; ++point) gatherer.gather(point, worker, targets);
+  });
+}
+
+}  // namespace splitnerf
