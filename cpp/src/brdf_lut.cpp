@@ -6,14 +6,6 @@
 #include "splitnerf/split_sum.h"
 
 namespace splitnerf {
-namespace {
-
-constexpr int kTablePoints = 4096;  // of each entry; error of F1 and F2 below 1e-3, see test_split_sum.cpp
-
-struct LobeIntegrals {
-  double f1, f2, chi;
-  double dielectric;  // E with fresnel_dielectric in place of Schlick's form
-};
 
 // The lobe integral  E = int f(l) (n.l) dl  by sampling the microfacet normal h ~ D(h)(n.h):
 //   pdf(l) = D (n.h) / (4 v.h),  f = D V F   =>   E = mean of  4 V F (n.l)(v.h) / (n.h).
@@ -23,7 +15,7 @@ struct LobeIntegrals {
 // The mean direction m = int l f (n.l) dl / E has a tangential part m_t along that of the
 // reflection r = (s, c) and a normal part m_n. (1 - chi) n + chi r is parallel to m for
 //   chi = m_t / (s m_n + m_t (1 - c)).
-LobeIntegrals integrate_lobe(double n_dot_v, double roughness, int n_points) {
+LobeIntegrals integrate_brdf(double n_dot_v, double roughness, int n_points) {
   const double a = ggx_alpha_from_roughness(roughness), a2 = a * a;
   const double nv = std::clamp(n_dot_v, kMinNdotV, 1.0 - 1e-6);  // chi is 0/0 at n.v = 1; its limit is not
   const double sin_v = std::sqrt(1 - nv * nv);
@@ -53,24 +45,25 @@ LobeIntegrals integrate_lobe(double n_dot_v, double roughness, int n_points) {
   return {f1 * scale, f2 * scale, std::clamp(chi, 0.0, 1.0), dielectric * scale};
 }
 
-struct Tables {
-  std::array<float, kLutSize * kLutSize * 3> brdf;
-  std::array<float, kLutSize * kLutSize> dielectric;
-};
+namespace {
 
-const Tables& tables() {
-  static const Tables computed = [] {
-    Tables t;
+constexpr int kTablePoints = 4096;  // of each entry; error below 1e-3, see test_split_sum.cpp
+
+using Table = std::array<float, kLutSize * kLutSize * kLutChannels>;
+
+const Table& table() {
+  static const Table computed = [] {
+    Table t;
     parallel_for(kLutSize, 1, [&](int64_t begin, int64_t end) {
       for (int64_t row = begin; row < end; ++row)
         for (int col = 0; col < kLutSize; ++col) {
           const double root = double(col) / (kLutSize - 1), roughness = double(row) / (kLutSize - 1);
-          const LobeIntegrals entry = integrate_lobe(root * root, roughness, kTablePoints);
-          const int64_t texel = row * kLutSize + col;
-          t.brdf[texel * 3] = static_cast<float>(entry.f1);
-          t.brdf[texel * 3 + 1] = static_cast<float>(entry.f2);
-          t.brdf[texel * 3 + 2] = static_cast<float>(entry.chi);
-          t.dielectric[texel] = static_cast<float>(entry.dielectric);
+          const LobeIntegrals entry = integrate_brdf(root * root, roughness, kTablePoints);
+          float* texel = &t[(row * kLutSize + col) * kLutChannels];
+          texel[0] = static_cast<float>(entry.f1);
+          texel[1] = static_cast<float>(entry.f2);
+          texel[2] = static_cast<float>(entry.chi);
+          texel[3] = static_cast<float>(entry.dielectric);
         }
     });
     return t;
@@ -80,12 +73,6 @@ const Tables& tables() {
 
 }  // namespace
 
-Vec3<double> integrate_brdf(double n_dot_v, double roughness, int n_points) {
-  const LobeIntegrals entry = integrate_lobe(n_dot_v, roughness, n_points);
-  return {entry.f1, entry.f2, entry.chi};
-}
-
-const float* brdf_lut() { return tables().brdf.data(); }
-const float* dielectric_lut() { return tables().dielectric.data(); }
+const float* brdf_lut() { return table().data(); }
 
 }  // namespace splitnerf

@@ -54,7 +54,7 @@ class LightGatherer {
     const Frame<float> frame(normal);
     Vec view = frame.to_local(load3(points_.views + 3 * point));
     view.z = max_of(view.z, float(kMinNdotV));
-    const PrincipledBsdf<float> bsdf(paths_.tables(), load3(points_.albedo + 3 * point), points_.roughness[point],
+    const PrincipledBsdf<float> bsdf(paths_.lut(), load3(points_.albedo + 3 * point), points_.roughness[point],
                                      points_.metallic[point], normalize(view));
     const Vec start = load3(points_.positions + 3 * point) + geometric * paths_.ray_offset();
     const EnvironmentSampler& light = paths_.light();

@@ -41,7 +41,7 @@ class PathIntegrator {
 
   const EnvironmentSampler& light() const { return light_; }
   const SamplePattern& pattern() const { return pattern_; }
-  const PrincipledTables& tables() const { return tables_; }
+  const float* lut() const { return lut_; }
   float ray_offset() const { return ray_offset_; }  // start of secondary rays above the surface, in scene units
 
   // The light that leaves a hit against `direction`; 0 where there is none. `bounce` counts the scattering before.
@@ -68,7 +68,7 @@ class PathIntegrator {
       if (bounce == first_bounce && first) *first = point;
       radiance += limited(throughput * point.emission, bounce > 0);
       const Frame<float> frame(point.shading_normal);
-      const PrincipledBsdf<float> bsdf(tables_, point.albedo, point.roughness, point.metallic,
+      const PrincipledBsdf<float> bsdf(lut_, point.albedo, point.roughness, point.metallic,
                                        frame.to_local(-direction));
       const Vec start = point.position + point.geometric_normal * ray_offset_;
       const int pair = 1 + kPairsPerBounce * bounce;
@@ -122,7 +122,7 @@ class PathIntegrator {
   SurfaceLookup surface_;
   EnvironmentSampler light_;
   const PathTracerParams& params_;
-  PrincipledTables tables_;
+  const float* lut_ = brdf_lut();
   SamplePattern pattern_;
   float ray_offset_;
 };

@@ -45,23 +45,24 @@ PYBIND11_MODULE(_core, m) {
   m.def(
       "brdf_lut",
       [] {
-        constexpr int n = splitnerf::kLutSize;
-        py::array_t<float> lut({n, n, 3});
-        std::copy_n(splitnerf::brdf_lut(), n * n * 3, lut.mutable_data());
+        constexpr int n = splitnerf::kLutSize, channels = splitnerf::kLutChannels;
+        py::array_t<float> lut({n, n, channels});
+        std::copy_n(splitnerf::brdf_lut(), n * n * channels, lut.mutable_data());
         return lut;
       },
-      "F1, F2 and chi over (roughness, sqrt(n.v)) as a [32, 32, 3] float32 array.");
+      "F1, F2, chi and E_d over (roughness, sqrt(n.v)) as a [32, 32, 4] float32 array.");
 
   m.def(
       "integrate_brdf",
       [](double n_dot_v, double roughness, int n_points) {
         if (!(n_dot_v > 0 && n_dot_v <= 1 && roughness >= 0 && roughness <= 1 && n_points > 0))
           throw py::value_error("integrate_brdf: n_dot_v must be in (0, 1], roughness in [0, 1], n_points positive");
-        const splitnerf::Vec3<double> entry = splitnerf::integrate_brdf(n_dot_v, roughness, n_points);
-        return py::make_tuple(entry.x, entry.y, entry.z);
+        const splitnerf::LobeIntegrals entry = splitnerf::integrate_brdf(n_dot_v, roughness, n_points);
+        return py::make_tuple(entry.f1, entry.f2, entry.chi, entry.dielectric);
       },
       py::arg("n_dot_v"), py::arg("roughness"), py::arg("n_points"),
-      "F1, F2 and chi by quadrature over 2 n_points microfacet normals: an entry of brdf_lut before it is rounded.");
+      "F1, F2, chi and E_d by quadrature over 2 n_points microfacet normals: an entry of brdf_lut before it is "
+      "rounded.");
 
   m.def(
       "fibonacci_sphere",

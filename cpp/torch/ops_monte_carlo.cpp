@@ -1,25 +1,46 @@
-// sample_bsdf, monte_carlo_light, summed_light and shade_sums as torch operators.
+// specular_share, sample_bsdf, monte_carlo_light, summed_light and shade_sums as torch operators.
 #include <tuple>
 
+#include "check_lut.h"
 #include "device.h"
 
 namespace splitnerf::glue {
 namespace {
 
-std::tuple<Tensor, Tensor> sample_bsdf(Tensor normals, Tensor view_dirs, Tensor roughness, int64_t n_samples,
-                                       int64_t seed) {
+Tensor specular_share(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor lut) {
+  const char* op = "specular_share";
+  const Kind type = real_kind(op, "normals", normals);
+  const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
+  const Tensor v = checked(op, "view_dirs", view_dirs, {n.size(0), 3}, type);
+  const Tensor a = checked(op, "albedo", albedo, {n.size(0), 3}, type);
+  const Tensor rho = checked(op, "roughness", roughness, {n.size(0), 1}, type);
+  const Tensor m = checked(op, "metallic", metallic, {n.size(0), 1}, type);
+  const Tensor table = checked_lut(op, lut, type);
+  Tensor share = empty_like_type(n, {n.size(0), 1}, type);
+  on_device(type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    device.run(
+        op, n.size(0),
+        SpecularShareBody<T>{in<float>(table), in<T>(n), in<T>(v), in<T>(a), in<T>(rho), in<T>(m), out<T>(share)});
+  });
+  return share;
+}
+
+std::tuple<Tensor, Tensor> sample_bsdf(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor specular_share,
+                                       int64_t n_samples, int64_t seed) {
   const char* op = "sample_bsdf";
   const Kind type = real_kind(op, "normals", normals);
   const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
   const Tensor v = checked(op, "view_dirs", view_dirs, {n.size(0), 3}, type);
   const Tensor rho = checked(op, "roughness", roughness, {n.size(0), 1}, type);
+  const Tensor share = checked(op, "specular_share", specular_share, {n.size(0), 1}, type);
   require(n_samples > 0 && n_samples <= 1 << 20, op, "n_samples must be in [1, 2^20]");
   Tensor directions = empty_like_type(n, {n.size(0), n_samples, 3}, type);
   Tensor pdf = empty_like_type(n, {n.size(0), n_samples}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, n.size(0),
-               SampleBsdfBody<T>{in<T>(n), in<T>(v), in<T>(rho), static_cast<int>(n_samples),
+               SampleBsdfBody<T>{in<T>(n), in<T>(v), in<T>(rho), in<T>(share), static_cast<int>(n_samples),
                                  static_cast<uint32_t>(seed), out<T>(directions), out<T>(pdf)});
   });
   return {directions, pdf};
@@ -51,7 +72,7 @@ Tensor monte_carlo_light(Tensor normals, Tensor view_dirs, Tensor roughness, Ten
                          Tensor radiance) {
   const char* op = "monte_carlo_light";
   const Inputs i(op, normals, view_dirs, roughness, light_dirs, pdf, radiance);
-  Tensor sums = empty_like_type(i.normals, {i.n_points(), 3, 3}, i.type);
+  Tensor sums = empty_like_type(i.normals, {i.n_points(), kLightSums, 3}, i.type);
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, i.n_points(),
@@ -66,7 +87,7 @@ std::tuple<Tensor, Tensor, Tensor> monte_carlo_light_backward(Tensor normals, Te
                                                               Tensor grad_sums) {
   const char* op = "monte_carlo_light_backward";
   const Inputs i(op, normals, view_dirs, roughness, light_dirs, pdf, radiance);
-  const Tensor g = checked(op, "grad_sums", grad_sums, {i.n_points(), 3, 3}, i.type);
+  const Tensor g = checked(op, "grad_sums", grad_sums, {i.n_points(), kLightSums, 3}, i.type);
   Tensor grad_normals = empty_like_type(g, {i.n_points(), 3}, i.type);
   Tensor grad_roughness = empty_like_type(g, {i.n_points(), 1}, i.type);
   Tensor grad_radiance = empty_like_type(g, {i.n_points(), i.n_samples(), 3}, i.type);
@@ -110,7 +131,7 @@ Tensor summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor d
                     Tensor radiance, Tensor visible, Tensor sent) {
   const char* op = "summed_light";
   const SharedInputs i(op, normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent);
-  Tensor sums = empty_like_type(i.normals, {i.n_points(), 3, 3}, i.type);
+  Tensor sums = empty_like_type(i.normals, {i.n_points(), kLightSums, 3}, i.type);
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     const SharedLight<T> light = i.light<T>();
@@ -126,7 +147,7 @@ std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor 
                                                          Tensor visible, Tensor sent, Tensor grad_sums) {
   const char* op = "summed_light_backward";
   const SharedInputs i(op, normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent);
-  const Tensor g = checked(op, "grad_sums", grad_sums, {i.n_points(), 3, 3}, i.type);
+  const Tensor g = checked(op, "grad_sums", grad_sums, {i.n_points(), kLightSums, 3}, i.type);
   const auto like = [&](const Tensor& t) { return torch::stable::empty_like(t); };
   Tensor grad_normals = like(i.normals), grad_roughness = like(i.roughness), grad_light = like(i.radiance);
   on_device(i.type, [&](auto zero, const auto& device) {
@@ -144,10 +165,10 @@ std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor 
 // What both directions of shade_sums read: the fields of SummedPoint and the table.
 struct SummedInputs {
   Kind type;
-  Tensor normals, view_dirs, albedo, roughness, metallic, all, grazing, diffuse, lut;
+  Tensor normals, view_dirs, albedo, roughness, metallic, all, grazing, diffuse, dielectric, lut;
 
   SummedInputs(const char* op, const Tensor& n, const Tensor& v, const Tensor& a, const Tensor& rho, const Tensor& m,
-               const Tensor& specular, const Tensor& g, const Tensor& d, const Tensor& table)
+               const Tensor& specular, const Tensor& g, const Tensor& d, const Tensor& layer, const Tensor& table)
       : type(real_kind(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
         view_dirs(checked(op, "view_dirs", v, {n_points(), 3}, type)),
         albedo(checked(op, "albedo", a, {n_points(), 3}, type)),
@@ -156,18 +177,19 @@ struct SummedInputs {
         all(checked(op, "specular", specular, {n_points(), 3}, type)),
         grazing(checked(op, "grazing", g, {n_points(), 3}, type)),
         diffuse(checked(op, "diffuse", d, {n_points(), 3}, type)),
-        lut(checked(op, "lut", table, {kLutSize, kLutSize, 3}, type.with(ScalarType::Float))) {}
+        dielectric(checked(op, "dielectric", layer, {n_points(), 3}, type)), lut(checked_lut(op, table, type)) {}
   int64_t n_points() const { return normals.size(0); }
   template <class T> SummedArrays<const T> arrays() const {
-    return {in<T>(normals),  in<T>(view_dirs), in<T>(albedo),  in<T>(roughness),
-            in<T>(metallic), in<T>(all),       in<T>(grazing), in<T>(diffuse)};
+    return {in<T>(normals), in<T>(view_dirs), in<T>(albedo),  in<T>(roughness), in<T>(metallic),
+            in<T>(all),     in<T>(grazing),   in<T>(diffuse), in<T>(dielectric)};
   }
 };
 
 Tensor shade_sums(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular,
-                  Tensor grazing, Tensor diffuse, Tensor lut, bool compensate) {
+                  Tensor grazing, Tensor diffuse, Tensor dielectric, Tensor lut, bool compensate) {
   const char* op = "shade_sums";
-  const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, lut);
+  const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, dielectric,
+                       lut);
   Tensor radiance = empty_like_type(i.normals, {i.n_points(), 3}, i.type);
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
@@ -176,31 +198,37 @@ Tensor shade_sums(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughn
   return radiance;
 }
 
-std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade_sums_backward(
+std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade_sums_backward(
     Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, Tensor grazing,
-    Tensor diffuse, Tensor lut, bool compensate, Tensor grad_radiance) {
+    Tensor diffuse, Tensor dielectric, Tensor lut, bool compensate, Tensor grad_radiance) {
   const char* op = "shade_sums_backward";
-  const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, lut);
+  const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, dielectric,
+                       lut);
   const Tensor g = checked(op, "grad_radiance", grad_radiance, {i.n_points(), 3}, i.type);
   const auto make = [&](int64_t columns) { return empty_like_type(g, {i.n_points(), columns}, i.type); };
-  Tensor grad[8] = {make(3), make(3), make(3), make(1), make(1), make(3), make(3), make(3)};
+  Tensor grad[9] = {make(3), make(3), make(3), make(1), make(1), make(3), make(3), make(3), make(3)};
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    const SummedArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]),
-                             out<T>(grad[4]), out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7])};
+    const SummedArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
+                             out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])};
     device.run(op, i.n_points(),
                ShadeSumsBackwardBody<T>{in<float>(i.lut), compensate, i.arrays<T>(), in<T>(g), to});
   });
-  return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7]};
+  return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};
 }
 
 }  // namespace
 
 #define SPLITNERF_SUMMED_POINT                                                                            \
   "Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, " \
-  "Tensor grazing, Tensor diffuse, Tensor lut, bool compensate"
+  "Tensor grazing, Tensor diffuse, Tensor dielectric, Tensor lut, bool compensate"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("sample_bsdf(Tensor normals, Tensor view_dirs, Tensor roughness, int n_samples, int seed) -> (Tensor, Tensor)");
+  m.def(
+      "specular_share(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor lut) "
+      "-> Tensor");
+  m.def(
+      "sample_bsdf(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor specular_share, int n_samples, "
+      "int seed) -> (Tensor, Tensor)");
   m.def(
       "monte_carlo_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
       "Tensor radiance) -> Tensor");
@@ -217,10 +245,11 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("shade_sums(" SPLITNERF_SUMMED_POINT ") -> Tensor");
   m.def("shade_sums_backward(" SPLITNERF_SUMMED_POINT
         ", Tensor grad_radiance) -> "
-        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
+        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 
 SPLITNERF_IMPLEMENT(m) {
+  m.impl("specular_share", TORCH_BOX(&specular_share));
   m.impl("sample_bsdf", TORCH_BOX(&sample_bsdf));
   m.impl("summed_light", TORCH_BOX(&summed_light));
   m.impl("summed_light_backward", TORCH_BOX(&summed_light_backward));

@@ -1,14 +1,11 @@
 // query_direction and split_sum_shade as torch operators.
 #include <tuple>
 
+#include "check_lut.h"
 #include "device.h"
 
 namespace splitnerf::glue {
 namespace {
-
-Tensor checked_lut(const char* op, const Tensor& lut, Kind kind) {
-  return checked(op, "lut", lut, {kLutSize, kLutSize, 3}, kind.with(ScalarType::Float));
-}
 
 Tensor query_direction(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) {
   const char* op = "query_direction";

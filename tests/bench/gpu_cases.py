@@ -251,13 +251,17 @@ class World:
         matrix = pyramid_filters(self.sizes.light_resolution).averages
         return *matrix, self.rand(len(matrix.transposed_offsets) - 1, 3, seed=37)
 
+    def shares(self) -> Tensor:
+        """Of the directions of :meth:`own_directions`, those of visible normals."""
+        return torch.full((self.sizes.traced, 1), 0.5)
+
     def own_directions(self) -> tuple:
         """Normals, views, roughness, directions, densities, radiance."""
         t, j = self.sizes.traced, self.sizes.own
         normals = unit(self.randn(t, 3, seed=38))
         views = unit(normals + 0.7 * unit(self.randn(t, 3, seed=39)))
         roughness = 0.2 + 0.7 * self.rand(t, 1, seed=40)
-        drawn = lib.sample_bsdf(normals, views, roughness, j, 3)
+        drawn = lib.sample_bsdf(normals, views, roughness, self.shares(), j, 3)
         return normals, views, roughness, *drawn, self.rand(t, j, 3, seed=41)
 
     def shared_directions(self) -> tuple:
@@ -376,7 +380,7 @@ LAYER = Case(
 )  # fmt: skip
 QUERY = Case("query_direction", World.query, a_point(45), reference.query_direction)
 SPLIT = Case("split_sum_shade", World.split_sum, a_point(70), reference.split_sum_shade)
-SUMS = Case("shade_sums", lambda w: (*w.shading(), *w.threes(3), brdf_lut(), True), a_point(75))
+SUMS = Case("shade_sums", lambda w: (*w.shading(), *w.threes(4), brdf_lut(), True), a_point(75))
 PREFILTER = Case(  # of a pair: a cosine 5, the lobe 10, three sums and their total 7
     "prefilter_light", World.prefiltering, lambda s, out: 22 * s.queries * s.lights,
     reference.prefilter_light,
@@ -418,7 +422,8 @@ CASES = [
     Case("sample_ggx_lobe", lambda w: (*w.prefiltering()[:2], w.sizes.own, 3), lambda s, out: 25 * s.queries * s.own),
     Case("sparse_product", World.averaging, lambda s, out: 12 * s.light_resolution**2), LOOKUP,
     backward(LOOKUP, a_point(120 + 169 * 10)),
-    Case("sample_bsdf", lambda w: (*w.own_directions()[:3], w.sizes.own, 3), lambda s, out: 60 * s.traced * s.own),
+    Case("specular_share", lambda w: (*w.shading(), brdf_lut()), a_point(60)),
+    Case("sample_bsdf", lambda w: (*w.own_directions()[:3], w.shares(), w.sizes.own, 3), lambda s, out: 60 * s.traced * s.own),
     OWN, backward(OWN, lambda s, out: 120 * s.traced * s.own), SHARED,
     backward(SHARED, lambda s, out: 100 * s.points * s.directions),
     # About eight vertices around a point, an addition and a product for each of the directions.

@@ -1,110 +1,209 @@
-"""What limits a reconstructed asset: its parts replaced by the truth, one at a time, each variant relit and scored.
+"""The swap table: what limits a reconstructed asset. Its parts are replaced by the truth, and each variant is scored.
 
-    python tests/bench/limits.py RUN/mesh.glb SCENE [--views 4] [--spp 64] [--downscale 1]
+    python tests/bench/limits.py RUN SCENE [--views 2] [--spp 32] [--texture 2048] [--downscale 1] [--out table.md]
 
-SCENE holds the truth as asset.glb and relit test views. Both meshes are subdivided, and each vertex takes its albedo,
-roughness and metallic from the asset itself or from the nearest vertex of the other one. `all true` is the bench's own
-ceiling: the truth by vertices.
+RUN is a run's folder or a GLB file with the recovered light beside it; SCENE a dataset with the truth as asset.glb,
+light.hdr and relit test views. With --out the scene's table is appended to a page, which is made where it is missing.
+
+The first and the last row are the files as they are; between them parts come from the nearest points of the other
+surface (tests/bench/swap.py). `all true` is what noise and the data's own renderer leave of the truth itself.
 """
 
 from __future__ import annotations
 
 import argparse
-import dataclasses
+import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import trimesh
-from scipy.spatial import cKDTree
 
-from splitnerf.data.asset import Asset, Material
-from splitnerf.data.dataset import load_dataset
+from splitnerf.bench.provenance import header, provenance
+from splitnerf.data.asset import Asset
+from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import srgb_to_linear
+from splitnerf.data.truth import OPAQUE, ViewTruth, load_scene_truth, load_view_truths
+from splitnerf.evaluate import metrics
+from splitnerf.evaluate.asset import asset_predictions, environment_beside
 from splitnerf.evaluate.jobs import Protocol, choose_views, relit_scores
+from splitnerf.evaluate.protocol import evaluate_maps
+from splitnerf.evaluate.relight import RelitViews, relight
+from splitnerf.evaluate.similarity import ScaledView, on_white, scaled_scores
+from splitnerf.relight.job import asset_of
 from splitnerf.render.path_traced import AssetRenderer
 
-PARTS = ("albedo", "roughness", "metallic")
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from bench.swap import MATERIALS, PARTS, Canvas  # noqa: E402
+
+ROWS = (
+    ("ours", ()),
+    *((f"true {part}", (part,)) for part in (*PARTS, "mesh")),
+    ("true materials", MATERIALS),
+    ("true mesh, normals", ("mesh", "normals")),
+    *((f"all true but {part}", {*PARTS, "mesh"} - {part}) for part in (*PARTS, "mesh")),
+    ("all true", (*PARTS, "mesh")),
+)
+SOURCES = ("tests/bench/limits.py", "tests/bench/swap.py", "python/splitnerf/evaluate")
+QUIET_FLOOR = 1e-5  # least squared error that is told from noise
+COLUMNS = (
+    ("relit", "relit, dB"), ("relit_quiet", "less noise"), ("relit_raw", "without scale"),
+    ("novel", "novel, our light"), ("novel_true", "true light"),
+    ("albedo", "albedo, dB"), ("roughness", "roughness"), ("metallic", "metal"), ("shading", "shading normals, deg"),
+    ("smooth", "mesh's normals, deg"),
+)  # fmt: skip
+INTRODUCTION = """# What limits the relit images
+
+Parts of reconstructed assets are replaced by the truth at the nearest surface point, and every variant is path traced
+again. Relit: PSNR of the test views under the data's maps with one factor per channel, as `splitnerf evaluate` scores
+it; the same less the noise of the paths, which two renderings tell from errors that they share (but for what clipping
+makes of noise; at most 50 dB); and without the factor. Novel: PSNR of the photos under our light and under the true
+one, with one factor per channel too, since light and albedo share a scale. Then the errors of the maps against the
+truth: albedo in dB with one factor per channel, roughness as the mean absolute error, metal as the balanced accuracy,
+normals with and without the normal texture in degrees.
+"""
 
 
-def bilinear(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """[n, c] values of a repeating texture."""
-    h, w = texture.shape[:2]
-    x, y = uv[:, 0] * w - 0.5, uv[:, 1] * h - 0.5
-    x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
-    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
-    at = lambda j, i: texture[(y0 + j) % h, (x0 + i) % w]  # noqa: E731
-    return (at(0, 0) * (1 - fx) + at(0, 1) * fx) * (1 - fy) + (at(1, 0) * (1 - fx) + at(1, 1) * fx) * fy
+class Reseeded:
+    """A renderer with other random numbers."""
+
+    def __init__(self, renderer: AssetRenderer):
+        self._renderer = renderer
+
+    def render(self, *arguments: object, seed: int, **options: object) -> dict[str, np.ndarray]:
+        return self._renderer.render(*arguments, seed=seed ^ (1 << 30), **options)
 
 
-def vertex_materials(asset: Asset, materials: list[Material]) -> dict[str, np.ndarray]:
-    """Albedo, roughness and metallic at the vertices; a vertex belongs to one material."""
-    n = len(asset.vertices)
-    number = np.zeros(n, int)
-    number[asset.triangles] = asset.material_ids[:, None]
-    albedo = np.ones((n, 3)) if asset.colors is None else asset.colors.astype(np.float64)
-    rough_metal = np.ones((n, 2))
-    for i, m in enumerate(materials):
-        here = number == i
-        albedo[here] *= m.albedo
-        rough_metal[here] *= (m.roughness, m.metallic)
-        if m.albedo_texture is not None:
-            albedo[here] *= bilinear(m.albedo_texture, asset.uv[here])
-        if m.roughness_metallic_texture is not None:
-            rough_metal[here] *= bilinear(m.roughness_metallic_texture, asset.uv[here])
-    return {"albedo": albedo, "roughness": rough_metal[:, 0], "metallic": rough_metal[:, 1]}
+def quiet_psnr(first: RelitViews, second: RelitViews, scale: list[float]) -> float:
+    """Mean PSNR of relit views with most of the noise of the paths taken out.
+
+    The squared error is estimated as the product of two renderings' errors, whose noise is independent. What remains
+    is the shift that clipping and the curve of sRGB give to the mean of noisy values.
+    """
+    scores = []
+    for a, b in zip(first.views(), second.views()):
+        truth = on_white(a.truth, a.truth_alpha)
+        errors = [on_white(v.prediction, v.alpha, np.array(scale)) - truth for v in (a, b)]
+        scores.append(-10 * np.log10(max(np.mean(errors[0] * errors[1]), QUIET_FLOOR)))
+    return float(np.mean(scores))
 
 
-def subdivided(asset: Asset, n_faces: int = 400_000) -> Asset:
-    """The same surface with more vertices, its materials bare but for their normal textures."""
-    vertices, faces, ids = asset.vertices, asset.triangles, asset.material_ids
-    attributes = {
-        k: getattr(asset, k) for k in ("normals", "uv", "tangents", "colors") if getattr(asset, k) is not None
-    }
-    while 4 * len(faces) <= n_faces:
-        vertices, faces, attributes = trimesh.remesh.subdivide(vertices, faces, vertex_attributes=attributes)
-        ids = np.concatenate([ids] * 4) if len(np.unique(ids)) == 1 else np.repeat(ids, 4)
-    attributes["normals"] = trimesh.util.unitize(attributes["normals"])
-    bare = [Material(m.name, metallic=1.0, normal_texture=m.normal_texture) for m in asset.materials]
-    return dataclasses.replace(
-        asset, vertices=vertices, triangles=faces, material_ids=ids, materials=bare, **attributes
-    )
+@dataclass
+class Scene:
+    """What variants are scored against.
+
+    Attributes:
+        views: The test views.
+        maps: The maps of the relit views.
+        truths: The views' truth.
+        lights: The recovered light (None where there is none) and the true one, [h, w, 3].
+        shading_normals: Per view the true shading normals [H, W, 3] and where they count [H, W].
+        spp: Paths a pixel.
+    """
+
+    views: Dataset
+    maps: dict[str, Path]
+    truths: list[ViewTruth]
+    lights: dict[str, np.ndarray | None]
+    shading_normals: list[tuple[np.ndarray, np.ndarray]]
+    spp: int
+
+    def scores(self, asset: Asset) -> dict[str, float | None]:
+        """The columns of the table, None where the data have no truth."""
+        renderer = AssetRenderer(asset)
+        relit, relit_part = relit_scores(renderer, self.views, self.maps, self.spp)
+        again = relit and relight(Reseeded(renderer), self.views, self.maps, max(1, self.spp // 2))
+        seen = {
+            name: asset_predictions(renderer, self.views, light, self.spp)
+            for name, light in self.lights.items()
+            if light is not None
+        }
+        predictions = seen["novel_true"]
+        errors = evaluate_maps(predictions, self.views, self.truths)
+        pairs = [
+            (p["shading_normal"][mask & (p["alpha"] > OPAQUE)], normals[mask & (p["alpha"] > OPAQUE)])
+            for p, (normals, mask) in zip(predictions, self.shading_normals)
+        ]
+        return {name: self.novel_psnr(maps) for name, maps in seen.items()} | {
+            "relit": relit_part and relit_part["psnr"],
+            "relit_quiet": relit_part and quiet_psnr(relit, again, relit_part["lsq"]["scale"]),
+            "relit_raw": relit_part and relit_part["raw"]["psnr"],
+            "albedo": errors["albedo"] and errors["albedo"]["psnr"],
+            "roughness": errors["roughness_mae"],
+            "metallic": errors["metallic_balanced_accuracy"],
+            "shading": metrics.normal_mae_deg(*map(np.concatenate, zip(*pairs))),
+            "smooth": errors["normal_mae_deg"],
+        }
+
+    def novel_psnr(self, predictions: list[dict[str, np.ndarray]]) -> float:
+        """PSNR of rendered photos with one factor per channel."""
+        pairs = list(zip(predictions, self.views.images))
+        views = [
+            ScaledView("", srgb_to_linear(p["rgb"]), p["alpha"], srgb_to_linear(image[..., :3]), image[..., 3])
+            for p, image in pairs
+        ]
+        return scaled_scores(lambda: views)[0]["psnr"]
+
+
+def load_scene(root: Path, light: Path | None, truth: Asset, protocol: Protocol) -> Scene:
+    """The scene's views, maps and truth; the true shading normals are rendered."""
+    views, maps = choose_views(load_dataset(root, "test", protocol.downscale), protocol)
+    lights = {"novel": None if light is None else read_environment(light), "novel_true": load_scene_truth(root).light}
+    rendered = asset_predictions(AssetRenderer(truth), views, None, protocol.spp)
+    normals = [(p["shading_normal"], p["alpha"] > OPAQUE) for p in rendered]
+    return Scene(views, maps, load_view_truths(views), lights, normals, protocol.spp)
+
+
+def section(run: Path, root: Path, protocol: Protocol, texture: int) -> str:
+    """The scene's table as markdown, its rows printed as they come."""
+    ours, truth = asset_of(run), read_asset(root / "asset.glb")
+    scene = load_scene(root, environment_beside(run / "mesh.glb" if run.is_dir() else run), truth, protocol)
+    canvases = {"ours": Canvas(ours, truth, texture), "true": Canvas(truth, ours, texture)}
+    light = scene.lights["novel"]
+    light_error = "none" if light is None else f"{metrics.light_psnr(light, scene.lights['novel_true']):.1f} dB"
+    lines = [
+        f"## {root.name}: {'/'.join(run.resolve().parts[-2:])}",
+        f"{len(scene.views)} test views, {len(scene.maps)} maps, {protocol.spp} paths a pixel, "
+        f"textures of {texture} x {texture}; our light has {light_error}.",
+        "| | " + " | ".join(title for _, title in COLUMNS) + " |\n|---" + "|--:" * len(COLUMNS) + "|",
+    ]
+    print("\n\n".join(lines), flush=True)
+    for name, replaced in ROWS:
+        replaced = set(replaced)
+        if name in ("ours", "all true"):
+            asset = ours if name == "ours" else truth
+        elif "mesh" in replaced:
+            asset = canvases["true"].painted(set(PARTS) - replaced)
+        else:
+            asset = canvases["ours"].painted(replaced)
+        lines.append(row(name, scene.scores(asset)))
+        print(lines[-1], flush=True)
+    text = "\n\n".join(lines[:3]) + "\n" + "\n".join(lines[3:])
+    return f"{text}\n\n{header(provenance(SOURCES))}\n"
+
+
+def row(name: str, scores: dict[str, float | None]) -> str:
+    """A line of the table."""
+    digits = {"roughness": 3, "metallic": 3}
+    cells = ["" if scores.get(key) is None else f"{scores[key]:.{digits.get(key, 2)}f}" for key, _ in COLUMNS]
+    return f"| {name} | {' | '.join(cells)} |"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("asset", type=Path)
+    parser.add_argument("run", type=Path)
     parser.add_argument("scene", type=Path)
-    parser.add_argument("--views", type=int, default=4)
-    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--views", type=int, default=2)
+    parser.add_argument("--spp", type=int, default=32)
+    parser.add_argument("--texture", type=int, default=2048, help="texels along an edge of the baked textures")
     parser.add_argument("--downscale", type=int, default=1)
+    parser.add_argument("--out", type=Path, help="page that the table is appended to")
     args = parser.parse_args()
-    ours, truth = read_asset(args.asset), read_asset(args.scene / "asset.glb")
-    views, maps = choose_views(
-        load_dataset(args.scene, "test", args.downscale), Protocol(args.downscale, args.views, args.spp)
-    )
-    shapes = {"ours": subdivided(ours), "true": subdivided(truth)}
-    found = {
-        (name, name): vertex_materials(shapes[name], asset.materials)
-        for name, asset in (("ours", ours), ("true", truth))
-    }
-    for here, there in (("ours", "true"), ("true", "ours")):
-        _, nearest = cKDTree(shapes[there].vertices).query(shapes[here].vertices, workers=-1)
-        found[here, there] = {part: values[nearest] for part, values in found[there, there].items()}
-    rows = {"ours": ("ours", ()), "true shape": ("true", ())}
-    rows |= {f"true {part}": ("ours", (part,)) for part in PARTS}
-    rows |= {
-        "true materials": ("ours", PARTS),
-        "true shape, albedo": ("true", ("albedo",)),
-        "all true": ("true", PARTS),
-    }
-    print(f"{'':24}relight  raw")
-    for name, (shape, from_truth) in rows.items():
-        renderer = AssetRenderer(shapes[shape])
-        for part in PARTS:
-            values = found[shape, "true" if part in from_truth else "ours"][part]
-            renderer._surface[part] = np.ascontiguousarray(np.clip(values, 0, 1), np.float32)
-        _, scores = relit_scores(renderer, views, maps, args.spp)
-        print(f"{name:24}{scores['psnr']:6.2f}  {scores['raw']['psnr']:6.2f}", flush=True)
+    text = section(args.run, args.scene, Protocol(args.downscale, args.views, args.spp), args.texture)
+    if args.out is not None:
+        before = args.out.read_text() if args.out.is_file() else INTRODUCTION
+        args.out.write_text(f"{before}\n{text}")
 
 
 if __name__ == "__main__":

@@ -83,7 +83,7 @@ TEST(PathTracer, GreySphereUnderConstantLightReflectsItsDirectionalAlbedo) {
   const Image image = s.render();
   const Vec table = lookup_brdf_lut(brdf_lut(), 1.f, 1.f);
   const float gain = 1 + 0.04f * (1 / (table.x + table.y) - 1);
-  const float e = lookup_dielectric_lut(dielectric_lut(), 1.f, 1.f) * gain;
+  const float e = sample_brdf_lut(brdf_lut(), 1.f, 1.f).dielectric * gain;
   for (int c = 0; c < 3; ++c) {
     double mean = 0;
     for (size_t i = 0; i < image.alpha.size(); ++i) mean += image.radiance[i * 3 + c] / double(image.alpha.size());
@@ -111,7 +111,7 @@ TEST(PathTracer, DiffuseSphereUnderTheSkyFollowsTheCosineLaw) {
     if (cosine < 0.3f) continue;
     const Vec table = lookup_brdf_lut(brdf_lut(), cosine, 1.f);
     const float gain = 1 + 0.04f * (1 / (table.x + table.y) - 1);
-    const float e = lookup_dielectric_lut(dielectric_lut(), cosine, 1.f) * gain;
+    const float e = sample_brdf_lut(brdf_lut(), cosine, 1.f).dielectric * gain;
     const double expected = (1 - e) * 0.5 * (1 + normal.z) / 2;
     mean_error += std::abs(grey.radiance[i * 3] - black.radiance[i * 3] - expected);
     ++n;
@@ -262,10 +262,34 @@ TEST(PathTracer, RejectsUnusableInputs) {
   EXPECT_THROW(s.render(), std::invalid_argument);
 }
 
+// Under uniform light what the split sum says is the integral of this BSDF, term by term.
+TEST(Principled, DirectionalAlbedoIsTheSplitSum) {
+  const Vec3<double> one{1, 1, 1}, albedo{0.02, 0.4, 0.9};
+  for (const double roughness : {0.2, 0.5, 0.9}) {
+    for (const double cosine : {0.2, 0.5, 0.9}) {
+      for (const double metallic : {0.0, 0.3, 1.0}) {
+        const Vec3<double> view{std::sqrt(1 - cosine * cosine), 0, cosine};
+        const PrincipledBsdf<double> bsdf(brdf_lut(), albedo, roughness, metallic, view);
+        Vec3<double> sum{0, 0, 0};
+        constexpr int kPoints = 1 << 16;
+        for (int i = 0; i < kPoints; ++i) {
+          const Vec2<double> u = fibonacci_lattice<double>(i, kPoints);
+          const BsdfValue<double> f = bsdf.evaluate(bsdf.sample(random_unit<double>(i), u.x, u.y));
+          if (f.pdf > 0) sum += f.f_cos * (1 / (f.pdf * kPoints));
+        }
+        const ShadePoint<double> p{{0, 0, 1}, view, albedo, roughness, metallic, one, one, one, one};
+        const Vec3<double> split = split_sum_shade(brdf_lut(), {FresnelMode::kExact, true}, p);
+        for (int c = 0; c < 3; ++c)
+          EXPECT_NEAR(sum[c], split[c], 0.01 * split[c] + 1e-3) << roughness << " " << cosine << " " << metallic;
+      }
+    }
+  }
+}
+
 TEST(Principled, DensityIsNormalisedAndReciprocal) {
   for (float roughness : {0.3f, 0.8f}) {
     const Vec3<double> view = normalize(Vec3<double>{0.5, 0.3, 0.6}), albedo{0.6, 0.5, 0.4};
-    const PrincipledBsdf<double> bsdf(PrincipledTables{}, albedo, double(roughness), 0.2, view);
+    const PrincipledBsdf<double> bsdf(brdf_lut(), albedo, double(roughness), 0.2, view);
     double total = 0;
     constexpr uint32_t kPoints = 400000;
     for (uint32_t i = 0; i < kPoints; ++i)

@@ -126,7 +126,8 @@ def drawn_inputs(n: int = 5, k: int = 6, dtype=torch.float64, seed: int = 0) -> 
     normals = unit(torch.randn(n, 3, generator=g, dtype=dtype))
     view_dirs = unit(normals + 0.7 * unit(torch.randn(n, 3, generator=g, dtype=dtype)))
     roughness = 0.2 + 0.7 * torch.rand(n, 1, generator=g, dtype=dtype)
-    directions, pdf = sample_bsdf(normals, view_dirs, roughness, k, seed)
+    share = 0.2 + 0.6 * torch.rand(n, 1, generator=g, dtype=dtype)
+    directions, pdf = sample_bsdf(normals, view_dirs, roughness, share, k, seed)
     return normals, view_dirs, roughness, directions, pdf, torch.rand(n, k, 3, generator=g, dtype=dtype)
 
 
@@ -223,7 +224,7 @@ def sums_inputs(n: int = 6, dtype=torch.float64, seed: int = 0) -> tuple:
 
     normals = unit(torch.randn(n, 3, generator=g, dtype=dtype))
     view_dirs = unit(normals + 0.7 * unit(torch.randn(n, 3, generator=g, dtype=dtype)))
-    sums = [rand(3, 0.5, 2.0), rand(3, 0.0, 0.3), rand(3, 0.1, 2.0)]
+    sums = [rand(3, 0.5, 2.0), rand(3, 0.0, 0.3), rand(3, 0.1, 2.0), rand(3, 0.02, 0.5)]
     return normals, view_dirs, rand(3, 0.05, 0.9), rand(1, 0.1, 0.9), rand(1, 0.1, 0.9), *sums
 
 
@@ -391,7 +392,8 @@ CASES = {
     "sparse_product": sparse_inputs,
     "light_lookup": lambda t: lookup_inputs(t, 300),
     "light_lookup_backward": lambda t: with_gradients("light_lookup", lookup_inputs(t, 300)),
-    "sample_bsdf": lambda t: (*drawn_inputs(40, dtype=t)[:3], 70, 3),
+    "specular_share": lambda t: (*sums_inputs(300, t)[:5], brdf_lut()),
+    "sample_bsdf": lambda t: (*drawn_inputs(40, dtype=t)[:3], rand(40, 1, seed=5, dtype=t), 70, 3),
     "monte_carlo_light": lambda t: drawn_inputs(40, 70, t),
     "monte_carlo_light_backward": lambda t: with_gradients("monte_carlo_light", drawn_inputs(40, 70, t)),
     "summed_light": lambda t: shared_inputs(40, dtype=t),
@@ -442,8 +444,8 @@ def moved(op: str, inputs: tuple, device: str) -> tuple:
 
 
 def truth(inputs: tuple) -> tuple:
-    """The same numbers in float64, but the table of F1, F2 and chi, which is float32."""
-    is_table = lambda x: x.shape == (32, 32, 3)  # noqa: E731
+    """The same numbers in float64, but the table of the split sum, which is float32."""
+    is_table = lambda x: x.shape == (32, 32, 4)  # noqa: E731
     return tuple(
         x.double() if isinstance(x, torch.Tensor) and x.is_floating_point() and not is_table(x) else x for x in inputs
     )

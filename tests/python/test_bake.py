@@ -11,6 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from splitnerf.data.tangents import vertex_tangents
+from splitnerf.export import surface
 from splitnerf.export.bake import Spread, UnwrappedMesh, bake_occlusion, rasterise, to_tangent_space
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.surface import Surface, to_level_set
@@ -135,6 +136,26 @@ def test_charts_do_not_overlap_and_keep_their_distance():
     assert len(texels.index) == pytest.approx(area * SIZE**2, rel=0.01)  # each texel counted once
 
 
+def test_a_chart_keeps_its_shape():
+    """A strip, eight times as long as wide, whatever the shape of the packed area."""
+    vertices, faces = np.float32([[0, 0, 0], [8, 0, 0], [8, 1, 0], [0, 1, 0]]), np.int32([[0, 1, 2], [0, 2, 3]])
+    origins, new_faces, uv = unwrap(vertices, faces, SIZE)
+    points = vertices[origins]
+    scales = [np.linalg.norm(uv[new_faces[:, i]] - uv[new_faces[:, i - 1]], axis=1)
+              / np.linalg.norm(points[new_faces[:, i]] - points[new_faces[:, i - 1]], axis=1) for i in range(3)]  # fmt: skip
+    assert np.ptp(scales) < 0.02 * np.mean(scales)
+
+
+def test_charts_are_small_and_fill_a_large_texture():
+    """None holds much more than 1 / 64 of the surface; between them lie texels of the texture as it is asked for."""
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    _, faces, uv = unwrap(np.float32(ball.vertices), np.int32(ball.faces), 1024)
+    graph = coo_matrix((np.ones(2 * len(faces)), (faces[:, :2].reshape(-1), faces[:, 1:].reshape(-1))), shape=(len(uv),) * 2)
+    _, chart = connected_components(graph, directed=False)
+    assert np.bincount(chart[faces[:, 0]], ball.area_faces).max() < 2 * ball.area / 64
+    assert len(rasterise(uv, faces, 1024).index) > 0.38 * 1024**2
+
+
 def test_texels_know_their_place():
     uv = np.float32([[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]])
     texels = rasterise(uv, np.int32([[0, 1, 2]]), 64)
@@ -172,21 +193,54 @@ def test_points_move_onto_the_level_set_and_never_away():
     def field(x):
         return x.square().sum(dim=1) - 1
 
-    surface = surface_of(field)
+    squares = surface_of(field)
     rng = np.random.default_rng(1)
     directions = rng.normal(size=(1000, 3))
     directions = np.float32(directions / np.linalg.norm(directions, axis=1, keepdims=True))
     points = np.float32(directions * rng.uniform(0.9, 1.1, (1000, 1)))
     for along in (None, directions):
-        moved = to_level_set(surface, points, 0.2, along)
+        moved = to_level_set(squares, points, 0.2, along)
         assert np.abs(np.linalg.norm(moved, axis=1) - 1).max() < 1e-5
-    moved = to_level_set(surface, points, 0.02)
+    moved = to_level_set(squares, points, 0.02)
     assert np.linalg.norm(moved - points, axis=1).max() < 0.0201
     assert (np.abs(np.linalg.norm(moved, axis=1) - 1) <= np.abs(np.linalg.norm(points, axis=1) - 1) + 1e-6).all()
     across = np.float32(np.cross(directions, [0.0, 0.0, 1.0]))
     assert np.array_equal(
-        to_level_set(surface, points, 0.2, across / np.linalg.norm(across, axis=1, keepdims=True)), points
+        to_level_set(squares, points, 0.2, across / np.linalg.norm(across, axis=1, keepdims=True)), points
     )
+
+
+def test_a_distance_out_of_reach_is_covered_as_far_as_it_goes():
+    """Though the first step would land on the surface."""
+    points = np.float32([[0.85, 0, 0], [0, 0.76, 0]])
+    moved = to_level_set(surface_of(lambda x: x.norm(dim=1) - 0.8), points, 0.02)
+    assert moved == pytest.approx(np.float32([[0.83, 0, 0], [0, 0.78, 0]]), abs=1e-6)
+
+
+def test_steps_that_lead_astray_are_not_taken():
+    """A field that rises and falls: nobody ends where it is larger than where it began, whatever the number at a time."""
+
+    def field(x):
+        r = x.norm(dim=1)
+        return r - 0.8 + 0.06 * (37 * r).sin()
+
+    rng = np.random.default_rng(2)
+    points = rng.normal(size=(400, 3))
+    points = np.float32(points / np.linalg.norm(points, axis=1, keepdims=True) * rng.uniform(0.6, 1.0, (400, 1)))
+    lines = np.float32(points / np.linalg.norm(points, axis=1, keepdims=True))
+    moved = to_level_set(surface_of(field), points, 0.3, lines)
+    before, after = (field(torch.from_numpy(x)).abs() for x in (points, moved))
+    assert (after <= before + 1e-6).all() and after.median() < 0.2 * before.median()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(surface, "CHUNK", 70)
+        assert to_level_set(surface_of(field), points, 0.3, lines) == pytest.approx(moved, abs=1e-6)
+
+
+def test_materials_that_are_not_finite_are_refused():
+    ball = surface_of(bumpy)
+    broken = Surface(ball.sdf, ball.gradient, lambda x: tuple(m / (x[:, :1] > 0) for m in ball.materials(x)))
+    with pytest.raises(RuntimeError, match="the materials are not finite"):
+        surface.surface_materials(broken, np.float32([[1, 0, 0], [-1, 0, 0]]))
 
 
 def test_occlusion_beside_a_wall():

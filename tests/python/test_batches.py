@@ -11,10 +11,21 @@ from tiny_runs import tiny
 from splitnerf.training.batches import draw_batch
 
 
-def drawn(seed: int = 0):
-    config = tiny(box=1.3, eikonal_points=4000, smoothness_points=3000, smoothness_radius=0.05)
-    source = SimpleNamespace(generator=torch.Generator().manual_seed(seed), draw=lambda n: (torch.zeros(n, 3),) * 2 + (torch.zeros(n, 4),))
+def drawn(seed: int = 0, **settings):
+    """A batch whose origins are 1, directions 2 and pixels 3."""
+    config = tiny(box=1.3, eikonal_points=4000, smoothness_points=3000, smoothness_radius=0.05, **settings)
+    source = SimpleNamespace(
+        generator=torch.Generator().manual_seed(seed),
+        draw=lambda n: (torch.full((n, 3), 1.0), torch.full((n, 3), 2.0), torch.full((n, 4), 3.0)),
+    )
     return draw_batch(source, 2000, config)
+
+
+def test_rays_and_pixels_are_those_of_the_source():
+    batch = drawn()
+    for found, columns, value in ((batch.rays_o, 3, 1.0), (batch.rays_d, 3, 2.0), (batch.target, 4, 3.0)):
+        assert torch.equal(found, torch.full((2000, columns), value))
+    assert batch.rays == (batch.rays_o, batch.rays_d, batch.jitter)
 
 
 def test_what_is_drawn_fills_its_range():
@@ -25,11 +36,18 @@ def test_what_is_drawn_fills_its_range():
         assert 0 <= x.min() < 0.01 and 0.99 < x.max() < 1
     anywhere, shifts = batch.probes.anywhere, batch.probes.shifts
     assert anywhere.shape == (4000, 3) and -1.3 <= anywhere.min() < -1.29 and 1.29 < anywhere.max() <= 1.3
-    assert shifts.shape == (3000, 3) and shifts.std().item() == pytest.approx(0.05, rel=0.05)
+    assert batch.probes.chosen.shape == (3000,) and shifts.shape == (3000, 3)
+    assert shifts.mean(0).abs().max() < 0.005
+    torch.testing.assert_close(shifts.T.cov(), 0.05**2 * torch.eye(3), rtol=0, atol=0.1 * 0.05**2)
+
+
+def test_without_smoothness_no_neighbours_are_drawn():
+    probes = drawn(normal_smoothness=0.0).probes
+    assert len(probes.anywhere) == 4000 and len(probes.chosen) == len(probes.shifts) == 0
 
 
 def test_the_same_generator_draws_the_same():
     first, again, other = drawn(), drawn(), drawn(1)
-    for part in ("background", "jitter"):
-        assert torch.equal(getattr(first, part), getattr(again, part)) and not torch.equal(getattr(first, part), getattr(other, part))
-    assert torch.equal(first.probes.shifts, again.probes.shifts)
+    drawn_parts = [(batch.background, batch.jitter, *batch.probes) for batch in (first, again, other)]
+    for a, b, c in zip(*drawn_parts):
+        assert torch.equal(a, b) and not torch.equal(a, c)

@@ -129,6 +129,18 @@ def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
     torch.testing.assert_close(asked["on_surface"], ray.positions - ray.normals * ray.sdf[:, None])
 
 
+def test_a_corrected_picture_moves_all_its_parts():
+    """Visibility has no gradient and needs none: those to the field, the materials and the light are there and finite."""
+    model = with_mesh(trimesh.creation.icosphere(2, 0.7), initial_roughness=0.8)
+    rays = torch.tensor([[4.0, 0.3, 0], [4.0, -0.2, 0.2]]), torch.tensor([[-1.0, 0, 0]] * 2), torch.full((2,), 0.5)
+    cells = make_grid(model.config).cells
+    light = model.evaluate_light()
+    render_rays(model, light, find_samples(model, cells, *rays)).mean.sum().backward()
+    light.backward()
+    for name, p in model.named_parameters():
+        assert p.grad.isfinite().all() and (p.grad != 0).any(), name
+
+
 def test_rays_are_weighed_by_the_cosine_they_are_told():
     """Oblique rays, whose weights change while the cosine is annealed, of the same samples."""
     model, cells = ball()
@@ -154,7 +166,7 @@ def test_samples_that_are_left_out_weigh_next_to_nothing(variance):
 
 
 def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
-    model, cells = ball(shades_per_ray=1, smoothness_points=40, eikonal_points=30)
+    model, cells = ball(shades_per_ray=1, smoothness_points=40, eikonal_points=30, entropy_points=20)
     grid = make_grid(model.config)
     grid.cells = cells
     step, g = Step(model, grid, SurfaceMesh(model), generator(3)), generator(4)
@@ -168,6 +180,13 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     n = len(ray.weights)
     assert len(ray.beside) == 40 and len(ray.gradients) == n + 30 + 40
     assert len(ray.shaded) < 0.5 * n
+    assert step.is_complete(1e9, 1e9)  # it has no capacity
+    entropies = []
+    for seed in range(2):
+        torch.manual_seed(seed)
+        step = Step(model, grid, SurfaceMesh(model), generator(3))
+        entropies.append(step(batch, model.evaluate_light(), None, 1, 0.9)[1]["entropy"].value.item())
+    assert entropies[0] == entropies[1] > 0
 
 
 # ---- settings ----

@@ -110,11 +110,14 @@ def test_glb_is_y_up_with_textures_in_their_colour_spaces(tmp_path, asset):
     assert normal == pytest.approx(stored.normal_texture, abs=1.01 / 255)
 
 
-def test_glb_without_textures_has_factors_alone(tmp_path, asset):
+def test_without_textures_there_are_factors_alone(tmp_path, asset):
     plain = dataclasses.replace(asset, uv=None, tangents=None, materials=[Material("grey", (0.3, 0.3, 0.3), 0.5)])
     write_glb(tmp_path / "a.glb", plain)
     document, arrays, _ = parse_glb(tmp_path / "a.glb")
     assert set(arrays) == {"POSITION", "NORMAL", "indices"} and "images" not in document
+    write_obj(tmp_path / "a.obj", plain)
+    first = [line for line in (tmp_path / "a.obj").read_text().splitlines() if line.startswith("f ")][0]
+    assert first == "f " + " ".join(f"{i}//{i}" for i in plain.triangles[0] + 1)
     assert document["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] == 0.5
 
 
@@ -129,8 +132,10 @@ def test_obj_reads_back(tmp_path, asset):
         assert line in text.splitlines()
     stored = asset.materials[0]
     assert read_image(tmp_path / "a_albedo.png") == pytest.approx(linear_to_srgb(stored.albedo_texture), abs=0.51 / 255)
-    roughness = read_image(tmp_path / "a_roughness.png")[..., 0]
-    assert roughness == pytest.approx(stored.roughness_metallic_texture[..., 0], abs=0.51 / 255)
+    for i, name in enumerate(("roughness", "metallic")):
+        values = read_image(tmp_path / f"a_{name}.png")[..., 0]
+        assert values == pytest.approx(stored.roughness_metallic_texture[..., i], abs=0.51 / 255)
+    assert {"Kd 0.5 0.25 1", "Pr 0.9", "Pm 0.8"} < set(text.splitlines())
 
 
 def test_usdz_passes_usd_s_own_validators(tmp_path, asset):
@@ -155,6 +160,8 @@ def test_bad_assets_write_nothing(tmp_path, asset, write):
         "empty mesh": {"triangles": np.zeros((0, 3), np.int32)},
         "2 materials": {"materials": asset.materials * 2},
         "have texture coordinates": {"uv": None},
+        "tangents must be finite": {"tangents": asset.tangents * np.nan},
+        "degenerate or empty": {"triangles": asset.triangles + 1},
     }
     for message, change in broken.items():
         with pytest.raises(RuntimeError, match=message):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import struct
 
@@ -66,6 +67,14 @@ def test_raised_normals_are_of_length_one():
     world = np.float32([[0, 0, -1], [0.8, 0, -0.6], [1, 0, 0]])
     local = to_tangent_space(world, normals, tangents)
     assert np.linalg.norm(local, axis=1) == pytest.approx(1.0, abs=1e-6) and (local[:, 2] > 0).all()
+    np.testing.assert_allclose(to_tangent_space(0.01 * world, normals, tangents), local, atol=1e-6)
+
+
+def test_charts_between_the_texels_are_refused():
+    mesh = dataclasses.replace(square(), uv=square().uv * np.float32(0.01) + np.float32(0.02))
+    assert (bake_occlusion(mesh, 8, 0.01) == 1).all()
+    with pytest.raises(RuntimeError, match="no texel of 8 x 8 lies in a chart; give a larger texture size"):
+        bake.bake(mesh, ball(), 8, reach=0.1, offset=0.01)
 
 
 def ball(radius: float = 0.8, sign: float = 1.0) -> Surface:
@@ -90,8 +99,28 @@ def test_normals_are_the_fields_where_they_agree_with_the_faces():
     vertices, faces = np.float32(mesh.vertices), np.int32(mesh.faces)
     tilted = vertices + np.float32([0.3, 0, 0])
     tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
-    np.testing.assert_allclose(vertex_normals(ball(), vertices, faces), tilted, atol=1e-5)
+    for slope in (1.0, 3.0):
+        np.testing.assert_allclose(vertex_normals(ball(sign=slope), vertices, faces), tilted, atol=1e-5)
     np.testing.assert_allclose(vertex_normals(ball(sign=-1.0), vertices, faces), mesh.vertex_normals, atol=1e-5)
+    more, field = np.concatenate([vertices, np.float32([[0, 0.9, 0]])]), np.float32([0.3, 0.9, 0]) / 0.9**0.5
+    assert vertex_normals(ball(), more, faces)[-1] == pytest.approx(field, abs=1e-5)  # of no face
+    assert vertex_normals(ball(sign=0.0), more, faces)[-1].tolist() == [0, 0, 1]
+
+
+def test_normals_are_those_of_the_places_that_vertices_move_to():
+    """Off the surface the gradient leans over, on it it is radial."""
+    surface = ball()
+
+    def leaning(x):
+        f = surface.sdf(x)
+        return f, torch.nn.functional.normalize(x, dim=1) + 5 * f[:, None] * torch.tensor([1.0, 0.0, 0.0])
+
+    mesh = trimesh.creation.icosphere(2, 0.85)
+    found = textured_asset(
+        "ball", np.float32(mesh.vertices), np.int32(mesh.faces), dataclasses.replace(surface, gradient=leaning), n_faces=0,
+        texture_size=64, spacing=0.05, occlusion_offset=0.01,
+    ).asset  # fmt: skip
+    np.testing.assert_allclose(found.normals, found.vertices / 0.8, atol=2e-3)
 
 
 def test_textures_stand_without_factors():

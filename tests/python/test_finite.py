@@ -6,6 +6,7 @@ import itertools
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import OpenImageIO as oiio
@@ -17,7 +18,7 @@ from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, FAILED
 from splitnerf.data.dataset import load_dataset
-from splitnerf.training.finite import MOST_SKIPPED, Diverged, first_not_finite
+from splitnerf.training.finite import MOST_SKIPPED, Diverged, GradientWatch, check_state, explain_loss, first_not_finite
 
 
 def goes_on(data: Path, run: Path, before: bytes) -> None:
@@ -164,3 +165,94 @@ def test_the_first_that_is_not_finite_is_found():
     fine, bad = torch.tensor([3e38, 3e38]), torch.tensor([1.0, torch.nan, torch.inf])
     assert first_not_finite([("fine", fine)]) is None
     assert first_not_finite([("fine", fine), ("bad", bad), ("worse", bad)]) == "bad (2 of 3 values)"
+
+
+def test_the_largest_magnitude_is_that_of_one_value():
+    """Of either sign and of any parameter; one without a gradient counts as none."""
+    parameters = [torch.zeros(2, requires_grad=True) for _ in range(3)]
+    watch = GradientWatch(parameters)
+    for parameter, gradient in ((parameters[0], [3.0, 4.0]), (parameters[2], [-7.0, 6.0])):
+        parameter.grad = torch.tensor(gradient)
+    assert watch.largest().item() == 7.0
+
+
+def test_a_gradient_may_be_taken_if_its_square_is_a_number(capsys):
+    watch = GradientWatch([])
+    assert watch.allows(0, 9e17) and watch.skipped == 0
+    for bad in (2e19, torch.inf, torch.nan):  # in single precision the square of the first is infinite
+        assert not watch.allows(7, bad)
+    assert watch.skipped == 3 and capsys.readouterr().err.count("step 7: ") == 3
+
+
+def test_nine_bad_gradients_in_a_row_are_borne_as_often_as_they_come():
+    watch = GradientWatch([])
+    for _ in range(3):
+        assert [watch.allows(0, torch.nan) for _ in range(9)] == [False] * 9 and watch.allows(0, 1.0)
+    assert watch.skipped == 27
+    with pytest.raises(Diverged, match="step 5: .*10 steps in a row"):
+        for _ in range(10):
+            watch.allows(5, torch.nan)
+    assert watch.skipped == 37
+
+
+@pytest.fixture
+def stepped() -> tuple[torch.nn.Module, torch.optim.Optimizer]:
+    """A layer after one step of its optimiser."""
+    model = torch.nn.Linear(2, 3)
+    optimiser = torch.optim.AdamW(model.parameters())
+    model(torch.ones(1, 2)).sum().backward()
+    optimiser.step()
+    return model, optimiser
+
+
+@pytest.mark.parametrize("value", [torch.nan, torch.inf, -torch.inf])
+def test_a_parameter_or_a_moment_that_is_not_finite_is_named(stepped, value):
+    model, optimiser = stepped
+    check_state(4, model, optimiser)
+    for name, tensor in (
+        ("parameter weight", model.weight), ("parameter bias", model.bias),
+        ("exp_avg of weight", optimiser.state[model.weight]["exp_avg"]),
+        ("exp_avg_sq of bias", optimiser.state[model.bias]["exp_avg_sq"]),
+    ):  # fmt: skip
+        kept = tensor.detach().clone()
+        tensor.data.view(-1)[1] = value
+        with pytest.raises(Diverged, match=rf"step 4: not finite: {name} \(1 of {tensor.numel()} values\)"):
+            check_state(4, model, optimiser)
+        tensor.data.copy_(kept)
+    check_state(4, model, optimiser)
+
+
+def test_parameters_whose_sum_is_too_large_are_finite(stepped):
+    model, optimiser = stepped
+    model.weight.data.fill_(3e38)
+    check_state(4, model, optimiser)
+
+
+def test_the_first_bad_input_is_named_in_order_of_the_data_flow():
+    """Whatever comes first, all that follows from it is bad as well."""
+    names = [f"{part} {frame}" for frame in "ab" for part in ("image", "pose of", "intrinsics of")]
+    names += [f"rays' {name}" for name in ("rays_o", "rays_d", "target", "background")] + ["parameter weight"]
+    points = ("albedo", "radiance")
+    names += [f"rendered {x}" for x in ("sdf", "gradients", "normals", "weights", *points, "mean", "opacity")]
+
+    def explained(first_bad: int) -> str:
+        def of(start: str) -> dict[str, torch.Tensor]:
+            return {name.removeprefix(start): x for name, x in values.items() if name.startswith(start)}
+
+        values = {name: torch.full((3,), torch.nan if i >= first_bad else 1.0) for i, name in enumerate(names)}
+        arrays = {
+            part: [values[f"{prefix} {frame}"].numpy() for frame in "ab"]
+            for part, prefix in (("images", "image"), ("poses", "pose of"), ("intrinsics", "intrinsics of"))
+        }
+        model = torch.nn.Module()
+        model.weight = torch.nn.Parameter(values["parameter weight"])
+        shaded = {name: values[f"rendered {name}"] for name in points}
+        ray = SimpleNamespace(**of("rendered "), points=SimpleNamespace(_asdict=lambda: shaded))
+        dataset = SimpleNamespace(frame_names=["a", "b"], **arrays)
+        terms = {"colour": 1.0, "mask": torch.inf, "metal": torch.nan}
+        return str(explain_loss(8, terms, dataset, SimpleNamespace(**of("rays' ")), model, ray))
+
+    for i, name in enumerate(names):
+        message = f"step 8: the loss is not finite (mask, metal); first not finite: {name} (3 of 3 values); "
+        assert explained(i).startswith(message)
+    assert "first not finite: none of what it comes from; " in explained(len(names))

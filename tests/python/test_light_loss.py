@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from types import SimpleNamespace
+
 import pytest
 import torch
 from test_physics import entropy, rays
@@ -96,6 +99,17 @@ def test_the_gradient_of_the_light_loss_goes_to_both_sides(below):
     assert levels.grad.tolist() == pytest.approx([-3.0, 3.0], rel=1e-3)
 
 
+@pytest.mark.parametrize(("form", "expected"), [("square", 3 * 0.25), ("smooth_l1", 3 * 0.125)])
+def test_the_error_of_the_light_has_its_form(form, expected):
+    """Off by a half in each channel."""
+
+    def light(directions, roughness):
+        return 1.0 + 0.5 * (roughness > 0).float().expand(-1, 3)
+
+    config = tiny(light_queries=64, **LOOSE | {"losses.light_form": form})
+    assert losses.light_loss(light, config, generator(), 0).item() == pytest.approx(expected, rel=1e-3)
+
+
 def test_the_number_of_directions_is_learned_from_broad_lobes_alone():
     """Off by 1 in each channel: 3 for each of the queries that are broad, of sets of 128 together."""
 
@@ -167,3 +181,125 @@ def test_occlusion_is_traced_for_its_share_as_it_is_set(monkeypatch, channels):
     assert asked == dict(
         n_diffuse_rays=5, n_specular_rays=5, offset=0.037, along_ray=False, seed=9, n_channels=channels
     )
+
+
+def occlusion_rays(n: int) -> SimpleNamespace:
+    """Samples whose number stands in all that belongs to them; factors are off .5 by .002 and -.004 of it."""
+    number = torch.arange(float(n))
+    column = number[:, None]
+    points = SimpleNamespace(
+        lobe_dirs=column + torch.tensor([0.0, 0.0, 0.5]), roughness=column, occlusion_d=0.5 + 0.002 * column,
+        occlusion_s=0.5 - 0.004 * column,
+    )  # fmt: skip
+    return SimpleNamespace(
+        shaded=torch.arange(n), shares=1.0 + number, positions=column.expand(-1, 3), sdf=torch.zeros(n),
+        normals=column + torch.tensor([0.0, 0.5, 0.0]), points=points,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("form", "factor"), [("square", 1.0), ("smooth_l1", 0.5)])
+def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch, form, factor):
+    """About 60 of 200, drawn by the run's own generator: w (.002^2 + .004^2) i^2 over the sum of w; half by smooth_l1."""
+    asked = []
+
+    def factors(scene, positions, normals, lobes, roughness, environment, **_):
+        asked.append((positions, normals, lobes, roughness[:, 0]))
+        return torch.full((len(positions), 1), 0.5), torch.full((len(positions), 1), 0.5)
+
+    monkeypatch.setattr(losses, "occlusion_factors", factors)
+    config = tiny(occlusion_share=0.3, occlusion_channels=1, occlusion_loss_form=form)
+    found = []
+    for seed in range(2):
+        torch.manual_seed(seed)
+        found.append(losses.occlusion_loss(occlusion_rays(200), None, None, config, generator(), 0).item())
+    positions, normals, lobes, number = asked[0]
+    assert 30 < len(number) < 90 and number.unique().equal(number)
+    for part, own in ((positions, [0.0, 0.0, 0.0]), (normals, [0.0, 0.5, 0.0]), (lobes, [0.0, 0.0, 0.5])):
+        assert torch.equal(part, number[:, None] + torch.tensor(own))
+    w = 1.0 + number
+    expected = factor * (w @ ((0.002**2 + 0.004**2) * number.square()) / w.sum()).item()
+    assert found[0] == found[1] == pytest.approx(expected, rel=1e-4)
+
+
+def test_rays_that_meet_nothing_cost_nothing():
+    """No sample is shaded; none is chosen."""
+    ray = occlusion_rays(0)
+    ray.points.albedo, ray.points.metallic = torch.zeros(0, 3), torch.zeros(0, 1)
+    for loss in (
+        losses.material_entropy_loss(ray, tiny(), generator()),
+        losses.occlusion_loss(ray, None, None, tiny(), generator(), 0),
+        losses.occlusion_loss(occlusion_rays(9), None, None, tiny(occlusion_share=0.0), generator(), 0),
+    ):
+        assert loss.shape == () and loss.item() == 0.0
+
+
+@pytest.mark.parametrize("light_set", ["fibonacci", "uniform"])
+def test_the_light_is_asked_by_the_runs_own_generator(light_set):
+    """About unit directions on all sides."""
+    asked = []
+
+    class Asked(Slope):
+        def __call__(self, directions, roughness):
+            asked.append((directions, roughness))
+            return super().__call__(directions, roughness)
+
+    config = tiny(light_set=light_set, light_samples=512, light_queries=256, neutral_queries=256, light_noise=0.0)
+    for seed in range(2):
+        torch.manual_seed(seed)
+        losses.light_loss(Asked(), config, generator(), 0)
+        losses.neutral_light_loss(Asked(), config, generator())
+    for first, again in zip(asked[0] + asked[1], asked[2] + asked[3]):
+        assert torch.equal(first, again)
+    queries, normals = asked[0][0][-256:], asked[1][0]
+    for directions in (asked[0][0][:512], queries, normals):
+        torch.testing.assert_close(directions.norm(dim=1), torch.ones(len(directions)))
+        assert directions.mean(0).norm() < 0.2
+    assert len(normals) == 256 and (asked[1][1] == 1).all()
+
+
+def test_narrow_lobes_sample_themselves_and_broad_ones_share(monkeypatch):
+    """Each query is one or the other, by its own roughness."""
+    narrow, broad = [], []
+    sample, prefilter = losses.sample_ggx_lobe, losses.prefilter_light
+    monkeypatch.setattr(losses, "sample_ggx_lobe", lambda *args: narrow.append(args) or sample(*args))
+    monkeypatch.setattr(losses, "prefilter_light", lambda *args: broad.append(args) or prefilter(*args))
+    losses.light_loss(Slope(), tiny(light_queries=64, **LOOSE | {"light_lobe_below": 0.6}), generator(), 0)
+    (axes, roughness, n, _), (others, rest, *_) = narrow[0], broad[0]
+    assert 5 < len(axes) < 32 and (roughness < 0.6).all() and n == 16
+    assert len(axes) + len(others) == 64 and (rest >= 0.6).all() and (rest < 1).sum() > 2
+
+
+# ---- where the slopes go ----
+
+
+def test_similar_materials_attract_each_other():
+    """Two halves whose roughness, metallic or log albedo differ by d widths: the slope of -ln(1/2 + e^(-d^2/4) / 2), d = 1."""
+    attraction = 0.5 * math.exp(-0.25) / (1 + math.exp(-0.25))
+    for name, values in (("roughness", [[0.4], [0.6]]), ("metallic", [[0.4], [0.6]]), ("albedo", [[0.29], [0.39]])):
+        ray = rays([1.0, 1.0], [0.5, 0.5])
+        ray.points.albedo, ray.points.roughness = torch.full((2, 3), 0.4), torch.full((2, 1), 0.5)
+        columns = 3 if name == "albedo" else 1
+        leaf = torch.tensor(values).repeat(1, columns).requires_grad_()
+        setattr(ray.points, name, leaf)
+        width = math.sqrt(3) * math.log(0.40 / 0.30) if name == "albedo" else 0.2
+        config = tiny(entropy_points=4000, gloss_width=0.2, albedo_width=width)
+        losses.material_entropy_loss(ray, config, generator()).backward()
+        by_width = [1 / 0.3, 1 / 0.4] if name == "albedo" else [1.0, 1.0]
+        for slope, sign, x in zip(leaf.grad, (-1, 1), by_width):
+            expected = sign * attraction * x / width / math.sqrt(columns)
+            assert slope.tolist() == pytest.approx([expected] * columns, rel=0.05), name
+
+
+def test_factors_are_drawn_to_the_traced_ones_and_diffuse_light_to_grey(monkeypatch):
+    """By 2 w (o - traced) over the sum of w; light of one tint by the slope of its chroma."""
+    monkeypatch.setattr(losses, "occlusion_factors", lambda *args, **_: (torch.full((4, 1), 0.5),) * 2)
+    ray = occlusion_rays(4)
+    factors = [x.requires_grad_() for x in (ray.points.occlusion_d, ray.points.occlusion_s)]
+    config = tiny(occlusion_share=1.1, occlusion_channels=1, occlusion_loss_form="square")
+    losses.occlusion_loss(ray, None, None, config, generator(), 0).backward()
+    for factor in factors:
+        expected = 2 * ray.shares * (factor[:, 0].detach() - 0.5) / ray.shares.sum()
+        torch.testing.assert_close(factor.grad[:, 0], expected)
+    tint = torch.tensor([0.5, 0.0, -0.5], requires_grad=True)
+    losses.neutral_light_loss(lambda x, _: tint.exp().expand(len(x), 3), tiny(), generator()).backward()
+    assert tint.grad.tolist() == pytest.approx([2 * 0.5 / 3, 0.0, -2 * 0.5 / 3], abs=1e-4)

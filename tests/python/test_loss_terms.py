@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 import torch
 from op_checks import generator, unit
@@ -49,6 +51,17 @@ def test_colours_are_summed_over_channels_and_averaged_over_rays(rendered):
     expected = 10.0 * (predicted - truth).square().sum(1).mean().item()
     assert (ray.opacity > 0.5).any() and (ray.opacity < 0.1).any()
     assert weighted(terms, "colour") == pytest.approx(expected, rel=1e-5)
+
+
+def test_colours_that_are_added_in_linear_light_are_compared_in_srgb(rendered):
+    config, batch, ray, _ = rendered
+    linear = dataclasses.replace(ray, linear=True)
+    model = SceneModel(config)
+    found = loss_terms(model, model.evaluate_light(), batch, linear, None, None, generator(2), 0, 0.0)
+    predicted = batch.background + ray.opacity[:, None] * (linear.colour - batch.background)
+    truth = batch.background + batch.target[:, 3:] * (batch.target[:, :3] - batch.background)
+    assert weighted(found, "colour") == pytest.approx(10.0 * (predicted - truth).square().sum(1).mean().item(), rel=1e-5)
+    assert (linear.colour - ray.colour).abs().max() > 0.1
 
 
 def test_gradients_are_averaged_over_points(rendered):
@@ -156,3 +169,19 @@ def test_terms_that_draw_numbers_draw_others_with_each_step(every_term):
         _, asked, g = every_term(step=step)
         assert asked["light"][-2:] == asked["occlusion"][-2:] == (g, step)
         assert asked["neutral"][-1] is asked["entropy"][-1] is g
+
+
+def test_metals_are_drawn_to_their_sides_and_albedo_is_not(rendered):
+    """Slopes with metallic m, by the weights w: 2 w m; w (1 - 2 m); w (1 - f0 / .4) where that is positive."""
+    config, batch, ray, _ = rendered
+    metallic = ray.points.metallic.detach().clone().requires_grad_()
+    albedo = (0.8 * torch.rand(len(metallic), 3, generator=generator(6))).requires_grad_()
+    model = SceneModel(config.replace({"binary_metal_weight": 1.0, "dark_metal_weight": 1.0, "priors_from": 0.0}))
+    leaves = dataclasses.replace(ray, points=ray.points._replace(metallic=metallic, albedo=albedo))
+    found = loss_terms(model, model.evaluate_light(), batch, leaves, None, None, generator(2), 0, 0.0)
+    w, m, f0 = ray.shares / ray.shares.sum(), metallic.detach()[:, 0], albedo.detach().amax(1)
+    slopes = {"metal": 2 * w * m, "binary_metal": w * (1 - 2 * m), "dark_metal": w * (1 - f0 / 0.4).clamp(min=0)}
+    for name, expected in slopes.items():
+        slope, none = torch.autograd.grad(found[name].value, (metallic, albedo), allow_unused=True, retain_graph=True)
+        assert none is None and expected.abs().max() > 0
+        torch.testing.assert_close(slope[:, 0], expected, rtol=1e-3, atol=1e-7)

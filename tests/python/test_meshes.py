@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import threading
 
+import numpy as np
 import pytest
 import torch
+import trimesh
 
 from splitnerf.training import meshes
 from splitnerf.config import preset
@@ -19,6 +21,36 @@ SMALL = {"n_levels": 2, "start_levels": 2, "log2_table_size": 8, "mesh_resolutio
 def model() -> SceneModel:
     torch.manual_seed(0)
     return SceneModel(preset("cpu").replace(SMALL))
+
+
+def test_a_mesh_is_the_surface_in_the_whole_box_at_its_resolution():
+    """A ball that reaches beyond 1, closed, faces outward; triangles as large as cells of 24 nodes along an edge."""
+    torch.manual_seed(0)
+    model = SceneModel(preset("cpu").replace(SMALL | {"sphere_radius": 1.2, "box": 1.6}))
+    mesh = SurfaceMesh(model)
+    mesh.request(0.1)
+    shape = trimesh.Trimesh(mesh.current.vertices.numpy(), mesh.current.faces.numpy(), process=False)
+    assert shape.is_watertight and model.sdf_field.sdf(mesh.current.vertices).abs().max() < 0.02
+    assert 5.0 < shape.volume < 10.0 and 1.2 < mesh.current.vertices.abs().max() < 1.6
+    cell = 2 * 1.6 / 23
+    assert np.sqrt(2) * cell < shape.edges_unique_length.max() < np.sqrt(3) * cell
+    assert mesh.scene is mesh.current.scene and len(model.occlusion.cache.vertices) == len(shape.vertices)
+
+
+def test_a_mesh_comes_back_as_it_was_stored(model):
+    stored = SurfaceMesh(model)
+    nothing = stored.state()
+    stored.request(0.3)
+    torch.manual_seed(1)
+    other = SceneModel(model.config)
+    restored = SurfaceMesh(other)
+    restored.restore(nothing)
+    assert restored.current is None and not other.occlusion.ready
+    restored.restore(stored.state())
+    assert (restored.asked_at, restored.made_at) == (0.3, 0.3) and restored.scene is not None
+    assert torch.equal(restored.current.vertices, stored.current.vertices)
+    assert torch.equal(restored.current.faces, stored.current.faces)
+    assert other.occlusion.ready and torch.equal(other.occlusion.cache.bits, model.occlusion.cache.bits)
 
 
 def test_a_mesh_made_beside_is_that_of_the_moment_it_was_asked_for(model, monkeypatch):

@@ -10,6 +10,7 @@ import torch
 import trimesh
 
 from splitnerf import _core
+from splitnerf.export import simplify
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.export.simplify import decimate, drop_floaters, is_closed, split_pinches
 
@@ -125,10 +126,20 @@ def test_small_components_go_and_are_counted():
         far, near = torch.tensor([1.3, 1.3, 1.3]), torch.tensor([-1.2, 0.0, 0.0])
         return torch.minimum(sphere(x), torch.minimum(sphere(x - far, 0.05), sphere(x - near, 0.2)))
 
-    vertices, faces, n_dropped = drop_floaters(*extract_mesh(three, 1.5, 96))
+    vertices, faces = extract_mesh(three, 1.5, 96)
+    vertices = np.concatenate([vertices, np.full((3, 3), 9.0, np.float32)])  # of no face: no component, and gone as well
+    vertices, faces, n_dropped = drop_floaters(vertices, faces)
     assert n_dropped == 1  # the middle one has more than a hundredth of the faces
-    assert np.abs(vertices).max() < 1.41 and vertices[:, 0].min() == pytest.approx(-1.4, abs=0.01)
+    assert vertices.max() == pytest.approx(RADIUS, abs=0.01) and vertices[:, 0].min() == pytest.approx(-1.4, abs=0.01)
     assert faces.max() == len(vertices) - 1
+
+
+def test_faces_that_share_any_vertex_are_one_component():
+    """150 that meet in their last corner, and one for itself."""
+    pairs = np.arange(300).reshape(-1, 2)
+    faces = np.concatenate([np.column_stack([pairs, np.full(150, 300)]), [[301, 302, 303]]])
+    vertices, kept, n_dropped = drop_floaters(np.zeros((304, 3), np.float32), faces)
+    assert n_dropped == 1 and len(kept) == 150 and len(vertices) == 301
 
 
 def test_decimation_keeps_a_thin_shape_closed():
@@ -158,9 +169,56 @@ def test_parts_that_touch_are_split(n_shared):
     tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     vertices = np.random.default_rng(0).normal(size=(8 - n_shared, 3)).astype(np.float32)
     other = np.where(tetrahedron < n_shared, tetrahedron, tetrahedron + 4 - n_shared)
-    faces = np.concatenate([tetrahedron, other])
+    faces = np.stack([tetrahedron, other], axis=1).reshape(-1, 3)  # in turn, so that no order tells them apart
     assert is_closed(faces) == (n_shared == 1)
     split_vertices, split_faces = split_pinches(vertices, faces)
     assert len(split_vertices) == 8 and is_closed(split_faces)
     np.testing.assert_array_equal(split_vertices[split_faces], vertices[faces])
     assert len(split_pinches(split_vertices, split_faces)[0]) == 8
+
+
+TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+
+
+def test_fans_do_not_depend_on_the_winding_of_their_faces():
+    """A face that is turned over shares its edges with the same neighbours: touching tetrahedra are parted, whole ones kept."""
+    vertices = np.random.default_rng(0).normal(size=(7, 3)).astype(np.float32)
+    two = np.concatenate([TETRAHEDRON, np.where(TETRAHEDRON < 1, TETRAHEDRON, TETRAHEDRON + 3)])
+    for turned in (0, 3, 5):
+        faces = two.copy()
+        faces[turned] = faces[turned, ::-1]
+        split_vertices, split_faces = split_pinches(vertices, faces)
+        assert len(split_vertices) == 8
+        np.testing.assert_array_equal(split_vertices[split_faces], vertices[faces])
+
+
+def decimated(monkeypatch, results: list, faces: np.ndarray) -> tuple[list, tuple]:
+    """What the simplification was asked for if it answered with these faces, one after the other, and what came of it."""
+    asked, vertices = [], np.random.default_rng(0).normal(size=(12, 3)).astype(np.float32)
+
+    def simplified(points, triangles, target_count, agg):
+        asked.append((target_count, agg))
+        return vertices, results[min(len(asked), len(results)) - 1]
+
+    monkeypatch.setattr(simplify.fast_simplification, "simplify", simplified)
+    return asked, (vertices, decimate(vertices, np.concatenate([faces] * 50), 100))
+
+
+def test_decimation_tries_until_a_closed_mesh_stays_closed(monkeypatch):
+    """Another aggressiveness first, then fewer faces; an open one is taken as it comes."""
+    monkeypatch.setattr(simplify, "is_closed", lambda faces: len(faces) % 4 == 0)
+    asked, (_, found) = decimated(monkeypatch, [TETRAHEDRON[:3]] * 4 + [TETRAHEDRON], TETRAHEDRON)
+    assert asked == [(100, 5), (100, 3), (100, 7), (97, 5), (97, 3)] and len(found[1]) == 4
+    asked, _ = decimated(monkeypatch, [TETRAHEDRON[:3]], TETRAHEDRON)
+    assert len(asked) == 9 and asked[-1] == (94, 7)
+    asked, (_, found) = decimated(monkeypatch, [TETRAHEDRON[:3]], TETRAHEDRON[:3])
+    assert asked == [(100, 5)] and len(found[1]) == 3
+
+
+def test_decimation_parts_what_touches_and_drops_sheets_without_volume(monkeypatch):
+    """Two tetrahedra that share an edge, and a pair of faces with the same three vertices: closed, at once, without the pair."""
+    other = np.where(TETRAHEDRON < 2, TETRAHEDRON, TETRAHEDRON + 2)
+    sheet = np.array([[0, 7, 8], [8, 7, 0]])
+    asked, (vertices, (points, faces)) = decimated(monkeypatch, [np.concatenate([TETRAHEDRON, other, sheet])], TETRAHEDRON)
+    assert len(points) == 8 and len(faces) == 8 and is_closed(faces)
+    np.testing.assert_array_equal(points[faces], vertices[np.concatenate([TETRAHEDRON, other])])

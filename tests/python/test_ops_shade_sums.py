@@ -9,7 +9,7 @@ from op_checks import check_op, grad_leaves, lib
 
 from splitnerf.ops import LightSums, brdf_lut, shade_sums, split_sum_shade
 
-DIFFERENTIABLE = tuple(range(8))
+DIFFERENTIABLE = tuple(range(9))
 
 
 def shade(*x: torch.Tensor, compensate: bool) -> torch.Tensor:
@@ -19,16 +19,16 @@ def shade(*x: torch.Tensor, compensate: bool) -> torch.Tensor:
 @pytest.mark.parametrize("compensate", [False, True])
 @pytest.mark.parametrize("turned", [1.0, -1.0])
 def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
-    """Where the light is L over the specular lobe, the sums are (F1 + F2) L and F2 L."""
-    normals, view_dirs, albedo, roughness, metallic, light, _, diffuse = sums_inputs(200)
+    """Where the light is L over the specular lobe, the sums are (F1 + F2) L, F2 L and E_d L."""
+    normals, view_dirs, albedo, roughness, metallic, light, _, diffuse, _ = sums_inputs(200)
     normals = turned * normals
     one, black = torch.ones_like(albedo), torch.zeros_like(albedo)
     metal = torch.ones_like(metallic)
 
-    def lobe(f0):  # F0 F1 + F2
-        return split_sum_shade(normals, view_dirs, f0, roughness, metal, one, black, one, one)
+    def lobe(albedo, metallic=metal):  # albedo F1 + F2, E_d of a dielectric
+        return split_sum_shade(normals, view_dirs, albedo, roughness, metallic, one, black, one, one)
 
-    sums = LightSums(lobe(one) * light, lobe(black) * light, diffuse)
+    sums = LightSums(lobe(one) * light, lobe(black) * light, diffuse, lobe(black, 0 * metal) * light)
     there = split_sum_shade(
         normals, view_dirs, albedo, roughness, metallic, light, diffuse, one, one, "exact", compensate
     )
@@ -36,9 +36,9 @@ def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
 
 
 def test_light_at_grazing_angles_alone_is_reflected_whole():
-    """All of the light where Schlick's weight is 1: reflected by every material alike."""
-    normals, view_dirs, albedo, roughness, metallic, light, _, _ = sums_inputs()
-    sums = LightSums(light, light, torch.zeros_like(light))
+    """All of the light where both Fresnel terms are 1: reflected by every material alike."""
+    normals, view_dirs, albedo, roughness, metallic, light, *_ = sums_inputs()
+    sums = LightSums(light, light, torch.zeros_like(light), light)
     torch.testing.assert_close(shade_sums(normals, view_dirs, albedo, roughness, metallic, sums), light)
 
 

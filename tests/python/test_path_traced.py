@@ -76,7 +76,64 @@ def test_wide_filter_blurs_the_outline_and_keeps_the_area():
         )
     partial = {name: ((m["alpha"] > 0.001) & (m["alpha"] < 0.999)).sum() for name, m in maps.items()}
     assert partial["blackman-harris"] > partial["box"]
+    default = AssetRenderer(square(Material())).render(np.ones((4, 8, 3), np.float32), camera, lens, SIZE, SIZE, spp=1024)
+    np.testing.assert_array_equal(default["alpha"], maps["blackman-harris"]["alpha"])
     assert maps["blackman-harris"]["alpha"].sum() == pytest.approx(maps["box"]["alpha"].sum(), rel=2e-3)
+
+
+def test_a_lens_has_two_lengths_and_a_centre():
+    """The square, 4 away, spans half of a focal length about the centre; columns to the right, rows down."""
+    asset = square(Material())
+    maps = AssetRenderer(asset).render(
+        np.ones((4, 8, 3), np.float32), FROM_ABOVE, (24.0, 16.0, 10.0, 5.0), 20, 12, spp=4, pixel_filter="box"
+    )
+    expected = np.zeros((12, 20), np.float32)
+    expected[1:9, 4:16] = 1
+    np.testing.assert_array_equal(maps["alpha"], expected)
+
+
+def test_a_camera_stands_as_its_pose_says():
+    """Turned about its axis: right in the image is +y of the world, up is -x. The square lies further along +x."""
+    asset = square(Material())
+    asset.vertices[:, 0] += 0.5
+    pose = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 4.0]])
+    maps = AssetRenderer(asset).render(np.ones((4, 8, 3), np.float32), pose, (16.0, 16.0, 8, 8), 16, 16, spp=4, pixel_filter="box")
+    expected = np.zeros((16, 16), np.float32)
+    expected[6:14, 4:12] = 1
+    np.testing.assert_array_equal(maps["alpha"], expected)
+
+
+def test_triangles_have_their_own_materials_and_normals_their_tilt():
+    asset = square(Material(albedo=(1.0, 0.0, 0.0)))
+    asset.materials.append(Material(albedo=(0.0, 1.0, 0.0)))
+    asset.material_ids = np.array([1, 0], np.int32)
+    asset.normals = np.tile(np.array([0.6, 0, 0.8], np.float32), (4, 1))
+    maps = render(asset, spp=1, pixel_filter="box")
+    assert maps["albedo"][-3, -2] == pytest.approx([0, 1, 0]) and maps["albedo"][2, 1] == pytest.approx([1, 0, 0])
+    assert maps["smooth_normal"][8, 8] == pytest.approx([0.6, 0, 0.8], abs=1e-6)
+
+
+def trough() -> Asset:
+    """Two white walls that meet at 45 degrees in the y axis, seen from above: light reaches the eye by many bounces."""
+    asset = square(Material(albedo=(1.0, 1.0, 1.0)))
+    asset.vertices = np.array(
+        [[0, -1, 0], [0, 1, 0], [1, 1, 2], [1, -1, 2], [0, -1, 0], [0, 1, 0], [-1, 1, 2], [-1, -1, 2]], np.float32
+    )
+    asset.triangles = np.array([[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]], np.int32)
+    normals = np.array([[-2, 0, 1], [2, 0, 1]], np.float32) / np.sqrt(5)
+    asset.normals, asset.material_ids = np.repeat(normals, 4, axis=0), np.zeros(4, np.int32)
+    asset.uv = asset.tangents = None
+    return asset
+
+
+def test_bounces_and_their_bound_are_as_asked():
+    """More bounces are brighter; indirect light of 40 is clamped to 10 unless that is not asked for, as is the default."""
+    asset = trough()
+    levels = {n: render(asset, light=1.0, spp=64, bounces=n)["radiance"].mean() for n in (0, 1, 4)}
+    assert levels[0] < 0.8 * levels[1] < 0.8 * levels[4] and render(asset, spp=64)["radiance"].mean() == levels[4]
+    bright = {c: render(asset, light=40.0, spp=64, clamp_indirect=c)["radiance"].mean() for c in (0.0, 10.0)}
+    assert bright[0.0] == pytest.approx(40 * levels[4], rel=0.05) and bright[10.0] < 0.8 * bright[0.0]
+    assert render(asset, light=40.0, spp=64)["radiance"].mean() == bright[10.0]
 
 
 def test_equal_seeds_give_equal_images():

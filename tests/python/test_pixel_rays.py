@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
 from blender_data import look_at
 from op_checks import generator
+from precision import precisions
 
 from splitnerf.data.dataset import Dataset
 from splitnerf.render.rays import PixelSource, image_rays, pixel_rays
@@ -90,3 +93,56 @@ def test_the_ray_of_the_principal_point_is_the_view_axis():
         origins, directions = pixel_rays(*map(torch.from_numpy, (pose, lens, lens[2:3], lens[3:4])))
         np.testing.assert_allclose(directions[0], -pose[:3, 2], atol=1e-6)
         np.testing.assert_allclose(origins[0], pose[:3, 3])
+
+
+# ---- what is drawn ----
+
+
+def with_images(dataset: Dataset, images: np.ndarray) -> Dataset:
+    return dataclasses.replace(dataset, images=images.astype(np.float32))
+
+
+@pytest.mark.parametrize(("share", "n_near"), [(0.0, 0), (0.75, 7), (1.0, 10)])
+def test_as_many_rays_are_drawn_as_asked(dataset, share, n_near):
+    """Ten, three quarters of which are seven: these are all from the only view that has a mask."""
+    images = dataset.images.copy()
+    images[1:, ..., 3] = 0.0
+    source = PixelSource(with_images(dataset, images), share, generator())
+    origins, directions, pixels = source.draw(10)
+    assert len(origins) == len(directions) == len(pixels) == 10
+    assert (pixels[:n_near, 2] == 0).all()
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_rays_follow_the_generator_they_were_given(dataset, share):
+    """And nothing else: not what others draw."""
+    found = []
+    for seed, other in ((1, 0), (1, 5), (2, 0)):
+        torch.manual_seed(other)
+        found.append(PixelSource(dataset, share, generator(seed)).draw(50)[2])
+    assert torch.equal(found[0], found[1]) and not torch.equal(found[0], found[2])
+
+
+def test_without_masks_rays_come_from_anywhere(dataset):
+    """From each of the 1,920 pixels, about as often from each view."""
+    images = dataset.images.copy()
+    images[..., 3] = 0.0
+    pixels = PixelSource(with_images(dataset, images), 0.9, generator()).draw(40_000)[2]
+    assert len(pixels.unique(dim=0)) == 3 * HEIGHT * WIDTH
+    assert (pixels[:, 2] * 3).round().long().bincount().min() > 0.9 * 40_000 / 3
+
+
+def test_masks_reach_a_fiftieth_of_the_width_and_are_there_where_they_are_thin(dataset):
+    """One pixel of a hundredth of an alpha, in images of 150 pixels: 7 x 7 pixels about it, two in small ones."""
+    for width, margin in ((32, 2), (150, 3), (249, 4)):
+        images = np.zeros((3, 20, width, 4))
+        images[..., 0], images[..., 1] = np.arange(width) / width, np.arange(20)[:, None] / 20
+        images[1, 9, 17, 3] = 0.01
+        pixels = PixelSource(with_images(dataset, images), 1.0, generator()).draw(2000)[2]
+        column, row = (pixels[:, 0] * width).round(), (pixels[:, 1] * 20).round()
+        assert (column.min(), column.max(), row.min(), row.max()) == (17 - margin, 17 + margin, 9 - margin, 9 + margin)
+
+
+def test_directions_are_not_rounded_to_tensor_cores(dataset):
+    asked = precisions(lambda: image_rays(torch.from_numpy(POSES[0]), torch.from_numpy(LENSES[0]), HEIGHT, WIDTH))
+    assert asked["__matmul__"] | asked["matmul"] == {"ieee"}

@@ -12,7 +12,7 @@ from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.truth import ViewTruth
 from splitnerf.evaluate import metrics
 from splitnerf.evaluate.protocol import evaluate_maps
-from splitnerf.evaluate.similarity import image_scores
+from splitnerf.evaluate.similarity import image_scores, mean_scores
 
 SIZE = 12
 PREDICTED, TRUE = np.zeros((2, SIZE, SIZE), bool)
@@ -92,13 +92,24 @@ def test_the_light_is_scaled_to_the_truth_and_judged_by_the_truths_white():
 
 def test_the_distance_is_asked_for_views_and_for_albedo():
     truth = ViewTruth("a", albedo=np.full((SIZE, SIZE, 3), 0.3, np.float32))
-    prediction = {"rgb": picture(0.5, 1.0)[..., :3], "alpha": np.ones((SIZE, SIZE)), "albedo": truth.albedo}
+    prediction = {"rgb": picture(0.6, 1.0)[..., :3], "alpha": np.ones((SIZE, SIZE)), "albedo": truth.albedo}
     scores = evaluate_maps(
         [prediction], dataset(picture(0.5, 1.0)), [truth], distance=lambda image, truth: 0.25 + image.mean() - truth.mean()
     )
-    assert [scores[key]["lpips"] for key in ("novel_view", "albedo")] == pytest.approx([0.25, 0.25], abs=1e-5)
+    assert [scores[key]["lpips"] for key in ("novel_view", "albedo")] == pytest.approx([0.35, 0.25], abs=1e-5)
 
 
 def test_a_prediction_is_clipped_before_it_is_scored():
     """What is brighter than white looks white."""
     assert image_scores(np.full((SIZE, SIZE, 3), 1.5), np.ones((SIZE, SIZE, 3)))["psnr"] == 100
+
+
+def test_structure_is_compared_with_the_truths():
+    image, truth = np.random.default_rng(0).random((2, 16, 16, 3))
+    assert image_scores(image, truth)["ssim"] == pytest.approx(metrics.ssim(image, truth)) and metrics.ssim(image, truth) < 0.5
+
+
+def test_scores_of_views_are_averaged():
+    scores = [{"psnr": x, "ssim": 0.1 * x, "lpips": 2 * x} for x in (1.0, 2.0, 6.0)]
+    assert mean_scores(scores) == pytest.approx({"psnr": 3.0, "ssim": 0.3, "lpips": 6.0})
+    assert mean_scores([{"psnr": 1.0, "ssim": 1.0, "lpips": None}])["lpips"] is None

@@ -7,7 +7,18 @@ import inspect
 import numpy as np
 import pytest
 import torch
-from op_cases import CASES, truth
+from op_cases import (
+    CASES,
+    cached_visibility_inputs,
+    lookup_inputs,
+    neus_inputs,
+    pixel_inputs,
+    rand,
+    shared_inputs,
+    sparse_inputs,
+    split_sum_inputs,
+    truth,
+)
 from op_checks import as_tuple, generator, grad_leaves, lib
 
 from splitnerf.bench import reference
@@ -16,7 +27,7 @@ from splitnerf.bench.hash_grid import SPEC
 # The inputs of each operator to which there is a gradient.
 DIFFERENTIABLE = {
     "hash_encode": (0, 1), "sdf_layer": range(1, 7), "march_rays": (), "neus_weights": (0, 1, 2), "surface_weights": (0, 1, 3),
-    "composite": (0, 1), "query_direction": (0, 1, 2), "split_sum_shade": range(9), "shade_sums": range(8),
+    "composite": (0, 1), "query_direction": (0, 1, 2), "split_sum_shade": range(9), "shade_sums": range(9),
     "monte_carlo_light": (0, 2, 5), "summed_light": (0, 2, 5), "linear_to_srgb": (0,), "prefilter_light": (3,),
     "sparse_product": (6,), "light_lookup": (0, 1, 2, 3), "cached_visibility": (), "cached_occlusion": (),
     "pixel_losses": (0, 1), "gradient_losses": (0,), "material_losses": (1,), "quadratic_entropy": (0,),
@@ -35,9 +46,38 @@ def results(op: str, inputs: tuple) -> list[torch.Tensor]:
     return list(got[0].unbind()) if op in LOSSES else list(got)
 
 
-@pytest.mark.parametrize("op", DIFFERENTIABLE)
-def test_operator_and_reference_agree(op):
-    inputs = as_the_operator_reads(truth(CASES[op](torch.float64)))
+def deep_light(dtype: torch.dtype) -> tuple:
+    """Spherical harmonics whose sums fall below 0 in places."""
+    inputs = lookup_inputs(dtype, 300)
+    return (*inputs[:3], inputs[3] * torch.where(torch.arange(169) == 0, 0.1, 3.0)[:, None].to(dtype), *inputs[4:])
+
+
+def far_points(dtype: torch.dtype) -> tuple:
+    """Some lie off the mesh by more than the radius in which vertices count at first, some by more than any."""
+    x, normals, *rest = cached_visibility_inputs(dtype)
+    return x + normals * rest[4] * torch.tensor([0.2, 1.5, 3.0, 5.0, 0.0, 1.2, 2.5, 9.0, 99.0]).to(dtype)[:, None], normals, *rest
+
+
+# Other settings of the same operators: what the first case of each does not reach.
+OTHERS = [
+    *(("split_sum_shade", lambda t, mode=mode, gain=gain: split_sum_inputs("cpu", t, mode, gain, 1, 300))
+      for mode in (0, 1, 2) for gain in (False, True)),
+    ("shade_sums", lambda t: (*CASES["shade_sums"](t)[:-1], False)),
+    ("neus_weights", lambda t: neus_inputs("cpu", t, 0.7)),
+    ("sparse_product", lambda t: tuple(0.3 * x if x.is_floating_point() else x for x in sparse_inputs(t))),
+    ("light_lookup", deep_light),
+    ("summed_light", lambda t: shared_inputs(40, dtype=t, with_sent=False)),
+    ("cached_visibility", far_points),
+    ("pixel_losses", lambda t: (*pixel_inputs(600, t), False)),
+    ("material_losses", lambda t: (
+        rand(600, 3, dtype=t), rand(600, 1, seed=1, dtype=t), rand(600, seed=2, dtype=t), True
+    )),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("op", "case"), [*((op, CASES[op]) for op in DIFFERENTIABLE), *OTHERS], ids=lambda x: x if isinstance(x, str) else "")
+def test_operator_and_reference_agree(op, case):
+    inputs = as_the_operator_reads(truth(case(torch.float64)))
     ours, theirs = (grad_leaves(inputs, DIFFERENTIABLE[op]) for _ in range(2))
     expected = as_tuple(getattr(reference, op)(*theirs))
     got = results(op, ours)[: len(expected)]

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import math
+import threading
+import time
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import pytest
 import torch
 from tiny_runs import lines_of, tiny
 
 from splitnerf.data.dataset import load_dataset
+from splitnerf.errors import InputError
 from splitnerf.fields import VisibilityBits
 from splitnerf.render.model import SceneModel
-from splitnerf.render.occupancy import OccupancyGrid
-from splitnerf.training import loop
+from splitnerf.render.occupancy import OccupancyGrid, visual_hull
+from splitnerf.training import loop, meshes
+from splitnerf.training.finite import Diverged
+from splitnerf.training.losses import Term
 from splitnerf.training.schedule import next_ray_count
 
 
@@ -47,7 +54,7 @@ def refreshed(data, tmp_path, monkeypatch):
     def run(**settings):
         at = steps_of(monkeypatch)
         seen = {
-            "grid": calls(monkeypatch, OccupancyGrid, "update", lambda _, *args, use_hull=False, **__: (at[0], use_hull)),
+            "grid": calls(monkeypatch, OccupancyGrid, "update", lambda _, *args, **settings: (at[0], settings)),
             "backward": calls(monkeypatch, loop.EvaluatedLight, "backward", lambda *_: at[0]),
         }  # fmt: skip
         config = tiny(steps=40, mesh_every=2.0, preview_every=2.0, **settings)
@@ -57,9 +64,11 @@ def refreshed(data, tmp_path, monkeypatch):
 
 
 def test_cells_are_brought_up_to_date_every_few_steps_and_the_hull_counts_at_first(refreshed):
-    """Every 6 steps and at the end; the hull until .4 of the run, which is step 16."""
+    """Every 6 steps, all cells at first and at the end; the hull until .4 of the run, which is step 16."""
     trained, seen = refreshed(grid_every=6, hull_until=0.4)
-    assert seen["grid"] == [(step, step < 16) for step in range(0, 40, 6)] + [(39, False)]
+    assert seen["grid"] == [
+        (step, {"first": step == 0, "step": step, "use_hull": step < 16}) for step in range(0, 40, 6)
+    ] + [(39, {})]
     assert 0 < trained.grid.hull.float().mean() < 0.6
     assert not refreshed(hull_until=0.0)[0].grid.hull
 
@@ -111,7 +120,7 @@ def test_all_that_a_run_draws_follows_its_seed(data, tmp_path):
 
 
 def test_a_line_of_the_log_holds_the_weighted_terms(data, tmp_path):
-    """They add up to the loss; psnr follows the colour's mean squared error without its weight."""
+    """They add up to the loss; psnr follows the mean squared error of colours by a twentieth a step."""
     config = tiny(steps=5, colour_weight=7.0, neutral_weight=0.0)
     loop.train(load_dataset(data), config, tmp_path)
     lines = lines_of(tmp_path)
@@ -119,8 +128,13 @@ def test_a_line_of_the_log_holds_the_weighted_terms(data, tmp_path):
     for line in lines:
         terms = [value for name, value in line.items() if name.startswith("loss_")]
         assert line["loss"] == pytest.approx(sum(terms), rel=1e-5)
-    mse = lines[0]["loss_colour"] / (3 * 7.0)
-    assert lines[0]["psnr"] == pytest.approx(-10 * math.log10(mse), abs=1e-3)
+    psnr = [-10 * math.log10(line["loss_colour"] / (3 * 7.0)) for line in lines]
+    mean = psnr[0]
+    for line, found in zip(lines, psnr):
+        mean += 0.05 * (found - mean)
+        assert line["psnr"] == pytest.approx(mean, abs=1e-3)
+    assert max(psnr) - min(psnr) > 0.1
+    assert "loss_light" not in lines[0]  # texels are filtered exactly; an MLP is asked to be consistent
 
 
 def test_previews_and_checkpoints_come_from_time_to_time(data, tmp_path, monkeypatch):
@@ -143,3 +157,149 @@ def test_the_number_of_rays_follows_that_of_the_samples(data, tmp_path):
     samples = [line["kept"] * line["samples_per_ray"] * line["rays"] for line in lines]
     assert rays[0] == 64 and rays[-1] > 100
     assert rays[1:] == [next_ray_count(a, round(n), config) for a, n in zip(rays, samples[:-1])]
+
+
+def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(data, tmp_path):
+    """Of 50 rays: 600 points looked at, 300 composited, 120 shaded; steps that were skipped, by either reason."""
+    training = loop.Training(load_dataset(data), tiny(), tmp_path, torch.device("cpu"))
+    training.watch.skipped, training.take_step.n_discarded = 2, 3
+    numbers = loop.StepNumbers({"colour": 0.25}, 0.5, 1.0, 300, 600, 120, True)
+    line = training.line(SimpleNamespace(target=torch.zeros(50, 4)), {"colour": Term(2.0, torch.tensor(0.0))}, numbers)
+    counts = {"rays": 50, "samples_per_ray": 12.0, "kept": 0.5, "shaded": 0.2, "skipped": 5}
+    expected = counts | {"loss": 0.5, "loss_colour": 0.5}
+    assert {name: line[name] for name in expected} == expected
+
+
+def test_the_first_steps_the_last_and_every_twentieth_are_logged(data, tmp_path):
+    loop.train(load_dataset(data), tiny(steps=45, mesh_every=2.0, preview_every=2.0), tmp_path)
+    assert [line["step"] for line in lines_of(tmp_path)] == [*range(1, 21), 40, 45]
+
+
+def test_time_is_counted_in_minutes_and_goes_on_with_the_run(data, tmp_path, monkeypatch):
+    """Each step takes 10 seconds: checkpoints after more than a minute; a pause between two parts does not count."""
+    at, pause, saved = steps_of(monkeypatch), [0.0], []
+    monkeypatch.setattr(loop.time, "monotonic", lambda: 10.0 * (at[0] + 1) + pause[0])
+    save = loop.Training.save
+    monkeypatch.setattr(loop.Training, "save", lambda self: saved.append(self.step) or save(self))
+    config = tiny(steps=20, checkpoint_minutes=1.0, light_step_every=1, mesh_every=2.0, preview_every=2.0)
+    loop.train(load_dataset(data), config, tmp_path)
+    assert saved == [7, 14, 20]
+    pause[0] = 5000.0
+    trained = loop.train(load_dataset(data), config.replace({"steps": 30}), tmp_path, resume=True)
+    lines = lines_of(tmp_path)
+    assert [line["step"] for line in lines] == [*range(1, 21), 30] and trained.step == 30
+    assert [line["seconds"] for line in lines] == [*range(10, 201, 10), 300] and trained.seconds == 300
+
+
+@pytest.mark.parametrize(
+    ("step", "seconds", "progress"),
+    [(0, 0, 0.0), (30, 6, 0.3), (10, 60, 0.5), (100, 0, 1.0), (0, 120, 1.0), (200, 300, 1.0)],
+)
+def test_progress_is_the_larger_share_of_steps_or_minutes(data, tmp_path, step, seconds, progress):
+    training = loop.Training(load_dataset(data), tiny(steps=100, max_minutes=2.0), tmp_path, torch.device("cpu"))
+    training.step, training.seconds = step, float(seconds)
+    assert training.progress == pytest.approx(progress)
+    training.config = tiny(steps=100)
+    assert training.progress == pytest.approx(min(1.0, step / 100))
+
+
+def test_a_finished_run_that_is_resumed_stays_as_it_is(data, tmp_path):
+    """All levels are open, so that the mesh is that of the whole field."""
+    config = tiny(steps=24, start_levels=1, levels_open_by=0.5, learning_rate=0.05, warmup_steps=1)
+    first = loop.train(load_dataset(data), config, tmp_path)
+    again = loop.train(load_dataset(data), config, tmp_path, resume=True)
+    assert again.step == 24 and again.finished and again.model.sdf_field.grid.n_active == 4
+    x = torch.rand(100, 3) - 0.5
+    assert torch.equal(again.model.sdf_field.sdf(x), first.model.sdf_field.sdf(x))
+    assert torch.equal(again.model.occlusion.cache.vertices, first.model.occlusion.cache.vertices)
+
+
+@pytest.mark.parametrize("deterministic", [False, True])
+def test_a_thread_makes_the_meshes_where_that_is_set(data, tmp_path, monkeypatch, deterministic):
+    """A run whose bits repeat waits for each, another goes on without it."""
+    make, makers, at, used = meshes.make_mesh, [], steps_of(monkeypatch), []
+
+    def slowly(*args):
+        makers.append(threading.current_thread())
+        time.sleep(0.3)
+        return make(*args)
+
+    monkeypatch.setattr(meshes, "make_mesh", slowly)
+    use = SceneModel.use_mesh
+    monkeypatch.setattr(SceneModel, "use_mesh", lambda self, bits: used.append(at[0]) or use(self, bits))
+    config = tiny(steps=12, mesh_every=0.5, preview_every=2.0, background_meshes=True, deterministic=deterministic)
+    loop.train(load_dataset(data), config, tmp_path)
+    assert threading.main_thread() not in makers and len(makers) == 2
+    assert (used[0] == 6) == deterministic and used[-1] == 11
+
+
+@pytest.mark.parametrize("settings", [{}, {"occlusion": "off", "shading": "split"},
+                                      {"occlusion": "mlp", "shading": "split", "occlusion_weight": 0.0}])  # fmt: skip
+def test_occlusion_is_traced_only_where_an_mlp_learns_it(data, tmp_path, settings):
+    loop.train(load_dataset(data), tiny(steps=6, mesh_every=0.3, preview_every=2.0, **settings), tmp_path)
+    assert not any("loss_occlusion" in line for line in lines_of(tmp_path))
+
+
+@pytest.mark.parametrize(("occlusion", "asked"), [("bits", [0.5, 1.0]), ("mlp", [0.5]), ("off", [])])
+def test_meshes_are_asked_for_where_they_are_used(data, tmp_path, monkeypatch, occlusion, asked):
+    """The last one is for the bits: they are stored with it."""
+    requests = calls(monkeypatch, meshes.SurfaceMesh, "request", lambda _, progress: progress)
+    config = tiny(steps=6, mesh_every=0.5, preview_every=2.0, occlusion=occlusion, shading="split")
+    loop.train(load_dataset(data), config, tmp_path)
+    assert requests == asked
+
+
+def test_parameters_are_checked_before_a_mesh_and_before_they_are_saved(data, tmp_path, monkeypatch):
+    """Between two lines of the log."""
+    training = loop.Training(load_dataset(data), tiny(mesh_every=0.5), tmp_path, torch.device("cpu"))
+    training.step = 5000
+    training.model.sdf_field.out_bias.data[0] = torch.nan
+    for act in (training.refresh, training.save, training.finish):
+        with pytest.raises(Diverged, match="step 5000: not finite: parameter sdf_field.out_bias"):
+            act()
+    assert not (tmp_path / "checkpoint.pt").exists()
+
+
+@pytest.mark.parametrize("on", [False, True])
+def test_a_run_adds_and_multiplies_as_it_is_set(data, tmp_path, monkeypatch, on):
+    cores = []
+    monkeypatch.setattr(loop, "tensor_cores", lambda on: cores.append(on) or nullcontext())
+    order = calls(monkeypatch, loop.Training, "advance", lambda *_: torch.are_deterministic_algorithms_enabled())
+    config = tiny(steps=2, preview_every=2.0, tensor_cores=not on, deterministic=on)
+    loop.train(load_dataset(data), config, tmp_path)
+    assert cores == [not on] and order == [on, on]
+
+
+def test_bits_repeat_on_the_cpu_alone(data, tmp_path):
+    """Others are refused before anything is made."""
+    loop.check_repeatable(tiny(deterministic=True), "cpu")
+    loop.check_repeatable(tiny(), "cuda")
+    with pytest.raises(InputError, match="deterministic run needs the CPU"):
+        loop.train(load_dataset(data), tiny(deterministic=True), tmp_path, device="cuda")
+
+
+def test_rays_are_drawn_near_the_masks_as_often_as_is_set(data, tmp_path):
+    """All of them, or as many as the masks fill."""
+    dataset, inside = load_dataset(data), []
+    for share in (0.0, 1.0):
+        training = loop.Training(dataset, tiny(foreground_share=share), tmp_path, torch.device("cpu"))
+        inside.append((training.source.draw(2000)[2][:, 3] > 0).float().mean().item())
+    masks = (dataset.images[..., 3] > 0).mean()
+    assert inside[0] == pytest.approx(masks, abs=0.04) and inside[1] > inside[0] + 0.1
+
+
+def test_the_hull_is_that_of_the_runs_box_and_cells(data, tmp_path):
+    training = loop.Training(load_dataset(data), tiny(box=1.2, hull_until=0.1), tmp_path, torch.device("cpu"))
+    cameras = training.source.masks, training.source.poses, training.source.intrinsics
+    hull = training.grid.hull.flatten()
+    assert torch.equal(hull, visual_hull(16, 1.2, *cameras).flatten())
+    assert not torch.equal(hull, visual_hull(16, 1.5, *cameras).flatten())
+
+
+def test_without_indirect_light_nothing_is_refreshed_between_two_meshes(data, tmp_path, monkeypatch):
+    """Each of the two is told to the occlusion, which leaves the light out."""
+    at = steps_of(monkeypatch)
+    indirect = calls(monkeypatch, SceneModel, "refresh_indirect", lambda *_: at[0])
+    config = tiny(steps=6, mesh_every=0.5, indirect=False, indirect_every=1, preview_every=2.0)
+    loop.train(load_dataset(data), config, tmp_path)
+    assert indirect == [3] * 3 + [5] * 3

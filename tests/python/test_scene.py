@@ -266,8 +266,52 @@ class TestAveragedGrid:
         grid.update(field, 200.0, first=False, step=300)
         assert asked[0] == 4096 and 1024 < asked[1] < 2048
 
+    @pytest.mark.parametrize(("left", "right"), [(0.0, 5.46), (9.4, 10.1), (5.46, 9.4)])
+    def test_a_cell_stays_while_its_opacity_exceeds_the_mean_or_a_thousandth(self, left, right):
+        """Opacities of a sample across the surface's distance f: 1 - Phi(f - h) / Phi(f + h), of one half of the cells and the
+        other; .63 and .01 both stay, of two below a thousandth the one above the mean."""
+        s, step = 200.0, 0.01
+        f = torch.tensor([left, right], dtype=torch.float64) / s
+        opacity = 1 - torch.sigmoid(s * (f - step / 2)) / torch.sigmoid(s * (f + step / 2))
+        grid = AveragedGrid(8, 1.5, step)
+        grid.update(lambda x: torch.where(x[:, 0] < 0, *f.float()), s)
+        values = grid.values.view(2, -1)
+        torch.testing.assert_close(values, opacity.float()[:, None].expand_as(values), rtol=1e-3, atol=0)
+        stays = opacity > min(opacity.mean(), 1e-3)
+        cells = grid.cells.view(2, -1) == CELL_OCCUPIED
+        assert torch.equal(cells, stays[:, None].expand_as(cells))
+
+    def test_later_what_is_asked_decays_and_most_of_what_is_occupied_is_asked(self):
+        """At a point anywhere in its cell; the other cells keep what they have."""
+        asked = []
+
+        def nothing(x):
+            asked.append(x)
+            return torch.full_like(x[:, 0], 9.0)
+
+        torch.manual_seed(0)
+        grid = AveragedGrid(16, 1.5, 0.01)
+        grid.update(lambda x: x[:, 0] + 1.2, 200.0)
+        before, occupied = grid.values.clone(), (grid.cells == CELL_OCCUPIED).reshape(-1)
+        assert 100 < occupied.sum() < 1000
+        grid.update(nothing, 200.0, first=False, step=256)
+        inside = (asked[0] + 1.5) / (3.0 / 16)
+        cell = inside.long()
+        now = torch.zeros(4096, dtype=torch.bool).index_fill(0, (cell[:, 0] * 16 + cell[:, 1]) * 16 + cell[:, 2], True)
+        assert now.sum() == len(cell) and now[occupied].float().mean() > 0.8 and 0.15 < now[~occupied].float().mean() < 0.3
+        place = inside - cell
+        assert place.min() >= 0 and place.mean().item() == pytest.approx(0.5, abs=0.02) and place.std().item() == pytest.approx(12**-0.5, abs=0.02)
+        torch.testing.assert_close(grid.values, torch.where(now, 0.95 * before, before))
+        grid.update(nothing, 200.0, first=True, step=300)
+        grid.update(nothing, 200.0, first=False, step=255)
+        assert len(asked[1]) == len(asked[2]) == 4096
+
     def test_the_setting_chooses(self):
         assert type(make_grid(preset("paper"))) is AveragedGrid and type(make_grid(preset("cpu"))) is OccupancyGrid
+        config = preset("paper").replace({"min_step": 0.013, "grid_resolution": 12})
+        assert make_grid(config).step == 0.013
+        for grid in (make_grid(config), make_grid(config.replace({"occupancy": "distance"}))):  # before the first look
+            assert grid.cells.shape == (12, 12, 12) and (grid.cells == CELL_OCCUPIED).all()
 
 
 def orbit(n: int, distance: float = 4.0) -> torch.Tensor:
@@ -295,6 +339,21 @@ class TestHull:
         assert hull[inside].all()
         far = (grid.centres()[:, :2].norm(dim=1) > RADIUS + 0.4).view(32, 32, 32)
         assert not hull[far].any()
+
+    def test_each_view_carves_by_its_own_mask_place_and_lens(self):
+        """Faint masks: the sphere from +x, and its upper half from +y by a lens of its own."""
+        size, distance = 160, 4.0
+        lenses = torch.tensor([[100.0, 100.0, 80.0, 80.0], [70.0, 90.0, 50.0, 100.0]])
+        y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
+        masks = torch.stack(
+            [((x - cx) / fx) ** 2 + ((y - cy) / fy) ** 2 < RADIUS**2 / (distance**2 - RADIUS**2) for fx, fy, cx, cy in lenses]
+        )
+        masks[1] &= y < lenses[1, 3]
+        hull = visual_hull(32, 1.5, 0.2 * masks.float(), orbit(4)[:2], lenses).reshape(-1)
+        centres = OccupancyGrid(32, 1.5).centres()
+        assert hull[(centres.norm(dim=1) < RADIUS) & (centres[:, 2] > 0)].all()
+        for beside in (centres[:, 1:].norm(dim=1) - 0.4, centres[:, ::2].norm(dim=1) - 0.4, RADIUS - centres[:, 2] - 0.3):
+            assert not hull[beside > RADIUS].any()
 
 
 @pytest.fixture

@@ -111,21 +111,25 @@ def at_nodes(mode: str, metallic: float = 0.0, albedo: tuple = (0.2, 0.5, 0.9)) 
     albedo, one = torch.tensor([albedo]).expand(n, 3), torch.ones(n, 1)
     white = torch.ones(n, 3)
     radiance = split_sum_shade(up, views, albedo, rho, metallic * one, white, white, one, one, fresnel_mode=mode)
-    f1, f2 = brdf_lut()[:, 1:, :2].reshape(-1, 2, 1).unbind(1)
-    return radiance, dict(albedo=albedo, rho=rho, grazing=(1 - cosine[:, None]) ** 5, f1=f1, f2=f2, metallic=metallic)
+    f1, f2, _, layer = brdf_lut()[:, 1:].reshape(-1, 4, 1).unbind(1)
+    return radiance, dict(albedo=albedo, rho=rho, grazing=(1 - cosine[:, None]) ** 5, f1=f1, f2=f2, layer=layer)
 
 
 @pytest.mark.parametrize("metallic", [0.0, 0.6, 1.0])
 @pytest.mark.parametrize("mode", FRESNEL_MODES)
 def test_fresnels_term_by_its_name(mode, metallic):
-    """exact: E = F0 F1 + F2, diffuse (1 - m)(1 - E); as published E = F_r F1 + F2, (1 - m)(1 - F_r), with Schlick's
-    F_r = F0 + (1 - rho - F0)(1 - n.v)^5, in the released code with max(1 - rho, F0) for 1 - rho."""
+    """exact: E = m (albedo F1 + F2) + (1 - m) E_d, diffuse (1 - m)(1 - E_d); as published E = F_r F1 + F2,
+    (1 - m)(1 - F_r), with Schlick's F_r = F0 + (1 - rho - F0)(1 - n.v)^5, in the released code with max(1 - rho, F0) for
+    1 - rho."""
     radiance, p = at_nodes(mode, metallic)
-    f0 = 0.04 * (1 - metallic) + metallic * p["albedo"]
-    rim = {"exact": f0, "paper": 1 - p["rho"], "code": torch.maximum(1 - p["rho"], f0)}[mode]
-    fresnel = f0 + (rim - f0) * p["grazing"]
-    energy = fresnel * p["f1"] + p["f2"]
-    diffuse = (1 - metallic) * (1 - (energy if mode == "exact" else fresnel)) * p["albedo"]
+    if mode == "exact":
+        energy, taken = metallic * (p["albedo"] * p["f1"] + p["f2"]) + (1 - metallic) * p["layer"], p["layer"]
+    else:
+        f0 = 0.04 * (1 - metallic) + metallic * p["albedo"]
+        rim = 1 - p["rho"] if mode == "paper" else torch.maximum(1 - p["rho"], f0)
+        taken = f0 + (rim - f0) * p["grazing"]
+        energy = taken * p["f1"] + p["f2"]
+    diffuse = (1 - metallic) * (1 - taken) * p["albedo"]
     torch.testing.assert_close(radiance, diffuse + energy, rtol=1e-4, atol=1e-5)
 
 

@@ -136,7 +136,19 @@ def test_torch_adds_in_a_fixed_order_where_asked():
     for on in (False, True):
         with same_bits(on):
             assert torch.are_deterministic_algorithms_enabled() == on
+            assert torch.utils.deterministic.fill_uninitialized_memory != on
         assert not torch.are_deterministic_algorithms_enabled()
+        assert torch.utils.deterministic.fill_uninitialized_memory
+    # What was so before is so again, after an error as well.
+    with same_bits(True):
+        with pytest.raises(KeyError), same_bits(True):
+            raise KeyError
+        with same_bits(False):
+            pass
+        assert torch.are_deterministic_algorithms_enabled()
+    with pytest.raises(KeyError), same_bits(True):
+        raise KeyError
+    assert not torch.are_deterministic_algorithms_enabled()
 
 
 # Runs by what decides their steps to come. One cell is always near the surface: the grid is the same.

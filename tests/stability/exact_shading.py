@@ -20,12 +20,12 @@ def clipped(x, low, high):
 
 
 def table(n_dot_v, roughness) -> list:
-    """F1, F2, chi: bilinear in sqrt(n.v) and roughness."""
+    """F1, F2, chi, E_d: bilinear in sqrt(n.v) and roughness."""
     lut = brdf_lut().double().numpy()
     x, y = mp.sqrt(clipped(n_dot_v, 1e-4, 1)) * NODES, clipped(roughness, 0, 1) * NODES
     i, j = min(int(x), NODES - 1), min(int(y), NODES - 1)
     corners = [(a, b, (x - i if a else 1 - x + i) * (y - j if b else 1 - y + j)) for a in (0, 1) for b in (0, 1)]
-    return [mp.fsum(w * mp.mpf(float(lut[j + b, i + a, k])) for a, b, w in corners) for k in range(3)]
+    return [mp.fsum(w * mp.mpf(float(lut[j + b, i + a, k])) for a, b, w in corners) for k in range(4)]
 
 
 def turned(normal: list, view: list) -> tuple[list, object]:
@@ -46,8 +46,12 @@ def query_direction(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]
 
 
 def fresnel(mode: str, f0, roughness, cosine):
-    edge = {"paper": 1 - roughness, "code": max(1 - roughness, f0)}.get(mode, f0)
+    edge = {"paper": 1 - roughness, "code": max(1 - roughness, f0)}[mode]
     return f0 + (edge - f0) * clipped(1 - cosine, 0, 1) ** 5
+
+
+def gain(f0, f1, f2, compensated: bool):
+    return 1 + f0 * (1 / (f1 + f2) - 1) if compensated else mp.mpf(1)
 
 
 def split_sum_shade(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
@@ -57,36 +61,58 @@ def split_sum_shade(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]
         mp.mpf(float(row["metallic"][0])),
     )
     cosine = turned(vector(row["normals"]), view)[1]
-    f1, f2, _ = table(cosine, roughness)
+    f1, f2, _, layer = table(cosine, roughness)
     names = ("albedo", "specular", "diffuse", "occlusion_s", "occlusion_d")
     out: dict[str, list] = {}
     for mode in ("exact", "paper", "code", "compensated"):
         out[mode] = []
         for albedo, l_s, l_d, o_s, o_d in zip(*(vector(row[name]) for name in names)):
-            f0 = mp.mpf("0.04") * (1 - metallic) + metallic * albedo
-            f = fresnel(mode, f0, roughness, cosine)
-            energy = f * f1 + f2
-            if mode == "compensated":
-                energy *= 1 + f * (1 / (f1 + f2) - 1)
-            kept = 1 - (f if mode in ("paper", "code") else energy)
+            if mode in ("paper", "code"):
+                f = fresnel(mode, mp.mpf("0.04") * (1 - metallic) + metallic * albedo, roughness, cosine)
+                energy, kept = f * f1 + f2, 1 - f
+            else:
+                coat = layer * gain(mp.mpf("0.04"), f1, f2, mode == "compensated")
+                metal = (albedo * f1 + f2) * gain(albedo, f1, f2, mode == "compensated")
+                energy, kept = metallic * metal + (1 - metallic) * coat, 1 - coat
             out[mode].append(o_d * (1 - metallic) * kept * albedo * l_d + o_s * energy * l_s)
     return out
 
 
 def shade_sums(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
     view, metallic = vector(row["view_dirs"]), mp.mpf(float(row["metallic"][0]))
-    f1, f2, _ = table(turned(vector(row["normals"]), view)[1], mp.mpf(float(row["roughness"][0])))
+    f1, f2, _, layer = table(turned(vector(row["normals"]), view)[1], mp.mpf(float(row["roughness"][0])))
     out: dict[str, list] = {"single": [], "compensated": []}
-    for albedo, specular, grazing, diffuse in zip(
-        *(vector(row[n]) for n in ("albedo", "specular", "grazing", "diffuse"))
+    for albedo, specular, grazing, diffuse, dielectric in zip(
+        *(vector(row[n]) for n in ("albedo", "specular", "grazing", "diffuse", "dielectric"))
     ):
-        f0 = mp.mpf("0.04") * (1 - metallic) + metallic * albedo
         for name, values in out.items():
-            gain = 1 + f0 * (1 / (f1 + f2) - 1) if name == "compensated" else mp.mpf(1)
-            energy = (f0 * f1 + f2) * gain
-            lobes = gain * (f0 * (specular - grazing) + grazing)
-            values.append(lobes + (1 - metallic) * (1 - energy) * albedo * diffuse)
+            coat = gain(mp.mpf("0.04"), f1, f2, name == "compensated")
+            metal = gain(albedo, f1, f2, name == "compensated") * (albedo * (specular - grazing) + grazing)
+            base = (1 - coat * layer) * albedo * diffuse
+            values.append(metallic * metal + (1 - metallic) * (coat * dielectric + base))
     return out
+
+
+def specular_share(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+    """What single scattering reflects, of all that is reflected, between .1 and .95."""
+    view, metallic = vector(row["view_dirs"]), mp.mpf(float(row["metallic"][0]))
+    f1, f2, _, layer = table(turned(vector(row["normals"]), view)[1], mp.mpf(float(row["roughness"][0])))
+    coat = layer * gain(mp.mpf("0.04"), f1, f2, True)
+    single = whole = mp.mpf(0)
+    for albedo in vector(row["albedo"]):
+        metal = metallic * (albedo * f1 + f2)
+        single += metal + (1 - metallic) * coat
+        whole += metal * gain(albedo, f1, f2, True) + (1 - metallic) * (coat + (1 - coat) * albedo)
+    return {"share": [clipped(single / whole, mp.mpf("0.1"), mp.mpf("0.95"))]}
+
+
+def fresnel_dielectric(cosine):
+    """The mean reflectance of both polarisations at a dielectric of index 1.5."""
+    cosine, index = clipped(cosine, 0, 1), mp.mpf("1.5")
+    refracted = mp.sqrt(1 - (1 - cosine**2) / index**2)
+    across = (cosine - index * refracted) / (cosine + index * refracted)
+    along = (index * cosine - refracted) / (index * cosine + refracted)
+    return (across**2 + along**2) / 2
 
 
 def light_sums(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
@@ -95,7 +121,7 @@ def light_sums(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
     normal, cosine = turned(vector(row["normals"]), view)
     cosine = max(cosine, mp.mpf("1e-4"))
     a2 = max(roughness**2, mp.mpf("2e-3")) ** 2
-    out = {name: [mp.mpf(0)] * 3 for name in ("specular", "grazing", "diffuse")}
+    out = {name: [mp.mpf(0)] * 3 for name in ("specular", "grazing", "diffuse", "dielectric")}
     for light_dir, pdf, radiance in zip(row["light_dirs"], row["pdf"], row["radiance"]):
         light = vector(light_dir)
         along = dot(normal, light)
@@ -109,10 +135,15 @@ def light_sums(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
         density = a2 / (mp.pi * (a2 + (1 - a2) * sin2) ** 2)
         shadowed = along * mp.sqrt(cosine**2 * (1 - a2) + a2) + cosine * mp.sqrt(along**2 * (1 - a2) + a2)
         lobe = density * along / (2 * shadowed)
-        schlick = clipped(1 - dot(view, half), 0, 1) ** 5
+        weights = {
+            "specular": lobe,
+            "grazing": lobe * clipped(1 - dot(view, half), 0, 1) ** 5,
+            "diffuse": along / mp.pi,
+            "dielectric": lobe * fresnel_dielectric(dot(view, half)),
+        }
         for c, value in enumerate(vector(radiance)):
             share = value / (len(row["pdf"]) * mp.mpf(float(pdf)))
-            for name, weight in (("specular", lobe), ("grazing", lobe * schlick), ("diffuse", along / mp.pi)):
+            for name, weight in weights.items():
                 out[name][c] += share * weight
     return out
 

@@ -222,17 +222,18 @@ def lobe_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
 
 
 def bsdf_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """Unit vectors, densities finite and not below 0, above the horizon at least half of the cosine's."""
+    """Unit vectors, densities finite and not below 0, above the horizon at least the cosine's times its share."""
     normals = draw.directions(n)
     rows = {
         "normals": normals.float(),
         "view_dirs": draw.at_cosine(normals).float(),
         "roughness": draw.roughness(n).float(),
+        "specular_share": draw.shares(n, 1).float(),
     }
     found, pdf = ops.sample_bsdf(*rows.values(), 8, int(draw.uniform(1).item() * 1e9))
     sign = torch.where((rows["normals"].double() * rows["view_dirs"].double()).sum(1, keepdim=True) < 0, -1.0, 1.0)
     cosine = ((rows["normals"].double() * sign)[:, None] * found.double()).sum(-1)
-    least = 0.5 * cosine / torch.pi * (1 - 1e-5) - 1e-6
+    least = (1 - rows["specular_share"].double()) * cosine / torch.pi * (1 - 1e-5) - 1e-6
     clear = (rows["normals"].double() * rows["view_dirs"].double()).sum(1).abs() > 1e-6  # whether the normal is turned
     low = torch.where(clear, (least - pdf.double()).amax(1), -1.0)
     length = (found.double().norm(dim=-1) - 1).abs().amax(1) - 2e-6
@@ -256,7 +257,7 @@ PROPERTIES = (
     Property("march_rays", marched, "in the box, ascending by the step, at most as many as asked for"),
     Property("spread_samples", spread, "shares in [0, 1]; every ray has a sample; constants stay themselves", size=8),
     Property("sample_ggx_lobe", lobe_samples, "unit, above the horizon, evenly spaced in the CDF of D cos", size=8),
-    Property("sample_bsdf", bsdf_samples, "unit; the density is finite and at least half of the cosine's", size=8),
+    Property("sample_bsdf", bsdf_samples, "unit; the density is finite and at least the cosine's share", size=8),
 )
 
 

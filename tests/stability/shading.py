@@ -61,20 +61,21 @@ def draw_shaded(draw: Draw, n: int) -> Rows:
 
 
 def draw_sums(draw: Draw, n: int) -> Rows:
-    light = {name: draw.radiance(n, 3) for name in ("specular", "grazing", "diffuse")}
+    light = {name: draw.radiance(n, 3) for name in ops.LightSums._fields}
     return within_the_light(draw_material(draw, n) | light)
 
 
 def within_the_light(rows: Rows) -> Rows:
-    """The light at grazing angles is a share of all of it, (1 - v.h)^5 of each direction's."""
-    return rows | {"grazing": torch.minimum(rows["grazing"], rows["specular"])}
+    """The light at grazing angles is a share of all of it, (1 - v.h)^5 of each direction's; so is the dielectric's."""
+    return rows | {name: torch.minimum(rows[name], rows["specular"]) for name in ("grazing", "dielectric")}
 
 
 def draw_lit(draw: Draw, n: int) -> Rows:
     """Points with a few directions each, those of the operator itself or extreme ones, with their densities."""
     rows = surface(draw, n)
     names = ("normals", "view_dirs", "roughness")
-    sampled, pdf = ops.sample_bsdf(*(rows[name].float() for name in names), SAMPLES, int(draw.uniform(1).item() * 1e9))
+    given = (*(rows[name] for name in names), draw.shares(n, 1))
+    sampled, pdf = ops.sample_bsdf(*(x.float() for x in given), SAMPLES, int(draw.uniform(1).item() * 1e9))
     own = draw.at_cosine(rows["normals"].repeat_interleave(SAMPLES, 0)).reshape(n, SAMPLES, 3)
     wild = draw.chance(0.3, n, SAMPLES)
     return rows | {
@@ -93,9 +94,13 @@ def shade_modes(rows: Rows, shared: Rows) -> Rows:
 
 
 def shade_from_sums(rows: Rows, shared: Rows) -> Rows:
-    given = [rows[name] for name in (*SHADED, "specular", "grazing", "diffuse")]
+    given = [rows[name] for name in (*SHADED, *ops.LightSums._fields)]
     modes = {"single": False, "compensated": True}
     return {name: lib.shade_sums(*given, shared["lut"].float(), mode) for name, mode in modes.items()}
+
+
+def share_of_lobe(rows: Rows, shared: Rows) -> Rows:
+    return {"share": lib.specular_share(*(rows[name] for name in SHADED), shared["lut"].float())}
 
 
 def directions(rows: Rows, shared: Rows) -> Rows:
@@ -184,9 +189,21 @@ ENTRIES = (
         repair=lambda rows: within_the_light(repaired(rows)),
         conditioned=True,
         bound=2e-6,
-        smooth=(*SHADED, "specular", "grazing", "diffuse"),
+        smooth=(*SHADED, *ops.LightSums._fields),
         gradient_bound=4e-6,
         exact=exact_shading.shade_sums,
+        exact_bound=1e-14,
+        reason=BY_CONDITION,
+    ),
+    Entry(
+        "specular_share",
+        draw=draw_material,
+        call=share_of_lobe,
+        shared=TABLE,
+        repair=repaired,
+        conditioned=True,
+        bound=2e-6,
+        exact=exact_shading.specular_share,
         exact_bound=1e-14,
         reason=BY_CONDITION,
     ),

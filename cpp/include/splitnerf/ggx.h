@@ -52,11 +52,14 @@ template <class T> SPLITNERF_HD T schlick(T f0, T v_dot_h) {
   return f0 + (T(1) - f0) * pow5(clamp(T(1) - v_dot_h, T(0), T(1)));
 }
 
-// Unpolarised reflectance of a smooth dielectric of refractive index 1.5 (F0 = .04), seen from outside.
+// Unpolarised reflectance of a smooth dielectric of refractive index 1.5 (F0 = .04), seen from outside: the mean of
+// ((g - c) / (g + c))^2 and ((n^2 c - g) / (n^2 c + g))^2 with c = v.h and g^2 = n^2 - 1 + c^2.
 // Source: Walter et al. 2007, Eq. (22).
 template <class T> SPLITNERF_HD T fresnel_dielectric(T v_dot_h) {
-  const T c = clamp(v_dot_h, T(0), T(1)), g = std::sqrt(T(1.5 * 1.5 - 1) + c * c);
-  return T(0.5) * square((g - c) / (g + c)) * (T(1) + square((c * (g + c) - T(1)) / (c * (g - c) + T(1))));
+  constexpr double kSquaredIndex = 1.5 * 1.5;
+  const T c = clamp(v_dot_h, T(0), T(1)), g = std::sqrt(T(kSquaredIndex - 1) + c * c), across = T(kSquaredIndex) * c;
+  const T inverse = T(1) / ((g + c) * (across + g));
+  return T(0.5) * (square((g - c) * (across + g) * inverse) + square((across - g) * (g + c) * inverse));
 }
 
 }  // namespace splitnerf

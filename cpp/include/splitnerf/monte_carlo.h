@@ -15,27 +15,41 @@ template <class T> SPLITNERF_HD T sampled_alpha(T roughness) {
   return max_of(ggx_alpha_from_roughness(roughness), T(kMinSampledAlpha));
 }
 
-// Half of the directions follow the cosine, half the visible normals: the density of both together
-// (balance heuristic; Veach 1997). normal: turned to the viewer.
-template <class T> SPLITNERF_HD T bsdf_pdf(Vec3<T> normal, Vec3<T> view, Vec3<T> light, T ggx_alpha) {
-  const Frame<T> frame(normal);
-  const Vec3<T> v = frame.to_local(view), l = frame.to_local(light), h = normalize(v + l);
-  if (!(l.z > T(0))) return T(0);
-  return T(0.5) * (pdf_cosine_hemisphere(l.z) + pdf_ggx_vndf(v, h, ggx_alpha));
-}
+// A share of the n directions of a point follows the visible normals, the others the cosine. share: in [0, 1]; other
+// numbers count as the nearest in it. u in [0, 1) rounds the number of the former up or down, so that its mean is
+// share n, and each lobe has a lattice of its own; the first directions are those of the visible normals.
+template <class T> struct LobeChoice {
+  T share;
+  int n, n_visible;
 
-// Direction i of n; u in [0, 1)^2 from a lattice over all n, so that each half is stratified too. It
-// may lie below the horizon.
-template <class T> SPLITNERF_HD Vec3<T> sample_bsdf(Vec3<T> normal, Vec3<T> view, T ggx_alpha, int i, Vec2<T> u) {
-  const Frame<T> frame(normal);
-  if (i % 2 == 0) return frame.to_world(sample_cosine_hemisphere(u.x, u.y));
-  const Vec3<T> v = frame.to_local(view);
-  return frame.to_world(reflect(sample_ggx_vndf(v, u.x, u.y, ggx_alpha), v));
-}
+  SPLITNERF_HD LobeChoice(T share_, int n_, T u)
+      : share(clamp(share_, T(0), T(1))), n(n_), n_visible(clamp(static_cast<int>(share * T(n_) + u), 0, n_)) {}
 
-// f without Fresnel times n.l, w = D V (n.l)+, Schlick's weight (1 - v.h)^5, and the cosine over pi.
+  // The density of both together, at a direction to the light (balance heuristic; Veach 1997). normal: turned to the
+  // viewer.
+  SPLITNERF_HD T pdf(Vec3<T> normal, Vec3<T> view, Vec3<T> light, T ggx_alpha) const {
+    const Frame<T> frame(normal);
+    const Vec3<T> v = frame.to_local(view), l = frame.to_local(light), h = normalize(v + l);
+    if (!(l.z > T(0))) return T(0);
+    return (T(1) - share) * pdf_cosine_hemisphere(l.z) + share * pdf_ggx_vndf(v, h, ggx_alpha);
+  }
+  // Direction i; it may lie below the horizon.
+  SPLITNERF_HD Vec3<T> sample(Vec3<T> normal, Vec3<T> view, T ggx_alpha, int i, Vec2<T> shift) const {
+    const Frame<T> frame(normal);
+    if (i >= n_visible) {
+      const Vec2<T> u = fibonacci_lattice<T>(i - n_visible, n - n_visible, shift);
+      return frame.to_world(sample_cosine_hemisphere(u.x, u.y));
+    }
+    const Vec2<T> u = fibonacci_lattice<T>(i, n_visible, shift);
+    const Vec3<T> v = frame.to_local(view);
+    return frame.to_world(reflect(sample_ggx_vndf(v, u.x, u.y, ggx_alpha), v));
+  }
+};
+
+// f without Fresnel times n.l, w = D V (n.l)+, Schlick's weight (1 - v.h)^5, the Fresnel term of a dielectric, and the
+// cosine over pi.
 template <class T> struct LobeWeight {
-  T specular, schlick, cosine;
+  T specular, schlick, dielectric, cosine;
 };
 
 // w and its derivatives; the half vector does not depend on the normal.
@@ -48,7 +62,7 @@ template <class T> struct LobeWeightGrad {
 template <class T>
 SPLITNERF_HD LobeWeightGrad<T> lobe_weight(Vec3<T> normal, Vec3<T> view, Vec3<T> light, T ggx_alpha) {
   const T nl = dot(normal, light), nv = max_of(dot(normal, view), T(kMinNdotV));
-  LobeWeightGrad<T> out{{T(0), T(0), T(0)}, T(0), {T(0), T(0), T(0)}};
+  LobeWeightGrad<T> out{{T(0), T(0), T(0), T(0)}, T(0), {T(0), T(0), T(0)}};
   if (!(nl > T(0))) return out;
   const Vec3<T> h = normalize(view + light);
   const T a2 = ggx_alpha * ggx_alpha;
@@ -57,7 +71,8 @@ SPLITNERF_HD LobeWeightGrad<T> lobe_weight(Vec3<T> normal, Vec3<T> view, Vec3<T>
   const T root_v = std::sqrt(nv * nv * (T(1) - a2) + a2), root_l = std::sqrt(nl * nl * (T(1) - a2) + a2);
   const T x = nl * root_v + nv * root_l;
   const T lobe = ggx_d(ggx_alpha, sin2) * smith_v(ggx_alpha, nv, nl), w = lobe * nl;
-  out.value = {w, pow5(clamp(T(1) - dot(view, h), T(0), T(1))), nl * T(1 / kPi)};
+  const T v_dot_h = dot(view, h);
+  out.value = {w, pow5(clamp(T(1) - v_dot_h, T(0), T(1))), fresnel_dielectric(v_dot_h), nl * T(1 / kPi)};
   // ln w = 2 ln a - 2 ln q + ln nl - ln x + const; what nearly cancels in its derivatives by a and by nl is summed by hand:
   //   2 / a - 4 a (1 - sin2) / q = 2 (sin2 (1 + a^2) - a^2) / (a q),  1 - nl (d x / d nl) / x = nv a^2 / (root_l x)
   const T d_x_alpha = ggx_alpha * (nl * (T(1) - nv * nv) / root_v + nv * (T(1) - nl * nl) / root_l);
@@ -69,12 +84,13 @@ SPLITNERF_HD LobeWeightGrad<T> lobe_weight(Vec3<T> normal, Vec3<T> view, Vec3<T>
 }
 
 // Sums over the n directions of a point, per channel, radiance L_i past the object itself:
-//   all     = 1/n sum w_i L_i / p_i           grazing = 1/n sum w_i (1 - v.h_i)^5 L_i / p_i
-//   diffuse = 1/n sum (n.l_i)+ / pi L_i / p_i
+//   all     = 1/n sum w_i L_i / p_i             grazing    = 1/n sum w_i (1 - v.h_i)^5 L_i / p_i
+//   diffuse = 1/n sum (n.l_i)+ / pi L_i / p_i   dielectric = 1/n sum w_i F_d(v.h_i) L_i / p_i
 // so that the specular light with Schlick's Fresnel term is F0 (all - grazing) + grazing.
 template <class T> struct LightSums {
-  Vec3<T> all, grazing, diffuse;
+  Vec3<T> all, grazing, diffuse, dielectric;
 };
+inline constexpr int kLightSums = 4;
 
 // incoming(i) says where light comes from, 1 / (n p_i), or the solid angle of a fixed set of directions, and L_i.
 template <class T> struct IncomingLight {
@@ -88,7 +104,7 @@ SPLITNERF_HD LightSums<T> sum_light(const Group& group, Vec3<T> normal, Vec3<T> 
                                     Incoming incoming) {
   const Vec3<T> facing_normal = normal * facing(normal, view);
   const T ggx_alpha = sampled_alpha(roughness);
-  LightSums<T> sums{{T(0), T(0), T(0)}, {T(0), T(0), T(0)}, {T(0), T(0), T(0)}};
+  LightSums<T> sums{};
   for (int i = group.lane(); i < n; i += Group::size) {
     const IncomingLight<T> light = incoming(i);
     if (!(light.measure > T(0))) continue;
@@ -97,8 +113,9 @@ SPLITNERF_HD LightSums<T> sum_light(const Group& group, Vec3<T> normal, Vec3<T> 
     sums.all += share * w.specular;
     sums.grazing += share * (w.specular * w.schlick);
     sums.diffuse += share * w.cosine;
+    sums.dielectric += share * (w.specular * w.dielectric);
   }
-  return {sum3(group, sums.all), sum3(group, sums.grazing), sum3(group, sums.diffuse)};
+  return {sum3(group, sums.all), sum3(group, sums.grazing), sum3(group, sums.diffuse), sum3(group, sums.dielectric)};
 }
 
 template <class T> struct LightSumsGrad {
@@ -121,7 +138,7 @@ SPLITNERF_HD LightSumsGrad<T> sum_light_backward(const Group& group, Vec3<T> nor
     if (light.measure > T(0)) {
       const LobeWeightGrad<T> w = lobe_weight(facing_normal, view, light.direction, ggx_alpha);
       const Vec3<T> share = light.radiance * light.measure;
-      const Vec3<T> grad_specular = grad.all + grad.grazing * w.value.schlick;
+      const Vec3<T> grad_specular = grad.all + grad.grazing * w.value.schlick + grad.dielectric * w.value.dielectric;
       grad_share = (grad_specular * w.value.specular + grad.diffuse * w.value.cosine) * light.measure;
       const T grad_w = dot(grad_specular, share);
       grad_alpha += grad_w * w.d_ggx_alpha;
@@ -149,19 +166,19 @@ template <class T> struct SummedPoint {
   LightSums<T> light;
 };
 
-// L = gain (F0 (all - grazing) + grazing) + (1 - m)(1 - E) albedo diffuse, Schlick's Fresnel term inside the sums;
-// gain and E as in the split sum with FresnelMode::kExact.        Source: SplitNeRF Eq. (4)-(6).
+// L = m gain_m (albedo (all - grazing) + grazing) + (1 - m) (gain_d dielectric + (1 - E) albedo diffuse): the integral
+// of the path tracer's BSDF, principled.h; E of the dielectric layer.        Source: SplitNeRF Eq. (4)-(6).
 template <class T> SPLITNERF_HD Vec3<T> shade_sums(const float* lut, bool compensate, const SummedPoint<T>& p) {
   const T nv = dot(p.normal, p.view) * facing(p.normal, p.view), m = p.metallic;
   const LutSample<T> table = sample_brdf_lut(lut, nv, p.roughness);
+  const DielectricAlbedo<T> layer = dielectric_albedo(table, compensate);
   Vec3<T> radiance;
   for (int c = 0; c < 3; ++c) {
-    const T f0 = normal_reflectance(m, p.albedo[c]);
-    const T gain = scattering_gain(f0, table.lost, compensate).value;
-    const T kept = specular_albedo(f0, T(1) - f0, table, compensate).rest;
+    const T albedo = p.albedo[c], gain = scattering_gain(albedo, table.lost, compensate).value;
+    const T reflected = albedo * (p.light.all[c] - p.light.grazing[c]) + p.light.grazing[c];
     // The light first: shares of it may be so small that their product has no float.
-    radiance[c] = gain * (f0 * (p.light.all[c] - p.light.grazing[c]) + p.light.grazing[c]) +
-                  p.light.diffuse[c] * kept * (T(1) - m) * p.albedo[c];
+    radiance[c] = reflected * gain * m + p.light.dielectric[c] * layer.gain.value * (T(1) - m) +
+                  p.light.diffuse[c] * layer.rest * (T(1) - m) * albedo;
   }
   return radiance;
 }
@@ -172,28 +189,30 @@ SPLITNERF_HD SummedPoint<T> shade_sums_backward(const float* lut, bool compensat
                                                 Vec3<T> grad) {
   const T sign = facing(p.normal, p.view), nv = dot(p.normal, p.view) * sign, m = p.metallic;
   const LutSample<T> table = sample_brdf_lut(lut, nv, p.roughness);
+  const DielectricAlbedo<T> layer = dielectric_albedo(table, compensate);
   SummedPoint<T> out{};
-  T grad_f2 = T(0), grad_lost = T(0);
+  T grad_layer = T(0), grad_lost = T(0);
   for (int c = 0; c < 3; ++c) {
-    const T albedo = p.albedo[c], diffuse = p.light.diffuse[c], spread = p.light.all[c] - p.light.grazing[c];
-    const T f0 = normal_reflectance(m, albedo), reflected = f0 * spread + p.light.grazing[c];
-    const ScatteringGain<T> gain = scattering_gain(f0, table.lost, compensate);
-    const SpecularAlbedo<T> e = specular_albedo(f0, T(1) - f0, table, compensate);
-    const T kept = e.rest, g = grad[c];
-    // radiance = gain reflected + (1 - m) kept albedo diffuse
-    out.light.all[c] = g * gain.value * f0;
-    out.light.grazing[c] = g * gain.value * (T(1) - f0);
-    out.light.diffuse[c] = g * (T(1) - m) * kept * albedo;
-    const T grad_gain = g * reflected, grad_e = -g * diffuse * albedo * (T(1) - m);
-    const T grad_f0 = g * gain.value * spread + grad_gain * gain.d_fr + grad_e * e.d_fr;
-    out.albedo[c] = g * diffuse * kept * (T(1) - m) + grad_f0 * m;
-    out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - g * diffuse * kept * albedo;
-    grad_f2 += grad_e * e.d_f2;
-    grad_lost += grad_gain * gain.d_lost + grad_e * e.d_lost;
+    const T albedo = p.albedo[c], diffuse = p.light.diffuse[c], dielectric = p.light.dielectric[c], g = grad[c];
+    const T spread = p.light.all[c] - p.light.grazing[c], reflected = albedo * spread + p.light.grazing[c];
+    const ScatteringGain<T> gain = scattering_gain(albedo, table.lost, compensate);
+    // radiance = m gain reflected + (1 - m) (layer.gain dielectric + layer.rest albedo diffuse)
+    out.light.all[c] = g * m * gain.value * albedo;
+    out.light.grazing[c] = g * m * gain.value * (T(1) - albedo);
+    out.light.diffuse[c] = g * (T(1) - m) * layer.rest * albedo;
+    out.light.dielectric[c] = g * (T(1) - m) * layer.gain.value;
+    const T grad_gain = g * reflected * m;
+    out.albedo[c] = g * spread * gain.value * m + grad_gain * gain.d_fr + g * diffuse * layer.rest * (T(1) - m);
+    out.metallic += g * reflected * gain.value - g * dielectric * layer.gain.value - g * diffuse * layer.rest * albedo;
+    grad_layer -= g * diffuse * albedo * (T(1) - m);
+    grad_lost += grad_gain * albedo * gain.d_lost_over_fr +
+                 g * dielectric * (T(kDielectricF0) * layer.gain.d_lost_over_fr) * (T(1) - m);
   }
-  // F2, lost = table(n.v, roughness)
-  out.roughness = grad_f2 * table.d_roughness.y + grad_lost * table.lost_by_roughness;
-  const T grad_nv = grad_f2 * table.d_n_dot_v.y + grad_lost * table.lost_by_n_dot_v;
+  grad_lost += grad_layer * layer.d_lost;
+  const T grad_dielectric = grad_layer * layer.gain.value;
+  // lost, E_d = table(n.v, roughness)
+  out.roughness = grad_lost * table.lost_by_roughness + grad_dielectric * table.dielectric_by_roughness;
+  const T grad_nv = grad_lost * table.lost_by_n_dot_v + grad_dielectric * table.dielectric_by_n_dot_v;
   out.normal = p.view * (sign * grad_nv);
   out.view = p.normal * (sign * grad_nv);
   return out;
@@ -201,7 +220,7 @@ SPLITNERF_HD SummedPoint<T> shade_sums_backward(const float* lut, bool compensat
 
 // The fields of SummedPoint as arrays, 3 values each but for roughness and metallic.
 template <class T> struct SummedArrays {
-  T *normals, *view_dirs, *albedo, *roughness, *metallic, *all, *grazing, *diffuse;
+  T *normals, *view_dirs, *albedo, *roughness, *metallic, *all, *grazing, *diffuse, *dielectric;
 };
 
 }  // namespace splitnerf

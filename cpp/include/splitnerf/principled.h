@@ -12,33 +12,35 @@ template <class T> struct BsdfValue {
   T pdf;          // density of sample() at l, sr^-1
 };
 
-// The tables that the BSDF reads.
-struct PrincipledTables {
-  const float* brdf = brdf_lut();
-  const float* dielectric = dielectric_lut();
-};
+// The share of light reflected by single scattering of the specular lobe, of all that is reflected: visible normals are
+// sampled in proportion to it, the cosine lobe for the rest. Where gain is large most reflections at visible normals
+// end below the horizon, and the few above would carry weights of gain > 1 from bounce to bounce.
+template <class T> SPLITNERF_HD T specular_share(const LutSample<T>& table, Vec3<T> albedo, T metallic) {
+  const DielectricAlbedo<T> layer = dielectric_albedo(table, true);
+  T specular = T(3) * (T(1) - metallic) * layer.value, diffuse = T(0);
+  for (int c = 0; c < 3; ++c) {
+    const T metal = metallic * (albedo[c] * table.value.x + table.value.y);
+    specular += metal;
+    diffuse += (T(1) - metallic) * layer.rest * albedo[c] +
+               metal * (scattering_gain(albedo[c], table.lost, true).value - T(1));
+  }
+  return specular / max_of(specular + diffuse, T(1e-20));
+}
 
 template <class T> class PrincipledBsdf {
  public:
-  // view: unit, local, view.z > 0, towards the viewer.
-  SPLITNERF_HD PrincipledBsdf(const PrincipledTables& tables, Vec3<T> albedo, T roughness, T metallic, Vec3<T> view)
+  // lut: brdf_lut(). view: unit, local, view.z > 0, towards the viewer.
+  SPLITNERF_HD PrincipledBsdf(const float* lut, Vec3<T> albedo, T roughness, T metallic, Vec3<T> view)
       : view_(view), f0_(albedo), ggx_alpha_(max_of(ggx_alpha_from_roughness(roughness), T(1e-3))) {
     // Below ggx_alpha = 1e-3 rounding of h in float dominates D.
-    const Vec3<T> table = lookup_brdf_lut(tables.brdf, view.z, roughness);
-    const T missing = T(1) / (table.x + table.y) - T(1);
-    dielectric_ = (T(1) - metallic) * (T(1) + T(kDielectricF0) * missing);
-    const T e_dielectric = dielectric_ * lookup_dielectric_lut(tables.dielectric, view.z, roughness);
-    T specular = T(0), diffuse = T(0);
+    const LutSample<T> table = sample_brdf_lut(lut, view.z, roughness);
+    const DielectricAlbedo<T> layer = dielectric_albedo(table, true);
+    dielectric_ = (T(1) - metallic) * layer.gain.value;
     for (int c = 0; c < 3; ++c) {
-      metal_[c] = metallic * (T(1) + f0_[c] * missing);
-      diffuse_[c] = max_of(T(1) - metallic - e_dielectric, T(0)) * albedo[c];
-      // Visible normals are sampled in proportion to single scattering, the cosine lobe for the
-      // rest: where gain is large most of their reflections end below the horizon, and the few
-      // above would carry weights of gain > 1 from bounce to bounce.
-      specular += metallic * (f0_[c] * table.x + table.y) + e_dielectric;
-      diffuse += diffuse_[c] + (metal_[c] - metallic) * (f0_[c] * table.x + table.y);
+      metal_[c] = metallic * scattering_gain(f0_[c], table.lost, true).value;
+      diffuse_[c] = (T(1) - metallic) * layer.rest * albedo[c];
     }
-    specular_probability_ = specular / max_of(specular + diffuse, T(1e-20));
+    specular_probability_ = specular_share(table, albedo, metallic);
   }
 
   SPLITNERF_HD BsdfValue<T> evaluate(Vec3<T> light) const {
@@ -63,7 +65,8 @@ template <class T> class PrincipledBsdf {
   }
 
  private:
-  Vec3<T> view_, f0_, metal_, diffuse_;  // metal_: share of the metal times its gain
+  // metal_ and dielectric_: the share of each times its gain
+  Vec3<T> view_, f0_, metal_, diffuse_;
   T ggx_alpha_, dielectric_, specular_probability_;
 };
 

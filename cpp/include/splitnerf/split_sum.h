@@ -1,4 +1,4 @@
-// Split-sum shading: the F1 / F2 / chi table, the direction at which the pre-integrated light is
+// Split-sum shading: the table of the lobe's integrals, the direction at which the pre-integrated light is
 // asked, and the shading of one point, each with its adjoint directly below it.
 //
 // Source: SplitNeRF Eq. (6)-(10), (17); Karis 2013 for the split sum.
@@ -10,34 +10,46 @@
 namespace splitnerf {
 
 inline constexpr int kLutSize = 32;        // texels along sqrt(n.v) and along roughness
+inline constexpr int kLutChannels = 4;     // F1, F2, chi, E_d
 inline constexpr double kMinNdotV = 1e-4;  // n.v is clamped to [kMinNdotV, 1]
 
-// [kLutSize roughness][kLutSize sqrt(n.v)][F1, F2, chi] float32, computed once per process.
+// [kLutSize roughness][kLutSize sqrt(n.v)][F1, F2, chi, E_d] float32, computed once per process.
 // Texel i stands at i / (kLutSize - 1) on both axes.
-//   F1 = int D V (1 - (1 - v.h)^5) 4 ... dl,  F2 the same with (1 - v.h)^5:  E = F0 F1 + F2
+//   F1 = int D V (1 - (1 - v.h)^5) (n.l) dl,  F2 the same with (1 - v.h)^5:  E = F0 F1 + F2 with Schlick's Fresnel term
 //   chi places the mean direction of the lobe between normal and reflection, see query_direction.
+//   E_d = int D V F_d (n.l) dl with the exact Fresnel term of a dielectric, fresnel_dielectric; at most 1 - .01
 SPLITNERF_API const float* brdf_lut();
 
-// One entry of the table, F1, F2 and chi, by quadrature over 2 n_points microfacet normals.
-SPLITNERF_API Vec3<double> integrate_brdf(double n_dot_v, double roughness, int n_points);
+// One entry of the table by quadrature over 2 n_points microfacet normals.
+struct LobeIntegrals {
+  double f1, f2, chi, dielectric;
+};
+SPLITNERF_API LobeIntegrals integrate_brdf(double n_dot_v, double roughness, int n_points);
 
-// [kLutSize roughness][kLutSize sqrt(n.v)] float32: E of a dielectric with its exact Fresnel term, for
-// the path tracer; the split sum itself uses Schlick's form.
-SPLITNERF_API const float* dielectric_lut();
-
-// Values and partial derivatives of the table at one point.
+// Values and partial derivatives of the table at one point. Those by n.v are zero where it is clamped, those by
+// roughness outside [0, 1].
 template <class T> struct LutSample {
-  Vec3<T> value;        // F1, F2, chi
-  Vec3<T> d_n_dot_v;    // d value / d n.v, zero where n.v is clamped
-  Vec3<T> d_roughness;  // d value / d roughness, zero outside [0, 1]
-  T rest;               // 1 - chi, which the difference would lose where chi is close to 1
+  Vec3<T> value;  // F1, F2, chi
+  Vec3<T> d_n_dot_v, d_roughness;
+  T rest;  // 1 - chi, which the difference would lose where chi is close to 1
   // 1 - F1 - F2, what a lobe that reflects all light loses by single scattering, and its derivatives: on smooth surfaces
   // close to 0, where those of F1 and F2 cancel
   T lost, lost_by_n_dot_v, lost_by_roughness;
+  T dielectric, dielectric_by_n_dot_v, dielectric_by_roughness;  // E_d
 };
 
 // 1 - a - b of shares, the larger one first: that difference has no rounding.
 template <class T> SPLITNERF_HD T rest_of_shares(T a, T b) { return (T(1) - max_of(a, b)) - min_of(a, b); }
+
+// Between four nodes of the table: v01 follows v00 along n.v, v10 along roughness; derivatives per interval, from
+// differences of nodes, which are exact where neighbours are close.
+template <class T> struct Bilinear {
+  T value, along_n_dot_v, along_roughness;
+};
+template <class T> SPLITNERF_HD Bilinear<T> bilinear(T v00, T v01, T v10, T v11, T fx, T fy) {
+  return {lerp(lerp(v00, v01, fx), lerp(v10, v11, fx), fy), lerp(v01 - v00, v11 - v10, fy),
+          lerp(v10 - v00, v11 - v01, fx)};
+}
 
 // Bilinear in (sqrt(n.v), roughness).
 template <class T> SPLITNERF_HD LutSample<T> sample_brdf_lut(const float* lut, T n_dot_v, T roughness) {
@@ -50,34 +62,25 @@ template <class T> SPLITNERF_HD LutSample<T> sample_brdf_lut(const float* lut, T
   const bool roughness_free = roughness >= T(0) && roughness <= T(1);
   const T dx = nv_free ? T(kLutSize - 1) * T(0.5) / root : T(0), dy = roughness_free ? T(kLutSize - 1) : T(0);
   // Indices, not pointers: so a loop over points turns these reads into gathers.
-  const int at = (y0 * kLutSize + x0) * 3;
+  const int n00 = (y0 * kLutSize + x0) * kLutChannels, n01 = n00 + kLutChannels;
+  const int n10 = n00 + kLutSize * kLutChannels, n11 = n10 + kLutChannels;
+  const auto entry = [&](int c) {
+    return bilinear(T(lut[n00 + c]), T(lut[n01 + c]), T(lut[n10 + c]), T(lut[n11 + c]), fx, fy);
+  };
   LutSample<T> s;
   SPLITNERF_UNROLL for (int c = 0; c < 3; ++c) {
-    const T v00 = T(lut[at + c]), v01 = T(lut[at + c + 3]);
-    const T v10 = T(lut[at + c + 3 * kLutSize]), v11 = T(lut[at + c + 3 * kLutSize + 3]);
-    const T a = lerp(v00, v01, fx), b = lerp(v10, v11, fx);
-    s.value[c] = lerp(a, b, fy);
-    s.d_n_dot_v[c] = lerp(v01 - v00, v11 - v10, fy) * dx;
-    s.d_roughness[c] = (b - a) * dy;
-    if (c == 2) s.rest = lerp(lerp(T(1) - v00, T(1) - v01, fx), lerp(T(1) - v10, T(1) - v11, fx), fy);
+    const Bilinear<T> e = entry(c);
+    s.value[c] = e.value, s.d_n_dot_v[c] = e.along_n_dot_v * dx, s.d_roughness[c] = e.along_roughness * dy;
   }
-  const auto lost = [&](int node) { return rest_of_shares(T(lut[node]), T(lut[node + 1])); };
-  const T l00 = lost(at), l01 = lost(at + 3), l10 = lost(at + 3 * kLutSize), l11 = lost(at + 3 * kLutSize + 3);
-  const T a = lerp(l00, l01, fx), b = lerp(l10, l11, fx);
-  s.lost = lerp(a, b, fy);
-  s.lost_by_n_dot_v = lerp(l01 - l00, l11 - l10, fy) * dx;
-  s.lost_by_roughness = (b - a) * dy;
+  const Bilinear<T> dielectric = entry(3);
+  s.dielectric = dielectric.value;
+  s.dielectric_by_n_dot_v = dielectric.along_n_dot_v * dx, s.dielectric_by_roughness = dielectric.along_roughness * dy;
+  const auto rest = [&](int node) { return T(1) - T(lut[node + 2]); };
+  s.rest = bilinear(rest(n00), rest(n01), rest(n10), rest(n11), fx, fy).value;
+  const auto lost_at = [&](int node) { return rest_of_shares(T(lut[node]), T(lut[node + 1])); };
+  const Bilinear<T> lost = bilinear(lost_at(n00), lost_at(n01), lost_at(n10), lost_at(n11), fx, fy);
+  s.lost = lost.value, s.lost_by_n_dot_v = lost.along_n_dot_v * dx, s.lost_by_roughness = lost.along_roughness * dy;
   return s;
-}
-
-// Bilinear in the table of one value, dielectric_lut().
-template <class T> SPLITNERF_HD T lookup_dielectric_lut(const float* lut, T n_dot_v, T roughness) {
-  const T x = std::sqrt(clamp(n_dot_v, T(kMinNdotV), T(1))) * T(kLutSize - 1);
-  const T y = clamp(roughness, T(0), T(1)) * T(kLutSize - 1);
-  const int x0 = clamp(static_cast<int>(x), 0, kLutSize - 2), y0 = clamp(static_cast<int>(y), 0, kLutSize - 2);
-  const float* row0 = lut + y0 * kLutSize + x0;
-  const float* row1 = row0 + kLutSize;
-  return lerp(lerp(T(row0[0]), T(row0[1]), x - T(x0)), lerp(T(row1[0]), T(row1[1]), x - T(x0)), y - T(y0));
 }
 
 template <class T> SPLITNERF_HD Vec3<T> lookup_brdf_lut(const float* lut, T n_dot_v, T roughness) {
@@ -162,6 +165,8 @@ SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bo
 
 // ---- shading ---------------------------------------------------------------------------------
 
+// exact: a metal and a diffuse base under a dielectric layer, mixed: the path tracer's BSDF, principled.h.
+// paper, code: one Fresnel term of F0 = .04 (1 - m) + m albedo, counted twice, as published and as released.
 enum class FresnelMode : int { kExact = 0, kPaper = 1, kCode = 2 };
 
 struct ShadeOptions {
@@ -173,13 +178,12 @@ struct ShadeOptions {
 
 inline constexpr double kDielectricF0 = 0.04;
 
-// Reflectance at normal incidence of one channel.
+// Reflectance at normal incidence of one channel in the modes paper and code.
 template <class T> SPLITNERF_HD T normal_reflectance(T metallic, T albedo) {
   return T(kDielectricF0) * (T(1) - metallic) + metallic * albedo;
 }
 
 // Effective Fresnel colour Fr of one channel that multiplies F1, and its partial derivatives.
-//   exact: Fr = F0 (F1 and F2 already hold Schlick's term)
 //   paper: Fr = F0 + (1 - rho - F0)(1 - n.v)^5                     SplitNeRF Eq. (7)
 //   code:  Fr = F0 + (max(1 - rho, F0) - F0)(1 - n.v)^5            the released code
 template <class T> struct FresnelTerm {
@@ -187,7 +191,6 @@ template <class T> struct FresnelTerm {
   T rest;  // 1 - Fr, which the difference would lose where both are close to 1
 };
 template <class T> SPLITNERF_HD FresnelTerm<T> fresnel_term(FresnelMode mode, T f0, T roughness, T n_dot_v) {
-  if (mode == FresnelMode::kExact) return {f0, T(1), T(0), T(0), T(1) - f0};
   const T nv = clamp(n_dot_v, T(0), T(1)), c = T(1) - nv, c5 = pow5(c);
   const T inner = nv * (T(1) + c * (T(1) + c * (T(1) + c * (T(1) + c))));  // 1 - c^5
   const T smooth = T(1) - roughness;
@@ -198,15 +201,16 @@ template <class T> SPLITNERF_HD FresnelTerm<T> fresnel_term(FresnelMode mode, T 
           floored ? T(1) - f0 : (T(1) - f0) * inner + roughness * c5};
 }
 
-// What multiple scattering adds to the specular lobe of one channel, a factor, and its partial derivatives:
+// What multiple scattering adds to the specular lobe of one channel, a factor, and its partial derivatives by Fr, and
+// by lost over Fr, which may be so small that its products have no float:
 // 1 or, compensated, 1 + Fr (1 / (F1 + F2) - 1) = 1 + Fr lost / (1 - lost).
 template <class T> struct ScatteringGain {
-  T value, d_fr, d_lost;
+  T value, d_fr, d_lost_over_fr;
 };
 template <class T> SPLITNERF_HD ScatteringGain<T> scattering_gain(T fr, T lost, bool compensate) {
   if (!compensate) return {T(1), T(0), T(0)};
   const T inv_s = T(1) / (T(1) - lost);
-  return {T(1) + fr * lost * inv_s, lost * inv_s, fr * inv_s * inv_s};
+  return {T(1) + fr * lost * inv_s, lost * inv_s, inv_s * inv_s};
 }
 
 // Directional albedo E = (Fr F1 + F2) gain of the specular lobe for one channel, and its partial derivatives. With
@@ -226,6 +230,19 @@ SPLITNERF_HD SpecularAlbedo<T> specular_albedo(T fr, T rest_of_fr, const LutSamp
           rest_of_fr * fr * (f2 * inv_s * inv_s - T(1)), rest_of_fr * (table.lost + f1 * gain.value)};
 }
 
+// Directional albedo E = gain E_d of a dielectric layer; its partial derivatives are gain by E_d, and d_lost.
+template <class T> struct DielectricAlbedo {
+  T value, d_lost;
+  T rest;  // 1 - E, at least .01
+  ScatteringGain<T> gain;
+};
+template <class T>
+SPLITNERF_HD DielectricAlbedo<T> dielectric_albedo(const LutSample<T>& table, bool compensate) {
+  const ScatteringGain<T> gain = scattering_gain(T(kDielectricF0), table.lost, compensate);
+  const T value = table.dielectric * gain.value;
+  return {value, table.dielectric * (T(kDielectricF0) * gain.d_lost_over_fr), T(1) - value, gain};
+}
+
 template <class T> struct ShadePoint {
   Vec3<T> normal, view, albedo;
   T roughness, metallic;
@@ -238,21 +255,62 @@ template <class T> struct ShadeArrays {
   T *normals, *view_dirs, *albedo, *roughness, *metallic, *specular, *diffuse, *occlusion_s, *occlusion_d;
 };
 
-// L = o_d (1 - m)(1 - E) albedo g(n, 1) + o_s E g(d, rho), with F0 = .04 (1 - m) + m albedo.
-// paper and code modes use k_d = (1 - m)(1 - Fr).        Source: SplitNeRF Eq. (6)-(10), (17).
+// Of one channel: the albedo E of the specular lobe, and the share of light that it leaves to a diffuse base.
+//   exact: E = m E_m + (1 - m) E_d,  kept = 1 - E_d;  E_m = gain (albedo F1 + F2), E_d of the dielectric layer
+//   paper, code: E = gain (Fr F1 + F2),  kept = 1 - Fr
+template <class T> struct ChannelAlbedo {
+  T specular, kept;
+};
+template <class T>
+SPLITNERF_HD ChannelAlbedo<T> channel_albedo(ShadeOptions options, const LutSample<T>& table, T n_dot_v, T roughness,
+                                             T metallic, T albedo) {
+  if (options.fresnel == FresnelMode::kExact) {
+    const SpecularAlbedo<T> metal = specular_albedo(albedo, T(1) - albedo, table, options.compensate);
+    const DielectricAlbedo<T> layer = dielectric_albedo(table, options.compensate);
+    return {metallic * metal.value + (T(1) - metallic) * layer.value, layer.rest};
+  }
+  const FresnelTerm<T> fr = fresnel_term(options.fresnel, normal_reflectance(metallic, albedo), roughness, n_dot_v);
+  return {specular_albedo(fr.value, fr.rest, table, options.compensate).value, fr.rest};
+}
+
+template <class T> struct ChannelAlbedoGrad {
+  T albedo, metallic, roughness, n_dot_v;  // the last two but for what goes through the table
+  T f2, lost, dielectric;                  // of the table
+};
+template <class T>
+SPLITNERF_HD ChannelAlbedoGrad<T> channel_albedo_backward(ShadeOptions options, const LutSample<T>& table, T n_dot_v,
+                                                          T roughness, T metallic, T albedo, ChannelAlbedo<T> grad) {
+  if (options.fresnel == FresnelMode::kExact) {
+    const SpecularAlbedo<T> metal = specular_albedo(albedo, T(1) - albedo, table, options.compensate);
+    const DielectricAlbedo<T> layer = dielectric_albedo(table, options.compensate);
+    const T grad_metal = grad.specular * metallic, grad_layer = grad.specular * (T(1) - metallic) - grad.kept;
+    return {grad_metal * metal.d_fr,
+            grad.specular * (metal.value - layer.value),
+            T(0),
+            T(0),
+            grad_metal * metal.d_f2,
+            grad_metal * metal.d_lost + grad_layer * layer.d_lost,
+            grad_layer * layer.gain.value};
+  }
+  const FresnelTerm<T> fr = fresnel_term(options.fresnel, normal_reflectance(metallic, albedo), roughness, n_dot_v);
+  const SpecularAlbedo<T> e = specular_albedo(fr.value, fr.rest, table, options.compensate);
+  const T grad_fr = grad.specular * e.d_fr - grad.kept, grad_f0 = grad_fr * fr.d_f0;
+  return {grad_f0 * metallic,         grad_f0 * (albedo - T(kDielectricF0)), grad_fr * fr.d_roughness,
+          grad_fr * fr.d_n_dot_v,     grad.specular * e.d_f2,                grad.specular * e.d_lost,
+          T(0)};
+}
+
+// L = o_d (1 - m) kept albedo g(n, 1) + o_s E g(d, rho).        Source: SplitNeRF Eq. (6)-(10), (17).
 template <class T>
 SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, const ShadePoint<T>& p) {
   const T nv = dot(p.normal, p.view) * facing(p.normal, p.view), m = p.metallic;
   const LutSample<T> table = sample_brdf_lut(lut, nv, p.roughness);
   Vec3<T> radiance;
   SPLITNERF_UNROLL for (int c = 0; c < 3; ++c) {
-    const T f0 = normal_reflectance(m, p.albedo[c]);
-    const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
-    const SpecularAlbedo<T> e = specular_albedo(fr.value, fr.rest, table, options.compensate);
-    const T kept = options.fresnel == FresnelMode::kExact ? e.rest : fr.rest;
+    const ChannelAlbedo<T> e = channel_albedo(options, table, nv, p.roughness, m, p.albedo[c]);
     // The light first: shares of it may be so small that their product has no float.
-    radiance[c] =
-        p.diffuse[c] * kept * (T(1) - m) * p.albedo[c] * p.occlusion_d[c] + p.specular[c] * e.value * p.occlusion_s[c];
+    radiance[c] = p.diffuse[c] * e.kept * (T(1) - m) * p.albedo[c] * p.occlusion_d[c] +
+                  p.specular[c] * e.specular * p.occlusion_s[c];
   }
   return radiance;
 }
@@ -263,39 +321,33 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
                                                     Vec3<T> grad) {
   const T sign = facing(p.normal, p.view), nv = dot(p.normal, p.view) * sign, m = p.metallic;
   const LutSample<T> table = sample_brdf_lut(lut, nv, p.roughness);
-  const bool exact = options.fresnel == FresnelMode::kExact;
   ShadePoint<T> out{};
-  T grad_f2 = T(0), grad_lost = T(0), grad_nv = T(0);
+  T grad_f2 = T(0), grad_lost = T(0), grad_dielectric = T(0), grad_nv = T(0);
   SPLITNERF_UNROLL for (int c = 0; c < 3; ++c) {
     const T albedo = p.albedo[c], l_d = p.diffuse[c], l_s = p.specular[c], o_d = p.occlusion_d[c],
-            o_s = p.occlusion_s[c];
-    const T f0 = normal_reflectance(m, albedo);
-    const FresnelTerm<T> fr = fresnel_term(options.fresnel, f0, p.roughness, nv);
-    const SpecularAlbedo<T> e = specular_albedo(fr.value, fr.rest, table, options.compensate);
-    const T kept = exact ? e.rest : fr.rest, sent = l_d * kept * (T(1) - m);
+            o_s = p.occlusion_s[c], g = grad[c];
+    const ChannelAlbedo<T> e = channel_albedo(options, table, nv, p.roughness, m, albedo);
     // radiance = o_d kept (1 - m) albedo l_d + o_s e l_s
-    const T g = grad[c];
+    const T sent = l_d * e.kept * (T(1) - m), grad_base = l_d * o_d * albedo * g;
     out.occlusion_d[c] = sent * albedo * g;
-    out.occlusion_s[c] = l_s * e.value * g;
-    out.diffuse[c] = g * o_d * kept * (T(1) - m) * albedo;
-    out.specular[c] = g * o_s * e.value;
-    const T grad_k_d = l_d * o_d * albedo * g;
-    // kept = 1 - e or 1 - fr
-    const T grad_kept = grad_k_d * (T(1) - m);
-    const T grad_e = l_s * o_s * g - (exact ? grad_kept : T(0));
-    const T grad_fr = grad_e * e.d_fr - (exact ? T(0) : grad_kept);
-    // f0 = .04 (1 - m) + m albedo
-    const T grad_f0 = grad_fr * fr.d_f0;
-    out.albedo[c] = sent * o_d * g + grad_f0 * m;
-    out.metallic += grad_f0 * (albedo - T(kDielectricF0)) - grad_k_d * kept;
-    out.roughness += grad_fr * fr.d_roughness;
-    grad_nv += grad_fr * fr.d_n_dot_v;
-    grad_f2 += grad_e * e.d_f2;
-    grad_lost += grad_e * e.d_lost;
+    out.occlusion_s[c] = l_s * e.specular * g;
+    out.diffuse[c] = g * o_d * e.kept * (T(1) - m) * albedo;
+    out.specular[c] = g * o_s * e.specular;
+    const ChannelAlbedoGrad<T> d = channel_albedo_backward(options, table, nv, p.roughness, m, albedo,
+                                                           {l_s * o_s * g, grad_base * (T(1) - m)});
+    out.albedo[c] = sent * o_d * g + d.albedo;
+    out.metallic += d.metallic - grad_base * e.kept;
+    out.roughness += d.roughness;
+    grad_nv += d.n_dot_v;
+    grad_f2 += d.f2;
+    grad_lost += d.lost;
+    grad_dielectric += d.dielectric;
   }
-  // F2, lost = table(n.v, roughness)
-  out.roughness += grad_f2 * table.d_roughness.y + grad_lost * table.lost_by_roughness;
-  grad_nv += grad_f2 * table.d_n_dot_v.y + grad_lost * table.lost_by_n_dot_v;
+  // F2, lost, E_d = table(n.v, roughness)
+  out.roughness += grad_f2 * table.d_roughness.y + grad_lost * table.lost_by_roughness +
+                   grad_dielectric * table.dielectric_by_roughness;
+  grad_nv += grad_f2 * table.d_n_dot_v.y + grad_lost * table.lost_by_n_dot_v +
+             grad_dielectric * table.dielectric_by_n_dot_v;
   out.normal = p.view * (sign * grad_nv);
   out.view = p.normal * (sign * grad_nv);
   return out;

@@ -126,7 +126,7 @@ def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:
 
 
 def brdf_table(lut: Tensor, n_dot_v: Tensor, roughness: Tensor) -> Tensor:
-    """[n, 3] F1, F2, chi: bilinear in roughness and sqrt(n.v), [n, 1] both."""
+    """[n, 4] F1, F2, chi, E_d: bilinear in roughness and sqrt(n.v), [n, 1] both."""
     lut, n = lut.to(roughness.dtype), len(lut) - 1
     x, y = n_dot_v.clamp(1e-4, 1).sqrt() * n, roughness.clamp(0, 1) * n
     x0, y0 = x.detach().long().clamp(max=n - 1), y.detach().long().clamp(max=n - 1)
@@ -149,39 +149,58 @@ def query_direction(normals, view_dirs, roughness, lut, mean) -> Tensor:
     if not mean:
         return mirror
     t = ((roughness - 0.3) / 0.1).clamp(0, 1)
-    k = 1 + t * t * (3 - 2 * t) * (brdf_table(lut, cosine, roughness)[:, 2:] - 1)
+    k = 1 + t * t * (3 - 2 * t) * (brdf_table(lut, cosine, roughness)[:, 2:3] - 1)
     return F.normalize((1 - k) * normals + k * mirror, dim=1)
+
+
+def gain(f0: Tensor | float, f1: Tensor, f2: Tensor, compensate: bool) -> Tensor | float:
+    """What multiple scattering makes of single scattering, a factor."""
+    return 1 + f0 * (1 / (f1 + f2) - 1) if compensate else 1.0
 
 
 def split_sum_shade(
     normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d, lut, mode, compensate
 ) -> Tensor:
-    """o_d (1 - metallic) (1 - E) albedo L_d + o_s E L_s, E = F F1 + F2; F by the mode: exact, paper or code."""
+    """o_d (1 - metallic) kept albedo L_d + o_s E L_s. Mode exact: E of metal and dielectric, mixed, and the dielectric's
+    1 - E; paper and code: E = F F1 + F2 and 1 - F."""
     _, cosine = facing(normals, view_dirs)
-    f1, f2, _ = brdf_table(lut, cosine, roughness).split(1, 1)
-    fresnel = f0 = 0.04 * (1 - metallic) + metallic * albedo
+    f1, f2, _, layer = brdf_table(lut, cosine, roughness).split(1, 1)
     if mode:
+        f0 = 0.04 * (1 - metallic) + metallic * albedo
         edge = 1 - roughness if mode == 1 else torch.maximum(1 - roughness, f0)
         fresnel = f0 + (edge - f0) * (1 - cosine) ** 5
-    energy = fresnel * f1 + f2
-    if compensate:
-        energy = energy * (1 + fresnel * (1 / (f1 + f2) - 1))
-    kept = 1 - (fresnel if mode else energy)
+        energy, kept = (fresnel * f1 + f2) * gain(fresnel, f1, f2, compensate), 1 - fresnel
+    else:
+        coat = layer * gain(0.04, f1, f2, compensate)
+        metal = (albedo * f1 + f2) * gain(albedo, f1, f2, compensate)
+        energy, kept = metallic * metal + (1 - metallic) * coat, 1 - coat
     return occlusion_d * (1 - metallic) * kept * albedo * diffuse + occlusion_s * energy * specular
 
 
-def shade_sums(normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, lut, compensate) -> Tensor:
-    """Radiance reflected from sums over the light; `grazing` is the sum with Schlick's factor (1 - v.h)^5."""
+def shade_sums(
+    normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, dielectric, lut, compensate
+) -> Tensor:
+    """Radiance reflected from sums over the light; `grazing` is the sum with Schlick's factor (1 - v.h)^5, `dielectric`
+    that with the exact Fresnel factor."""
     _, cosine = facing(normals, view_dirs)
-    f1, f2, _ = brdf_table(lut, cosine, roughness).split(1, 1)
-    f0 = 0.04 * (1 - metallic) + metallic * albedo
-    gain = 1 + f0 * (1 / (f1 + f2) - 1) if compensate else torch.ones_like(f0)
-    energy = (f0 * f1 + f2) * gain
-    return gain * (f0 * (specular - grazing) + grazing) + (1 - metallic) * (1 - energy) * albedo * diffuse
+    f1, f2, _, layer = brdf_table(lut, cosine, roughness).split(1, 1)
+    coat = gain(0.04, f1, f2, compensate)
+    metal = gain(albedo, f1, f2, compensate) * (albedo * (specular - grazing) + grazing)
+    return metallic * metal + (1 - metallic) * (coat * dielectric + (1 - coat * layer) * albedo * diffuse)
+
+
+def fresnel_dielectric(cosine: Tensor) -> Tensor:
+    """Reflectance of a dielectric of index 1.5: the mean over both polarisations."""
+    cosine = cosine.clamp(0, 1)
+    refracted = (1 - (1 - cosine**2) / 1.5**2).sqrt()
+    across = (cosine - 1.5 * refracted) / (cosine + 1.5 * refracted)
+    along = (1.5 * cosine - refracted) / (1.5 * cosine + refracted)
+    return (across**2 + along**2) / 2
 
 
 def monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance) -> Tensor:
-    """[n, 3, 3] means over directions: D V (n.l) L / p, D V (n.l) L (1 - v.h)^5 / p, and (n.l) L / (pi p)."""
+    """[n, 4, 3] means over directions: D V (n.l) L / p, the same times (1 - v.h)^5, (n.l) L / (pi p), and the first
+    times the Fresnel factor of a dielectric."""
     normals, n_v = facing(normals, view_dirs)
     n_v = n_v.clamp(min=1e-4)
     a2 = (roughness**2).clamp(min=2e-3) ** 2
@@ -192,7 +211,8 @@ def monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance) 
     d = a2 / (math.pi * (a2 + (1 - a2) * apart * (1 - apart / 4)) ** 2)
     smith = n_l * torch.sqrt(n_v**2 * (1 - a2) + a2) + n_v * torch.sqrt(n_l**2 * (1 - a2) + a2)
     lobe = 0.5 * d / smith * n_l
-    weights = torch.stack([lobe, lobe * (1 - v_h).clamp(0, 1) ** 5, n_l / math.pi], 1)
+    parts = lobe, lobe * (1 - v_h).clamp(0, 1) ** 5, n_l / math.pi, lobe * fresnel_dielectric(v_h)
+    weights = torch.stack(parts, 1)
     share = torch.where(pdf > 0, 1 / (light_dirs.shape[1] * pdf), 0)
     return weights @ (radiance * share[..., None])
 

@@ -22,6 +22,7 @@ from splitnerf.ops import (
     query_direction,
     sample_bsdf,
     shade_sums,
+    specular_share,
     split_sum_shade,
     summed_light,
 )
@@ -132,16 +133,17 @@ def split_errors(
     roughness, metal, colour = rho * column, metallic * column, albedo * torch.ones(count, 3)
     diffuse = truth(normals, 1.0)
     seen = torch.ones(count, len(light.directions))
+    share = specular_share(normals, views, colour, roughness, metal)
     lamps = summed_light(
         normals, views, roughness, light.directions, light.solid_angles, light.lamps(light.directions), seen
     )
     groups = []
     for seed in range(GROUPS):
-        directions, pdf = sample_bsdf(normals, views, roughness, n, seed)
+        directions, pdf = sample_bsdf(normals, views, roughness, share, n, seed)
         radiance = light.rest(directions.reshape(-1, 3)).view(count, n, 3)
         rest = monte_carlo_light(normals, views, roughness, directions, pdf, radiance)
-        sums = LightSums(rest.specular + lamps.specular, rest.grazing + lamps.grazing, diffuse)
-        groups.append(shade_sums(normals, views, colour, roughness, metal, sums, True))
+        whole = LightSums(*(a + b for a, b in zip(rest, lamps)))._replace(diffuse=diffuse)
+        groups.append(shade_sums(normals, views, colour, roughness, metal, whole, True))
     true = torch.stack(groups).mean(0)
     size = true.square().mean().sqrt()
     errors = {NOISE: float(torch.stack(groups).std(0).square().mean().sqrt() / GROUPS**0.5 / size)}

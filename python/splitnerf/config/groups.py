@@ -108,7 +108,9 @@ class Shading:
         choices=("split", "summed"),
     )  # fmt: skip
     fresnel: str = setting(
-        "exact", "form of the Fresnel term; exact: from the table alone; paper, code: as published, as released",
+        "exact",
+        "form of the Fresnel term; exact: the path tracer's and Blender's, Schlick's for metals and the exact one of "
+        "index 1.5 for dielectrics; paper, code: as published, as released",
         choices=("exact", "paper", "code"),
     )  # fmt: skip
     query: str = setting(

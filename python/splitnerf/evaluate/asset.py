@@ -31,15 +31,17 @@ def asset_predictions(
 
     Returns:
         The maps of each view for :func:`splitnerf.evaluate.protocol.evaluate_maps`: `alpha`, `albedo`, `roughness`,
-        `metallic`, `normal` (without the normal map, like the truth) and, with a light, `rgb`.
+        `metallic`, `normal` (without the normal map, like the truth) and, with a light, `rgb`. In addition
+        `shading_normal`, with the normal map.
     """
     predictions = []
     for index in range(len(dataset)):
         light = np.ones((2, 4, 3), np.float32) if environment is None else environment
         maps = render_view(renderer, dataset, index, light, spp)
         prediction = {key: maps[key] for key in ("alpha", "albedo", "roughness", "metallic")}
-        lengths = np.linalg.norm(maps["smooth_normal"], axis=-1, keepdims=True)
-        prediction["normal"] = maps["smooth_normal"] / np.maximum(lengths, 1e-8)
+        for key, kept in (("normal", "smooth_normal"), ("shading_normal", "normal")):
+            lengths = np.linalg.norm(maps[kept], axis=-1, keepdims=True)
+            prediction[key] = maps[kept] / np.maximum(lengths, 1e-8)
         if environment is not None:
             prediction["rgb"] = straight_srgb(maps)
         predictions.append(prediction)

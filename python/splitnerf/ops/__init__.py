@@ -14,7 +14,14 @@ from splitnerf.ops.light_pyramid import (
     zonal_factors,
 )
 from splitnerf.ops.losses import gradient_losses, material_losses, pixel_losses, quadratic_entropy
-from splitnerf.ops.monte_carlo import LightSums, monte_carlo_light, sample_bsdf, shade_sums, summed_light
+from splitnerf.ops.monte_carlo import (
+    LightSums,
+    monte_carlo_light,
+    sample_bsdf,
+    shade_sums,
+    specular_share,
+    summed_light,
+)
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
 from splitnerf.ops.rays import (
     CELL_EMPTY,
@@ -40,7 +47,7 @@ __all__ = [
     "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters", "light_lookup", "light_sum_of_levels",
     "linear_to_srgb", "march_rays", "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors",
     "pixel_losses", "prefilter_light", "quadratic_entropy", "query_direction", "sample_bsdf", "sample_ggx_lobe",
-    "sample_rays", "sdf_layer", "sdf_values", "sh_projection", "shade_sums", "sparse_product", "split_sum_shade",
+    "sample_rays", "sdf_layer", "sdf_values", "sh_projection", "shade_sums", "sparse_product", "specular_share", "split_sum_shade",
     "spread_samples", "srgb_to_linear", "summed_light", "surface_weights", "trace_visibility", "visibility_bits",
     "zonal_factors",
 ]  # fmt: skip

@@ -1,7 +1,8 @@
 """Monte Carlo shading: directions from the BSDF, sums over their incoming light, and the reflected radiance.
 
 ``monte_carlo_light`` is differentiable once in normals, roughness and radiance, ``shade_sums`` once in all; a gradient
-to the rest raises.
+to the rest raises. ``shade_sums`` is the path tracer's BSDF under the light: a metal with Schlick's Fresnel term and a
+diffuse base under a dielectric of index 1.5 with the exact one, mixed.
 
 Source: the rendering equation, SplitNeRF Eq. (4)-(6), without the split.
 """
@@ -24,34 +25,59 @@ class LightSums(NamedTuple):
         grazing: The integral of D V L (n.l) (1 - v.h)^5, with Schlick's factor, so that the lobe reflects
             F0 (specular - grazing) + grazing.
         diffuse: The irradiance over pi.
+        dielectric: The integral of D V L (n.l) F_d, with the exact Fresnel factor of a dielectric of index 1.5.
     """
 
     specular: Tensor
     grazing: Tensor
     diffuse: Tensor
+    dielectric: Tensor
+
+
+def specular_share(normals: Tensor, view_dirs: Tensor, albedo: Tensor, roughness: Tensor, metallic: Tensor) -> Tensor:
+    """The share of directions that :func:`sample_bsdf` should draw from the visible normals. No gradient.
+
+    It is the share of the specular lobe's single scattering in what the material reflects of uniform light, as the path
+    tracer samples, between .1 and .95, so that neither lobe is without directions.
+
+    Args:
+        normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
+        albedo: [n, 3] linear, in [0, 1].
+        roughness, metallic: [n, 1], in [0, 1].
+
+    Returns:
+        [n, 1] shares.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+    """
+    return lib.specular_share(normals, view_dirs, albedo, roughness, metallic, brdf_lut(normals.device))
 
 
 def sample_bsdf(
-    normals: Tensor, view_dirs: Tensor, roughness: Tensor, n_samples: int, seed: int = 0
+    normals: Tensor, view_dirs: Tensor, roughness: Tensor, specular_share: Tensor, n_samples: int, seed: int = 0
 ) -> tuple[Tensor, Tensor]:
-    """Samples light directions for points: one half by the cosine, the other by the visible normals. No gradient.
+    """Samples light directions for points: a share of them by the visible normals, the rest by the cosine. No gradient.
 
     Args:
         normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
         roughness: [n, 1] perceptual roughness in [0, 1]; lobes below ggx_alpha = .002 are sampled with that width.
-        n_samples: The number of directions per point; they form a lattice with a random shift for each point.
-        seed: The seed of the shifts.
+        specular_share: [n, 1] share of the visible normals, in [0, 1], from :func:`specular_share`. With 0 or 1 a lobe
+            has no directions; what only that lobe can reach is then missing.
+        n_samples: The number of directions per point; those of either lobe form a lattice with a random shift for each
+            point. The number of the visible normals' is share times n_samples, rounded up or down at random.
+        seed: The seed of the shifts and roundings.
 
     Returns:
-        directions [n, n_samples, 3] unit, and the density of the mixture of both halves [n, n_samples], sr^-1; 0 for a
-        direction below the horizon.
+        directions [n, n_samples, 3] unit, those of the visible normals first, and the density of the mixture of both
+        lobes [n, n_samples], sr^-1; 0 for a direction below the horizon.
 
     Raises:
         ValueError: A shape, dtype or count does not fit.
 
     Source: Heitz 2018 (visible normals); Veach 1997 (balance heuristic).
     """
-    return lib.sample_bsdf(normals, view_dirs, roughness, n_samples, seed)
+    return lib.sample_bsdf(normals, view_dirs, roughness, specular_share, n_samples, seed)
 
 
 def monte_carlo_light(
@@ -111,10 +137,10 @@ def shade_sums(
     sums: LightSums,
     compensate: bool = False,
 ) -> Tensor:
-    """Outgoing linear radiance of points from integrals of incoming light that contain Schlick's Fresnel term.
+    """Outgoing linear radiance of points from integrals of incoming light that contain the Fresnel terms.
 
-    ``L = gain (F0 (specular - grazing) + grazing) + (1 - m)(1 - E) albedo diffuse``, with F0, E and the gain of
-    multiple scattering as in :func:`splitnerf.ops.split_sum_shade` in its ``exact`` mode.
+    ``L = m gain_m (albedo (specular - grazing) + grazing) + (1 - m) [gain_d dielectric + (1 - E_d) albedo diffuse]``,
+    with E_d and the gains of multiple scattering as in :func:`splitnerf.ops.split_sum_shade` in its ``exact`` mode.
 
     Args:
         normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
@@ -149,25 +175,29 @@ def _shared_backward(ctx, grad_sums):
 
 
 def _keep_summed(ctx, inputs, output):
-    ctx.save_for_backward(*inputs[:9])
-    ctx.compensate = inputs[9]
+    ctx.save_for_backward(*inputs[:10])
+    ctx.compensate = inputs[10]
 
 
 def _summed_backward(ctx, grad):
-    refuse_gradients(ctx, "shade_sums", lut=8)
+    refuse_gradients(ctx, "shade_sums", lut=9)
     return *lib.shade_sums_backward(*ctx.saved_tensors, ctx.compensate, grad), None, None
 
 
 register(
+    "specular_share",
+    fake=lambda normals, view_dirs, albedo, roughness, *rest: roughness.new_empty(roughness.shape),
+)
+register(
     "sample_bsdf",
-    fake=lambda normals, view_dirs, roughness, n_samples, seed: (
+    fake=lambda normals, view_dirs, roughness, specular_share, n_samples, seed: (
         normals.new_empty(normals.shape[0], n_samples, 3),
         normals.new_empty(normals.shape[0], n_samples),
     ),
 )
 register(
     "monte_carlo_light",
-    fake=lambda normals, *rest: normals.new_empty(normals.shape[0], 3, 3),
+    fake=lambda normals, *rest: normals.new_empty(normals.shape[0], len(LightSums._fields), 3),
     setup_context=_keep,
     backward=_backward,
 )
@@ -181,7 +211,7 @@ register(
 )
 register(
     "summed_light",
-    fake=lambda normals, *rest: normals.new_empty(normals.shape[0], 3, 3),
+    fake=lambda normals, *rest: normals.new_empty(normals.shape[0], len(LightSums._fields), 3),
     setup_context=_keep,
     backward=_shared_backward,
 )
@@ -199,5 +229,5 @@ register(
 )
 register(
     "shade_sums_backward",
-    fake=lambda *inputs: tuple(t.new_empty(t.shape) for t in inputs[:8]),
+    fake=lambda *inputs: tuple(t.new_empty(t.shape) for t in inputs[:9]),
 )

@@ -27,10 +27,11 @@ def _brdf_lut(device: torch.device) -> Tensor:
 
 
 def brdf_lut(device: torch.device | str = "cpu") -> Tensor:
-    """The table of the split sum: [32 roughness, 32 sqrt(n.v), (F1, F2, chi)] float32, computed once.
+    """The table of the split sum: [32 roughness, 32 sqrt(n.v), (F1, F2, chi, E_d)] float32, computed once.
 
-    The specular directional albedo is ``E = F0 F1 + F2`` (height-correlated Smith GGX, ggx_alpha =
-    roughness squared); chi places the lobe's mean direction between normal and reflection.
+    The directional albedo of a specular lobe with Schlick's Fresnel term is ``E = F0 F1 + F2`` (height-correlated Smith
+    GGX, ggx_alpha = roughness squared), that of a dielectric of index 1.5 with the exact term is E_d; chi places the
+    lobe's mean direction between normal and reflection.
     """
     return _brdf_lut(torch.device(device))
 
@@ -73,8 +74,9 @@ def split_sum_shade(
 ) -> Tensor:
     """Outgoing linear radiance of points under the pre-integrated light, in one pass.
 
-    ``L = o_d (1 - m)(1 - E) albedo g(n, 1) + o_s E g(d, rho)``, ``E = F0 F1 + F2``,
-    ``F0 = .04 (1 - m) + m albedo``. g(n, 1) is irradiance / pi, so no further pi appears.
+    ``L = o_d (1 - m)(1 - E_d) albedo g(n, 1) + o_s [m (albedo F1 + F2) + (1 - m) E_d] g(d, rho)``: a metal with
+    Schlick's Fresnel term and a diffuse base under a dielectric of index 1.5 with the exact one, mixed, as the path
+    tracer and Blender have it. g(n, 1) is irradiance / pi, so no further pi appears.
 
     Args:
         normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
@@ -83,10 +85,10 @@ def split_sum_shade(
         specular: [n, 3] radiance g(d, rho); d from :func:`query_direction`.
         diffuse: [n, 3] radiance g(n, 1).
         occlusion_s, occlusion_d: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open.
-        fresnel_mode: The form of the Fresnel term: ``exact``, ``paper`` or ``code`` (the last two apply it twice, as
-            published).
-        compensate: Whether to compensate for multiple scattering: ``E [1 + F0 (1/(F1 + F2) - 1)]`` (Turquin 2019), as
-            in Blender's Principled BSDF.
+        fresnel_mode: The form of the Fresnel term: ``exact`` (above), ``paper`` or ``code``. The last two mix the
+            materials' reflectances, ``F0 = .04 (1 - m) + m albedo``, and apply the term twice, as published.
+        compensate: Whether to compensate for multiple scattering: each lobe's ``E [1 + F0 (1/(F1 + F2) - 1)]`` with F0
+            the albedo of the metal and .04 of the dielectric (Turquin 2019), as in Blender's Principled BSDF.
 
     Returns:
         [n, 3] linear radiance.

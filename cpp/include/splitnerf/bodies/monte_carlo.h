@@ -34,7 +34,7 @@ SPLITNERF_ON_GPU(SampleLobeBody);
 
 // directions [n, n_samples, 3], pdf [n, n_samples]; a group of threads a point.
 template <class T> struct SampleBsdfBody {
-  const T *normals, *view_dirs, *roughness;
+  const T *normals, *view_dirs, *roughness, *specular_share;
   int n_samples;
   uint32_t seed;
   T *directions, *pdf;
@@ -44,11 +44,12 @@ template <class T> struct SampleBsdfBody {
     const Vec3<T> given = load3(normals + 3 * i), normal = given * facing(given, view);
     const T ggx_alpha = sampled_alpha(roughness[i]);
     const Vec2<T> shift = lattice_shift<T>(seed, i);
+    const LobeChoice<T> lobes(specular_share[i], n_samples, random_unit<T>(seed, static_cast<uint32_t>(i), 2));
     for (int k = group.lane(); k < n_samples; k += Group::size) {
       const int64_t at = i * n_samples + k;
-      const Vec3<T> l = sample_bsdf(normal, view, ggx_alpha, k, fibonacci_lattice<T>(k, n_samples, shift));
+      const Vec3<T> l = lobes.sample(normal, view, ggx_alpha, k, shift);
       store3(directions + 3 * at, l);
-      pdf[at] = bsdf_pdf(normal, view, l, ggx_alpha);
+      pdf[at] = lobes.pdf(normal, view, l, ggx_alpha);
     }
   }
 };
@@ -83,7 +84,8 @@ template <class T> struct ArrivingLight {
   }
 };
 
-// sums [n, 3 (all, grazing, diffuse), 3]; a group of threads a point. Light: one of the two above, over n directions.
+// sums [n, 4 (all, grazing, diffuse, dielectric), 3]; a group of threads a point. Light: one of the two above, over n
+// directions.
 template <class T, class Light> struct SumLightBody {
   int n;
   const T *normals, *view_dirs, *roughness;
@@ -94,7 +96,8 @@ template <class T, class Light> struct SumLightBody {
     const LightSums<T> s =
         sum_light(group, load3(normals + 3 * p), load3(view_dirs + 3 * p), roughness[p], n, light.of_point(p));
     if (group.lane() > 0) return;
-    store3(sums + 9 * p, s.all), store3(sums + 9 * p + 3, s.grazing), store3(sums + 9 * p + 6, s.diffuse);
+    T* to = sums + 3 * kLightSums * p;
+    store3(to, s.all), store3(to + 3, s.grazing), store3(to + 6, s.diffuse), store3(to + 9, s.dielectric);
   }
 };
 
@@ -108,10 +111,11 @@ template <class T, class Light, class Receive> struct SumLightBackwardBody {
   Receive receive;
 
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t p) const {
-    const T* g = grad_sums + 9 * p;
+    const T* g = grad_sums + 3 * kLightSums * p;
     const LightSumsGrad<T> out = sum_light_backward(
         group, load3(normals + 3 * p), load3(view_dirs + 3 * p), roughness[p], n, light.of_point(p),
-        LightSums<T>{load3(g), load3(g + 3), load3(g + 6)}, [&](int i, Vec3<T> grad) { receive(p, i, grad); });
+        LightSums<T>{load3(g), load3(g + 3), load3(g + 6), load3(g + 9)},
+        [&](int i, Vec3<T> grad) { receive(p, i, grad); });
     if (group.lane() > 0) return;
     store3(grad_normals + 3 * p, out.normal);
     grad_roughness[p] = out.roughness;

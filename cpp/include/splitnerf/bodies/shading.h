@@ -2,6 +2,7 @@
 #pragma once
 
 #include "splitnerf/monte_carlo.h"
+#include "splitnerf/principled.h"
 #include "splitnerf/split_sum.h"
 
 namespace splitnerf {
@@ -94,13 +95,29 @@ template <class T> struct ShadeBackwardBody {
 };
 SPLITNERF_ON_GPU(ShadeBackwardBody);
 
+// The share of directions that follow the visible normals, for sample_bsdf: within bounds, so that neither lobe is
+// without directions.
+inline constexpr double kMinLobeShare = 0.1, kMaxLobeShare = 0.95;
+template <class T> struct SpecularShareBody {
+  const float* lut;
+  const T *normals, *view_dirs, *albedo, *roughness, *metallic;
+  T* share;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const T nv = std::fabs(dot(load3(normals + 3 * i), load3(view_dirs + 3 * i)));
+    share[i] = clamp(specular_share(sample_brdf_lut(lut, nv, roughness[i]), load3(albedo + 3 * i), metallic[i]),
+                     T(kMinLobeShare), T(kMaxLobeShare));
+  }
+};
+SPLITNERF_ON_GPU(SpecularShareBody);
+
 template <class T> SPLITNERF_HD SummedPoint<T> load_summed_point(const SummedArrays<const T>& in, int64_t i) {
   return {load3(in.normals + 3 * i),
           load3(in.view_dirs + 3 * i),
           load3(in.albedo + 3 * i),
           in.roughness[i],
           in.metallic[i],
-          {load3(in.all + 3 * i), load3(in.grazing + 3 * i), load3(in.diffuse + 3 * i)}};
+          {load3(in.all + 3 * i), load3(in.grazing + 3 * i), load3(in.diffuse + 3 * i), load3(in.dielectric + 3 * i)}};
 }
 
 template <class T> struct ShadeSumsBody {
@@ -133,6 +150,7 @@ template <class T> struct ShadeSumsBackwardBody {
     store3(grad.all + 3 * i, g.light.all);
     store3(grad.grazing + 3 * i, g.light.grazing);
     store3(grad.diffuse + 3 * i, g.light.diffuse);
+    store3(grad.dielectric + 3 * i, g.light.dielectric);
   }
 };
 SPLITNERF_ON_GPU(ShadeSumsBackwardBody);

@@ -1,0 +1,357 @@
+"""When a step is recorded, repeated, or taken without a graph, and what goes into a graph and comes out of it."""
+
+from __future__ import annotations
+
+import gc
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import pretend_graphs
+import pytest
+import torch
+from test_graphs import NoStream
+from tiny_runs import tiny
+from torch import Tensor
+
+from splitnerf.render.model import SceneModel
+from splitnerf.training import graphs
+from splitnerf.training.graphs import GraphedStep, has_room, round_up
+
+LIGHT_PERIOD = 4
+PRIORS_FROM = 0.5
+PADDED = 1280  # 1.15 times the target of 1000, in units of 256
+COUNTS = (1000.0, 300.0)  # shaded samples and segments
+ROOM = (1280, 512)  # 1.25 times as many, in units of 256
+LOOKUP = torch.tensor([[0.0, 0.6, 0.8], [0.6, 0.0, 0.8]]), torch.tensor([[0.3], [0.7]])
+
+
+class Rays(NamedTuple):
+    target: Tensor
+
+
+class Found(NamedTuple):
+    directions: Tensor
+    number: Tensor
+
+
+class Fake(GraphedStep):
+    """Finds what it is told, and takes the gradient of something simple of each of a step's inputs."""
+
+    def __init__(self, model: SceneModel):
+        mesh = SimpleNamespace(made_at=0.0)
+        super().__init__(model, None, mesh, torch.Generator().manual_seed(0))
+        self.calls: list[tuple[int, int] | None] = []
+        self.n_found, self.scale = PADDED, 1.0
+        self.given: tuple[Rays, Found] | None = None  # the inputs of the last step
+
+    def find(self, batch: Rays, progress: float, capacity: int) -> Found:
+        assert capacity == PADDED
+        self.given = batch, Found(torch.full((self.n_found, 3), self.scale), torch.tensor([int(7 * self.scale)]))
+        return self.given[1]
+
+    def differentiate(self, batch, found, light, environment, step, progress, capacity):
+        self.calls.append(capacity)
+        self.model.zero_grad(set_to_none=True)
+        looked_up = light(*LOOKUP).sum() + (light.cells.radiance * light.cells.solid_angles[:, None]).mean()
+        value = (
+            batch.target.sum() * found.directions.mean() * self.model.variance
+            + batch.target.mean() * found.number.sum() * looked_up
+        )
+        value.backward()
+        return value.detach(), {"value": value.detach()}
+
+    def taken(
+        self,
+        n_rays: int = 5,
+        step: int = 0,
+        progress: float = 0.0,
+        counts: tuple | None = COUNTS,
+        light=None,
+        target=1.0,
+    ):
+        """One step and its counts; returns what it gave, how it was taken, and whether it was complete."""
+        before, known = len(self.calls), list(self._graphs.values())
+        light = self.model.evaluate_light() if light is None else light
+        result = self(Rays(torch.full((n_rays, 3), target)), light, None, step, progress)
+        is_new = any(all(graph is not other for other in known) for graph in self._graphs.values())
+        how = "recorded" if is_new else "called" if len(self.calls) > before else "repeated"
+        complete = self.is_complete(*counts) if counts else None
+        return SimpleNamespace(value=result[0].item(), how=how, room=self.calls[-1], complete=complete)
+
+
+@pytest.fixture
+def step(monkeypatch) -> Fake:
+    monkeypatch.setattr(graphs, "record", pretend_graphs.record)
+    monkeypatch.setattr(torch.cuda, "Stream", NoStream)
+    monkeypatch.setattr(torch.cuda, "graph_pool_handle", lambda: None)
+    torch.manual_seed(0)
+    config = tiny(
+        target_samples=1000, light_step_every=LIGHT_PERIOD, priors_from=PRIORS_FROM, shading="summed",
+        table_dtype="float16", steps=100,
+    )  # fmt: skip
+    return Fake(SceneModel(config))
+
+
+def ways(taker: Fake, n: int, **settings) -> list[str]:
+    """How n steps were taken."""
+    return [taker.taken(**settings).how for _ in range(n)]
+
+
+# ---- when ----
+
+
+def test_a_step_is_called_and_then_recorded_and_then_repeated(step, monkeypatch):
+    """The first has room for all there is; the very first with a capacity is called too, so that kernels are loaded."""
+    assert step.capacity == PADDED
+    replays, replay = [], pretend_graphs.PretendGraph.replay
+    monkeypatch.setattr(pretend_graphs.PretendGraph, "replay", lambda self: replays.append(self) or replay(self))
+    assert ways(step, 5) == ["called", "called", "recorded", "repeated", "repeated"]
+    assert step.calls == [None, ROOM, ROOM] and len(replays) == 3 and replays[0] is replays[1] is replays[2]
+    assert ways(step, 3, n_rays=6) == ["called", "recorded", "repeated"] and step.calls[3:] == [None, ROOM]
+    assert ways(step, 1) == ["repeated"]
+
+
+def test_without_counts_of_a_step_before_none_is_recorded(step):
+    assert ways(step, 4, counts=None) == ["called"] * 4 and step.calls == [None] * 4
+
+
+def test_a_step_that_finds_more_than_there_is_room_for_is_called(step):
+    ways(step, 4)
+    step.n_found = PADDED + 1
+    assert ways(step, 4) == ["called"] * 4 and step.calls[-4:] == [None] * 4
+    step.n_found = PADDED
+    assert ways(step, 1) == ["repeated"]
+
+
+def decide(step: Fake, what: str) -> dict:
+    """Changes one of the host's decisions."""
+    if what == "levels":
+        step.model.sdf_field.grid.n_active -= 1
+    elif what == "mesh":
+        step.mesh.made_at = 0.25
+    elif what == "occlusion":
+        step.model.occlusion.ready = True
+    return {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}.get(
+        what, {}
+    )
+
+
+@pytest.mark.parametrize("what", ["levels", "mesh", "occlusion", "light", "priors", "rays"])
+def test_another_decision_is_another_graph(step, what):
+    ways(step, 4)
+    settings = decide(step, what)
+    assert ways(step, 3, **settings) == ["called", "recorded", "repeated"]
+
+
+def test_steps_that_decide_alike_share_a_graph(step):
+    """The light moves with the 4th, the 8th and the last step, for which it stands for 4, 4 and one steps."""
+    ways(step, 3)
+    assert [step.taken(step=k, progress=p).how for k, p in ((1, 0.1), (2, 0.3), (6, PRIORS_FROM - 0.01))] == [
+        "repeated"
+    ] * 3
+    assert [step.taken(step=3).how for _ in range(2)] == ["called", "recorded"]
+    assert step.taken(step=7).how == step.taken(step=95).how == "repeated"
+    assert step.taken(step=99).how == "repeated" and step.taken(step=98).how == "repeated"
+    step.model.config = step.model.config.replace({"steps": 98})
+    assert step.taken(step=97).how == "called"  # for 2 steps
+
+
+def test_a_graph_with_too_little_room_is_recorded_anew_before_it_fails(step):
+    """While a tenth more than the last counts still fits it stays: 1.1 * 1163 = 1279.3, 1.1 * 465 = 511.5."""
+    ways(step, 3)
+    for counts in ((1163.0, 100.0), (100.0, 465.0), COUNTS):
+        assert step.taken(counts=counts).complete
+    assert ways(step, 1) == ["repeated"]
+    for counts, room in (((1164.0, 100.0), (1536, 256)), ((100.0, 466.0), (256, 768))):
+        assert step.taken(counts=counts).how == "repeated"
+        assert step.taken().how == "recorded" and step.calls[-1] == room
+        ways(step, 1, counts=COUNTS)
+
+
+def test_what_exceeds_its_room_is_not_complete_and_all_graphs_are_dropped(step):
+    for counts, n_rays in (((1281.0, 512.0), 5), ((1280.0, 513.0), 6)):
+        assert step.taken(n_rays=n_rays, counts=(1e9, 1e9)).complete  # without a graph there is no limit
+        ways(step, 3, n_rays=n_rays)
+        step.taken(n_rays=n_rays, counts=COUNTS)
+        n = step.n_discarded
+        assert step.taken(n_rays=n_rays, counts=(1280.0, 512.0)).complete is True and step.n_discarded == n
+        ways(step, 1, n_rays=n_rays)
+        step._graphs.clear()
+        assert ways(step, 1, n_rays=n_rays) == ["recorded"] and step.calls[-1] == ROOM
+        assert step.taken(n_rays=n_rays, counts=counts).complete is False and step.n_discarded == n + 1
+        assert not step._graphs
+        assert step.taken(n_rays=n_rays).how == "recorded"
+
+
+def test_four_graphs_are_kept_and_the_oldest_makes_room(step):
+    for n_rays in range(5, 9):
+        ways(step, 4, n_rays=n_rays)
+    assert [step.taken(n_rays=n).how for n in range(5, 9)] == ["repeated"] * 4
+    ways(step, 2, n_rays=9)
+    assert [step.taken(n_rays=n).how for n in (6, 7, 8, 9, 5, 7)] == ["repeated"] * 4 + ["recorded", "repeated"]
+    assert len(step._graphs) == 4
+
+
+# ---- what ----
+
+
+def gradients(step: Fake) -> list[Tensor | None]:
+    return [None if p.grad is None else p.grad.clone() for p in step.model.parameters()]
+
+
+def test_a_repeated_step_is_that_of_its_own_inputs(step):
+    """Rays, samples, light and its cells; gradients are at the parameters and at the light given, where they add up."""
+    ways(step, 4)
+    model = step.model
+    for k in range(1, 4):
+        with torch.no_grad():
+            model.light.texels.add_(0.1 * k * torch.randn_like(model.light.texels))
+            model.variance.add_(0.1)
+        step.scale = 1.0 + k
+        light, again = model.evaluate_light(), model.evaluate_light()
+        for number in (1, 2):
+            repeated = step.taken(light=light, target=0.3 * k + number)
+            assert repeated.how == "repeated"
+            found, own = gradients(step), model.variance.grad
+            called = step.differentiate(*step.given, again, None, 0, 0.0, None)
+            assert repeated.value == pytest.approx(called[0].item(), rel=1e-6)
+            for a, b in zip(found, gradients(step), strict=True):
+                assert (a is None and b is None) or torch.equal(a, b)
+            for a, b in zip(light.leaves, again.leaves, strict=True):
+                torch.testing.assert_close(a.grad, b.grad)
+                assert a.grad.abs().sum() > 0
+        assert own is not model.variance.grad
+
+
+def test_the_directions_of_the_cells_are_handed_on_too(step):
+    """They are no leaves, and change with the light."""
+    ways(step, 4)
+    light = step.model.evaluate_light()
+    changed = light.with_tensors(light.leaves, [x * 3.0 for x in light.constants])
+    assert step.taken(light=light).value != pytest.approx(step.taken(light=changed).value, rel=1e-3)
+
+
+def test_a_graph_leaves_its_callers_tensors_alone(step):
+    """Those that it was recorded with: other steps' numbers go into memory of its own."""
+    ways(step, 2)
+    light, other = step.model.evaluate_light(), step.model.evaluate_light()
+    assert step.taken(light=light).how == "recorded"
+    tensors = [*step.given[0], *step.given[1], *light.leaves, *light.constants]
+    before = [x.detach().clone() for x in tensors]
+    step.scale = 3.0
+    changed = other.with_tensors([2.0 * x.detach() for x in other.leaves], [x + 1.0 for x in other.constants])
+    assert step.taken(light=changed, target=5.0).how == "repeated"
+    assert all(torch.equal(a, b) for a, b in zip(tensors, before, strict=True))
+
+
+def test_the_copy_of_16_bits_is_made_outside_of_a_graph(step):
+    """In the memory that a graph reads, where it is stale when a step begins: the step itself does not ask for it."""
+    ways(step, 4)
+    grid = step.model.sdf_field.grid
+    copy = grid.stored()
+    with torch.no_grad():
+        grid.table.add_(1.0)
+    assert ways(step, 1) == ["repeated"] and torch.equal(copy, grid.table.detach().half())
+
+
+@pytest.mark.parametrize(("n", "rounded"), [(0, 0), (1, 256), (256, 256), (256.9, 256), (257, 512), (1150, 1280)])
+def test_capacities_come_in_units(n, rounded):
+    assert round_up(n) == rounded
+
+
+def test_room_is_room_for_both():
+    assert has_room((10, 20), (10, 20)) and has_room((10, 20), (0, 0))
+    assert not has_room((10, 20), (11, 20)) and not has_room((10, 20), (10, 21))
+    assert has_room((11, 22), (10, 20), slack=1.1) and not has_room((11, 22), (10, 20.1), slack=1.1)
+
+
+# ---- the recording itself ----
+
+
+class Work:
+    """A CUDA graph that notes what is asked of it."""
+
+    ends_badly = False
+
+    def __init__(self):
+        self.asked = []
+        Work.last = self
+
+    def register_generator_state(self, generator):
+        self.asked.append(("generator", generator))
+
+    def capture_begin(self, **settings):
+        self.asked.append(("begin", settings))
+
+    def capture_end(self):
+        self.asked.append("end")
+        if self.ends_badly:
+            raise RuntimeError("the recording is void")
+
+
+@pytest.fixture
+def work(monkeypatch):
+    monkeypatch.setattr(torch.cuda, "CUDAGraph", Work)
+    monkeypatch.setattr(Work, "ends_badly", False)
+    was_on = gc.isenabled()
+    yield Work
+    (gc.enable if was_on else gc.disable)()
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_nothing_is_collected_while_recording(work, collects):
+    (gc.enable if collects else gc.disable)()
+    seen = []
+    graph, result = graphs.record(
+        lambda: seen.append((gc.isenabled(), list(work.last.asked))) or "result", "pool", "generator"
+    )
+    begun = [("generator", "generator"), ("begin", {"pool": "pool", "capture_error_mode": "thread_local"})]
+    assert result == "result" and graph is work.last and seen == [(False, begun)]
+    assert graph.asked == [*begun, "end"] and gc.isenabled() == collects
+
+
+@pytest.mark.parametrize("ends_badly", [True, False])
+def test_the_first_error_of_a_recording_is_told_and_the_recording_ends(work, monkeypatch, ends_badly):
+    monkeypatch.setattr(work, "ends_badly", ends_badly)
+    gc.enable()
+
+    def fails():
+        raise ZeroDivisionError("first")
+
+    with pytest.raises(ZeroDivisionError, match="first"):
+        graphs.record(fails, None, None)
+    assert work.last.asked[-1] == "end" and work.last.asked.count("end") == 1 and gc.isenabled()
+
+
+def test_work_waits_for_what_came_before_and_what_comes_after_for_it(step, monkeypatch):
+    events = []
+
+    class Stream:
+        def __init__(self, name):
+            self.name = name
+
+        def wait_stream(self, other):
+            events.append(f"{self.name} waits for {other.name}")
+
+    class Within:
+        def __init__(self, stream):
+            self.name = stream.name
+
+        def __enter__(self):
+            events.append(f"in {self.name}")
+
+        def __exit__(self, *_):
+            events.append(f"out of {self.name}")
+
+    step._stream = Stream("ours")
+    monkeypatch.setattr(torch.cuda, "current_stream", lambda device: Stream("theirs"))
+    monkeypatch.setattr(torch.cuda, "stream", Within)
+    expected = ["ours waits for theirs", "in ours", "work", "out of ours", "theirs waits for ours"]
+    with step.stream():
+        events.append("work")
+    assert events == expected
+    events.clear()
+    with pytest.raises(ValueError), step.stream():
+        events.append("work")
+        raise ValueError
+    assert events == expected

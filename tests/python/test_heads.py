@@ -1,0 +1,157 @@
+"""The small networks by their own weights: layers, where they start, and what each of their outputs is."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from op_checks import generator, unit
+
+from splitnerf import _core
+from splitnerf.fields import MaterialHead, NoOcclusion, OcclusionHead, OcclusionQuery, RaySegments
+from splitnerf.fields.heads import relu_mlp
+
+
+@pytest.mark.parametrize("n_layers", [1, 3])
+def test_a_network_is_its_layers_with_what_is_negative_cut_off_between_them(n_layers):
+    """max(0, W x + b) for each hidden layer, W x + b at the end."""
+    torch.manual_seed(0)
+    net = relu_mlp(5, 16, n_layers, 4)
+    with torch.no_grad():
+        for parameter in net.parameters():
+            parameter.normal_()
+    matrices = list(net.parameters())
+    assert [tuple(x.shape) for x in matrices[::2]] == [(16, 5)] + [(16, 16)] * (n_layers - 1) + [(4, 16)]
+    x = expected = torch.randn(30, 5, generator=generator(1))
+    for weight, bias in zip(matrices[:-2:2], matrices[1:-2:2]):
+        expected = torch.where(expected @ weight.T + bias > 0, expected @ weight.T + bias, 0.0)
+    torch.testing.assert_close(net(x), expected @ matrices[-2].T + matrices[-1])
+
+
+def test_hidden_layers_keep_the_size_of_what_they_read_and_outputs_start_near_0():
+    """Weights with a mean square of 2 over the number of inputs: half of each unit's square is cut off."""
+    torch.manual_seed(0)
+    net = relu_mlp(100, 400, 3, 50)
+    *hidden, out = (layer for layer in net if isinstance(layer, torch.nn.Linear))
+    for layer in hidden:
+        assert layer.weight.square().mean().item() == pytest.approx(2.0 / layer.in_features, rel=0.05)
+    assert out.weight.std().item() == pytest.approx(0.01, rel=0.05)
+    assert not any(layer.bias.any() for layer in (*hidden, out))
+
+
+def test_materials_are_their_own_outputs():
+    """Three of albedo, one of roughness, one of metallic: sigmoids, the roughness brought to [least, 1]."""
+    head = MaterialHead(4, 8, 1, min_roughness=0.2)
+    logits = torch.tensor([-2.0, -0.5, 0.4, 1.0, 3.0])
+    with torch.no_grad():
+        head.net[-1].weight.zero_()
+        head.net[-1].bias.copy_(logits)
+    albedo, roughness, metallic = head(torch.zeros(2, 4))
+    share = 1 / (1 + torch.exp(-logits))
+    torch.testing.assert_close(albedo, share[:3].expand(2, 3))
+    torch.testing.assert_close(roughness, (0.2 + 0.8 * share[3:4]).expand(2, 1))
+    torch.testing.assert_close(metallic, share[4:].expand(2, 1))
+
+
+@pytest.mark.parametrize(("initial", "least", "expected"), [(0.2, 0.2, 0.2008), (0.1, 0.2, 0.2008), (1.0, 0.2, 0.9992)])
+def test_a_roughness_at_the_end_of_its_range_can_be_learned(initial, least, expected):
+    """It starts a thousandth of the range from there, where the sigmoid still has a slope; albedo starts at a half."""
+    torch.manual_seed(0)
+    head = MaterialHead(4, 8, 1, initial, least)
+    albedo, roughness, metallic = head(torch.zeros(1, 4))
+    assert roughness.item() == pytest.approx(expected, abs=1e-6)
+    torch.testing.assert_close(albedo, torch.full((1, 3), 0.5))
+    assert metallic.item() == pytest.approx(1 / (1 + math.exp(2)))
+
+
+# ---- occlusion ----
+
+
+def query_of(n: int = 40, n_inputs: int = 7) -> OcclusionQuery:
+    """Points of which each number may have a gradient."""
+    g = generator(3)
+    normals, lobes = (unit(torch.randn(n, 3, generator=g)) for _ in range(2))
+    parts = (
+        torch.randn(n, n_inputs, generator=g),
+        torch.randn(n, 3, generator=g),
+        normals,
+        lobes,
+        torch.rand(n, 1, generator=g),
+    )
+    return OcclusionQuery(*(part.requires_grad_() for part in parts))
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_the_factors_are_their_own_outputs_and_mostly_open_at_first(channels):
+    head = OcclusionHead(7, 8, 1, channels, directional=False)
+    head.use(None)
+    with torch.no_grad():
+        head.net[-1].weight.zero_()
+    found = head(query_of())
+    assert found.diffuse.shape == found.specular.shape == (40, channels)
+    for factor in found[:2]:
+        torch.testing.assert_close(factor, torch.full_like(factor, 1 / (1 + math.exp(-2))))
+    logits = torch.linspace(-3, 2, 2 * channels)
+    with torch.no_grad():
+        head.net[-1].bias.copy_(logits)
+    found, share = head(query_of()), 1 / (1 + torch.exp(-logits))
+    torch.testing.assert_close(found.diffuse, share[:channels].expand(40, channels))
+    torch.testing.assert_close(found.specular, share[channels:].expand(40, channels))
+    assert found.indirect_diffuse is found.indirect_specular is None
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_all_is_open_before_the_first_mesh_without_occlusion_and_where_nothing_is_blocked(channels):
+    head, none = OcclusionHead(7, 8, 1, channels, directional=True), NoOcclusion(channels)
+    found = [head(query_of()), none(query_of())]
+    head.use(None)
+    none.use(None)
+    assert head.ready and not none.ready and head.needs_mesh and not none.needs_mesh
+    assert (head(query_of()).diffuse < 1).all()
+    found.append(none(query_of()))
+    head.is_unoccluded = True
+    found.append(head(query_of()))
+    for occlusion in found:
+        assert torch.equal(occlusion.diffuse, torch.ones(40, channels)) and torch.equal(
+            occlusion.specular, torch.ones(40, channels)
+        )
+
+
+def test_the_gradient_goes_into_what_the_head_reads_of_the_field_and_not_into_the_geometry():
+    head, query = OcclusionHead(7, 8, 1, 1, directional=True), query_of()
+    head.use(None)
+    found = head(query)
+    (found.diffuse.sum() + found.specular.sum()).backward()
+    assert query.inputs.grad.abs().sum() > 0 and head.net[0].weight.grad.abs().sum() > 0
+    assert query.positions.grad is query.normals.grad is query.lobe_dirs.grad is query.roughness.grad is None
+
+
+def test_a_kind_of_occlusion_is_told_the_segments_of_the_points():
+    head, segments, told = OcclusionHead(7, 8, 1, 1, directional=True), RaySegments(torch.zeros(1), torch.zeros(40)), []
+    head.use(None)
+    head.answer = lambda query, given: told.append(given)
+    head(query_of(), segments)
+    head(query_of())
+    assert told[0] is segments and told[1] is None
+
+
+def test_a_directional_head_reads_the_lobe_by_functions_that_differ_over_the_sphere():
+    """Its axis, the five harmonics of degree 2, without a mean or anything in common, the cube of z, and its width."""
+    directions = torch.from_numpy(_core.fibonacci_sphere(4096)).float()
+    head = OcclusionHead(7, 8, 1, 1, directional=True)
+    head.use(None)
+    read = []
+    head.net = torch.nn.Sequential(torch.nn.Identity())
+    head.net.register_forward_hook(lambda _, inputs, __: read.append(inputs[0]))
+    n = len(directions)
+    inputs, normals, roughness = torch.rand(n, 7), directions.flip(0), torch.rand(n, 1, generator=generator())
+    head(OcclusionQuery(inputs, directions, normals, directions, roughness))
+    (read,) = read
+    assert read.shape == (n, 17) and torch.equal(read[:, :7], inputs)
+    assert torch.equal(read[:, 7:10], directions) and torch.equal(read[:, 16:], roughness)
+    torch.testing.assert_close(read[:, 15], directions[:, 2] ** 3)
+    harmonics = read[:, 10:15].double()
+    assert harmonics.mean(0).abs().max() < 1e-3
+    products = harmonics.T @ harmonics / n
+    assert products.diag().min() > 0.05 and (products - products.diag().diag()).abs().max() < 1e-3

@@ -1,0 +1,260 @@
+"""The parts that lights share: how many directions, gradients that gather, other tensors in their place, panoramas."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from op_cases import octahedral_directions
+from op_checks import generator, unit
+from precision import precisions
+
+from splitnerf.fields import EvaluatedLight, Light, LightMlp, LightPyramid, VisibilityBits
+from splitnerf.fields.light import LightSamples, lobe_roughness, panorama_directions
+from splitnerf.fields import light_pyramid
+from splitnerf.fields.light_pyramid import chain_resolution, is_resolved, pyramid_filters
+from splitnerf.ops import sh_projection
+
+
+# ---- the number of directions ----
+
+
+def learned(*steps: tuple[float, float, int]) -> LightSamples:
+    samples = LightSamples()
+    for step in steps:
+        samples.learn(*step)
+    return samples
+
+
+def test_the_number_of_directions_has_bounds():
+    assert learned().count(0.1, 1000) == 1000
+    assert learned((0.1, 1.0, 200)).count(0.1, 1000) == 200
+    assert learned((0.1, 1.0, 200)).count(0.05, 1000) == 400
+    assert learned((0.1, 1.0, 200)).count(0.1, 150) == 150
+    assert learned((0.01, 1.0, 200)).count(0.1, 1000) == 64 and learned((0.01, 1.0, 200)).count(0.1, 50) == 50
+
+
+def test_noise_and_error_are_means_of_the_last_steps():
+    """A step counts for 3 in 100: 20 and then 50 make 20.9 of variance, 1 and then 5 make 1.12 of error."""
+    samples = learned((0.1, 1.0, 200), (0.5, 5.0, 100))
+    assert samples.state().tolist() == pytest.approx([20.9, 1.12], rel=1e-12)
+    assert samples.state().dtype == torch.float64
+
+
+def test_what_was_learned_comes_back_with_all_its_bits():
+    samples, other = learned((0.1, 1 / 3, 200)), LightSamples()
+    other.restore(samples.state().tolist())
+    assert (other.variance, other.squared_error) == (samples.variance, samples.squared_error) == (0.1 * 200, 1 / 3)
+    other.learn(0.5, 5.0, 100)
+    samples.learn(0.5, 5.0, 100)
+    assert other.count(0.1, 10_000) == samples.count(0.1, 10_000)
+
+
+# ---- evaluated lights ----
+
+
+BITS = VisibilityBits(64, 0.01, 3, indirect=False)
+W, RHO = unit(torch.randn(30, 3, generator=generator(1))), torch.rand(30, 1, generator=generator(2))
+
+
+def light_of(kind: str, seed: int = 0) -> Light:
+    torch.manual_seed(seed)
+    light = LightPyramid(16) if kind == "pyramid" else LightMlp(16, 1, 2, 1)
+    with torch.no_grad():
+        for parameter in light.parameters():
+            parameter.add_(0.3 * torch.randn_like(parameter))
+    return light
+
+
+def evaluated(light: Light) -> EvaluatedLight:
+    maps = light.evaluate()
+    return EvaluatedLight(maps, BITS.cell_light(maps))
+
+
+def use(light: EvaluatedLight) -> torch.Tensor:
+    """Something that reads all parts of a light."""
+    return (
+        light(W, RHO).square().sum()
+        + (light.cells.radiance.square() * light.cells.solid_angles[:, None]).sum()
+        + light.cells.directions[:, 0].sum()
+    )
+
+
+def test_a_light_may_read_other_tensors_and_leaves_its_gradients_there():
+    """Of the pyramid: maps, harmonics and the cells' radiance, whose directions and solid angles have no gradient."""
+    ours, theirs = evaluated(light_of("pyramid")), evaluated(light_of("pyramid", seed=1))
+    assert len(ours.leaves) == 3 and len(ours.constants) == 2
+    assert ours.constants[0] is ours.cells.directions and ours.constants[1] is ours.cells.solid_angles
+    leaves = [leaf.detach().clone().requires_grad_() for leaf in theirs.leaves]
+    copy = ours.with_tensors(leaves, [x.clone() for x in theirs.constants])
+    assert len(copy.leaves) == 3 and all(a is b for a, b in zip(copy.leaves, leaves))
+    assert use(copy).item() == use(theirs).item() != use(ours).item()
+    use(copy).backward()
+    use(theirs).backward()
+    for a, b, untouched in zip(leaves, theirs.leaves, ours.leaves):
+        assert torch.equal(a.grad, b.grad) and a.grad.abs().sum() > 0 and untouched.grad is None
+    with torch.no_grad():
+        for leaf in leaves:
+            leaf.mul_(2.0)
+    torch.testing.assert_close(copy(W, RHO), 2 * theirs(W, RHO))
+    again = ours.with_tensors(ours.leaves, ours.constants)
+    assert use(again).item() == use(ours).item()
+
+
+def test_a_light_without_leaves_stays_what_it_is():
+    """The MLP's gradients reach its parameters by themselves, those of the cells too."""
+    light = light_of("mlp")
+    ours = evaluated(light)
+    assert ours.leaves == () and len(ours.constants) == 2
+    copy = ours.with_tensors([], [x.clone() for x in ours.constants])
+    assert use(copy).item() == use(ours).item()
+    use(copy).backward()
+    ours.backward()
+    assert all(p.grad.abs().sum() > 0 for p in light.parameters())
+
+
+def test_a_light_without_cells_has_none_with_other_tensors_either():
+    light = EvaluatedLight(light_of("pyramid").evaluate())
+    copy = light.with_tensors(light.leaves, light.constants)
+    assert light.constants == () and light.cells is copy.cells is None and len(copy.leaves) == 2
+
+
+@pytest.mark.parametrize("read", ["lookups", "cells", "both"])
+def test_what_gathers_is_handed_on_whatever_was_read(read):
+    """The gradient of maps alone, of the cells alone, and of both, is that of a light evaluated for this one step."""
+    light, grads = light_of("pyramid"), []
+
+    def loss(shared, cells) -> torch.Tensor:
+        parts = {"lookups": shared(W, RHO).square().sum(), "cells": (cells.radiance**3).sum()}
+        return parts[read] if read in parts else sum(parts.values())
+
+    shared = evaluated(light)
+    loss(shared, shared.cells).backward()
+    assert light.texels.grad is None
+    shared.backward()
+    grads.append(light.texels.grad.clone())
+    light.zero_grad()
+    loss(light, BITS.cell_light(light)).backward()
+    torch.testing.assert_close(grads[0], light.texels.grad)
+
+
+def test_gradients_that_are_dropped_are_dropped_everywhere():
+    """Of maps, harmonics and cells: what gathers afterwards is that of the next step alone."""
+    light = light_of("pyramid")
+    shared = evaluated(light)
+    use(shared).backward()
+    assert all(leaf.grad is not None for leaf in shared.leaves)
+    shared.zero_grad()
+    assert all(leaf.grad is None for leaf in shared.leaves)
+    use(shared).backward()
+    once = [leaf.grad.clone() for leaf in evaluated_once(light)]
+    for leaf, grad in zip(shared.leaves, once, strict=True):
+        torch.testing.assert_close(leaf.grad, grad)
+    shared.zero_grad()
+    shared.backward()
+    assert light.texels.grad is None
+
+
+def evaluated_once(light: Light) -> tuple[torch.Tensor, ...]:
+    """The leaves of an evaluation that was used once."""
+    shared = evaluated(light)
+    use(shared).backward()
+    return shared.leaves
+
+
+# ---- panoramas, and widths ----
+
+
+class Painted(Light):
+    """The direction as a colour, and the roughness as a fourth of it, so that it shows."""
+
+    def __init__(self):
+        super().__init__()
+        self.one = torch.nn.Parameter(torch.ones(1))
+
+    def forward(self, directions, roughness):
+        return self.one * (2 + directions + 0.25 * roughness)
+
+
+@pytest.mark.parametrize("height", [8, 200])
+def test_a_panorama_is_the_light_in_each_of_its_directions(height):
+    """More texels than are asked at a time (65,536), too."""
+    panorama, directions = Painted().panorama(height, 0.8), panorama_directions(height)
+    assert panorama.shape == directions.shape == (height, 2 * height, 3) and not panorama.requires_grad
+    torch.testing.assert_close(panorama, 2.2 + directions)
+    torch.testing.assert_close(Painted().panorama(8), 2 + panorama_directions(8))
+    assert directions[0, 0, 2] > 0.9 > -0.9 > directions[-1, 0, 2] and directions[height // 2, height, 0] > 0.9
+
+
+def test_a_lobe_as_wide_as_the_sphere_is_rough():
+    """Roughness r: 4 pi r^4; whatever is wider counts as 1."""
+    for roughness in (0.1, 0.5, 1.0):
+        solid_angle = 4 * math.pi * roughness**4
+        assert lobe_roughness(solid_angle) == pytest.approx(roughness)
+        assert lobe_roughness(torch.tensor([solid_angle])).item() == pytest.approx(roughness)
+    assert lobe_roughness(50.0) == 1.0 == lobe_roughness(torch.tensor([50.0])).item()
+
+
+# ---- the pyramid's maps ----
+
+
+@pytest.mark.parametrize(("resolution", "maps", "nodes"), [
+    (16, [16, 16, 16], [0.05, 0.3, 0.4, 0.5]), (32, [32, 32, 32], [0.05, 0.3, 0.4, 0.5]),
+    (64, [64, 64, 64, 64, 32], [0.05, 0.15, 0.2, 0.3, 0.4, 0.5]),
+])  # fmt: skip
+def test_maps_are_as_fine_as_their_lobes(resolution, maps, nodes):
+    """5 texels for ggx_alpha = rho^2, where the lobe, 2.57 alpha wide, is wider than a texel, and what is wide is wider
+    than one of its own map."""
+    filters = pyramid_filters(resolution)
+    assert filters.resolutions.tolist() == maps and filters.nodes.tolist() == pytest.approx(nodes)
+    assert torch.equal(filters.projection, sh_projection(resolution, cells=False))  # as texels are read: bilinearly
+    for rho in (0.1, 0.15, 0.2, 0.3, 0.4):
+        assert is_resolved(resolution, rho) == (2.57 * rho**2 >= math.sqrt(4 * math.pi) / resolution)
+        m = chain_resolution(1 << 12, rho)
+        assert m >= 5 / rho**2 > m / 2 and chain_resolution(resolution, rho) == min(m, resolution)
+
+
+def test_the_light_starts_as_it_is_told_and_its_texels_stay_in_bounds():
+    """exp(-12) to exp(12), where the gradient ends."""
+    for start in (0.5, 3.0):
+        light = LightPyramid(16, start)
+        torch.testing.assert_close(light.radiance(), torch.full((256, 3), start))
+        assert not light.texels[16:].any()
+    assert LightMlp.needs_consistency_loss and not light.needs_consistency_loss  # lobes are integrals of the texels
+    light = LightPyramid(16, 1.0)
+    with torch.no_grad():
+        light.texels[-256:] = torch.linspace(-21, 21, 256)[:, None]
+    radiance = light.radiance()
+    expected = torch.linspace(-21, 21, 256).clamp(-12, 12).exp()[:, None].expand(256, 3)
+    torch.testing.assert_close(radiance, expected, rtol=1e-4, atol=0)
+    radiance.log().sum().backward()
+    inside = torch.linspace(-21, 21, 256).abs() < 12
+    torch.testing.assert_close(light.texels.grad[-256:, 0], inside.float())
+
+
+def test_texels_are_read_as_they_are_up_to_a_roughness_of_a_twentieth():
+    light = light_of("pyramid")
+    sharp, still, rough = (light(W, torch.full((30, 1), rho)) for rho in (0.0, 0.05, 0.06))
+    assert torch.equal(sharp, still) and not torch.allclose(still, rough)
+
+
+def test_harmonics_are_those_of_the_averages_where_maps_are_large(monkeypatch):
+    """By averages of 16 texels along the edge of 32. c + z + z^3 at roughness 1, where it is the irradiance over pi:
+    z^3 = 3/5 P1 + 2/5 P3, of which P1 counts by 2/3 and P3 by nothing."""
+    monkeypatch.setattr(light_pyramid, "SH_RESOLUTION", 16)
+    filters = pyramid_filters.__wrapped__(32)
+    monkeypatch.setattr(light_pyramid, "filters_on", lambda *_: filters)
+    assert filters.projected == slice(32 * 32, 32 * 32 + 16 * 16) and filters.projection.shape == (169, 256)
+    assert torch.equal(filters.projection, sh_projection(16, cells=True))  # averages are constant in their cells
+    light, z = LightPyramid(32), octahedral_directions(32)[:, 2:].float()
+    with torch.no_grad():
+        light.texels.zero_()
+        light.texels[-(32 * 32) :] = (2.5 + z + z**3).log()
+    expected = (2.5 + (2 / 3) * 1.6 * W[:, 2:]).expand(30, 3)
+    torch.testing.assert_close(light(W, torch.ones(30, 1)), expected, rtol=0.015, atol=0)
+
+
+def test_harmonics_are_not_rounded_to_tensor_cores():
+    asked = precisions(light_of("pyramid").chain)
+    assert asked["__matmul__"] | asked["matmul"] == {"ieee"}

@@ -1,0 +1,203 @@
+"""The swap table on a scene of two balls, and the assets that are hard to reconstruct."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+
+import numpy as np
+import pytest
+import trimesh
+from bench import hard_scenes, limits
+from bench.swap import PARTS, Canvas, NearestPoints, surface_values
+from bench.tubes import assemble
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import write_image
+from splitnerf.evaluate.jobs import Protocol, evaluate_asset
+from splitnerf.export.glb import write_glb
+from splitnerf.synth.jobs import SynthSettings, synthesise
+
+SPP = 4
+
+
+def ball(colour, metallic, roughness, radius, offset):
+    """A ball of one material, without texture coordinates."""
+    mesh = trimesh.creation.icosphere(subdivisions=3, radius=radius)
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorFactor=[*colour, 1.0], metallicFactor=metallic, roughnessFactor=roughness
+    )
+    visual = trimesh.visual.TextureVisuals(material=material)
+    normals = np.array(mesh.vertex_normals)
+    return trimesh.Trimesh(mesh.vertices + offset, mesh.faces, vertex_normals=normals, visual=visual, process=False)
+
+
+def spoiled(asset: Asset) -> Asset:
+    """The same shape with wrong materials and tilted normals."""
+    right = Canvas(asset, asset, 256).painted(())
+    material = dataclasses.replace(
+        right.materials[0],
+        albedo_texture=(0.9 - 0.8 * right.materials[0].albedo_texture).astype(np.float32),
+        roughness_metallic_texture=np.full((256, 256, 2), (0.9, 0.4), np.float32),
+        normal_texture=np.broadcast_to(np.float32([0.6, 0, 0.8]), (256, 256, 3)).copy(),
+    )
+    return dataclasses.replace(right, materials=[material])
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """A data set of two balls, and a run's folder with a spoiled asset."""
+    folder = tmp_path_factory.mktemp("limits")
+    scene = trimesh.Scene({
+        "large": ball((0.6, 0.2, 0.1), 0.0, 0.3, 0.6, (0, 0, 0)),
+        "small": ball((0.8, 0.8, 0.4), 1.0, 0.2, 0.3, (0.9, 0, 0)),
+    })  # fmt: skip
+    (folder / "balls.glb").write_bytes(scene.export(file_type="glb", include_normals=True))
+    light = np.full((16, 32, 3), 0.3, np.float32)
+    light[4:8, 10:14] = 8
+    write_image(folder / "light.exr", light)
+    write_image(folder / "turned.exr", np.roll(light, 11, axis=1))
+    data = synthesise(
+        folder / "balls.glb", folder / "light.exr", [folder / "turned.exr"], folder / "data",
+        SynthSettings(size=32, train=2, test=2, spp=64),
+    )  # fmt: skip
+    (folder / "run").mkdir()
+    write_glb(folder / "run" / "mesh.glb", spoiled(read_asset(data / "asset.glb")))
+    write_image(folder / "run" / "environment.exr", 0.5 * light)
+    return folder / "run", data
+
+
+def read_table(text: str) -> dict[str, dict[str, float]]:
+    """The rows of the last table on a page."""
+    lines = [line.strip("| ") for line in text.splitlines() if line.startswith("|")]
+    keys = [key for key, _ in limits.COLUMNS]
+    cells = [[cell.strip() for cell in line.split("|")] for line in lines[-len(limits.ROWS) :]]
+    return {name: dict(zip(keys, map(float, values))) for name, *values in cells}
+
+
+def test_the_table_has_the_ceiling_and_mends_one_part_at_a_time(files, tmp_path, monkeypatch):
+    run, data = files
+    page = tmp_path / "page.md"
+    words = ["limits.py", run, data, "--views", 2, "--spp", SPP, "--texture", 256, "--out", page]
+    monkeypatch.setattr("sys.argv", [str(word) for word in words])
+    limits.main()
+    text = page.read_text()
+    rows = read_table(text)
+    assert "commit " in text and "limits.py" in text and list(rows) == [name for name, _ in limits.ROWS]
+
+    protocol = Protocol(views=2, spp=SPP)
+    for name, path in (("ours", run / "mesh.glb"), ("all true", data / "asset.glb")):
+        scores = evaluate_asset(path, data, protocol).scores
+        for key, value in (
+            ("relit", scores["relight"]["psnr"]), ("relit_raw", scores["relight"]["raw"]["psnr"]),
+            ("albedo", scores["albedo"]["psnr"]), ("roughness", scores["roughness_mae"]),
+            ("smooth", scores["normal_mae_deg"]),
+        ):  # fmt: skip
+            assert rows[name][key] == pytest.approx(value, abs=6e-3), (name, key)
+
+    ours, ceiling = rows["ours"], rows["all true"]
+    assert ceiling["shading"] == 0 and ceiling["relit_quiet"] > ceiling["relit"] + 1
+    for part in PARTS:
+        key = "shading" if part == "normals" else part
+        mended, left = rows[f"true {part}"], rows[f"all true but {part}"]
+        tolerance = {"albedo": 0.5, "shading": 0.7}.get(key, 0.01)
+        assert mended[key] == pytest.approx(ceiling[key], abs=tolerance) != pytest.approx(ours[key], abs=5 * tolerance)
+        assert left[key] == pytest.approx(ours[key], abs=5 * tolerance), key
+        for other in {"albedo", "roughness", "metallic", "shading"} - {key}:
+            assert mended[other] == pytest.approx(ours[other], abs=0.02), (part, other)
+    for whole in ("true mesh, normals", "true materials", "all true but mesh"):
+        assert rows[whole]["relit"] <= ceiling["relit"] + 0.3
+    assert rows["all true but mesh"]["relit"] == pytest.approx(ceiling["relit"], abs=0.3)  # the mesh is the true one
+    assert ours["relit"] < ceiling["relit"] - 3
+
+
+def test_tables_are_appended_under_one_introduction(tmp_path, monkeypatch):
+    monkeypatch.setattr(limits, "section", lambda run, scene, *_: f"## {scene.name}\n")
+    for name in ("first", "second"):
+        monkeypatch.setattr("sys.argv", ["limits.py", "run", name, "--out", str(tmp_path / "page.md")])
+        limits.main()
+    assert (tmp_path / "page.md").read_text() == limits.INTRODUCTION + "\n## first\n\n## second\n"
+
+
+def test_true_albedo_is_found_on_every_texel(files):
+    run, data = files
+    ours, truth = read_asset(run / "mesh.glb"), read_asset(data / "asset.glb")
+    painted = Canvas(ours, truth, 256).painted({"albedo", "normals"})
+    centres = painted.vertices[painted.triangles].mean(axis=1)
+    numbers = np.arange(len(painted.triangles))
+    weights = np.full((len(numbers), 3), 1 / 3, np.float32)
+    found = surface_values(painted, numbers, weights)
+    triangles, nearest = NearestPoints(truth)(centres, painted.normals[painted.triangles[:, 0]])
+    true, own = surface_values(truth, triangles, nearest), surface_values(ours, numbers, weights)
+    assert found["albedo"] == pytest.approx(true["albedo"], abs=1e-6)
+    assert (found["normals"] * true["normals"]).sum(axis=1).min() > np.cos(np.radians(2))
+    assert found["roughness"] == pytest.approx(own["roughness"], abs=1e-6)
+    assert np.abs(own["albedo"] - true["albedo"]).max() > 0.1
+
+
+def test_nearest_points_are_on_the_sheet_that_faces_the_same_way():
+    thickness = 0.01
+    box = trimesh.creation.box(extents=(2, 2, thickness))
+    plate = Asset("plate", box.vertices.astype(np.float32), box.faces.astype(np.int32),
+                  np.array(box.vertex_normals, np.float32), np.zeros(12, np.int32))  # fmt: skip
+    draw = np.random.default_rng(0)
+    points = draw.uniform(-0.9, 0.9, (200, 3)) * [1, 1, 0] + [0, 0, 0.004]
+    for side in (1.0, -1.0):
+        triangles, weights = NearestPoints(plate)(points, np.tile([0, 0, side], (200, 1)))
+        found = (box.vertices[box.faces[triangles]] * weights[..., None]).sum(axis=1)
+        assert found == pytest.approx(points * [1, 1, 0] + [0, 0, side * thickness / 2], abs=1e-5)
+
+
+def test_charts_that_share_texels_are_unwrapped_again():
+    mesh = trimesh.creation.icosphere(subdivisions=1)
+    uv = np.tile(np.float32([[0, 0], [1, 0], [0, 1]]), (len(mesh.faces), 1))
+    corners = mesh.faces.ravel()
+    vertices, normals = (np.asarray(v, np.float32)[corners] for v in (mesh.vertices, mesh.vertex_normals))
+    faces = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
+    shared = Asset("shared", vertices, faces, normals, np.zeros(len(faces), np.int32), uv=uv)
+    fresh = Canvas(shared, shared, 128).painted(PARTS)
+    assert not np.array_equal(fresh.uv, uv)
+    assert np.array_equal(Canvas(fresh, shared, 128).painted(PARTS).uv, fresh.uv)
+
+
+# ---- hard scenes ----
+
+DETAIL = 0.12
+RANGES = {  # of albedo, roughness, metallic
+    "knot": ((0.028, 0.082), (0.10, 0.31), (0, 0)),
+    "rings": ((0.018, 0.96), (0.10, 0.35), (0, 1)),
+    "basket": ((0.018, 0.87), (0.20, 0.61), (0, 1)),
+}
+
+
+@pytest.mark.parametrize("name", hard_scenes.SCENES)
+def test_hard_scenes_are_closed_and_their_materials_in_range(name, tmp_path):
+    tubes = hard_scenes.SCENES[name]()
+    asset = assemble(name, tubes, DETAIL)
+    write_glb(tmp_path / "a.glb", asset)
+    read = read_asset(tmp_path / "a.glb")
+    assert read.vertices == pytest.approx(asset.vertices, abs=1e-6) and len(read.triangles) == len(asset.triangles)
+    assert np.linalg.norm(read.normals, axis=1) == pytest.approx(1, abs=1e-5)
+    assert 0 <= read.uv.min() and read.uv.max() <= 1
+
+    parts = trimesh.Trimesh(read.vertices, read.triangles, process=True, merge_tex=True, merge_norm=True).split()
+    assert len(parts) == len(tubes)
+    assert all(part.is_watertight and part.is_winding_consistent and part.volume > 0 for part in parts)
+    flat = trimesh.Trimesh(read.vertices, read.triangles, process=False).face_normals
+    assert ((flat * read.normals[read.triangles[:, 0]]).sum(axis=1) > 0).mean() > 0.99
+
+    corners = np.tile(np.eye(3, dtype=np.float32), (len(read.triangles), 1))
+    values = surface_values(read, np.repeat(np.arange(len(read.triangles)), 3), corners)
+    for part, (low, high) in zip(("albedo", "roughness", "metallic"), RANGES[name]):
+        assert low - 3e-3 <= values[part].min() and values[part].max() <= high + 3e-3, part
+
+
+def test_hard_scenes_are_the_same_every_time(tmp_path, monkeypatch):
+    for folder in ("a", "b"):
+        monkeypatch.setattr("sys.argv", ["hard_scenes.py", str(tmp_path / folder), "--detail", str(DETAIL)])
+        hard_scenes.main()
+    sums = [
+        {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in (tmp_path / folder).iterdir()} for folder in "ab"
+    ]
+    assert sums[0] == sums[1] and sorted(sums[0]) == ["basket.glb", "knot.glb", "rings.glb"]
