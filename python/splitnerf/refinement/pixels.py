@@ -12,6 +12,7 @@ from splitnerf.data.images import srgb_to_linear
 MIN_ALPHA = 0.99  # of a pixel that the object covers
 SATURATED = 254.5 / 255.0  # sRGB value from which the photo says only that the light was at least so bright
 FILTER_WIDTH = 3.0  # pixels from end to end
+INTERVALS = 4096
 
 
 @dataclass
@@ -69,14 +70,14 @@ def covered_pixels(dataset: Dataset) -> Pixels:
 
 
 def filter_offsets() -> np.ndarray:
-    """[4097] the offset in pixels below which a share i / 4096 of the Blackman-Harris filter lies.
+    """[INTERVALS + 1] the offset in pixels below which a share i / INTERVALS of the Blackman-Harris filter lies.
 
     Source: Harris 1978 (the window of four terms); Ernst, Stamminger and Greiner 2006 (sampling it).
     """
     t = np.linspace(0.0, 1.0, 1 << 16)
     x = 2 * np.pi * t
     share = t + (-0.48829 * np.sin(x) + 0.14128 / 2 * np.sin(2 * x) - 0.01168 / 3 * np.sin(3 * x)) / (2 * np.pi * 0.35875)
-    return (FILTER_WIDTH * (np.interp(np.linspace(0, 1, 4097), share, t) - 0.5)).astype(np.float32)
+    return (FILTER_WIDTH * (np.interp(np.linspace(0, 1, INTERVALS + 1), share, t) - 0.5)).astype(np.float32)
 
 
 class PixelFilter:
@@ -85,8 +86,6 @@ class PixelFilter:
     def __init__(self):
         self._offsets = filter_offsets()
 
-    def draw(self, n: int, n_rays: int, generator: np.random.Generator) -> np.ndarray:
-        """[n, n_rays, 2] offsets in pixels, stratified along both axes within a pixel."""
-        order = generator.permuted(np.broadcast_to(np.arange(n_rays), (2, n, n_rays)), axis=2)
-        u = (order + generator.random((2, n, n_rays))) / n_rays
-        return np.stack([np.interp(part * 4096, np.arange(4097), self._offsets) for part in u], axis=-1)
+    def draw(self, n: int, generator: np.random.Generator) -> np.ndarray:
+        """[n, 2] float32 independent offsets from the pixels' centres, in pixels."""
+        return np.interp(generator.random((n, 2)) * INTERVALS, np.arange(INTERVALS + 1), self._offsets).astype(np.float32)
