@@ -1,5 +1,8 @@
 #include "splitnerf/incoming_light.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -21,25 +24,32 @@ class LightGatherer {
       : scene_(scene), points_(points), n_(n_directions), seed_(path.seed),
         paths_(scene, surface, environment, path, n_directions) {}
 
+  // The rays of one point.
   struct Worker {
     PathState path;
+    std::vector<int> numbers;  // of their directions
     std::vector<Vec> origins, directions;
     std::vector<Hit> hits;
-    explicit Worker(int n) : origins(n), directions(n), hits(n) {}
+    explicit Worker(int n) : hits(n) {}
   };
 
   void gather(int64_t point, Worker& worker, const IncomingLightTargets& out) const {
     draw(point, worker, out);
-    scene_.trace_closest(&worker.origins[0].x, &worker.directions[0].x, n_, std::numeric_limits<float>::infinity(),
+    const int n_rays = static_cast<int>(worker.numbers.size());
+    std::fill_n(out.visible + point * n_, n_, 0.f);
+    std::fill_n(out.sent + 3 * point * n_, 3 * n_, 0.f);
+    if (n_rays == 0) return;
+    scene_.trace_closest(&worker.origins[0].x, &worker.directions[0].x, n_rays, std::numeric_limits<float>::infinity(),
                          worker.hits.data());
     paths_.pattern().start_pixel(static_cast<uint32_t>(point), worker.path.offsets);
-    for (int i = 0; i < n_; ++i) {
+    for (int ray = 0; ray < n_rays; ++ray) {
+      const int i = worker.numbers[ray];
       const int64_t at = point * n_ + i;
-      const bool above = dot(worker.directions[i], load3(points_.geometric_normals + 3 * point)) > 0;
-      const bool counts = above && out.solid_angles[at] > 0, hit = worker.hits[i].t >= 0;
-      out.visible[at] = counts && !hit ? 1.f : 0.f;
-      Vec sent{0, 0, 0};
-      if (counts && hit) sent = paths_.radiance(worker.directions[i], worker.hits[i], i, 1, worker.path);
+      if (worker.hits[ray].t < 0) {
+        out.visible[at] = 1.f;
+        continue;
+      }
+      const Vec sent = paths_.radiance(worker.directions[ray], worker.hits[ray], i, 1, worker.path);
       if (!std::isfinite(sum(sent))) {
         throw std::runtime_error("incoming_light: the light at point " + std::to_string(point) + " is not finite");
       }
@@ -48,7 +58,7 @@ class LightGatherer {
   }
 
  private:
-  // Directions of a point and the solid angle that each stands for.
+  // Directions of a point, the solid angle that each stands for, and rays along those from which light can arrive.
   void draw(int64_t point, Worker& worker, const IncomingLightTargets& out) const {
     const Vec normal = load3(points_.normals + 3 * point), geometric = load3(points_.geometric_normals + 3 * point);
     const Frame<float> frame(normal);
@@ -65,6 +75,7 @@ class LightGatherer {
     const int n_light = light.black() ? 0 : n_ / 2, n_bsdf = n_ - n_light;
     const Vec2<float> light_shift = shift(0), bsdf_shift = shift(2);
     const float lobe_shift = random_unit<float>(seed_, counter, 4);
+    worker.numbers.clear(), worker.origins.clear(), worker.directions.clear();
     for (int i = 0; i < n_; ++i) {
       Vec direction;
       float light_pdf;
@@ -79,10 +90,11 @@ class LightGatherer {
       }
       const float bsdf_pdf = bsdf.evaluate(frame.to_local(direction)).pdf;
       const bool counts = bsdf_pdf > 0;
-      worker.origins[i] = start;
-      worker.directions[i] = direction;
       store3(out.directions + 3 * (point * n_ + i), direction);
       out.solid_angles[point * n_ + i] = counts ? 1.f / (n_light * light_pdf + n_bsdf * bsdf_pdf) : 0.f;
+      // Nothing arrives from below the true surface, whatever the shading normal says.
+      if (!counts || !(dot(direction, geometric) > 0)) continue;
+      worker.numbers.push_back(i), worker.origins.push_back(start), worker.directions.push_back(direction);
     }
   }
 
@@ -98,7 +110,7 @@ class LightGatherer {
 void incoming_light(const Scene& scene, const Surface& surface, const EnvironmentMap& environment,
                     const SurfacePoints& points, const IncomingLightParams& params,
                     const IncomingLightTargets& targets) {
-  check_surface(scene, surface, environment);
+  check_surface("incoming_light", scene, surface, environment);
   PathTracerParams path;
   path.max_bounces = params.max_bounces;
   path.seed = params.seed;

@@ -68,8 +68,7 @@ class PathIntegrator {
       if (bounce == first_bounce && first) *first = point;
       radiance += limited(throughput * point.emission, bounce > 0);
       const Frame<float> frame(point.shading_normal);
-      const PrincipledBsdf<float> bsdf(lut_, point.albedo, point.roughness, point.metallic,
-                                       frame.to_local(-direction));
+      const PrincipledBsdf<float> bsdf(lut_, point.albedo, point.roughness, point.metallic, frame.to_local(-direction));
       const Vec start = point.position + point.geometric_normal * ray_offset_;
       const int pair = 1 + kPairsPerBounce * bounce;
 

@@ -52,7 +52,8 @@ class PathTracer {
     for (int sample = 0; sample < spp; ++sample) {
       const int k = sample % kCameraRays;
       if (k == 0) trace_camera_rays(x, y, sample, min_of(kCameraRays, spp - sample), worker);
-      if (params_.shadow_catcher && meets_catcher(worker.directions[k], worker.hits[k], sample, worker, &caught)) continue;
+      if (params_.shadow_catcher && meets_catcher(worker.directions[k], worker.hits[k], sample, worker, &caught))
+        continue;
       ShadingPoint first;
       const Vec path = paths_.radiance(worker.directions[k], worker.hits[k], sample, 0, worker.path, &first);
       if (!std::isfinite(sum(path))) {
@@ -146,91 +147,99 @@ class PathTracer {
   PathIntegrator paths_;
 };
 
-void require(bool condition, const char* what) {
-  if (!condition) throw std::invalid_argument(std::string("render: ") + what);
-}
+// Refuses what `caller` was given.
+struct Checks {
+  const char* caller;
 
-void require_range(const float* values, int64_t n, float hi, const char* what) {
-  bool good = true;
-  for (int64_t i = 0; i < n; ++i) good &= values[i] >= 0.f && values[i] <= hi;  // false for NaN
-  require(good, what);
-}
-
-void require_finite(const float* values, int64_t n, const char* what) {
-  bool good = true;
-  for (int64_t i = 0; i < n; ++i) good &= std::isfinite(values[i]);
-  require(good, what);
-}
+  void require(bool condition, const char* what) const {
+    if (!condition) throw std::invalid_argument(std::string(caller) + ": " + what);
+  }
+  void range(const float* values, int64_t n, float hi, const char* what) const {
+    bool good = true;
+    for (int64_t i = 0; i < n; ++i) good &= values[i] >= 0.f && values[i] <= hi;  // false for NaN
+    require(good, what);
+  }
+  void finite(const float* values, int64_t n, const char* what) const {
+    bool good = true;
+    for (int64_t i = 0; i < n; ++i) good &= std::isfinite(values[i]);
+    require(good, what);
+  }
+};
 
 int64_t texels(const Texture& texture) { return int64_t(texture.height) * texture.width; }
 
-void check_ids(const Scene& scene, const Surface& surface) {
+void check_ids(const Checks& check, const Scene& scene, const Surface& surface) {
   bool any_texture = false, any_normal_texture = false;
   for (int i = 0; i < surface.n_materials; ++i) {
     const SurfaceMaterial& m = surface.materials[i];
     any_normal_texture |= m.normal_texture.texels != nullptr;
     any_texture |= m.albedo_texture.texels || m.roughness_metallic_texture.texels || m.emission_texture.texels;
   }
-  require(!(any_texture || any_normal_texture) || surface.uv, "textures need uv");
-  require(!any_normal_texture || (surface.tangents && surface.normals), "a normal texture needs normals and tangents");
+  check.require(!(any_texture || any_normal_texture) || surface.uv, "textures need uv");
+  check.require(!any_normal_texture || (surface.tangents && surface.normals),
+                "a normal texture needs normals and tangents");
   for (int64_t i = 0; i < scene.n_triangles(); ++i) {
-    require(surface.material_ids[i] >= 0 && surface.material_ids[i] < surface.n_materials,
-            "material_ids must name materials");
+    check.require(surface.material_ids[i] >= 0 && surface.material_ids[i] < surface.n_materials,
+                  "material_ids must name materials");
   }
-  if (surface.uv) require_finite(surface.uv, scene.n_vertices() * 2, "uv must be finite");
-  if (surface.tangents) require_finite(surface.tangents, scene.n_vertices() * 4, "tangents must be finite");
+  if (surface.uv) check.finite(surface.uv, scene.n_vertices() * 2, "uv must be finite");
+  if (surface.tangents) check.finite(surface.tangents, scene.n_vertices() * 4, "tangents must be finite");
 }
 
 }  // namespace
 
-void check_material(const SurfaceMaterial& m) {
+void check_material(const char* caller, const SurfaceMaterial& m) {
+  const Checks check{caller};
   constexpr float kMax = std::numeric_limits<float>::max();
   const float factors[5] = {m.albedo.x, m.albedo.y, m.albedo.z, m.roughness, m.metallic};
-  require_range(factors, 5, 1.f, "material factors must lie in [0, 1]");
-  require_range(&m.emission.x, 3, kMax, "emission must be finite and not negative");
+  check.range(factors, 5, 1.f, "material factors must lie in [0, 1]");
+  check.range(&m.emission.x, 3, kMax, "emission must be finite and not negative");
   for (const Texture* t : {&m.albedo_texture, &m.roughness_metallic_texture, &m.normal_texture, &m.emission_texture}) {
-    require(!t->texels || (t->height > 0 && t->width > 0), "textures must not be empty");
+    check.require(!t->texels || (t->height > 0 && t->width > 0), "textures must not be empty");
   }
   if (m.albedo_texture.texels) {
-    require_range(m.albedo_texture.texels, texels(m.albedo_texture) * 3, 1.f, "albedo textures must lie in [0, 1]");
+    check.range(m.albedo_texture.texels, texels(m.albedo_texture) * 3, 1.f, "albedo textures must lie in [0, 1]");
   }
   if (m.roughness_metallic_texture.texels) {
-    require_range(m.roughness_metallic_texture.texels, texels(m.roughness_metallic_texture) * 2, 1.f,
-                  "roughness and metallic textures must lie in [0, 1]");
+    check.range(m.roughness_metallic_texture.texels, texels(m.roughness_metallic_texture) * 2, 1.f,
+                "roughness and metallic textures must lie in [0, 1]");
   }
   if (m.emission_texture.texels) {
-    require_range(m.emission_texture.texels, texels(m.emission_texture) * 3, kMax,
-                  "emission textures must be finite and not negative");
+    check.range(m.emission_texture.texels, texels(m.emission_texture) * 3, kMax,
+                "emission textures must be finite and not negative");
   }
   if (m.normal_texture.texels) {
-    require_finite(m.normal_texture.texels, texels(m.normal_texture) * 3, "normal textures must be finite");
+    check.finite(m.normal_texture.texels, texels(m.normal_texture) * 3, "normal textures must be finite");
   }
 }
 
-void check_surface(const Scene& scene, const Surface& surface, const EnvironmentMap& environment) {
-  require(environment.height > 0 && environment.width > 0, "the environment map must not be empty");
+void check_surface(const char* caller, const Scene& scene, const Surface& surface, const EnvironmentMap& environment) {
+  const Checks check{caller};
+  check.require(environment.height > 0 && environment.width > 0, "the environment map must not be empty");
   const int64_t n = surface.per_triangle ? scene.n_triangles() : scene.n_vertices();
-  require_range(surface.albedo, n * 3, 1.f, "albedo must lie in [0, 1]");
-  require_range(surface.roughness, n, 1.f, "roughness must lie in [0, 1]");
-  require_range(surface.metallic, n, 1.f, "metallic must lie in [0, 1]");
-  require_range(environment.radiance, int64_t(environment.height) * environment.width * 3,
-                std::numeric_limits<float>::max(), "environment radiance must be finite and not negative");
-  if (surface.normals) require_finite(surface.normals, scene.n_vertices() * 3, "normals must be finite");
-  if (surface.material_ids) check_ids(scene, surface);
+  check.range(surface.albedo, n * 3, 1.f, "albedo must lie in [0, 1]");
+  check.range(surface.roughness, n, 1.f, "roughness must lie in [0, 1]");
+  check.range(surface.metallic, n, 1.f, "metallic must lie in [0, 1]");
+  check.range(environment.radiance, int64_t(environment.height) * environment.width * 3,
+              std::numeric_limits<float>::max(), "environment radiance must be finite and not negative");
+  if (surface.normals) check.finite(surface.normals, scene.n_vertices() * 3, "normals must be finite");
+  if (surface.material_ids) check_ids(check, scene, surface);
 }
 
 int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
                const PathTracerParams& params, const RenderTargets& targets) {
-  require(camera.width > 0 && camera.height > 0, "camera width and height must be positive");
-  require(int64_t(camera.width) * camera.height < int64_t(1) << 31, "the image must have fewer than 2^31 pixels");
-  require(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy),
-          "fx and fy must be positive, cx and cy finite");
-  for (float m : camera.camera_to_world) require(std::isfinite(m), "camera_to_world must be finite");
-  require(params.samples_per_pixel > 0, "samples_per_pixel must be positive");
-  require(params.max_bounces >= 0, "max_bounces must not be negative");
-  require(params.clamp_indirect >= 0, "clamp_indirect must not be negative");
-  check_surface(scene, surface, environment);
-  require(std::isfinite(params.catcher_height), "catcher_height must be finite");
+  const char* caller = "render";
+  const Checks check{caller};
+  check.require(camera.width > 0 && camera.height > 0, "camera width and height must be positive");
+  check.require(int64_t(camera.width) * camera.height < int64_t(1) << 31, "the image must have fewer than 2^31 pixels");
+  check.require(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy),
+                "fx and fy must be positive, cx and cy finite");
+  for (float m : camera.camera_to_world) check.require(std::isfinite(m), "camera_to_world must be finite");
+  check.require(params.samples_per_pixel > 0, "samples_per_pixel must be positive");
+  check.require(params.max_bounces >= 0, "max_bounces must not be negative");
+  check.require(params.clamp_indirect >= 0, "clamp_indirect must not be negative");
+  check_surface(caller, scene, surface, environment);
+  check.require(std::isfinite(params.catcher_height), "catcher_height must be finite");
 
   const PathTracer tracer(scene, surface, environment, camera, params);
   std::atomic<int64_t> n_rays{0};

@@ -140,7 +140,7 @@ def test_in_a_furnace_a_convex_body_reflects_its_albedo(roughness, metallic, lam
         assert ((mean - albedo).abs() < SIGMAS * error + 3e-3 * albedo).all(), (mean, albedo, error)
 
 
-def seen_from_close(asset: Asset, environment: np.ndarray, bounces: int, n_points: int = 8) -> list[tuple]:
+def seen_from_close(asset: Asset, environment: np.ndarray, bounces: int, n_points: int = 12) -> list[tuple]:
     """Points of an asset as one pixel of the path tracer sees each: (point, mean radiance [3], its standard error [3])."""
     random, renderer = np.random.default_rng(5), AssetRenderer(asset)
     lens, found = (1e3, 1e3, 0.5, 0.5), []
@@ -170,18 +170,18 @@ def seen_from_close(asset: Asset, environment: np.ndarray, bounces: int, n_point
 
 @pytest.mark.parametrize("bounces", [0, 3])
 def test_reflected_light_is_the_path_tracer_s(bounces):
-    asset, sky, n = furnished_corner(), sky_with_a_lamp(), 600
+    asset, sky, n = furnished_corner(), sky_with_a_lamp(), 4000
     surface, darkened, lit = textured(asset), 0, 0
     for point, expected, tracer_error in seen_from_close(asset, sky, bounces):
         points = {name: x.repeat(n, 1) for name, x in point.items()}
         light = incoming_light(surface, torch.from_numpy(sky), **points, n_directions=32, max_bounces=bounces, seed=1)
         mean, error = mean_and_error(reflected(light, arriving_radiance(light, sky), points))
         noise = torch.hypot(error, tracer_error)
-        assert (noise < 0.03 * expected).all()
+        assert (noise < 0.015 * expected).all()
         assert ((mean - expected).abs() < SIGMAS * noise + 1e-3 * expected).all(), (mean, expected, noise)
         darkened += int((light.visible[light.pdf > 0] == 0).any())
         lit += int((light.sent > 0).any())
-    assert darkened >= 6 and lit >= (6 if bounces else 0)
+    assert darkened >= 10 and lit >= (10 if bounces else 0)
 
 
 def test_no_light_is_sent_without_bounces_and_it_is_bounded_where_asked():
@@ -313,8 +313,8 @@ BAD_POINTS = [
     ("positions", lambda x: x[:, :2], "[n, 3] float32"),
     ("positions", lambda x: x.double(), "float64"),
     *((name, lambda x: x[1:], "got [39, ") for name in ("geometric_normals", "normals", "view_dirs", "albedo")),
-    ("roughness", lambda x: x[:, 0], "[40, 1] float32, got [40] float32"),
-    ("metallic", lambda x: x.double(), "[40, 1] float32, got [40, 1] float64"),
+    ("roughness", lambda x: x[:, 0], "[40, 1] float32 on the CPU, got [40] float32"),
+    ("metallic", lambda x: x.double(), "[40, 1] float32 on the CPU, got [40, 1] float64"),
 ]
 
 
