@@ -7,12 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "sample_pattern.h"
-#include "shading_point.h"
-#include "splitnerf/environment_sampler.h"
+#include "path_integrator.h"
 #include "splitnerf/parallel.h"
-#include "splitnerf/principled.h"
-#include "splitnerf/sampling.h"
 
 namespace splitnerf {
 namespace {
@@ -20,23 +16,15 @@ namespace {
 using Vec = Vec3<float>;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr int kRouletteStart = 3;  // bounces before Russian roulette may end a path
 constexpr int64_t kPixelsPerTask = 64;
-constexpr int kPairsPerBounce = 3;  // light direction; BSDF direction; lobe choice and roulette
 
 constexpr int kCameraRays = 64;  // of a pixel, traced together
 
-struct FirstHit {
-  bool hit;
-  ShadingPoint point;
-};
-
 // What one thread needs while it renders.
 struct Worker {
-  std::vector<SamplePattern::Offset> offsets;
+  PathState path;
   Vec origins[kCameraRays], directions[kCameraRays];
   Hit hits[kCameraRays];
-  int64_t n_rays = 0;
 };
 
 // Direct light (luminance) that the catcher receives with the object and without it.
@@ -45,26 +33,17 @@ struct CaughtLight {
   double shadowed = 0, open = 0;
 };
 
-// Power heuristic with exponent 2, pdf > 0; as a ratio neither square can overflow or vanish.
-// Source: Veach 1997, Eq. (9.15).
-float mis_weight(float pdf, float other_pdf) { return 1.f / (1.f + square(other_pdf / pdf)); }
-
 float luminance(Vec c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
 class PathTracer {
  public:
   PathTracer(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
              const PathTracerParams& params)
-      : scene_(scene), surface_(scene, surface), light_(environment.radiance, environment.height, environment.width),
-        camera_(camera), params_(params), filter_(params.filter),
-        pattern_(params.samples_per_pixel, 1 + kPairsPerBounce * (params.max_bounces + 1), params.seed) {
-    float extent = 0;
-    for (int64_t i = 0; i < scene.n_vertices() * 3; ++i) extent = max_of(extent, std::abs(scene.vertices()[i]));
-    ray_offset_ = 1e-5f * extent;
-  }
+      : scene_(scene), camera_(camera), params_(params), filter_(params.filter),
+        paths_(scene, surface, environment, params, params.samples_per_pixel) {}
 
   void render_pixel(int64_t pixel, Worker& worker, const RenderTargets& out) const {
-    pattern_.start_pixel(static_cast<uint32_t>(pixel), worker.offsets);
+    paths_.pattern().start_pixel(static_cast<uint32_t>(pixel), worker.path.offsets);
     const int spp = params_.samples_per_pixel, x = int(pixel % camera_.width), y = int(pixel / camera_.width);
     Vec3<double> radiance{}, albedo{}, normal{}, smooth_normal{};
     double roughness = 0, metallic = 0, depth = 0;
@@ -73,22 +52,24 @@ class PathTracer {
     for (int sample = 0; sample < spp; ++sample) {
       const int k = sample % kCameraRays;
       if (k == 0) trace_camera_rays(x, y, sample, min_of(kCameraRays, spp - sample), worker);
-      FirstHit first{};
-      const Vec path = trace_path(worker.directions[k], worker.hits[k], sample, worker, &first, &caught);
+      if (params_.shadow_catcher && meets_catcher(worker.directions[k], worker.hits[k], sample, worker, &caught))
+        continue;
+      ShadingPoint first;
+      const Vec path = paths_.radiance(worker.directions[k], worker.hits[k], sample, 0, worker.path, &first);
       if (!std::isfinite(sum(path))) {
         throw std::runtime_error("render: a path through pixel (" + std::to_string(x) + ", " + std::to_string(y) +
                                  ") has a radiance that is not finite");
       }
-      if (!first.hit) continue;
+      if (worker.hits[k].t < 0) continue;
       ++n_hits;
       for (int c = 0; c < 3; ++c) {
         radiance[c] += path[c];
-        albedo[c] += first.point.albedo[c];
-        normal[c] += first.point.shading_normal[c];
-        smooth_normal[c] += first.point.smooth_normal[c];
+        albedo[c] += first.albedo[c];
+        normal[c] += first.shading_normal[c];
+        smooth_normal[c] += first.smooth_normal[c];
       }
-      roughness += first.point.roughness;
-      metallic += first.point.metallic;
+      roughness += first.roughness;
+      metallic += first.metallic;
       depth += worker.hits[k].t;
     }
     const double per_hit = 1. / max_of(n_hits, 1);
@@ -113,104 +94,38 @@ class PathTracer {
   void trace_camera_rays(int x, int y, int first, int n, Worker& worker) const {
     for (int k = 0; k < n; ++k) {
       worker.origins[k] = camera_centre();
-      worker.directions[k] = camera_ray(x, y, pattern_.get(worker.offsets, first + k, 0));
+      worker.directions[k] = camera_ray(x, y, paths_.pattern().get(worker.path.offsets, first + k, 0));
     }
     scene_.trace_closest(&worker.origins[0].x, &worker.directions[0].x, n, kInfinity, worker.hits);
   }
 
-  // L = sum over vertices of throughput x (emission + light sampled there + light that the BSDF
-  // sample finds).
-  Vec trace_path(Vec direction, Hit hit, int sample, Worker& worker, FirstHit* first, CaughtLight* caught) const {
-    Vec radiance{0, 0, 0}, throughput{1, 1, 1};
-    Vec origin = camera_centre();
-    float bsdf_pdf = 0;
-    for (int bounce = 0;; ++bounce) {
-      if (bounce > 0) hit = scene_.trace_closest(origin, direction, kInfinity);
-      ++worker.n_rays;
-      if (bounce == 0 && params_.shadow_catcher) {
-        const float t = (params_.catcher_height - origin.z) / direction.z;
-        if (direction.z < 0 && t > 0 && (hit.t < 0 || t < hit.t)) {
-          catch_shadow(origin + direction * t, sample, worker, caught);
-          return radiance;
-        }
-      }
-      if (hit.t < 0) {
-        if (bounce > 0) {
-          const bool both = params_.light_sampling && !light_.black();
-          const float weight = both ? mis_weight(bsdf_pdf, light_.pdf(direction)) : 1.f;
-          radiance += limited(throughput * light_.radiance(direction) * weight, bounce > 1);
-        }
-        return radiance;
-      }
-      if (bounce > params_.max_bounces) return radiance;
-
-      const ShadingPoint point = surface_(hit, -direction);
-      if (bounce == 0) *first = {true, point};
-      radiance += limited(throughput * point.emission, bounce > 0);
-      const Frame<float> frame(point.shading_normal);
-      const PrincipledBsdf<float> bsdf(lut_, point.albedo, point.roughness, point.metallic,
-                                       frame.to_local(-direction));
-      const Vec start = point.position + point.geometric_normal * ray_offset_;
-      const int pair = 1 + kPairsPerBounce * bounce;
-
-      if (params_.light_sampling && !light_.black()) {
-        float light_pdf;
-        const Vec to_light = light_.sample(pattern_.get(worker.offsets, sample, pair), &light_pdf);
-        // Nothing arrives from below the true surface, whatever the shading normal says.
-        if (dot(to_light, point.geometric_normal) > 0) {
-          const BsdfValue<float> f = bsdf.evaluate(frame.to_local(to_light));
-          if (f.pdf > 0 && !occluded(start, to_light, worker)) {
-            const float weight = mis_weight(light_pdf, f.pdf) / light_pdf;
-            radiance += limited(throughput * f.f_cos * light_.radiance(to_light) * weight, bounce > 0);
-          }
-        }
-      }
-
-      const Vec2<float> choice = pattern_.get(worker.offsets, sample, pair + 2);
-      const Vec2<float> u = pattern_.get(worker.offsets, sample, pair + 1);
-      const Vec next = bsdf.sample(choice.x, u.x, u.y);
-      const BsdfValue<float> f = bsdf.evaluate(next);
-      direction = normalize(frame.to_world(next));
-      if (!(f.pdf > 0) || !(dot(direction, point.geometric_normal) > 0)) return radiance;
-      throughput *= f.f_cos / f.pdf;
-      if (bounce >= kRouletteStart) {
-        const float survival = min_of(max_of(throughput.x, max_of(throughput.y, throughput.z)), 0.95f);
-        if (choice.y >= survival) return radiance;
-        throughput = throughput / survival;
-      }
-      bsdf_pdf = f.pdf;
-      origin = start;
-    }
+  // Whether the catcher hides the hit; then it has caught the light of one sample.
+  bool meets_catcher(Vec direction, const Hit& hit, int sample, Worker& worker, CaughtLight* caught) const {
+    const Vec origin = camera_centre();
+    const float t = (params_.catcher_height - origin.z) / direction.z;
+    if (!(direction.z < 0 && t > 0 && (hit.t < 0 || t < hit.t))) return false;
+    ++worker.path.n_rays;
+    catch_shadow(origin + direction * t, sample, worker, caught);
+    return true;
   }
 
   // Irradiance of a point of the catcher by one light and one cosine sample. What is blocked is
   // compared with the same two samples unblocked: where nothing blocks, the ratio is exactly 1.
   void catch_shadow(Vec position, int sample, Worker& worker, CaughtLight* caught) const {
     ++caught->n_samples;
-    if (light_.black()) return;
+    if (paths_.light().black()) return;
     const auto add = [&](Vec to_light, float pdf, float other_pdf) {
       if (!(to_light.z > 0) || !(pdf > 0)) return;
-      const double light = luminance(light_.radiance(to_light)) * to_light.z * mis_weight(pdf, other_pdf) / pdf;
+      const double light = luminance(paths_.light().radiance(to_light)) * to_light.z * mis_weight(pdf, other_pdf) / pdf;
       caught->open += light;
-      if (!occluded(position, to_light, worker)) caught->shadowed += light;
+      if (!paths_.occluded(position, to_light, worker.path)) caught->shadowed += light;
     };
     float light_pdf;
-    const Vec to_light = light_.sample(pattern_.get(worker.offsets, sample, 1), &light_pdf);
+    const Vec to_light = paths_.light().sample(paths_.pattern().get(worker.path.offsets, sample, 1), &light_pdf);
     if (to_light.z > 0) add(to_light, light_pdf, pdf_cosine_hemisphere(to_light.z));
-    const Vec2<float> u = pattern_.get(worker.offsets, sample, 2);
+    const Vec2<float> u = paths_.pattern().get(worker.path.offsets, sample, 2);
     const Vec up = sample_cosine_hemisphere(u.x, u.y);
-    add(up, pdf_cosine_hemisphere(up.z), light_.pdf(up));
-  }
-
-  bool occluded(Vec origin, Vec direction, Worker& worker) const {
-    ++worker.n_rays;
-    return scene_.occluded(origin, direction, kInfinity);
-  }
-
-  Vec limited(Vec contribution, bool indirect) const {
-    const float largest = max_of(contribution.x, max_of(contribution.y, contribution.z));
-    if (!indirect || params_.clamp_indirect <= 0 || !(largest > params_.clamp_indirect)) return contribution;
-    return contribution * (params_.clamp_indirect / largest);
+    add(up, pdf_cosine_hemisphere(up.z), paths_.light().pdf(up));
   }
 
   Vec camera_centre() const {
@@ -226,104 +141,112 @@ class PathTracer {
   }
 
   const Scene& scene_;
-  SurfaceLookup surface_;
-  EnvironmentSampler light_;
   const Camera& camera_;
   const PathTracerParams& params_;
-  const float* lut_ = brdf_lut();
   PixelFilterSampler filter_;
-  SamplePattern pattern_;
-  float ray_offset_;  // start of secondary rays above the surface, in scene units
+  PathIntegrator paths_;
 };
 
-void require(bool condition, const char* what) {
-  if (!condition) throw std::invalid_argument(std::string("render: ") + what);
-}
+// Refuses what `caller` was given.
+struct Checks {
+  const char* caller;
 
-void require_range(const float* values, int64_t n, float hi, const char* what) {
-  bool good = true;
-  for (int64_t i = 0; i < n; ++i) good &= values[i] >= 0.f && values[i] <= hi;  // false for NaN
-  require(good, what);
-}
-
-void require_finite(const float* values, int64_t n, const char* what) {
-  bool good = true;
-  for (int64_t i = 0; i < n; ++i) good &= std::isfinite(values[i]);
-  require(good, what);
-}
+  void require(bool condition, const char* what) const {
+    if (!condition) throw std::invalid_argument(std::string(caller) + ": " + what);
+  }
+  void range(const float* values, int64_t n, float hi, const char* what) const {
+    bool good = true;
+    for (int64_t i = 0; i < n; ++i) good &= values[i] >= 0.f && values[i] <= hi;  // false for NaN
+    require(good, what);
+  }
+  void finite(const float* values, int64_t n, const char* what) const {
+    bool good = true;
+    for (int64_t i = 0; i < n; ++i) good &= std::isfinite(values[i]);
+    require(good, what);
+  }
+};
 
 int64_t texels(const Texture& texture) { return int64_t(texture.height) * texture.width; }
 
-void check_ids(const Scene& scene, const Surface& surface) {
+void check_ids(const Checks& check, const Scene& scene, const Surface& surface) {
   bool any_texture = false, any_normal_texture = false;
   for (int i = 0; i < surface.n_materials; ++i) {
     const SurfaceMaterial& m = surface.materials[i];
     any_normal_texture |= m.normal_texture.texels != nullptr;
     any_texture |= m.albedo_texture.texels || m.roughness_metallic_texture.texels || m.emission_texture.texels;
   }
-  require(!(any_texture || any_normal_texture) || surface.uv, "textures need uv");
-  require(!any_normal_texture || (surface.tangents && surface.normals), "a normal texture needs normals and tangents");
+  check.require(!(any_texture || any_normal_texture) || surface.uv, "textures need uv");
+  check.require(!any_normal_texture || (surface.tangents && surface.normals),
+                "a normal texture needs normals and tangents");
   for (int64_t i = 0; i < scene.n_triangles(); ++i) {
-    require(surface.material_ids[i] >= 0 && surface.material_ids[i] < surface.n_materials,
-            "material_ids must name materials");
+    check.require(surface.material_ids[i] >= 0 && surface.material_ids[i] < surface.n_materials,
+                  "material_ids must name materials");
   }
-  if (surface.uv) require_finite(surface.uv, scene.n_vertices() * 2, "uv must be finite");
-  if (surface.tangents) require_finite(surface.tangents, scene.n_vertices() * 4, "tangents must be finite");
+  if (surface.uv) check.finite(surface.uv, scene.n_vertices() * 2, "uv must be finite");
+  if (surface.tangents) check.finite(surface.tangents, scene.n_vertices() * 4, "tangents must be finite");
 }
 
 }  // namespace
 
-void check_material(const SurfaceMaterial& m) {
+void check_material(const char* caller, const SurfaceMaterial& m) {
+  const Checks check{caller};
   constexpr float kMax = std::numeric_limits<float>::max();
   const float factors[5] = {m.albedo.x, m.albedo.y, m.albedo.z, m.roughness, m.metallic};
-  require_range(factors, 5, 1.f, "material factors must lie in [0, 1]");
-  require_range(&m.emission.x, 3, kMax, "emission must be finite and not negative");
+  check.range(factors, 5, 1.f, "material factors must lie in [0, 1]");
+  check.range(&m.emission.x, 3, kMax, "emission must be finite and not negative");
   for (const Texture* t : {&m.albedo_texture, &m.roughness_metallic_texture, &m.normal_texture, &m.emission_texture}) {
-    require(!t->texels || (t->height > 0 && t->width > 0), "textures must not be empty");
+    check.require(!t->texels || (t->height > 0 && t->width > 0), "textures must not be empty");
   }
   if (m.albedo_texture.texels) {
-    require_range(m.albedo_texture.texels, texels(m.albedo_texture) * 3, 1.f, "albedo textures must lie in [0, 1]");
+    check.range(m.albedo_texture.texels, texels(m.albedo_texture) * 3, 1.f, "albedo textures must lie in [0, 1]");
   }
   if (m.roughness_metallic_texture.texels) {
-    require_range(m.roughness_metallic_texture.texels, texels(m.roughness_metallic_texture) * 2, 1.f,
-                  "roughness and metallic textures must lie in [0, 1]");
+    check.range(m.roughness_metallic_texture.texels, texels(m.roughness_metallic_texture) * 2, 1.f,
+                "roughness and metallic textures must lie in [0, 1]");
   }
   if (m.emission_texture.texels) {
-    require_range(m.emission_texture.texels, texels(m.emission_texture) * 3, kMax,
-                  "emission textures must be finite and not negative");
+    check.range(m.emission_texture.texels, texels(m.emission_texture) * 3, kMax,
+                "emission textures must be finite and not negative");
   }
   if (m.normal_texture.texels) {
-    require_finite(m.normal_texture.texels, texels(m.normal_texture) * 3, "normal textures must be finite");
+    check.finite(m.normal_texture.texels, texels(m.normal_texture) * 3, "normal textures must be finite");
   }
+}
+
+void check_surface(const char* caller, const Scene& scene, const Surface& surface, const EnvironmentMap& environment) {
+  const Checks check{caller};
+  check.require(environment.height > 0 && environment.width > 0, "the environment map must not be empty");
+  const int64_t n = surface.per_triangle ? scene.n_triangles() : scene.n_vertices();
+  check.range(surface.albedo, n * 3, 1.f, "albedo must lie in [0, 1]");
+  check.range(surface.roughness, n, 1.f, "roughness must lie in [0, 1]");
+  check.range(surface.metallic, n, 1.f, "metallic must lie in [0, 1]");
+  check.range(environment.radiance, int64_t(environment.height) * environment.width * 3,
+              std::numeric_limits<float>::max(), "environment radiance must be finite and not negative");
+  if (surface.normals) check.finite(surface.normals, scene.n_vertices() * 3, "normals must be finite");
+  if (surface.material_ids) check_ids(check, scene, surface);
 }
 
 int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
                const PathTracerParams& params, const RenderTargets& targets) {
-  require(camera.width > 0 && camera.height > 0, "camera width and height must be positive");
-  require(int64_t(camera.width) * camera.height < int64_t(1) << 31, "the image must have fewer than 2^31 pixels");
-  require(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy),
-          "fx and fy must be positive, cx and cy finite");
-  for (float m : camera.camera_to_world) require(std::isfinite(m), "camera_to_world must be finite");
-  require(environment.height > 0 && environment.width > 0, "the environment map must not be empty");
-  require(params.samples_per_pixel > 0, "samples_per_pixel must be positive");
-  require(params.max_bounces >= 0, "max_bounces must not be negative");
-  require(params.clamp_indirect >= 0, "clamp_indirect must not be negative");
-  const int64_t n = surface.per_triangle ? scene.n_triangles() : scene.n_vertices();
-  require_range(surface.albedo, n * 3, 1.f, "albedo must lie in [0, 1]");
-  require_range(surface.roughness, n, 1.f, "roughness must lie in [0, 1]");
-  require_range(surface.metallic, n, 1.f, "metallic must lie in [0, 1]");
-  require_range(environment.radiance, int64_t(environment.height) * environment.width * 3,
-                std::numeric_limits<float>::max(), "environment radiance must be finite and not negative");
-  if (surface.normals) require_finite(surface.normals, scene.n_vertices() * 3, "normals must be finite");
-  if (surface.material_ids) check_ids(scene, surface);
-  require(std::isfinite(params.catcher_height), "catcher_height must be finite");
+  const char* caller = "render";
+  const Checks check{caller};
+  check.require(camera.width > 0 && camera.height > 0, "camera width and height must be positive");
+  check.require(int64_t(camera.width) * camera.height < int64_t(1) << 31, "the image must have fewer than 2^31 pixels");
+  check.require(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy),
+                "fx and fy must be positive, cx and cy finite");
+  for (float m : camera.camera_to_world) check.require(std::isfinite(m), "camera_to_world must be finite");
+  check.require(params.samples_per_pixel > 0, "samples_per_pixel must be positive");
+  check.require(params.max_bounces >= 0, "max_bounces must not be negative");
+  check.require(params.clamp_indirect >= 0, "clamp_indirect must not be negative");
+  check_surface(caller, scene, surface, environment);
+  check.require(std::isfinite(params.catcher_height), "catcher_height must be finite");
 
   const PathTracer tracer(scene, surface, environment, camera, params);
   std::atomic<int64_t> n_rays{0};
   parallel_for(int64_t(camera.width) * camera.height, kPixelsPerTask, [&](int64_t begin, int64_t end) {
     Worker worker;
     for (int64_t pixel = begin; pixel < end; ++pixel) tracer.render_pixel(pixel, worker, targets);
-    n_rays += worker.n_rays;
+    n_rays += worker.path.n_rays;
   });
   return n_rays;
 }

@@ -115,7 +115,7 @@ struct PyMaterials {
       m.roughness_metallic_texture = texture(item, "roughness_metallic_texture", 2);
       m.normal_texture = texture(item, "normal_texture", 3);
       m.emission_texture = texture(item, "emission_texture", 3);
-      splitnerf::check_material(m);
+      splitnerf::check_material("render", m);
       materials.push_back(m);
     }
   }

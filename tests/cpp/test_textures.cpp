@@ -181,7 +181,7 @@ TEST(TexturedPath, UnusableMaterialsAreRefused) {
   const auto refused = [&](auto change) {
     SquareJob job;
     change(job);
-    const auto use = [&] { check_material(job.materials[0]), job.render(); };
+    const auto use = [&] { check_material("render", job.materials[0]), job.render(); };
     EXPECT_THROW(use(), std::invalid_argument);
   };
   refused([](SquareJob& j) { j.ids = {0, 1}; });

@@ -16,7 +16,7 @@ LAYERS = [
     {"workflow"},
     {"training"},
     {"outputs", "report"},
-    {"evaluate", "relight", "synth"},
+    {"evaluate", "refinement", "relight", "synth"},
     {"export", "render"},
     {"fields", "config"},
     {"data"},

@@ -9,7 +9,9 @@ from op_checks import as_tuple, devices, has_cuda_kernel, lib
 
 from splitnerf import _core
 
-ON_THE_CPU_ALONE = {"trace_visibility", "occlusion_factors", "visibility_bits", "vertex_grids"}  # Embree; once a mesh
+ON_THE_CPU_ALONE = {  # Embree; once a mesh
+    "trace_visibility", "occlusion_factors", "incoming_light", "visibility_bits", "vertex_grids"
+}  # fmt: skip
 WRITES_TO_ARGUMENTS = {"adamw_step_"}  # has no outputs: see test_ops_adamw.py
 
 

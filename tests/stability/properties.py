@@ -97,6 +97,46 @@ def open_outside(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     return 1.0 - open_.double(), {"origins": origins.float(), "directions": directions.float()}
 
 
+@lru_cache(maxsize=1)
+def chequered() -> ops.TexturedSurface:
+    """The cube, its normals those of its corners, with textures of extremes."""
+    n, black_and_white = len(CORNERS), (torch.arange(16).reshape(4, 4) * 5 % 3 % 2).float()
+    normals = unit(torch.tensor(CORNERS, dtype=torch.float64)).float()
+    side = unit(torch.linalg.cross(normals, torch.tensor([0.0, 0.0, 1.0]).expand(n, 3)))
+    tilts = torch.stack([2 * black_and_white - 1, 1 - 2 * black_and_white.T, 0 * black_and_white], -1)
+    return ops.TexturedSurface(
+        cube(), normals, torch.cat([side, torch.ones(n, 1)], 1), torch.tensor(CORNERS)[:, :2] * 0.7,
+        black_and_white[..., None].expand(4, 4, 3), torch.stack([black_and_white.T, black_and_white], -1), tilts,
+    )  # fmt: skip
+
+
+def light_arriving(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """Unit directions, densities and light finite and not below 0, nothing below the triangle or from a convex body."""
+    positions, faces = on_cube(draw, n)
+    inside = draw.chance(0.5, n, 1)
+    geometric = torch.where(inside, -faces, faces)
+    normals = torch.where(draw.chance(0.1, n, 1), 0.0, unit(geometric + draw.pick((0.0, 1e-7, 0.9, 3.0), n, 1) * draw.directions(n)))
+    rows = {
+        "positions": positions, "geometric_normals": geometric, "normals": normals, "view_dirs": draw.at_cosine(normals),
+        "albedo": draw.shares(n, 3), "roughness": draw.roughness(n), "metallic": draw.shares(n, 1),
+    }  # fmt: skip
+    rows = {name: x.float() for name, x in rows.items()}
+    sky = torch.full((4, 8, 3), draw.pick((0.0, 1e-38, 1.0, 1e6), 1).item())
+    sky[1, 2] = max(sky[0, 0, 0].item(), 1e6 if draw.chance(0.5, 1).item() else 0.0)
+    found = ops.incoming_light(chequered(), sky, **rows, n_directions=8, max_bounces=3, seed=int(draw.uniform(1).item() * 1e9))
+    directions = found.directions.double()
+    length = directions.norm(dim=-1)
+    wrong = ((length - 1).abs() > 2e-6) & (found.pdf > 0)
+    lit = (found.visible > 0) | (found.sent > 0).any(-1)
+    wrong |= lit & ((directions * geometric[:, None]).sum(-1) < -1e-6) | lit & (found.pdf <= 0)
+    wrong |= (found.visible > 0) & (found.sent > 0).any(-1)
+    broken = torch.where(wrong.any(1), 1.0, torch.maximum(finite_in(found.pdf, 0.0, 3e38), finite_in(found.sent, 0.0, 1e9)))
+    broken = torch.maximum(broken, finite_in(found.visible, 0.0, 1.0))
+    clear = (positions.abs() < HALF * (1 - 1e-3)).sum(1) == 2  # not beside an edge, where rays start past the other faces
+    leaks = torch.where(inside[:, 0], (found.visible > 0).any(1), (found.sent > 0).any(-1).any(1))
+    return torch.where(clear & leaks, 1.0, broken), rows
+
+
 def occlusion_inputs(draw: Draw, n: int) -> tuple[Rows, Tensor]:
     positions, normals = on_cube(draw, n)
     lobes = draw.at_cosine(normals)
@@ -247,6 +287,13 @@ PROPERTIES = (
     Property("trace_visibility, open", open_outside, "every ray away from a face of a convex body is open"),
     Property("occlusion_factors", shares, "in [0, 1] under black, dim, bright and single lights", chunk=1024),
     Property("occlusion_factors, blocked", all_blocked, "0 where all rays are blocked, in black light too", chunk=1024),
+    Property(
+        "incoming_light",
+        light_arriving,
+        "finite, from above both horizons, and from the sky or the mesh alone; none into a closed body",
+        size=8,
+        chunk=1024,
+    ),
     Property(
         "visibility_bits",
         bits_apart,

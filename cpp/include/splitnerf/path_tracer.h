@@ -37,9 +37,9 @@ struct SurfaceMaterial {
   Texture emission_texture;            // 3 channels, linear
 };
 
-// Throws std::invalid_argument for a factor or a texel outside its range. render() relies on it: big
-// textures are checked once, not for each view.
-SPLITNERF_API void check_material(const SurfaceMaterial& material);
+// Throws std::invalid_argument for a factor or a texel outside its range; the error begins with the caller's name.
+// render() relies on it: big textures are checked once, not for each view.
+SPLITNERF_API void check_material(const char* caller, const SurfaceMaterial& material);
 
 // Materials and normals of a mesh. All arrays are read during the call only.
 struct Surface {
@@ -63,6 +63,11 @@ struct EnvironmentMap {
   const float* radiance;  // [height, width, 3] linear, finite, not negative
   int height, width;
 };
+
+// Throws std::invalid_argument where arrays of the surface or the map do not fit or lie outside their ranges; the error
+// begins with the caller's name. The materials must have passed check_material.
+SPLITNERF_API void check_surface(const char* caller, const Scene& scene, const Surface& surface,
+                                 const EnvironmentMap& environment);
 
 struct PathTracerParams {
   int samples_per_pixel = 64;  // paths a pixel, jittered over the pixel's box

@@ -170,6 +170,9 @@ class Spread:
     Args:
         index: [k] row * size + column of the texels that have values.
         size: Texels along an edge.
+
+    Attributes:
+        rows: [size, size] which of the k values each texel has.
     """
 
     def __init__(self, index: np.ndarray, size: int):
@@ -177,11 +180,11 @@ class Spread:
         row_of[index] = np.arange(len(index), dtype=np.int32)
         missing = (row_of < 0).reshape(size, size)
         nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
-        self._rows = row_of.reshape(size, size)[tuple(nearest)]
+        self.rows = row_of.reshape(size, size)[tuple(nearest)]
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """The map [size, size] or [size, size, c] float32 of values [k] or [k, c]."""
-        return values.astype(np.float32)[self._rows]
+        return values.astype(np.float32)[self.rows]
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

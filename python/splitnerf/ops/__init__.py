@@ -2,6 +2,7 @@
 
 from splitnerf.ops.adamw import AdamW, adamw_step_
 from splitnerf.ops.hash_grid import HashGrid, HashGridSpec, growth_for, hash_encode, hash_encode_jacobian
+from splitnerf.ops.incoming_light import IncomingLight, TexturedSurface, incoming_light
 from splitnerf.ops.light import fibonacci_directions, prefilter_light, sample_ggx_lobe
 from splitnerf.ops.light_pyramid import (
     SparseMap,
@@ -41,13 +42,13 @@ from splitnerf.ops.srgb import linear_to_srgb, srgb_to_linear
 from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_visibility, visibility_bits
 
 __all__ = [
-    "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "LightSums",
-    "MeshScene", "PackedSamples", "QUERIES", "SdfNetwork", "SparseMap", "ShadingSubset", "VisibilityCache", "adamw_step_", "brdf_lut",
-    "cached_occlusion", "cached_visibility", "composite", "fibonacci_directions", "gradient_losses", "growth_for",
-    "hash_encode", "hash_encode_jacobian", "light_averages", "light_filters", "light_lookup", "light_sum_of_levels",
-    "linear_to_srgb", "march_rays", "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors",
-    "pixel_losses", "prefilter_light", "quadratic_entropy", "query_direction", "sample_bsdf", "sample_ggx_lobe",
-    "sample_rays", "sdf_layer", "sdf_values", "sh_projection", "shade_sums", "sparse_product", "specular_share", "split_sum_shade",
-    "spread_samples", "srgb_to_linear", "summed_light", "surface_weights", "trace_visibility", "visibility_bits",
-    "zonal_factors",
+    "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "IncomingLight",
+    "LightSums", "MeshScene", "PackedSamples", "QUERIES", "SdfNetwork", "ShadingSubset", "SparseMap", "TexturedSurface",
+    "VisibilityCache", "adamw_step_", "brdf_lut", "cached_occlusion", "cached_visibility", "composite",
+    "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian", "incoming_light",
+    "light_averages", "light_filters", "light_lookup", "light_sum_of_levels", "linear_to_srgb", "march_rays",
+    "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors", "pixel_losses", "prefilter_light",
+    "quadratic_entropy", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer", "sdf_values",
+    "sh_projection", "shade_sums", "sparse_product", "specular_share", "split_sum_shade", "spread_samples",
+    "srgb_to_linear", "summed_light", "surface_weights", "trace_visibility", "visibility_bits", "zonal_factors",
 ]  # fmt: skip

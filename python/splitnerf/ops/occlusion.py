@@ -37,6 +37,20 @@ class MeshScene:
         )
         self.handle: int = self._scene.handle
 
+    def trace_closest(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The nearest hits of rays.
+
+        Args:
+            origins, directions: [n, 3] float32.
+
+        Returns:
+            triangle [n] int64, -1 for a miss, and barycentric coordinates u, v [n] of its second and third corner.
+
+        Raises:
+            ValueError: A shape or dtype does not fit.
+        """
+        return self._scene.trace_closest(origins, directions)[1:]
+
 
 def trace_visibility(scene: MeshScene, origins: Tensor, directions: Tensor, t_far: float = math.inf) -> Tensor:
     """Whether each ray meets no triangle.

@@ -1,0 +1,217 @@
+"""The fit of an asset's textures and of the light to photos, through the path tracer's model.
+
+A pixel is seen by two rays through its filter, and each ray's point by directions of its own. The error of one ray's colour
+times that of the other is the squared error without the noise (in expectation), and one ray's derivatives times the other's
+error are its gradient. Batches of pixels are gathered into normal equations of the texels; the light moves with each batch.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.dataset import Dataset
+from splitnerf.ops import MeshScene, monte_carlo_light, shade_sums
+from splitnerf.ops.incoming_light import TexturedSurface, incoming_light
+from splitnerf.refinement.light import EnvironmentLight, look_up
+from splitnerf.refinement.normal_equations import NormalEquations, Prior
+from splitnerf.refinement.pixels import PixelFilter, covered_pixels
+from splitnerf.refinement.texels import AssetTexels, SurfaceSamples, materials_of
+from splitnerf.refinement.unknowns import STEP_LIMITS, into_range, per_unknown, to_unknowns, to_values
+
+CLAMP_INDIRECT = 10.0
+MIN_TONE = 0.02  # linear value below which errors weigh as at this one
+
+
+@dataclass(frozen=True)
+class RefinementSettings:
+    """What the fit does.
+
+    Attributes:
+        sweeps: Gauss-Newton steps.
+        minutes: Time after which no further sweep begins; 0 does not limit.
+        sweep_share: Pixels of a sweep as a share of all.
+        pixels: Pixels of a batch.
+        directions: Directions of a ray's point.
+        bounces: Scattering events of the light that the asset sends to itself.
+        keep: Share of the observations that outlives a sweep.
+        smooth_albedo, smooth_gloss, smooth_normal: Weights of the differences between neighbours' steps.
+        anchor: Weight of the distance to the start.
+        light_rate: Learning rate of the light's log radiance; 0 keeps the light.
+        seed: Seed of all random numbers.
+    """
+
+    sweeps: int = 16
+    minutes: float = 0.0
+    sweep_share: float = 0.25
+    pixels: int = 2048
+    directions: int = 12
+    bounces: int = 3
+    keep: float = 0.9
+    smooth_albedo: float = 1.0
+    smooth_gloss: float = 5.0
+    smooth_normal: float = 1.0
+    anchor: float = 0.02
+    light_rate: float = 0.002
+    seed: int = 0
+
+
+class Sweep(NamedTuple):
+    """What one sweep says.
+
+    Attributes:
+        number: Sweeps so far.
+        seconds: Time since the start.
+        error: Mean squared error of the photos before the sweep's step, in sRGB units, without the noise; it may come out
+            slightly negative.
+        moved: [7] root mean square of the step, by unknown.
+    """
+
+    number: int
+    seconds: float
+    error: float
+    moved: list[float]
+
+
+class Refinement:
+    """The state of a fit.
+
+    Args:
+        dataset: The photos, in the world frame of the asset.
+        asset: An asset with one material, textured with albedo, roughness-metallic and normals of one square size.
+        environment: [h, 2 h, 3] linear radiance to start from, h = 8 2^k.
+        settings: What the fit does.
+    """
+
+    def __init__(self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings):
+        s = self.settings = settings
+        self.pixels, self.filter = covered_pixels(dataset), PixelFilter()
+        self.texels = AssetTexels(asset)
+        self.scene = MeshScene(asset.vertices, asset.triangles)
+        self.vertex_values = [
+            torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (asset.normals, asset.tangents, asset.uv)
+        ]
+        self.light = EnvironmentLight(torch.from_numpy(environment))
+        self.light_optimiser = torch.optim.Adam(self.light.levels, lr=s.light_rate, betas=(0.9, 0.99))
+        self.random = np.random.default_rng(s.seed)
+        self.unknowns = to_unknowns(self.texels.start)
+        prior = Prior(
+            self.texels.pairs, per_unknown(s.smooth_albedo, s.smooth_gloss, s.smooth_normal), per_unknown(*[s.anchor] * 3)
+        )
+        self.equations = NormalEquations(self.unknowns, prior, s.keep)
+        self.n_batches = 0
+
+    def maps(self) -> tuple[Tensor, Tensor, Tensor]:
+        """The textures as they are now: albedo [h, w, 3], roughness and metallic [h, w, 2], normals [h, w, 3]."""
+        return self.texels.maps(to_values(self.unknowns))
+
+    def surface(self) -> TexturedSurface:
+        """The asset as it is now, for the tracer."""
+        return TexturedSurface(self.scene, *self.vertex_values, *self.maps())
+
+    def see(self) -> tuple[np.ndarray, SurfaceSamples]:
+        """Draws a batch: numbers of pixels [b] whose two rays both meet the asset, and the rays' points [2 b]."""
+        n = self.settings.pixels
+        index = self.random.integers(0, len(self.pixels), n)
+        offsets = np.stack([self.filter.draw(n, self.random) for _ in range(2)], axis=1)
+        origins, directions = (part.reshape(-1, 3) for part in self.pixels.rays(index, offsets))
+        triangle, u, v = self.scene.trace_closest(origins, directions)
+        hit = (triangle >= 0).reshape(n, 2).all(axis=1)
+        both = np.repeat(hit, 2)
+        return index[hit], self.texels.sample(triangle[both], u[both], v[both], -directions[both])
+
+    def shade(self, surface: TexturedSurface, samples: SurfaceSamples, unknowns: Tensor) -> Tensor:
+        """[n, 3] linear radiance of points, an estimate without bias; differentiable in unknowns [n, 7] and the light."""
+        s, m = self.settings, materials_of(to_values(unknowns), samples)
+        light = self.light.radiance()
+        arriving = incoming_light(
+            surface, light.detach(), samples.positions, samples.geometric, m.normals.detach(), samples.view_dirs,
+            m.albedo.detach(), m.roughness.detach(), m.metallic.detach(), n_directions=s.directions, max_bounces=s.bounces,
+            clamp_indirect=CLAMP_INDIRECT, seed=s.seed + self.n_batches,
+        )  # fmt: skip
+        sky = look_up(light, arriving.directions.view(-1, 3)).view_as(arriving.directions)
+        radiance = sky * arriving.visible[..., None] + arriving.sent
+        sums = monte_carlo_light(m.normals, samples.view_dirs, m.roughness, arriving.directions, arriving.pdf, radiance)
+        return shade_sums(m.normals, samples.view_dirs, m.albedo, m.roughness, m.metallic, sums, compensate=True)
+
+    def gather(self, surface: TexturedSurface) -> float:
+        """Gathers one batch of pixels and moves the light; returns the batch's mean squared error without noise."""
+        index, samples = self.see()
+        texels, shares = self.texels.rows(samples.footprints), samples.footprints.weights
+        unknowns = (self.unknowns[texels] * shares[..., None]).sum(1).requires_grad_(True)
+        colours = self.shade(surface, samples, unknowns)
+        target, saturated = (torch.from_numpy(x[index]) for x in (self.pixels.target, self.pixels.saturated))
+        pairs = colours.detach().view(-1, 2, 3)
+        weights = srgb_slope(target.clamp(min=MIN_TONE)).square()
+        weights = torch.where(saturated & (pairs.mean(1) > target), 0.0, weights)
+        errors = pairs - target[:, None]
+        of_other = errors.flip(1).flatten(0, 1)
+        weights_of_rays = weights.repeat_interleave(2, 0)
+        if self.settings.light_rate > 0:
+            gradients = torch.autograd.grad(
+                colours, self.light.levels, weights_of_rays * of_other / len(of_other), retain_graph=True
+            )
+            for level, gradient in zip(self.light.levels, gradients):
+                level.grad = gradient
+            self.light_optimiser.step()
+        jacobian = torch.stack(
+            [torch.autograd.grad(colours[:, c].sum(), unknowns, retain_graph=c < 2)[0] for c in range(3)], dim=1
+        )
+        self.equations.add(texels, shares, jacobian, weights_of_rays, of_other)
+        self.n_batches += 1
+        return float((weights * errors[:, 0] * errors[:, 1]).mean())
+
+    def sweep(self) -> tuple[float, list[float]]:
+        """Gathers a share of all pixels and takes one step; returns the error and the step's size by unknown."""
+        s, surface = self.settings, self.surface()
+        n_batches = max(1, round(s.sweep_share * len(self.pixels) / s.pixels))
+        error = float(np.mean([self.gather(surface) for _ in range(n_batches)]))
+        limits = torch.tensor(STEP_LIMITS)
+        wanted = into_range(self.unknowns + self.equations.step(self.unknowns).clamp(-limits, limits))
+        step = wanted - self.unknowns
+        if not bool(torch.isfinite(step).all()):
+            raise RuntimeError(f"refinement: the step after {self.n_batches} batches is not finite; the asset is unchanged")
+        self.unknowns = wanted
+        self.equations.move(step)
+        return error, step.square().mean(0).sqrt().tolist()
+
+
+def srgb_slope(linear: Tensor) -> Tensor:
+    """d sRGB / d linear of values above 0.0031308. Source: IEC 61966-2-1."""
+    return 1.055 / 2.4 * linear ** (1 / 2.4 - 1)
+
+
+def refine(
+    dataset: Dataset,
+    asset: Asset,
+    environment: np.ndarray,
+    settings: RefinementSettings,
+    report: Callable[[Sweep], None] = lambda sweep: None,
+) -> tuple[Asset, np.ndarray, list[Sweep]]:
+    """Fits an asset's textures and the light to photos; see :class:`Refinement` for the arguments.
+
+    Args:
+        report: Called after each sweep.
+
+    Returns:
+        The asset with new textures, the light [h, 2 h, 3], and what each sweep said.
+
+    Raises:
+        ValueError: The asset or the light has another form than :class:`Refinement` takes.
+        RuntimeError: Numbers are no longer finite.
+    """
+    fit, sweeps, started = Refinement(dataset, asset, environment, settings), [], time.monotonic()
+    for number in range(1, settings.sweeps + 1):
+        if settings.minutes > 0 and time.monotonic() - started > 60 * settings.minutes:
+            break
+        error, moved = fit.sweep()
+        sweeps.append(Sweep(number, time.monotonic() - started, error, moved))
+        report(sweeps[-1])
+    return fit.texels.asset_with(fit.maps()), fit.light.radiance().detach().numpy(), sweeps

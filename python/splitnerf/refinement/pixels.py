@@ -1,0 +1,91 @@
+"""The pixels of photos that show the object alone, with rays through their filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.images import srgb_to_linear
+
+MIN_ALPHA = 0.99  # of a pixel that the object covers
+SATURATED = 254.5 / 255.0  # sRGB value from which the photo says only that the light was at least so bright
+FILTER_WIDTH = 3.0  # pixels from end to end
+INTERVALS = 4096
+
+
+@dataclass
+class Pixels:
+    """Covered pixels of all photos.
+
+    Attributes:
+        view: [n] int64, the number of the photo.
+        centre: [n, 2] float32, (x, y) of the pixel's centre.
+        target: [n, 3] float32 linear radiance.
+        saturated: [n, 3] bool, whether the photo gives a lower bound alone.
+        poses: [views, 3, 4] float32 camera-to-world, OpenGL axes, the data's world frame.
+        intrinsics: [views, 4] float32 fx, fy, cx, cy in pixels.
+    """
+
+    view: np.ndarray
+    centre: np.ndarray
+    target: np.ndarray
+    saturated: np.ndarray
+    poses: np.ndarray
+    intrinsics: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.view)
+
+    def rays(self, index: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rays through pixels.
+
+        Args:
+            index: [k] pixels.
+            offsets: [k, s, 2] offsets from the pixels' centres in pixels.
+
+        Returns:
+            origins and unit directions, [k, s, 3] float32 each, world frame.
+        """
+        view = self.view[index]
+        fx, fy, cx, cy = (self.intrinsics[view, i, None] for i in range(4))
+        x, y = np.moveaxis(self.centre[index, None] + offsets, -1, 0)
+        local = np.stack([(x - cx) / fx, -(y - cy) / fy, -np.ones_like(x)], axis=-1)
+        pose = self.poses[view]
+        directions = np.einsum("kij,ksj->ksi", pose[:, :, :3], local)
+        directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+        origins = np.broadcast_to(pose[:, None, :, 3], directions.shape)
+        return np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
+
+
+def covered_pixels(dataset: Dataset) -> Pixels:
+    """The pixels of a split that the object covers."""
+    view, row, column = np.nonzero(dataset.images[..., 3] >= MIN_ALPHA)
+    colours = dataset.images[view, row, column, :3]
+    return Pixels(
+        view, np.stack([column, row], axis=1).astype(np.float32) + 0.5, srgb_to_linear(colours).astype(np.float32),
+        colours >= SATURATED, dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics,
+    )  # fmt: skip
+
+
+def filter_offsets() -> np.ndarray:
+    """[INTERVALS + 1] the offset in pixels below which a share i / INTERVALS of the Blackman-Harris filter lies.
+
+    Source: Harris 1978 (the window of four terms); Ernst, Stamminger and Greiner 2006 (sampling it).
+    """
+    t = np.linspace(0.0, 1.0, 1 << 16)
+    x = 2 * np.pi * t
+    share = t + (-0.48829 * np.sin(x) + 0.14128 / 2 * np.sin(2 * x) - 0.01168 / 3 * np.sin(3 * x)) / (2 * np.pi * 0.35875)
+    return (FILTER_WIDTH * (np.interp(np.linspace(0, 1, INTERVALS + 1), share, t) - 0.5)).astype(np.float32)
+
+
+class PixelFilter:
+    """Offsets drawn with the density of Blender's default filter, a Blackman-Harris window of 3 pixels."""
+
+    def __init__(self):
+        self._offsets = filter_offsets()
+
+    def draw(self, n: int, generator: np.random.Generator) -> np.ndarray:
+        """[n, 2] float32 independent offsets from the pixels' centres, in pixels."""
+        return np.interp(generator.random((n, 2)) * INTERVALS, np.arange(INTERVALS + 1), self._offsets).astype(np.float32)

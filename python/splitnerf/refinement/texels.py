@@ -1,0 +1,178 @@
+"""The textures of an asset: which texels its charts cover, and what the points that rays meet read of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from torch import Tensor
+from torch.nn import functional as F
+
+from splitnerf.data.asset import Asset
+from splitnerf.export.bake import Spread, Texels, rasterise
+
+MIN_COSINE = 1e-3  # of a shading normal and the direction to the viewer
+N_CHANNELS = 8  # albedo 3, roughness, metallic, tangent-space normal 3
+
+
+class Footprints(NamedTuple):
+    """Where points read the texture.
+
+    Attributes:
+        texels: [n, 4] int64 row * size + column.
+        weights: [n, 4] float32 bilinear.
+    """
+
+    texels: Tensor
+    weights: Tensor
+
+
+class SurfaceSamples(NamedTuple):
+    """Points of the mesh seen by camera rays.
+
+    Attributes:
+        positions, view_dirs: [n, 3].
+        geometric: [n, 3] unit normals of the triangles, on the viewer's side.
+        smooth, tangents, bitangents: [n, 3] the frame of the normal texture, interpolated and not normalised.
+        footprints: Where the textures are read.
+    """
+
+    positions: Tensor
+    view_dirs: Tensor
+    geometric: Tensor
+    smooth: Tensor
+    tangents: Tensor
+    bitangents: Tensor
+    footprints: Footprints
+
+
+def bilinear_footprints(uv: np.ndarray, size: int) -> Footprints:
+    """The four texels around uv [n, 2], (0, 0) the top left corner of a square texture that repeats."""
+    x, y = (uv.T % 1.0) * size - 0.5
+    left, top = np.floor(x), np.floor(y)
+    fx, fy = x - left, y - top
+    x0, y0 = left.astype(np.int64) % size, top.astype(np.int64) % size
+    x1, y1 = (x0 + 1) % size, (y0 + 1) % size
+    texels = np.stack([y0 * size + x0, y0 * size + x1, y1 * size + x0, y1 * size + x1], axis=1)
+    weights = np.stack([(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy], axis=1)
+    return Footprints(torch.from_numpy(texels), torch.from_numpy(weights.astype(np.float32)))
+
+
+class AssetTexels:
+    """The covered texels of an asset's textures, m of them, and the mesh that they lie on.
+
+    Args:
+        asset: An asset with one material and square albedo, roughness-metallic and normal textures of one size; the
+            material's factors must be 1.
+
+    Attributes:
+        start: [m, 8] the texture's values.
+        pairs: [k, 2] int64 neighbours within a chart.
+
+    Raises:
+        ValueError: The asset has another form.
+    """
+
+    def __init__(self, asset: Asset):
+        check_form(asset)
+        self.asset, m = asset, asset.materials[0]
+        self.size = m.albedo_texture.shape[0]
+        covered = rasterise(asset.uv, asset.triangles, self.size)
+        self._spread = Spread(covered.index, self.size)
+        self._row_of = torch.from_numpy(self._spread.rows.reshape(-1).astype(np.int64))
+        maps = [m.albedo_texture, m.roughness_metallic_texture, m.normal_texture]
+        values = np.concatenate(maps, axis=2).reshape(-1, N_CHANNELS).astype(np.float32)
+        self.start = torch.from_numpy(values[covered.index])
+        self.pairs = torch.from_numpy(neighbours(covered, charts(asset)[asset.triangles[covered.triangle, 0]], self.size))
+
+    def rows(self, footprints: Footprints) -> Tensor:
+        """[n, 4] the covered texels that points read; texels outside the charts have the value of the nearest inside."""
+        return self._row_of[footprints.texels]
+
+    def maps(self, values: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Textures of values [m, 8]: albedo [h, w, 3], roughness and metallic [h, w, 2], normals [h, w, 3]."""
+        image = torch.from_numpy(self._spread(values.numpy()))
+        return tuple(part.contiguous() for part in image.split([3, 2, 3], dim=2))
+
+    def asset_with(self, maps: tuple[Tensor, Tensor, Tensor]) -> Asset:
+        """The asset with other textures, see :meth:`maps`."""
+        names = ("albedo_texture", "roughness_metallic_texture", "normal_texture")
+        textures = {name: part.numpy() for name, part in zip(names, maps)}
+        return replace(self.asset, materials=[replace(self.asset.materials[0], **textures)])
+
+    def sample(self, triangle: np.ndarray, u: np.ndarray, v: np.ndarray, view_dirs: np.ndarray) -> SurfaceSamples:
+        """The points of hits: triangle [n] with barycentric u, v [n] of its second and third corner."""
+        a = self.asset
+        corners = a.triangles[triangle]
+        weights = np.stack([1 - u - v, u, v], axis=1)[..., None]
+        mean = lambda values: (values[corners] * weights).sum(axis=1)  # noqa: E731
+        p0, p1, p2 = (a.vertices[corners[:, i]] for i in range(3))
+        geometric = np.cross(p1 - p0, p2 - p0)
+        geometric /= np.maximum(np.linalg.norm(geometric, axis=1, keepdims=True), 1e-20)
+        geometric *= np.where((geometric * view_dirs).sum(axis=1, keepdims=True) < 0, -1, 1)
+        smooth, tangents = mean(a.normals), mean(a.tangents[:, :3])
+        bitangents = np.cross(smooth, tangents) * a.tangents[corners[:, 0], 3:]
+        numbers = (mean(a.vertices), view_dirs, geometric, smooth, tangents, bitangents)
+        tensors = (torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in numbers)
+        return SurfaceSamples(*tensors, bilinear_footprints(mean(a.uv), self.size))
+
+
+class Materials(NamedTuple):
+    """Materials of points: albedo [n, 3], roughness and metallic [n, 1], unit shading normals [n, 3] that face the viewer."""
+
+    albedo: Tensor
+    roughness: Tensor
+    metallic: Tensor
+    normals: Tensor
+
+
+def materials_of(values: Tensor, samples: SurfaceSamples) -> Materials:
+    """The materials of samples from texture values [n, 8] at them."""
+    albedo, roughness, metallic, local = values.split([3, 1, 1, 3], dim=1)
+    x, y, z = local.unbind(1)
+    world = x[:, None] * samples.tangents + y[:, None] * samples.bitangents + z[:, None] * samples.smooth
+    normals = F.normalize(world, dim=1)
+    side = torch.where((normals.detach() * samples.geometric).sum(1, keepdim=True) < 0, -1.0, 1.0)
+    normals = normals * side
+    # Where a normal turns away from the viewer it is bent back, as the path tracer does.
+    cosine = (normals * samples.view_dirs).sum(1, keepdim=True)
+    across = F.normalize(normals - samples.view_dirs * cosine, dim=1)
+    bent = F.normalize(across + samples.view_dirs * MIN_COSINE, dim=1)
+    return Materials(albedo, roughness, metallic, torch.where(cosine >= MIN_COSINE, normals, bent))
+
+
+def check_form(asset: Asset) -> None:
+    """Raises ValueError where an asset is not of the form that :class:`AssetTexels` takes."""
+    m = asset.materials[0]
+    textures = (m.albedo_texture, m.roughness_metallic_texture, m.normal_texture)
+    if len(asset.materials) > 1 or asset.uv is None or asset.tangents is None or any(t is None for t in textures):
+        raise ValueError("the asset must have one material with albedo, roughness-metallic and normal textures")
+    sizes = {t.shape[:2] for t in textures}
+    if len(sizes) > 1 or len(set(*sizes)) > 1:
+        raise ValueError("the asset's textures must be square and of one size")
+    factors = np.array([*m.albedo, m.roughness, m.metallic])
+    if asset.colors is not None or np.abs(factors - 1).max() > 1e-6 or np.any(m.emission):
+        raise ValueError("the asset must have factors of 1, no vertex colours and no emission")
+
+
+def charts(asset: Asset) -> np.ndarray:
+    """[n] the number of the chart that each vertex belongs to; charts share no vertices."""
+    faces, n = asset.triangles, len(asset.vertices)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+    return connected_components(coo_matrix((np.ones(len(edges)), edges.T), shape=(n, n)), directed=False)[1]
+
+
+def neighbours(covered: Texels, chart: np.ndarray, size: int) -> np.ndarray:
+    """[k, 2] pairs of covered texels beside or above each other in one chart; chart [m] is that of each texel."""
+    chart_map, number = (np.full(size * size, -1, np.int64) for _ in range(2))
+    chart_map[covered.index], number[covered.index] = chart, np.arange(len(covered.index))
+    chart_map, number = chart_map.reshape(size, size), number.reshape(size, size)
+    pairs = []
+    for a, b in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+        same = (chart_map[a] == chart_map[b]) & (chart_map[a] >= 0)
+        pairs.append(np.stack([number[a][same], number[b][same]], axis=1))
+    return np.concatenate(pairs)

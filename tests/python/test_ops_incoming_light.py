@@ -1,0 +1,389 @@
+"""incoming_light: its directions, its densities, and the light that it finds, against closed forms and the path tracer."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+from mesh_shapes import grid_mesh, scene_of
+from op_checks import check_error, check_no_gradient, check_op, generator, lib, unit
+
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.environment import sample_environment
+from splitnerf.ops import (
+    IncomingLight,
+    MeshScene,
+    TexturedSurface,
+    incoming_light,
+    monte_carlo_light,
+    shade_sums,
+    split_sum_shade,
+)
+from splitnerf.render.path_traced import AssetRenderer
+
+SIGMAS = 4.5
+WHITE = torch.ones(4, 8, 3)
+
+
+# ---- scenes ----
+
+
+def plain_surface(mesh: trimesh.Trimesh, albedo: float = 1.0, roughness: float = 1.0, metallic: float = 0.0) -> TexturedSurface:
+    """A mesh of one colour whose normals are the triangles'."""
+    n = len(mesh.vertices)
+    return TexturedSurface(
+        scene_of(mesh), torch.zeros(n, 3), torch.zeros(n, 4), torch.zeros(n, 2), torch.full((1, 1, 3), albedo),
+        torch.tensor([[[roughness, metallic]]]), torch.tensor([[[0.0, 0.0, 1.0]]]),
+    )  # fmt: skip
+
+
+def under_a_roof() -> trimesh.Trimesh:
+    """A floor of width 2 below a plate of width 1 at height 1/2."""
+    return trimesh.util.concatenate([grid_mesh(2.0, 2), grid_mesh(1.0, 2, z=0.5)])
+
+
+def flat_points(n: int, n_dot_v: float = 0.8) -> dict[str, torch.Tensor]:
+    """n times the origin on a floor that faces up, white and rough."""
+    up = torch.tensor([0.0, 0.0, 1.0]).repeat(n, 1)
+    view = torch.tensor([math.sqrt(1 - n_dot_v**2), 0.0, n_dot_v]).repeat(n, 1)
+    return {
+        "positions": 0 * up, "geometric_normals": up, "normals": up, "view_dirs": view, "albedo": torch.ones(n, 3),
+        "roughness": torch.ones(n, 1), "metallic": torch.zeros(n, 1),
+    }  # fmt: skip
+
+
+def furnished_corner() -> Asset:
+    """A floor, a wall and a ball: they block, light and mirror each other; every texture varies."""
+    wall = grid_mesh(2.0, 3).apply_transform(trimesh.transformations.rotation_matrix(math.pi / 2, [0, 1, 0]))
+    ball = trimesh.creation.icosphere(2, 0.4).apply_translation((0.0, 0.1, 0.45))
+    parts = [grid_mesh(2.0, 3), wall.apply_translation((-1, 0, 1)), ball]
+    mesh = trimesh.util.concatenate(parts)
+    normals = np.concatenate([np.asarray(part.vertex_normals) for part in parts])
+    random = np.random.default_rng(0)
+    tangents = np.cross(normals, random.normal(size=normals.shape))
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    tilts = np.concatenate([random.uniform(-0.4, 0.4, (8, 8, 2)), np.ones((8, 8, 1))], axis=2)
+    material = Material(
+        metallic=1.0,
+        albedo_texture=random.uniform(0.1, 0.9, (8, 8, 3)).astype(np.float32),
+        roughness_metallic_texture=random.uniform(0.15, 0.9, (8, 8, 2)).astype(np.float32),
+        normal_texture=(tilts / np.linalg.norm(tilts, axis=2, keepdims=True)).astype(np.float32),
+    )
+    return Asset(
+        "corner", np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), normals.astype(np.float32),
+        np.zeros(len(mesh.faces), np.int32), [material], uv=random.uniform(0, 1, (len(normals), 2)).astype(np.float32),
+        tangents=np.concatenate([tangents, np.ones((len(normals), 1))], axis=1).astype(np.float32),
+    )  # fmt: skip
+
+
+def textured(asset: Asset) -> TexturedSurface:
+    m = asset.materials[0]
+    values = asset.normals, asset.tangents, asset.uv, m.albedo_texture, m.roughness_metallic_texture, m.normal_texture
+    return TexturedSurface(MeshScene(asset.vertices, asset.triangles), *map(torch.from_numpy, values))
+
+
+def sky_with_a_lamp() -> np.ndarray:
+    sky = np.random.default_rng(1).uniform(0.1, 0.5, (16, 32, 3)).astype(np.float32)
+    sky[4, 20] = 150.0
+    return sky
+
+
+def arriving_radiance(light: IncomingLight, environment: np.ndarray) -> torch.Tensor:
+    sky = torch.from_numpy(sample_environment(environment, light.directions.numpy()).astype(np.float32))
+    return sky * light.visible[..., None] + light.sent
+
+
+def reflected(light: IncomingLight, radiance: torch.Tensor, points: dict[str, torch.Tensor]) -> torch.Tensor:
+    """[n, 3] estimates of the reflected radiance, in float64."""
+    p = {name: x.double() for name, x in points.items()}
+    lobe = p["normals"], p["view_dirs"], p["roughness"]
+    sums = monte_carlo_light(*lobe, light.directions.double(), light.pdf.double(), radiance.double())
+    return shade_sums(
+        p["normals"], p["view_dirs"], p["albedo"], p["roughness"], p["metallic"], sums, compensate=True
+    )
+
+
+def mean_and_error(samples: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Mean of independent rows and its standard error."""
+    return samples.mean(0), samples.std(0) / math.sqrt(len(samples))
+
+
+# ---- the light that is found ----
+
+
+@pytest.mark.parametrize("lamp", [False, True])
+@pytest.mark.parametrize("metallic", [0.0, 1.0])
+@pytest.mark.parametrize("roughness", [0.1, 0.4, 0.8])
+def test_in_a_furnace_a_convex_body_reflects_its_albedo(roughness, metallic, lamp):
+    """Light 1 from everywhere; the directions are drawn as if there were a lamp, or not."""
+    ball, n, face = trimesh.creation.icosphere(2), 400, 37
+    normal, centre = (torch.tensor(np.asarray(x[face]), dtype=torch.float32) for x in (ball.face_normals, ball.triangles_center))
+    side = unit(torch.linalg.cross(normal, torch.tensor([1.0, 0.0, 0.0])))
+    for n_dot_v in (0.95, 0.3):
+        points = {
+            "positions": centre, "geometric_normals": normal, "normals": normal,
+            "view_dirs": n_dot_v * normal + math.sqrt(1 - n_dot_v**2) * side, "albedo": torch.tensor([0.2, 0.5, 1.0]),
+            "roughness": torch.tensor([roughness]), "metallic": torch.tensor([metallic]),
+        }  # fmt: skip
+        points = {name: x.repeat(n, 1) for name, x in points.items()}
+        sky = torch.from_numpy(sky_with_a_lamp()) if lamp else WHITE
+        light = incoming_light(plain_surface(ball), sky, **points, n_directions=64, seed=3)
+        assert torch.equal(light.visible > 0, (light.directions @ normal > 0) & (light.pdf > 0))
+        mean, error = mean_and_error(reflected(light, light.visible[..., None].expand(-1, -1, 3), points))
+        one = torch.ones(1, 3)
+        x = [points[name][:1] for name in ("normals", "view_dirs", "albedo", "roughness", "metallic")]
+        albedo = split_sum_shade(*x, one, one, one, one, "exact", compensate=True)[0].double()
+        assert (error < 0.01 * albedo).all()
+        assert ((mean - albedo).abs() < SIGMAS * error + 3e-3 * albedo).all(), (mean, albedo, error)
+
+
+def seen_from_close(asset: Asset, environment: np.ndarray, bounces: int, n_points: int = 12) -> list[tuple]:
+    """Points of an asset as one pixel of the path tracer sees each: (point, mean radiance [3], its standard error [3])."""
+    random, renderer = np.random.default_rng(5), AssetRenderer(asset)
+    lens, found = (1e3, 1e3, 0.5, 0.5), []
+    for face in random.choice(len(asset.triangles), n_points, replace=False):
+        corners = asset.vertices[asset.triangles[face]].astype(np.float64)
+        position = random.dirichlet([2.0, 2.0, 2.0]) @ corners
+        geometric = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        geometric /= np.linalg.norm(geometric)
+        view = geometric + 0.9 * unit(torch.from_numpy(random.normal(size=3))).numpy()
+        view /= np.linalg.norm(view)
+        across = np.cross(view, random.normal(size=3))
+        across /= np.linalg.norm(across)
+        pose = np.stack([across, np.cross(view, across), view, position + 0.02 * view], axis=1)
+        options = dict(spp=16384, bounces=bounces, clamp_indirect=0.0, pixel_filter="box")
+        views = [renderer.render(environment, pose, lens, 1, 1, seed=seed, **options) for seed in range(8)]
+        maps = {name: torch.tensor(x[0, 0]).reshape(1, -1) for name, x in views[0].items()}
+        assert maps["alpha"] == 1 and abs(maps["depth"] - 0.02) < 1e-4
+        point = {
+            "positions": torch.tensor(position)[None], "geometric_normals": torch.tensor(geometric)[None],
+            "normals": unit(maps["normal"]), "view_dirs": torch.tensor(view)[None],
+            "albedo": maps["albedo"], "roughness": maps["roughness"], "metallic": maps["metallic"],
+        }  # fmt: skip
+        radiance = torch.tensor(np.stack([v["radiance"][0, 0] for v in views]), dtype=torch.float64)
+        found.append(({name: x.float() for name, x in point.items()}, *mean_and_error(radiance)))
+    return found
+
+
+@pytest.mark.parametrize("bounces", [0, 3])
+def test_reflected_light_is_the_path_tracer_s(bounces):
+    asset, sky, n = furnished_corner(), sky_with_a_lamp(), 4000
+    surface, darkened, lit = textured(asset), 0, 0
+    for point, expected, tracer_error in seen_from_close(asset, sky, bounces):
+        points = {name: x.repeat(n, 1) for name, x in point.items()}
+        light = incoming_light(surface, torch.from_numpy(sky), **points, n_directions=32, max_bounces=bounces, seed=1)
+        mean, error = mean_and_error(reflected(light, arriving_radiance(light, sky), points))
+        noise = torch.hypot(error, tracer_error)
+        assert (noise < 0.015 * expected).all()
+        assert ((mean - expected).abs() < SIGMAS * noise + 1e-3 * expected).all(), (mean, expected, noise)
+        darkened += int((light.visible[light.pdf > 0] == 0).any())
+        lit += int((light.sent > 0).any())
+    assert darkened >= 10 and lit >= (10 if bounces else 0)
+
+
+def test_no_light_is_sent_without_bounces_and_it_is_bounded_where_asked():
+    asset, sky = furnished_corner(), torch.from_numpy(40 * sky_with_a_lamp())
+    points = flat_points(30) | {"positions": torch.tensor([[-0.9, 0.3, 0.0]]).repeat(30, 1)}
+
+    def sent(**options) -> torch.Tensor:
+        return incoming_light(textured(asset), sky, **points, n_directions=32, **options).sent
+
+    assert (sent(max_bounces=0) == 0).all()
+    one, all_, bounded = (sent(**x) for x in ({"max_bounces": 1}, {}, {"max_bounces": 1, "clamp_indirect": 2.0}))
+    assert 0 < one.sum() < all_.sum()
+    assert one.amax() > 8.0 and 0 < bounded.amax() <= 4.0  # two contributions, by the light and by the material
+
+
+# ---- what blocks ----
+
+
+def test_the_environment_is_seen_past_the_roof_alone():
+    light = incoming_light(plain_surface(under_a_roof()), WHITE, **flat_points(100), n_directions=64)
+    on_roof = 0.5 * light.directions / light.directions[..., 2:].clamp(min=1e-9)
+    reach = on_roof[..., :2].abs().amax(-1)
+    counts = light.pdf > 0
+    assert torch.equal(counts, light.directions[..., 2] > 0)
+    assert (light.visible[counts & (reach > 0.501)] == 1).all() and (light.visible[counts & (reach < 0.499)] == 0).all()
+    assert (light.visible[~counts] == 0).all() and (light.sent[~counts] == 0).all()
+    assert (light.sent[light.visible > 0] == 0).all()
+    assert (light.sent[counts & (reach < 0.499)].amax(-1) > 0).float().mean() > 0.9
+    assert 0.2 < light.visible[counts].mean() < 0.8
+
+
+def test_nothing_arrives_from_below_the_triangle():
+    """The shading normal leans by 60 degrees; a ball below the floor's plane would be seen."""
+    mesh = trimesh.util.concatenate([grid_mesh(0.2, 1), trimesh.creation.icosphere(2, 0.5).apply_translation((2, 0, -1))])
+    points = flat_points(60) | {"normals": torch.tensor([[math.sqrt(0.75), 0.0, 0.5]]).repeat(60, 1)}
+    light = incoming_light(plain_surface(mesh), WHITE, **points, n_directions=64)
+    below = light.directions[..., 2] <= 0
+    assert (below & (light.pdf > 0)).sum() > 200
+    assert (light.visible[below] == 0).all() and (light.sent[below] == 0).all()
+    assert (light.visible[~below & (light.pdf > 0)] == 1).all()
+
+
+# ---- densities ----
+
+
+@pytest.mark.parametrize("lamp", [False, True])
+@pytest.mark.parametrize("roughness, metallic", [(0.05, 1.0), (0.5, 0.3), (1.0, 0.0)])
+def test_densities_add_up_to_the_hemisphere(roughness, metallic, lamp):
+    points = flat_points(2000, 0.4) | {
+        "roughness": torch.full((2000, 1), roughness), "metallic": torch.full((2000, 1), metallic)
+    }  # fmt: skip
+    sky = torch.from_numpy(sky_with_a_lamp()) if lamp else WHITE
+    light = incoming_light(plain_surface(grid_mesh(2.0, 1)), sky, **points, n_directions=16, seed=2)
+    torch.testing.assert_close(light.directions.norm(dim=-1), torch.ones(2000, 16), rtol=0, atol=1e-6)
+    inverse = torch.where(light.pdf > 0, 1 / light.pdf.double(), 0.0)
+    mean, error = mean_and_error(inverse.mean(1))
+    assert error < 0.2 and abs(mean - 2 * math.pi) < SIGMAS * error, (mean, error)
+
+
+def test_a_black_environment_leaves_the_material_s_directions():
+    points = flat_points(500)
+    light = incoming_light(plain_surface(grid_mesh(2.0, 1)), 0 * WHITE, **points, n_directions=32)
+    assert (light.sent == 0).all() and light.visible.mean() > 0.9
+    cosine = light.directions[..., 2] / math.pi
+    mean, error = mean_and_error(torch.where(light.pdf > 0, cosine / light.pdf, 0.0).double().mean(1))
+    assert error < 0.01 and abs(mean - 1) < SIGMAS * error
+    mean, error = mean_and_error(reflected(light, light.visible[..., None].expand(-1, -1, 3), points))
+    assert ((mean - 1).abs() < SIGMAS * error + 3e-3).all()
+
+
+@pytest.mark.parametrize("roughness", [0.0, 1e-3, 1.0])
+@pytest.mark.parametrize("n_dot_v", [1.0, 1e-4, 0.0, -0.5])
+def test_edges_stay_finite(n_dot_v, roughness):
+    """Mirrors, views along the surface and from below it, and a normal of length 0."""
+    points = flat_points(20, n_dot_v) | {"roughness": torch.full((20, 1), roughness)}
+    points["metallic"][:10] = 1.0
+    points["normals"] = points["normals"].clone()
+    points["normals"][5] = 0.0
+    light = incoming_light(plain_surface(under_a_roof()), torch.from_numpy(sky_with_a_lamp()), **points, n_directions=32)
+    assert all(bool(torch.isfinite(x).all()) for x in light)
+    assert (light.pdf >= 0).all() and (light.sent >= 0).all() and (light.pdf[5] == 0).all()
+    rest = torch.arange(20) != 5
+    torch.testing.assert_close(light.directions[rest].norm(dim=-1), torch.ones(19, 32), rtol=0, atol=1e-6)
+
+
+# ---- the operator ----
+
+
+def some_points(n: int = 40) -> dict[str, torch.Tensor]:
+    """Points of the corner's floor, of all materials."""
+    g = generator()
+    points = flat_points(n)
+    return points | {
+        "positions": torch.cat([torch.rand(n, 2, generator=g) * 1.8 - 0.9, torch.zeros(n, 1)], 1),
+        "albedo": torch.rand(n, 3, generator=g), "roughness": torch.rand(n, 1, generator=g),
+        "metallic": torch.rand(n, 1, generator=g),
+    }  # fmt: skip
+
+
+def test_equal_seeds_give_equal_bits_whatever_the_threads():
+    surface, sky, points = textured(furnished_corner()), torch.from_numpy(sky_with_a_lamp()), some_points()
+    before, found = torch.get_num_threads(), []
+    for threads, seed in ((1, 7), (2, 7), (2, 8)):
+        torch.set_num_threads(threads)
+        found.append(incoming_light(surface, sky, **points, n_directions=32, seed=seed))
+    torch.set_num_threads(before)
+    one, two, other = found
+    assert all(torch.equal(a, b) for a, b in zip(one, two))
+    assert all(not torch.equal(a, b) for a, b in zip(one, other))
+    assert not torch.equal(one.directions[0], one.directions[1])
+
+
+def arguments(surface: TexturedSurface, sky: torch.Tensor, points: dict, numbers: tuple = (4, 2, 0.0, 3)) -> tuple:
+    """Those of the operator itself."""
+    return surface.scene.handle, *points.values(), *surface[1:], sky, *numbers
+
+
+def test_opcheck_empty_batch_and_no_gradient():
+    surface, sky = textured(furnished_corner()), torch.from_numpy(sky_with_a_lamp())
+    inputs = arguments(surface, sky, some_points())
+    check_op(lib.incoming_light, inputs)
+    for index in (1, 3, 7, 11, 14):
+        check_no_gradient(lib.incoming_light, inputs, index)
+    none = incoming_light(surface, sky, **some_points(0), n_directions=4)
+    assert [tuple(x.shape) for x in none] == [(0, 4, 3), (0, 4), (0, 4), (0, 4, 3)]
+
+
+BAD_POINTS = [
+    ("positions", lambda x: x[:, :2], "[n, 3] float32"),
+    ("positions", lambda x: x.double(), "float64"),
+    *((name, lambda x: x[1:], "got [39, ") for name in ("geometric_normals", "normals", "view_dirs", "albedo")),
+    ("roughness", lambda x: x[:, 0], "[40, 1] float32 on the CPU, got [40] float32"),
+    ("metallic", lambda x: x.double(), "[40, 1] float32 on the CPU, got [40, 1] float64"),
+]
+
+
+@pytest.mark.parametrize("name, change, message", BAD_POINTS)
+def test_bad_points_are_refused(name, change, message):
+    points = some_points()
+    points[name] = change(points[name])
+    surface = plain_surface(grid_mesh(2.0, 1))
+    check_error(lambda: incoming_light(surface, WHITE, **points, n_directions=4), "incoming_light", name, message)
+
+
+NAN, BIG = math.nan, 1.5
+BAD_SURFACES = [
+    ("normals", lambda x: x[1:], "vertex_normals", "[4, 3] float32"),
+    ("tangents", lambda x: x[:, :3], "tangents", "[4, 4] float32"),
+    ("uv", lambda x: x.double(), "uv", "float64"),
+    ("uv", lambda x: x + NAN, "uv", "finite"),
+    ("tangents", lambda x: x + NAN, "tangents", "finite"),
+    ("normals", lambda x: x + NAN, "normals", "finite"),
+    ("albedo_map", lambda x: x[0], "albedo_map", "[n, n, 3] float32"),
+    ("albedo_map", lambda x: x[:0], "albedo_map", "empty"),
+    ("albedo_map", lambda x: x + NAN, "albedo", "[0, 1]"),
+    ("albedo_map", lambda x: x + BIG, "albedo", "[0, 1]"),
+    ("roughness_metallic_map", lambda x: x[..., :1], "roughness_metallic_map", "[n, n, 2] float32"),
+    ("roughness_metallic_map", lambda x: x + NAN, "roughness and metallic", "[0, 1]"),
+    ("normal_map", lambda x: x[..., :2], "normal_map", "[n, n, 3] float32"),
+    ("normal_map", lambda x: x + NAN, "normal", "finite"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("field, change, name, message", BAD_SURFACES)
+def test_bad_surfaces_are_refused(field, change, name, message):
+    surface = plain_surface(grid_mesh(2.0, 1))
+    surface = surface._replace(**{field: change(getattr(surface, field))})
+    check_error(lambda: incoming_light(surface, WHITE, **some_points(), n_directions=4), "incoming_light: ", name, message)
+
+
+@pytest.mark.parametrize(
+    "environment, message",
+    [(WHITE[0], "[n, n, 3] float32"), (WHITE[:0], "empty"), (WHITE * NAN, "finite"), (-WHITE, "not negative")],
+)
+def test_bad_environments_are_refused(environment, message):
+    surface = plain_surface(grid_mesh(2.0, 1))
+    check_error(
+        lambda: incoming_light(surface, environment, **some_points(), n_directions=4), "incoming_light: ", "environment", message
+    )
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"n_directions": 1}, "n_directions must be in [2, 65536]"),
+        ({"n_directions": 1 << 17}, "n_directions must be in [2, 65536]"),
+        ({"max_bounces": -1}, "max_bounces must be in [0, 64]"),
+        ({"max_bounces": 65}, "max_bounces must be in [0, 64]"),
+        ({"clamp_indirect": -1.0}, "clamp_indirect must not be negative"),
+        ({"clamp_indirect": NAN}, "clamp_indirect must not be negative"),
+    ],
+)
+def test_bad_numbers_are_refused(options, message):
+    call = lambda: incoming_light(  # noqa: E731
+        plain_surface(grid_mesh(2.0, 1)), WHITE, **some_points(), **({"n_directions": 4} | options)
+    )
+    check_error(call, "incoming_light: " + message)
+
+
+def test_a_released_scene_raises():
+    surface = plain_surface(grid_mesh(2.0, 1))
+    inputs = arguments(surface, WHITE, some_points())
+    del surface
+    with pytest.raises(IndexError, match=str(inputs[0])):
+        lib.incoming_light(*inputs)
