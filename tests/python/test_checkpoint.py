@@ -119,11 +119,17 @@ def test_tensors_of_any_device_are_stored_as_those_of_the_cpu(tmp_path):
 
 MESH = {"mesh_vertices": torch.zeros(4, 3), "mesh_faces": torch.tensor([[0, 1, 3]])}
 SKY = torch.zeros(256, 3)  # of as many directions as the bits have
+AIMS = torch.tensor([[0.0, 0.6, -0.8]]).repeat(256, 1)
 
 
-def sent(n: int) -> dict:
-    """Cached light, with that of n vertices."""
-    return {"sky": SKY, "sent": torch.zeros(n, 3)}
+def sent(n: int, *senders: int, **changed: object) -> dict:
+    """Cached light, with that of n senders of these numbers, some of it changed."""
+    return {"sky": SKY, "aims": AIMS, "sent": torch.zeros(n, 3), "senders": torch.tensor(senders, dtype=torch.int64)} | changed
+
+
+def old(n: int | None) -> dict:
+    """Cached light of before rays were aimed, with that of n vertices."""
+    return {"sky": SKY, "sent": None if n is None else torch.zeros(n, 3)}
 
 
 def gaps(texels: torch.Tensor) -> torch.Tensor:
@@ -140,7 +146,11 @@ ALLOWED = {
     "the largest progress": lambda c: c.update(meshed_at=1.0, previewed_at=1.0, seconds=0.0, step=0),
     "a mesh": lambda c: c.update(MESH),
     "a mesh of smaller numbers": lambda c: c.update(MESH, mesh_faces=MESH["mesh_faces"].int()),
-    "light that a mesh sends": lambda c: c.update(MESH, occlusion_light=sent(4)),
+    "light that a mesh sends": lambda c: c.update(MESH, occlusion_light=sent(4, 0, 2, 255, 4 * 256 - 1)),
+    "light of a mesh that nothing hits": lambda c: c.update(MESH, occlusion_light=sent(0)),
+    "light that was not sent yet": lambda c: c.update(MESH, occlusion_light=sent(0, sent=None, senders=None)),
+    "light that vertices sent": lambda c: c.update(MESH, occlusion_light=old(4)),
+    "light of vertices, not sent yet": lambda c: c.update(MESH, occlusion_light=old(None)),
     "light that weighs rays": lambda c: c.update(environment=torch.zeros(32, 64, 3)),
     "a GPU": lambda c: c.update(device="cuda", generator=torch.zeros(16, dtype=torch.uint8)),
 }  # fmt: skip
@@ -151,10 +161,37 @@ REFUSED = {
     "one ray too many": (lambda c: c.update(n_rays=8193), "n_rays is 8193"),
     "no fingerprint": (lambda c: c.update(fingerprint=None), "fingerprint is missing or of another type"),
     "a sky of other directions": (lambda c: c["occlusion_light"].update(sky=SKY[1:]), "the sky's light is missing"),
-    "light of other vertices": (lambda c: c.update(MESH, occlusion_light=sent(5)), "the light that the mesh sends"),
-    "light of no mesh": (
-        lambda c: c.update(occlusion_light=sent(4), mesh_vertices=None, mesh_faces=None), "the light that the mesh sends",
+    "fewer aims than cells": (
+        lambda c: c["occlusion_light"].update(aims=AIMS[1:]), "the traced directions is missing or of another",
     ),
+    "no aims": (lambda c: c["occlusion_light"].update(aims=None), "the traced directions is missing or of another"),
+    "aims of no length": (lambda c: c["occlusion_light"].update(aims=SKY), "the traced directions are not of length 1"),
+    "a single aim that is longer": (
+        lambda c: c["occlusion_light"].update(aims=torch.cat([AIMS[1:], 1.01 * AIMS[:1]])), "are not of length 1",
+    ),
+    "an aim of NaN": (lambda c: c["occlusion_light"]["aims"][7].fill_(torch.nan), "the traced directions has NaN"),
+    "light of other senders": (
+        lambda c: c.update(MESH, occlusion_light=sent(5, 0, 2, 3, 4)), "the light that the mesh sends is missing",
+    ),
+    "light of senders of no numbers": (
+        lambda c: c.update(MESH, occlusion_light=sent(4, senders=None)), "the number of each sender is missing",
+    ),
+    "numbers of senders without light": (
+        lambda c: c.update(MESH, occlusion_light=sent(4, 0, 2, 3, 4, sent=None)), "the light that the mesh sends is missing",
+    ),
+    "senders out of order": (lambda c: c.update(MESH, occlusion_light=sent(3, 0, 5, 4)), "senders do not ascend"),
+    "a sender twice": (lambda c: c.update(MESH, occlusion_light=sent(3, 0, 5, 5)), "senders do not ascend"),
+    "a sender one too far": (lambda c: c.update(MESH, occlusion_light=sent(2, 0, 4 * 256)), "name vertices that are none"),
+    "a sender before the first": (lambda c: c.update(MESH, occlusion_light=sent(2, -1, 4)), "name vertices that are none"),
+    "light of no mesh": (
+        lambda c: c.update(occlusion_light=sent(2, 0, 4), mesh_vertices=None, mesh_faces=None), "name vertices that are none",
+    ),
+    "light of other vertices": (lambda c: c.update(MESH, occlusion_light=old(5)), "the light that the mesh sends"),
+    "light of vertices of no mesh": (
+        lambda c: c.update(occlusion_light=old(4), mesh_vertices=None, mesh_faces=None), "the light that the mesh sends",
+    ),
+    "senders without aims": (lambda c: c["occlusion_light"].pop("aims"), "occlusion_light is missing or of another kind"),
+    "a mesh of a number": (lambda c: c.update(MESH, mesh_vertices=torch.tensor(1.0)), "mesh_vertices is missing"),
     "no light of the occlusion": (lambda c: c.update(occlusion_light={}), "occlusion_light is missing"),
     "light of an occlusion without any": (
         lambda c: c["config"].update(occlusion={"kind": "off"}, shading={"method": "split"}),
@@ -207,6 +244,30 @@ def test_what_no_run_writes_is_refused(content, tmp_path, case):
 
 
 # ---- what is taken back ----
+
+
+def test_a_checkpoint_of_before_rays_were_aimed_goes_on(data, tmp_path):
+    """With the rays that its mesh was traced by, its sky, and the light of the mesh computed anew; then as all runs do."""
+    dented = dict(  # a surface that blocks some of its own sky
+        n_levels=2, levels_open_by=0.0, learning_rate=0.05, warmup_steps=1, open_below=0.0, occlusion="bits", indirect=True,
+    )  # fmt: skip
+    dataset, config, path = load_dataset(data), tiny(steps=20, **dented), tmp_path / "checkpoint.pt"
+    bits = trainer.train(dataset, config, tmp_path).model.occlusion
+    assert not torch.equal(bits.directions, bits.centres)
+    content = torch.load(path, weights_only=True)
+    light, n = content["occlusion_light"], len(content["mesh_vertices"])
+    assert len(light.pop("senders")) > 100 and not torch.equal(light.pop("aims"), bits.centres)
+    light.update(sent=torch.full((n, 3), 9e9), sky=torch.full((256, 3), 0.7))
+    torch.save(content, path)
+    resumed = trainer.Training(dataset, config.replace({"steps": 24}), tmp_path, torch.device("cpu"))
+    resumed.restore()
+    bits = resumed.model.occlusion
+    assert torch.equal(bits.directions, bits.centres) and (bits.light == 0.7).all()
+    assert len(bits.radiance) == len(bits.senders.vertices) > 100 and bits.radiance.max() < 1e3
+    scene = trainer.train(dataset, config.replace({"steps": 24}), tmp_path, resume=True)
+    bits = scene.model.occlusion
+    assert scene.finished and scene.step == 24 and not torch.equal(bits.directions, bits.centres)
+    assert load_checkpoint(path)["occlusion_light"].keys() == bits.cached_light().keys()
 
 
 def test_moments_come_back_and_rates_are_those_of_the_settings(content):

@@ -37,20 +37,45 @@ def test_a_mesh_is_the_surface_in_the_whole_box_at_its_resolution():
     assert mesh.scene is mesh.current.scene and len(model.occlusion.cache.vertices) == len(shape.vertices)
 
 
+def content_of(mesh: SurfaceMesh) -> dict:
+    """What a checkpoint holds of a mesh."""
+    return mesh.state() | {"occlusion_light": mesh.model.occlusion.cached_light()}
+
+
 def test_a_mesh_comes_back_as_it_was_stored(model):
+    """Traced where the light of then was, not that of the other model."""
+    with torch.no_grad():
+        model.light.texels.normal_()
     stored = SurfaceMesh(model)
-    nothing = stored.state()
+    nothing = content_of(stored)
     stored.request(0.3)
     torch.manual_seed(1)
     other = SceneModel(model.config)
     restored = SurfaceMesh(other)
     restored.restore(nothing)
     assert restored.current is None and not other.occlusion.ready
-    restored.restore(stored.state())
+    restored.restore(content_of(stored))
     assert (restored.asked_at, restored.made_at) == (0.3, 0.3) and restored.scene is not None
     assert torch.equal(restored.current.vertices, stored.current.vertices)
     assert torch.equal(restored.current.faces, stored.current.faces)
     assert other.occlusion.ready and torch.equal(other.occlusion.cache.bits, model.occlusion.cache.bits)
+    assert torch.equal(other.occlusion.directions, model.occlusion.directions)
+    assert not torch.equal(other.occlusion.directions, other.occlusion.centres)
+
+
+@pytest.mark.parametrize("background", [False, True])
+def test_a_mesh_is_traced_where_the_light_is_when_it_is_asked_for(model, background):
+    mesh = SurfaceMesh(model, background=background)
+    before = model.occlusion.centres
+    for progress in (0.1, 0.2):
+        with torch.no_grad():
+            model.light.texels.normal_()
+        mesh.request(progress)
+        mesh.poll(wait=True)
+        found = model.occlusion.directions.clone()
+        model.occlusion.aim(model.evaluate_light())
+        assert torch.equal(found, model.occlusion.aims) and not torch.equal(found, before)
+        before = found
 
 
 def test_a_mesh_made_beside_is_that_of_the_moment_it_was_asked_for(model, monkeypatch):

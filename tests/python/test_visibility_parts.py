@@ -15,7 +15,7 @@ from torch.nn import functional as F
 from splitnerf.fields import EvaluatedLight, Light, OcclusionQuery, RaySegments, VisibilityBits
 from splitnerf.fields import visibility
 from splitnerf.fields.light import lobe_roughness, panorama_directions
-from splitnerf.ops import VisibilityCache, cached_occlusion, cached_visibility
+from splitnerf.ops import VisibilityCache, cached_occlusion, cached_visibility, query_direction
 
 
 def dented() -> trimesh.Trimesh:
@@ -53,6 +53,22 @@ class Painted(Light):
         return self.level * (0.3 + directions + 2 * directions**2)
 
 
+class Hazy(Painted):
+    """As painted, and brighter for wide lobes."""
+
+    def forward(self, directions, roughness):
+        return (1.0 + roughness) * super().forward(directions, roughness)
+
+
+def lit_up(bits: VisibilityBits) -> None:
+    """Makes the mesh send colours of its own, after the place of each vertex."""
+    bits.refresh(
+        EvaluatedLight(Painted()),
+        lambda x: (0.5 + x.abs(), torch.full_like(x[:, :1], 0.5), torch.zeros_like(x[:, :1])),
+        lambda n, views, here, light_s, light_d: here[0],
+    )
+
+
 # ---- a mesh ----
 
 
@@ -66,21 +82,54 @@ def test_the_numbers_of_set_bits():
 
 @pytest.mark.parametrize("indirect", [True, False])
 def test_what_is_kept_of_a_mesh_is_what_its_vertices_see(indirect):
-    """Along the normals, from the offset, as many vertices as came, though two are in one place; what they hit where
-    it counts."""
+    """From the offset along the normals, in the directions of the light, as many vertices as came, though two are in
+    one place; what they hit where it counts, by the number of the sender."""
     mesh = dented()
     vertices, faces = corners(mesh)[0], faces_of(mesh)
     vertices, faces = torch.cat([vertices, vertices[faces[-1]]]), faces.clone()
     faces[-1] = torch.arange(3) + len(vertices) - 3
     again = trimesh.Trimesh(vertices.numpy(), faces.numpy(), process=False)
-    traced = VisibilityBits(256, 0.03, 3, indirect).trace(scene_of(mesh), vertices, faces)
     normals = torch.tensor(np.array(again.vertex_normals)).float()
-    expected = VisibilityCache.trace(
-        scene_of(mesh), vertices, normals, float(again.area), lattice(256), offset=0.03, with_hits=True
-    )
-    assert torch.equal(traced.cache.vertices, vertices) and torch.equal(traced.cache.normals, normals)
-    assert torch.equal(traced.cache.bits, expected.bits) and traced.cache.radius == expected.radius
-    assert (traced.cache.hits is not None and torch.equal(traced.cache.hits, expected.hits)) == indirect
+    bits = VisibilityBits(256, 0.03, 3, indirect)
+    for towards in (lattice(256), None):
+        if towards is None:
+            bits.aim(EvaluatedLight(Painted()))
+            towards = bits.aims
+            assert not torch.equal(towards, lattice(256))
+        traced = bits.trace(scene_of(mesh), vertices, faces)
+        expected = VisibilityCache.trace(
+            scene_of(mesh), vertices, normals, float(again.area), towards, offset=0.03, with_hits=True
+        )
+        assert torch.equal(traced.cache.vertices, vertices) and torch.equal(traced.cache.normals, normals)
+        assert torch.equal(traced.cache.directions, towards) and traced.cache.radius == expected.radius
+        assert torch.equal(traced.cache.bits, expected.bits) and (traced.senders is not None) == indirect
+        if indirect:
+            hits, senders = traced.cache.hits, traced.senders
+            assert torch.equal(hits >= 0, expected.hits >= 0)
+            vertex, direction = (hits >= 0).nonzero().unbind(1)
+            row = hits[vertex, direction].long()
+            assert torch.equal(senders.vertices[row], expected.hits[vertex, direction].long())
+            assert torch.equal(senders.directions[row], direction)
+            assert torch.equal(row.unique(), torch.arange(len(senders.vertices)))
+            assert len(set(zip(*(x.tolist() for x in senders[:2])))) == len(senders.vertices) > 100
+        else:
+            assert traced.cache.hits.numel() == 0
+
+
+def test_a_sender_knows_its_sides_and_what_it_mirrors():
+    """It is seen against the ray that hits it. What it mirrors is what its own vertex sees in the traced direction that
+    is nearest to the mirrored one."""
+    bits = bits_on(dented())
+    senders, n = bits.senders, bits.cache.normals[bits.senders.vertices]
+    ray = bits.directions[senders.directions]
+    mirrored = ray - 2 * (ray * n).sum(1, keepdim=True) * n
+    nearest = ((mirrored[:, None] - bits.directions) ** 2).sum(-1)
+    least, found = nearest.topk(2, largest=False)
+    clear = least[:, 1] - least[:, 0] > 1e-5
+    expected = bits.cache.hits[senders.vertices, found[:, 0]].long()
+    assert torch.equal(senders.mirrored[clear], expected[clear]) and clear.float().mean() > 0.9
+    assert 0.01 < (senders.mirrored >= 0).float().mean() < 0.99
+    assert torch.equal(senders.facing, (ray * n).sum(1, keepdim=True) < 0)
 
 
 def test_a_mesh_is_convex_whose_every_vertex_sees_all_but_a_share_of_its_sky():
@@ -96,13 +145,17 @@ def test_a_mesh_is_convex_whose_every_vertex_sees_all_but_a_share_of_its_sky():
 
 
 def test_a_new_mesh_takes_the_place_of_the_one_before():
-    """With its bits, its convexity, and no light of its own."""
+    """With its bits, directions and senders, its convexity, and no light of its own."""
     bits = bits_on(dented(), open_below=0.02)
     assert bits.ready and not bits.is_unoccluded
-    bits.refresh(lambda x, n: torch.ones_like(x))
-    ball = trimesh.creation.icosphere(2)
+    lit_up(bits)
+    assert len(bits.radiance) == len(bits.senders.vertices) > 0
+    ball, place = trimesh.creation.icosphere(2), bits.directions.data_ptr()
+    bits.aim(EvaluatedLight(Painted()))
     bits.use(bits.trace(scene_of(ball), corners(ball)[0], faces_of(ball)))
     assert bits.is_unoccluded and bits.radiance is None and len(bits.cache.vertices) == len(ball.vertices)
+    assert torch.equal(bits.directions, bits.aims) and bits.directions.data_ptr() == place
+    assert not torch.equal(bits.directions, bits.centres) and len(bits.senders.vertices) == 0
     assert not VisibilityBits(256, OFFSET, 3, True).ready
     visible, sent = bits.visibility(torch.zeros(5, 3), torch.ones(5, 3))
     assert torch.equal(visible, torch.ones(5, 256)) and sent is None
@@ -112,23 +165,38 @@ def test_a_new_mesh_takes_the_place_of_the_one_before():
 
 
 def test_light_is_averaged_over_the_texels_that_are_nearest_to_a_direction():
-    """By solid angle, as rough as a texel is wide, 8 texels or more a direction; its direction is that of its power."""
+    """By solid angle, as rough as a texel is wide, 8 texels or more a direction. Rays are aimed where the power is, which
+    moves no cell; the light's directions are those of the rays that were traced."""
     bits, light = VisibilityBits(64, OFFSET, 3, True), Painted()
-    cells = bits.cell_light(light)
+    bits.aim(EvaluatedLight(light))
+    assert torch.equal(bits.cell_light(light).directions, lattice(64))
+    traced = VisibilityBits(64, OFFSET, 3, True)
+    traced.directions.copy_(bits.aims)
+    cells = traced.cell_light(light)
     rows = math.isqrt(len(light.roughness) // 2)
     w = panorama_directions(rows).reshape(-1, 3)
     assert len(w) == len(light.roughness) >= 8 * 64 > len(panorama_directions(rows - 1).reshape(-1, 3))
     torch.testing.assert_close(light.roughness, torch.full((len(w), 1), lobe_roughness(4 * math.pi / len(w))))
     area = (w[:, 0] ** 2 + w[:, 1] ** 2).sqrt()[:, None]
-    nearest = ((w[:, None] - bits.directions) ** 2).sum(-1).argmin(1)
+    nearest = ((w[:, None] - lattice(64)) ** 2).sum(-1).argmin(1)
     value = light(w, torch.zeros(len(w), 1))
     for k in range(64):
         mine = nearest == k
         torch.testing.assert_close(cells.radiance[k], (value * area)[mine].sum(0) / area[mine].sum())
         torch.testing.assert_close(cells.solid_angles[k], 4 * math.pi * area[mine].sum() / area.sum())
         power = (value * area)[mine].sum(1, keepdim=True)
-        torch.testing.assert_close(cells.directions[k], F.normalize((w[mine] * power).sum(0), dim=0))
+        torch.testing.assert_close(bits.aims[k], F.normalize((w[mine] * power).sum(0), dim=0))
+    assert torch.equal(cells.directions, bits.aims) and not bits.aims.requires_grad
     assert cells.radiance.requires_grad and not cells.directions.requires_grad and not cells.solid_angles.requires_grad
+
+
+def test_rays_go_to_the_middles_of_cells_that_are_dark():
+    bits, light = VisibilityBits(64, OFFSET, 3, True), Painted()
+    bits.aim(EvaluatedLight(light))
+    with torch.no_grad():
+        light.level.zero_()
+    bits.aim(EvaluatedLight(light))
+    torch.testing.assert_close(bits.aims, lattice(64))
 
 
 def test_the_light_is_kept_in_its_place_for_recorded_steps():
@@ -146,52 +214,110 @@ def test_the_light_is_kept_in_its_place_for_recorded_steps():
 
 
 def test_light_that_was_kept_comes_back():
+    """On the mesh traced again, in the directions that were kept too."""
     mesh = dented()
-    ours, theirs = bits_on(mesh), bits_on(mesh)
+    ours, theirs = (VisibilityBits(256, OFFSET, 3, True) for _ in range(2))
+    ours.aim(EvaluatedLight(Painted()))
+    ours.use(ours.trace(scene_of(mesh), corners(mesh)[0], faces_of(mesh)))
+    theirs.restore_aims(ours.cached_light())
+    theirs.use(theirs.trace(scene_of(mesh), corners(mesh)[0], faces_of(mesh)))
+    assert torch.equal(theirs.directions, ours.aims) and not torch.equal(ours.aims, ours.centres)
     ours.set_light(EvaluatedLight(Painted()))
     for sends in (False, True):
         if sends:
-            ours.refresh(lambda x, n: 0.5 + x.abs())
+            lit_up(ours)
         kept = {name: x if x is None else x.clone() for name, x in ours.cached_light().items()}
-        assert (kept["sent"] is not None) == sends
+        assert (kept["sent"] is not None) == (kept["senders"] is not None) == sends
         theirs.restore_light(kept)
         for a, b in zip(ours(queries(mesh)), theirs(queries(mesh))):
             assert (a is None and b is None) or torch.equal(a, b)
-    theirs.restore_light({"sky": kept["sky"], "sent": None})
+    assert torch.equal(theirs.radiance, kept["sent"]) and theirs.radiance.data_ptr() != kept["sent"].data_ptr()
+    theirs.restore_light(kept | {"sent": None, "senders": None})
     assert theirs.radiance is None
 
 
+def test_light_of_other_senders_comes_back_to_those_that_are_there():
+    """Rays of another machine may hit a few others: those that are not stored keep what they have."""
+    bits = bits_on(dented())
+    lit_up(bits)
+    before, kept = bits.radiance.clone(), bits.cached_light()
+    numbers = bits.senders.vertices * 256 + bits.senders.directions
+    assert torch.equal(kept["senders"], numbers) and (numbers.diff() > 0).all()
+    lost = torch.arange(len(numbers)) % 3 == 1
+    strange = torch.tensor([n for n in range(numbers[-1] + 9) if n not in set(numbers.tolist())][::50])
+    theirs, order = torch.cat([numbers[~lost], strange]).sort()
+    sent = torch.cat([2 * before[~lost], torch.full((len(strange), 3), 77.0)])[order]
+    bits.restore_light(kept | {"sent": sent, "senders": theirs})
+    torch.testing.assert_close(bits.radiance, torch.where(lost[:, None], before, 2 * before))
+
+
+def test_light_that_was_kept_before_rays_were_aimed():
+    """The rays go to the middles of the cells as they did; what the vertices sent is no sender's."""
+    mesh = dented()
+    bits = VisibilityBits(256, OFFSET, 3, True)
+    bits.aim(EvaluatedLight(Painted()))
+    old = {"sky": torch.rand(256, 3, generator=generator(1)), "sent": torch.rand(len(mesh.vertices), 3)}
+    bits.restore_aims(old)
+    bits.use(bits.trace(scene_of(mesh), corners(mesh)[0], faces_of(mesh)))
+    lit_up(bits)
+    before = bits.radiance.clone()
+    bits.restore_light(old)
+    assert torch.equal(bits.directions, lattice(256)) and torch.equal(bits.light, old["sky"])
+    assert torch.equal(bits.radiance, before)
+
+
 @pytest.mark.parametrize("chunk", [1 << 15, 50])
-def test_each_vertex_sends_what_it_is_shaded_with(monkeypatch, chunk):
-    """Asked at the vertices along their normals, in parts; again in the same memory, after the first was read."""
+def test_each_sender_sends_what_it_reflects(monkeypatch, chunk):
+    """The materials of its vertex under the light there, towards the ray that sees it, in parts; again in the same
+    memory, after the first was read. Its mirror shows the sky, blurred by a cell, or what another sender sent before."""
     monkeypatch.setattr(visibility, "SHADED_CHUNK", chunk)
-    bits, seen = bits_on(dented()), []
+    bits, light, asked, seen, before = bits_on(dented()), EvaluatedLight(Hazy()), [], [], []
+    bits.set_light(light)
+    cache, senders = bits.cache, bits.senders
 
-    def shade(x: torch.Tensor, n: torch.Tensor) -> torch.Tensor:
+    def materials(x: torch.Tensor) -> tuple[torch.Tensor, ...]:
         assert len(x) <= chunk and not torch.is_grad_enabled()
-        seen.append(bits.radiance if bits.radiance is None else bits.radiance.clone())
-        return torch.stack([x[:, 0], n[:, 1], x[:, 2] + len(seen)], 1)
+        asked.append(x)
+        return x.abs(), 0.3 + 0.2 * x[:, :1], 7 * x[:, 1:2]
 
-    bits.refresh(shade)
-    first, place = bits.radiance.clone(), bits.radiance.data_ptr()
-    torch.testing.assert_close(first[:, :2], torch.stack([bits.cache.vertices[:, 0], bits.cache.normals[:, 1]], 1))
-    n_parts = len(seen)
-    bits.refresh(shade)
-    assert n_parts == math.ceil(len(first) / chunk) and len(seen) == 2 * n_parts
-    assert all(x is None for x in seen[:n_parts]) and all(torch.equal(x, first) for x in seen[n_parts:])
-    torch.testing.assert_close(bits.radiance[:, 2], first[:, 2] + n_parts)
-    assert bits.radiance.data_ptr() == place
+    def reflect(n, views, here, light_s, light_d) -> torch.Tensor:
+        assert len(n) <= chunk and not torch.is_grad_enabled()
+        seen.append((n, views, *here, light_s, light_d))
+        before.append(bits.radiance if bits.radiance is None else bits.radiance.clone())
+        return torch.stack([here[0][:, 0], views[:, 1] + light_s[:, 1], light_d[:, 2]], 1)
+
+    x, n, rho = cache.vertices, cache.normals, 0.3 + 0.2 * cache.vertices[:, :1]
+    at, views, up = senders.vertices, -bits.directions[senders.directions], torch.ones(len(x), 1)
+    here, previous = (x.abs()[at], rho[at], 7 * x[at, 1:2]), None
+    for turn in range(3):
+        asked.clear(), seen.clear(), before.clear()
+        place = None if previous is None else bits.radiance.data_ptr()
+        bits.refresh(light, materials, reflect)
+        assert torch.equal(torch.cat(asked), x) and len(seen) == math.ceil(len(at) / chunk)
+        assert all((b is previous is None) or torch.equal(b, previous) for b in before)
+        o_d, _, i_d, _ = cached_occlusion(cache, x, n, n, rho, bits.light, previous)
+        light_d = (o_d * light(n, up) + (0 if i_d is None else i_d))[at]
+        sky = light(query_direction(n[at], views, rho[at]), (rho[at] ** 4 + 1 / 256) ** 0.25)
+        shown = torch.zeros_like(sky) if previous is None else previous[senders.mirrored.clamp(min=0)]
+        light_s = torch.where((senders.mirrored < 0)[:, None], sky, shown)
+        for found, expected in zip(map(torch.cat, zip(*seen)), (n[at], views, *here, light_s, light_d)):
+            torch.testing.assert_close(found, expected)
+        sent = torch.stack([here[0][:, 0], views[:, 1] + light_s[:, 1], light_d[:, 2]], 1) * senders.facing
+        torch.testing.assert_close(bits.radiance, sent)
+        assert place in (None, bits.radiance.data_ptr()) and not bits.radiance.requires_grad
+        assert previous is None or (bits.radiance - previous).abs().max() > 1e-3
+        previous = bits.radiance.clone()
 
 
 def test_light_of_the_mesh_is_not_asked_for_where_it_does_not_count():
     """Without indirect light, before a mesh, and on one that hides nothing."""
 
-    def shade(x: torch.Tensor, n: torch.Tensor) -> torch.Tensor:
+    def asked(*args: object) -> torch.Tensor:
         raise AssertionError("is not asked")
 
     ball = bits_on(trimesh.creation.icosphere(2), open_below=0.02)
     for bits in (bits_on(dented(), indirect=False), VisibilityBits(64, OFFSET, 3, True), ball):
-        bits.refresh(shade)
+        bits.refresh(asked, asked, asked)
         assert bits.radiance is None
 
 
@@ -206,7 +332,7 @@ def test_factors_are_those_of_the_cache_under_the_light_that_is_kept(n_channels,
     bits, q = bits_on(mesh, n_channels), queries(mesh)
     bits.set_light(EvaluatedLight(Painted()))
     if sends:
-        bits.refresh(lambda x, n: 0.5 + x.abs())
+        lit_up(bits)
     o_d, o_s, i_d, i_s = cached_occlusion(bits.cache, *q[1:], bits.light, bits.radiance)
     assert (o_d - o_s).abs().max() > 0.1 and (o_d.amax(1) - o_d.amin(1)).max() > 0.05
     if n_channels == 1:
@@ -226,7 +352,7 @@ def test_a_segment_has_the_factors_of_its_leader():
     mesh = dented()
     bits, q = bits_on(mesh), queries(mesh)
     leaders, segment = torch.tensor([70, 3, 41]), torch.randint(3, (80,), generator=generator(6))
-    bits.refresh(lambda x, n: 0.5 + x.abs())
+    lit_up(bits)
     alone = bits(q)
     for found, expected in zip(bits(q, RaySegments(leaders, segment)), alone):
         assert torch.equal(found, expected[leaders[segment]]) and not torch.equal(found, expected)
@@ -237,7 +363,7 @@ def test_directions_are_seen_as_the_cache_has_them():
     bits, q = bits_on(mesh), queries(mesh)
     for sends in (False, True):
         if sends:
-            bits.refresh(lambda x, n: 0.5 + x.abs())
+            lit_up(bits)
         visible, sent = bits.visibility(q.positions, q.normals)
         expected = cached_visibility(bits.cache, q.positions, q.normals, bits.radiance)
         assert torch.equal(visible, expected[0]) and 0.01 < (visible < 1).float().mean() < 0.9

@@ -101,13 +101,13 @@ class Senders(NamedTuple):
 
     Attributes:
         vertices: [p] int64, the vertex.
-        view_dirs: [p, 3] unit, towards where it is seen from.
+        directions: [p] int64, the traced direction that hits it; it is seen from the opposite direction.
         mirrored: [p] int64, the sender that the vertex sees in the mirror direction, -1 where that is open.
         facing: [p, 1] bool, whether it is seen from the outside.
     """
 
     vertices: Tensor
-    view_dirs: Tensor
+    directions: Tensor
     mirrored: Tensor
     facing: Tensor
 

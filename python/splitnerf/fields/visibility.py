@@ -49,7 +49,7 @@ def senders_of(cache: VisibilityCache) -> tuple[Tensor, Senders]:
     cosine = (normals * view_dirs).sum(1, keepdim=True)
     mirror = 2.0 * cosine * normals - view_dirs
     nearest = torch.cat([(part @ cache.directions.T).argmax(1) for part in mirror.split(SHADED_CHUNK)] or [directions])
-    return rows, Senders(vertices, view_dirs, rows[vertices, nearest].long(), cosine > 0)
+    return rows, Senders(vertices, directions, rows[vertices, nearest].long(), cosine > 0)
 
 
 class VisibilityBits(OcclusionModel):
@@ -124,19 +124,34 @@ class VisibilityBits(OcclusionModel):
 
     def cached_light(self) -> dict[str, Tensor | None]:
         """The environment's radiance of each direction [k, 3], the directions of the traced rays [k, 3], and the
-        radiance of each sender [p, 3] or None."""
-        return {"sky": self.light, "aims": self.directions, "sent": self.radiance}
+        radiance [p, 3] and the numbers [p] of the senders, or None for both."""
+        senders = None if self.radiance is None else self._sender_numbers()
+        return {"sky": self.light, "aims": self.directions, "sent": self.radiance, "senders": senders}
 
     def restore_light(self, cached: dict[str, Tensor | None]) -> None:
-        """Restores the result of :meth:`cached_light`, on the same mesh traced in the same directions. The radiance of
-        other senders is left out."""
+        """Restores the result of :meth:`cached_light`, on the same mesh traced in the same directions.
+
+        Senders that are not stored keep the radiance that they have: another machine's rays may hit a few others, and
+        older checkpoints have the radiance of vertices, which no sender takes.
+        """
         self.light.copy_(cached["sky"])
-        sent, n = cached["sent"], 0 if self.senders is None else len(self.senders.vertices)
-        self.radiance = sent.to(self.light.device) if sent is not None and len(sent) == n else None
+        stored = cached.get("senders")
+        if cached["sent"] is None or self.senders is None:
+            self.radiance = None
+        elif stored is not None:
+            stored, ours = stored.to(self.light.device), self._sender_numbers()
+            radiance = self.light.new_zeros(len(ours), 3) if self.radiance is None else self.radiance.clone()
+            radiance[torch.isin(ours, stored)] = cached["sent"].to(radiance.device)[torch.isin(stored, ours)]
+            self.radiance = radiance
 
     def restore_aims(self, cached: dict[str, Tensor | None]) -> None:
-        """Restores the directions in which a mesh is traced from :meth:`cached_light`."""
+        """Restores the directions in which a mesh is traced from :meth:`cached_light`: the cells' centres where an
+        older checkpoint has none."""
         self.aims = cached.get("aims", self.centres).to(self.centres.device)
+
+    def _sender_numbers(self) -> Tensor:
+        """A number [p] int64 of each sender, ascending: k times its vertex plus its direction."""
+        return self.senders.vertices * len(self.directions) + self.senders.directions
 
     def cell_light(self, light: LightMaps) -> CellLight:
         """The light's mean over each direction's cell, differentiable in the light. A texel belongs to one cell, so
@@ -184,8 +199,8 @@ class VisibilityBits(OcclusionModel):
         before = x.new_zeros(1, 3) if self.radiance is None else F.pad(self.radiance, (0, 0, 0, 1))
         blur = lobe_roughness(4.0 * math.pi / len(self.centres)) ** 4  # a ray stands for all of its cell
         parts = []
-        for vertices, views, mirrored, facing in zip(*(part.split(SHADED_CHUNK) for part in self.senders)):
-            here = [part[vertices] for part in at_vertices]
+        for vertices, directions, mirrored, facing in zip(*(part.split(SHADED_CHUNK) for part in self.senders)):
+            here, views = [part[vertices] for part in at_vertices], -self.directions[directions]
             sky = light(query_direction(n[vertices], views, here[1]), (here[1] ** 4 + blur).sqrt().sqrt())
             seen = before[mirrored.clamp(max=len(before) - 1)]
             specular = torch.where(mirrored[:, None] < 0, sky, seen)

@@ -23,6 +23,7 @@ STORAGES = {f"torch {kind}Storage" for kind in ("Float", "Double", "Long", "Int"
 LONGEST_PICKLE = 1 << 22  # bytes; a checkpoint of a run has about ten thousand
 LARGEST = {"step": 1e12, "seconds": 1e12, "meshed_at": 1.0, "previewed_at": 1.0}
 MOMENTS = ("exp_avg", "exp_avg_sq")
+CACHED_LIGHT = (("sky", "aims", "sent", "senders"), ("sky", "sent"))  # now, and before rays were aimed
 
 
 def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict) -> None:
@@ -194,7 +195,6 @@ def _check_content(content: dict) -> None:
     resolution = config.sampling.grid_resolution
     _check_tensor("occupancy", content.get("occupancy"), (resolution**3,), torch.float32)
     _check_tensor("cells", content.get("cells"), (resolution,) * 3, torch.uint8)
-    _check_light(config, content)
     _check_sizes(config, content["model"])
     _check_tensor("box_from_world", content.get("box_from_world"), (4, 4), torch.float64)
     vertices, faces = content.get("mesh_vertices"), content.get("mesh_faces")
@@ -203,6 +203,7 @@ def _check_content(content: dict) -> None:
         _check_tensor("mesh_faces", faces, (-1, 3), torch.int32, torch.int64)
         if not (faces.numel() and 0 <= int(faces.min()) and int(faces.max()) < len(vertices)):
             raise ValueError("mesh_faces is empty or names vertices that are none")
+    _check_light(config, content)
 
 
 def _check_light(config: Config, content: dict) -> None:
@@ -211,14 +212,30 @@ def _check_light(config: Config, content: dict) -> None:
     height, cached = config.occlusion.environment_height, content.get("occlusion_light")
     if content.get("environment") is not None:
         _check_tensor("environment", content["environment"], (height, 2 * height, 3), torch.float32)
-    keys = {"sky", "sent"} if config.occlusion.kind == "bits" else set()
-    if not isinstance(cached, dict) or cached.keys() - {"aims"} != keys:
+    has_mesh = content.get("mesh_vertices") is not None
+    kinds = CACHED_LIGHT if config.occlusion.kind == "bits" else ((),)
+    if not isinstance(cached, dict) or cached.keys() not in map(set, kinds):
         raise ValueError("occlusion_light is missing or of another kind")
     if cached:
-        for name in cached.keys() - {"sent"}:
-            _check_tensor(f"the {name} of the bits", cached[name], (config.occlusion.directions, 3), torch.float32)
-    if cached.get("sent") is not None:
-        _check_tensor("the light that the mesh sends", cached["sent"], (-1, 3), torch.float32)
+        _check_bits(cached, config.occlusion.directions, len(content["mesh_vertices"]) if has_mesh else 0)
+
+
+def _check_bits(cached: dict, k: int, n_vertices: int) -> None:
+    """Raises ValueError where the cached light is not that of bits of k directions on a mesh of so many vertices."""
+    _check_tensor("the sky's light", cached["sky"], (k, 3), torch.float32)
+    if "aims" in cached:
+        _check_tensor("the traced directions", cached["aims"], (k, 3), torch.float32)
+        if (cached["aims"].norm(dim=1) - 1.0).abs().max() > 1e-3:
+            raise ValueError("the traced directions are not of length 1")
+    n, senders = n_vertices, cached.get("senders")
+    if senders is None and cached["sent"] is None:
+        return
+    if "senders" in cached:
+        _check_tensor("the number of each sender", senders, (-1,), torch.int64)
+        n = len(senders)
+        if n and not (senders[0] >= 0 and senders[-1] < n_vertices * k and (senders[1:] > senders[:-1]).all()):
+            raise ValueError("the numbers of the senders do not ascend, or name vertices that are none")
+    _check_tensor("the light that the mesh sends", cached["sent"], (n, 3), torch.float32)
 
 
 def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:
