@@ -1,4 +1,4 @@
-"""incoming_light: its directions, its densities, and the light that it finds, against closed forms and the path tracer."""
+"""incoming_light: its directions, densities and the light that it finds, against closed forms and the path tracer."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ WHITE = torch.ones(4, 8, 3)
 # ---- scenes ----
 
 
-def plain_surface(mesh: trimesh.Trimesh, albedo: float = 1.0, roughness: float = 1.0, metallic: float = 0.0) -> TexturedSurface:
+def plain_surface(
+    mesh: trimesh.Trimesh, albedo: float = 1.0, roughness: float = 1.0, metallic: float = 0.0
+) -> TexturedSurface:
     """A mesh of one colour whose normals are the triangles'."""
     n = len(mesh.vertices)
     return TexturedSurface(
@@ -101,9 +103,7 @@ def reflected(light: IncomingLight, radiance: torch.Tensor, points: dict[str, to
     p = {name: x.double() for name, x in points.items()}
     lobe = p["normals"], p["view_dirs"], p["roughness"]
     sums = monte_carlo_light(*lobe, light.directions.double(), light.pdf.double(), radiance.double())
-    return shade_sums(
-        p["normals"], p["view_dirs"], p["albedo"], p["roughness"], p["metallic"], sums, compensate=True
-    )
+    return shade_sums(p["normals"], p["view_dirs"], p["albedo"], p["roughness"], p["metallic"], sums, compensate=True)
 
 
 def mean_and_error(samples: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -120,7 +120,9 @@ def mean_and_error(samples: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
 def test_in_a_furnace_a_convex_body_reflects_its_albedo(roughness, metallic, lamp):
     """Light 1 from everywhere; the directions are drawn as if there were a lamp, or not."""
     ball, n, face = trimesh.creation.icosphere(2), 400, 37
-    normal, centre = (torch.tensor(np.asarray(x[face]), dtype=torch.float32) for x in (ball.face_normals, ball.triangles_center))
+    normal, centre = (
+        torch.tensor(np.asarray(x[face]), dtype=torch.float32) for x in (ball.face_normals, ball.triangles_center)
+    )
     side = unit(torch.linalg.cross(normal, torch.tensor([1.0, 0.0, 0.0])))
     for n_dot_v in (0.95, 0.3):
         points = {
@@ -141,7 +143,7 @@ def test_in_a_furnace_a_convex_body_reflects_its_albedo(roughness, metallic, lam
 
 
 def seen_from_close(asset: Asset, environment: np.ndarray, bounces: int, n_points: int = 12) -> list[tuple]:
-    """Points of an asset as one pixel of the path tracer sees each: (point, mean radiance [3], its standard error [3])."""
+    """[(point, radiance [3], standard error [3])]: points of an asset, each as one pixel of the path tracer sees it."""
     random, renderer = np.random.default_rng(5), AssetRenderer(asset)
     lens, found = (1e3, 1e3, 0.5, 0.5), []
     for face in random.choice(len(asset.triangles), n_points, replace=False):
@@ -154,7 +156,7 @@ def seen_from_close(asset: Asset, environment: np.ndarray, bounces: int, n_point
         across = np.cross(view, random.normal(size=3))
         across /= np.linalg.norm(across)
         pose = np.stack([across, np.cross(view, across), view, position + 0.02 * view], axis=1)
-        options = dict(spp=16384, bounces=bounces, clamp_indirect=0.0, pixel_filter="box")
+        options = {"spp": 16384, "bounces": bounces, "clamp_indirect": 0.0, "pixel_filter": "box"}
         views = [renderer.render(environment, pose, lens, 1, 1, seed=seed, **options) for seed in range(8)]
         maps = {name: torch.tensor(x[0, 0]).reshape(1, -1) for name, x in views[0].items()}
         assert maps["alpha"] == 1 and abs(maps["depth"] - 0.02) < 1e-4
@@ -182,6 +184,17 @@ def test_reflected_light_is_the_path_tracer_s(bounces):
         darkened += int((light.visible[light.pdf > 0] == 0).any())
         lit += int((light.sent > 0).any())
     assert darkened >= 10 and lit >= (10 if bounces else 0)
+
+
+@pytest.mark.parametrize("metallic", [0.0, 1.0])
+def test_in_a_white_furnace_what_blocks_sends_as_much_light(metallic):
+    """Nothing is absorbed between a white floor and a white roof: after all bounces each direction brings light 1."""
+    surface = plain_surface(under_a_roof(), roughness=0.7, metallic=metallic)
+    light = incoming_light(surface, WHITE, **flat_points(1500), n_directions=32, max_bounces=64)
+    blocked = (light.pdf > 0) & (light.visible == 0)
+    mean, error = mean_and_error(light.sent[blocked].double())
+    assert blocked.sum() > 10000 and (error < 0.01).all()
+    assert ((mean - 1).abs() < SIGMAS * error + 5e-3).all(), (mean, error)
 
 
 def test_no_light_is_sent_without_bounces_and_it_is_bounded_where_asked():
@@ -215,13 +228,18 @@ def test_the_environment_is_seen_past_the_roof_alone():
 
 def test_nothing_arrives_from_below_the_triangle():
     """The shading normal leans by 60 degrees; a ball below the floor's plane would be seen."""
-    mesh = trimesh.util.concatenate([grid_mesh(0.2, 1), trimesh.creation.icosphere(2, 0.5).apply_translation((2, 0, -1))])
+    mesh = trimesh.util.concatenate(
+        [grid_mesh(0.2, 1), trimesh.creation.icosphere(2, 0.5).apply_translation((2, 0, -1))]
+    )
     points = flat_points(60) | {"normals": torch.tensor([[math.sqrt(0.75), 0.0, 0.5]]).repeat(60, 1)}
     light = incoming_light(plain_surface(mesh), WHITE, **points, n_directions=64)
     below = light.directions[..., 2] <= 0
     assert (below & (light.pdf > 0)).sum() > 200
     assert (light.visible[below] == 0).all() and (light.sent[below] == 0).all()
     assert (light.visible[~below & (light.pdf > 0)] == 1).all()
+    from_behind = points | {"geometric_normals": -points["geometric_normals"], "normals": points["geometric_normals"]}
+    light = incoming_light(plain_surface(mesh), WHITE, **from_behind, n_directions=64)
+    assert (light.pdf > 0).any() and (light.visible == 0).all() and (light.sent == 0).all()
 
 
 # ---- densities ----
@@ -260,7 +278,9 @@ def test_edges_stay_finite(n_dot_v, roughness):
     points["metallic"][:10] = 1.0
     points["normals"] = points["normals"].clone()
     points["normals"][5] = 0.0
-    light = incoming_light(plain_surface(under_a_roof()), torch.from_numpy(sky_with_a_lamp()), **points, n_directions=32)
+    light = incoming_light(
+        plain_surface(under_a_roof()), torch.from_numpy(sky_with_a_lamp()), **points, n_directions=32
+    )
     assert all(bool(torch.isfinite(x).all()) for x in light)
     assert (light.pdf >= 0).all() and (light.sent >= 0).all() and (light.pdf[5] == 0).all()
     rest = torch.arange(20) != 5
@@ -349,7 +369,9 @@ BAD_SURFACES = [
 def test_bad_surfaces_are_refused(field, change, name, message):
     surface = plain_surface(grid_mesh(2.0, 1))
     surface = surface._replace(**{field: change(getattr(surface, field))})
-    check_error(lambda: incoming_light(surface, WHITE, **some_points(), n_directions=4), "incoming_light: ", name, message)
+    check_error(
+        lambda: incoming_light(surface, WHITE, **some_points(), n_directions=4), "incoming_light: ", name, message
+    )
 
 
 @pytest.mark.parametrize(
@@ -359,7 +381,10 @@ def test_bad_surfaces_are_refused(field, change, name, message):
 def test_bad_environments_are_refused(environment, message):
     surface = plain_surface(grid_mesh(2.0, 1))
     check_error(
-        lambda: incoming_light(surface, environment, **some_points(), n_directions=4), "incoming_light: ", "environment", message
+        lambda: incoming_light(surface, environment, **some_points(), n_directions=4),
+        "incoming_light: ",
+        "environment",
+        message,
     )
 
 
@@ -375,10 +400,8 @@ def test_bad_environments_are_refused(environment, message):
     ],
 )
 def test_bad_numbers_are_refused(options, message):
-    call = lambda: incoming_light(  # noqa: E731
-        plain_surface(grid_mesh(2.0, 1)), WHITE, **some_points(), **({"n_directions": 4} | options)
-    )
-    check_error(call, "incoming_light: " + message)
+    surface, options = plain_surface(grid_mesh(2.0, 1)), {"n_directions": 4} | options
+    check_error(lambda: incoming_light(surface, WHITE, **some_points(), **options), "incoming_light: " + message)
 
 
 def test_a_released_scene_raises():

@@ -22,6 +22,7 @@ from splitnerf.export.unwrap import unwrap
 from splitnerf.refinement.fit import Refinement, RefinementSettings, refine, srgb_slope
 from splitnerf.refinement.job import fitting_height
 from splitnerf.refinement.light import EnvironmentLight, look_up
+from splitnerf.refinement.outline import fit_outline, weld
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.texels import AssetTexels, materials_of
@@ -228,13 +229,14 @@ def refined(painted):
     start = texels.start.clone()
     start[:, :3], start[:, 3] = 0.35, 0.5
     wrong = texels.asset_with(texels.maps(start))
-    settings = RefinementSettings(sweeps=14, sweep_share=1.0, light_rate=0.0, pixels=2000, directions=16)
-    return (wrong, *refine(data, wrong, sky(), settings))
+    settings = RefinementSettings(sweeps=14, sweep_share=1.0, light_rate=0.0, pixels=2000, directions=16, outline=False)
+    return wrong, refine(data, wrong, sky(), settings)
 
 
 def test_a_balls_albedo_is_found_and_its_roughness_approached(painted, refined):
-    asset, (wrong, found, light, sweeps) = painted[0], refined
-    values = {name: AssetTexels(a).start for name, a in (("true", asset), ("wrong", wrong), ("found", found))}
+    asset, (wrong, result) = painted[0], refined
+    assets = (("true", asset), ("wrong", wrong), ("found", result.asset))
+    values, sweeps = {name: AssetTexels(a).start for name, a in assets}, result.sweeps
     height = heights(asset, AssetTexels(asset))[:, 0].abs()
     seen = (height > 0.1) & (height < 0.8)
     error = lambda name: (values[name] - values["true"])[seen, :3].abs().mean().item()  # noqa: E731
@@ -243,15 +245,17 @@ def test_a_balls_albedo_is_found_and_its_roughness_approached(painted, refined):
     assert values["found"][seen, 4].mean() < 0.1  # no metal is invented
     assert sweeps[-1].error < 0.03 * sweeps[0].error
     assert sweeps[-1].moved[0] < 0.3 * sweeps[0].moved[0]
-    np.testing.assert_allclose(light, sky(), rtol=1e-5)
+    np.testing.assert_allclose(result.light, sky(), rtol=1e-5)
 
 
 def test_a_wrong_light_comes_nearer_to_the_true_one(painted):
     asset, data = painted
     grey = np.full_like(sky(), 0.8)
-    _, light, sweeps = refine(
-        data, asset, grey, RefinementSettings(sweeps=8, sweep_share=1.0, light_rate=0.05, pixels=1000, anchor=1e4, directions=16)
+    settings = RefinementSettings(
+        sweeps=8, sweep_share=1.0, light_rate=0.05, pixels=1000, anchor=1e4, directions=16, outline=False
     )
+    result = refine(data, asset, grey, settings)
+    light, sweeps = result.light, result.sweeps
     cosine = np.sin((np.arange(16) + 0.5) * np.pi / 16)[:, None, None]
     apart = lambda map_: (np.abs(np.log(map_) - np.log(sky())) * cosine).mean()  # noqa: E731
     assert apart(light) < 0.6 * apart(grey) and sweeps[-1].error < 0.1 * sweeps[0].error
@@ -262,9 +266,10 @@ def test_a_wrong_light_comes_nearer_to_the_true_one(painted):
 def test_equal_seeds_give_equal_bits(painted):
     asset, data = painted
     settings = RefinementSettings(sweeps=2, sweep_share=0.1, pixels=256)
-    (first, light, _), (second, again, _) = (refine(data, asset, sky(), settings) for _ in range(2))
-    np.testing.assert_array_equal(first.materials[0].albedo_texture, second.materials[0].albedo_texture)
-    np.testing.assert_array_equal(light, again)
+    first, second = (refine(data, asset, sky(), settings) for _ in range(2))
+    np.testing.assert_array_equal(first.asset.vertices, second.asset.vertices)
+    np.testing.assert_array_equal(*(r.asset.materials[0].albedo_texture for r in (first, second)))
+    np.testing.assert_array_equal(first.light, second.light)
 
 
 def test_saturated_pixels_ask_for_no_less_light(painted):
@@ -279,6 +284,27 @@ def test_slope_of_srgb():
     x = torch.linspace(0.02, 1, 50, dtype=torch.float64)
     numeric = (linear_to_srgb((x + 1e-6).numpy()) - linear_to_srgb((x - 1e-6).numpy())) / 2e-6
     np.testing.assert_allclose(srgb_slope(x).numpy(), numeric, rtol=1e-3)
+
+
+@pytest.mark.parametrize("scale", [0.96, 1.04])
+@pytest.mark.parametrize("hard", [False, True])
+def test_a_balls_outline_is_found(ball, painted, scale, hard):
+    """A ball that is too small or too large gets its size back, from masks with soft edges and without, and stays closed."""
+    data = painted[1]
+    if hard:
+        alpha = (data.images[..., 3:] > 0.5).astype(np.float32)
+        data = replace(data, images=np.concatenate([data.images[..., :3], alpha], -1))
+    wrong = replace(ball, vertices=scale * ball.vertices)
+    found, errors = fit_outline(data, wrong)
+    radius = np.linalg.norm(found.vertices, axis=1)
+    assert abs(radius.mean() - 1) < 0.15 * abs(scale - 1) and radius.std() < 0.01
+    assert errors[-1] < 0.3 * errors[0]
+    assert weld(found.vertices).max() == weld(ball.vertices).max()  # what was one vertex still is
+
+
+def test_a_true_outline_stays(ball, painted):
+    found, errors = fit_outline(painted[1], ball)
+    assert np.abs(np.linalg.norm(found.vertices, axis=1) - 1).max() < 0.01 and errors[-1] < 5e-3
 
 
 @pytest.mark.parametrize(("height", "fitted"), [(128, 128), (512, 256), (96, 32), (8, 8), (7, 0)])

@@ -111,28 +111,33 @@ def chequered() -> ops.TexturedSurface:
 
 
 def light_arriving(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """Unit directions, densities and light finite and not below 0, nothing below the triangle or from a convex body."""
+    """Unit directions; finite numbers, none below 0; no light from below the triangle, or out of a convex body."""
     positions, faces = on_cube(draw, n)
     inside = draw.chance(0.5, n, 1)
     geometric = torch.where(inside, -faces, faces)
-    normals = torch.where(draw.chance(0.1, n, 1), 0.0, unit(geometric + draw.pick((0.0, 1e-7, 0.9, 3.0), n, 1) * draw.directions(n)))
+    leaning = unit(geometric + draw.pick((0.0, 1e-7, 0.9, 3.0), n, 1) * draw.directions(n))
+    normals = torch.where(draw.chance(0.1, n, 1), 0.0, leaning)
     rows = {
-        "positions": positions, "geometric_normals": geometric, "normals": normals, "view_dirs": draw.at_cosine(normals),
-        "albedo": draw.shares(n, 3), "roughness": draw.roughness(n), "metallic": draw.shares(n, 1),
+        "positions": positions, "geometric_normals": geometric, "normals": normals,
+        "view_dirs": draw.at_cosine(normals), "albedo": draw.shares(n, 3), "roughness": draw.roughness(n),
+        "metallic": draw.shares(n, 1),
     }  # fmt: skip
     rows = {name: x.float() for name, x in rows.items()}
     sky = torch.full((4, 8, 3), draw.pick((0.0, 1e-38, 1.0, 1e6), 1).item())
     sky[1, 2] = max(sky[0, 0, 0].item(), 1e6 if draw.chance(0.5, 1).item() else 0.0)
-    found = ops.incoming_light(chequered(), sky, **rows, n_directions=8, max_bounces=3, seed=int(draw.uniform(1).item() * 1e9))
+    seed = int(draw.uniform(1).item() * 1e9)
+    found = ops.incoming_light(chequered(), sky, **rows, n_directions=8, max_bounces=3, seed=seed)
     directions = found.directions.double()
     length = directions.norm(dim=-1)
     wrong = ((length - 1).abs() > 2e-6) & (found.pdf > 0)
     lit = (found.visible > 0) | (found.sent > 0).any(-1)
     wrong |= lit & ((directions * geometric[:, None]).sum(-1) < -1e-6) | lit & (found.pdf <= 0)
     wrong |= (found.visible > 0) & (found.sent > 0).any(-1)
-    broken = torch.where(wrong.any(1), 1.0, torch.maximum(finite_in(found.pdf, 0.0, 3e38), finite_in(found.sent, 0.0, 1e9)))
-    broken = torch.maximum(broken, finite_in(found.visible, 0.0, 1.0))
-    clear = (positions.abs() < HALF * (1 - 1e-3)).sum(1) == 2  # not beside an edge, where rays start past the other faces
+    limits = ((found.pdf, 3e38), (found.sent, 1e9), (found.visible, 1.0))
+    broken = torch.stack([finite_in(x, 0.0, limit) for x, limit in limits]).amax(0)
+    broken = torch.where(wrong.any(1), 1.0, broken)
+    # beside an edge rays start past the other face
+    clear = (positions.abs() < HALF * (1 - 1e-3)).sum(1) == 2
     leaks = torch.where(inside[:, 0], (found.visible > 0).any(1), (found.sent > 0).any(-1).any(1))
     return torch.where(clear & leaks, 1.0, broken), rows
 

@@ -12,9 +12,9 @@ from splitnerf.errors import InputError
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "refine", help="fit an exported asset and its light to the photos",
-        description="Fits the textures (albedo, roughness, metallic, normals) of RUN/mesh.glb and the light of "
-        "RUN/environment.exr to the photos through the path tracer's own model, interreflection included. Writes mesh.glb, "
-        "environment.exr, environment.hdr and refinement.json into RUN/refined. The shape of the mesh stays as it is.",
+        description="Moves the vertices of RUN/mesh.glb until its outline is that of the masks, then fits its textures (albedo, "
+        "roughness, metallic, normals) and the light of RUN/environment.exr to the photos through the path tracer's own model, "
+        "interreflection included. Writes mesh.glb, environment.exr, environment.hdr and refinement.json into RUN/refined.",
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN", help="a finished run, or a folder with both files")
     parser.add_argument("--data", type=Path, required=True, metavar="DATA", help="the data that RUN was trained on")
@@ -23,11 +23,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument("--sweeps", type=int, default=16, metavar="N", help="steps of the fit (default: 16)")
     parser.add_argument("--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)")
+    parser.add_argument("--keep-shape", action="store_true", help="leave the vertices where they are")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN/refined)")
     parser.set_defaults(execute=run)
 
 
 def run(args: argparse.Namespace) -> int:
+    from splitnerf.refinement.fit import RefinementSettings
     from splitnerf.refinement.job import refine_run
 
     if args.sweeps < 1:
@@ -37,7 +39,11 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or args.run / "refined"
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
-    sweeps = refine_run(args.run, args.data, out, downscale=args.downscale, sweeps=args.sweeps, minutes=args.minutes)
-    print(f"error of the photos: {sweeps[0].error:.3g} -> {sweeps[-1].error:.3g} in {len(sweeps)} steps, {sweeps[-1].seconds:.0f} s")
+    settings = RefinementSettings(sweeps=args.sweeps, minutes=args.minutes, outline=not args.keep_shape)
+    refined = refine_run(args.run, args.data, out, downscale=args.downscale, settings=settings)
+    first, last = refined.sweeps[0], refined.sweeps[-1]
+    if refined.outline:
+        print(f"coverage at the outline, squared error: {refined.outline[0]:.2g} -> {refined.outline[-1]:.2g}")
+    print(f"colours, squared error: {first.error:.3g} -> {last.error:.3g} in {last.number} steps, {last.seconds:.0f} s")
     print(f"results: {out / 'mesh.glb'}, {out / 'environment.exr'}")
     return DONE

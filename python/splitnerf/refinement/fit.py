@@ -18,12 +18,12 @@ from torch import Tensor
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
-from splitnerf.ops import MeshScene, monte_carlo_light, shade_sums
-from splitnerf.ops.incoming_light import TexturedSurface, incoming_light
+from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
 from splitnerf.refinement.light import EnvironmentLight, look_up
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
+from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
-from splitnerf.refinement.texels import AssetTexels, SurfaceSamples, materials_of
+from splitnerf.refinement.texels import AssetTexels, SurfaceSamples, check_form, materials_of
 from splitnerf.refinement.unknowns import STEP_LIMITS, into_range, per_unknown, to_unknowns, to_values
 
 CLAMP_INDIRECT = 10.0
@@ -36,7 +36,7 @@ class RefinementSettings:
 
     Attributes:
         sweeps: Gauss-Newton steps.
-        minutes: Time after which no further sweep begins; 0 does not limit.
+        minutes: Time after which no further sweep begins, the first one aside; 0 does not limit.
         sweep_share: Pixels of a sweep as a share of all.
         pixels: Pixels of a batch.
         directions: Directions of a ray's point.
@@ -45,6 +45,7 @@ class RefinementSettings:
         smooth_albedo, smooth_gloss, smooth_normal: Weights of the differences between neighbours' steps.
         anchor: Weight of the distance to the start.
         light_rate: Learning rate of the light's log radiance; 0 keeps the light.
+        outline: Whether vertices move first, so that the asset covers the pixels as the masks do.
         seed: Seed of all random numbers.
     """
 
@@ -60,7 +61,26 @@ class RefinementSettings:
     smooth_normal: float = 1.0
     anchor: float = 0.02
     light_rate: float = 0.002
+    outline: bool = True
     seed: int = 0
+
+
+@dataclass(frozen=True)
+class Refined:
+    """What a refinement leaves.
+
+    Attributes:
+        asset: The asset.
+        light: [h, 2 h, 3] linear radiance.
+        outline: Mean squared errors of the coverage at the outline, before each round and at the end; empty where the
+            shape was kept.
+        sweeps: What each sweep says.
+    """
+
+    asset: Asset
+    light: np.ndarray
+    outline: list[float]
+    sweeps: list[Sweep]
 
 
 class Sweep(NamedTuple):
@@ -194,24 +214,25 @@ def refine(
     environment: np.ndarray,
     settings: RefinementSettings,
     report: Callable[[Sweep], None] = lambda sweep: None,
-) -> tuple[Asset, np.ndarray, list[Sweep]]:
-    """Fits an asset's textures and the light to photos; see :class:`Refinement` for the arguments.
+) -> Refined:
+    """Fits an asset's outline, its textures and the light to photos; see :class:`Refinement` for the arguments.
 
     Args:
         report: Called after each sweep.
-
-    Returns:
-        The asset with new textures, the light [h, 2 h, 3], and what each sweep said.
 
     Raises:
         ValueError: The asset or the light has another form than :class:`Refinement` takes.
         RuntimeError: Numbers are no longer finite.
     """
-    fit, sweeps, started = Refinement(dataset, asset, environment, settings), [], time.monotonic()
+    check_form(asset)
+    outline, sweeps, started = [], [], time.monotonic()
+    if settings.outline:
+        asset, outline = fit_outline(dataset, asset, settings.seed)
+    fit = Refinement(dataset, asset, environment, settings)
     for number in range(1, settings.sweeps + 1):
-        if settings.minutes > 0 and time.monotonic() - started > 60 * settings.minutes:
+        if sweeps and settings.minutes > 0 and time.monotonic() - started > 60 * settings.minutes:
             break
         error, moved = fit.sweep()
         sweeps.append(Sweep(number, time.monotonic() - started, error, moved))
         report(sweeps[-1])
-    return fit.texels.asset_with(fit.maps()), fit.light.radiance().detach().numpy(), sweeps
+    return Refined(fit.texels.asset_with(fit.maps()), fit.light.radiance().detach().numpy(), outline, sweeps)

@@ -18,7 +18,7 @@ from splitnerf.errors import InputError
 from splitnerf.export.bake import UnwrappedMesh, bake_occlusion
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
-from splitnerf.refinement.fit import RefinementSettings, Sweep, refine
+from splitnerf.refinement.fit import Refined, RefinementSettings, refine
 
 OCCLUSION_OFFSET = 0.006  # distance of a ray's start from the mesh, as a share of its extent
 LEAST_HEIGHT, LARGEST_HEIGHT = 8, 256  # rows of the light that is fitted
@@ -51,7 +51,7 @@ def occlusion_texture(asset: Asset) -> np.ndarray:
     return bake_occlusion(mesh, asset.materials[0].albedo_texture.shape[0], OCCLUSION_OFFSET * extent)
 
 
-def refine_run(run: Path, data: Path, out: Path, *, downscale: int, sweeps: int, minutes: float) -> list[Sweep]:
+def refine_run(run: Path, data: Path, out: Path, *, downscale: int, settings: RefinementSettings) -> Refined:
     """Refines the asset of a run; writes mesh.glb, environment.exr and .hdr and refinement.json.
 
     Raises:
@@ -64,14 +64,14 @@ def refine_run(run: Path, data: Path, out: Path, *, downscale: int, sweeps: int,
         raise InputError(f"{path}: no such asset; finish the run, or write it with `splitnerf export {run}`")
     asset, light = read_asset(path), read_light(run)
     dataset = load_dataset(data, "train", downscale)
-    settings = RefinementSettings(sweeps=sweeps, minutes=minutes)
-    with tqdm(total=sweeps, desc="refining", unit="step", leave=False, disable=None) as bar:
+    with tqdm(total=settings.sweeps, desc="refining", unit="step", leave=False, disable=None) as bar:
         try:
-            asset, light, said = refine(dataset, asset, light, settings, report=lambda sweep: bar.update())
+            refined = refine(dataset, asset, light, settings, report=lambda sweep: bar.update())
         except ValueError as error:
             raise InputError(f"{path}: {error}; give an asset that `splitnerf train` or `export` wrote") from error
     out.mkdir(parents=True, exist_ok=True)
-    write_glb(out / "mesh.glb", asset, occlusion_texture(asset))
-    write_environment(out, light)
-    write_json(out / "refinement.json", {"sweeps": [sweep._asdict() for sweep in said]})
-    return said
+    write_glb(out / "mesh.glb", refined.asset, occlusion_texture(refined.asset))
+    write_environment(out, refined.light)
+    said = {"outline": refined.outline, "sweeps": [sweep._asdict() for sweep in refined.sweeps]}
+    write_json(out / "refinement.json", said)
+    return refined

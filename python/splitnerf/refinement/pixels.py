@@ -59,14 +59,19 @@ class Pixels:
         return np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
 
 
-def covered_pixels(dataset: Dataset) -> Pixels:
-    """The pixels of a split that the object covers."""
-    view, row, column = np.nonzero(dataset.images[..., 3] >= MIN_ALPHA)
+def pixels_of(dataset: Dataset, chosen: np.ndarray) -> Pixels:
+    """The pixels of a split where `chosen` [photos, H, W] is true."""
+    view, row, column = np.nonzero(chosen)
     colours = dataset.images[view, row, column, :3]
     return Pixels(
         view, np.stack([column, row], axis=1).astype(np.float32) + 0.5, srgb_to_linear(colours).astype(np.float32),
         colours >= SATURATED, dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics,
     )  # fmt: skip
+
+
+def covered_pixels(dataset: Dataset) -> Pixels:
+    """The pixels of a split that the object covers."""
+    return pixels_of(dataset, dataset.images[..., 3] >= MIN_ALPHA)
 
 
 def filter_offsets() -> np.ndarray:
@@ -88,4 +93,15 @@ class PixelFilter:
 
     def draw(self, n: int, generator: np.random.Generator) -> np.ndarray:
         """[n, 2] float32 independent offsets from the pixels' centres, in pixels."""
-        return np.interp(generator.random((n, 2)) * INTERVALS, np.arange(INTERVALS + 1), self._offsets).astype(np.float32)
+        return self._at(generator.random((n, 2)))
+
+    def spread(self, n: int, n_rays: int, generator: np.random.Generator) -> np.ndarray:
+        """[n, n_rays, 2] float32 offsets, those of a pixel a lattice with a random shift: for means with little noise.
+
+        Source: Cranley and Patterson 1976; Roberts 2018 (the lattice).
+        """
+        lattice = np.arange(n_rays)[:, None] * [0.7548776662466927, 0.5698402909980532]
+        return self._at((lattice + generator.random((n, 1, 2))) % 1.0)
+
+    def _at(self, u: np.ndarray) -> np.ndarray:
+        return np.interp(u * INTERVALS, np.arange(INTERVALS + 1), self._offsets).astype(np.float32)
