@@ -241,7 +241,8 @@ def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
     one.step, one.seconds, one.n_rays, one.previewed_at = 5, 12.5, 77, 0.125
     one.environment, one.mesh.made_at = torch.rand(32, 64, 3), 0.375
     cached = one.model.occlusion.cached_light()
-    one.model.occlusion.restore_light({name: torch.rand_like(radiance) for name, radiance in cached.items()})
+    other_light = {name: torch.rand_like(cached[name]) for name in ("sky", "sent") if cached[name] is not None}
+    one.model.occlusion.restore_light(cached | other_light)
     one.save()
     kept = loop.load_checkpoint(tmp_path / "checkpoint.pt")
     torch.manual_seed(9)
