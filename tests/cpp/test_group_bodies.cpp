@@ -265,17 +265,18 @@ TEST(GroupBodies, MonteCarloSumsAndTheirGradients) {
   const int k = 21;
   Random random(9);
   const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n, 0.05, 1);
+  const auto share = random.uniforms(n, 0, 1);
   std::vector<double> dirs(3 * n * k), pdf(n * k), dirs8(dirs.size()), pdf8(pdf.size());
-  cpu::run(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), k, 3u, dirs.data(), pdf.data()});
+  cpu::run(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs.data(), pdf.data()});
   for_each_by_lanes<8>(
-      n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), k, 3u, dirs8.data(), pdf8.data()});
+      n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs8.data(), pdf8.data()});
   expect_near(dirs8, dirs, 0), expect_near(pdf8, pdf, 0);
   cpu::run(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs.data()});
   for_each_by_lanes<8>(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs8.data()});
   expect_near(dirs8, dirs, 0);
 
-  const auto radiance = random.uniforms(3 * n * k), g = random.uniforms(9 * n, -1);
-  std::vector<double> sums(9 * n), to_n(3 * n), to_rho(n), to_light(3 * n * k), sums8(9 * n), to_n8(3 * n), to_rho8(n),
+  const auto radiance = random.uniforms(3 * n * k), g = random.uniforms(3 * kLightSums * n, -1);
+  std::vector<double> sums(3 * kLightSums * n), to_n(3 * n), to_rho(n), to_light(3 * n * k), sums8(3 * kLightSums * n), to_n8(3 * n), to_rho8(n),
       to_light8(3 * n * k);
   const DrawnLight<double> light{k, dirs.data(), pdf.data(), radiance.data()};
   const ToDrawnLight<double> receive{k, to_light.data()};
@@ -304,11 +305,11 @@ TEST(GroupBodies, SummedLightAndItsGradients) {
   Random random(11);
   const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n, 0.05, 1);
   const auto dirs = random.directions(k), angles = random.uniforms(k), radiance = random.uniforms(3 * k);
-  const auto visible = random.uniforms(n * k), sent = random.uniforms(3 * n * k), g = random.uniforms(9 * n, -1);
+  const auto visible = random.uniforms(n * k), sent = random.uniforms(3 * n * k), g = random.uniforms(3 * kLightSums * n, -1);
   for (const bool with_sent : {false, true}) {
     const SharedLight<double> light{
         k, dirs.data(), angles.data(), radiance.data(), visible.data(), with_sent ? sent.data() : nullptr};
-    std::vector<double> sums(9 * n), to_n(3 * n), to_rho(n), to_light(3 * k), sums8(9 * n), to_n8(3 * n), to_rho8(n),
+    std::vector<double> sums(3 * kLightSums * n), to_n(3 * n), to_rho(n), to_light(3 * k), sums8(3 * kLightSums * n), to_n8(3 * n), to_rho8(n),
         to_light8(3 * k);
     const ToSharedLight<double> receive{k, visible.data(), to_light.data()};
     cpu::run(n, SharedLightBody<double>{k, normals.data(), views.data(), rho.data(), {light}, sums.data()});
