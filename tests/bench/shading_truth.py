@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 import torch
 import trimesh
-from limits import vertex_materials
 from scipy.spatial import cKDTree
+from swap import MATERIALS, surface_values
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -101,7 +101,11 @@ class TrueMaterials(torch.nn.Module):
     def __init__(self, asset: Asset):
         super().__init__()
         points = surface_points(asset)
-        values = vertex_materials(points, points.materials).values()
+        triangle = np.zeros(len(points.vertices), np.int64)
+        triangle[points.triangles] = np.arange(len(points.triangles))[:, None]
+        corner = points.triangles[triangle] == np.arange(len(triangle))[:, None]
+        at_vertices = surface_values(points, triangle, (corner / corner.sum(1, keepdims=True)).astype(np.float32))
+        values = [at_vertices[name] for name in MATERIALS]
         self.tree, self.normals = cKDTree(points.vertices), torch.from_numpy(points.normals).float()
         self.nearest = [torch.from_numpy(np.clip(x.reshape(len(x), -1), 0, 1)).float() for x in values]
         self.given: tuple[Tensor, ...] | None = None
