@@ -172,6 +172,51 @@ def test_a_shaded_point_is_what_the_path_tracer_renders(painted):
     assert abs(error) < 2e-4 < 0.05 * grey.gather(grey.surface())
 
 
+@pytest.fixture(scope="module")
+def cornered() -> tuple[Asset, Dataset]:
+    """A rough metal ball on a plate of the same metal: each hides light from the other and sends it some."""
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.6)
+    ball.apply_translation([0, 0, 0.55])
+    plate = trimesh.creation.box(extents=[2.0, 2.0, 0.2]).subdivide().subdivide()
+    plate.apply_translation([0, 0, -0.15])
+    both = trimesh.util.concatenate([ball, plate])
+    gloss = np.tile(np.float32([0.8, 1.0]), (SIZE, SIZE, 1))
+    asset = with_textures(textured(both.vertices, both.faces), roughness_metallic_texture=gloss,
+                          albedo_texture=np.full((SIZE, SIZE, 3), 0.9, np.float32))  # fmt: skip
+    return asset, photos(asset, 0.4 * sky(), n=6, spp=256)
+
+
+def test_light_that_the_asset_hides_and_sends_is_the_path_tracers(cornered):
+    """No error is left where all is true; a shade too dark or too bright would leave one."""
+    asset, data = cornered
+    fit = Refinement(data, asset, 0.4 * sky(), RefinementSettings(light_rate=0.0, pixels=4000))
+    surface = fit.surface()
+    assert abs(np.mean([fit.gather(surface) for _ in range(6)])) < 1.5e-4
+
+
+def test_errors_are_those_of_srgb(painted):
+    """A light that is a tenth too bright."""
+    asset, data = painted
+    fit = Refinement(data, asset, 1.1 * sky(), RefinementSettings(light_rate=0.0, pixels=4000))
+    surface = fit.surface()
+    target = torch.from_numpy(fit.pixels.target)
+    open_above = ~torch.from_numpy(fit.pixels.saturated)
+    wanted = (open_above * (srgb_slope(target.clamp(min=0.02)) * 0.1 * target) ** 2).mean().item()
+    assert np.mean([fit.gather(surface) for _ in range(6)]) == pytest.approx(wanted, rel=0.15)
+
+
+def test_each_batch_has_directions_of_its_own(painted):
+    asset, data = painted
+    fit = Refinement(data, asset, sky(), RefinementSettings(pixels=64))
+    _, samples = fit.see()
+    texels, shares = fit.texels.rows(samples.footprints), samples.footprints.weights
+    colours = []
+    for fit.n_batches in (0, 0, 1):
+        unknowns = (fit.unknowns[texels] * shares[..., None]).sum(1)
+        colours.append(fit.shade(fit.surface(), samples, unknowns).detach())
+    assert torch.equal(colours[0], colours[1]) and not torch.equal(colours[0], colours[2])
+
+
 def test_the_equations_find_what_linear_observations_say():
     """Without a prior to speak of the least-squares solution, by another program's solver."""
     generator = torch.Generator().manual_seed(0)
