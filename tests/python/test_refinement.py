@@ -16,6 +16,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.tangents import vertex_tangents
+from splitnerf.errors import InputError
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.export.unwrap import unwrap
@@ -366,6 +367,18 @@ def test_an_asset_of_another_form_is_refused(ball):
     ):  # fmt: skip
         with pytest.raises(ValueError, match="asset"):
             AssetTexels(wrong)
+
+
+def test_photos_that_show_nothing_of_the_asset_are_refused(painted):
+    asset, data = painted
+    elsewhere = replace(asset, vertices=asset.vertices + np.float32([50, 0, 0]))
+    with pytest.raises(InputError, match="shows the asset"):
+        refine(data, elsewhere, sky(), RefinementSettings(sweeps=1, pixels=64, outline=False))
+    empty = replace(data, images=np.zeros_like(data.images))
+    with pytest.raises(InputError, match="no pixel"):
+        refine(empty, asset, sky(), RefinementSettings(sweeps=1, pixels=64))
+    full = replace(data, images=np.ones_like(data.images))
+    assert fit_outline(full, asset) == (asset, [])  # masks without edges say nothing of the outline
 
 
 def test_the_command_writes_an_asset_and_says_what_is_wrong(tmp_path, capsys, painted, data):

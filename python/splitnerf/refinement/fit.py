@@ -18,6 +18,7 @@ from torch import Tensor
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
+from splitnerf.errors import InputError
 from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
 from splitnerf.refinement.light import EnvironmentLight, look_up
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
@@ -113,6 +114,8 @@ class Refinement:
     def __init__(self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings):
         s = self.settings = settings
         self.pixels, self.filter = covered_pixels(dataset), PixelFilter()
+        if len(self.pixels) == 0:
+            raise InputError("the masks of the photos cover no pixel; give data with masks")
         self.texels = AssetTexels(asset)
         self.scene = MeshScene(asset.vertices, asset.triangles)
         self.vertex_values = [
@@ -144,11 +147,16 @@ class Refinement:
         origins, directions = (part.reshape(-1, 3) for part in self.pixels.rays(index, offsets))
         triangle, u, v = self.scene.trace_closest(origins, directions)
         hit = (triangle >= 0).reshape(n, 2).all(axis=1)
+        if not hit.any():
+            raise InputError("no pixel of the photos shows the asset; give the data that it was made from")
         both = np.repeat(hit, 2)
         return index[hit], self.texels.sample(triangle[both], u[both], v[both], -directions[both])
 
     def shade(self, surface: TexturedSurface, samples: SurfaceSamples, unknowns: Tensor) -> Tensor:
-        """[n, 3] linear radiance of points, an estimate without bias; differentiable in unknowns [n, 7] and the light."""
+        """[n, 3] linear radiance of points, differentiable in unknowns [n, 7] and the light.
+
+        It is an estimate without bias but for the clamp and the last bounce of the light that the asset sends to itself.
+        """
         s, m = self.settings, materials_of(to_values(unknowns), samples)
         light = self.light.radiance()
         arriving = incoming_light(
@@ -193,11 +201,13 @@ class Refinement:
         s, surface = self.settings, self.surface()
         n_batches = max(1, round(s.sweep_share * len(self.pixels) / s.pixels))
         error = float(np.mean([self.gather(surface) for _ in range(n_batches)]))
+        if not np.isfinite(error):
+            raise RuntimeError(f"refinement: the error of the photos is {error}; nothing was written")
         limits = torch.tensor(STEP_LIMITS)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns).clamp(-limits, limits))
         step = wanted - self.unknowns
         if not bool(torch.isfinite(step).all()):
-            raise RuntimeError(f"refinement: the step after {self.n_batches} batches is not finite; the asset is unchanged")
+            raise RuntimeError(f"refinement: the step after {self.n_batches} batches is not finite; nothing was written")
         self.unknowns = wanted
         self.equations.move(step)
         return error, step.square().mean(0).sqrt().tolist()
@@ -222,6 +232,7 @@ def refine(
 
     Raises:
         ValueError: The asset or the light has another form than :class:`Refinement` takes.
+        InputError: The photos show nothing of the asset.
         RuntimeError: Numbers are no longer finite.
     """
     check_form(asset)

@@ -19,6 +19,7 @@ from splitnerf.export.bake import UnwrappedMesh, bake_occlusion
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.refinement.fit import Refined, RefinementSettings, refine
+from splitnerf.refinement.texels import check_form
 
 OCCLUSION_OFFSET = 0.006  # distance of a ray's start from the mesh, as a share of its extent
 LEAST_HEIGHT, LARGEST_HEIGHT = 8, 256  # rows of the light that is fitted
@@ -63,12 +64,16 @@ def refine_run(run: Path, data: Path, out: Path, *, downscale: int, settings: Re
     if not path.is_file():
         raise InputError(f"{path}: no such asset; finish the run, or write it with `splitnerf export {run}`")
     asset, light = read_asset(path), read_light(run)
+    try:
+        check_form(asset)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; give an asset that `splitnerf train` or `export` wrote") from error
     dataset = load_dataset(data, "train", downscale)
     with tqdm(total=settings.sweeps, desc="refining", unit="step", leave=False, disable=None) as bar:
         try:
             refined = refine(dataset, asset, light, settings, report=lambda sweep: bar.update())
-        except ValueError as error:
-            raise InputError(f"{path}: {error}; give an asset that `splitnerf train` or `export` wrote") from error
+        except InputError as error:
+            raise InputError(f"{path} and {data}: {error}") from error
     out.mkdir(parents=True, exist_ok=True)
     write_glb(out / "mesh.glb", refined.asset, occlusion_texture(refined.asset))
     write_environment(out, refined.light)

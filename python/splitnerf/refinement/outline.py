@@ -118,8 +118,10 @@ def fit_outline(dataset: Dataset, asset: Asset, seed: int = 0) -> tuple[Asset, l
 
     Returns:
         The asset, unchanged where that covers the pixels better, and the mean squared error of the coverage at the
-        outline before each round and at the end.
+        outline before each round and at the end; no errors, and the asset as it was, where the masks have no edges.
     """
+    if len(outline_pixels(dataset)[0]) == 0:
+        return asset, []
     place = weld(asset.vertices)
     laplacian = smoothness(asset, place)
     distance = np.linalg.norm(dataset.world_poses[:, :3, 3] - asset.vertices.mean(0), axis=1).mean()
