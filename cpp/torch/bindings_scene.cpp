@@ -139,6 +139,14 @@ splitnerf::PixelFilter pixel_filter(const std::string& name) {
   throw py::value_error("render: pixel_filter must be 'box' or 'blackman-harris', got '" + name + "'");
 }
 
+py::array_t<float> pixel_filter_offsets(const py::object& u, const std::string& filter) {
+  const auto shares = checked<float>("pixel_filter_offsets", "u", u, {kAny});
+  const splitnerf::PixelFilterSampler sampler(pixel_filter(filter));
+  py::array_t<float> offsets(shares.shape(0));
+  for (py::ssize_t i = 0; i < shares.shape(0); ++i) offsets.mutable_data()[i] = sampler(shares.data()[i]);
+  return offsets;
+}
+
 py::dict render(const PyScene& self, const py::object& albedo, const py::object& roughness, const py::object& metallic,
                 const py::object& environment, const py::object& camera_to_world, float fx, float fy, float cx,
                 float cy, int width, int height, const py::object& normals, const std::string& materials_per,
@@ -292,6 +300,10 @@ void bind_scene(py::module_& m) {
         "normal texture), depth (along the ray); with a catcher shadow [h, w], the opacity of the black shadow\n"
         "(alpha + shadow <= 1); and rays, the number of rays traced.\n"
         "Equal seeds give equal images.");
+
+  m.def("pixel_filter_offsets", &pixel_filter_offsets, py::arg("u"), py::arg("pixel_filter") = "blackman-harris",
+        "Offsets from a pixel's centre, in pixels, at which shares u [n] float32 in [0, 1) of the filter lie below; see "
+        "render.");
 
   m.def(
       "embree_version", [] { return std::string(splitnerf::embree_version()); },

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from splitnerf import _core
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import srgb_to_linear
 
 MIN_ALPHA = 0.99  # of a pixel that the object covers
 SATURATED = 254.5 / 255.0  # sRGB value from which the photo says only that the light was at least so bright
-FILTER_WIDTH = 3.0  # pixels from end to end
-INTERVALS = 4096
 
 
 @dataclass
@@ -74,22 +73,8 @@ def covered_pixels(dataset: Dataset) -> Pixels:
     return pixels_of(dataset, dataset.images[..., 3] >= MIN_ALPHA)
 
 
-def filter_offsets() -> np.ndarray:
-    """[INTERVALS + 1] the offset in pixels below which a share i / INTERVALS of the Blackman-Harris filter lies.
-
-    Source: Harris 1978 (the window of four terms); Ernst, Stamminger and Greiner 2006 (sampling it).
-    """
-    t = np.linspace(0.0, 1.0, 1 << 16)
-    x = 2 * np.pi * t
-    share = t + (-0.48829 * np.sin(x) + 0.14128 / 2 * np.sin(2 * x) - 0.01168 / 3 * np.sin(3 * x)) / (2 * np.pi * 0.35875)
-    return (FILTER_WIDTH * (np.interp(np.linspace(0, 1, INTERVALS + 1), share, t) - 0.5)).astype(np.float32)
-
-
 class PixelFilter:
     """Offsets drawn with the density of Blender's default filter, a Blackman-Harris window of 3 pixels."""
-
-    def __init__(self):
-        self._offsets = filter_offsets()
 
     def draw(self, n: int, generator: np.random.Generator) -> np.ndarray:
         """[n, 2] float32 independent offsets from the pixels' centres, in pixels."""
@@ -103,5 +88,6 @@ class PixelFilter:
         lattice = np.arange(n_rays)[:, None] * [0.7548776662466927, 0.5698402909980532]
         return self._at((lattice + generator.random((n, 1, 2))) % 1.0)
 
-    def _at(self, u: np.ndarray) -> np.ndarray:
-        return np.interp(u * INTERVALS, np.arange(INTERVALS + 1), self._offsets).astype(np.float32)
+    @staticmethod
+    def _at(u: np.ndarray) -> np.ndarray:
+        return _core.pixel_filter_offsets(u.astype(np.float32).reshape(-1)).reshape(u.shape)
