@@ -21,7 +21,7 @@ LAYERS = [
     {"fields", "config"},
     {"data"},
     {"ops", "devices"},
-    {"_core", "errors", "notes"},
+    {"_core", "errors", "notes", "progress"},
 ]
 
 

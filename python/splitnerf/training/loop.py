@@ -19,6 +19,7 @@ from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight
 from splitnerf.ops import MeshScene
 from splitnerf.outputs import write_preview
+from splitnerf.progress import Interrupt, Progress
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
@@ -37,7 +38,6 @@ from splitnerf.training.graphs import GraphedStep
 from splitnerf.training.losses import Term
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
-from splitnerf.training.progress import Interrupt, Progress
 from splitnerf.training.repeatable import same_bits
 from splitnerf.training.schedule import light_moves, light_period, next_ray_count
 from splitnerf.training.step import Step
@@ -187,7 +187,7 @@ class Training:
     def progress(self) -> float:
         """The progress of the schedule, in [0, 1]."""
         c = self.config
-        by_time = self.seconds / (60.0 * c.run.max_minutes) if c.run.max_minutes > 0 else 0.0
+        by_time = self.seconds / (60.0 * c.training_minutes) if c.training_minutes > 0 else 0.0
         return min(1.0, max(self.step / c.run.steps, by_time))
 
     @property
@@ -241,7 +241,7 @@ class Training:
             self.psnr_mean = psnr if self.psnr_mean is None else 0.95 * self.psnr_mean + 0.05 * psnr
         self.n_rays = next_ray_count(self.n_rays, numbers.n_samples, c)
         self.step, self.first, self.seconds = self.step + 1, False, time.monotonic() - self.started
-        bar.show(self.progress, self.step, self.psnr_mean, numbers.n_evaluated / len(batch.target))
+        bar.show(self.progress, self.told(numbers.n_evaluated / len(batch.target)))
         if self.step % LOG_EVERY == 0 or self.step <= LOG_EVERY or self.progress >= 1.0:
             check_state(self.step, self.model, self.optimiser)
             log.write(json.dumps(self.line(batch, terms, numbers)) + "\n")
@@ -260,6 +260,11 @@ class Training:
         loss = sum(term.weight * value for term, value in zip(terms.values(), values))
         is_complete = self.take_step.is_complete(n_shaded, n_segments)
         return StepNumbers(dict(zip(terms, values)), loss, largest, n_samples, n_evaluated, n_shaded, is_complete)
+
+    def told(self, samples_per_ray: float) -> str:
+        """What the bar tells of a step: its number, the batches' mean PSNR in dB and the samples per ray."""
+        psnr = "" if self.psnr_mean is None else f"PSNR {self.psnr_mean:.2f} dB, "
+        return f"step {self.step} {psnr}{samples_per_ray:.1f} samples/ray"
 
     def line(self, batch: Batch, terms: dict[str, Term], numbers: StepNumbers) -> dict[str, object]:
         """The values of one line of metrics.jsonl, by name."""
