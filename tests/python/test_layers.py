@@ -14,6 +14,7 @@ LAYERS = [
     {"bench", "demo"},
     {"ablate"},
     {"workflow"},
+    {"delivery"},
     {"training"},
     {"outputs", "report"},
     {"evaluate", "refinement", "relight", "synth"},

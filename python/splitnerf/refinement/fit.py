@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from torch import Tensor
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.tensor_files import check_tensor
 from splitnerf.errors import InputError
 from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
 from splitnerf.refinement.light import EnvironmentLight, look_up
@@ -25,6 +26,7 @@ from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.texels import AssetTexels, SurfaceSamples, check_form, materials_of
+from splitnerf.refinement.uncertainty import Information, Uncertainty, patch_width, uncertainty_of
 from splitnerf.refinement.unknowns import STEP_LIMITS, into_range, per_unknown, to_unknowns, to_values
 
 CLAMP_INDIRECT = 10.0
@@ -76,12 +78,14 @@ class Refined:
         outline: Mean squared errors of the coverage at the outline, before each round and at the end; empty where the
             shape was kept.
         sweeps: What each sweep says.
+        uncertainty: What the photos leave open.
     """
 
     asset: Asset
     light: np.ndarray
     outline: list[float]
     sweeps: list[Sweep]
+    uncertainty: Uncertainty
 
 
 class Sweep(NamedTuple):
@@ -129,7 +133,36 @@ class Refinement:
             self.texels.pairs, per_unknown(s.smooth_albedo, s.smooth_gloss, s.smooth_normal), per_unknown(*[s.anchor] * 3)
         )
         self.equations = NormalEquations(self.unknowns, prior, s.keep)
+        self.information = Information(self.texels, patch_width(dataset, self.texels), len(self.pixels))
         self.n_batches = 0
+
+    def state(self) -> dict[str, object]:
+        """All that further sweeps depend on beside the arguments, as tensors and plain values."""
+        return {
+            "unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient,
+            "light": [level.detach() for level in self.light.levels], "information": self.information.sums,
+            "n_seen": self.information.n_seen, "light_optimiser": self.light_optimiser.state_dict()["state"],
+            "random": self.random.bit_generator.state, "n_batches": self.n_batches,
+        }  # fmt: skip
+
+    def restore(self, state: dict[str, object]) -> None:
+        """Takes back what :meth:`state` gave of a fit with the same arguments.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is another fit's.
+        """
+        sums = {"unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient,
+                "information": self.information.sums}  # fmt: skip
+        for name, tensor in sums.items():
+            check_tensor(name, state[name], tuple(tensor.shape), torch.float32)
+            tensor.copy_(state[name])
+        for level, stored in zip(self.light.levels, state["light"], strict=True):
+            check_tensor("a level of the light", stored, tuple(level.shape), torch.float32)
+            level.data.copy_(stored)
+        groups = self.light_optimiser.state_dict()["param_groups"]
+        self.light_optimiser.load_state_dict({"state": state["light_optimiser"], "param_groups": groups})
+        self.random.bit_generator.state = state["random"]
+        self.n_batches, self.information.n_seen = int(state["n_batches"]), int(state["n_seen"])
 
     def maps(self) -> tuple[Tensor, Tensor, Tensor]:
         """The textures as they are now: albedo [h, w, 3], roughness and metallic [h, w, 2], normals [h, w, 3]."""
@@ -193,6 +226,7 @@ class Refinement:
             [torch.autograd.grad(colours[:, c].sum(), unknowns, retain_graph=c < 2)[0] for c in range(3)], dim=1
         )
         self.equations.add(texels, shares, jacobian, weights_of_rays, of_other)
+        self.information.add(texels, shares, jacobian, weights_of_rays)
         self.n_batches += 1
         return float((weights * errors[:, 0] * errors[:, 1]).mean())
 
@@ -218,6 +252,70 @@ def srgb_slope(linear: Tensor) -> Tensor:
     return 1.055 / 2.4 * linear ** (1 / 2.4 - 1)
 
 
+class Stage:
+    """A refinement sweep by sweep: what it has said so far, and the state by which it can go on elsewhere.
+
+    Args:
+        dataset, asset, environment, settings: See :class:`Refinement`.
+        state: What :meth:`state` gave of a stage with the same other arguments, `sweeps` and `minutes` aside; None begins.
+
+    Attributes:
+        outline, sweeps: See :class:`Refined`.
+
+    Raises:
+        ValueError, KeyError, TypeError: The asset or the light has another form, or the state is another stage's.
+        InputError: The photos show nothing.
+    """
+
+    def __init__(
+        self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings, state: dict | None = None
+    ):
+        check_form(asset)
+        self.settings, self.outline, self.sweeps = settings, [], []
+        self.started = time.monotonic()
+        if state is not None:
+            check_tensor("vertices", state["vertices"], asset.vertices.shape, torch.float32)
+            asset = replace(asset, vertices=state["vertices"].numpy())
+            self.outline, self.sweeps = list(map(float, state["outline"])), [Sweep(*sweep) for sweep in state["sweeps"]]
+            self.started -= float(state["seconds"])
+        elif settings.outline:
+            asset, self.outline = fit_outline(dataset, asset, settings.seed)
+        self.fit = Refinement(dataset, asset, environment, settings)
+        if state is not None:
+            self.fit.restore(state["fit"])
+
+    @property
+    def seconds(self) -> float:
+        """The time that the stage has taken, in all its parts."""
+        return time.monotonic() - self.started
+
+    @property
+    def progress(self) -> float:
+        """The share done, in [0, 1]: of the sweeps, or of the minutes where those are further; a first sweep is always made."""
+        by_time = self.seconds / (60 * self.settings.minutes) if self.settings.minutes > 0 and self.sweeps else 0.0
+        return min(1.0, max(len(self.sweeps) / self.settings.sweeps, by_time))
+
+    def advance(self) -> Sweep:
+        """Makes one sweep. Raises RuntimeError where numbers are no longer finite."""
+        error, moved = self.fit.sweep()
+        self.sweeps.append(Sweep(len(self.sweeps) + 1, self.seconds, error, moved))
+        return self.sweeps[-1]
+
+    def state(self) -> dict[str, object]:
+        """What goes on from here, as tensors and plain values."""
+        vertices = torch.from_numpy(np.ascontiguousarray(self.fit.texels.asset.vertices, np.float32))
+        return {"vertices": vertices, "outline": self.outline, "sweeps": [list(sweep) for sweep in self.sweeps],
+                "seconds": self.seconds, "fit": self.fit.state()}  # fmt: skip
+
+    def result(self) -> Refined:
+        """What the stage leaves."""
+        fit = self.fit
+        left_over = max(self.sweeps[-1].error, 0.0)
+        uncertainty = uncertainty_of(fit.information, fit.texels, left_over, float(fit.pixels.saturated.mean()))
+        light = fit.light.radiance().detach().numpy()
+        return Refined(fit.texels.asset_with(fit.maps()), light, self.outline, self.sweeps, uncertainty)
+
+
 def refine(
     dataset: Dataset,
     asset: Asset,
@@ -235,15 +333,7 @@ def refine(
         InputError: The photos show nothing of the asset.
         RuntimeError: Numbers are no longer finite.
     """
-    check_form(asset)
-    outline, sweeps, started = [], [], time.monotonic()
-    if settings.outline:
-        asset, outline = fit_outline(dataset, asset, settings.seed)
-    fit = Refinement(dataset, asset, environment, settings)
-    for number in range(1, settings.sweeps + 1):
-        if sweeps and settings.minutes > 0 and time.monotonic() - started > 60 * settings.minutes:
-            break
-        error, moved = fit.sweep()
-        sweeps.append(Sweep(number, time.monotonic() - started, error, moved))
-        report(sweeps[-1])
-    return Refined(fit.texels.asset_with(fit.maps()), fit.light.radiance().detach().numpy(), outline, sweeps)
+    stage = Stage(dataset, asset, environment, settings)
+    while stage.progress < 1.0:
+        report(stage.advance())
+    return stage.result()

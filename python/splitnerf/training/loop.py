@@ -48,7 +48,8 @@ ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the o
 
 @dataclass
 class TrainedScene:
-    """The scene that a finished or interrupted training leaves in memory."""
+    """The scene that a finished or interrupted training leaves in memory; `n_new` of its steps were made since it began or
+    was resumed."""
 
     model: SceneModel
     grid: OccupancyGrid
@@ -56,6 +57,7 @@ class TrainedScene:
     step: int
     seconds: float
     finished: bool
+    n_new: int
 
 
 class StepNumbers(NamedTuple):
@@ -146,6 +148,7 @@ class Training:
         self.psnr_mean: float | None = None
         self.started = self.saved_at = time.monotonic()
         self.first = True  # step of the run
+        self.resumed_at = 0
 
     def restore(self) -> None:
         """Restores the state from the run's checkpoint."""
@@ -165,7 +168,7 @@ class Training:
         self.mesh.restore(content)
         if content["occlusion_light"]:
             self.model.occlusion.restore_light(content["occlusion_light"])
-        self.first = self.step == 0
+        self.first, self.resumed_at = self.step == 0, self.step
         self.started = time.monotonic() - self.seconds
 
     def save(self) -> None:
@@ -295,7 +298,7 @@ class Training:
 
     def result(self) -> TrainedScene:
         """The scene as the training leaves it in memory."""
-        return TrainedScene(self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0)
+        return TrainedScene(self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0, self.step - self.resumed_at)
 
 
 def check_repeatable(config: Config, device: torch.device | str) -> None:
