@@ -155,7 +155,8 @@ class Refinement:
                 "information": self.information.sums}  # fmt: skip
         for name, tensor in sums.items():
             check_tensor(name, state[name], tuple(tensor.shape), torch.float32)
-            tensor.copy_(state[name])
+        self.unknowns, self.information.sums = state["unknowns"], state["information"]
+        self.equations.curvature, self.equations.gradient = state["curvature"], state["gradient"]
         for level, stored in zip(self.light.levels, state["light"], strict=True):
             check_tensor("a level of the light", stored, tuple(level.shape), torch.float32)
             level.data.copy_(stored)
