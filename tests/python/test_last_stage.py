@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from test_refinement import painted, photos, sky, with_textures, ball  # noqa: F401, fixtures among them
-from tiny_runs import tiny, train
+from test_refinement import ball, painted, sky, with_textures  # noqa: F401, fixtures among them
+from tiny_runs import train
 
 from splitnerf import delivery
 from splitnerf.cli import BAD_INPUT, DONE, INTERRUPTED, main
@@ -28,7 +28,7 @@ from splitnerf.evaluate.jobs import Protocol, score_asset
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.refinement import job
-from splitnerf.refinement.fit import RefinementSettings, Stage, refine
+from splitnerf.refinement.fit import RefinementSettings, Stage
 from splitnerf.refinement.job import OtherState, refine_folder
 from splitnerf.report.last_stage import KNOWN_COLOURS, UNKNOWN_COLOURS, coloured, last_stage_section
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from test_refinement import ball, painted, photos, sky, with_textures  # noqa: F401, fixtures among them
+from test_refinement import ball, painted, sky  # noqa: F401, fixtures among them
 
 from splitnerf.refinement.fit import RefinementSettings, Stage
 from splitnerf.refinement.texels import AssetTexels

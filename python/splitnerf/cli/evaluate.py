@@ -15,9 +15,10 @@ NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env")
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "evaluate", help="score runs or GLB files against the truth, and put the scores into a table",
-        description="Path-traces the test views of DATA of the asset that RUN's last stage fitted, or of a GLB file (a RUN "
-        "without a last stage is rendered from its checkpoint), relights the asset under the data's maps, and writes evaluation.json and report.html into RUN (for a file "
-        "FILE_evaluation.json beside it). Without --data it reads the scores written before, for --table.",
+        description="Path-traces the test views of DATA, of the asset that RUN's last stage fitted or of a GLB file (a RUN "
+        "without a last stage is rendered from its checkpoint), relights the asset under the data's maps, and writes "
+        "evaluation.json and report.html into RUN (for a file FILE_evaluation.json beside it). Without --data it reads the "
+        "scores written before, for --table.",
     )  # fmt: skip
     parser.add_argument("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
     parser.add_argument(

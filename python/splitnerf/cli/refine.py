@@ -12,9 +12,10 @@ from splitnerf.errors import InputError
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "refine", help="fit an exported asset and its light to the photos: the last stage of train, alone",
-        description="Starts from RUN/trained, where a last stage kept what training exported, else from RUN. Moves the vertices of mesh.glb until its outline is that of the masks, then fits its textures (albedo, "
-        "roughness, metallic, normals) and the light of environment.exr to the photos through the path tracer's own model, "
-        "interreflection included. Writes mesh.glb, environment.exr and .hdr, uncertainty.exr and refinement.json into RUN/refined. Ctrl-C "
+        description="Starts from RUN/trained, where a last stage kept what training exported, else from RUN. Moves the "
+        "vertices of mesh.glb until its outline is that of the masks, then fits its textures (albedo, roughness, metallic, "
+        "normals) and the light of environment.exr to the photos through the path tracer's own model, interreflection "
+        "included. Writes mesh.glb, environment.exr and .hdr, uncertainty.exr and refinement.json into RUN/refined. Ctrl-C "
         "keeps the state there; --resume goes on.",
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN", help="a finished run, or a folder with both files")
