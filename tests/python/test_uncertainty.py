@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from test_refinement import ball, painted, sky  # noqa: F401, fixtures among them
+import trimesh
+from test_refinement import ball, painted, sky, textured  # noqa: F401, fixtures among them
 
 from splitnerf.refinement.fit import RefinementSettings, Stage
 from splitnerf.refinement.texels import AssetTexels
@@ -68,9 +69,10 @@ def test_texels_of_a_patch_share_what_is_known_and_charts_do_not():
     assert patch[:3].unique().numel() == 1 and patch[3] != patch[0] and patch[4:].unique().numel() == 1 and patch[4] != patch[3]
 
 
-def test_a_patch_is_two_pixels_wide(ball, painted):
-    """The ball has 4 pi in its texels; a pixel is 2.4 / 60 wide at the camera's distance from the surface, 3.4 / 60 from its middle."""
-    texels = AssetTexels(ball)
+def test_a_patch_is_two_pixels_wide(painted):
+    """Texels share the ball's area of 4 pi; a pixel is 3.4 / 60 wide at its middle."""
+    mesh = trimesh.creation.icosphere(subdivisions=3)
+    texels = AssetTexels(textured(mesh.vertices, mesh.faces, 256))
     edge = np.sqrt(4 * np.pi / len(texels.index))
     assert patch_width(painted[1], texels) == pytest.approx(2 * 3.4 / 60 / edge, abs=0.55)
 
