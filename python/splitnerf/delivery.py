@@ -108,7 +108,7 @@ def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool) ->
     """
     move_assets(run, run / TRAINED)
     settings = RefinementSettings(
-        sweeps=config.refinement.sweeps, minutes=config.refinement_minutes, seed=abs(config.run.seed) % (1 << 31)
+        sweeps=config.refinement_sweeps, minutes=config.refinement_minutes, seed=abs(config.run.seed) % (1 << 31)
     )
     try:
         with same_bits(config.run.deterministic):

@@ -23,7 +23,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)"
     )
-    parser.add_argument("--sweeps", type=int, default=16, metavar="N", help="steps of the fit (default: 16)")
+    parser.add_argument("--sweeps", type=int, metavar="N", help="most steps of the fit (default: 16 without --minutes)")
     parser.add_argument("--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)")
     parser.add_argument("--resume", action="store_true", help="go on from the state that an interruption left")
     parser.add_argument("--keep-shape", action="store_true", help="leave the vertices where they are")
@@ -32,17 +32,19 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from splitnerf.config.settings import UNLIMITED
     from splitnerf.refinement.fit import RefinementSettings
     from splitnerf.refinement.job import refine_run
 
-    if args.sweeps < 1:
-        raise InputError(f"--sweeps must be at least 1, got {args.sweeps}")
     if not args.minutes >= 0:
         raise InputError(f"--minutes must not be negative, got {args.minutes}")
+    sweeps = (UNLIMITED if args.minutes > 0 else 16) if args.sweeps is None else args.sweeps
+    if sweeps < 1:
+        raise InputError(f"--sweeps must be at least 1, got {sweeps}")
     out = args.out or args.run / "refined"
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
-    settings = RefinementSettings(sweeps=args.sweeps, minutes=args.minutes, outline=not args.keep_shape)
+    settings = RefinementSettings(sweeps=sweeps, minutes=args.minutes, outline=not args.keep_shape)
     refined = refine_run(args.run, args.data, out, downscale=args.downscale, settings=settings, resume=args.resume)
     if refined is None:
         print(f"stopped; the state is in {out}. To go on, repeat the command with --resume.")

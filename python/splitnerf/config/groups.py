@@ -274,7 +274,7 @@ class Refinement:
     share: float = setting(
         0.4, "share of run.max_minutes that it gets, training the rest", unit="share of the run", below=1.0
     )
-    sweeps: int = setting(16, "most Gauss-Newton steps of the last stage", unit="steps", at_least=1)
+    sweeps: int = setting(16, "Gauss-Newton steps of the last stage where no minutes end it", unit="steps", at_least=1)
 
 
 @dataclass(frozen=True)

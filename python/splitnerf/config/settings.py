@@ -33,6 +33,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+UNLIMITED = 10**9
 SUMMED_DIRECTIONS = 256  # fewer do not resolve the lobes that `shading.method = summed` sums
 
 # Names that settings had before there were groups, where they differ from the name within the group.
@@ -107,6 +108,11 @@ class Config:
     def refinement_minutes(self) -> float:
         """The minutes of the run that the last stage gets; 0 without it, or without a limit."""
         return self.run.max_minutes * self.refinement.share if self.refinement.enabled else 0.0
+
+    @property
+    def refinement_sweeps(self) -> int:
+        """The most steps of the last stage: where minutes end it, as many as these allow."""
+        return UNLIMITED if self.refinement_minutes > 0 else self.refinement.sweeps
 
     def replace(self, settings: dict[str, object]) -> Config:
         """A copy with some settings changed.

@@ -187,7 +187,7 @@ def begin(
 
 def told(stage: Stage) -> str:
     """What the bar tells: the sweeps and the photos' error before the last one."""
-    return f"last stage, step {len(stage.sweeps)} of {stage.settings.sweeps}, photos {decibels(stage.sweeps[-1].error):.2f} dB"
+    return f"last stage, step {len(stage.sweeps)}, photos {decibels(stage.sweeps[-1].error):.2f} dB"
 
 
 def decibels(error: float) -> float:

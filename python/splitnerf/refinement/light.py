@@ -19,10 +19,13 @@ class EnvironmentLight:
     """
 
     def __init__(self, radiance: Tensor):
-        height = radiance.shape[0]
-        n_levels = int(math.log2(height // 8)) + 1
-        log_radiance = radiance.clamp(min=math.exp(-LOG_LIMIT)).log().permute(2, 0, 1)
-        maps = [F.avg_pool2d(log_radiance, 1 << k) for k in reversed(range(n_levels))]
+        self.set_log_radiance(radiance.clamp(min=math.exp(-LOG_LIMIT)).log().permute(2, 0, 1))
+
+    def set_log_radiance(self, map_: Tensor) -> None:
+        """Takes the map whose log radiance is [3, h, 2 h]: a level holds what the mean over larger texels leaves."""
+        map_ = map_.clamp(-LOG_LIMIT, LOG_LIMIT)
+        n_levels = int(math.log2(map_.shape[1] // 8)) + 1
+        maps = [F.avg_pool2d(map_, 1 << k) for k in reversed(range(n_levels))]
         self.levels = [maps[0]] + [fine - doubled(coarse) for coarse, fine in zip(maps, maps[1:])]
 
     @property
@@ -32,7 +35,7 @@ class EnvironmentLight:
 
     def radiance(self) -> Tensor:
         """[h, 2 h, 3] linear radiance."""
-        return sum_of_levels(self.levels).clamp(-LOG_LIMIT, LOG_LIMIT).exp().permute(1, 2, 0).contiguous()
+        return sum_of_levels(self.levels).exp().permute(1, 2, 0).contiguous()
 
 
 def doubled(level: Tensor) -> Tensor:

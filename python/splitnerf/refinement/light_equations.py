@@ -1,8 +1,9 @@
 """Gauss-Newton steps of the light: what the photos say of it, and a prior that makes it as smooth and grey as they allow.
 
-A pixel is a linear function of the light. The gradient comes from all pixels, the curvature from some of them; the unknowns
-are the levels of log radiance, and each of a finer level's texels is expected to be near zero, in colour nearer than in
-brightness, and with heavy tails, as windows and lamps have edges.
+A pixel is a linear function of the light. The gradient comes from all pixels; the curvature from some of them and from a bound
+of its whole, without which steps are far too long where few of them look (Levenberg 1944; Marquardt 1963). The unknowns are
+the levels of log radiance. Each of a finer level's texels is expected to be near zero, in colour nearer than in brightness,
+and with heavy tails, as windows and lamps have edges.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ WEIGHT = 1e-8  # of the prior beside the mean squared error of the photos in sRG
 BRIGHTNESS = 0.5  # deviation of the mean of the channels' log radiance from the coarser levels, on each level
 COLOUR = 0.4  # deviation of a channel's log radiance from that mean on the coarsest level; half of it on each next one
 TAILS = 3.0  # degrees of freedom of Student's t distribution
-SHARE_OF_ROWS = 0.06  # of the pixels, from which the curvature comes
 N_PROBES = 4  # random vectors by which the diagonal is estimated
+DAMPING = 0.1  # share of a diagonal bound of the whole curvature (its rows' sums) that is added to that of some rays
 N_ITERATIONS = 15
-LARGEST = 2.0  # change of log radiance in a step
+LARGEST = 0.5  # change of log radiance in a step: beyond it the photos are no linear function of it
 
 
 class Rows(NamedTuple):
@@ -46,10 +47,11 @@ class LightEquations:
 
     Args:
         light: The light that :meth:`step` moves.
+        share_of_rows: The share of the rays from which the curvature comes.
     """
 
-    def __init__(self, light: EnvironmentLight):
-        self.light = light
+    def __init__(self, light: EnvironmentLight, share_of_rows: float = 0.08):
+        self.light, self.share_of_rows = light, share_of_rows
         self._sizes = [level.numel() for level in light.levels]
         self._shapes = [level.shape for level in light.levels]
         self._n_texels = self._sizes[-1] // 3
@@ -57,7 +59,8 @@ class LightEquations:
 
     def clear(self) -> None:
         """Forgets the observations."""
-        self.gradient, self.n_batches, self.rows = torch.zeros(self._n_texels, 3), 0, []
+        self.gradient, self.bound = torch.zeros(self._n_texels, 3), torch.zeros(self._n_texels, 3)
+        self.n_batches, self.rows = 0, []
 
     def add(self, directions: Tensor, slopes: Tensor, weights: Tensor, residual: Tensor) -> None:
         """Adds a batch of n rays.
@@ -70,8 +73,11 @@ class LightEquations:
         texels, shares = footprints(self.light.height, directions.reshape(-1, 3))
         back = slopes * (weights * residual / len(slopes))[:, None]
         self.gradient += read_adjoint(back.reshape(-1, 3), texels, shares, self._n_texels)
+        lit = read(self.light.radiance().view(-1, 3), texels, shares).view_as(slopes)
+        bound = slopes.abs() * ((slopes.abs() * lit).sum(1) * weights / len(slopes))[:, None]
+        self.bound += read_adjoint(bound.reshape(-1, 3), texels, shares, self._n_texels)
         self.n_batches += 1
-        n, k = max(1, int(len(slopes) * SHARE_OF_ROWS)), slopes.shape[1]
+        n, k = max(1, int(len(slopes) * self.share_of_rows)), slopes.shape[1]
         self.rows.append(Rows(texels[: n * k], shares[: n * k], slopes[:n], weights[:n]))
 
     def _levels(self, vector: Tensor) -> list[Tensor]:
@@ -116,11 +122,14 @@ class LightEquations:
         radiance = self.light.radiance().view(-1, 3)
         now = torch.cat([level.flatten() for level in self.light.levels])
 
+        damping = DAMPING * self.bound * radiance / self.n_batches
+
         def curvature(vector: Tensor) -> Tensor:
             change = read(self._synthesis(vector) * radiance, rows.texels, rows.shares).view(n, k, 3)
             seen = (rows.slopes * change).sum(1) * rows.weights / n
             back = (rows.slopes * seen[:, None]).reshape(-1, 3)
-            return self._adjoint(read_adjoint(back, rows.texels, rows.shares, self._n_texels) * radiance)
+            table = read_adjoint(back, rows.texels, rows.shares, self._n_texels) * radiance
+            return self._adjoint(table + damping * self._synthesis(vector))
 
         precisions = self._precisions(now)
         before = 1.0 / (self._diagonal(curvature) + WEIGHT / BRIGHTNESS**2)
@@ -128,11 +137,10 @@ class LightEquations:
         step = conjugate_gradients(
             lambda x: curvature(x) + self._prior(x, precisions), lambda x: before * x, -down, N_ITERATIONS
         )
-        change = self._synthesis(step) * share
-        within = min(1.0, LARGEST / max(float(change.abs().max()), 1e-9))
-        self.light.levels = [level.contiguous() for level in self._levels(now + share * within * step)]
+        change = (self._synthesis(step) * share).clamp(-LARGEST, LARGEST)
+        self.light.set_log_radiance((self._synthesis(now) + change).T.reshape(self._shapes[-1]))
         self.clear()
-        return float(change.square().mean().sqrt()) * within
+        return float(change.square().mean().sqrt())
 
     def _diagonal(self, curvature) -> Tensor:
         """An estimate of the curvature's diagonal, smoothed over neighbours. Source: Bekas, Kokiopoulou and Saad 2007."""

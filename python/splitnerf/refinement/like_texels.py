@@ -23,7 +23,8 @@ def with_like_roughness(unknowns: Tensor, certainty: Tensor, seed: int) -> Tenso
     random = np.random.default_rng(seed)
     colours = unknowns[:, :3].double().numpy()
     seen = random.permutation(len(colours))[:N_SEEN]
-    centres, _ = kmeans2(colours[seen], min(N_COLOURS, len(seen)), minit="++", seed=random, missing="warn")
+    apart = random.normal(scale=1e-3, size=(len(seen), 3))  # equal colours make no clusters
+    centres, _ = kmeans2(colours[seen] + apart, min(N_COLOURS, len(seen)), minit="++", seed=random)
     label, _ = vq(colours, centres)
     usual = unknowns[:, ROUGHNESS].numpy()[seen].copy()
     of_colour = np.full(len(centres), np.nan, np.float32)
