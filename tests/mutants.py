@@ -40,7 +40,7 @@ TESTS = {
     "training/losses.py": "test_light_loss.py test_loss_terms.py test_physics.py test_shading_model.py test_scene.py",
     "training/meshes.py": "test_meshes.py",
     "training/optimiser.py": "test_schedule.py",
-    "training/progress.py": "test_progress.py",
+    "progress.py": "test_progress.py",
     "training/repeatable.py": "test_train.py",
     "training/schedule.py": "test_schedule.py",
     "training/step.py": "test_loss_terms.py test_correction.py test_schedule.py test_train.py",

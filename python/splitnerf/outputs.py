@@ -179,7 +179,7 @@ def evaluate_scene(
     relight: dict | None = None,
     distance: Distance | None = None,
 ) -> tuple[dict, list[dict[str, np.ndarray]]]:
-    """Renders all test views and scores them; see :func:`splitnerf.evaluate.protocol.evaluate_maps`.
+    """Renders all test views from the fields and scores them; see :func:`splitnerf.evaluate.protocol.evaluate_maps`.
 
     Returns:
         The contents of evaluation.json and the rendered maps.
@@ -191,4 +191,4 @@ def evaluate_scene(
         predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1),
         relight=relight, distance=distance,
     )  # fmt: skip
-    return result, predictions
+    return result | {"scored": "fields"}, predictions

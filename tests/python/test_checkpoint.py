@@ -12,19 +12,15 @@ import torch
 from test_hostile_files import Calls, first, repack
 from tiny_runs import tiny
 
+from splitnerf.data import tensor_files
 from splitnerf.data.dataset import load_dataset
+from splitnerf.data.tensor_files import LONGEST_PICKLE
 from splitnerf.errors import InputError
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import make_grid
 from splitnerf.training import checkpoint
 from splitnerf.training import loop as trainer
-from splitnerf.training.checkpoint import (
-    LONGEST_PICKLE,
-    load_checkpoint,
-    restore_generator,
-    restore_optimiser,
-    restored_grid,
-)
+from splitnerf.training.checkpoint import load_checkpoint, restore_generator, restore_optimiser, restored_grid
 from splitnerf.training.optimiser import make_optimiser
 
 
@@ -67,7 +63,7 @@ def test_a_pickle_that_is_too_long_is_not_read(written, tmp_path):
 
 def test_the_unpickler_calls_nothing_by_itself(tmp_path, monkeypatch):
     """Without the look into the pickle that comes before it."""
-    monkeypatch.setattr(checkpoint, "_check_pickle", lambda pickled: None)
+    monkeypatch.setattr(tensor_files, "_check_pickle", lambda pickled: None)
     with pytest.raises(InputError, match="not a readable checkpoint"):
         stored({"format": 1, "model": Calls(os.system, f"touch {tmp_path / 'owned'}")}, tmp_path)
     assert not (tmp_path / "owned").exists()

@@ -140,6 +140,9 @@ SETTINGS = {
     "optimiser.final_learning_rate": ("final_learning_rate", 0.02, 0.1, PAPER),
     "optimiser.weight_decay": ("weight_decay", 0.01, 0.01, OURS),  # what torch's AdamW has by default
     "optimiser.sparse_steps": ("sparse_steps", False, False, OURS),
+    "refinement.enabled": ("refine", True, False, OURS),
+    "refinement.share": ("refinement_share", 0.4, 0.4, OURS),
+    "refinement.sweeps": ("refinement_sweeps", 16, 16, OURS),
     "export.resolution": ("export_resolution", 192, 512, OURS),
     "export.faces": ("export_faces", 20000, 20000, OURS),
     "export.texture_size": ("export_texture_size", 1024, 1024, OURS),
@@ -173,7 +176,8 @@ LIMITS = {
     "sampling.grid_resolution": "in [1, 512]", "losses.entropy_points": "in [1, 16777216]",
     "losses.albedo_width": "in (0, 1e+30]", "losses.gloss_width": "in (0, 1e+30]",
     "losses.neutral_queries": "in [1, 16777216]", "losses.smoothness_points": "in [1, 16777216]",
-    "optimiser.light_step_every": "in [1, 64]", "export.resolution": "in [8, 4096]",
+    "optimiser.light_step_every": "in [1, 64]", "refinement.share": "in [0, 1)",
+    "refinement.sweeps": "in [1, 16777216]", "export.resolution": "in [8, 4096]",
     "export.texture_size": "in [8, 32768]", "export.environment_height": "in [1, 8192]",
 }  # fmt: skip
 CHOICES = {
@@ -189,9 +193,9 @@ CHOICES = {
 # By unit: the settings that have it.
 UNITS = {
     "steps": "run.steps occlusion.indirect_every sampling.grid_every losses.light_every optimiser.light_step_every "
-    "optimiser.warmup_steps",
+    "optimiser.warmup_steps refinement.sweeps",
     "share of the run": "run.preview_every surface.levels_open_by surface.cos_anneal_by mesh.every sampling.hull_until "
-    "losses.priors_from",
+    "losses.priors_from refinement.share",
     "minutes": "run.max_minutes run.checkpoint_minutes",
     "scene units": "surface.box surface.sphere_radius occlusion.offset sampling.min_step sampling.max_step "
     "losses.smoothness_radius",

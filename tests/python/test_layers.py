@@ -14,6 +14,7 @@ LAYERS = [
     {"bench", "demo"},
     {"ablate"},
     {"workflow"},
+    {"delivery"},
     {"training"},
     {"outputs", "report"},
     {"evaluate", "refinement", "relight", "synth"},
@@ -21,7 +22,7 @@ LAYERS = [
     {"fields", "config"},
     {"data"},
     {"ops", "devices"},
-    {"_core", "errors", "notes"},
+    {"_core", "errors", "notes", "progress"},
 ]
 
 

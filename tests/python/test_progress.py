@@ -7,8 +7,8 @@ import signal
 
 import pytest
 
-from splitnerf.training import progress
-from splitnerf.training.progress import Interrupt, Progress
+from splitnerf import progress
+from splitnerf.progress import Interrupt, Progress
 
 
 class Terminal(io.StringIO):
@@ -29,13 +29,13 @@ def test_elsewhere_than_on_a_terminal_a_line_is_written_every_ten_seconds(clock,
     with Progress(0.2) as bar:
         for seconds, share in ((5, 0.3), (10, 0.4), (19, 0.5), (20, 0.6), (29.9, 0.7)):
             clock[0] = 100.0 + seconds
-            bar.show(share, round(10 * share), 21.456, 3.24)
-        bar.show(1.0, 10, None, 3.0)
+            bar.show(share, f"step {round(10 * share)}")
+        bar.show(1.0, "done")
     printed = capsys.readouterr()
     assert printed.out == "" and printed.err.splitlines() == [
-        " 40% 00:10<00:30 step 4 PSNR 21.46 dB, 3.2 samples/ray",
-        " 60% 00:20<00:20 step 6 PSNR 21.46 dB, 3.2 samples/ray",
-        "100% 00:29<00:00 step 10 3.0 samples/ray",
+        " 40% 00:10<00:30 step 4",
+        " 60% 00:20<00:20 step 6",
+        "100% 00:29<00:00 done",
     ]
 
 
@@ -45,11 +45,11 @@ def test_a_terminal_shows_a_bar(monkeypatch):
     monkeypatch.setattr("sys.stderr", terminal)
     with Progress(0.25) as bar:
         assert " 25%|" in terminal.getvalue()
-        bar.show(0.5, 7, 21.456, 3.24)
-        bar.show(0.75, 8, None, 3.24)
+        bar.show(0.5, "step 7")
+        bar.show(0.75, "step 8")
         assert not terminal.getvalue().endswith("\n")
     shown = terminal.getvalue()
-    assert " 75%|" in shown.split("\r")[-1] and "step 8 3.2 samples/ray" in shown and shown.endswith("\n")
+    assert " 75%|" in shown.split("\r")[-1] and "step 8" in shown and shown.endswith("\n")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

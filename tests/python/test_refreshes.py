@@ -219,6 +219,22 @@ def test_progress_is_the_larger_share_of_steps_or_minutes(data, tmp_path, step, 
     assert training.progress == pytest.approx(min(1.0, step / 100))
 
 
+@pytest.mark.parametrize(("refine", "share"), [(True, 0.6), (False, 1.0)])
+def test_training_leaves_the_last_stage_its_share_of_the_minutes(data, tmp_path, refine, share):
+    config = tiny(steps=100, max_minutes=2.0, refine=refine, refinement_share=0.4)
+    assert config.training_minutes + config.refinement_minutes == 2.0
+    training = loop.Training(load_dataset(data), config, tmp_path, torch.device("cpu"))
+    training.seconds = 60.0
+    assert training.progress == pytest.approx(0.5 / share)
+
+
+def test_the_bar_tells_the_step_the_error_and_the_samples(data, tmp_path):
+    training = loop.Training(load_dataset(data), tiny(steps=100), tmp_path, torch.device("cpu"))
+    assert training.told(3.04) == "step 0 3.0 samples/ray"
+    training.step, training.psnr_mean = 4, 21.456
+    assert training.told(3.24) == "step 4 PSNR 21.46 dB, 3.2 samples/ray"
+
+
 def test_a_finished_run_that_is_resumed_stays_as_it_is(data, tmp_path):
     """Half of its levels are open, as they were: the mesh is that of the same field."""
     config = tiny(steps=8, start_levels=1, levels_open_by=2.0, learning_rate=0.05, warmup_steps=1, mesh_every=2.0)

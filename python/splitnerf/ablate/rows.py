@@ -23,6 +23,7 @@ PAPER: dict[str, dict[str, object]] = {
     "mip-map light": {"light": "pyramid"},
 }
 SWITCHES: dict[str, dict[str, object]] = {
+    "no last stage": {"refine": False},
     "MLP light": {"light": "mlp"},
     "light by the split sum": SPLIT,
     "summed light": SUMMED,

@@ -117,7 +117,7 @@ def run_skip(args: argparse.Namespace) -> int:
         raise InputError(f"--minutes must be positive, got {args.minutes}")
     if args.out is not None and args.out.exists() and any(args.out.iterdir()):
         raise InputError(f"{args.out}: is not empty; give another --out")
-    full = preset("cpu").replace(dict(parse_setting(text) for text in args.settings))
+    full = preset("cpu").replace({"refinement.enabled": False} | dict(parse_setting(text) for text in args.settings))
     training, test = load_splits(args.data, args.downscale)
     if test is None:
         raise InputError(f"{args.data}: has no test views to score")

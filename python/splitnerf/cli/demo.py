@@ -20,7 +20,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)"
     )
-    parser.add_argument("--max-minutes", type=float, default=4.0, metavar="M", help="training time (default: 4)")
+    parser.add_argument("--max-minutes", type=float, default=4.0, metavar="M", help="time of training and last stage (default: 4)")
+    parser.add_argument("--no-refine", action="store_true", help="no last stage: training gets all minutes")
     parser.add_argument("--seed", type=int, default=0)
     parser.set_defaults(execute=run)
 
@@ -34,7 +35,8 @@ def run(args: argparse.Namespace) -> int:
     data = args.out / "data"
     print(f"rendering the demo scene into {data} ...", file=sys.stderr)
     write_demo_dataset(data, seed=args.seed)
-    config = preset("cpu").replace({"run.seed": args.seed, **budget(None, args.max_minutes)})
+    settings = {"run.seed": args.seed, "refinement.enabled": not args.no_refine, **budget(None, args.max_minutes)}
+    config = preset("cpu").replace(settings)
     trained, evaluation = reconstruct(data, args.out, config, overwrite=True)
     if evaluation is None:
         print("stopped; run the demo again to start over.")

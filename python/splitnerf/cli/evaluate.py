@@ -15,9 +15,10 @@ NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env")
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "evaluate", help="score runs or GLB files against the truth, and put the scores into a table",
-        description="Renders the test views of DATA from RUN's checkpoint, or from a GLB file by the path tracer, relights "
-        "the asset under the data's maps, and writes evaluation.json and report.html into RUN (for a file "
-        "FILE_evaluation.json beside it). Without --data it reads the scores written before, for --table.",
+        description="Path-traces the test views of DATA, of the asset that RUN's last stage fitted or of a GLB file (a RUN "
+        "without a last stage is rendered from its checkpoint), relights the asset under the data's maps, and writes "
+        "evaluation.json and report.html into RUN (for a file FILE_evaluation.json beside it). Without --data it reads the "
+        "scores written before, for --table.",
     )  # fmt: skip
     parser.add_argument("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
     parser.add_argument(
@@ -31,7 +32,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)"
     )
     parser.add_argument(
-        "--spp", type=int, default=64, metavar="N", help="paths a pixel of relit views and GLB files (default: 64)"
+        "--spp", type=int, default=128, metavar="N", help="paths a pixel of what is path traced (default: 128)"
     )
     parser.add_argument(
         "--views", type=int, metavar="N", help="test views, evenly spread (default: all; 20 with --lights)"

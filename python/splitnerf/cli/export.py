@@ -15,12 +15,12 @@ MIN_FACES = 100
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "export", help="write a run's textured mesh and light",
-        description="Writes mesh.glb (watertight where the object is, decimated, UV-unwrapped, with albedo, "
-        "occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex colours), "
-        "environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces are dropped.",
+        description="Writes what RUN trained, before its last stage: mesh.glb (watertight where the object is, decimated, "
+        "UV-unwrapped, with albedo, occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex "
+        "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces are dropped.",
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained after a last stage)")
     for option, kind, default, name, text in (
         ("--faces", int, 50000, "N", "faces of the textured mesh, 0 keeps all (default: 50000)"),
         ("--texture-size", int, 2048, "N", "texels along an edge (default: 2048)"),
@@ -33,6 +33,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.config import MIN_EXPORT_SIZE
+    from splitnerf.delivery import export_folder
     from splitnerf.outputs import FORMATS
     from splitnerf.workflow import export_run
 
@@ -46,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--texture-size must be in [{MIN_EXPORT_SIZE}, {MAX_TEXTURE_SIZE}], got {args.texture_size}")
     if args.resolution is not None and args.resolution < MIN_EXPORT_SIZE:
         raise InputError(f"--resolution must be at least {MIN_EXPORT_SIZE}, got {args.resolution}")
-    out = args.out or args.run
+    out = args.out or export_folder(args.run)
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
     exported = export_run(

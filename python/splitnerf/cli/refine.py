@@ -5,42 +5,50 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.exit_codes import DONE, INTERRUPTED
 from splitnerf.errors import InputError
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "refine", help="fit an exported asset and its light to the photos",
-        description="Moves the vertices of RUN/mesh.glb until its outline is that of the masks, then fits its textures (albedo, "
-        "roughness, metallic, normals) and the light of RUN/environment.exr to the photos through the path tracer's own model, "
-        "interreflection included. Writes mesh.glb, environment.exr, environment.hdr and refinement.json into RUN/refined.",
+        "refine", help="fit an exported asset and its light to the photos: the last stage of train, alone",
+        description="Starts from RUN/trained, where a last stage kept what training exported, else from RUN. Moves the "
+        "vertices of mesh.glb until its outline is that of the masks, then fits its textures (albedo, roughness, metallic, "
+        "normals) and the light of environment.exr to the photos through the path tracer's own model, interreflection "
+        "included. Writes mesh.glb, environment.exr and .hdr, uncertainty.exr and refinement.json into RUN/refined. Ctrl-C "
+        "keeps the state there; --resume goes on.",
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN", help="a finished run, or a folder with both files")
     parser.add_argument("--data", type=Path, required=True, metavar="DATA", help="the data that RUN was trained on")
     parser.add_argument(
         "--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)"
     )
-    parser.add_argument("--sweeps", type=int, default=16, metavar="N", help="steps of the fit (default: 16)")
+    parser.add_argument("--sweeps", type=int, metavar="N", help="most steps of the fit (default: 16 without --minutes)")
     parser.add_argument("--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)")
+    parser.add_argument("--resume", action="store_true", help="go on from the state that an interruption left")
     parser.add_argument("--keep-shape", action="store_true", help="leave the vertices where they are")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN/refined)")
     parser.set_defaults(execute=run)
 
 
 def run(args: argparse.Namespace) -> int:
+    from splitnerf.config.settings import UNLIMITED
     from splitnerf.refinement.fit import RefinementSettings
     from splitnerf.refinement.job import refine_run
 
-    if args.sweeps < 1:
-        raise InputError(f"--sweeps must be at least 1, got {args.sweeps}")
     if not args.minutes >= 0:
         raise InputError(f"--minutes must not be negative, got {args.minutes}")
+    sweeps = (UNLIMITED if args.minutes > 0 else 16) if args.sweeps is None else args.sweeps
+    if sweeps < 1:
+        raise InputError(f"--sweeps must be at least 1, got {sweeps}")
     out = args.out or args.run / "refined"
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
-    settings = RefinementSettings(sweeps=args.sweeps, minutes=args.minutes, outline=not args.keep_shape)
-    refined = refine_run(args.run, args.data, out, downscale=args.downscale, settings=settings)
+    settings = RefinementSettings(sweeps=sweeps, minutes=args.minutes, outline=not args.keep_shape)
+    refined = refine_run(args.run, args.data, out, downscale=args.downscale, settings=settings, resume=args.resume)
+    if refined is None:
+        print(f"stopped; the state is in {out}. To go on, repeat the command with --resume.")
+        return INTERRUPTED
     first, last = refined.sweeps[0], refined.sweeps[-1]
     if refined.outline:
         print(f"coverage at the outline, squared error: {refined.outline[0]:.2g} -> {refined.outline[-1]:.2g}")

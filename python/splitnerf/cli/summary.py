@@ -9,8 +9,19 @@ def print_summary(run: Path, evaluation: dict, step: int | None = None, seconds:
     """Prints the errors against the truth in the data, and the path of the results."""
     if step is not None and seconds is not None:
         print(f"{step} steps in {seconds:.0f} s")
+    print_last_stage(evaluation.get("last_stage"))
     print_scores(evaluation)
     print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")
+
+
+def print_last_stage(summary: dict | None) -> None:
+    """A line for what the last stage changed, if there was one."""
+    if summary is None:
+        return
+    changes = ["colours {:.2f} -> {:.2f} dB".format(*summary["photos_psnr"])]
+    if summary["outline_error"]:
+        changes.append("coverage at the outline, squared error {:.2g} -> {:.2g}".format(*summary["outline_error"]))
+    print(f"last stage, on the photos: {', '.join(changes)}, in {summary['steps']} steps, {summary['seconds']:.0f} s")
 
 
 def print_scores(evaluation: dict) -> None:

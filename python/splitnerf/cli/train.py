@@ -15,8 +15,9 @@ UNLIMITED_STEPS = 10**9
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "train", help="reconstruct an object from posed images",
-        description="Trains on DATA (NeRF-Blender layout, or a transforms.json with masks) and writes mesh.glb, mesh.ply, "
-        "environment.exr/.hdr, evaluation.json and report.html into the run's folder.",
+        description="Trains on DATA (NeRF-Blender layout, or a transforms.json with masks), fits the exported asset and its light "
+        "to the photos in a last stage, and writes mesh.glb, mesh.ply, environment.exr/.hdr, uncertainty.exr, evaluation.json and "
+        "report.html into the run's folder.",
         epilog="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient "
         "alone skips its step. The message names where it came from, and the last checkpoint stands: --resume goes on "
         "from it.",
@@ -37,7 +38,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
         help="cpu: small, for a few cores (default there); fast: for a GPU (default there); paper: the publication's settings",
     )
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
-    parser.add_argument("--max-minutes", type=float, metavar="M", help="training time; the schedule fits itself to it")
+    parser.add_argument("--max-minutes", type=float, metavar="M", help="time of training and last stage; the schedule fits itself to it")
     parser.add_argument(
         "--device", choices=["cpu", "cuda"], default="cpu",
         help="where to train (default: cpu; see docs/cuda.md)",
@@ -47,6 +48,11 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
         "--deterministic",
         action="store_true",
         help="two runs with one seed give the same bits, on one machine with one number of threads",
+    )
+    parser.add_argument(
+        "--no-refine",
+        action="store_true",
+        help="no last stage: deliver what training exports, and give training all minutes",
     )
     parser.add_argument(
         "--set",
@@ -74,6 +80,8 @@ def run(args: argparse.Namespace) -> int:
     settings |= budget(args.steps, args.max_minutes)
     if args.seed is not None:
         settings["run.seed"] = args.seed
+    if args.no_refine:
+        settings["refinement.enabled"] = False
     if args.deterministic:
         settings["run.deterministic"] = True
     if args.resume:
@@ -88,7 +96,8 @@ def run(args: argparse.Namespace) -> int:
         overwrite=args.overwrite,
     )  # fmt: skip
     if evaluation is None:
-        print(f"stopped at step {trained.step}; the state is in {run}. To go on, repeat the command with --resume.")
+        where = "in the last stage" if trained.finished else f"at step {trained.step}"
+        print(f"stopped {where}; the state is in {run}. To go on, repeat the command with --resume.")
         return INTERRUPTED
     print_summary(run, evaluation, trained.step, trained.seconds)
     return DONE

@@ -42,6 +42,7 @@ PAPER = dict(
         neutral_weight=0.0, entropy_weight=0.0, binary_metal_weight=0.0, dark_metal_weight=0.0, smoothness_weight=0.0,
     ),
     optimiser=dict(warmup_steps=500, final_learning_rate=0.1),
+    refinement=dict(enabled=False),
     export=dict(resolution=512),
 )  # fmt: skip
 

@@ -19,6 +19,7 @@ from splitnerf.config.groups import (
     Mesh,
     Occlusion,
     Optimiser,
+    Refinement,
     Run,
     Sampling,
     Shading,
@@ -32,6 +33,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+UNLIMITED = 10**9
 SUMMED_DIRECTIONS = 256  # fewer do not resolve the lobes that `shading.method = summed` sums
 
 # Names that settings had before there were groups, where they differ from the name within the group.
@@ -51,6 +53,7 @@ RENAMED = {
     "sampling.min_weight": "sample_above",
     "losses.smoothness_weight": "normal_smoothness", "losses.light_form": "light_loss_form",
     "losses.occlusion_form": "occlusion_loss_form", "losses.metal_form": "metal_loss_form",
+    "refinement.enabled": "refine", "refinement.share": "refinement_share", "refinement.sweeps": "refinement_sweeps",
     "export.resolution": "export_resolution", "export.faces": "export_faces",
     "export.texture_size": "export_texture_size", "export.environment_height": "export_environment_height",
 }  # fmt: skip
@@ -74,6 +77,7 @@ class Config:
     sampling: Sampling = field(default_factory=Sampling)
     losses: Losses = field(default_factory=Losses)
     optimiser: Optimiser = field(default_factory=Optimiser)
+    refinement: Refinement = field(default_factory=Refinement)
     export: Export = field(default_factory=Export)
 
     def __post_init__(self) -> None:
@@ -94,6 +98,21 @@ class Config:
         """The value of a setting by its name: ``group.name``, or its older name without a group."""
         group, _, key = OLD_NAMES.get(name, name).partition(".")
         return getattr(getattr(self, group), key)
+
+    @property
+    def training_minutes(self) -> float:
+        """The minutes of the run that training gets, the rest is the last stage's; 0: no limit."""
+        return self.run.max_minutes - self.refinement_minutes
+
+    @property
+    def refinement_minutes(self) -> float:
+        """The minutes of the run that the last stage gets; 0 without it, or without a limit."""
+        return self.run.max_minutes * self.refinement.share if self.refinement.enabled else 0.0
+
+    @property
+    def refinement_sweeps(self) -> int:
+        """The most steps of the last stage: where minutes end it, as many as these allow."""
+        return UNLIMITED if self.refinement_minutes > 0 else self.refinement.sweeps
 
     def replace(self, settings: dict[str, object]) -> Config:
         """A copy with some settings changed.

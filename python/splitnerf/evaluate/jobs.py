@@ -38,7 +38,7 @@ class Protocol:
 
     downscale: int = 1
     views: int | None = None
-    spp: int = 64
+    spp: int = 128
     lights: str | None = None
     maps: Path | None = None
 
@@ -112,16 +112,31 @@ def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None 
     split = "test" if has_test_split(data) else "train"
     views, maps = choose_views(load_dataset(data, split, protocol.downscale), protocol)
     env = environment_beside(path) if env is None else env
-    environment = None if env is None else read_environment(env)
-    truths, truth = load_view_truths(views), load_scene_truth(data)
+    return score_asset(asset, None if env is None else read_environment(env), views, maps, protocol.spp)
+
+
+def score_asset(
+    asset: Asset, environment: np.ndarray | None, views: Dataset, maps: dict[str, Path], spp: int, seconds: float | None = None
+) -> Evaluated:
+    """Scores an asset by path tracing.
+
+    Args:
+        asset: The asset, in the data's world frame.
+        environment: [h, w, 3] the light of the photos, or None.
+        views: The views.
+        maps: Environment maps for relit views, by name; none for no such views.
+        spp: Paths a pixel.
+        seconds: The time that the asset took, to record.
+    """
+    truths, truth = load_view_truths(views), load_scene_truth(views.root)
     renderer = AssetRenderer(asset)
-    predictions = asset_predictions(renderer, views, environment, protocol.spp)
-    relit, relight_part = relit_scores(renderer, views, maps, protocol.spp)
+    predictions = asset_predictions(renderer, views, environment, spp)
+    relit, relight_part = relit_scores(renderer, views, maps, spp)
     scores = evaluate_maps(
-        predictions, views, truths, environment, truth.light, asset_mesh(asset), truth.mesh,
+        predictions, views, truths, environment, truth.light, asset_mesh(asset), truth.mesh, seconds,
         relight=relight_part, distance=load_distance(),
     )  # fmt: skip
-    return Evaluated(scores, views, predictions, truths, relit)
+    return Evaluated(scores | {"scored": "asset", "spp": spp}, views, predictions, truths, relit)
 
 
 def is_asset(path: Path) -> bool:

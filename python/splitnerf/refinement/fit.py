@@ -2,14 +2,15 @@
 
 A pixel is seen by two rays through its filter, and each ray's point by directions of its own. The error of one ray's colour
 times that of the other is the squared error without the noise (in expectation), and one ray's derivatives times the other's
-error are its gradient. Batches of pixels are gathered into normal equations of the texels; the light moves with each batch.
+error are its gradient. Batches of pixels are gathered into normal equations of the texels and of the light, and a sweep of
+batches ends with a step of each.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,16 +19,21 @@ from torch import Tensor
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.tensor_files import check_tensor
 from splitnerf.errors import InputError
 from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
 from splitnerf.refinement.light import EnvironmentLight, look_up
+from splitnerf.refinement.light_equations import LightEquations
+from splitnerf.refinement.like_texels import ROUGHNESS, with_like_roughness
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.texels import AssetTexels, SurfaceSamples, check_form, materials_of
-from splitnerf.refinement.unknowns import STEP_LIMITS, into_range, per_unknown, to_unknowns, to_values
+from splitnerf.refinement.uncertainty import Information, Uncertainty, patch_width, uncertainty_of
+from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS, STEP_LIMITS, into_range, per_unknown, to_unknowns, to_values
 
 CLAMP_INDIRECT = 10.0
+SWEEPS_OF_LARGE_STEPS = 4  # after as many the light's steps are half as large: they average over the noise of sweeps
 MIN_TONE = 0.02  # linear value below which errors weigh as at this one
 
 
@@ -44,8 +50,10 @@ class RefinementSettings:
         bounces: Scattering events of the light that the asset sends to itself.
         keep: Share of the observations that outlives a sweep.
         smooth_albedo, smooth_gloss, smooth_normal: Weights of the differences between neighbours' steps.
+        flat_gloss, flat_normal: Weights of the differences between neighbours' values; edges cost little.
+        like_colours: Weight of the difference between a texel's roughness and the usual one of its colour.
         anchor: Weight of the distance to the start.
-        light_rate: Learning rate of the light's log radiance; 0 keeps the light.
+        light_step: Share of the light's first Gauss-Newton step that is taken, less of the later ones; 0 keeps the light.
         outline: Whether vertices move first, so that the asset covers the pixels as the masks do.
         seed: Seed of all random numbers.
     """
@@ -60,8 +68,11 @@ class RefinementSettings:
     smooth_albedo: float = 1.0
     smooth_gloss: float = 5.0
     smooth_normal: float = 1.0
+    flat_gloss: float = 5.0
+    flat_normal: float = 2.0
+    like_colours: float = 0.5
     anchor: float = 0.02
-    light_rate: float = 0.002
+    light_step: float = 0.5
     outline: bool = True
     seed: int = 0
 
@@ -76,12 +87,14 @@ class Refined:
         outline: Mean squared errors of the coverage at the outline, before each round and at the end; empty where the
             shape was kept.
         sweeps: What each sweep says.
+        uncertainty: What the photos leave open.
     """
 
     asset: Asset
     light: np.ndarray
     outline: list[float]
     sweeps: list[Sweep]
+    uncertainty: Uncertainty
 
 
 class Sweep(NamedTuple):
@@ -99,6 +112,22 @@ class Sweep(NamedTuple):
     seconds: float
     error: float
     moved: list[float]
+
+
+class Shaded(NamedTuple):
+    """What n points send to the viewer, by k directions of the light.
+
+    Attributes:
+        colours: [n, 3] linear radiance.
+        radiance: [n, k, 3] light that arrives, a leaf of the graph.
+        directions: [n, k, 3] unit.
+        visible: [n, k] 1 where it is the environment's.
+    """
+
+    colours: Tensor
+    radiance: Tensor
+    directions: Tensor
+    visible: Tensor
 
 
 class Refinement:
@@ -122,14 +151,46 @@ class Refinement:
             torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (asset.normals, asset.tangents, asset.uv)
         ]
         self.light = EnvironmentLight(torch.from_numpy(environment))
-        self.light_optimiser = torch.optim.Adam(self.light.levels, lr=s.light_rate, betas=(0.9, 0.99))
+        self.light_equations = LightEquations(self.light)
         self.random = np.random.default_rng(s.seed)
         self.unknowns = to_unknowns(self.texels.start)
+        like = torch.zeros(N_UNKNOWNS)
+        like[ROUGHNESS] = s.like_colours
         prior = Prior(
-            self.texels.pairs, per_unknown(s.smooth_albedo, s.smooth_gloss, s.smooth_normal), per_unknown(*[s.anchor] * 3)
-        )
+            pairs=self.texels.pairs, smooth=per_unknown(s.smooth_albedo, s.smooth_gloss, s.smooth_normal),
+            flat=per_unknown(0.0, s.flat_gloss, s.flat_normal), groups=GROUPS, anchor=per_unknown(*[s.anchor] * 3), like=like,
+        )  # fmt: skip
         self.equations = NormalEquations(self.unknowns, prior, s.keep)
-        self.n_batches = 0
+        self.information = Information(self.texels, patch_width(dataset, self.texels), len(self.pixels))
+        self.n_batches = self.n_sweeps = 0
+
+    def state(self) -> dict[str, object]:
+        """All that further sweeps depend on beside the arguments, as tensors and plain values."""
+        return {
+            "unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient,
+            "light": self.light.levels, "information": self.information.sums, "n_seen": self.information.n_seen,
+            "random": self.random.bit_generator.state, "n_batches": self.n_batches, "n_sweeps": self.n_sweeps,
+        }  # fmt: skip
+
+    def restore(self, state: dict[str, object]) -> None:
+        """Takes back what :meth:`state` gave of a fit with the same arguments.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is another fit's.
+        """
+        sums = {"unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient,
+                "information": self.information.sums}  # fmt: skip
+        for name, tensor in sums.items():
+            check_tensor(name, state[name], tuple(tensor.shape), torch.float32)
+        self.unknowns, self.information.sums = state["unknowns"], state["information"]
+        self.equations.curvature, self.equations.gradient = state["curvature"], state["gradient"]
+        for level, stored in zip(self.light.levels, state["light"], strict=True):
+            check_tensor("a level of the light", stored, tuple(level.shape), torch.float32)
+        self.light.levels = list(state["light"])
+        self.random.bit_generator.state = state["random"]
+        self.n_batches, self.n_sweeps, self.information.n_seen = (
+            int(state[name]) for name in ("n_batches", "n_sweeps", "n_seen")
+        )
 
     def maps(self) -> tuple[Tensor, Tensor, Tensor]:
         """The textures as they are now: albedo [h, w, 3], roughness and metallic [h, w, 2], normals [h, w, 3]."""
@@ -152,29 +213,31 @@ class Refinement:
         both = np.repeat(hit, 2)
         return index[hit], self.texels.sample(triangle[both], u[both], v[both], -directions[both])
 
-    def shade(self, surface: TexturedSurface, samples: SurfaceSamples, unknowns: Tensor) -> Tensor:
-        """[n, 3] linear radiance of points, differentiable in unknowns [n, 7] and the light.
+    def shade(self, surface: TexturedSurface, samples: SurfaceSamples, unknowns: Tensor) -> Shaded:
+        """The light that n points send to the viewer, differentiable in unknowns [n, 7] and the light that arrives.
 
         It is an estimate without bias but for the clamp and the last bounce of the light that the asset sends to itself.
         """
         s, m = self.settings, materials_of(to_values(unknowns), samples)
         light = self.light.radiance()
         arriving = incoming_light(
-            surface, light.detach(), samples.positions, samples.geometric, m.normals.detach(), samples.view_dirs,
+            surface, light, samples.positions, samples.geometric, m.normals.detach(), samples.view_dirs,
             m.albedo.detach(), m.roughness.detach(), m.metallic.detach(), n_directions=s.directions, max_bounces=s.bounces,
             clamp_indirect=CLAMP_INDIRECT, seed=s.seed + self.n_batches,
         )  # fmt: skip
         sky = look_up(light, arriving.directions.view(-1, 3)).view_as(arriving.directions)
-        radiance = sky * arriving.visible[..., None] + arriving.sent
+        radiance = (sky * arriving.visible[..., None] + arriving.sent).requires_grad_(True)
         sums = monte_carlo_light(m.normals, samples.view_dirs, m.roughness, arriving.directions, arriving.pdf, radiance)
-        return shade_sums(m.normals, samples.view_dirs, m.albedo, m.roughness, m.metallic, sums, compensate=True)
+        colours = shade_sums(m.normals, samples.view_dirs, m.albedo, m.roughness, m.metallic, sums, compensate=True)
+        return Shaded(colours, radiance, arriving.directions, arriving.visible)
 
     def gather(self, surface: TexturedSurface) -> float:
-        """Gathers one batch of pixels and moves the light; returns the batch's mean squared error without noise."""
+        """Gathers one batch of pixels; returns its mean squared error without noise."""
         index, samples = self.see()
         texels, shares = self.texels.rows(samples.footprints), samples.footprints.weights
         unknowns = (self.unknowns[texels] * shares[..., None]).sum(1).requires_grad_(True)
-        colours = self.shade(surface, samples, unknowns)
+        shaded = self.shade(surface, samples, unknowns)
+        colours = shaded.colours
         target, saturated = (torch.from_numpy(x[index]) for x in (self.pixels.target, self.pixels.saturated))
         pairs = colours.detach().view(-1, 2, 3)
         weights = srgb_slope(target.clamp(min=MIN_TONE)).square()
@@ -182,17 +245,14 @@ class Refinement:
         errors = pairs - target[:, None]
         of_other = errors.flip(1).flatten(0, 1)
         weights_of_rays = weights.repeat_interleave(2, 0)
-        if self.settings.light_rate > 0:
-            gradients = torch.autograd.grad(
-                colours, self.light.levels, weights_of_rays * of_other / len(of_other), retain_graph=True
-            )
-            for level, gradient in zip(self.light.levels, gradients):
-                level.grad = gradient
-            self.light_optimiser.step()
+        if self.settings.light_step > 0:
+            slopes = torch.autograd.grad(colours.sum(), shaded.radiance, retain_graph=True)[0] * shaded.visible[..., None]
+            self.light_equations.add(shaded.directions, slopes, weights_of_rays, of_other)
         jacobian = torch.stack(
             [torch.autograd.grad(colours[:, c].sum(), unknowns, retain_graph=c < 2)[0] for c in range(3)], dim=1
         )
         self.equations.add(texels, shares, jacobian, weights_of_rays, of_other)
+        self.information.add(texels, shares, jacobian, weights_of_rays)
         self.n_batches += 1
         return float((weights * errors[:, 0] * errors[:, 1]).mean())
 
@@ -203,12 +263,16 @@ class Refinement:
         error = float(np.mean([self.gather(surface) for _ in range(n_batches)]))
         if not np.isfinite(error):
             raise RuntimeError(f"refinement: the error of the photos is {error}; nothing was written")
+        if s.light_step > 0:
+            self.light_equations.step(s.light_step / (1.0 + self.n_sweeps / SWEEPS_OF_LARGE_STEPS))
         limits = torch.tensor(STEP_LIMITS)
-        wanted = into_range(self.unknowns + self.equations.step(self.unknowns).clamp(-limits, limits))
+        like = with_like_roughness(self.unknowns, self.equations.curvature[:, ROUGHNESS, ROUGHNESS], s.seed)
+        wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
         step = wanted - self.unknowns
         if not bool(torch.isfinite(step).all()):
             raise RuntimeError(f"refinement: the step after {self.n_batches} batches is not finite; nothing was written")
         self.unknowns = wanted
+        self.n_sweeps += 1
         self.equations.move(step)
         return error, step.square().mean(0).sqrt().tolist()
 
@@ -216,6 +280,70 @@ class Refinement:
 def srgb_slope(linear: Tensor) -> Tensor:
     """d sRGB / d linear of values above 0.0031308. Source: IEC 61966-2-1."""
     return 1.055 / 2.4 * linear ** (1 / 2.4 - 1)
+
+
+class Stage:
+    """A refinement sweep by sweep: what it has said so far, and the state by which it can go on elsewhere.
+
+    Args:
+        dataset, asset, environment, settings: See :class:`Refinement`.
+        state: What :meth:`state` gave of a stage with the same other arguments, `sweeps` and `minutes` aside; None begins.
+
+    Attributes:
+        outline, sweeps: See :class:`Refined`.
+
+    Raises:
+        ValueError, KeyError, TypeError: The asset or the light has another form, or the state is another stage's.
+        InputError: The photos show nothing.
+    """
+
+    def __init__(
+        self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings, state: dict | None = None
+    ):
+        check_form(asset)
+        self.settings, self.outline, self.sweeps = settings, [], []
+        self.started = time.monotonic()
+        if state is not None:
+            check_tensor("vertices", state["vertices"], asset.vertices.shape, torch.float32)
+            asset = replace(asset, vertices=state["vertices"].numpy())
+            self.outline, self.sweeps = list(map(float, state["outline"])), [Sweep(*sweep) for sweep in state["sweeps"]]
+            self.started -= float(state["seconds"])
+        elif settings.outline:
+            asset, self.outline = fit_outline(dataset, asset, settings.seed)
+        self.fit = Refinement(dataset, asset, environment, settings)
+        if state is not None:
+            self.fit.restore(state["fit"])
+
+    @property
+    def seconds(self) -> float:
+        """The time that the stage has taken, in all its parts."""
+        return time.monotonic() - self.started
+
+    @property
+    def progress(self) -> float:
+        """The share done, in [0, 1]: of the sweeps, or of the minutes where those are further; a first sweep is always made."""
+        by_time = self.seconds / (60 * self.settings.minutes) if self.settings.minutes > 0 and self.sweeps else 0.0
+        return min(1.0, max(len(self.sweeps) / self.settings.sweeps, by_time))
+
+    def advance(self) -> Sweep:
+        """Makes one sweep. Raises RuntimeError where numbers are no longer finite."""
+        error, moved = self.fit.sweep()
+        self.sweeps.append(Sweep(len(self.sweeps) + 1, self.seconds, error, moved))
+        return self.sweeps[-1]
+
+    def state(self) -> dict[str, object]:
+        """What goes on from here, as tensors and plain values."""
+        vertices = torch.from_numpy(np.ascontiguousarray(self.fit.texels.asset.vertices, np.float32))
+        return {"vertices": vertices, "outline": self.outline, "sweeps": [list(sweep) for sweep in self.sweeps],
+                "seconds": self.seconds, "fit": self.fit.state()}  # fmt: skip
+
+    def result(self) -> Refined:
+        """What the stage leaves."""
+        fit = self.fit
+        left_over = max(self.sweeps[-1].error, 0.0)
+        uncertainty = uncertainty_of(fit.information, fit.texels, left_over, float(fit.pixels.saturated.mean()))
+        light = fit.light.radiance().detach().numpy()
+        return Refined(fit.texels.asset_with(fit.maps()), light, self.outline, self.sweeps, uncertainty)
 
 
 def refine(
@@ -235,15 +363,7 @@ def refine(
         InputError: The photos show nothing of the asset.
         RuntimeError: Numbers are no longer finite.
     """
-    check_form(asset)
-    outline, sweeps, started = [], [], time.monotonic()
-    if settings.outline:
-        asset, outline = fit_outline(dataset, asset, settings.seed)
-    fit = Refinement(dataset, asset, environment, settings)
-    for number in range(1, settings.sweeps + 1):
-        if sweeps and settings.minutes > 0 and time.monotonic() - started > 60 * settings.minutes:
-            break
-        error, moved = fit.sweep()
-        sweeps.append(Sweep(number, time.monotonic() - started, error, moved))
-        report(sweeps[-1])
-    return Refined(fit.texels.asset_with(fit.maps()), fit.light.radiance().detach().numpy(), outline, sweeps)
+    stage = Stage(dataset, asset, environment, settings)
+    while stage.progress < 1.0:
+        report(stage.advance())
+    return stage.result()

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
 import math
+import time
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from splitnerf.data.asset import Asset
-from splitnerf.data.dataset import load_dataset
+from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.images import area_average
+from splitnerf.data.images import area_average, write_image
 from splitnerf.data.json_files import write_json
+from splitnerf.data.tensor_files import read_tensors, write_tensors
 from splitnerf.errors import InputError
 from splitnerf.export.bake import UnwrappedMesh, bake_occlusion
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
-from splitnerf.refinement.fit import Refined, RefinementSettings, refine
+from splitnerf.progress import Interrupt, Progress
+from splitnerf.refinement.fit import Refined, RefinementSettings, Stage
 from splitnerf.refinement.texels import check_form
 
+TRAINED = "trained"  # the folder in a run of what training alone exported
+STATE, STATE_FORMAT = "refinement.pt", 1
+RECORD = "refinement.json"
 OCCLUSION_OFFSET = 0.006  # distance of a ray's start from the mesh, as a share of its extent
 LEAST_HEIGHT, LARGEST_HEIGHT = 8, 256  # rows of the light that is fitted
 
@@ -52,31 +59,165 @@ def occlusion_texture(asset: Asset) -> np.ndarray:
     return bake_occlusion(mesh, asset.materials[0].albedo_texture.shape[0], OCCLUSION_OFFSET * extent)
 
 
-def refine_run(run: Path, data: Path, out: Path, *, downscale: int, settings: RefinementSettings) -> Refined:
-    """Refines the asset of a run; writes mesh.glb, environment.exr and .hdr and refinement.json.
+def source_of(run: Path) -> Path:
+    """The folder in a run that holds what training alone exported: RUN/trained, or RUN where there was no last stage."""
+    return run / TRAINED if (run / TRAINED / "mesh.glb").is_file() else run
+
+
+class OtherState(InputError):
+    """A state from which a refinement cannot go on."""
+
+
+class StateFile:
+    """The state of an unfinished refinement, in a file that is deleted at its end.
+
+    Args:
+        folder: The folder of the results.
+        origin: What tells the refinement from others, see :func:`origin_of`.
+        minutes: The time between two saves.
+    """
+
+    def __init__(self, folder: Path, origin: str, minutes: float):
+        self.path, self.origin, self.minutes = folder / STATE, origin, minutes
+        self.saved_at = time.monotonic()
+
+    def load(self) -> dict | None:
+        """The state; None where there is no file.
+
+        Raises:
+            OtherState: The file cannot be read, or is another refinement's.
+        """
+        if not self.path.is_file():
+            return None
+        try:
+            content = read_tensors(self.path)
+        except ValueError as error:
+            raise OtherState(f"{self.path}: not a readable state ({error}); delete it to begin anew") from None
+        if content["format"] != STATE_FORMAT or content.get("origin") != self.origin:
+            raise OtherState(f"{self.path}: is of another asset, other photos or settings; delete it to begin anew")
+        return content
+
+    def save(self, stage: Stage) -> None:
+        """Writes the state. Raises OSError where the disk is full; the old file is kept."""
+        write_tensors(self.path, {"format": STATE_FORMAT, "origin": self.origin, **stage.state()})
+        self.saved_at = time.monotonic()
+
+    def save_if_due(self, stage: Stage) -> None:
+        """Writes the state where the last one is old enough."""
+        if time.monotonic() - self.saved_at > 60.0 * self.minutes:
+            self.save(stage)
+
+
+def origin_of(source: Path, dataset: Dataset, settings: RefinementSettings) -> str:
+    """A hash of all that decides the bits of a sweep: the asset, its light, the photos and the settings."""
+    fixed = dataclasses.replace(settings, sweeps=1, minutes=0.0)  # these say only when it ends
+    digest = hashlib.sha256(f"{fixed} {dataset_fingerprint(dataset)}".encode())
+    for name in ("mesh.glb", "environment.exr"):
+        digest.update((source / name).read_bytes())
+    return digest.hexdigest()
+
+
+def refine_folder(
+    source: Path, dataset: Dataset, out: Path, settings: RefinementSettings, *, resume: bool = False, save_minutes: float = 2.0
+) -> Refined | None:
+    """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it after the sweep and keeps its state.
+
+    Args:
+        source: The folder of mesh.glb and environment.exr.
+        dataset: The photos.
+        out: The folder of the results: mesh.glb, environment.exr and .hdr, uncertainty.exr and refinement.json. The state of
+            an unfinished refinement stands there; the caller deletes it (:func:`forget_state`) once all is done.
+        settings: What the fit does.
+        resume: Whether to go on from that state, if there is one.
+        save_minutes: The time between two saves of the state.
+
+    Returns:
+        The result; None where it was interrupted.
 
     Raises:
-        InputError: The run, the data or the light cannot be used; nothing was written.
-        RuntimeError: Numbers are no longer finite; nothing was written.
+        InputError: The asset, the light, the photos or the state cannot be used; no result was written.
+        RuntimeError: Numbers are no longer finite; no result was written.
         OSError: A file cannot be written.
     """
-    path = run / "mesh.glb"
+    asset, light = read_source(source)
+    out.mkdir(parents=True, exist_ok=True)
+    kept = StateFile(out, origin_of(source, dataset, settings), save_minutes)
+    with Interrupt() as interrupt:
+        stage = begin(dataset, asset, light, settings, kept.load() if resume else None, kept.path)
+        with Progress(stage.progress) as bar:
+            while stage.progress < 1.0 and not interrupt.asked:
+                stage.advance()
+                kept.save_if_due(stage)
+                bar.show(stage.progress, told(stage))
+        if stage.progress < 1.0:
+            kept.save(stage)
+            return None
+    refined = stage.result()
+    write_glb(out / "mesh.glb", refined.asset, occlusion_texture(refined.asset))
+    write_environment(out, refined.light)
+    write_image(out / "uncertainty.exr", refined.uncertainty.map, half=True)
+    write_json(out / RECORD, record_of(refined, stage.seconds))
+    return refined
+
+
+def read_source(source: Path) -> tuple[Asset, np.ndarray]:
+    """The asset and the light [h, 2 h, 3] of a folder. Raises InputError where they cannot be fitted."""
+    path = source / "mesh.glb"
     if not path.is_file():
-        raise InputError(f"{path}: no such asset; finish the run, or write it with `splitnerf export {run}`")
-    asset, light = read_asset(path), read_light(run)
+        raise InputError(f"{path}: no such asset; finish the run, or write it with `splitnerf export {source}`")
+    asset, light = read_asset(path), read_light(source)
     try:
         check_form(asset)
     except ValueError as error:
         raise InputError(f"{path}: {error}; give an asset that `splitnerf train` or `export` wrote") from error
+    return asset, light
+
+
+def begin(
+    dataset: Dataset, asset: Asset, light: np.ndarray, settings: RefinementSettings, state: dict | None, path: Path
+) -> Stage:
+    """A stage that begins, or goes on from the state in the file `path`. Raises InputError where it cannot."""
+    try:
+        return Stage(dataset, asset, light, settings, state)
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
+        if state is None:
+            raise
+        raise OtherState(f"{path}: not the state of this refinement ({error}); delete it to begin anew") from error
+
+
+def told(stage: Stage) -> str:
+    """What the bar tells: the sweeps and the photos' error before the last one."""
+    return f"last stage, step {len(stage.sweeps)}, photos {decibels(stage.sweeps[-1].error):.2f} dB"
+
+
+def decibels(error: float) -> float:
+    """The PSNR of a mean squared error, which may come out as 0 or less where it is estimated."""
+    return -10.0 * math.log10(max(error, 1e-8))
+
+
+def record_of(refined: Refined, seconds: float) -> dict:
+    """The contents of refinement.json."""
+    u = refined.uncertainty
+    return {"seconds": round(seconds, 1), "outline": refined.outline, "saturated": u.saturated, "noise": u.noise,
+            "sweeps": [sweep._asdict() for sweep in refined.sweeps]}  # fmt: skip
+
+
+def forget_state(folder: Path) -> None:
+    """Deletes the state of a refinement that is done or void."""
+    (folder / STATE).unlink(missing_ok=True)
+
+
+def refine_run(
+    run: Path, data: Path, out: Path, *, downscale: int, settings: RefinementSettings, resume: bool = False
+) -> Refined | None:
+    """Refines what training exported into a run; see :func:`refine_folder`."""
+    source = source_of(run)
+    read_source(source)
     dataset = load_dataset(data, "train", downscale)
-    with tqdm(total=settings.sweeps, desc="refining", unit="step", leave=False, disable=None) as bar:
-        try:
-            refined = refine(dataset, asset, light, settings, report=lambda sweep: bar.update())
-        except InputError as error:
-            raise InputError(f"{path} and {data}: {error}") from error
-    out.mkdir(parents=True, exist_ok=True)
-    write_glb(out / "mesh.glb", refined.asset, occlusion_texture(refined.asset))
-    write_environment(out, refined.light)
-    said = {"outline": refined.outline, "sweeps": [sweep._asdict() for sweep in refined.sweeps]}
-    write_json(out / "refinement.json", said)
+    try:
+        refined = refine_folder(source, dataset, out, settings, resume=resume)
+    except InputError as error:
+        raise InputError(f"{source / 'mesh.glb'} and {data}: {error}") from error
+    if refined is not None:
+        forget_state(out)
     return refined

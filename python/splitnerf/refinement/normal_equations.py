@@ -7,6 +7,10 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from splitnerf.refinement.conjugate_gradients import conjugate_gradients
+
+EDGE = 0.05  # length of the differences between neighbours from which on they count as an edge
+APART = 0.1  # distance to the values of like texels from which on these pull less
 
 class Prior(NamedTuple):
     """What holds the unknowns where photos say little, in units of each unknown's mean curvature.
@@ -14,12 +18,26 @@ class Prior(NamedTuple):
     Attributes:
         pairs: [k, 2] int64, texels that are neighbours.
         smooth: [n] weight of the differences between the steps of neighbours.
+        flat: [n] weight of the differences d between the values of neighbours; their cost is log(1 + (d / EDGE)^2), so that
+            small differences are smoothed and edges are kept (Black and Anandan 1996).
+        groups: Numbers of unknowns, in order, that have their edges in common.
         anchor: [n] weight of the distance to the start.
+        like: [n] weight of the distance to the values of like texels, at the same cost with APART in place of EDGE.
     """
 
     pairs: Tensor
     smooth: Tensor
+    flat: Tensor
+    groups: tuple[int, ...]
     anchor: Tensor
+    like: Tensor
+
+    def flatness(self, unknowns: Tensor) -> Tensor:
+        """[k, n] the weights by which squared differences have the gradient of their cost at unknowns [m, n]."""
+        i, j = self.pairs.unbind(1)
+        squared = ((unknowns[i] - unknowns[j]) / EDGE).square().split(self.groups, dim=1)
+        lengths = torch.cat([part.sum(1, keepdim=True).expand_as(part) for part in squared], dim=1)
+        return self.flat / (1.0 + lengths)
 
 
 class NormalEquations:
@@ -67,33 +85,30 @@ class NormalEquations:
         return torch.zeros_like(values).index_add_(0, i, apart).index_add_(0, j, -apart)
 
     @torch.no_grad()
-    def step(self, unknowns: Tensor, n_iterations: int = 20) -> Tensor:
-        """The Gauss-Newton step [m, n] from unknowns [m, n], by conjugate gradients with each texel's inverse before.
+    def step(self, unknowns: Tensor, like: Tensor, n_iterations: int = 20) -> Tensor:
+        """The Gauss-Newton step [m, n] from unknowns [m, n]; the prior's costs by iteratively reweighted least squares.
 
-        Source: Nocedal and Wright 2006, section 10.3 and Algorithm 5.3.
+        Source: Nocedal and Wright 2006, section 10.3.
+
+        Args:
+            unknowns: The unknowns.
+            like: [m, n] the values of like texels.
+            n_iterations: The number of conjugate gradients.
         """
+        prior = self.prior
         typical = self.curvature.diagonal(dim1=1, dim2=2).mean(0)  # of each unknown
-        smooth, anchor = self.prior.smooth * typical, self.prior.anchor * typical
-        system = self.curvature + torch.diag(anchor + 1e-12)
-        n_neighbours = torch.bincount(self.prior.pairs.flatten(), minlength=len(unknowns))
-        before = torch.linalg.inv(system + torch.diag_embed(n_neighbours[:, None] * smooth))
-
-        def product(x: Tensor) -> Tensor:
-            return torch.einsum("mnk,mk->mn", system, x) + self._differences(x, smooth)
-
-        step = torch.zeros_like(unknowns)
-        rest = -(self.gradient + anchor * (unknowns - self.start))
-        towards = along = torch.einsum("mnk,mk->mn", before, rest)
-        size = (rest * towards).sum()
-        for _ in range(n_iterations):
-            image = product(along)
-            length = size / (along * image).sum().clamp(min=1e-30)
-            step = step + length * along
-            rest = rest - length * image
-            towards = torch.einsum("mnk,mk->mn", before, rest)
-            size, old = (rest * towards).sum(), size
-            along = towards + (size / old.clamp(min=1e-30)) * along
-        return step
+        flat = prior.flatness(unknowns) * typical
+        smooth = flat + prior.smooth * typical
+        anchor, unlike = prior.anchor * typical, unknowns - like
+        pull = prior.like * typical / (1.0 + (unlike / APART).square())
+        system = self.curvature + torch.diag_embed(anchor + pull + 1e-12)
+        of_pairs = sum(torch.zeros_like(unknowns).index_add_(0, end, smooth) for end in prior.pairs.unbind(1))
+        inverses = torch.linalg.inv(system + torch.diag_embed(of_pairs))
+        down = self.gradient + anchor * (unknowns - self.start) + pull * unlike + self._differences(unknowns, flat)
+        return conjugate_gradients(
+            lambda x: torch.einsum("mnk,mk->mn", system, x) + self._differences(x, smooth),
+            lambda x: torch.einsum("mnk,mk->mn", inverses, x), -down, n_iterations,
+        )  # fmt: skip
 
     @torch.no_grad()
     def move(self, step: Tensor) -> None:

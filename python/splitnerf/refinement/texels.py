@@ -70,6 +70,8 @@ class AssetTexels:
             material's factors must be 1.
 
     Attributes:
+        index: [m] int64 row * size + column, ascending.
+        chart: [m] the number of each texel's chart.
         start: [m, 8] the texture's values.
         pairs: [k, 2] int64 neighbours within a chart.
 
@@ -86,16 +88,21 @@ class AssetTexels:
         self._row_of = torch.from_numpy(self._spread.rows.reshape(-1).astype(np.int64))
         maps = [m.albedo_texture, m.roughness_metallic_texture, m.normal_texture]
         values = np.concatenate(maps, axis=2).reshape(-1, N_CHANNELS).astype(np.float32)
+        self.index, self.chart = covered.index, charts(asset)[asset.triangles[covered.triangle, 0]]
         self.start = torch.from_numpy(values[covered.index])
-        self.pairs = torch.from_numpy(neighbours(covered, charts(asset)[asset.triangles[covered.triangle, 0]], self.size))
+        self.pairs = torch.from_numpy(neighbours(covered, self.chart, self.size))
 
     def rows(self, footprints: Footprints) -> Tensor:
         """[n, 4] the covered texels that points read; texels outside the charts have the value of the nearest inside."""
         return self._row_of[footprints.texels]
 
+    def spread(self, values: Tensor) -> Tensor:
+        """The image [h, w, c] of texels' values [m, c]; outside the charts that of the nearest inside."""
+        return torch.from_numpy(self._spread(values.numpy()))
+
     def maps(self, values: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Textures of values [m, 8]: albedo [h, w, 3], roughness and metallic [h, w, 2], normals [h, w, 3]."""
-        image = torch.from_numpy(self._spread(values.numpy()))
+        image = self.spread(values)
         return tuple(part.contiguous() for part in image.split([3, 2, 3], dim=2))
 
     def asset_with(self, maps: tuple[Tensor, Tensor, Tensor]) -> Asset:

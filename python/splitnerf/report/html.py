@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -11,9 +10,11 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
-from splitnerf.data.images import atomic_path, encode_png, linear_to_srgb, over_background
+from splitnerf.data.images import atomic_path, linear_to_srgb, over_background
 from splitnerf.evaluate.metrics import psnr
 from splitnerf.report.curves import line_chart
+from splitnerf.report.last_stage import last_stage_section
+from splitnerf.report.pictures import WHITE_PER_MEAN, data_uri, tonemapped, white_of
 
 COLUMNS = {
     "rgb": "image",
@@ -25,7 +26,6 @@ COLUMNS = {
     "occlusion_specular": "occlusion, specular",
 }
 FOLD_ROWS = 14
-WHITE_PER_MEAN = 3
 
 
 def write_report(
@@ -38,6 +38,7 @@ def write_report(
     light_truth: np.ndarray | None,
     history: Sequence[Mapping],
     timings: Mapping[str, float],
+    last_stage: Mapping | None = None,
 ) -> None:
     """Writes a self-contained HTML page, atomically.
 
@@ -55,6 +56,7 @@ def write_report(
         light_truth: [h, w, 3] linear radiance, or None.
         history: Lines of `metrics.jsonl`: `step`, `loss`, `psnr`, `loss_*`; each but `step` optional.
         timings: Seconds by part of the run.
+        last_stage: What the last stage changed, see :func:`splitnerf.report.last_stage.last_stage_section`; None without one.
 
     Raises:
         OSError: The page cannot be written.
@@ -71,6 +73,7 @@ def write_report(
         tables=tables[1:],
         fold_rows=FOLD_ROWS,
         views=[_view(view) for view in views],
+        last_stage=None if last_stage is None else last_stage_section(last_stage),
         lights=_lights(lights, light_truth),
         charts=_charts(history),
         timings=[
@@ -131,7 +134,7 @@ def _map_picture(maps: Mapping, key: str) -> Markup:
     alpha = np.asarray(maps.get("alpha", np.ones(values.shape[:2])), dtype=np.float32)
     if key == "normal" and "normal_mask" in maps:
         alpha = alpha * maps["normal_mask"]
-    return _data_uri(np.concatenate([values, alpha[..., None]], axis=2))
+    return data_uri(np.concatenate([values, alpha[..., None]], axis=2))
 
 
 def _lights(lights: Sequence[Mapping], light_truth: np.ndarray | None) -> dict | None:
@@ -141,35 +144,23 @@ def _lights(lights: Sequence[Mapping], light_truth: np.ndarray | None) -> dict |
     columns, notes = [], []
     if lights:
         sharpest = min(lights, key=lambda light: light["roughness"])
-        white = _white(sharpest["g"])
+        white = white_of(sharpest["g"])
         notes.append(f"recovered light divided by {white:.3g}")
         for light in lights:
             estimate = light.get("g_bar")
             columns.append(
                 {
                     "name": f"ρ = {light['roughness']:g}",
-                    "g": _tonemapped(light["g"], white),
-                    "g_bar": None if estimate is None else _tonemapped(estimate, white),
+                    "g": tonemapped(light["g"], white),
+                    "g_bar": None if estimate is None else tonemapped(estimate, white),
                 }
             )
     if light_truth is not None:
-        white = _white(light_truth)
+        white = white_of(light_truth)
         notes.append(f"true light divided by {white:.3g}")
-        columns.append({"name": "true light", "g": _tonemapped(light_truth, white), "g_bar": None})
+        columns.append({"name": "true light", "g": tonemapped(light_truth, white), "g_bar": None})
     note = f"Exposure: {', '.join(notes)} ({WHITE_PER_MEAN} times the mean radiance), clipped to [0, 1], sRGB."
     return {"columns": columns, "note": note}
-
-
-def _white(radiance: np.ndarray) -> float:
-    return max(WHITE_PER_MEAN * float(np.mean(radiance)), 1e-6)
-
-
-def _tonemapped(radiance: np.ndarray, white: float) -> Markup:
-    return _data_uri(linear_to_srgb(np.clip(np.nan_to_num(np.asarray(radiance, np.float32)) / white, 0, 1)))
-
-
-def _data_uri(pixels: np.ndarray) -> Markup:
-    return Markup("data:image/png;base64," + base64.b64encode(encode_png(pixels)).decode())
 
 
 def _charts(history: Sequence[Mapping]) -> list[Markup]:

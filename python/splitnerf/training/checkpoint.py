@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-import pickletools
-import zipfile
 from pathlib import Path
 
 import torch
 from torch import Tensor, nn
 
 from splitnerf.config import Config
-from splitnerf.data.images import atomic_path
+from splitnerf.data.tensor_files import check_tensor, read_tensors, write_tensors
 from splitnerf.errors import InputError
 from splitnerf.ops.hash_grid import HashGridSpec
 from splitnerf.render.occupancy import OccupancyGrid
 
 FORMAT = 1
-GLOBALS = {"torch._utils _rebuild_tensor_v2", "collections OrderedDict"}  # STORAGES holds the storage types
-STORAGES = {f"torch {kind}Storage" for kind in ("Float", "Double", "Long", "Int", "Byte", "Bool")}
-LONGEST_PICKLE = 1 << 22  # bytes; a checkpoint of a run has about ten thousand
 LARGEST = {"step": 1e12, "seconds": 1e12, "meshed_at": 1.0, "previewed_at": 1.0}
 MOMENTS = ("exp_avg", "exp_avg_sq")
 CACHED_LIGHT = (("sky", "aims", "sent", "senders"), ("sky", "sent"))  # now, and before rays were aimed
@@ -32,29 +26,12 @@ def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict
     Raises:
         OSError: The disk is full or the folder cannot be written; the old checkpoint is kept.
     """
-    with atomic_path(path) as temporary:
-        try:
-            content = {"format": FORMAT, "config": dataclasses.asdict(config), "fingerprint": fingerprint, **state}
-            torch.save(on_cpu(content), temporary)
-        except RuntimeError as error:  # torch raises this when the disk is full
-            raise OSError(f"{path}: the checkpoint could not be written ({error})") from error
-
-
-def on_cpu(content: object) -> object:
-    """A copy of nested dictionaries and lists with all tensors on the CPU, so that any machine can read them."""
-    if isinstance(content, Tensor):
-        return content.cpu()
-    if isinstance(content, dict):
-        return type(content)((key, on_cpu(value)) for key, value in content.items())
-    return [on_cpu(value) for value in content] if isinstance(content, list) else content
+    write_tensors(path, {"format": FORMAT, "config": dataclasses.asdict(config), "fingerprint": fingerprint, **state})
 
 
 def load_checkpoint(path: Path) -> dict:
-    """Reads a checkpoint from any source with torch's restricted unpickler.
-
-    The container is checked first: nothing in it is compressed, and its pickle names only tensors. So reading takes
-    about as much memory as the file has bytes. Then every value is checked: its type, shape and range are those that
-    the trainer writes.
+    """Reads a checkpoint from any source, see :func:`splitnerf.data.tensor_files.read_tensors`, and checks every value:
+    its type, shape and range are those that the trainer writes.
 
     Raises:
         InputError: The file is missing, truncated or of another format, or it holds values that the trainer does not
@@ -63,12 +40,10 @@ def load_checkpoint(path: Path) -> dict:
     if not path.is_file():
         raise InputError(f"{path}: no checkpoint there; train without --resume first")
     try:
-        _check_container(path)
-        content = torch.load(path, map_location="cpu", weights_only=True)
-        found = content["format"]
-    except Exception as error:  # zipfile and torch raise many types for a damaged file
-        reason = (str(error) or type(error).__name__).splitlines()[0]
-        raise InputError(f"{path}: not a readable checkpoint ({reason}); use another, or train anew") from None
+        content = read_tensors(path)
+    except ValueError as error:
+        raise InputError(f"{path}: not a readable checkpoint ({error}); use another, or train anew") from None
+    found = content["format"]
     if found != FORMAT:
         raise InputError(f"{path}: checkpoint format {found}, this version reads {FORMAT}")
     try:
@@ -142,30 +117,6 @@ def restored_grid(grid: OccupancyGrid, content: dict, path: Path) -> tuple[Tenso
     return stored[0].to(grid.device), stored[1].to(grid.device)
 
 
-def _check_container(path: Path) -> None:
-    """Raises ValueError where reading could take more memory than the file has bytes, or names more than tensors."""
-    with zipfile.ZipFile(path) as archive:
-        entries = archive.infolist()
-        if any(
-            entry.compress_type != zipfile.ZIP_STORED or entry.file_size != entry.compress_size for entry in entries
-        ):
-            raise ValueError("its parts are compressed")
-        if sum(entry.file_size for entry in entries) > path.stat().st_size:
-            raise ValueError("its parts are longer than the file")
-        for entry in entries:
-            if entry.filename.endswith(".pkl"):
-                if entry.file_size > LONGEST_PICKLE:
-                    raise ValueError("its pickle is too long")
-                _check_pickle(archive.read(entry))
-
-
-def _check_pickle(pickled: bytes) -> None:
-    for operation, argument, _ in pickletools.genops(pickled):
-        named = "GLOBAL" in operation.name or operation.name in ("INST", "OBJ", "NEWOBJ", "NEWOBJ_EX")
-        if named and argument not in GLOBALS | STORAGES:
-            raise ValueError(f"it asks for {argument or operation.name}")
-
-
 def _check_content(content: dict) -> None:
     """Raises ValueError or InputError where a value is not what the trainer writes."""
     kinds = {"config": dict, "fingerprint": str, "step": int, "seconds": float, "n_rays": int, "meshed_at": float,
@@ -180,27 +131,27 @@ def _check_content(content: dict) -> None:
     if not 1 <= content["n_rays"] <= max(config.sampling.initial_rays, config.sampling.max_rays):
         raise ValueError(f"n_rays is {content['n_rays']}")
     for name, parameter in content["model"].items():
-        _check_tensor(f"parameter {name}", parameter, None, torch.float32)
+        check_tensor(f"parameter {name}", parameter, None, torch.float32)
     state = content["optimiser"].get("state")
     if not isinstance(state, dict) or not all(isinstance(moments, dict) for moments in state.values()):
         raise ValueError("the optimiser's state is missing")
     for moments in state.values():
-        _check_tensor("the optimiser's step", moments.get("step"), (), torch.float32)
+        check_tensor("the optimiser's step", moments.get("step"), (), torch.float32)
         for name in MOMENTS:
-            _check_tensor(f"the optimiser's {name}", moments.get(name), None, torch.float32)
+            check_tensor(f"the optimiser's {name}", moments.get(name), None, torch.float32)
     if content.get("device") not in ("cpu", "cuda"):
         raise ValueError(f"device is {content.get('device')!r}")
     for key in ("generator", "torch_generator"):
-        _check_tensor(key, content.get(key), (-1,), torch.uint8)
+        check_tensor(key, content.get(key), (-1,), torch.uint8)
     resolution = config.sampling.grid_resolution
-    _check_tensor("occupancy", content.get("occupancy"), (resolution**3,), torch.float32)
-    _check_tensor("cells", content.get("cells"), (resolution,) * 3, torch.uint8)
+    check_tensor("occupancy", content.get("occupancy"), (resolution**3,), torch.float32)
+    check_tensor("cells", content.get("cells"), (resolution,) * 3, torch.uint8)
     _check_sizes(config, content["model"])
-    _check_tensor("box_from_world", content.get("box_from_world"), (4, 4), torch.float64)
+    check_tensor("box_from_world", content.get("box_from_world"), (4, 4), torch.float64)
     vertices, faces = content.get("mesh_vertices"), content.get("mesh_faces")
     if vertices is not None or faces is not None:
-        _check_tensor("mesh_vertices", vertices, (-1, 3), torch.float32)
-        _check_tensor("mesh_faces", faces, (-1, 3), torch.int32, torch.int64)
+        check_tensor("mesh_vertices", vertices, (-1, 3), torch.float32)
+        check_tensor("mesh_faces", faces, (-1, 3), torch.int32, torch.int64)
         if not (faces.numel() and 0 <= int(faces.min()) and int(faces.max()) < len(vertices)):
             raise ValueError("mesh_faces is empty or names vertices that are none")
     _check_light(config, content)
@@ -208,10 +159,10 @@ def _check_content(content: dict) -> None:
 
 def _check_light(config: Config, content: dict) -> None:
     """Raises ValueError where the cached light, stored in addition to the parameters, does not fit the settings."""
-    _check_tensor("light_noise", content.get("light_noise"), (2,), torch.float64)
+    check_tensor("light_noise", content.get("light_noise"), (2,), torch.float64)
     height, cached = config.occlusion.environment_height, content.get("occlusion_light")
     if content.get("environment") is not None:
-        _check_tensor("environment", content["environment"], (height, 2 * height, 3), torch.float32)
+        check_tensor("environment", content["environment"], (height, 2 * height, 3), torch.float32)
     has_mesh = content.get("mesh_vertices") is not None
     kinds = CACHED_LIGHT if config.occlusion.kind == "bits" else ((),)
     if not isinstance(cached, dict) or cached.keys() not in map(set, kinds):
@@ -222,20 +173,20 @@ def _check_light(config: Config, content: dict) -> None:
 
 def _check_bits(cached: dict, k: int, n_vertices: int) -> None:
     """Raises ValueError where the cached light is not that of bits of k directions on a mesh of so many vertices."""
-    _check_tensor("the sky's light", cached["sky"], (k, 3), torch.float32)
+    check_tensor("the sky's light", cached["sky"], (k, 3), torch.float32)
     if "aims" in cached:
-        _check_tensor("the traced directions", cached["aims"], (k, 3), torch.float32)
+        check_tensor("the traced directions", cached["aims"], (k, 3), torch.float32)
         if (cached["aims"].norm(dim=1) - 1.0).abs().max() > 1e-3:
             raise ValueError("the traced directions are not of length 1")
     n, senders = n_vertices, cached.get("senders")
     if senders is None and cached["sent"] is None:
         return
     if "senders" in cached:
-        _check_tensor("the number of each sender", senders, (-1,), torch.int64)
+        check_tensor("the number of each sender", senders, (-1,), torch.int64)
         n = len(senders)
         if n and not (senders[0] >= 0 and senders[-1] < n_vertices * k and (senders[1:] > senders[:-1]).all()):
             raise ValueError("the numbers of the senders do not ascend, or name vertices that are none")
-    _check_tensor("the light that the mesh sends", cached["sent"], (n, 3), torch.float32)
+    check_tensor("the light that the mesh sends", cached["sent"], (n, 3), torch.float32)
 
 
 def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:
@@ -250,15 +201,3 @@ def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:
     for name, size in sizes.items():
         if name not in parameters or parameters[name].numel() != size:
             raise ValueError(f"parameter {name} does not fit the settings")
-
-
-def _check_tensor(name: str, value: object, shape: tuple[int, ...] | None, *dtypes: torch.dtype) -> None:
-    """Raises ValueError where a value is no tensor of this shape and dtype. Shape None allows any shape, -1 any
-    size."""
-    fits = type(value) is Tensor and value.dtype in dtypes and value.is_contiguous()
-    if fits and shape is not None:
-        fits = len(shape) == value.dim() and all(a in (-1, b) for a, b in zip(shape, value.shape))
-    if not fits:
-        raise ValueError(f"{name} is missing or of another type or shape")
-    if not (math.isfinite(value.sum().item()) or value.isfinite().all()):
-        raise ValueError(f"{name} has NaN or infinite values")

@@ -19,6 +19,7 @@ from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight
 from splitnerf.ops import MeshScene
 from splitnerf.outputs import write_preview
+from splitnerf.progress import Interrupt, Progress
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
@@ -37,7 +38,6 @@ from splitnerf.training.graphs import GraphedStep
 from splitnerf.training.losses import Term
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
-from splitnerf.training.progress import Interrupt, Progress
 from splitnerf.training.repeatable import same_bits
 from splitnerf.training.schedule import light_moves, light_period, next_ray_count
 from splitnerf.training.step import Step
@@ -48,7 +48,8 @@ ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the o
 
 @dataclass
 class TrainedScene:
-    """The scene that a finished or interrupted training leaves in memory."""
+    """The scene that a finished or interrupted training leaves in memory; `n_new` of its steps were made since it began or
+    was resumed."""
 
     model: SceneModel
     grid: OccupancyGrid
@@ -56,6 +57,7 @@ class TrainedScene:
     step: int
     seconds: float
     finished: bool
+    n_new: int
 
 
 class StepNumbers(NamedTuple):
@@ -146,6 +148,7 @@ class Training:
         self.psnr_mean: float | None = None
         self.started = self.saved_at = time.monotonic()
         self.first = True  # step of the run
+        self.resumed_at = 0
 
     def restore(self) -> None:
         """Restores the state from the run's checkpoint."""
@@ -165,7 +168,7 @@ class Training:
         self.mesh.restore(content)
         if content["occlusion_light"]:
             self.model.occlusion.restore_light(content["occlusion_light"])
-        self.first = self.step == 0
+        self.first, self.resumed_at = self.step == 0, self.step
         self.started = time.monotonic() - self.seconds
 
     def save(self) -> None:
@@ -187,7 +190,7 @@ class Training:
     def progress(self) -> float:
         """The progress of the schedule, in [0, 1]."""
         c = self.config
-        by_time = self.seconds / (60.0 * c.run.max_minutes) if c.run.max_minutes > 0 else 0.0
+        by_time = self.seconds / (60.0 * c.training_minutes) if c.training_minutes > 0 else 0.0
         return min(1.0, max(self.step / c.run.steps, by_time))
 
     @property
@@ -241,7 +244,7 @@ class Training:
             self.psnr_mean = psnr if self.psnr_mean is None else 0.95 * self.psnr_mean + 0.05 * psnr
         self.n_rays = next_ray_count(self.n_rays, numbers.n_samples, c)
         self.step, self.first, self.seconds = self.step + 1, False, time.monotonic() - self.started
-        bar.show(self.progress, self.step, self.psnr_mean, numbers.n_evaluated / len(batch.target))
+        bar.show(self.progress, self.told(numbers.n_evaluated / len(batch.target)))
         if self.step % LOG_EVERY == 0 or self.step <= LOG_EVERY or self.progress >= 1.0:
             check_state(self.step, self.model, self.optimiser)
             log.write(json.dumps(self.line(batch, terms, numbers)) + "\n")
@@ -260,6 +263,11 @@ class Training:
         loss = sum(term.weight * value for term, value in zip(terms.values(), values))
         is_complete = self.take_step.is_complete(n_shaded, n_segments)
         return StepNumbers(dict(zip(terms, values)), loss, largest, n_samples, n_evaluated, n_shaded, is_complete)
+
+    def told(self, samples_per_ray: float) -> str:
+        """What the bar tells of a step: its number, the batches' mean PSNR in dB and the samples per ray."""
+        psnr = "" if self.psnr_mean is None else f"PSNR {self.psnr_mean:.2f} dB, "
+        return f"step {self.step} {psnr}{samples_per_ray:.1f} samples/ray"
 
     def line(self, batch: Batch, terms: dict[str, Term], numbers: StepNumbers) -> dict[str, object]:
         """The values of one line of metrics.jsonl, by name."""
@@ -290,7 +298,7 @@ class Training:
 
     def result(self) -> TrainedScene:
         """The scene as the training leaves it in memory."""
-        return TrainedScene(self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0)
+        return TrainedScene(self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0, self.step - self.resumed_at)
 
 
 def check_repeatable(config: Config, device: torch.device | str) -> None:

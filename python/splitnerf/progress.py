@@ -29,8 +29,7 @@ class Interrupt:
 
 
 class Progress:
-    """Shows the share done, the time left, the batch's PSNR in dB and the samples per ray: as a bar on a terminal,
-    elsewhere as a line every ten seconds."""
+    """Shows the share done, the time left and a text: as a bar on a terminal, elsewhere as a line every ten seconds."""
 
     def __init__(self, start: float):
         self._is_terminal = sys.stderr.isatty()
@@ -43,8 +42,7 @@ class Progress:
     def __enter__(self) -> Progress:
         return self
 
-    def show(self, progress: float, step: int, psnr: float | None, samples_per_ray: float) -> None:
-        told = f"step {step} " + (f"PSNR {psnr:.2f} dB, " if psnr is not None else "") + f"{samples_per_ray:.1f} samples/ray"
+    def show(self, progress: float, told: str) -> None:
         if self._is_terminal:
             self._bar.set_postfix_str(told, refresh=False)
             self._bar.update(100.0 * progress - self._bar.n)

@@ -1,0 +1,253 @@
+"""From a trained scene to what a run delivers: the export, the last stage, the scores and the report."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from splitnerf.config import Config
+from splitnerf.data.asset import Asset
+from splitnerf.data.dataset import Dataset, spread
+from splitnerf.data.environment import read_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import over_background, read_image
+from splitnerf.data.json_files import read_json, write_json
+from splitnerf.data.truth import load_scene_truth, load_view_truths
+from splitnerf.errors import InputError
+from splitnerf.evaluate.asset import asset_predictions
+from splitnerf.evaluate.jobs import Evaluated, Protocol, asset_mesh, relit_scores, score_asset
+from splitnerf.evaluate.lpips import load_distance
+from splitnerf.export.meshing import EmptyMesh
+from splitnerf.notes import note
+from splitnerf.outputs import evaluate_scene, light_panels, write_assets
+from splitnerf.refinement.fit import RefinementSettings
+from splitnerf.refinement.job import RECORD, STATE, TRAINED, OtherState, decibels, forget_state, refine_folder
+from splitnerf.refinement.uncertainty import painted_with
+from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import OccupancyGrid
+from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.report import write_report
+from splitnerf.training.loop import TrainedScene
+from splitnerf.training.repeatable import same_bits
+
+ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
+LAST_STAGE_FILES = (RECORD, STATE, "uncertainty.exr", *(f"{TRAINED}/{name}" for name in ASSET_FILES))
+REPORT_VIEWS = 4
+VIEW_BUDGET = 1 << 20  # pixels of the test views that a run scores by path tracing at its end, REPORT_VIEWS views aside
+UNCERTAIN_SPP = 16
+
+
+def is_refined(run: Path) -> bool:
+    """Whether a run delivers what a last stage fitted."""
+    return (run / RECORD).is_file() and (run / "mesh.glb").is_file()
+
+
+def export_folder(run: Path) -> Path:
+    """Where a run's trained asset is written: the run, or RUN/trained where the run delivers a refined one."""
+    return run / TRAINED if is_refined(run) else run
+
+
+def finish(trained: TrainedScene, dataset: Dataset, test: Dataset | None, run: Path, *, resume: bool) -> dict | None:
+    """Makes the files of a trained run: meshes, environment, evaluation and report, after a last stage if it has one.
+
+    Without a surface (:class:`EmptyMesh`) the environment, the evaluation and the report are still written.
+
+    Args:
+        trained: The scene.
+        dataset, test: The train split, and the test split or None.
+        run: The run's folder.
+        resume: Whether to go on with the last stage, if the scene has not changed since it was interrupted.
+
+    Returns:
+        The evaluation; None where the last stage was interrupted.
+    """
+    config, timings, mesh, failure = trained.model.config, {"training": trained.seconds}, None, None
+    last_stage = config.refinement.enabled
+    if not (last_stage and resume and trained.n_new == 0 and (run / STATE).is_file()):
+        clock = time.monotonic()
+        discard_last_stage(run)
+        try:
+            mesh = write_assets(run, trained.model, dataset.box_from_world).mesh
+        except EmptyMesh as error:
+            failure = error
+        timings["export"] = time.monotonic() - clock
+    if last_stage and not failure and not refine_trained(run, dataset, config, resume):
+        return None
+    clock = time.monotonic()
+    views = test if test is not None else dataset
+    if is_refined(run):
+        n = max(REPORT_VIEWS, VIEW_BUDGET // (views.height * views.width))
+        views = views.select(spread(range(len(views)), min(n, len(views))))
+    evaluated = score_run(run, trained.model, trained.grid, views, mesh, timings, {}, Protocol.spp)
+    write_json(run / "evaluation.json", evaluated.scores)
+    timings["evaluation"] = time.monotonic() - clock
+    write_run_report(run, trained.model, evaluated, timings)
+    forget_state(run)
+    if failure:
+        raise failure
+    return evaluated.scores
+
+
+def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool) -> bool:
+    """Makes the last stage of a run, from what training exported to the run or, in a run that goes on, to RUN/trained.
+
+    Photos or an asset that it cannot use leave it out, with a note; the run then delivers what training exported.
+
+    Returns:
+        False where it was interrupted.
+
+    Raises:
+        RuntimeError: Numbers are no longer finite; the run delivers what training exported.
+        OSError: A file cannot be written.
+    """
+    move_assets(run, run / TRAINED)
+    settings = RefinementSettings(
+        sweeps=config.refinement_sweeps, minutes=config.refinement_minutes, seed=abs(config.run.seed) % (1 << 31)
+    )
+    try:
+        with same_bits(config.run.deterministic):
+            refined = refine_folder(
+                run / TRAINED, dataset, run, settings, resume=resume, save_minutes=config.run.checkpoint_minutes
+            )
+    except OtherState:
+        raise
+    except InputError as error:
+        move_assets(run / TRAINED, run)
+        note(f"{run}: without a last stage, as {error}")
+        return True
+    except RuntimeError:
+        move_assets(run / TRAINED, run)
+        raise
+    return refined is not None
+
+
+def move_assets(source: Path, target: Path) -> None:
+    """Moves the asset and its light, as far as they are there."""
+    target.mkdir(exist_ok=True)
+    for name in ASSET_FILES:
+        if (source / name).is_file():
+            os.replace(source / name, target / name)
+
+
+def discard_last_stage(run: Path) -> None:
+    """Deletes what a last stage wrote beside the asset, and what it started from."""
+    for name in LAST_STAGE_FILES:
+        (run / name).unlink(missing_ok=True)
+    if (run / TRAINED).is_dir() and not any((run / TRAINED).iterdir()):
+        (run / TRAINED).rmdir()
+
+
+def score_run(
+    run: Path, model: SceneModel, grid: OccupancyGrid, views: Dataset, mesh: trimesh.Trimesh | None, timings: dict[str, float],
+    maps: dict[str, Path], spp: int,
+) -> Evaluated:  # fmt: skip
+    """Scores what a run delivers: the asset and its light by path tracing after a last stage, else the trained fields.
+
+    Args:
+        run: The run's folder.
+        model, grid: The trained scene.
+        views: The views.
+        mesh: The trained mesh before its decimation, which is scored with the fields; None for that of mesh.glb.
+        timings: Seconds by part, "training" at least; that of a last stage is added.
+        maps: Environment maps of relit views by name, which are rendered of mesh.glb.
+        spp: Paths a pixel.
+    """
+    asset = read_asset(run / "mesh.glb") if (run / "mesh.glb").is_file() else None
+    if is_refined(run):
+        timings["last stage"] = read_json(run / RECORD, "seconds")["seconds"]
+        seconds = round(timings["training"] + timings["last stage"], 1)
+        evaluated = score_asset(asset, read_environment(run / "environment.exr"), views, maps, spp, seconds)
+        return replace(evaluated, scores=evaluated.scores | {"last_stage": last_stage_summary(run)})
+    relit, relight = (None, None) if asset is None else relit_scores(AssetRenderer(asset), views, maps, spp)
+    mesh = asset_mesh(asset) if mesh is None and asset is not None else mesh
+    scores, predictions = evaluate_scene(model, grid, views, mesh, timings["training"], relight, load_distance())
+    return Evaluated(scores, views, predictions, load_view_truths(views), relit)
+
+
+def last_stage_summary(run: Path) -> dict:
+    """What the last stage of a run changed, in numbers: pairs are before and after."""
+    record = read_json(run / RECORD, "sweeps")
+    sweeps, outline = record["sweeps"], record["outline"]
+    return {
+        "steps": len(sweeps), "seconds": record["seconds"],
+        "photos_psnr": [decibels(sweeps[i]["error"]) for i in (0, -1)],
+        "outline_error": [outline[0], outline[-1]] if outline else None,
+        "saturated": record["saturated"], "deviation": record["noise"] ** 0.5,
+    }  # fmt: skip
+
+
+def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings: dict[str, float]) -> None:
+    """report.html: maps beside the truth, what the last stage changed, the light, curves and settings."""
+    views, predictions, truths = evaluated.dataset, evaluated.predictions, evaluated.truths
+    shown = spread(range(len(views)), REPORT_VIEWS)
+    pages = []
+    for i in shown:
+        prediction = dict(predictions[i])
+        for old, new in (("occlusion_d", "occlusion_diffuse"), ("occlusion_s", "occlusion_specular")):
+            if old in prediction:
+                prediction[new] = prediction.pop(old)
+        truth = {key: value for key, value in vars(truths[i]).items() if key != "name"}
+        truth |= {"rgb": views.images[i, ..., :3], "alpha": views.images[i, ..., 3]}
+        pages.append({"name": views.frame_names[i], "truth": truth, "prediction": prediction})
+    lines = (run / "metrics.jsonl").read_text().splitlines()
+    write_report(
+        run / "report.html",
+        title=views.name,
+        summary={"Result": headline(evaluated.scores), "All scores": evaluated.scores, "Settings": asdict(model.config)},
+        views=pages,
+        last_stage=last_stage_page(run, views, predictions, shown, evaluated.scores) if is_refined(run) else None,
+        lights=light_panels(model),
+        light_truth=load_scene_truth(views.root).light,
+        history=[json.loads(line) for line in lines],
+        timings=timings,
+    )
+
+
+def last_stage_page(run: Path, views: Dataset, predictions: list[dict], shown: list[int], scores: dict) -> dict | None:
+    """What the report shows of the last stage, see :func:`splitnerf.report.write_report`; None where a file
+    that it shows is gone."""
+    source = run / TRAINED
+    needed = [run / "uncertainty.exr", *(folder / name for folder in (source, run) for name in ASSET_FILES[:2])]
+    if not all(path.is_file() for path in needed):
+        return None
+    chosen = views.select(shown)
+    lights = [read_environment(folder / "environment.exr") for folder in (source, run)]
+    before = asset_predictions(AssetRenderer(read_asset(source / "mesh.glb")), chosen, lights[0], scores["spp"])
+    uncertain = uncertain_maps(read_asset(run / "mesh.glb"), read_image(run / "uncertainty.exr"), chosen)
+    pages = []
+    for k, i in enumerate(shown):
+        photo, coverage = views.images[i, ..., :3], views.images[i, ..., 3]
+        pictures = [over_background(photo, coverage)]
+        pictures += [over_background(p["rgb"], p["alpha"]) for p in (before[k], predictions[i])]
+        errors = [float(np.square(p["alpha"] - coverage).mean()) for p in (before[k], predictions[i])]
+        pages.append({"name": views.frame_names[i], "pictures": pictures, "coverage": errors, "uncertain": uncertain[k]})
+    return {"views": pages, "summary": scores["last_stage"], "lights": lights}
+
+
+def uncertain_maps(asset: Asset, deviations: np.ndarray, views: Dataset) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Per view the deviations [H, W, 4] at the points seen, and the coverage [H, W]."""
+    maps = asset_predictions(AssetRenderer(painted_with(asset, deviations)), views, None, UNCERTAIN_SPP)
+    return [(np.dstack([m["albedo"], m["roughness"][..., None]]), m["alpha"]) for m in maps]
+
+
+def headline(evaluation: dict) -> dict[str, float]:
+    """The most important scores; scores without truth in the data are left out."""
+    novel_view, relight, albedo = (evaluation[key] or {} for key in ("novel_view", "relight", "albedo"))
+    scores = {
+        "novel views, PSNR dB": novel_view.get("psnr"),
+        "novel views, SSIM": novel_view.get("ssim"),
+        "relit views, PSNR dB": relight.get("psnr"),
+        "albedo, PSNR dB": albedo.get("psnr"),
+        "normals, degrees": evaluation["normal_mae_deg"],
+        "roughness, mean error": evaluation["roughness_mae"],
+        "metallic, accuracy": evaluation["metallic_balanced_accuracy"],
+        "light, PSNR dB": evaluation["light_psnr"],
+        "mesh, F-score": evaluation["f_score"],
+    }
+    return {name: value for name, value in scores.items() if value is not None}

@@ -1,0 +1,45 @@
+"""What texels of one colour have in common: a prior for the roughness of those about which the photos say little."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy.cluster.vq import kmeans2, vq
+from torch import Tensor
+
+N_COLOURS = 24
+N_SEEN = 20000  # texels by which colours and medians are found
+ROUGHNESS = 3  # its place among the unknowns
+
+
+def with_like_roughness(unknowns: Tensor, certainty: Tensor, seed: int) -> Tensor:
+    """The unknowns [m, n] with the usual roughness of each texel's colour: the median, weighted by certainty.
+
+    Args:
+        unknowns: See :mod:`splitnerf.refinement.unknowns`.
+        certainty: [m] how much is known of each texel's roughness, at least 0, in any unit.
+        seed: The seed of the texels by which colours and medians are found.
+    """
+    random = np.random.default_rng(seed)
+    colours = unknowns[:, :3].double().numpy()
+    seen = random.permutation(len(colours))[:N_SEEN]
+    apart = random.normal(scale=1e-3, size=(len(seen), 3))  # equal colours make no clusters
+    centres, _ = kmeans2(colours[seen] + apart, min(N_COLOURS, len(seen)), minit="++", seed=random)
+    label, _ = vq(colours, centres)
+    usual = unknowns[:, ROUGHNESS].numpy()[seen].copy()
+    of_colour = np.full(len(centres), np.nan, np.float32)
+    weights = certainty.numpy()[seen] + 1e-12
+    for number in np.unique(label[seen]):
+        chosen = np.flatnonzero(label[seen] == number)
+        of_colour[number] = weighted_median(usual[chosen], weights[chosen])
+    result = unknowns.clone()
+    roughness = torch.from_numpy(of_colour[label])
+    result[:, ROUGHNESS] = torch.where(roughness.isnan(), result[:, ROUGHNESS], roughness)
+    return result
+
+
+def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
+    """The value [n] at which half of the weights [n] is reached."""
+    order = np.argsort(values)
+    mass = np.cumsum(weights[order], dtype=np.float64)
+    return float(values[order][np.searchsorted(mass, 0.5 * mass[-1])])

@@ -1,0 +1,328 @@
+"""The last stage of a run: what is delivered and scored, how it ends, how it goes on, what it says."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import re
+import shutil
+import signal
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from test_refinement import ball, painted, sky, with_textures  # noqa: F401, fixtures among them
+from tiny_runs import train
+
+from splitnerf import delivery
+from splitnerf.cli import BAD_INPUT, DONE, INTERRUPTED, main
+from splitnerf.cli.summary import print_last_stage
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import read_image
+from splitnerf.data.tensor_files import read_tensors
+from splitnerf.errors import InputError
+from splitnerf.evaluate.jobs import Protocol, score_asset
+from splitnerf.export.environment import write_environment
+from splitnerf.export.glb import write_glb
+from splitnerf.refinement import job
+from splitnerf.refinement.fit import RefinementSettings, Stage
+from splitnerf.refinement.job import OtherState, refine_folder
+from splitnerf.report.last_stage import KNOWN_COLOURS, UNKNOWN_COLOURS, coloured, last_stage_section
+
+REFINED = ("--set", "refine=true", "--set", "refinement_sweeps=2")
+DELIVERED = ("mesh.glb", "environment.exr", "environment.hdr", "uncertainty.exr", "refinement.json")
+
+
+@pytest.fixture(scope="module")
+def scene(data, tmp_path_factory) -> Path:
+    """The tiny data without a true mesh, from which distances would take most of the time."""
+    copy = shutil.copytree(data, tmp_path_factory.mktemp("last_stage") / "data")
+    (copy / "mesh.ply").unlink()
+    return copy
+
+
+@pytest.fixture(scope="module")
+def run(scene, tmp_path_factory) -> Path:
+    """A run with a last stage."""
+    folder = tmp_path_factory.mktemp("refined") / "run"
+    assert train(scene, folder, "--steps", "25", "--deterministic", *REFINED) == DONE
+    return folder
+
+
+def bytes_of(run: Path, *names: str) -> list[bytes]:
+    """The files' contents, those of EXR files without their date."""
+    return [read_image(run / n).tobytes() if n.endswith(".exr") else (run / n).read_bytes() for n in names]
+
+
+# ---- what a run holds ----
+
+
+def test_a_run_delivers_what_was_fitted_and_keeps_what_was_trained(run):
+    assert all((run / name).stat().st_size > 0 for name in (*DELIVERED, "mesh.ply", "evaluation.json", "report.html"))
+    assert not (run / "refinement.pt").exists()
+    fitted, trained = read_asset(run / "mesh.glb"), read_asset(run / "trained" / "mesh.glb")
+    assert np.array_equal(fitted.triangles, trained.triangles) and not np.allclose(fitted.vertices, trained.vertices, atol=1e-5)
+    assert not np.array_equal(*(read_image(folder / "environment.exr") for folder in (run, run / "trained")))
+    deviations = read_image(run / "uncertainty.exr")
+    assert deviations.shape == (64, 64, 4) and deviations.min() > 0 and deviations[..., :3].max() < 0.29
+
+
+def test_what_is_delivered_is_what_is_scored(run, scene):
+    """By path tracing, the light with it; a later evaluation says the same."""
+    scores = json.loads((run / "evaluation.json").read_text())
+    assert scores["scored"] == "asset" and scores["spp"] == Protocol.spp
+    from splitnerf.data.dataset import load_dataset
+
+    own = score_asset(
+        read_asset(run / "mesh.glb"), read_image(run / "environment.exr"), load_dataset(scene, "test"), {}, Protocol.spp
+    ).scores
+    for key in ("novel_view", "albedo", "roughness_mae", "light_psnr"):
+        assert scores[key] == own[key], key
+    record = json.loads((run / "refinement.json").read_text())
+    assert scores["seconds"] > record["seconds"] > 0 and len(record["sweeps"]) == 2
+    before = (run / "evaluation.json").read_bytes()
+    assert main(["evaluate", str(run), "--data", str(scene)]) == DONE
+    again = json.loads((run / "evaluation.json").read_text())
+    assert again == json.loads(before)
+
+
+def test_without_a_last_stage_the_fields_are_scored(scene, tmp_path):
+    run = tmp_path / "run"
+    assert train(scene, run, "--steps", "12", "--set", "refine=true", "--no-refine") == DONE
+    assert json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
+    assert not (run / "trained").exists() and not any((run / name).exists() for name in DELIVERED[3:])
+    assert "The last stage" not in (run / "report.html").read_text()
+
+
+def test_another_run_in_the_folder_leaves_nothing_of_the_last_stage(run, scene, tmp_path):
+    again = shutil.copytree(run, tmp_path / "run")
+    assert train(scene, again, "--steps", "12", "--overwrite") == DONE
+    assert not (again / "trained").exists() and not any((again / name).exists() for name in DELIVERED[3:])
+    # And so does a run that goes on without.
+    again = shutil.copytree(run, tmp_path / "on")
+    assert main(["train", str(scene), "--out", str(again), "--resume", "--no-refine"]) == DONE
+    assert not (again / "trained").exists() and not (again / "refinement.json").exists()
+    assert bytes_of(again, "mesh.glb") == bytes_of(run / "trained", "mesh.glb")
+
+
+def test_photos_that_cannot_be_fitted_leave_the_trained_asset(scene, tmp_path, capsys, monkeypatch):
+    def refuses(*args, **kwargs):
+        raise InputError("no pixel of the photos shows the asset")
+
+    monkeypatch.setattr(delivery, "refine_folder", refuses)
+    run = tmp_path / "run"
+    assert train(scene, run, "--steps", "12", *REFINED) == DONE
+    assert "without a last stage, as no pixel" in capsys.readouterr().err
+    assert (run / "mesh.glb").is_file() and json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
+
+
+def test_an_export_does_not_replace_what_the_last_stage_fitted(run, tmp_path, capsys):
+    run = shutil.copytree(run, tmp_path / "run")
+    kept = bytes_of(run, *DELIVERED)
+    options = ["--texture-size", "32", "--faces", "200"]
+    assert main(["export", str(run), "--out", str(run), *options]) == BAD_INPUT
+    assert "last stage" in capsys.readouterr().err
+    assert main(["export", str(run), *options]) == DONE
+    assert bytes_of(run, *DELIVERED) == kept
+    assert read_asset(run / "trained" / "mesh.glb").materials[0].albedo_texture.shape == (32, 32, 3)
+
+
+def test_refine_starts_from_what_was_trained(run, scene, tmp_path):
+    """The same command again on a refined run does what the last stage did."""
+    run = shutil.copytree(run, tmp_path / "run")
+    assert main(["refine", str(run), "--data", str(scene), "--sweeps", "2"]) == DONE
+    assert bytes_of(run / "refined", "mesh.glb", "environment.exr") == bytes_of(run, "mesh.glb", "environment.exr")
+
+
+# ---- its end, and going on ----
+
+
+def stop_after(monkeypatch, sweeps: int) -> None:
+    """Sends SIGINT to this process once a stage has made so many sweeps."""
+    advance = Stage.advance
+
+    def counted(stage):
+        sweep = advance(stage)
+        if sweep.number == sweeps:
+            os.kill(os.getpid(), signal.SIGINT)
+        return sweep
+
+    monkeypatch.setattr(Stage, "advance", counted)
+
+
+def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_another(run, scene, tmp_path, capsys, monkeypatch):
+    halves = tmp_path / "halves"
+    with monkeypatch.context() as patch:
+        stop_after(patch, 1)
+        assert train(scene, halves, "--steps", "25", "--deterministic", *REFINED) == INTERRUPTED
+    assert "in the last stage" in capsys.readouterr().out
+    assert (halves / "refinement.pt").is_file() and not (halves / "mesh.glb").exists()
+    trained = (halves / "trained" / "mesh.glb").stat().st_mtime_ns
+    assert main(["train", str(scene), "--out", str(halves), "--resume"]) == DONE
+    assert (halves / "trained" / "mesh.glb").stat().st_mtime_ns == trained and not (halves / "refinement.pt").exists()
+    assert bytes_of(halves, *DELIVERED[:4]) == bytes_of(run, *DELIVERED[:4])
+
+
+def test_more_steps_make_the_state_void(scene, tmp_path, monkeypatch):
+    run = tmp_path / "run"
+    with monkeypatch.context() as patch:
+        stop_after(patch, 1)
+        assert train(scene, run, "--steps", "12", *REFINED) == INTERRUPTED
+    before = bytes_of(run / "trained", "mesh.glb")
+    assert main(["train", str(scene), "--out", str(run), "--resume", "--steps", "20"]) == DONE
+    assert bytes_of(run / "trained", "mesh.glb") != before
+    assert len(json.loads((run / "refinement.json").read_text())["sweeps"]) == 2
+
+
+@pytest.fixture
+def folder(painted, tmp_path) -> Path:
+    """A folder with an asset of a wrong grey and its light."""
+    write_glb(tmp_path / "mesh.glb", with_textures(painted[0], albedo_texture=np.full((64, 64, 3), 0.35, np.float32)))
+    write_environment(tmp_path, sky())
+    return tmp_path
+
+
+QUICK = RefinementSettings(sweeps=4, sweep_share=0.1, pixels=256)
+
+
+def test_a_stage_goes_on_from_each_of_its_states(painted, folder, monkeypatch):
+    """Interrupted after every sweep, it ends with the bits of the whole; the time of all parts counts."""
+    whole = refine_folder(folder, painted[1], folder / "whole", QUICK)
+    for n in range(1, 4):
+        with monkeypatch.context() as patch:
+            stop_after(patch, n)
+            assert refine_folder(folder, painted[1], folder / "parts", QUICK, resume=n > 1) is None
+        content = read_tensors(folder / "parts" / "refinement.pt")
+        assert len(content["sweeps"]) == n and not (folder / "parts" / "mesh.glb").exists()
+    seconds = content["seconds"]
+    parts = refine_folder(folder, painted[1], folder / "parts", QUICK, resume=True)
+    assert parts.sweeps[-1].seconds > seconds > parts.sweeps[0].seconds and parts.outline == whole.outline
+    assert [s.error for s in parts.sweeps] == [s.error for s in whole.sweeps]
+    assert bytes_of(folder / "parts", *DELIVERED[:4]) == bytes_of(folder / "whole", *DELIVERED[:4])
+
+
+def test_the_state_is_kept_from_time_to_time(painted, folder, monkeypatch):
+    saved = []
+    monkeypatch.setattr(job, "write_tensors", lambda path, content: saved.append(len(content["sweeps"])))
+    refine_folder(folder, painted[1], folder, QUICK, save_minutes=1e-9)
+    assert saved == [1, 2, 3, 4]
+    saved.clear()
+    refine_folder(folder, painted[1], folder, QUICK, save_minutes=10.0)
+    assert saved == []
+
+
+def test_another_state_is_refused(painted, folder, monkeypatch):
+    """Of other settings, another asset, damaged, or of another form; sweeps and minutes may change."""
+    asset, data = painted
+    with monkeypatch.context() as patch:
+        stop_after(patch, 1)
+        refine_folder(folder, data, folder, QUICK)
+    state = (folder / "refinement.pt").read_bytes()
+
+    def refused(match: str, settings: RefinementSettings = QUICK) -> None:
+        with pytest.raises(OtherState, match=match):
+            refine_folder(folder, data, folder, settings, resume=True)
+
+    refused("settings", dataclasses.replace(QUICK, anchor=1.0))
+    content = read_tensors(folder / "refinement.pt")
+    for broken in (
+        {"vertices": content["vertices"][1:]}, {"vertices": np.nan * content["vertices"]}, {"sweeps": [[1.0]]}, {"outline": [None]},
+        {"fit": content["fit"] | {"light": content["fit"]["light"][1:]}}, {"fit": content["fit"] | {"random": {}}},
+        {"fit": content["fit"] | {"unknowns": content["fit"]["unknowns"][1:]}}, {"fit": None},
+    ):  # fmt: skip
+        torch.save(content | broken, folder / "refinement.pt")
+        refused("not the state")
+    (folder / "refinement.pt").write_bytes(state[:1000])
+    refused("not a readable state")
+    (folder / "refinement.pt").write_bytes(state)
+    longer = dataclasses.replace(QUICK, sweeps=2, minutes=5.0)
+    assert len(refine_folder(folder, data, folder, longer, resume=True).sweeps) == 2
+    (folder / "refinement.pt").write_bytes(state)
+    write_glb(folder / "mesh.glb", asset)
+    refused("another asset")
+
+
+def test_refine_can_be_interrupted_and_goes_on(run, scene, tmp_path, monkeypatch, capsys):
+    run = shutil.copytree(run, tmp_path / "run")
+    command = ["refine", str(run), "--data", str(scene), "--sweeps", "2"]
+    with monkeypatch.context() as patch:
+        stop_after(patch, 1)
+        assert main(command) == INTERRUPTED
+    assert "--resume" in capsys.readouterr().out
+    assert main([*command, "--resume"]) == DONE
+    assert bytes_of(run / "refined", "mesh.glb") == bytes_of(run, "mesh.glb") and not (run / "refined" / "refinement.pt").exists()
+
+
+def test_time_ends_a_stage_by_its_minutes(painted):
+    stage = Stage(painted[1], painted[0], sky(), dataclasses.replace(QUICK, minutes=1e-6, outline=False))
+    assert stage.progress == 0.0  # a first sweep is always made
+    stage.advance()
+    assert stage.progress == 1.0
+    stage.settings = dataclasses.replace(QUICK, minutes=1e6)
+    assert stage.progress == 0.25
+    stage.settings, stage.started = dataclasses.replace(QUICK, minutes=2.0), stage.started - 60.0
+    assert 0.5 < stage.progress < 0.6
+
+
+# ---- what it says ----
+
+
+def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
+    refine_folder(folder, painted[1], folder, QUICK)
+    assert re.search(r"100% .* last stage, step 4, photos [1-4]\d\.\d\d dB", capsys.readouterr().err)
+    summary = delivery.last_stage_summary(folder)
+    before, after = summary["photos_psnr"]
+    assert after > before and summary["steps"] == 4
+    print_last_stage(summary)
+    assert f"colours {before:.2f} -> {after:.2f} dB, coverage at the outline" in capsys.readouterr().out
+    print_last_stage(None)
+    assert capsys.readouterr().out == ""
+
+
+class Pictures(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.found = []
+
+    def handle_starttag(self, tag, attributes):
+        if tag == "img":
+            self.found.append(dict(attributes)["alt"])
+
+
+def test_the_report_shows_before_and_after_and_what_is_open(run):
+    page = (run / "report.html").read_text()
+    pictures = Pictures()
+    pictures.feed(page)
+    for name in ("before", "after", "error before x4", "error after x4"):
+        assert sum(alt.endswith(f", {name}") for alt in pictures.found) == 2, name  # test views
+    assert sum(alt.startswith("deviation of") for alt in pictures.found) == 8
+    for text in ("one factor per colour channel", "are saturated in the photos", "The last stage", "What the photos leave open"):
+        assert text in page
+
+
+def test_the_reports_numbers_are_those_of_its_pictures():
+    photo = np.full((8, 8, 3), 0.5)
+    uncertain = np.zeros((8, 8, 4))
+    uncertain[:2, :, 1] = 1.0
+    page = {
+        "views": [{"name": "a", "pictures": [photo, photo + 0.1, photo + 0.01], "coverage": [0.2, 0.1],
+                   "uncertain": (uncertain, np.ones((8, 8)))}],
+        "summary": {"steps": 3, "seconds": 9.0, "photos_psnr": [20.0, 30.0], "outline_error": None, "saturated": 0.125, "deviation": 0.02},
+        "lights": [np.ones((4, 8, 3))] * 2,
+    }  # fmt: skip
+    section = last_stage_section(page)
+    assert section["rows"][0][1:] == ("20.00 dB", "40.00 dB") and section["rows"][2][1:] == ("0.2", "0.1")
+    assert [q["unknown"] for q in section["quantities"]] == ["0 %", "25 %", "0 %", "0 %"]
+    assert section["saturated"] == "12.5 %" and len(section["views"][0]["cells"]) == 5
+
+
+def test_what_is_unknown_is_striped_and_the_rest_on_a_scale():
+    values = np.zeros((12, 12, 4))
+    values[:6] = 1.0
+    picture = coloured((values, np.ones((12, 12))), 1)
+    assert {tuple(c) for c in picture[:6].reshape(-1, 3)} == {tuple(c) for c in UNKNOWN_COLOURS}
+    assert np.allclose(picture[6:], KNOWN_COLOURS[0])
+    assert np.allclose(coloured((values, np.zeros((12, 12))), 1), 1.0)
