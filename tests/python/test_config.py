@@ -141,7 +141,7 @@ SETTINGS = {
     "optimiser.weight_decay": ("weight_decay", 0.01, 0.01, OURS),  # what torch's AdamW has by default
     "optimiser.sparse_steps": ("sparse_steps", False, False, OURS),
     "refinement.enabled": ("refine", True, False, OURS),
-    "refinement.share": ("refinement_share", 0.4, 0.4, OURS),
+    "refinement.share": ("refinement_share", 0.2, 0.2, OURS),
     "refinement.sweeps": ("refinement_sweeps", 16, 16, OURS),
     "export.resolution": ("export_resolution", 192, 512, OURS),
     "export.faces": ("export_faces", 20000, 20000, OURS),

@@ -272,7 +272,7 @@ class Refinement:
 
     enabled: bool = setting(True, "whether there is a last stage")
     share: float = setting(
-        0.4, "share of run.max_minutes that it gets, training the rest", unit="share of the run", below=1.0
+        0.2, "share of run.max_minutes that it gets, training the rest", unit="share of the run", below=1.0
     )
     sweeps: int = setting(16, "Gauss-Newton steps of the last stage where no minutes end it", unit="steps", at_least=1)
 

@@ -29,7 +29,7 @@ from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.texels import AssetTexels, SurfaceSamples, check_form, materials_of
-from splitnerf.refinement.uncertainty import Information, Uncertainty, patch_width, uncertainty_of
+from splitnerf.refinement.uncertainty import PATCH_PIXELS, Information, Uncertainty, patch_width, uncertainty_of
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS, STEP_LIMITS, into_range, per_unknown, to_unknowns, to_values
 
 CLAMP_INDIRECT = 10.0
@@ -49,7 +49,8 @@ class RefinementSettings:
         directions: Directions of a ray's point.
         bounces: Scattering events of the light that the asset sends to itself.
         keep: Share of the observations that outlives a sweep.
-        smooth_albedo, smooth_gloss, smooth_normal: Weights of the differences between neighbours' steps.
+        smooth_albedo, smooth_gloss, smooth_normal: Weights of the differences between neighbours' steps where a texel is as wide
+            as a pixel; those of finer texels are larger, so that a step is smooth over a pixel.
         flat_gloss, flat_normal: Weights of the differences between neighbours' values; edges cost little.
         like_colours: Weight of the difference between a texel's roughness and the usual one of its colour.
         anchor: Weight of the distance to the start.
@@ -66,7 +67,7 @@ class RefinementSettings:
     bounces: int = 3
     keep: float = 0.9
     smooth_albedo: float = 1.0
-    smooth_gloss: float = 5.0
+    smooth_gloss: float = 2.0
     smooth_normal: float = 1.0
     flat_gloss: float = 5.0
     flat_normal: float = 2.0
@@ -156,12 +157,14 @@ class Refinement:
         self.unknowns = to_unknowns(self.texels.start)
         like = torch.zeros(N_UNKNOWNS)
         like[ROUGHNESS] = s.like_colours
+        width = patch_width(dataset, self.texels)
+        smooth = max(1.0, width / PATCH_PIXELS) ** 2 * per_unknown(s.smooth_albedo, s.smooth_gloss, s.smooth_normal)
         prior = Prior(
-            pairs=self.texels.pairs, smooth=per_unknown(s.smooth_albedo, s.smooth_gloss, s.smooth_normal),
+            pairs=self.texels.pairs, smooth=smooth,
             flat=per_unknown(0.0, s.flat_gloss, s.flat_normal), groups=GROUPS, anchor=per_unknown(*[s.anchor] * 3), like=like,
         )  # fmt: skip
         self.equations = NormalEquations(self.unknowns, prior, s.keep)
-        self.information = Information(self.texels, patch_width(dataset, self.texels), len(self.pixels))
+        self.information = Information(self.texels, width, len(self.pixels))
         self.n_batches = self.n_sweeps = 0
 
     def state(self) -> dict[str, object]:
@@ -266,7 +269,7 @@ class Refinement:
         if s.light_step > 0:
             self.light_equations.step(s.light_step / (1.0 + self.n_sweeps / SWEEPS_OF_LARGE_STEPS))
         limits = torch.tensor(STEP_LIMITS)
-        like = with_like_roughness(self.unknowns, self.equations.curvature[:, ROUGHNESS, ROUGHNESS], s.seed)
+        like = with_like_roughness(self.unknowns, s.seed)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
         step = wanted - self.unknowns
         if not bool(torch.isfinite(step).all()):

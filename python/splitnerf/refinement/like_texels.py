@@ -12,12 +12,13 @@ N_SEEN = 20000  # texels by which colours and medians are found
 ROUGHNESS = 3  # its place among the unknowns
 
 
-def with_like_roughness(unknowns: Tensor, certainty: Tensor, seed: int) -> Tensor:
-    """The unknowns [m, n] with the usual roughness of each texel's colour: the median, weighted by certainty.
+def with_like_roughness(unknowns: Tensor, seed: int) -> Tensor:
+    """The unknowns [m, n] with the usual roughness of each texel's colour: the median.
+
+    Each texel counts the same. Weighted by what the photos say of each, glossy texels would speak for all of their colour.
 
     Args:
         unknowns: See :mod:`splitnerf.refinement.unknowns`.
-        certainty: [m] how much is known of each texel's roughness, at least 0, in any unit.
         seed: The seed of the texels by which colours and medians are found.
     """
     random = np.random.default_rng(seed)
@@ -26,20 +27,11 @@ def with_like_roughness(unknowns: Tensor, certainty: Tensor, seed: int) -> Tenso
     apart = random.normal(scale=1e-3, size=(len(seen), 3))  # equal colours make no clusters
     centres, _ = kmeans2(colours[seen] + apart, min(N_COLOURS, len(seen)), minit="++", seed=random)
     label, _ = vq(colours, centres)
-    usual = unknowns[:, ROUGHNESS].numpy()[seen].copy()
+    usual = unknowns[:, ROUGHNESS].numpy()[seen]
     of_colour = np.full(len(centres), np.nan, np.float32)
-    weights = certainty.numpy()[seen] + 1e-12
     for number in np.unique(label[seen]):
-        chosen = np.flatnonzero(label[seen] == number)
-        of_colour[number] = weighted_median(usual[chosen], weights[chosen])
+        of_colour[number] = np.median(usual[label[seen] == number])
     result = unknowns.clone()
     roughness = torch.from_numpy(of_colour[label])
     result[:, ROUGHNESS] = torch.where(roughness.isnan(), result[:, ROUGHNESS], roughness)
     return result
-
-
-def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
-    """The value [n] at which half of the weights [n] is reached."""
-    order = np.argsort(values)
-    mass = np.cumsum(weights[order], dtype=np.float64)
-    return float(values[order][np.searchsorted(mass, 0.5 * mass[-1])])
