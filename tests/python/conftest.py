@@ -1,15 +1,19 @@
-"""What tests of several files share: tiny data sets and runs."""
+"""What tests of several files share: tiny data sets and runs, and a painted ball."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
+import torch
 import trimesh
+from painted_ball import heights, photos, sky, textured
 from tiny_runs import tiny
 
-from splitnerf.data.dataset import load_dataset
+from splitnerf.data.asset import Asset
+from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.demo.scene import write_demo_dataset
+from splitnerf.refinement.texels import AssetTexels
 from splitnerf.training.loop import train
 
 
@@ -40,3 +44,22 @@ def begun(data, tmp_path) -> tuple[Path, bytes]:
     run.mkdir()
     train(load_dataset(data), tiny(steps=8), run)
     return run, (run / "checkpoint.pt").read_bytes()
+
+
+@pytest.fixture(scope="session")
+def ball() -> Asset:
+    """A ball of one material."""
+    mesh = trimesh.creation.icosphere(subdivisions=3)
+    return textured(mesh.vertices, mesh.faces)
+
+
+@pytest.fixture(scope="session")
+def painted(ball) -> tuple[Asset, Dataset]:
+    """A ball with a colour and a roughness per side, and its photos."""
+    texels = AssetTexels(ball)
+    height = heights(ball, texels)
+    values = texels.start.clone()
+    values[:, :3] = torch.where(height > 0, torch.tensor([0.7, 0.25, 0.1]), torch.tensor([0.15, 0.3, 0.6]))
+    values[:, 3:4] = torch.where(height > 0, 0.35, 0.7)
+    asset = texels.asset_with(texels.maps(values))
+    return asset, photos(asset, sky())

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from test_refinement import ball, painted, sky, with_textures  # noqa: F401, fixtures among them
+from painted_ball import sky, with_textures
 from tiny_runs import train
 
 from splitnerf import delivery

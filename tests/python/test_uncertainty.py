@@ -8,11 +8,19 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from test_refinement import ball, painted, sky, textured  # noqa: F401, fixtures among them
+from painted_ball import sky, textured
 
 from splitnerf.refinement.fit import RefinementSettings, Stage
 from splitnerf.refinement.texels import AssetTexels
-from splitnerf.refinement.uncertainty import PATCH_PIXELS, QUANTISATION, UNINFORMED, UNKNOWN, Information, painted_with, patch_width
+from splitnerf.refinement.uncertainty import (
+    PATCH_PIXELS,
+    QUANTISATION,
+    UNINFORMED,
+    UNKNOWN,
+    Information,
+    painted_with,
+    patch_width,
+)
 from splitnerf.refinement.unknowns import N_UNKNOWNS
 
 

@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
 
     if not args.minutes >= 0:
         raise InputError(f"--minutes must not be negative, got {args.minutes}")
-    sweeps = (UNLIMITED if args.minutes > 0 else 16) if args.sweeps is None else args.sweeps
+    sweeps = (UNLIMITED if args.minutes > 0 else RefinementSettings.sweeps) if args.sweeps is None else args.sweeps
     if sweeps < 1:
         raise InputError(f"--sweeps must be at least 1, got {sweeps}")
     out = args.out or args.run / "refined"

@@ -9,8 +9,6 @@ from splitnerf.cli.exit_codes import DONE, INTERRUPTED
 from splitnerf.cli.summary import print_summary
 from splitnerf.errors import InputError
 
-UNLIMITED_STEPS = 10**9
-
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
@@ -65,9 +63,9 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.training.checkpoint import config_of, load_checkpoint
     from splitnerf.config import parse_setting, preset
     from splitnerf.devices import choose_device
+    from splitnerf.training.checkpoint import config_of, load_checkpoint
     from splitnerf.workflow import reconstruct
 
     if args.resume and args.overwrite:
@@ -105,6 +103,8 @@ def run(args: argparse.Namespace) -> int:
 
 def budget(steps: int | None, minutes: float | None) -> dict[str, object]:
     """The settings that end a run: the given one of steps and minutes; both together if both are given."""
+    from splitnerf.config.settings import UNLIMITED
+
     if minutes is None:
         return {} if steps is None else {"run.steps": steps, "run.max_minutes": 0.0}
-    return {"run.steps": UNLIMITED_STEPS if steps is None else steps, "run.max_minutes": minutes}
+    return {"run.steps": UNLIMITED if steps is None else steps, "run.max_minutes": minutes}

@@ -22,15 +22,24 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.tensor_files import check_tensor
 from splitnerf.errors import InputError
 from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
-from splitnerf.refinement.light import EnvironmentLight, look_up
-from splitnerf.refinement.light_equations import LightEquations
-from splitnerf.refinement.like_texels import ROUGHNESS, with_like_roughness
+from splitnerf.refinement.light import EnvironmentLight, footprints, read
+from splitnerf.refinement.light_equations import LightEquations, Rows
+from splitnerf.refinement.like_texels import with_like_roughness
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.texels import AssetTexels, SurfaceSamples, check_form, materials_of
 from splitnerf.refinement.uncertainty import PATCH_PIXELS, Information, Uncertainty, patch_width, uncertainty_of
-from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS, STEP_LIMITS, into_range, per_unknown, to_unknowns, to_values
+from splitnerf.refinement.unknowns import (
+    GROUPS,
+    N_UNKNOWNS,
+    ROUGHNESS,
+    STEP_LIMITS,
+    into_range,
+    per_unknown,
+    to_unknowns,
+    to_values,
+)
 
 CLAMP_INDIRECT = 10.0
 SWEEPS_OF_LARGE_STEPS = 4  # after as many the light's steps are half as large: they average over the noise of sweeps
@@ -121,14 +130,17 @@ class Shaded(NamedTuple):
     Attributes:
         colours: [n, 3] linear radiance.
         radiance: [n, k, 3] light that arrives, a leaf of the graph.
-        directions: [n, k, 3] unit.
         visible: [n, k] 1 where it is the environment's.
+        texels, shares: [n k, 4] where the environment is read.
+        sky: [n, k, 3] its radiance.
     """
 
     colours: Tensor
     radiance: Tensor
-    directions: Tensor
     visible: Tensor
+    texels: Tensor
+    shares: Tensor
+    sky: Tensor
 
 
 class Refinement:
@@ -228,11 +240,12 @@ class Refinement:
             m.albedo.detach(), m.roughness.detach(), m.metallic.detach(), n_directions=s.directions, max_bounces=s.bounces,
             clamp_indirect=CLAMP_INDIRECT, seed=s.seed + self.n_batches,
         )  # fmt: skip
-        sky = look_up(light, arriving.directions.view(-1, 3)).view_as(arriving.directions)
+        texels, shares = footprints(self.light.height, arriving.directions.view(-1, 3))
+        sky = read(light.view(-1, 3), texels, shares).view_as(arriving.directions)
         radiance = (sky * arriving.visible[..., None] + arriving.sent).requires_grad_(True)
         sums = monte_carlo_light(m.normals, samples.view_dirs, m.roughness, arriving.directions, arriving.pdf, radiance)
         colours = shade_sums(m.normals, samples.view_dirs, m.albedo, m.roughness, m.metallic, sums, compensate=True)
-        return Shaded(colours, radiance, arriving.directions, arriving.visible)
+        return Shaded(colours, radiance, arriving.visible, texels, shares, sky)
 
     def gather(self, surface: TexturedSurface) -> float:
         """Gathers one batch of pixels; returns its mean squared error without noise."""
@@ -250,7 +263,7 @@ class Refinement:
         weights_of_rays = weights.repeat_interleave(2, 0)
         if self.settings.light_step > 0:
             slopes = torch.autograd.grad(colours.sum(), shaded.radiance, retain_graph=True)[0] * shaded.visible[..., None]
-            self.light_equations.add(shaded.directions, slopes, weights_of_rays, of_other)
+            self.light_equations.add(Rows(shaded.texels, shaded.shares, slopes, weights_of_rays), shaded.sky, of_other)
         jacobian = torch.stack(
             [torch.autograd.grad(colours[:, c].sum(), unknowns, retain_graph=c < 2)[0] for c in range(3)], dim=1
         )
@@ -267,7 +280,9 @@ class Refinement:
         if not np.isfinite(error):
             raise RuntimeError(f"refinement: the error of the photos is {error}; nothing was written")
         if s.light_step > 0:
-            self.light_equations.step(s.light_step / (1.0 + self.n_sweeps / SWEEPS_OF_LARGE_STEPS))
+            moved = self.light_equations.step(s.light_step / (1.0 + self.n_sweeps / SWEEPS_OF_LARGE_STEPS))
+            if not np.isfinite(moved):
+                raise RuntimeError(f"refinement: the light after {self.n_batches} batches is not finite; nothing was written")
         limits = torch.tensor(STEP_LIMITS)
         like = with_like_roughness(self.unknowns, s.seed)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))

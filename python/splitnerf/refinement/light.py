@@ -52,11 +52,6 @@ def sum_of_levels(levels: list[Tensor]) -> Tensor:
     return total
 
 
-def look_up(radiance: Tensor, directions: Tensor) -> Tensor:
-    """Bilinear radiance [n, 3] of an equirectangular map [h, w, 3] from directions [n, 3]."""
-    return read(radiance.reshape(-1, 3), *footprints(radiance.shape[0], directions))
-
-
 def footprints(height: int, directions: Tensor) -> tuple[Tensor, Tensor]:
     """The four texels [n, 4], row * width + column, around directions [n, 3] of a map [h, 2 h], and their shares [n, 4]."""
     width = 2 * height
@@ -72,7 +67,7 @@ def footprints(height: int, directions: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def read(table: Tensor, texels: Tensor, shares: Tensor) -> Tensor:
-    """[n, 3] the values of a flat map [t, 3] at footprints."""
+    """[n, 3] the values of a flat map [t, 3] at footprints: bilinear."""
     return sum(table.index_select(0, texels[:, c]) * shares[:, c, None] for c in range(4))
 
 

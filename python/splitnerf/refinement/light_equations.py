@@ -8,6 +8,7 @@ and with heavy tails, as windows and lamps have edges.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
@@ -15,7 +16,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
-from splitnerf.refinement.light import EnvironmentLight, footprints, read, read_adjoint, sum_of_levels
+from splitnerf.refinement.light import EnvironmentLight, read, read_adjoint, sum_of_levels
 
 WEIGHT = 1e-8  # of the prior beside the mean squared error of the photos in sRGB units
 BRIGHTNESS = 0.5  # deviation of the mean of the channels' log radiance from the coarser levels, on each level
@@ -62,19 +63,18 @@ class LightEquations:
         self.gradient, self.bound = torch.zeros(self._n_texels, 3), torch.zeros(self._n_texels, 3)
         self.n_batches, self.rows = 0, []
 
-    def add(self, directions: Tensor, slopes: Tensor, weights: Tensor, residual: Tensor) -> None:
+    def add(self, rows: Rows, sky: Tensor, residual: Tensor) -> None:
         """Adds a batch of n rays.
 
         Args:
-            directions: [n, k, 3] directions of the light.
-            slopes, weights: See :class:`Rows`.
+            rows: Their dependence on the light.
+            sky: [n, k, 3] the light's radiance in their directions.
             residual: [n, 3] predicted minus observed colours, their noise independent of the slopes'.
         """
-        texels, shares = footprints(self.light.height, directions.reshape(-1, 3))
+        texels, shares, slopes, weights = rows
         back = slopes * (weights * residual / len(slopes))[:, None]
         self.gradient += read_adjoint(back.reshape(-1, 3), texels, shares, self._n_texels)
-        lit = read(self.light.radiance().view(-1, 3), texels, shares).view_as(slopes)
-        bound = slopes.abs() * ((slopes.abs() * lit).sum(1) * weights / len(slopes))[:, None]
+        bound = slopes.abs() * ((slopes.abs() * sky).sum(1) * weights / len(slopes))[:, None]
         self.bound += read_adjoint(bound.reshape(-1, 3), texels, shares, self._n_texels)
         self.n_batches += 1
         n, k = max(1, int(len(slopes) * self.share_of_rows)), slopes.shape[1]
@@ -98,9 +98,8 @@ class LightEquations:
         parts = []
         for number, level in enumerate(self._levels(vector)):
             mean, colour = parts_of(level, number)
-            squared = (colour / (COLOUR / 2**number)).square().mean(0, keepdim=True)
-            brightness = WEIGHT / BRIGHTNESS**2 / (1.0 + (mean / BRIGHTNESS).square() / TAILS)
-            parts.append([brightness, WEIGHT / (COLOUR / 2**number) ** 2 / (1.0 + squared / TAILS)])
+            brightness = WEIGHT / (BRIGHTNESS**2 + mean.square() / TAILS)
+            parts.append([brightness, WEIGHT / ((COLOUR / 2**number) ** 2 + colour.square().mean(0, keepdim=True) / TAILS)])
         return tuple(torch.cat([part.expand(3, -1, -1).flatten() for part in kind]) for kind in zip(*parts))
 
     def _prior(self, vector: Tensor, precisions: tuple[Tensor, Tensor]) -> Tensor:
@@ -121,7 +120,6 @@ class LightEquations:
         n, k, _ = rows.slopes.shape
         radiance = self.light.radiance().view(-1, 3)
         now = torch.cat([level.flatten() for level in self.light.levels])
-
         damping = DAMPING * self.bound * radiance / self.n_batches
 
         def curvature(vector: Tensor) -> Tensor:
@@ -142,7 +140,7 @@ class LightEquations:
         self.clear()
         return float(change.square().mean().sqrt())
 
-    def _diagonal(self, curvature) -> Tensor:
+    def _diagonal(self, curvature: Callable[[Tensor], Tensor]) -> Tensor:
         """An estimate of the curvature's diagonal, smoothed over neighbours. Source: Bekas, Kokiopoulou and Saad 2007."""
         random, total = torch.Generator().manual_seed(0), torch.zeros(sum(self._sizes))
         for _ in range(N_PROBES):

@@ -7,9 +7,10 @@ import torch
 from scipy.cluster.vq import kmeans2, vq
 from torch import Tensor
 
+from splitnerf.refinement.unknowns import ROUGHNESS
+
 N_COLOURS = 24
 N_SEEN = 20000  # texels by which colours and medians are found
-ROUGHNESS = 3  # its place among the unknowns
 
 
 def with_like_roughness(unknowns: Tensor, seed: int) -> Tensor:

@@ -12,6 +12,7 @@ from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 EDGE = 0.05  # length of the differences between neighbours from which on they count as an edge
 APART = 0.1  # distance to the values of like texels from which on these pull less
 
+
 class Prior(NamedTuple):
     """What holds the unknowns where photos say little, in units of each unknown's mean curvature.
 

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import cg
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
 from splitnerf.ops import MeshScene
-from splitnerf.refinement.pixels import PixelFilter, Pixels, pixels_of
+from splitnerf.refinement.pixels import PixelFilter, Pixels, pixel_size, pixels_of
 
 ROUNDS = 3
 RAYS = 32  # of a pixel
@@ -124,8 +124,7 @@ def fit_outline(dataset: Dataset, asset: Asset, seed: int = 0) -> tuple[Asset, l
         return asset, []
     place = weld(asset.vertices)
     laplacian = smoothness(asset, place)
-    distance = np.linalg.norm(dataset.world_poses[:, :3, 3] - asset.vertices.mean(0), axis=1).mean()
-    pixel = float(distance / dataset.intrinsics[:, 0].mean())
+    pixel = pixel_size(dataset, asset.vertices)
     errors, moved, start = [], np.zeros(int(place.max()) + 1), asset.vertices
     for turn in range(ROUNDS):
         seen = observe(asset, place, dataset, PROBE * pixel, seed + turn)

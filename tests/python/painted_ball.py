@@ -1,0 +1,79 @@
+"""A ball with a colour and a roughness per side, its light, and photos that the path tracer makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+import trimesh
+
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.images import linear_to_srgb
+from splitnerf.data.tangents import vertex_tangents
+from splitnerf.export.bake import rasterise
+from splitnerf.export.unwrap import unwrap
+from splitnerf.refinement.texels import AssetTexels
+from splitnerf.render.path_traced import AssetRenderer
+
+SIZE = 64  # texels
+PHOTO = 40  # pixels
+FOCAL = 60.0
+
+
+def textured(vertices: np.ndarray, faces: np.ndarray, size: int = SIZE) -> Asset:
+    """A mesh with smooth normals and plain textures."""
+    normals = np.asarray(trimesh.Trimesh(vertices, faces, process=False).vertex_normals, np.float32)
+    origins, faces, uv = unwrap(vertices.astype(np.float32), faces, size)
+    vertices, normals = vertices[origins].astype(np.float32), normals[origins]
+    material = Material(
+        roughness=1.0, metallic=1.0, albedo_texture=np.full((size, size, 3), 0.4, np.float32),
+        roughness_metallic_texture=np.tile(np.float32([0.5, 0.0]), (size, size, 1)),
+        normal_texture=np.tile(np.float32([0, 0, 1]), (size, size, 1)),
+    )  # fmt: skip
+    tangents = vertex_tangents(vertices, faces, normals, uv)
+    ids = np.zeros(len(faces), np.int32)
+    return Asset("ball", vertices, faces.astype(np.int32), normals, ids, [material], uv=uv, tangents=tangents)
+
+
+def with_textures(asset: Asset, **textures: np.ndarray) -> Asset:
+    return replace(asset, materials=[replace(asset.materials[0], **textures)])
+
+
+def sky(height: int = 16) -> np.ndarray:
+    """A bright lamp over a gradient."""
+    map_ = np.full((height, 2 * height, 3), 0.5, np.float32) * np.linspace(1.5, 0.5, height)[:, None, None]
+    map_[3:5, 6:9] = (12.0, 11.0, 9.0)
+    return map_.astype(np.float32)
+
+
+def looking(azimuth: float, elevation: float, distance: float = 3.4) -> np.ndarray:
+    """[4, 4] camera-to-world of a camera that looks at the origin, OpenGL axes."""
+    back = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    right = np.cross([0, 0, 1], back)
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3] = np.column_stack([right, np.cross(back, right), back, distance * back])
+    return pose.astype(np.float32)
+
+
+def photos(asset: Asset, environment: np.ndarray, n: int = 10, spp: int = 128) -> Dataset:
+    """The asset seen from all around, as photos."""
+    renderer = AssetRenderer(asset)
+    poses = np.stack([looking(2.4 * i, np.arcsin(1.6 * (i + 0.5) / n - 0.8)) for i in range(n)])
+    lens, images = (FOCAL, FOCAL, PHOTO / 2, PHOTO / 2), []
+    for i, pose in enumerate(poses):
+        maps = renderer.render(environment, pose, lens, PHOTO, PHOTO, spp=spp, seed=i)
+        straight = maps["radiance"] / np.maximum(maps["alpha"], 1e-6)[..., None]
+        images.append(np.dstack([linear_to_srgb(straight).clip(0, 1), maps["alpha"]]))
+    return Dataset(
+        "ball", Path(), "train", 1, np.stack(images).astype(np.float32), poses, np.tile(np.float32(lens), (n, 1)),
+        [str(i) for i in range(n)], [Path(str(i)) for i in range(n)], np.eye(4),
+    )  # fmt: skip
+
+
+def heights(asset: Asset, texels: AssetTexels) -> torch.Tensor:
+    """[m, 1] z of the covered texels."""
+    return torch.from_numpy(rasterise(asset.uv, asset.triangles, texels.size).interpolate(asset.vertices, asset.triangles))[:, 2:]
