@@ -18,7 +18,7 @@ from torch.nn import functional as F
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.light import EnvironmentLight, read, read_adjoint, sum_of_levels
 
-WEIGHT = 1e-8  # of the prior beside the mean squared error of the photos in sRGB units
+WEIGHT = 1e-7  # of the prior beside the mean squared error of the photos in sRGB units
 BRIGHTNESS = 0.5  # deviation of the mean of the channels' log radiance from the coarser levels, on each level
 COLOUR = 0.4  # deviation of a channel's log radiance from that mean on the coarsest level; half of it on each next one
 TAILS = 3.0  # degrees of freedom of Student's t distribution
