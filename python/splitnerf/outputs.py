@@ -23,7 +23,7 @@ from splitnerf.export.glb import write_glb
 from splitnerf.export.mesh import write_mesh_ply
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.obj import write_obj
-from splitnerf.export.simplify import drop_floaters, is_closed
+from splitnerf.export.simplify import drop_floaters_and_cavities, is_closed
 from splitnerf.export.surface import Surface, surface_materials
 from splitnerf.export.textured import textured_asset
 from splitnerf.export.usdz import require_usd, write_usdz
@@ -62,7 +62,7 @@ class Exported:
         mesh: The mesh before decimation, in the data's world.
         n_faces: The number of faces of the textured mesh; that of `mesh` where no format has textures.
         watertight: Whether the mesh of `n_faces` is closed.
-        n_dropped: The number of removed floating components.
+        n_dropped: The number of removed floating or enclosed components.
     """
 
     mesh: trimesh.Trimesh
@@ -105,7 +105,7 @@ def write_assets(
     if "usdz" in formats:
         require_usd()
     surface = surface_of(model)
-    vertices, faces, n_dropped = drop_floaters(*extract_mesh(surface.sdf, c.surface.box, resolution))
+    vertices, faces, n_dropped = drop_floaters_and_cavities(*extract_mesh(surface.sdf, c.surface.box, resolution))
     world_from_box = np.linalg.inv(box_from_world)
     mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
     exported = Exported(mesh, len(faces), is_closed(faces), n_dropped)

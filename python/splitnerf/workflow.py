@@ -139,8 +139,8 @@ def export_run(
     out: Path,
     *,
     formats: Sequence[str],
-    n_faces: int,
-    texture_size: int,
+    n_faces: int | None = None,
+    texture_size: int | None = None,
     resolution: int | None = None,
 ) -> Exported:
     """Writes a run's meshes and light into a folder, see :func:`splitnerf.outputs.write_assets`.

@@ -143,8 +143,8 @@ SETTINGS = {
     "refinement.enabled": ("refine", True, False, OURS),
     "refinement.share": ("refinement_share", 0.2, 0.2, OURS),
     "refinement.sweeps": ("refinement_sweeps", 16, 16, OURS),
-    "export.resolution": ("export_resolution", 192, 512, OURS),
-    "export.faces": ("export_faces", 20000, 20000, OURS),
+    "export.resolution": ("export_resolution", 384, 512, OURS),
+    "export.faces": ("export_faces", 50000, 50000, OURS),
     "export.texture_size": ("export_texture_size", 1024, 1024, OURS),
     "export.environment_height": ("export_environment_height", 128, 128, OURS),
 }
@@ -156,7 +156,7 @@ FAST = {
     "sampling.initial_rays": 4096, "sampling.max_rays": 16384, "sampling.target_samples": 32768,
     "sampling.grid_resolution": 128, "losses.eikonal_points": 2048, "losses.smoothness_points": 4096,
     "losses.neutral_queries": 1024, "losses.entropy_points": 1024, "optimiser.sparse_steps": True,
-    "optimiser.warmup_steps": 200, "export.resolution": 384, "export.faces": 50000, "export.texture_size": 2048,
+    "optimiser.warmup_steps": 200, "export.texture_size": 2048,
 }  # fmt: skip
 
 # Numbers whose limits are others than from 0 to 2^24 (integers) or 1e30.

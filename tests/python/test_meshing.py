@@ -12,7 +12,7 @@ import trimesh
 from splitnerf import _core
 from splitnerf.export import simplify
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
-from splitnerf.export.simplify import decimate, drop_floaters, is_closed, split_pinches
+from splitnerf.export.simplify import decimate, drop_floaters_and_cavities, is_closed, split_pinches
 
 RADIUS = 0.7
 
@@ -128,17 +128,28 @@ def test_small_components_go_and_are_counted():
 
     vertices, faces = extract_mesh(three, 1.5, 96)
     vertices = np.concatenate([vertices, np.full((3, 3), 9.0, np.float32)])  # of no face: no component, and gone as well
-    vertices, faces, n_dropped = drop_floaters(vertices, faces)
+    vertices, faces, n_dropped = drop_floaters_and_cavities(vertices, faces)
     assert n_dropped == 1  # the middle one has more than a hundredth of the faces
     assert vertices.max() == pytest.approx(RADIUS, abs=0.01) and vertices[:, 0].min() == pytest.approx(-1.4, abs=0.01)
     assert faces.max() == len(vertices) - 1
+
+
+def test_a_cavity_goes_and_a_part_beside_stays():
+    def hollow(x):
+        wall = torch.maximum(sphere(x), -sphere(x, 0.5))
+        return torch.minimum(wall, sphere(x - torch.tensor([-1.2, 0.0, 0.0]), 0.2))
+
+    vertices, faces, n_dropped = drop_floaters_and_cavities(*extract_mesh(hollow, 1.5, 96))
+    assert n_dropped == 1 and is_closed(faces)
+    assert np.linalg.norm(vertices, axis=1).min() == pytest.approx(RADIUS, abs=0.01)
+    assert vertices[:, 0].min() == pytest.approx(-1.4, abs=0.01)
 
 
 def test_faces_that_share_any_vertex_are_one_component():
     """150 that meet in their last corner, and one for itself."""
     pairs = np.arange(300).reshape(-1, 2)
     faces = np.concatenate([np.column_stack([pairs, np.full(150, 300)]), [[301, 302, 303]]])
-    vertices, kept, n_dropped = drop_floaters(np.zeros((304, 3), np.float32), faces)
+    vertices, kept, n_dropped = drop_floaters_and_cavities(np.zeros((304, 3), np.float32), faces)
     assert n_dropped == 1 and len(kept) == 150 and len(vertices) == 301
 
 

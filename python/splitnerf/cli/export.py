@@ -17,13 +17,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "export", help="write a run's textured mesh and light",
         description="Writes what RUN trained, before its last stage: mesh.glb (watertight where the object is, decimated, "
         "UV-unwrapped, with albedo, occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex "
-        "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces are dropped.",
+        "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces and the walls of cavities are dropped.",
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained after a last stage)")
     for option, kind, default, name, text in (
-        ("--faces", int, 50000, "N", "faces of the textured mesh, 0 keeps all (default: 50000)"),
-        ("--texture-size", int, 2048, "N", "texels along an edge (default: 2048)"),
+        ("--faces", int, None, "N", "faces of the textured mesh, 0 keeps all (default: as in training)"),
+        ("--texture-size", int, None, "N", "texels along an edge (default: as in training)"),
         ("--resolution", int, None, "N", "nodes along an edge of the grid that is meshed (default: as in training)"),
         ("--formats", str, "glb,ply", "LIST", "of glb, ply, obj, usdz (default: glb,ply); usdz needs the extra 'usd'"),
     ):
@@ -41,9 +41,9 @@ def run(args: argparse.Namespace) -> int:
     unknown = [name for name in formats if name not in FORMATS]
     if unknown:
         raise InputError(f"--formats: unknown {unknown[0]!r}; there are {', '.join(FORMATS)}")
-    if args.faces != 0 and args.faces < MIN_FACES:
+    if args.faces is not None and args.faces != 0 and args.faces < MIN_FACES:
         raise InputError(f"--faces must be 0 or at least {MIN_FACES}, got {args.faces}")
-    if not MIN_EXPORT_SIZE <= args.texture_size <= MAX_TEXTURE_SIZE:
+    if args.texture_size is not None and not MIN_EXPORT_SIZE <= args.texture_size <= MAX_TEXTURE_SIZE:
         raise InputError(f"--texture-size must be in [{MIN_EXPORT_SIZE}, {MAX_TEXTURE_SIZE}], got {args.texture_size}")
     if args.resolution is not None and args.resolution < MIN_EXPORT_SIZE:
         raise InputError(f"--resolution must be at least {MIN_EXPORT_SIZE}, got {args.resolution}")
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
         args.run, out, formats=formats, n_faces=args.faces, texture_size=args.texture_size, resolution=args.resolution,
     )  # fmt: skip
     closed = "watertight" if exported.watertight else "not watertight"
-    floaters = f"{exported.n_dropped} floating component{'' if exported.n_dropped == 1 else 's'} dropped"
-    print(f"mesh: {closed}, {exported.n_faces} faces of {len(exported.mesh.faces)}, {floaters}")
+    dropped = f"{exported.n_dropped} floating or enclosed component{'' if exported.n_dropped == 1 else 's'} dropped"
+    print(f"mesh: {closed}, {exported.n_faces} faces of {len(exported.mesh.faces)}, {dropped}")
     print(f"results: {', '.join(str(out / f'mesh.{name}') for name in formats)}, {out / 'environment.exr'}")
     return DONE

@@ -282,9 +282,9 @@ class Export:
     """The files of the finished run."""
 
     resolution: int = setting(
-        192, "nodes of marching cubes along an edge", unit="nodes", at_least=MIN_EXPORT_SIZE, at_most=4096
+        384, "nodes of marching cubes along an edge", unit="nodes", at_least=MIN_EXPORT_SIZE, at_most=4096
     )
-    faces: int = setting(20000, "triangles of the textured mesh; 0: all", unit="triangles")
+    faces: int = setting(50000, "triangles of the textured mesh; 0: all", unit="triangles")
     texture_size: int = setting(
         1024, "texels along the edge of a texture", unit="texels", at_least=MIN_EXPORT_SIZE, at_most=1 << 15
     )

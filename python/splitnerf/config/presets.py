@@ -54,7 +54,7 @@ FAST = dict(
     sampling=dict(initial_rays=4096, max_rays=16384, target_samples=32768, grid_resolution=128),
     losses=dict(eikonal_points=2048, smoothness_points=4096, neutral_queries=1024, entropy_points=1024),
     optimiser=dict(sparse_steps=True, warmup_steps=200),
-    export=dict(resolution=384, faces=50000, texture_size=2048),
+    export=dict(texture_size=2048),
 )
 
 PRESETS: dict[str, dict] = {"cpu": {}, "fast": FAST, "paper": PAPER}

@@ -1,4 +1,4 @@
-"""Simplifies an extracted mesh: removes floaters and reduces the number of faces; a closed mesh stays closed."""
+"""Simplifies an extracted mesh: removes floaters and cavities, reduces the number of faces; a closed mesh stays closed."""
 
 from __future__ import annotations
 
@@ -14,8 +14,15 @@ MIN_COMPONENT = 0.01  # share of the largest component's faces
 AGGRESSIVENESS, SHARES = (5, 3, 7), (1.0, 0.97, 0.94)
 
 
-def drop_floaters(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Removes connected components with less than 1 % of the largest one's faces.
+def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Removes connected components with less than 1 % of the largest one's faces, and the walls of cavities.
+
+    A cavity is a hollow inside the solid that nothing outside can see. Its wall faces inward, so that the volume that
+    the wall encloses is negative.
+
+    Args:
+        vertices: [n, 3].
+        faces: [m, 3], outward.
 
     Returns:
         vertices, faces and the number of removed components.
@@ -25,9 +32,11 @@ def drop_floaters(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
     graph = coo_matrix((np.ones(len(edges), bool), (edges[:, 0], edges[:, 1])), shape=(n, n))
     _, label = connected_components(graph, directed=False)
     count = np.bincount(label[faces[:, 0]], minlength=label.max() + 1)
-    small = (count < MIN_COMPONENT * count.max()) & (count > 0)
-    vertices, faces = _compact(vertices, faces[~small[label[faces[:, 0]]]])
-    return vertices, faces, int(small.sum())
+    a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
+    volume = np.bincount(label[faces[:, 0]], (a * np.cross(b, c)).sum(axis=1) / 6.0, minlength=len(count))
+    dropped = ((count < MIN_COMPONENT * count.max()) | (volume < 0)) & (count > 0)
+    vertices, faces = _compact(vertices, faces[~dropped[label[faces[:, 0]]]])
+    return vertices, faces, int(dropped.sum())
 
 
 def is_closed(faces: np.ndarray) -> bool:
