@@ -72,7 +72,10 @@ class LightGatherer {
     const auto shift = [&](uint32_t k) {
       return Vec2<float>{random_unit<float>(seed_, counter, k), random_unit<float>(seed_, counter, k + 1)};
     };
-    const int n_light = light.black() ? 0 : n_ / 2, n_bsdf = n_ - n_light;
+    // Directions drawn by the light rarely fall into a narrow lobe; the diffuse lobe of a glossy point needs some still.
+    const float glossy = bsdf.specular_probability() * (1.f - ggx_alpha_from_roughness(points_.roughness[point]));
+    const float light_share = light.black() ? 0.f : 0.5f - 0.25f * glossy;
+    const int n_light = static_cast<int>(light_share * n_ + 0.5f), n_bsdf = n_ - n_light;
     const Vec2<float> light_shift = shift(0), bsdf_shift = shift(2);
     const float lobe_shift = random_unit<float>(seed_, counter, 4);
     worker.numbers.clear(), worker.origins.clear(), worker.directions.clear();

@@ -8,7 +8,9 @@ import torch
 from painted_ball import sky
 
 from splitnerf.data.environment import sample_environment
+from splitnerf.ops import monte_carlo_light, sample_bsdf
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
+from splitnerf.refinement.fit import centred
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.like_texels import with_like_roughness
@@ -177,3 +179,27 @@ def test_the_lights_curvature_is_that_of_the_errors():
     way = (found / start).log()[2:-2]
     asked = (truth / start).log()[2:-2]
     assert 0.7 < (way * asked).sum() / asked.square().sum() < 1.05
+
+
+def test_centred_derivatives_say_the_same_with_less_noise():
+    """The light grows along x; its integral over a lobe follows the normal's x, whatever directions are drawn."""
+    n, k = 400, 12
+    normals = torch.tensor([0.0, 0.0, 1.0]).expand(n, 3).contiguous().requires_grad_(True)
+    view = torch.nn.functional.normalize(torch.tensor([[0.5, 0.2, 1.0]]), dim=1).expand(n, 3).contiguous()
+    roughness, share = torch.full((n, 1), 0.4), torch.full((n, 1), 0.8)
+    directions, pdf = sample_bsdf(normals.detach(), view, roughness, share, k, 3)
+    light = (1.0 + 0.3 * directions[..., :1]).expand(-1, -1, 3)
+    drawn = (normals, view, roughness, directions, pdf)
+    plain, white = monte_carlo_light(*drawn, light), monte_carlo_light(*drawn, torch.ones_like(light))
+    calm = centred(plain, white)
+    still = centred(white, white)
+    for name in ("specular", "diffuse"):
+        torch.testing.assert_close(getattr(calm, name), getattr(plain, name), rtol=0, atol=0)
+        of_plain, of_calm, of_still = (
+            torch.autograd.grad(getattr(sums, name)[:, 0].sum(), normals, retain_graph=True)[0][:, 0]
+            for sums in (plain, calm, still)
+        )
+        assert of_still.abs().max() < 1e-5  # the integral of a white light stays
+        assert of_calm.std() < 0.5 * of_plain.std()
+        assert abs(of_calm.mean() - of_plain.mean()) < 4 * of_plain.std() / n**0.5
+        assert of_calm.mean() > 8 * of_calm.std() / n**0.5 > 0

@@ -14,7 +14,9 @@ struct SurfacePoints {
 };
 
 struct IncomingLightParams {
-  int n_directions = 32;     // a point; the first half by the light unless it is black, the others by the material
+  // A point's; the first by the light, half of them at rough and diffuse points, a quarter at mirrors, none where the
+  // light is black; the others by the material.
+  int n_directions = 32;
   int max_bounces = 3;       // scattering events of the light that the asset itself sends
   uint32_t seed = 0;         // equal seeds give equal numbers, whatever the number of threads
   float clamp_indirect = 0;  // as in PathTracerParams, of that light

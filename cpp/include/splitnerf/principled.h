@@ -43,6 +43,8 @@ template <class T> class PrincipledBsdf {
     specular_probability_ = specular_share(table, albedo, metallic);
   }
 
+  SPLITNERF_HD T specular_probability() const { return specular_probability_; }
+
   SPLITNERF_HD BsdfValue<T> evaluate(Vec3<T> light) const {
     if (!(light.z > T(0))) return {{T(0), T(0), T(0)}, T(0)};
     const Vec3<T> h = normalize(view_ + light);

@@ -21,7 +21,7 @@ from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.tensor_files import check_tensor
 from splitnerf.errors import InputError
-from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
+from splitnerf.ops import LightSums, MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.like_texels import with_like_roughness
@@ -43,6 +43,7 @@ from splitnerf.refinement.unknowns import (
 
 CLAMP_INDIRECT = 10.0
 SWEEPS_OF_LARGE_STEPS = 4  # after as many the light's steps are half as large: they average over the noise of sweeps
+MIN_WHITE = 1e-6  # integral of a white light below which a lobe got no directions
 MIN_TONE = 0.02  # linear value below which errors weigh as at this one
 
 
@@ -243,7 +244,8 @@ class Refinement:
         texels, shares = footprints(self.light.height, arriving.directions.view(-1, 3))
         sky = read(light.view(-1, 3), texels, shares).view_as(arriving.directions)
         radiance = (sky * arriving.visible[..., None] + arriving.sent).requires_grad_(True)
-        sums = monte_carlo_light(m.normals, samples.view_dirs, m.roughness, arriving.directions, arriving.pdf, radiance)
+        drawn = (m.normals, samples.view_dirs, m.roughness, arriving.directions, arriving.pdf)
+        sums = centred(monte_carlo_light(*drawn, radiance), monte_carlo_light(*drawn, torch.ones_like(sky)))
         colours = shade_sums(m.normals, samples.view_dirs, m.albedo, m.roughness, m.metallic, sums, compensate=True)
         return Shaded(colours, radiance, arriving.visible, texels, shares, sky)
 
@@ -293,6 +295,25 @@ class Refinement:
         self.n_sweeps += 1
         self.equations.move(step)
         return error, step.square().mean(0).sqrt().tolist()
+
+
+def centred(sums: LightSums, white: LightSums) -> LightSums:
+    """Integrals of light whose derivatives by normal and roughness have less noise; their values stay.
+
+    Where a lobe turns or widens, its integral of a white light stays nearly the same, but that of the directions drawn does
+    not. The derivatives are therefore those of the light less its mean over the lobe (a control variate).
+    Source: Greensmith, Bartlett and Baxter 2004 (baselines of score-function derivatives).
+
+    Args:
+        sums: Integrals of the light.
+        white: Integrals of a light of 1 over the same directions.
+    """
+    of_specular, of_diffuse = (
+        (light / one.clamp(min=MIN_WHITE)).detach()
+        for light, one in ((sums.specular, white.specular), (sums.diffuse, white.diffuse))
+    )
+    means = sums._replace(specular=of_specular, grazing=of_specular, dielectric=of_specular, diffuse=of_diffuse)
+    return LightSums(*(light - mean * (one - one.detach()) for light, mean, one in zip(sums, means, white)))
 
 
 def srgb_slope(linear: Tensor) -> Tensor:
