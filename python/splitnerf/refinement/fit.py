@@ -16,12 +16,13 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.tensor_files import check_tensor
 from splitnerf.errors import InputError
-from splitnerf.ops import LightSums, MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
+from splitnerf.ops import LightSums, MeshScene, TexturedSurface, brdf_lut, incoming_light, monte_carlo_light, shade_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.like_texels import with_like_roughness
@@ -245,7 +246,8 @@ class Refinement:
         sky = read(light.view(-1, 3), texels, shares).view_as(arriving.directions)
         radiance = (sky * arriving.visible[..., None] + arriving.sent).requires_grad_(True)
         drawn = (m.normals, samples.view_dirs, m.roughness, arriving.directions, arriving.pdf)
-        sums = centred(monte_carlo_light(*drawn, radiance), monte_carlo_light(*drawn, torch.ones_like(sky)))
+        white = white_sums(m.normals, samples.view_dirs, m.roughness)
+        sums = centred(monte_carlo_light(*drawn, radiance), monte_carlo_light(*drawn, torch.ones_like(sky)), white)
         colours = shade_sums(m.normals, samples.view_dirs, m.albedo, m.roughness, m.metallic, sums, compensate=True)
         return Shaded(colours, radiance, arriving.visible, texels, shares, sky)
 
@@ -297,23 +299,35 @@ class Refinement:
         return error, step.square().mean(0).sqrt().tolist()
 
 
-def centred(sums: LightSums, white: LightSums) -> LightSums:
+def white_sums(normals: Tensor, view_dirs: Tensor, roughness: Tensor) -> LightSums:
+    """The integrals of a light of 1 from everywhere, [n, 1] each, by the table of :func:`splitnerf.ops.brdf_lut`."""
+    n_dot_v = (normals * view_dirs).sum(1, keepdim=True).clamp(1e-4, 1.0)
+    at = 2.0 * torch.cat([n_dot_v.sqrt(), roughness.clamp(0.0, 1.0)], dim=1) - 1.0
+    table = brdf_lut().permute(2, 0, 1)[None]
+    f1, f2, _, dielectric = F.grid_sample(table, at[None, None], align_corners=True)[0, :, 0, :, None]
+    return LightSums(specular=f1 + f2, grazing=f2, diffuse=torch.ones_like(f1), dielectric=dielectric)
+
+
+def centred(sums: LightSums, drawn: LightSums, white: LightSums) -> LightSums:
     """Integrals of light whose derivatives by normal and roughness have less noise; their values stay.
 
-    Where a lobe turns or widens, its integral of a white light stays nearly the same, but that of the directions drawn does
-    not. The derivatives are therefore those of the light less its mean over the lobe (a control variate).
+    The derivative is that of the light less its mean over the lobe, by the directions drawn, and that of the mean, by
+    the table (a control variate): where a lobe turns or widens, its integral of a white light hardly changes, but the
+    sum over a few directions does.
     Source: Greensmith, Bartlett and Baxter 2004 (baselines of score-function derivatives).
 
     Args:
         sums: Integrals of the light.
-        white: Integrals of a light of 1 over the same directions.
+        drawn: Integrals of a light of 1 over the same directions.
+        white: The same without noise, from :func:`white_sums`.
     """
     of_specular, of_diffuse = (
         (light / one.clamp(min=MIN_WHITE)).detach()
-        for light, one in ((sums.specular, white.specular), (sums.diffuse, white.diffuse))
+        for light, one in ((sums.specular, drawn.specular), (sums.diffuse, drawn.diffuse))
     )
     means = sums._replace(specular=of_specular, grazing=of_specular, dielectric=of_specular, diffuse=of_diffuse)
-    return LightSums(*(light - mean * (one - one.detach()) for light, mean, one in zip(sums, means, white)))
+    calmer = (exact - one for exact, one in zip(white, drawn))
+    return LightSums(*(light + mean * (less - less.detach()) for light, mean, less in zip(sums, means, calmer)))
 
 
 def srgb_slope(linear: Tensor) -> Tensor:
