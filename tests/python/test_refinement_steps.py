@@ -11,7 +11,7 @@ from splitnerf import _core
 from splitnerf.data.environment import sample_environment
 from splitnerf.ops import monte_carlo_light, sample_bsdf
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
-from splitnerf.refinement.fit import centred, white_sums
+from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.like_texels import with_like_roughness
@@ -146,7 +146,10 @@ def observed_light(truth: torch.Tensor, start: torch.Tensor, directions: torch.T
     equations = LightEquations(light, share_of_rows=1.0)
     slopes, weights = torch.full_like(directions, 1 / directions.shape[1]), torch.ones(len(directions), 3)
     texels, shares = footprints(light.height, directions.reshape(-1, 3))
-    radiance_of = lambda map_: read(map_.reshape(-1, 3), texels, shares).view_as(directions)  # noqa: E731
+
+    def radiance_of(map_: torch.Tensor) -> torch.Tensor:
+        return read(map_.reshape(-1, 3), texels, shares).view_as(directions)
+
     k = directions.shape[1]
     for _ in range(n_steps):
         for part in torch.arange(len(directions)).split(500):
@@ -166,7 +169,10 @@ def test_a_light_that_is_seen_is_found_and_the_rest_is_smooth_and_grey():
     noise = torch.exp(0.5 * torch.randn(16, 32, 3, generator=random))
     found = observed_light(truth, noise, directions)
     assert (found.log() - truth.log())[1:7].abs().max() < 0.1
-    colour = lambda map_: (map_.log() - map_.log().mean(2, keepdim=True))[10:].std()  # noqa: E731
+
+    def colour(map_: torch.Tensor) -> torch.Tensor:
+        return (map_.log() - map_.log().mean(2, keepdim=True))[10:].std()
+
     assert colour(found) < 0.3 * colour(noise) and found[10:].log().std() < 0.5 * noise[10:].log().std()
 
 

@@ -14,8 +14,8 @@ struct SurfacePoints {
 };
 
 struct IncomingLightParams {
-  // A point's; the first by the light, half of them at rough and diffuse points, a quarter at mirrors, none where the
-  // light is black; the others by the material.
+  // Of a point. The first ones are drawn by the light: half of all at rough and diffuse points, a quarter at mirrors,
+  // none where the light is black. The others are drawn by the material.
   int n_directions = 32;
   int max_bounces = 3;       // scattering events of the light that the asset itself sends
   uint32_t seed = 0;         // equal seeds give equal numbers, whatever the number of threads

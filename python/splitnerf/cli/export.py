@@ -17,7 +17,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "export", help="write a run's textured mesh and light",
         description="Writes what RUN trained, before its last stage: mesh.glb (watertight where the object is, decimated, "
         "UV-unwrapped, with albedo, occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex "
-        "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces and the walls of cavities are dropped.",
+        "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces and "
+        "the walls of cavities are dropped.",
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained after a last stage)")
