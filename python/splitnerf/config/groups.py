@@ -215,6 +215,7 @@ class Losses:
     dark_metal_weight: float = setting(0.002, "weight of metals that reflect less than any does")
     mask_weight: float = setting(1.0, "weight of the masks")
     neutral_weight: float = setting(0.03, "weight of the diffuse light's log chroma")
+    light_prior_weight: float = setting(0.001, "weight of the distance to a smooth and grey light (of the pyramid)")
     entropy_weight: float = setting(0.002, "weight of the materials' quadratic entropy, from priors_from")
     priors_from: float = setting(0.5, "time from which materials are told apart", unit="share of the run")
     entropy_points: int = setting(384, "surface points of the entropy", unit="points", at_least=1)

@@ -114,8 +114,8 @@ class Sweep(NamedTuple):
     Attributes:
         number: Sweeps so far.
         seconds: Time since the start.
-        error: Mean squared error of the photos before the sweep's step, in sRGB units, without the noise; it may come out
-            slightly negative.
+        error: Mean squared error of the photos before the sweep's step, without the noise, in sRGB units at the tone of the
+            brightest pixel around; it may come out slightly negative.
         moved: [7] root mean square of the step, by unknown.
     """
 
@@ -257,15 +257,20 @@ class Refinement:
         unknowns = (self.unknowns[texels] * shares[..., None]).sum(1).requires_grad_(True)
         shaded = self.shade(surface, samples, unknowns)
         colours = shaded.colours
-        target, saturated = (torch.from_numpy(x[index]) for x in (self.pixels.target, self.pixels.saturated))
+        photos = self.pixels
+        target, brightest, saturated = (
+            torch.from_numpy(x[index]) for x in (photos.target, photos.brightest, photos.saturated)
+        )
         pairs = colours.detach().view(-1, 2, 3)
-        weights = srgb_slope(target.clamp(min=MIN_TONE)).square()
+        weights = srgb_slope(brightest.clamp(min=MIN_TONE)).square()
         weights = torch.where(saturated & (pairs.mean(1) > target), 0.0, weights)
         errors = pairs - target[:, None]
         of_other = errors.flip(1).flatten(0, 1)
         weights_of_rays = weights.repeat_interleave(2, 0)
         if self.settings.light_step > 0:
-            slopes = torch.autograd.grad(colours.sum(), shaded.radiance, retain_graph=True)[0] * shaded.visible[..., None]
+            slopes = (
+                torch.autograd.grad(colours.sum(), shaded.radiance, retain_graph=True)[0] * shaded.visible[..., None]
+            )
             self.light_equations.add(Rows(shaded.texels, shaded.shares, slopes, weights_of_rays), shaded.sky, of_other)
         jacobian = torch.stack(
             [torch.autograd.grad(colours[:, c].sum(), unknowns, retain_graph=c < 2)[0] for c in range(3)], dim=1
@@ -285,13 +290,17 @@ class Refinement:
         if s.light_step > 0:
             moved = self.light_equations.step(s.light_step / (1.0 + self.n_sweeps / SWEEPS_OF_LARGE_STEPS))
             if not np.isfinite(moved):
-                raise RuntimeError(f"refinement: the light after {self.n_batches} batches is not finite; nothing was written")
+                raise RuntimeError(
+                    f"refinement: the light after {self.n_batches} batches is not finite; nothing was written"
+                )
         limits = torch.tensor(STEP_LIMITS)
         like = with_like_roughness(self.unknowns, s.seed)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
         step = wanted - self.unknowns
         if not bool(torch.isfinite(step).all()):
-            raise RuntimeError(f"refinement: the step after {self.n_batches} batches is not finite; nothing was written")
+            raise RuntimeError(
+                f"refinement: the step after {self.n_batches} batches is not finite; nothing was written"
+            )
         self.unknowns = wanted
         self.n_sweeps += 1
         self.equations.move(step)
@@ -319,7 +328,12 @@ class Stage:
     """
 
     def __init__(
-        self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings, state: dict | None = None
+        self,
+        dataset: Dataset,
+        asset: Asset,
+        environment: np.ndarray,
+        settings: RefinementSettings,
+        state: dict | None = None,
     ):
         check_form(asset)
         self.settings, self.outline, self.sweeps = settings, [], []

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import torch
+from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.data.dataset import Dataset
@@ -22,6 +24,7 @@ class Pixels:
         view: [n] int64, the number of the photo.
         centre: [n, 2] float32, (x, y) of the pixel's centre.
         target: [n, 3] float32 linear radiance.
+        brightest: [n, 3] float32 the largest linear radiance of the pixel and its eight neighbours, where the mask covers them.
         saturated: [n, 3] bool, whether the photo gives a lower bound alone.
         poses: [views, 3, 4] float32 camera-to-world, OpenGL axes, the data's world frame.
         intrinsics: [views, 4] float32 fx, fy, cx, cy in pixels.
@@ -30,6 +33,7 @@ class Pixels:
     view: np.ndarray
     centre: np.ndarray
     target: np.ndarray
+    brightest: np.ndarray
     saturated: np.ndarray
     poses: np.ndarray
     intrinsics: np.ndarray
@@ -68,10 +72,17 @@ def pixels_of(dataset: Dataset, chosen: np.ndarray) -> Pixels:
     """The pixels of a split where `chosen` [photos, H, W] is true."""
     view, row, column = np.nonzero(chosen)
     colours = dataset.images[view, row, column, :3]
+    brightest = np.concatenate([brightest_around(photo)[mask] for photo, mask in zip(dataset.images, chosen)])
     return Pixels(
         view, np.stack([column, row], axis=1).astype(np.float32) + 0.5, srgb_to_linear(colours).astype(np.float32),
-        colours >= SATURATED, dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics,
+        srgb_to_linear(brightest).astype(np.float32), colours >= SATURATED, dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics,
     )  # fmt: skip
+
+
+def brightest_around(photo: np.ndarray) -> np.ndarray:
+    """The largest colours [H, W, 3] of each pixel of a photo [H, W, 4] and its eight neighbours, of those that the object covers."""
+    covered = torch.from_numpy(photo[..., :3] * (photo[..., 3:] >= MIN_ALPHA)).permute(2, 0, 1)
+    return F.max_pool2d(covered, kernel_size=3, stride=1, padding=1).permute(1, 2, 0).numpy()
 
 
 def covered_pixels(dataset: Dataset) -> Pixels:

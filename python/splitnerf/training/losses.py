@@ -11,7 +11,7 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.config import Config
-from splitnerf.fields import EvaluatedLight, Light
+from splitnerf.fields import EvaluatedLight, Light, LightPyramid
 from splitnerf.ops import (
     MeshScene,
     fibonacci_directions,
@@ -22,6 +22,9 @@ from splitnerf.ops import (
 )
 from splitnerf.render.renderer import RenderedRays
 
+BRIGHTNESS_DEVIATION = 0.5  # of a texel's log radiance from the coarser levels
+COLOUR_DEVIATION = 0.2  # of its channels from their mean
+TAILS = 3.0  # degrees of freedom
 ALBEDO_FLOOR = 0.01  # albedos below it count as the same black
 
 
@@ -115,6 +118,24 @@ def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.G
     )
     log_light = torch.log(light(normals, torch.ones_like(normals[:, :1])) + 1e-6)
     return (log_light - log_light.mean(1, keepdim=True)).square().mean()
+
+
+def light_prior_loss(light: LightPyramid) -> Tensor:
+    """How far a light is from a smooth and grey one: the sum over its levels of the mean cost of a texel.
+
+    Many lights explain the photos of an object that is not a mirror. The log radiance of a texel is expected near that of the
+    coarser levels, and its channels near their mean. A deviation d costs log(1 + d^2 / (TAILS s^2)), that of Student's t
+    distribution with TAILS degrees of freedom, as windows and lamps have edges.
+    """
+    cost = light.texels.new_zeros(())
+    for number, level in enumerate(light.texels.split(light.level_sizes)):
+        if number == 0:
+            level = level - level.mean(0)
+        brightness = level.mean(1, keepdim=True)
+        colour = (level - brightness).square().mean(1) / COLOUR_DEVIATION**2
+        brightness = brightness.square().squeeze(1) / BRIGHTNESS_DEVIATION**2
+        cost = cost + torch.log1p(brightness / TAILS).mean() + torch.log1p(colour / TAILS).mean()
+    return cost
 
 
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:

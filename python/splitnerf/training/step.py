@@ -100,14 +100,20 @@ def loss_terms(
         ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.losses.metal_form == "smooth_l1"
     )
     # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
-    terms = {"colour": Term(CHANNELS * c.losses.colour_weight, colour), "eikonal": Term(c.losses.eikonal_weight, eikonal)}
+    terms = {
+        "colour": Term(CHANNELS * c.losses.colour_weight, colour),
+        "eikonal": Term(c.losses.eikonal_weight, eikonal),
+    }
     if c.losses.mask_weight:
         terms["mask"] = Term(c.losses.mask_weight, mask)
     if model.light.needs_consistency_loss and c.losses.light_weight and step % c.losses.light_every == 0:
         terms["light"] = Term(c.losses.light_weight, losses.light_loss(model.light, c, generator, step))
-    if c.losses.neutral_weight and light_moves(c, step):  # once for all steps since the light last moved
+    if light_moves(c, step):  # once for all steps since the light last moved
         since = step % light_period(c) + 1
-        terms["neutral"] = Term(c.losses.neutral_weight * since, losses.neutral_light_loss(light, c, generator))
+        if c.losses.neutral_weight:
+            terms["neutral"] = Term(c.losses.neutral_weight * since, losses.neutral_light_loss(light, c, generator))
+        if c.losses.light_prior_weight and c.light.kind == "pyramid":
+            terms["light_prior"] = Term(c.losses.light_prior_weight * since, losses.light_prior_loss(model.light))
     if c.losses.smoothness_weight:
         terms["smoothness"] = Term(c.losses.smoothness_weight, smoothness)
     if c.losses.entropy_weight and progress >= c.losses.priors_from:
