@@ -199,11 +199,7 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
     write_report(
         run / "report.html",
         title=views.name,
-        summary={
-            "Result": headline(evaluated.scores),
-            "All scores": evaluated.scores,
-            "Settings": asdict(model.config),
-        },
+        summary={"Result": headline(evaluated.scores), "All scores": evaluated.scores, "Settings": asdict(model.config)},
         views=pages,
         last_stage=last_stage_page(run, views, predictions, shown, evaluated.scores) if is_refined(run) else None,
         lights=light_panels(model),
@@ -230,9 +226,7 @@ def last_stage_page(run: Path, views: Dataset, predictions: list[dict], shown: l
         pictures = [over_background(photo, coverage)]
         pictures += [over_background(p["rgb"], p["alpha"]) for p in (before[k], predictions[i])]
         errors = [float(np.square(p["alpha"] - coverage).mean()) for p in (before[k], predictions[i])]
-        pages.append(
-            {"name": views.frame_names[i], "pictures": pictures, "coverage": errors, "uncertain": uncertain[k]}
-        )
+        pages.append({"name": views.frame_names[i], "pictures": pictures, "coverage": errors, "uncertain": uncertain[k]})
     return {"views": pages, "summary": scores["last_stage"], "lights": lights}
 
 

@@ -102,7 +102,7 @@ def test_the_light_is_summed_over_channels_and_averaged_over_queries(monkeypatch
 
 WEIGHTS = {
     "colour_weight": 0.11, "eikonal_weight": 0.13, "mask_weight": 0.17, "light_weight": 0.19, "neutral_weight": 0.23,
-    "smoothness_weight": 0.29, "entropy_weight": 0.31, "metal_weight": 0.37, "binary_metal_weight": 0.41, "dark_metal_weight": 0.43,
+    "light_prior_weight": 0.53, "smoothness_weight": 0.29, "entropy_weight": 0.31, "metal_weight": 0.37, "binary_metal_weight": 0.41, "dark_metal_weight": 0.43,
     "occlusion_weight": 0.47,
 }  # fmt: skip
 DUE = {"priors_from": 0.5, "light_every": 4}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from types import SimpleNamespace
 
@@ -9,8 +10,9 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from splitnerf.training import losses
 from splitnerf.config import Config
+from splitnerf.fields import LightPyramid
+from splitnerf.training import losses
 
 
 def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
@@ -74,6 +76,21 @@ def test_neutral_light_loss_measures_chroma_alone():
     assert losses.neutral_light_loss(coloured, config, generator).item() == pytest.approx(0.5 / 3, rel=1e-4)
     tinted = losses.neutral_light_loss(Sky([1.0, 1.0, 1.0], 0.6), config, generator).item()
     assert tinted == pytest.approx(2.0 / 3.0 * 0.36 / 3.0, rel=0.03)
+
+
+def test_the_lights_prior_costs_a_texel_what_its_level_is_worth():
+    """A light of one colour is free; a texel costs log(1 + d^2 / (3 s^2)) of its level's texels, s .5 in grey and .2 in colour."""
+    light = LightPyramid(16)
+    assert losses.light_prior_loss(light).item() == 0.0
+    with torch.no_grad():
+        light.texels[:16] += torch.tensor([0.5, 0.0, -0.7])
+    assert losses.light_prior_loss(light).item() == pytest.approx(0.0, abs=1e-6)
+    for texel, n in ((16, 64), (16 + 64 + 7, 256)):
+        for change, cost in (([0.9] * 3, 0.81 / 0.75), ([0.9, 0.0, -0.9], 0.54 / 0.12)):
+            changed = copy.deepcopy(light)
+            with torch.no_grad():
+                changed.texels[texel] += torch.tensor(change)
+            assert losses.light_prior_loss(changed).item() == pytest.approx(math.log1p(cost) / n, rel=1e-3)
 
 
 def entropy(albedo: list[float], weights: list[float] | None = None, roughness: list[float] | None = None) -> float:

@@ -21,7 +21,7 @@ from splitnerf.export.glb import write_glb
 from splitnerf.refinement.fit import Refinement, RefinementSettings, refine, srgb_slope
 from splitnerf.refinement.job import fitting_height
 from splitnerf.refinement.outline import fit_outline, weld
-from splitnerf.refinement.pixels import PixelFilter, covered_pixels
+from splitnerf.refinement.pixels import PixelFilter, brightest_around, covered_pixels
 from splitnerf.refinement.texels import AssetTexels, materials_of
 from splitnerf.refinement.unknowns import N_UNKNOWNS, into_range, to_unknowns, to_values
 from splitnerf.render.path_traced import AssetRenderer
@@ -111,14 +111,24 @@ def test_light_that_the_asset_hides_and_sends_is_the_path_tracers(cornered):
     assert abs(np.mean([fit.gather(surface) for _ in range(6)])) < 1.5e-4
 
 
-def test_errors_are_those_of_srgb(painted):
+def test_a_pixel_knows_the_brightest_around_it_that_the_object_covers():
+    photo = np.zeros((5, 6, 4), np.float32)
+    photo[..., 3] = 1.0
+    photo[1, 1, :3], photo[3, 4, :3] = (0.8, 0.2, 0.0), 0.9
+    photo[3, 4, 3] = 0.5  # the outline's
+    wanted = np.zeros((5, 6, 3), np.float32)
+    wanted[:3, :3] = 0.8, 0.2, 0.0
+    np.testing.assert_array_equal(brightest_around(photo), wanted)
+
+
+def test_errors_are_those_of_srgb_at_the_brightest_pixel_around(painted):
     """A light that is a tenth too bright."""
     asset, data = painted
     fit = Refinement(data, asset, 1.1 * sky(), RefinementSettings(light_step=0.0, pixels=4000))
     surface = fit.surface()
-    target = torch.from_numpy(fit.pixels.target)
+    target, tone = (torch.from_numpy(x) for x in (fit.pixels.target, fit.pixels.brightest))
     open_above = ~torch.from_numpy(fit.pixels.saturated)
-    wanted = (open_above * (srgb_slope(target.clamp(min=0.02)) * 0.1 * target) ** 2).mean().item()
+    wanted = (open_above * (srgb_slope(tone.clamp(min=0.02)) * 0.1 * target) ** 2).mean().item()
     assert np.mean([fit.gather(surface) for _ in range(6)]) == pytest.approx(wanted, rel=0.15)
 
 

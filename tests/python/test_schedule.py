@@ -224,7 +224,8 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
     n = 41
     config = tiny(
         steps=n, n_levels=8, start_levels=2, levels_open_by=0.6, cos_anneal_by=0.5, warmup_steps=8, final_learning_rate=0.1,
-        light_step_every=4, priors_from=0.5, entropy_weight=0.01, binary_metal_weight=0.01, neutral_weight=0.03, mesh_every=0.25,
+        light_step_every=4, priors_from=0.5, entropy_weight=0.01, binary_metal_weight=0.01, neutral_weight=0.03, light_prior_weight=0.002,
+        mesh_every=0.25,
     )  # fmt: skip
     levels = recorded(monkeypatch, "find_samples", lambda args, _, __: args[0].sdf_field.grid.n_active, step_module)
     anneals = recorded(monkeypatch, "find_samples", lambda args, *_: args[5], step_module)
@@ -245,8 +246,9 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
     assert all(group == pytest.approx([rate] * len(group)) for group, rate in zip(rates, expected, strict=True))
     for prior in ("entropy", "binary_metal"):
         assert [prior in step for step in terms] == [step / n >= 0.5 for step in range(n)]
-    assert [step for step in range(n) if "neutral" in terms[step]] == [*range(3, 40, 4), 40]
-    assert sum(step.get("neutral", 0.0) for step in terms) == pytest.approx(0.03 * n)
+    for prior, weight in (("neutral", 0.03), ("light_prior", 0.002)):
+        assert [step for step in range(n) if prior in terms[step]] == [*range(3, 40, 4), 40]
+        assert sum(step.get(prior, 0.0) for step in terms) == pytest.approx(weight * n)
     apart = math.ceil(0.25 * n)
     assert requested == pytest.approx([apart / n, 2 * apart / n, 3 * apart / n, 1.0])
 

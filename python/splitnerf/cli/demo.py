@@ -20,9 +20,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)"
     )
-    parser.add_argument(
-        "--max-minutes", type=float, default=4.0, metavar="M", help="time of training and last stage (default: 4)"
-    )
+    parser.add_argument("--max-minutes", type=float, default=4.0, metavar="M", help="time of training and last stage (default: 4)")
     parser.add_argument("--no-refine", action="store_true", help="no last stage: training gets all minutes")
     parser.add_argument("--seed", type=int, default=0)
     parser.set_defaults(execute=run)

@@ -21,9 +21,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "the walls of cavities are dropped.",
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN")
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained after a last stage)"
-    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained after a last stage)")
     for option, kind, default, name, text in (
         ("--faces", int, None, "N", "faces of the textured mesh, 0 keeps all (default: as in training)"),
         ("--texture-size", int, None, "N", "texels along an edge (default: as in training)"),

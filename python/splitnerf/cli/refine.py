@@ -24,9 +24,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)"
     )
     parser.add_argument("--sweeps", type=int, metavar="N", help="most steps of the fit (default: 16 without --minutes)")
-    parser.add_argument(
-        "--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)"
-    )
+    parser.add_argument("--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)")
     parser.add_argument("--resume", action="store_true", help="go on from the state that an interruption left")
     parser.add_argument("--keep-shape", action="store_true", help="leave the vertices where they are")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN/refined)")

@@ -36,9 +36,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
         help="cpu: small, for a few cores (default there); fast: for a GPU (default there); paper: the publication's settings",
     )
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
-    parser.add_argument(
-        "--max-minutes", type=float, metavar="M", help="time of training and last stage; the schedule fits itself to it"
-    )
+    parser.add_argument("--max-minutes", type=float, metavar="M", help="time of training and last stage; the schedule fits itself to it")
     parser.add_argument(
         "--device", choices=["cpu", "cuda"], default="cpu",
         help="where to train (default: cpu; see docs/cuda.md)",

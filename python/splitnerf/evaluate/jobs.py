@@ -116,12 +116,7 @@ def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None 
 
 
 def score_asset(
-    asset: Asset,
-    environment: np.ndarray | None,
-    views: Dataset,
-    maps: dict[str, Path],
-    spp: int,
-    seconds: float | None = None,
+    asset: Asset, environment: np.ndarray | None, views: Dataset, maps: dict[str, Path], spp: int, seconds: float | None = None
 ) -> Evaluated:
     """Scores an asset by path tracing.
 

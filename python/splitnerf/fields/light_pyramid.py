@@ -145,9 +145,7 @@ class LightPyramid(Light):
     def __init__(self, resolution: int = 64, start: float = 0.5):
         super().__init__()
         self.resolution = resolution
-        self.texels = nn.Parameter(
-            torch.zeros(len(pyramid_filters(resolution).sum_of_levels.transposed_offsets) - 1, 3)
-        )
+        self.texels = nn.Parameter(torch.zeros(len(pyramid_filters(resolution).sum_of_levels.transposed_offsets) - 1, 3))
         with torch.no_grad():
             self.texels[: 4 * 4] = math.log(start)
 

@@ -2,7 +2,9 @@
 
 A pixel is seen by two rays through its filter, and each ray's point by directions of its own. The error of one ray's colour
 times that of the other is the squared error without the noise (in expectation), and one ray's derivatives times the other's
-error are its gradient. Batches of pixels are gathered into normal equations of the texels and of the light, and a sweep of
+error are its gradient. An error counts as at the tone of the brightest pixel around it: shape and normals are never quite
+true, and a highlight a pixel off its place would cost more in the dark beside its place than in it, so that all lamps came
+out too dim. Batches of pixels are gathered into normal equations of the texels and of the light, and a sweep of
 batches ends with a step of each.
 """
 
@@ -252,15 +254,12 @@ class Refinement:
 
     def gather(self, surface: TexturedSurface) -> float:
         """Gathers one batch of pixels; returns its mean squared error without noise."""
-        index, samples = self.see()
+        (index, samples), photos = self.see(), self.pixels
         texels, shares = self.texels.rows(samples.footprints), samples.footprints.weights
         unknowns = (self.unknowns[texels] * shares[..., None]).sum(1).requires_grad_(True)
         shaded = self.shade(surface, samples, unknowns)
         colours = shaded.colours
-        photos = self.pixels
-        target, brightest, saturated = (
-            torch.from_numpy(x[index]) for x in (photos.target, photos.brightest, photos.saturated)
-        )
+        target, brightest, saturated = (torch.from_numpy(x[index]) for x in (photos.target, photos.brightest, photos.saturated))
         pairs = colours.detach().view(-1, 2, 3)
         weights = srgb_slope(brightest.clamp(min=MIN_TONE)).square()
         weights = torch.where(saturated & (pairs.mean(1) > target), 0.0, weights)
@@ -268,9 +267,7 @@ class Refinement:
         of_other = errors.flip(1).flatten(0, 1)
         weights_of_rays = weights.repeat_interleave(2, 0)
         if self.settings.light_step > 0:
-            slopes = (
-                torch.autograd.grad(colours.sum(), shaded.radiance, retain_graph=True)[0] * shaded.visible[..., None]
-            )
+            slopes = torch.autograd.grad(colours.sum(), shaded.radiance, retain_graph=True)[0] * shaded.visible[..., None]
             self.light_equations.add(Rows(shaded.texels, shaded.shares, slopes, weights_of_rays), shaded.sky, of_other)
         jacobian = torch.stack(
             [torch.autograd.grad(colours[:, c].sum(), unknowns, retain_graph=c < 2)[0] for c in range(3)], dim=1
@@ -290,17 +287,13 @@ class Refinement:
         if s.light_step > 0:
             moved = self.light_equations.step(s.light_step / (1.0 + self.n_sweeps / SWEEPS_OF_LARGE_STEPS))
             if not np.isfinite(moved):
-                raise RuntimeError(
-                    f"refinement: the light after {self.n_batches} batches is not finite; nothing was written"
-                )
+                raise RuntimeError(f"refinement: the light after {self.n_batches} batches is not finite; nothing was written")
         limits = torch.tensor(STEP_LIMITS)
         like = with_like_roughness(self.unknowns, s.seed)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
         step = wanted - self.unknowns
         if not bool(torch.isfinite(step).all()):
-            raise RuntimeError(
-                f"refinement: the step after {self.n_batches} batches is not finite; nothing was written"
-            )
+            raise RuntimeError(f"refinement: the step after {self.n_batches} batches is not finite; nothing was written")
         self.unknowns = wanted
         self.n_sweeps += 1
         self.equations.move(step)
@@ -328,12 +321,7 @@ class Stage:
     """
 
     def __init__(
-        self,
-        dataset: Dataset,
-        asset: Asset,
-        environment: np.ndarray,
-        settings: RefinementSettings,
-        state: dict | None = None,
+        self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings, state: dict | None = None
     ):
         check_form(asset)
         self.settings, self.outline, self.sweeps = settings, [], []

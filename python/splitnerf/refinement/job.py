@@ -48,9 +48,7 @@ def read_light(folder: Path) -> np.ndarray:
     light = read_environment(path)
     height = fitting_height(light.shape[0])
     if height == 0 or light.shape[1] != 2 * light.shape[0]:
-        raise InputError(
-            f"{path}: is {light.shape[1]}x{light.shape[0]}; a light of 8 2^k rows, twice as wide, is needed"
-        )
+        raise InputError(f"{path}: is {light.shape[1]}x{light.shape[0]}; a light of 8 2^k rows, twice as wide, is needed")
     return area_average(light, light.shape[0] // height).astype(np.float32)
 
 
@@ -120,13 +118,7 @@ def origin_of(source: Path, dataset: Dataset, settings: RefinementSettings) -> s
 
 
 def refine_folder(
-    source: Path,
-    dataset: Dataset,
-    out: Path,
-    settings: RefinementSettings,
-    *,
-    resume: bool = False,
-    save_minutes: float = 2.0,
+    source: Path, dataset: Dataset, out: Path, settings: RefinementSettings, *, resume: bool = False, save_minutes: float = 2.0
 ) -> Refined | None:
     """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it after the sweep and keeps its state.
 

@@ -19,10 +19,7 @@ ROUNDS = 3
 RAYS = 32  # of a pixel
 PROBE = 0.25  # pixels by which the surface is raised and lowered
 LARGEST = 1.0  # pixels that a vertex may move in a round
-SMOOTH, ANCHOR = (
-    3.0,
-    0.02,
-)  # weights of the differences of neighbours' moves and of the moves, in units of the mean curvature
+SMOOTH, ANCHOR = 3.0, 0.02  # weights of the differences of neighbours' moves and of the moves, in units of the mean curvature
 MIN_SLOPE = 0.05  # of the coverage a pixel; below it a pixel's outline does not move with the surface
 BATCH = 4096  # pixels
 

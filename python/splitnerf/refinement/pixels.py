@@ -24,7 +24,8 @@ class Pixels:
         view: [n] int64, the number of the photo.
         centre: [n, 2] float32, (x, y) of the pixel's centre.
         target: [n, 3] float32 linear radiance.
-        brightest: [n, 3] float32 the largest linear radiance of the pixel and its eight neighbours, where the mask covers them.
+        brightest: [n, 3] float32 the largest linear radiance of the pixel and those of its eight neighbours that the object
+            covers.
         saturated: [n, 3] bool, whether the photo gives a lower bound alone.
         poses: [views, 3, 4] float32 camera-to-world, OpenGL axes, the data's world frame.
         intrinsics: [views, 4] float32 fx, fy, cx, cy in pixels.
@@ -75,12 +76,13 @@ def pixels_of(dataset: Dataset, chosen: np.ndarray) -> Pixels:
     brightest = np.concatenate([brightest_around(photo)[mask] for photo, mask in zip(dataset.images, chosen)])
     return Pixels(
         view, np.stack([column, row], axis=1).astype(np.float32) + 0.5, srgb_to_linear(colours).astype(np.float32),
-        srgb_to_linear(brightest).astype(np.float32), colours >= SATURATED, dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics,
+        srgb_to_linear(brightest).astype(np.float32), colours >= SATURATED,
+        dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics,
     )  # fmt: skip
 
 
 def brightest_around(photo: np.ndarray) -> np.ndarray:
-    """The largest colours [H, W, 3] of each pixel of a photo [H, W, 4] and its eight neighbours, of those that the object covers."""
+    """[H, W, 3] the largest values of each pixel of a photo [H, W, 4] and its eight neighbours, where the object covers them."""
     covered = torch.from_numpy(photo[..., :3] * (photo[..., 3:] >= MIN_ALPHA)).permute(2, 0, 1)
     return F.max_pool2d(covered, kernel_size=3, stride=1, padding=1).permute(1, 2, 0).numpy()
 

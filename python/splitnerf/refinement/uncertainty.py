@@ -93,9 +93,7 @@ class Information:
         """[m, 4] standard deviations of the texels, see :class:`Uncertainty`."""
         variances = self.covariance(noise).diagonal(dim1=1, dim2=2)
         albedo, roughness, metallic, tilt = variances.split([3, 1, 1, 2], dim=1)
-        of_patch = torch.cat(
-            [albedo.mean(1, keepdim=True), roughness, metallic, tilt.sum(1, keepdim=True)], dim=1
-        ).sqrt()
+        of_patch = torch.cat([albedo.mean(1, keepdim=True), roughness, metallic, tilt.sum(1, keepdim=True)], dim=1).sqrt()
         return of_patch[self.patch_of]
 
 

@@ -37,20 +37,11 @@ def last_stage_section(page: Mapping) -> dict:
     coverage = np.mean([view["coverage"] for view in views], axis=0)
     rows.append(("these views: coverage, mean squared error", *(f"{value:.2g}" for value in coverage)))
     if summary["outline_error"]:
-        rows.append(
-            ("all photos: coverage at the outline, mean squared error", *(f"{v:.2g}" for v in summary["outline_error"]))
-        )
-    rows.append(
-        (
-            "all photos: colours inside, PSNR before the first and the last step",
-            *(f"{v:.2f} dB" for v in summary["photos_psnr"]),
-        )
-    )
+        rows.append(("all photos: coverage at the outline, mean squared error", *(f"{v:.2g}" for v in summary["outline_error"])))
+    rows.append(("all photos: colours inside, PSNR before the first and the last step", *(f"{v:.2f} dB" for v in summary["photos_psnr"])))
     return {
         "pictures": PICTURES,
-        "views": [
-            {"name": view["name"], "cells": [data_uri(p) for p in _with_errors(view["pictures"])]} for view in views
-        ],
+        "views": [{"name": view["name"], "cells": [data_uri(p) for p in _with_errors(view["pictures"])]} for view in views],
         "rows": rows,
         "lights": _lights(page["lights"]),
         "steps": summary["steps"],
@@ -61,8 +52,7 @@ def last_stage_section(page: Mapping) -> dict:
             for name, limit, share in zip(QUANTITIES, UNKNOWN.tolist(), _unknown_shares(views))
         ],
         "uncertain": [
-            {"name": view["name"], "cells": [data_uri(coloured(view["uncertain"], i)) for i in range(len(QUANTITIES))]}
-            for view in views
+            {"name": view["name"], "cells": [data_uri(coloured(view["uncertain"], i)) for i in range(len(QUANTITIES))]} for view in views
         ],
         "legend": data_uri(_legend()),
         "saturated": f"{100 * summary['saturated']:.1f} %",

@@ -298,15 +298,7 @@ class Training:
 
     def result(self) -> TrainedScene:
         """The scene as the training leaves it in memory."""
-        return TrainedScene(
-            self.model,
-            self.grid,
-            self.mesh.scene,
-            self.step,
-            self.seconds,
-            self.progress >= 1.0,
-            self.step - self.resumed_at,
-        )
+        return TrainedScene(self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0, self.step - self.resumed_at)
 
 
 def check_repeatable(config: Config, device: torch.device | str) -> None:

@@ -100,10 +100,7 @@ def loss_terms(
         ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.losses.metal_form == "smooth_l1"
     )
     # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
-    terms = {
-        "colour": Term(CHANNELS * c.losses.colour_weight, colour),
-        "eikonal": Term(c.losses.eikonal_weight, eikonal),
-    }
+    terms = {"colour": Term(CHANNELS * c.losses.colour_weight, colour), "eikonal": Term(c.losses.eikonal_weight, eikonal)}
     if c.losses.mask_weight:
         terms["mask"] = Term(c.losses.mask_weight, mask)
     if model.light.needs_consistency_loss and c.losses.light_weight and step % c.losses.light_every == 0:
