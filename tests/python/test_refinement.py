@@ -122,10 +122,11 @@ def test_a_pixel_knows_the_brightest_around_it_that_the_object_covers():
 
 
 def test_errors_are_those_of_srgb_at_the_brightest_pixel_around(painted):
-    """A light that is a tenth too bright."""
+    """A light that is a tenth too bright, and pixels beside others four times as bright."""
     asset, data = painted
     fit = Refinement(data, asset, 1.1 * sky(), RefinementSettings(light_step=0.0, pixels=4000))
     surface = fit.surface()
+    fit.pixels.brightest = 4 * fit.pixels.target
     target, tone = (torch.from_numpy(x) for x in (fit.pixels.target, fit.pixels.brightest))
     open_above = ~torch.from_numpy(fit.pixels.saturated)
     wanted = (open_above * (srgb_slope(tone.clamp(min=0.02)) * 0.1 * target) ** 2).mean().item()
