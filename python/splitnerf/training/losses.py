@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf import _core
 from splitnerf.config import Config
 from splitnerf.fields import EvaluatedLight, Light, LightPyramid
 from splitnerf.ops import (
