@@ -3,9 +3,9 @@
 A pixel is seen by two rays through its filter, and each ray's point by directions of its own. The error of one ray's colour
 times that of the other is the squared error without the noise (in expectation), and one ray's derivatives times the other's
 error are its gradient. An error counts as at the tone of the brightest pixel around it: shape and normals are never quite
-true, and a highlight a pixel off its place would cost more in the dark beside its place than in it, so that all lamps came
-out too dim. Batches of pixels are gathered into normal equations of the texels and of the light, and a sweep of
-batches ends with a step of each.
+true, and a highlight a pixel off its place would cost more in the dark beside its place than in it, and all lamps would
+come out too dim. Batches of pixels are gathered into normal equations of the texels and of the light, and a sweep of batches
+ends with a step of each.
 """
 
 from __future__ import annotations
