@@ -14,7 +14,7 @@ from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
-from splitnerf.refinement.like_texels import with_like_roughness
+from splitnerf.refinement.like_texels import weighted_medians, with_like_gloss
 from splitnerf.refinement.normal_equations import APART, EDGE, NormalEquations, Prior
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
 
@@ -63,24 +63,48 @@ def test_small_differences_are_smoothed_and_edges_are_kept():
 def test_like_texels_pull_at_the_cost_that_is_written():
     observed, like = torch.zeros(3, N_UNKNOWNS), torch.zeros(3, N_UNKNOWNS)
     observed[:, 3], like[:, 3] = torch.tensor([0.3, 0.3, 0.9]), torch.tensor([0.3, 0.35, 0.3])
-    found = fitted(chain(like=1.0), observed, like)
+    found = fitted(chain(like=0.5), observed, like)
     at = found.clone().requires_grad_(True)
-    pull = 0.5 * APART**2 * torch.log1p(((at - like) / APART).square()).sum()
+    pull = 0.25 * APART**2 * torch.log1p(((at - like) / APART).square()).sum()
     assert torch.autograd.grad(0.5 * (at - observed).square().sum() + pull, at)[0].abs().max() < 1e-4
-    assert found[0, 3] == pytest.approx(0.3, abs=1e-5) and 0.31 < found[1, 3] < 0.34  # half way, nearly
-    assert found[2, 3] > 0.87  # what differs is not merged
+    assert found[0, 3] == pytest.approx(0.3, abs=1e-5) and 0.31 < found[1, 3] < 0.32  # a third of the way, nearly
+    assert found[2, 3] > 0.83  # what differs much is hardly moved
 
 
-def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
+def two_colours(metallic: float) -> tuple[torch.Tensor, torch.Tensor]:
+    """Random unknowns of red and blue texels, six of ten with one roughness and metallic per colour, and which are red."""
     unknowns = torch.rand(5000, N_UNKNOWNS, generator=torch.Generator().manual_seed(0))
     red = torch.arange(5000) % 2 == 0
     unknowns[:, :3] = torch.where(red[:, None], torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.2, 0.8]))
     same = torch.arange(5000) % 10 < 6
     unknowns[same, 3] = torch.where(red[same], 0.1, 0.9)
-    found = with_like_roughness(unknowns, 0)
+    unknowns[same, 4] = torch.where(red[same], metallic, 0.05)
+    return unknowns, red
+
+
+def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
+    unknowns, red = two_colours(metallic=0.2)
+    found = with_like_gloss(unknowns, 0)
     torch.testing.assert_close(found[:, 3], torch.where(red, 0.1, 0.9))
     torch.testing.assert_close(found[:, [0, 1, 2, 4, 5, 6]], unknowns[:, [0, 1, 2, 4, 5, 6]])
-    assert torch.isfinite(with_like_roughness(unknowns[red], 0)).all()  # one colour
+    assert torch.isfinite(with_like_gloss(unknowns[red], 0)).all()  # one colour
+
+
+def test_a_colour_that_is_mostly_metal_is_metal_and_no_other_turns_into_a_dielectric():
+    unknowns, red = two_colours(metallic=0.95)
+    found = with_like_gloss(unknowns, 0)
+    torch.testing.assert_close(found[:, 4], torch.where(red, 0.95, unknowns[:, 4]))
+
+
+def test_a_colours_gloss_is_that_of_colours_nearby_and_less_of_those_farther_away():
+    """Many greys of a dark and of a light half: those in the middle have a share of both, the outermost none of the others."""
+    unknowns = torch.rand(8000, N_UNKNOWNS, generator=torch.Generator().manual_seed(0))
+    grey = torch.linspace(0.1, 0.9, 8000)
+    unknowns[:, :3], unknowns[:, 3] = grey[:, None], torch.where(grey < 0.6, 0.2, 0.7)
+    found = with_like_gloss(unknowns, 0)[:, 3]
+    assert (found[grey < 0.3] == 0.2).all() and (found[grey > 0.75] == 0.7).all()
+    weights = np.array([[1.0, 1.0, 1.0], [0.0, 5.0, 1.0], [9.0, 1.0, 1.0]])
+    assert weighted_medians(np.array([3.0, 1.0, 2.0]), weights).tolist() == [2.0, 1.0, 3.0]
 
 
 def test_conjugate_gradients_solve_a_system():

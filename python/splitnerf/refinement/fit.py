@@ -27,7 +27,7 @@ from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carl
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
-from splitnerf.refinement.like_texels import with_like_roughness
+from splitnerf.refinement.like_texels import with_like_gloss
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
@@ -35,6 +35,7 @@ from splitnerf.refinement.texels import AssetTexels, SurfaceSamples, check_form,
 from splitnerf.refinement.uncertainty import PATCH_PIXELS, Information, Uncertainty, patch_width, uncertainty_of
 from splitnerf.refinement.unknowns import (
     GROUPS,
+    METALLIC,
     N_UNKNOWNS,
     ROUGHNESS,
     STEP_LIMITS,
@@ -64,7 +65,8 @@ class RefinementSettings:
         smooth_albedo, smooth_gloss, smooth_normal: Weights of the differences between neighbours' steps where a texel is as wide
             as a pixel; those of finer texels are larger, so that a step is smooth over a pixel.
         flat_gloss, flat_normal: Weights of the differences between neighbours' values; edges cost little.
-        like_colours: Weight of the difference between a texel's roughness and the usual one of its colour.
+        like_roughness: Weight of the difference between a texel's roughness and the usual one of its colour.
+        like_metal: Weight of the difference between a texel's metallic and the usual one of its colour, where that is metal.
         anchor: Weight of the distance to the start.
         light_step: Share of the light's first Gauss-Newton step that is taken, less of the later ones; 0 keeps the light.
         outline: Whether vertices move first, so that the asset covers the pixels as the masks do.
@@ -83,7 +85,8 @@ class RefinementSettings:
     smooth_normal: float = 1.0
     flat_gloss: float = 5.0
     flat_normal: float = 2.0
-    like_colours: float = 0.5
+    like_roughness: float = 0.5
+    like_metal: float = 2.0
     anchor: float = 0.02
     light_step: float = 0.5
     outline: bool = True
@@ -171,7 +174,7 @@ class Refinement:
         self.random = np.random.default_rng(s.seed)
         self.unknowns = to_unknowns(self.texels.start)
         like = torch.zeros(N_UNKNOWNS)
-        like[ROUGHNESS] = s.like_colours
+        like[ROUGHNESS], like[METALLIC] = s.like_roughness, s.like_metal
         width = patch_width(dataset, self.texels)
         smooth = max(1.0, width / PATCH_PIXELS) ** 2 * per_unknown(s.smooth_albedo, s.smooth_gloss, s.smooth_normal)
         prior = Prior(
@@ -289,7 +292,7 @@ class Refinement:
             if not np.isfinite(moved):
                 raise RuntimeError(f"refinement: the light after {self.n_batches} batches is not finite; nothing was written")
         limits = torch.tensor(STEP_LIMITS)
-        like = with_like_roughness(self.unknowns, s.seed)
+        like = with_like_gloss(self.unknowns, s.seed)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
         step = wanted - self.unknowns
         if not bool(torch.isfinite(step).all()):

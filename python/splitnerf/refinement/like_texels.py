@@ -1,4 +1,4 @@
-"""What texels of one colour have in common: a prior for the roughness of those about which the photos say little."""
+"""What texels of one colour have in common: a prior for roughness and metal of those about which the photos say little."""
 
 from __future__ import annotations
 
@@ -7,16 +7,22 @@ import torch
 from scipy.cluster.vq import kmeans2, vq
 from torch import Tensor
 
-from splitnerf.refinement.unknowns import ROUGHNESS
+from splitnerf.refinement.unknowns import METALLIC, ROUGHNESS
 
 N_COLOURS = 24
 N_SEEN = 20000  # texels by which colours and medians are found
+REACH = 0.15  # deviation of the colours that count as one
+METAL = 0.5  # the usual metallic from which on a colour is a metal's
 
 
-def with_like_roughness(unknowns: Tensor, seed: int) -> Tensor:
-    """The unknowns [m, n] with the usual roughness of each texel's colour: the median.
+def with_like_gloss(unknowns: Tensor, seed: int) -> Tensor:
+    """The unknowns [m, n] with the usual roughness of each texel's colour, and with its usual metallic where that is metal.
 
-    Each texel counts the same. Weighted by what the photos say of each, glossy texels would speak for all of their colour.
+    The usual one is a median over all texels, weighted by a Gaussian of the distance of their colours. What the photos say of
+    each has no weight: glossy texels would speak for all of their colour.
+
+    A metal in which little is mirrored looks like a dark dielectric, so that islands of one arise in a metal; the
+    opposite is rare, and details of metal in the colour of the cloth around them are not to be lost.
 
     Args:
         unknowns: See :mod:`splitnerf.refinement.unknowns`.
@@ -28,11 +34,18 @@ def with_like_roughness(unknowns: Tensor, seed: int) -> Tensor:
     apart = random.normal(scale=1e-3, size=(len(seen), 3))  # equal colours make no clusters
     centres, _ = kmeans2(colours[seen] + apart, min(N_COLOURS, len(seen)), minit="++", seed=random)
     label, _ = vq(colours, centres)
-    usual = unknowns[:, ROUGHNESS].numpy()[seen]
-    of_colour = np.full(len(centres), np.nan, np.float32)
-    for number in np.unique(label[seen]):
-        of_colour[number] = np.median(usual[label[seen] == number])
+    squared = np.square(colours[seen] - centres[:, None]).sum(2)
+    weights = np.exp((squared.min(1, keepdims=True) - squared) / (2 * REACH**2))
+    usual = [weighted_medians(unknowns[:, unknown].numpy()[seen], weights)[label] for unknown in (ROUGHNESS, METALLIC)]
     result = unknowns.clone()
-    roughness = torch.from_numpy(of_colour[label])
-    result[:, ROUGHNESS] = torch.where(roughness.isnan(), result[:, ROUGHNESS], roughness)
+    roughness, metallic = map(torch.from_numpy, usual)
+    result[:, ROUGHNESS] = roughness
+    result[:, METALLIC] = torch.where(metallic >= METAL, metallic, result[:, METALLIC])
     return result
+
+
+def weighted_medians(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """[k] the medians of values [n], one for each row of weights [k, n]; each row's sum is above 0."""
+    order = np.argsort(values)
+    sums = np.cumsum(weights[:, order], axis=1)
+    return values[order][(sums < 0.5 * sums[:, -1:]).sum(axis=1)]

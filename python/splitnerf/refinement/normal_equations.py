@@ -10,7 +10,7 @@ from torch import Tensor
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 
 EDGE = 0.05  # length of the differences between neighbours from which on they count as an edge
-APART = 0.1  # distance to the values of like texels from which on these pull less
+APART = 0.3  # distance to the values of like texels from which on these pull less
 
 
 class Prior(NamedTuple):
