@@ -20,7 +20,7 @@ from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.refinement.fit import Refinement, RefinementSettings, refine, srgb_slope
 from splitnerf.refinement.job import fitting_height
-from splitnerf.refinement.outline import fit_outline, weld
+from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, brightest_around, covered_pixels
 from splitnerf.refinement.texels import AssetTexels, materials_of
 from splitnerf.refinement.unknowns import N_UNKNOWNS, into_range, to_unknowns, to_values
@@ -218,27 +218,6 @@ def test_slope_of_srgb():
     x = torch.linspace(0.02, 1, 50, dtype=torch.float64)
     numeric = (linear_to_srgb((x + 1e-6).numpy()) - linear_to_srgb((x - 1e-6).numpy())) / 2e-6
     np.testing.assert_allclose(srgb_slope(x).numpy(), numeric, rtol=1e-3)
-
-
-@pytest.mark.parametrize("scale", [0.96, 1.04])
-@pytest.mark.parametrize("hard", [False, True])
-def test_a_balls_outline_is_found(ball, painted, scale, hard):
-    """A ball that is too small or too large gets its size back, from masks with soft edges and without, and stays closed."""
-    data = painted[1]
-    if hard:
-        alpha = (data.images[..., 3:] > 0.5).astype(np.float32)
-        data = replace(data, images=np.concatenate([data.images[..., :3], alpha], -1))
-    wrong = replace(ball, vertices=scale * ball.vertices)
-    found, errors = fit_outline(data, wrong)
-    radius = np.linalg.norm(found.vertices, axis=1)
-    assert abs(radius.mean() - 1) < 0.15 * abs(scale - 1) and radius.std() < 0.01
-    assert errors[-1] < 0.3 * errors[0]
-    assert weld(found.vertices).max() == weld(ball.vertices).max()  # what was one vertex still is
-
-
-def test_a_true_outline_stays(ball, painted):
-    found, errors = fit_outline(painted[1], ball)
-    assert np.abs(np.linalg.norm(found.vertices, axis=1) - 1).max() < 0.01 and errors[-1] < 5e-3
 
 
 @pytest.mark.parametrize(("height", "fitted"), [(128, 128), (512, 256), (96, 32), (8, 8), (7, 0)])

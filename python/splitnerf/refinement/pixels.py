@@ -13,6 +13,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import srgb_to_linear
 
 MIN_ALPHA = 0.99  # of a pixel that the object covers
+NEARBY = 0.01  # pixels over which a density is a mean
 SATURATED = 254.5 / 255.0  # sRGB value from which the photo says only that the light was at least so bright
 
 
@@ -52,12 +53,15 @@ class Pixels:
         Returns:
             origins and unit directions, [k, s, 3] float32 each, world frame.
         """
-        view = self.view[index]
+        return self.rays_through(self.view[index], self.centre[index, None] + offsets)
+
+    def rays_through(self, view: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rays of photos [k] through points [k, s, 2] of their images, see :meth:`rays`."""
         fx, fy, cx, cy = (self.intrinsics[view, i, None] for i in range(4))
-        x, y = np.moveaxis(self.centre[index, None] + offsets, -1, 0)
+        x, y = np.moveaxis(points, -1, 0)
         local = np.stack([(x - cx) / fx, -(y - cy) / fy, -np.ones_like(x)], axis=-1)
         pose = self.poses[view]
-        directions = np.einsum("kij,ksj->ksi", pose[:, :, :3], local)
+        directions = local @ pose[:, :, :3].swapaxes(1, 2)
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
         origins = np.broadcast_to(pose[:, None, :, 3], directions.shape)
         return np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
@@ -94,6 +98,18 @@ def covered_pixels(dataset: Dataset) -> Pixels:
 
 class PixelFilter:
     """Offsets drawn with the density of Blender's default filter, a Blackman-Harris window of 3 pixels."""
+
+    WIDTH = 3  # pixels
+    N_QUANTILES = 4096
+
+    def density(self, offsets: np.ndarray) -> np.ndarray:
+        """[...] the density per square pixel of offsets [..., 2] from a pixel's centre, by differences of its quantiles."""
+        quantiles = self._at(np.arange(self.N_QUANTILES) / self.N_QUANTILES).astype(np.float64)
+        quantiles = np.append(quantiles, self.WIDTH / 2)
+        below, above = (
+            np.interp(offsets + side, quantiles, np.linspace(0, 1, len(quantiles))) for side in (-NEARBY, NEARBY)
+        )
+        return ((above - below) / (2 * NEARBY)).prod(axis=-1)
 
     def draw(self, n: int, generator: np.random.Generator) -> np.ndarray:
         """[n, 2] float32 independent offsets from the pixels' centres, in pixels."""

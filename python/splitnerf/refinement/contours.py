@@ -1,0 +1,141 @@
+"""The contours of a mesh in photos: where its outline runs, and how the coverage of pixels changes as vertices move.
+
+The coverage of a pixel is the share of its filter that the mesh fills. Where a piece of the outline moves outward by d, it
+grows by d times the filter's integral along the piece. Source: Li, Aittala, Durand and Lehtinen 2018 (edge sampling).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from splitnerf.ops import MeshScene
+from splitnerf.refinement.pixels import PixelFilter, Pixels
+
+PIECE = 0.5  # pixels, the greatest length of a piece of a contour
+BESIDE = 0.02  # pixels beside a piece at which it is seen whether the mesh ends there
+
+
+class Edges(NamedTuple):
+    """The edges of a mesh that two triangles share, k of them.
+
+    Attributes:
+        ends: [k, 2] vertices.
+        triangles: [k, 2].
+        opposite: [k, 2] the third vertex of each triangle.
+    """
+
+    ends: np.ndarray
+    triangles: np.ndarray
+    opposite: np.ndarray
+
+
+class Pieces(NamedTuple):
+    """Short pieces of the outline in one photo, n of them.
+
+    Attributes:
+        points: [n, 2] their middles in the image, in pixels.
+        lengths: [n] in pixels.
+        ends: [n, 2] the vertices that move a piece.
+        moves: [n, 2, 3] how far a piece moves outward, in pixels, as each of them moves by a unit along each axis.
+    """
+
+    points: np.ndarray
+    lengths: np.ndarray
+    ends: np.ndarray
+    moves: np.ndarray
+
+
+def edges_of(triangles: np.ndarray) -> Edges:
+    """The edges of triangles [t, 3] that share their vertices; edges of one triangle or of more than two are left out."""
+    ends = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    opposite = np.concatenate([triangles[:, 2], triangles[:, 0], triangles[:, 1]])
+    _, first, of_edge, count = np.unique(ends, axis=0, return_index=True, return_inverse=True, return_counts=True)
+    order = np.argsort(of_edge.reshape(-1), kind="stable")
+    start = (np.cumsum(count) - count)[count == 2]
+    two = np.stack([order[start], order[start + 1]], axis=1)
+    return Edges(ends[first[count == 2]], two % len(triangles), opposite[two])
+
+
+def projected(points: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
+    """[n, 2] the images, in pixels, of points [n, 3] in a camera's frame (OpenGL axes) with fx, fy, cx, cy."""
+    fx, fy, cx, cy = intrinsics
+    return np.stack([cx - fx * points[:, 0] / points[:, 2], cy + fy * points[:, 1] / points[:, 2]], axis=1)
+
+
+def outline_pieces(
+    vertices: np.ndarray, faces: np.ndarray, edges: Edges, scene: MeshScene, pixels: Pixels, view: int
+) -> Pieces:
+    """The pieces of edges that bound the mesh's image in a photo.
+
+    Args:
+        vertices: [m, 3] world.
+        faces: [t, 3] int64.
+        edges: Those of the faces.
+        scene: The same mesh, to be traced.
+        pixels: Holds the cameras.
+        view: The number of the photo.
+    """
+    pose, intrinsics = pixels.poses[view].astype(np.float64), pixels.intrinsics[view].astype(np.float64)
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    front = (normals * (pose[:, 3] - corners[:, 0])).sum(axis=1) > 0
+    turns = front[edges.triangles[:, 0]] != front[edges.triangles[:, 1]]
+    ends = edges.ends[turns]
+    inner = np.where(front[edges.triangles[turns, 0]], edges.opposite[turns, 0], edges.opposite[turns, 1])
+    local = (vertices - pose[:, 3]) @ pose[:, :3]
+    a, b, inside = (projected(local[i], intrinsics) for i in (*ends.T, inner))
+    along = b - a
+    length = np.linalg.norm(along, axis=1)
+    seen = (length > 1e-6) & (local[ends].max(axis=1)[:, 2] < 0)
+    ends, a, along, length, inside = (x[seen] for x in (ends, a, along, length, inside))
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
+    outward *= -np.sign(((inside - a) * outward).sum(axis=1, keepdims=True))
+
+    count = np.maximum(1, np.ceil(length / PIECE)).astype(np.int64)
+    edge = np.repeat(np.arange(len(count)), count)
+    share = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[edge]
+    points = a[edge] + along[edge] * share[:, None]
+    free = np.zeros(len(edge), bool)
+    for side, ends_there in ((BESIDE, True), (-BESIDE, False)):
+        rays = pixels.rays_through(np.array([view]), (points + side * outward[edge])[None])
+        misses = scene.trace_closest(*(part[0] for part in rays))[0] < 0
+        free = misses if ends_there else free & ~misses
+    edge, share, points = edge[free], share[free], points[free]
+
+    ends, outward = ends[edge], outward[edge]
+    depths = -local[ends][:, :, 2]
+    share = share * depths[:, 0] / (share * depths[:, 0] + (1 - share) * depths[:, 1])  # linear in space, not in the image
+    x, y, z = (local[ends] * np.stack([1 - share, share], axis=1)[..., None]).sum(axis=1).T
+    fx, fy = intrinsics[:2]
+    right, down = outward.T
+    slopes = np.stack([-fx * right / z, fy * down / z, (fx * x * right - fy * y * down) / z**2], axis=1) @ pose[:, :3].T
+    moves = np.stack([1 - share, share], axis=1)[..., None] * slopes[:, None]
+    return Pieces(points, (length / count)[edge], ends, moves)
+
+
+def coverage_slopes(pieces: Pieces, number: np.ndarray, n_vertices: int, window: PixelFilter) -> csr_matrix:
+    """The derivatives [pixels, 3 m] of the coverage of a photo's pixels by the vertices' coordinates.
+
+    Args:
+        pieces: The outline in the photo.
+        number: [H, W] int64 the row of each pixel, -1 where there is none; the rows are 0 to number.max().
+        n_vertices: m.
+        window: The pixels' filter.
+    """
+    height, width = number.shape
+    reach = np.arange(window.WIDTH + 1) - (window.WIDTH - 1) // 2 - 1  # a piece is within the windows of so many pixels
+    column, row = (np.floor(pieces.points[:, i, None] - 0.5).astype(np.int64) + 1 + reach for i in range(2))
+    column, row = np.broadcast_arrays(column[:, None, :], row[:, :, None])
+    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    of_pixel = np.where(inside, number[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)], -1)
+    piece, y, x = np.nonzero(of_pixel >= 0)
+    centres = np.stack([column[piece, y, x], row[piece, y, x]], axis=1) + 0.5
+    weights = window.density(pieces.points[piece] - centres) * pieces.lengths[piece]
+    used = weights > 0
+    piece, weights, rows = piece[used], weights[used], of_pixel[piece, y, x][used]
+    values = (weights[:, None, None] * pieces.moves[piece]).reshape(-1)
+    columns = (3 * pieces.ends[piece][..., None] + np.arange(3)).reshape(-1)
+    return csr_matrix((values, (np.repeat(rows, 6), columns)), shape=(int(number.max()) + 1, 3 * n_vertices))
