@@ -23,13 +23,30 @@ class Edges(NamedTuple):
 
     Attributes:
         ends: [k, 2] vertices.
-        triangles: [k, 2].
+        triangles: [k, 2] the two triangles at each.
         opposite: [k, 2] the third vertex of each triangle.
     """
 
     ends: np.ndarray
     triangles: np.ndarray
     opposite: np.ndarray
+
+
+class Mesh:
+    """A mesh whose outline is looked for.
+
+    Args:
+        vertices: [m, 3] world, each place once.
+        faces: [t, 3] int64, each with three corners that differ.
+        edges: Those of the faces, from :func:`edges_of`.
+    """
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray, edges: Edges):
+        self.vertices, self.edges = vertices, edges
+        self.scene = MeshScene(vertices.astype(np.float32), faces.astype(np.int32))
+        corners = vertices[faces]
+        self.points = corners[:, 0]  # one of each face
+        self.normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 class Pieces(NamedTuple):
@@ -49,7 +66,7 @@ class Pieces(NamedTuple):
 
 
 def edges_of(triangles: np.ndarray) -> Edges:
-    """The edges of triangles [t, 3] that share their vertices; edges of one triangle or of more than two are left out."""
+    """The edges of triangles [t, 3]. Those of one triangle, or of more than two, are left out: the rims of an open mesh."""
     ends = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     opposite = np.concatenate([triangles[:, 2], triangles[:, 0], triangles[:, 1]])
     _, first, of_edge, count = np.unique(ends, axis=0, return_index=True, return_inverse=True, return_counts=True)
@@ -65,31 +82,28 @@ def projected(points: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
     return np.stack([cx - fx * points[:, 0] / points[:, 2], cy + fy * points[:, 1] / points[:, 2]], axis=1)
 
 
-def outline_pieces(
-    vertices: np.ndarray, faces: np.ndarray, edges: Edges, scene: MeshScene, pixels: Pixels, view: int
-) -> Pieces:
+def outline_pieces(mesh: Mesh, pixels: Pixels, view: int, shape: tuple[int, int]) -> Pieces:
     """The pieces of edges that bound the mesh's image in a photo.
 
     Args:
-        vertices: [m, 3] world.
-        faces: [t, 3] int64.
-        edges: Those of the faces.
-        scene: The same mesh, to be traced.
+        mesh: The mesh.
         pixels: Holds the cameras.
         view: The number of the photo.
+        shape: Height and width of the photo.
     """
     pose, intrinsics = pixels.poses[view].astype(np.float64), pixels.intrinsics[view].astype(np.float64)
-    corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    front = (normals * (pose[:, 3] - corners[:, 0])).sum(axis=1) > 0
+    edges, front = mesh.edges, (mesh.normals * (pose[:, 3] - mesh.points)).sum(axis=1) > 0
     turns = front[edges.triangles[:, 0]] != front[edges.triangles[:, 1]]
     ends = edges.ends[turns]
     inner = np.where(front[edges.triangles[turns, 0]], edges.opposite[turns, 0], edges.opposite[turns, 1])
-    local = (vertices - pose[:, 3]) @ pose[:, :3]
+    local = (mesh.vertices - pose[:, 3]) @ pose[:, :3]
+    ahead = np.maximum(local[ends].max(axis=1), local[inner])[:, 2] < 0
+    ends, inner = ends[ahead], inner[ahead]
     a, b, inside = (projected(local[i], intrinsics) for i in (*ends.T, inner))
     along = b - a
     length = np.linalg.norm(along, axis=1)
-    seen = (length > 1e-6) & (local[ends].max(axis=1)[:, 2] < 0)
+    in_photo = (np.maximum(a, b) > 0).all(axis=1) & (np.minimum(a, b) < shape[::-1]).all(axis=1)
+    seen = in_photo & (length > 1e-6) & (length < sum(shape))  # a longer one passes through the plane of the camera, almost
     ends, a, along, length, inside = (x[seen] for x in (ends, a, along, length, inside))
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
     outward *= -np.sign(((inside - a) * outward).sum(axis=1, keepdims=True))
@@ -98,13 +112,13 @@ def outline_pieces(
     edge = np.repeat(np.arange(len(count)), count)
     share = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[edge]
     points = a[edge] + along[edge] * share[:, None]
-    free = np.zeros(len(edge), bool)
-    for side, ends_there in ((BESIDE, True), (-BESIDE, False)):
-        rays = pixels.rays_through(np.array([view]), (points + side * outward[edge])[None])
-        misses = scene.trace_closest(*(part[0] for part in rays))[0] < 0
-        free = misses if ends_there else free & ~misses
-    edge, share, points = edge[free], share[free], points[free]
 
+    def meets(side: float) -> np.ndarray:
+        rays = pixels.rays_through(np.array([view]), (points + side * outward[edge])[None])
+        return mesh.scene.trace_closest(*(part[0] for part in rays))[0] >= 0
+
+    free = ~meets(BESIDE) & meets(-BESIDE)
+    edge, share, points = edge[free], share[free], points[free]
     ends, outward = ends[edge], outward[edge]
     depths = -local[ends][:, :, 2]
     share = share * depths[:, 0] / (share * depths[:, 0] + (1 - share) * depths[:, 1])  # linear in space, not in the image
@@ -126,16 +140,15 @@ def coverage_slopes(pieces: Pieces, number: np.ndarray, n_vertices: int, window:
         window: The pixels' filter.
     """
     height, width = number.shape
-    reach = np.arange(window.WIDTH + 1) - (window.WIDTH - 1) // 2 - 1  # a piece is within the windows of so many pixels
-    column, row = (np.floor(pieces.points[:, i, None] - 0.5).astype(np.int64) + 1 + reach for i in range(2))
+    around = np.arange(window.WIDTH) - window.WIDTH // 2  # from its own pixel to those whose windows hold a piece
+    column, row = (np.floor(pieces.points[:, i, None]).astype(np.int64) + around for i in range(2))
     column, row = np.broadcast_arrays(column[:, None, :], row[:, :, None])
     inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
     of_pixel = np.where(inside, number[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)], -1)
     piece, y, x = np.nonzero(of_pixel >= 0)
     centres = np.stack([column[piece, y, x], row[piece, y, x]], axis=1) + 0.5
     weights = window.density(pieces.points[piece] - centres) * pieces.lengths[piece]
-    used = weights > 0
-    piece, weights, rows = piece[used], weights[used], of_pixel[piece, y, x][used]
     values = (weights[:, None, None] * pieces.moves[piece]).reshape(-1)
     columns = (3 * pieces.ends[piece][..., None] + np.arange(3)).reshape(-1)
-    return csr_matrix((values, (np.repeat(rows, 6), columns)), shape=(int(number.max()) + 1, 3 * n_vertices))
+    rows = np.repeat(of_pixel[piece, y, x], 6)
+    return csr_matrix((values, (rows, columns)), shape=(int(number.max()) + 1, 3 * n_vertices))

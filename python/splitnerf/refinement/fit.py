@@ -27,7 +27,7 @@ from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carl
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
-from splitnerf.refinement.like_texels import with_like_gloss
+from splitnerf.refinement.like_texels import usual_gloss
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
@@ -292,7 +292,7 @@ class Refinement:
             if not np.isfinite(moved):
                 raise RuntimeError(f"refinement: the light after {self.n_batches} batches is not finite; nothing was written")
         limits = torch.tensor(STEP_LIMITS)
-        like = with_like_gloss(self.unknowns, s.seed)
+        like = usual_gloss(self.unknowns, s.seed)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
         step = wanted - self.unknowns
         if not bool(torch.isfinite(step).all()):

@@ -15,14 +15,16 @@ REACH = 0.15  # deviation of the colours that count as one
 METAL = 0.5  # the usual metallic from which on a colour is a metal's
 
 
-def with_like_gloss(unknowns: Tensor, seed: int) -> Tensor:
-    """The unknowns [m, n] with the usual roughness of each texel's colour, and with its usual metallic where that is metal.
+def usual_gloss(unknowns: Tensor, seed: int) -> Tensor:
+    """What each texel's roughness and metallic would be by its colour alone: [m, n], NaN for all that has no such value.
 
-    The usual one is a median over all texels, weighted by a Gaussian of the distance of their colours. What the photos say of
-    each has no weight: glossy texels would speak for all of their colour.
+    The usual roughness of a colour is a median over the texels, weighted by a Gaussian of the distance of their colours
+    from the centre of the colour's cluster. What the photos say of each has no weight: glossy texels would speak for all
+    of their colour.
 
-    A metal in which little is mirrored looks like a dark dielectric, so that islands of one arise in a metal; the
-    opposite is rare, and details of metal in the colour of the cloth around them are not to be lost.
+    The usual metallic counts where it is metal, for texels with less. A metal in which little is mirrored looks like a
+    dark dielectric, so that islands of one arise in a metal; the opposite is rare, and details of metal in the colour of
+    the cloth around them are not to be lost.
 
     Args:
         unknowns: See :mod:`splitnerf.refinement.unknowns`.
@@ -37,10 +39,11 @@ def with_like_gloss(unknowns: Tensor, seed: int) -> Tensor:
     squared = np.square(colours[seen] - centres[:, None]).sum(2)
     weights = np.exp((squared.min(1, keepdims=True) - squared) / (2 * REACH**2))
     usual = [weighted_medians(unknowns[:, unknown].numpy()[seen], weights)[label] for unknown in (ROUGHNESS, METALLIC)]
-    result = unknowns.clone()
+    result = torch.full_like(unknowns, torch.nan)
     roughness, metallic = map(torch.from_numpy, usual)
     result[:, ROUGHNESS] = roughness
-    result[:, METALLIC] = torch.where(metallic >= METAL, metallic, result[:, METALLIC])
+    islands = (metallic >= METAL) & (unknowns[:, METALLIC] < metallic)
+    result[:, METALLIC] = torch.where(islands, metallic, torch.nan)
     return result
 
 

@@ -93,15 +93,15 @@ class NormalEquations:
 
         Args:
             unknowns: The unknowns.
-            like: [m, n] the values of like texels.
+            like: [m, n] the values of like texels, NaN where there are none.
             n_iterations: The number of conjugate gradients.
         """
         prior = self.prior
         typical = self.curvature.diagonal(dim1=1, dim2=2).mean(0)  # of each unknown
         flat = prior.flatness(unknowns) * typical
         smooth = flat + prior.smooth * typical
-        anchor, unlike = prior.anchor * typical, unknowns - like
-        pull = prior.like * typical / (1.0 + (unlike / APART).square())
+        anchor, unlike = prior.anchor * typical, torch.where(like.isnan(), 0.0, unknowns - like)
+        pull = torch.where(like.isnan(), 0.0, prior.like * typical / (1.0 + (unlike / APART).square()))
         system = self.curvature + torch.diag_embed(anchor + pull + 1e-12)
         of_pairs = sum(torch.zeros_like(unknowns).index_add_(0, end, smooth) for end in prior.pairs.unbind(1))
         inverses = torch.linalg.inv(system + torch.diag_embed(of_pairs))

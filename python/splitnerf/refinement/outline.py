@@ -12,12 +12,12 @@ from scipy.sparse.linalg import cg
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
 from splitnerf.ops import MeshScene
-from splitnerf.refinement.contours import coverage_slopes, edges_of, outline_pieces
+from splitnerf.refinement.contours import Mesh, coverage_slopes, edges_of, outline_pieces
 from splitnerf.refinement.pixels import PixelFilter, Pixels, pixel_size, pixels_of
 
 ROUNDS = 3
 RAYS = 32  # of a pixel
-LARGEST = 1.0  # pixels that a vertex may move along an axis in a round
+LARGEST = 1.0  # pixels that a vertex may move in a round
 SMOOTH, ANCHOR = 0.3, 0.02  # weights of the differences of neighbours' moves and of the moves, in units of the mean curvature
 BATCH = 4096  # pixels
 
@@ -53,24 +53,22 @@ def coverage(scene: MeshScene, pixels: Pixels, generator: np.random.Generator) -
     return np.concatenate(shares)
 
 
-def slopes(vertices: np.ndarray, faces: np.ndarray, scene: MeshScene, pixels: Pixels, shape: tuple[int, int]) -> csr_matrix:
-    """The derivatives [n, 3 m] of the coverage of n pixels by the vertices' coordinates.
+def slopes(mesh: Mesh, pixels: Pixels, shape: tuple[int, int]) -> csr_matrix:
+    """The derivatives [n, 3 m] of the coverage of n pixels by the coordinates of m vertices.
 
     Args:
-        vertices: [m, 3], each place once.
-        faces: [t, 3] int64.
-        scene: The same mesh.
+        mesh: The mesh.
         pixels: In the order of their photos.
         shape: Height and width of a photo.
     """
-    edges, window, parts = edges_of(faces), PixelFilter(), []
+    window, parts = PixelFilter(), []
     column, row = pixels.centre.astype(np.int64).T
     for view in np.unique(pixels.view):
         here = pixels.view == view
         number = np.full(shape, -1, np.int64)
         number[row[here], column[here]] = np.arange(here.sum())
-        pieces = outline_pieces(vertices, faces, edges, scene, pixels, view)
-        parts.append(coverage_slopes(pieces, number, len(vertices), window))
+        pieces = outline_pieces(mesh, pixels, view, shape)
+        parts.append(coverage_slopes(pieces, number, len(mesh.vertices), window))
     return vstack(parts).tocsr()
 
 
@@ -85,37 +83,41 @@ def smoothness(faces: np.ndarray, n_vertices: int) -> csr_matrix:
 def fit_outline(dataset: Dataset, asset: Asset, seed: int = 0) -> tuple[Asset, list[float]]:
     """Moves vertices so that the asset covers the pixels as the masks do; the moves are a smooth field on the mesh.
 
+    Normals, tangents and texture coordinates stay: a texture goes where its triangles go.
+
     Args:
         dataset: The photos, whose alpha is the mask.
         asset: A closed asset in the photos' world frame.
         seed: The seed of the rays.
 
     Returns:
-        The asset, unchanged where that covers the pixels better, and the mean squared error of the coverage at the
-        outline before each round and at the end; no errors, and the asset as it was, where the masks have no edges.
+        The moved asset, or the given one where moving it did not lower the error, and the mean squared error of the
+        coverage at the outline before each round and at the end; no errors where the masks have no edges.
     """
     pixels, mask = outline_pixels(dataset)
     if len(pixels) == 0:
         return asset, []
     place = weld(asset.vertices)
     faces, m = place[asset.triangles], int(place.max()) + 1
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    edges = edges_of(faces)
     start = np.zeros((m, 3))
     start[place] = asset.vertices
     smooth = kron(SMOOTH * smoothness(faces, m) + ANCHOR * identity(m), identity(3)).tocsr()
     largest, random = LARGEST * pixel_size(dataset, asset.vertices), np.random.default_rng(seed)
     errors, moved = [], np.zeros(3 * m)
     for turn in range(ROUNDS + 1):
-        vertices = start + moved.reshape(-1, 3)
-        scene = MeshScene(vertices.astype(np.float32), faces.astype(asset.triangles.dtype))
-        rest = mask - coverage(scene, pixels, random)
+        mesh = Mesh(start + moved.reshape(-1, 3), faces, edges)
+        rest = mask - coverage(mesh.scene, pixels, random)
         errors.append(float((rest**2).mean()))
         if turn == ROUNDS:
             break
-        jacobian = slopes(vertices, faces, scene, pixels, dataset.images.shape[1:3])
+        jacobian = slopes(mesh, pixels, dataset.images.shape[1:3])
         curvature = (jacobian.T @ jacobian).tocsr()
         typical = curvature.diagonal()
         prior = (typical[typical > 0].mean() if (typical > 0).any() else 1.0) * smooth
         step, _ = cg(curvature + prior, jacobian.T @ rest - prior @ moved, rtol=1e-4, maxiter=500)
-        moved += np.clip(step, -largest, largest)
+        length = np.linalg.norm(step.reshape(-1, 3), axis=1).repeat(3)
+        moved += step * np.minimum(1, largest / np.maximum(length, 1e-20))
     better = errors[-1] < errors[0]
-    return (replace(asset, vertices=vertices[place].astype(np.float32)) if better else asset), errors
+    return (replace(asset, vertices=mesh.vertices[place].astype(np.float32)) if better else asset), errors

@@ -13,7 +13,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import srgb_to_linear
 
 MIN_ALPHA = 0.99  # of a pixel that the object covers
-NEARBY = 0.01  # pixels over which a density is a mean
+NEARBY = 0.01  # pixels to either side over which a density is a mean
 SATURATED = 254.5 / 255.0  # sRGB value from which the photo says only that the light was at least so bright
 
 
