@@ -10,7 +10,7 @@ import trimesh
 from painted_ball import PHOTO, photos, sky, textured
 
 from splitnerf.refinement import outline
-from splitnerf.refinement.contours import Mesh, edges_of, outline_pieces, projected
+from splitnerf.refinement.contours import Mesh, coverage_slopes, edges_of, outline_pieces, projected
 from splitnerf.refinement.outline import fit_outline, outline_pixels, slopes, weld
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 
@@ -47,7 +47,10 @@ def test_a_piece_moves_as_its_edge_does_in_the_image(painted):
     pieces = outline_pieces(Mesh(vertices, faces, edges_of(faces)), pixels, 3, (50, 40))
     outline_edges = {tuple(ends) for ends in pieces.ends.tolist()}
     assert outline_edges == {(0, 1), (1, 2), (0, 2)} and len(pieces.points) > 60
-    image = lambda v: projected((v - pose[:, 3]) @ pose[:, :3], pixels.intrinsics[3])  # noqa: E731
+
+    def image(points):
+        return projected((points - pose[:, 3]) @ pose[:, :3], pixels.intrinsics[3])
+
     middle = image(vertices)[:3].mean(axis=0)
     for point, ends, moves in zip(pieces.points, pieces.ends, pieces.moves):
         a, b = image(vertices)[ends]
@@ -77,6 +80,21 @@ def test_what_is_behind_the_camera_or_beside_the_photo_has_no_outline(painted):
     across = box.vertices * [3, 1, 2] + [2, 0, -1]  # from the camera's plane on
     with np.errstate(divide="raise", invalid="raise"):
         outline_pieces(Mesh(across, faces, edges_of(faces)), pixels, 0, (PHOTO, PHOTO))
+
+
+def test_an_edge_just_outside_the_photo_changes_the_pixels_at_its_border(painted):
+    """A plate that ends .7 pixels beyond: each pixel of the last column by the window at its distance, 1.2 pixels."""
+    pixels, box, size, z = covered_pixels(painted[1]), trimesh.creation.box(), 40, 3.0
+    pixels.poses, pixels.intrinsics = np.eye(4, dtype=np.float32)[None, :3], np.float32([[60, 60, size / 2, size / 2]])
+    right = (size / 2 + 0.7) * z / 60
+    plate = box.vertices * [4.0, 8.0, 0.5] + [right - 2.0, 0.0, -z - 0.25]  # its front at distance z
+    faces = np.asarray(box.faces)
+    pieces = outline_pieces(Mesh(plate, faces, edges_of(faces)), pixels, 0, (size, size))
+    number = np.full((size, size), -1)
+    number[20, -1] = 0
+    by_x = coverage_slopes(pieces, number, len(plate), PixelFilter()).toarray()[0, ::3].sum()
+    window = PixelFilter().density(np.array([1.2, 0.0])) / np.sqrt(PixelFilter().density(np.zeros(2)))
+    assert by_x == pytest.approx(window * 60 / z, rel=0.05)
 
 
 @pytest.fixture(scope="module")

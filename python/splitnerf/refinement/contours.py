@@ -15,6 +15,7 @@ from splitnerf.ops import MeshScene
 from splitnerf.refinement.pixels import PixelFilter, Pixels
 
 PIECE = 0.5  # pixels, the greatest length of a piece of a contour
+LONGEST = 50.0  # heights and widths of the photo; an edge of more pixels comes close to the plane of the camera
 BESIDE = 0.02  # pixels beside a piece at which it is seen whether the mesh ends there
 
 
@@ -102,8 +103,9 @@ def outline_pieces(mesh: Mesh, pixels: Pixels, view: int, shape: tuple[int, int]
     a, b, inside = (projected(local[i], intrinsics) for i in (*ends.T, inner))
     along = b - a
     length = np.linalg.norm(along, axis=1)
-    in_photo = (np.maximum(a, b) > 0).all(axis=1) & (np.minimum(a, b) < shape[::-1]).all(axis=1)
-    seen = in_photo & (length > 1e-6) & (length < sum(shape))  # a longer one passes through the plane of the camera, almost
+    margin = PixelFilter.WIDTH / 2  # outside of the photo, within which an edge changes the pixels at its border
+    in_photo = (np.maximum(a, b) > -margin).all(axis=1) & (np.minimum(a, b) < np.add(shape[::-1], margin)).all(axis=1)
+    seen = in_photo & (length > 1e-6) & (length < LONGEST * sum(shape))
     ends, a, along, length, inside = (x[seen] for x in (ends, a, along, length, inside))
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
     outward *= -np.sign(((inside - a) * outward).sum(axis=1, keepdims=True))
