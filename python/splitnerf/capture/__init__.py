@@ -1,0 +1,1 @@
+"""From photographs to the posed, masked images that training reads."""

@@ -1,0 +1,254 @@
+"""From a folder of photographs to data for training: poses, pinhole images, masks, exposures and a page about them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from splitnerf.capture.exposure import Exposures, find_exposures
+from splitnerf.capture.masks import View, find_masks
+from splitnerf.capture.page import write_page
+from splitnerf.capture.photographs import Photograph, find_photographs, read_upright, sharpness
+from splitnerf.capture.poses import Reconstruction, reconstruct
+from splitnerf.capture.video import SUFFIXES, write_frames
+from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignetting
+from splitnerf.capture.world import World, settle
+from splitnerf.data.images import atomic_path, srgb_to_linear
+from splitnerf.errors import InputError
+from splitnerf.notes import note
+
+MASK_SIZE = 800  # longest edge in pixels at which masks are found
+BLURRED = 0.12  # share of the median sharpness below which a photo is left out
+MIN_OBJECT_POINTS = 20
+DARK = 0.02  # sRGB value that 1 % of a photo's pixels must exceed
+
+
+@dataclass(frozen=True)
+class PrepareSettings:
+    """How photos are prepared.
+
+    Attributes:
+        max_size: The longest edge of the written images in pixels; 0 keeps the photos'.
+        masks: A folder with masks of the photos, or None to find them.
+        frames: The number of frames that are taken of a video.
+        seed: The seed of all random choices.
+    """
+
+    max_size: int = 0
+    masks: Path | None = None
+    frames: int = 100
+    seed: int = 0
+
+
+@dataclass
+class Prepared:
+    """What was prepared.
+
+    Attributes:
+        world: Cameras and points.
+        exposures: The photos' brightness.
+        left_out: Why photos were left out, by name.
+        mask_share: [n] the share of each image that its mask covers.
+    """
+
+    world: World
+    exposures: Exposures
+    left_out: dict[str, str]
+    mask_share: np.ndarray
+
+
+def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable[[str, float], None]) -> Prepared:
+    """Writes `images/`, `masks/`, `transforms.json`, `points.ply` and `prepare.html`.
+
+    What an interrupted call with the same photos has done in `out/work` is used again.
+
+    Raises:
+        InputError: The photos cannot be read, or do not fit together.
+    """
+    work = out / "work"
+    if source.suffix.lower() in SUFFIXES:
+        write_frames(source, out / "frames", settings.frames, lambda share: report("frames", share))
+    photos = find_photographs(out / "frames" if source.suffix.lower() in SUFFIXES else source)
+    _begin(work, photos, settings)
+    kept, left_out = _sorted_out(photos, report)
+    images = _upright_copies(kept, work)
+    found = reconstruct(kept, images, work, settings.seed, report)
+    placed = set(found.names)
+    left_out |= {p.name: "its camera was not found: too little in common with the others" for p in kept if p.name not in placed}
+    world = settle(found, settings.seed)
+    if settings.masks is None and world.object_points.sum() < MIN_OBJECT_POINTS:
+        raise InputError(f"{source}: no object stands out in the middle of the photos; give masks with --masks")
+    by_name = {photo.name: photo for photo in kept}
+    exposures = exposures_of(world.scene, by_name, report)
+    shares = _write_images(world, exposures, by_name, out, settings, report)
+    _write_transforms(world, exposures, out, settings)
+    write_page(out, world, exposures.gains, shares, left_out, source.resolve().name)
+    return Prepared(world, exposures, left_out, shares)
+
+
+def _begin(work: Path, photos: list[Photograph], settings: PrepareSettings) -> None:
+    """Empties the working folder where it holds another set of photos."""
+    files = [(p.name, p.path.stat().st_size, p.path.stat().st_mtime_ns) for p in photos]
+    print_of_photos = hashlib.sha256(json.dumps([files, settings.seed]).encode()).hexdigest()
+    marker = work / "photos.sha256"
+    if work.exists() and (not marker.exists() or marker.read_text() != print_of_photos):
+        shutil.rmtree(work)
+    work.mkdir(parents=True, exist_ok=True)
+    marker.write_text(print_of_photos)
+
+
+def _sorted_out(photos: list[Photograph], report: Callable[[str, float], None]) -> tuple[list[Photograph], dict[str, str]]:
+    """The photos that are neither blurred nor dark, and why the others are left out."""
+    sharp, bright = np.zeros(len(photos)), np.zeros(len(photos))
+    for i, photo in enumerate(photos):
+        pixels = read_upright(photo.path)
+        sharp[i], bright[i] = sharpness(pixels), np.quantile(pixels[::4, ::4], 0.99) / np.iinfo(pixels.dtype).max
+        report("photos", (i + 1) / len(photos))
+    reasons = {}
+    for photo, s, b in zip(photos, sharp, bright):
+        if b < DARK:
+            reasons[photo.name] = "too dark"
+        elif s < BLURRED * np.median(sharp):
+            reasons[photo.name] = f"blurred: {100 * s / np.median(sharp):.0f} % of the others' sharpness"
+    return [photo for photo in photos if photo.name not in reasons], reasons
+
+
+def _upright_copies(photos: list[Photograph], work: Path) -> Path:
+    """The folder `work/photos` with a folder for each lens; files that COLMAP reads as they are, are linked."""
+    folder = work / "photos"
+    lenses = sorted({photo.lens for photo in photos})
+    for photo in photos:
+        group = folder / f"lens_{lenses.index(photo.lens) + 1}"
+        group.mkdir(parents=True, exist_ok=True)
+        with_exif = Image.Exif()
+        upright = photo.path.suffix.lower() in (".jpg", ".jpeg", ".png") and Image.open(photo.path).size == (photo.width, photo.height)
+        target = group / f"{photo.name}{photo.path.suffix.lower() if upright else '.png'}"
+        if target.exists():
+            continue
+        if upright:
+            target.symlink_to(photo.path.resolve())
+        else:
+            with atomic_path(target) as temporary:
+                pixels = read_upright(photo.path)
+                pixels = pixels if pixels.dtype == np.uint8 else (pixels >> 8).astype(np.uint8)
+                Image.fromarray(pixels).save(temporary, format="PNG", exif=with_exif, compress_level=1)
+    return folder
+
+
+def exposures_of(scene: Reconstruction, by_name: dict[str, Photograph], report: Callable[[str, float], None]) -> Exposures:
+    """The exposures by the photos' values at the points that they show."""
+    values, radii = np.zeros(len(scene.photo_of)), np.zeros(len(scene.photo_of))
+    for i, name in enumerate(scene.names):
+        lens, here = scene.lenses[i], scene.photo_of == i
+        pixels = read_upright(by_name[name].path)
+        luminance = srgb_to_linear(pixels / np.float32(np.iinfo(pixels.dtype).max)) @ np.float32([0.2126, 0.7152, 0.0722])
+        padded = np.pad(luminance, 1, mode="edge")
+        smooth = sum(padded[a : a + lens.height, b : b + lens.width] for a in range(3) for b in range(3)) / 9
+        x, y = scene.observed[here].astype(int).T
+        values[here] = smooth[y.clip(0, lens.height - 1), x.clip(0, lens.width - 1)]
+        radii[here] = np.linalg.norm(scene.observed[here] - [lens.cx, lens.cy], axis=1) / (0.5 * np.hypot(lens.width, lens.height))
+        report("exposures", (i + 1) / len(scene.names))
+    by_file = np.array([by_name[name].exposure or np.nan for name in scene.names])
+    return find_exposures(scene.photo_of, scene.point_of, values, radii, by_file)
+
+
+def _write_images(
+    world: World, exposures: Exposures, by_name: dict[str, Photograph], out: Path, settings: PrepareSettings,
+    report: Callable[[str, float], None],
+) -> np.ndarray:  # fmt: skip
+    """Writes pinhole images and masks; returns the share that each mask covers."""
+    scene = world.scene
+    for folder in ("images", "masks"):
+        (out / folder).mkdir(exist_ok=True)
+    views = []
+    for i, name in enumerate(scene.names):
+        pinhole = pinhole_of(scene.lenses[i], settings.max_size)
+        photo = without_vignetting(read_upright(by_name[name].path), scene.lenses[i], exposures.vignetting)
+        image = undistort(photo, scene.lenses[i], pinhole)
+        write_png(out / "images" / f"{name}.png", image)
+        views.append(view_of(world, i, image, settings.max_size))
+        report("images", (i + 1) / len(scene.names))
+    masks = given_masks(world, views, settings) if settings.masks else find_masks(views, world, lambda x: report("masks", x))
+    for i, (name, mask) in enumerate(zip(scene.names, masks)):
+        pinhole = pinhole_of(scene.lenses[i], settings.max_size)
+        size = (pinhole.width, pinhole.height)
+        large = Image.fromarray((255 * mask).astype(np.uint8)).resize(size, Image.Resampling.BILINEAR)
+        write_png(out / "masks" / f"{name}.png", np.asarray(large))
+    return np.array([mask.mean() for mask in masks])
+
+
+def given_masks(world: World, views: list[View], settings: PrepareSettings) -> list[np.ndarray]:
+    """The masks of a folder as the undistorted photos have them; those that are black on the object are turned around.
+
+    Raises:
+        InputError: A photo has no mask, or one of another size.
+    """
+    scene, masks, score = world.scene, [], 0.0
+    for i, (name, view) in enumerate(zip(scene.names, views)):
+        lens = scene.lenses[i]
+        found = [path for path in sorted(settings.masks.iterdir()) if path.name.split(".")[0] == name]
+        if not found:
+            raise InputError(f"{settings.masks}: has no mask {name}.png; add it or leave --masks out")
+        mask = read_upright(found[0])[..., 0]
+        if mask.shape != (lens.height, lens.width):
+            raise InputError(f"{found[0]}: is {mask.shape[1]}x{mask.shape[0]}, its photo {lens.width}x{lens.height}; make them equal")
+        masks.append(undistort(mask, lens, pinhole_of(lens, settings.max_size)) > np.iinfo(mask.dtype).max / 2)
+        scale = masks[-1].shape[1] / view.photo.shape[1]
+        at = lambda dots: masks[-1][tuple(((dots[:, ::-1] * scale).astype(int)).clip(0, np.array(masks[-1].shape) - 1).T)]  # noqa: E731
+        for dots, sign in ((view.object_dots, 1), (view.other_dots, -1)):
+            score += sign * at(dots).mean() if len(dots) else 0.0
+    if score < 0:
+        note(f"{settings.masks}: the masks are black on the object; they are turned around")
+    return [mask if score >= 0 else ~mask for mask in masks]
+
+
+def view_of(world: World, i: int, image: np.ndarray, max_size: int) -> View:
+    """What the search for masks needs of photo `i`, whose undistorted image is given."""
+    import cv2
+
+    scene = world.scene
+    pinhole = pinhole_of(scene.lenses[i], max_size)
+    scale = min(1.0, MASK_SIZE / max(image.shape[:2]))
+    small = image if image.dtype == np.uint8 else (image >> 8).astype(np.uint8)
+    size = (round(image.shape[1] * scale), round(image.shape[0] * scale))
+    small = cv2.resize(small, size, interpolation=cv2.INTER_AREA)
+    zoom = np.diag([size[0] / pinhole.width, size[1] / pinhole.height, 1.0])
+    flip = np.diag([1.0, -1.0, -1.0, 1.0])
+    camera = zoom @ pinhole.matrix @ np.linalg.inv(scene.poses[i] @ flip)[:3]
+    seen = scene.point_of[scene.photo_of == i]
+    view = View(small, camera, np.empty((0, 2)), np.empty((0, 2)))
+    places, _ = view.project(scene.points[seen])
+    of_object = world.object_points[seen]
+    return View(small, camera, places[of_object], places[~of_object])
+
+
+def write_png(path: Path, image: np.ndarray) -> None:
+    """An image [h, w] or [h, w, 3], uint8 or uint16, as PNG."""
+    import cv2
+
+    with atomic_path(path) as temporary:
+        coded, data = cv2.imencode(".png", image[..., ::-1] if image.ndim == 3 else image)
+        if not coded:
+            raise OSError(f"{path}: the image could not be encoded")
+        temporary.write_bytes(data.tobytes())
+
+
+def _write_transforms(world: World, exposures: Exposures, out: Path, settings: PrepareSettings) -> None:
+    scene, frames = world.scene, []
+    for i, name in enumerate(scene.names):
+        pinhole = pinhole_of(scene.lenses[i], settings.max_size)
+        frames.append({
+            "file_path": f"images/{name}.png", "mask_path": f"masks/{name}.png", "w": pinhole.width, "h": pinhole.height,
+            "fl_x": pinhole.fx, "fl_y": pinhole.fy, "cx": pinhole.cx, "cy": pinhole.cy,
+            "exposure": float(exposures.gains[i]), "transform_matrix": scene.poses[i].tolist(),
+        })  # fmt: skip
+    content = {"camera_model": "PINHOLE", "frames": frames}
+    with atomic_path(out / "transforms.json") as temporary:
+        temporary.write_text(json.dumps(content, indent=1))

@@ -1,0 +1,136 @@
+"""The photographs of a folder: which there are, how they were exposed, how sharp they are."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import ExifTags, Image, ImageOps
+
+from splitnerf.errors import InputError
+
+COMMON = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
+HEIC = (".heic", ".heif")
+RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".raf", ".rw2")
+SHARPNESS_WIDTH = 640  # pixels to which a photo is reduced before its sharpness is measured
+DIAGONAL_35MM = math.hypot(36.0, 24.0)  # millimetres
+MAX_PIXELS = 200_000_000
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """One photo as its file describes it.
+
+    Attributes:
+        path: The file.
+        name: A name without folder and extension, unique among the photos.
+        width, height: The size in pixels, upright.
+        exposure: Exposure time times ISO over the squared f-number (seconds), or None where the file does not tell.
+        lens: A text that photos taken with one lens at one zoom have in common.
+        focal: The focal length in pixels by the file's 35 mm equivalent, or None.
+    """
+
+    path: Path
+    name: str
+    width: int
+    height: int
+    exposure: float | None
+    lens: str
+    focal: float | None
+
+
+def find_photographs(folder: Path) -> list[Photograph]:
+    """The photos of a folder in the order of their names; files of the same content are taken once.
+
+    Raises:
+        InputError: The folder has no photo, or one cannot be read.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; give the folder with the photos")
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in COMMON + HEIC + RAW and path.is_file())
+    if not paths:
+        raise InputError(f"{folder}: holds no photos ({', '.join(COMMON + HEIC + RAW)}); give the folder with the photos")
+    seen: dict[str, Path] = {}
+    for path in paths:
+        seen.setdefault(hashlib.sha256(path.read_bytes()).hexdigest(), path)
+    stems = [path.stem for path in seen.values()]
+    names = [path.stem if stems.count(path.stem) == 1 else path.name.replace(".", "_") for path in seen.values()]
+    return [_described(path, name) for path, name in zip(seen.values(), names)]
+
+
+def read_upright(path: Path) -> np.ndarray:
+    """[H, W, 3] uint8 (uint16 of a raw photo) sRGB, turned as the file says.
+
+    Raises:
+        InputError: The file is no photo, or the package that reads it is missing.
+    """
+    if path.suffix.lower() in RAW:
+        try:
+            import rawpy
+        except ImportError:
+            raise InputError(f"{path}: raw photos need the package rawpy; pip install 'splitnerf[raw]'") from None
+        with rawpy.imread(str(path)) as raw:
+            return raw.postprocess(gamma=(2.4, 12.92), no_auto_bright=True, use_camera_wb=True, output_bps=16)
+    with _open(path) as image:
+        return np.asarray(ImageOps.exif_transpose(image).convert("RGB"))
+
+
+def sharpness(photo: np.ndarray) -> float:
+    """The variance of the Laplacian of the luminance of a photo [H, W, 3], reduced to a common width, in 8-bit units."""
+    import cv2
+
+    grey = cv2.cvtColor(np.ascontiguousarray(photo), cv2.COLOR_RGB2GRAY).astype(np.float32)
+    grey *= 255.0 / np.iinfo(photo.dtype).max
+    scale = min(1.0, SHARPNESS_WIDTH / max(grey.shape))
+    small = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    return float(cv2.Laplacian(small, cv2.CV_32F).var())
+
+
+def _open(path: Path) -> Image.Image:
+    if path.suffix.lower() in HEIC:
+        try:
+            import pillow_heif
+        except ImportError:
+            raise InputError(f"{path}: HEIC photos need the package pillow-heif; pip install 'splitnerf[heic]'") from None
+        pillow_heif.register_heif_opener()
+    try:
+        image = Image.open(path)
+        if image.width * image.height > MAX_PIXELS:
+            raise InputError(f"{path}: has more than {MAX_PIXELS // 10**6} megapixels; scale it down")
+        image.load()
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise InputError(f"{path}: is no photo that can be read ({error}); repair or remove it") from None
+    return image
+
+
+def _described(path: Path, name: str) -> Photograph:
+    if path.suffix.lower() in RAW:
+        height, width = read_upright(path).shape[:2]
+        return Photograph(path, name, width, height, None, f"{path.suffix} {width}x{height}", None)
+    with _open(path) as image:
+        exif = image.getexif()
+        details = exif.get_ifd(ExifTags.IFD.Exif)
+        width, height = image.size
+        if exif.get(ExifTags.Base.Orientation, 1) >= 5:
+            width, height = height, width
+    seconds, f_number = (_positive(details.get(tag)) for tag in (ExifTags.Base.ExposureTime, ExifTags.Base.FNumber))
+    sensitivity = details.get(ExifTags.Base.ISOSpeedRatings)
+    iso = _positive(sensitivity[0] if isinstance(sensitivity, tuple) and sensitivity else sensitivity)
+    exposure = seconds * iso / f_number**2 if seconds and f_number and iso else None
+    equivalent = _positive(details.get(ExifTags.Base.FocalLengthIn35mmFilm))
+    focal = equivalent / DIAGONAL_35MM * math.hypot(width, height) if equivalent else None
+    maker = [str(exif.get(tag, "")).strip() for tag in (ExifTags.Base.Make, ExifTags.Base.Model)]
+    lens = " ".join([*maker, f"{width}x{height}", str(details.get(ExifTags.Base.FocalLength, ""))]).strip()
+    return Photograph(path, name, width, height, exposure, lens, focal)
+
+
+def _positive(value: object) -> float | None:
+    """A number above 0, or None."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, ZeroDivisionError):
+        return None
+    return number if 0 < number < math.inf else None

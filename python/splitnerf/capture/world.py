@@ -1,0 +1,150 @@
+"""The world of a reconstruction: which way is up, where the object stands, how large it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from splitnerf.capture.poses import Reconstruction
+
+CAMERA_DISTANCE = 3.0  # of the median camera from the centre, in the world's units
+TABLE_TOLERANCE = 0.006  # distance of the table's points from their plane, in the cameras' distances
+TABLE_TILT = 40.0  # degrees between the table's normal and the mean of the cameras' upward axes
+TABLE_SHARE = 0.15  # of the points near the object that a plane needs to count as a table
+TRIALS = 2000
+NEAREST = 8  # the neighbour whose median distance is the spacing of the object's points
+SMALLEST_GROUP = 0.02  # share of the points above the table that a group needs
+STANDS_OVER = 1.0  # horizontal distance of a group's middle from the largest one's, in the latter's radii
+LINK = 1.5  # distance of two points that hang together, in spacings
+
+
+@dataclass
+class World:
+    """A reconstruction in the frame that is written: z up, the object above the origin.
+
+    Attributes:
+        scene: The reconstruction in this frame.
+        table: Whether a table was found; it is then the plane z = 0.
+        object_points: [m] bool, the sparse points that belong to the object.
+    """
+
+    scene: Reconstruction
+    table: bool
+    object_points: np.ndarray
+
+
+def settle(found: Reconstruction, seed: int) -> World:
+    """Turns, moves and scales a reconstruction, and tells the object's points from the others.
+
+    The centre is where the cameras' axes meet. Up is the normal of the plane on which most points near it lie, below it
+    (the table), or the mean of the cameras' upward axes where there is none.
+
+    Args:
+        found: The reconstruction, in any frame.
+        seed: The seed of the search for the table.
+    """
+    centre, up = meeting_point(found.poses), found.poses[:, :3, 1].mean(0)
+    up = up / np.linalg.norm(up)
+    distance = np.median(np.linalg.norm(found.poses[:, :3, 3] - centre, axis=1))
+    near = np.linalg.norm(found.points - centre, axis=1) < 0.6 * distance
+    plane = find_table(found.points[near], centre, up, distance, np.random.default_rng(seed))
+    origin = centre
+    if plane is not None:
+        up, offset = plane
+        origin = centre - (centre @ up - offset) * up
+    forward = found.poses[0, :3, 3] - origin
+    x = forward - (forward @ up) * up
+    x /= np.linalg.norm(x)
+    rotation = np.stack([x, np.cross(up, x), up])
+    scale = CAMERA_DISTANCE / distance
+    moved = lambda points: scale * (points - origin) @ rotation.T  # noqa: E731
+    poses = found.poses.copy()
+    poses[:, :3, :3], poses[:, :3, 3] = rotation @ found.poses[:, :3, :3], moved(found.poses[:, :3, 3])
+    scene = replace(found, poses=poses, points=moved(found.points))
+    return World(scene, plane is not None, object_points(scene.points, moved(centre), plane is not None))
+
+
+def meeting_point(poses: np.ndarray) -> np.ndarray:
+    """[3] the point nearest to the optical axes of poses [n, 4, 4], OpenGL axes; axes far from it count less."""
+    origins, axes = poses[:, :3, 3], -poses[:, :3, 2]
+    across = np.eye(3) - axes[:, :, None] * axes[:, None]
+    weights = np.ones(len(poses))
+    for _ in range(10):
+        total = (across * weights[:, None, None]).sum(0)
+        point = np.linalg.lstsq(total, (across @ origins[..., None])[..., 0].T @ weights, rcond=None)[0]
+        misses = np.linalg.norm((across @ (point - origins)[..., None])[..., 0], axis=1)
+        weights = 1 / (misses + 0.1 * np.median(misses) + 1e-12)
+    return point
+
+
+def find_table(
+    points: np.ndarray, centre: np.ndarray, up: np.ndarray, distance: float, random: np.random.Generator
+) -> tuple[np.ndarray, float] | None:
+    """The plane below the centre on which most points lie.
+
+    Args:
+        points: [n, 3] sparse points.
+        centre: [3] the centre of the object.
+        up: [3] roughly upward, a unit vector.
+        distance: The cameras' distance from the centre.
+        random: The source of random numbers.
+
+    Returns:
+        The unit normal, upward, and its product with the plane's points; None where no plane has enough points.
+    """
+    if len(points) < 10:
+        return None
+    tolerance, best, most = TABLE_TOLERANCE * distance, None, TABLE_SHARE * len(points)
+    corners = points[random.integers(0, len(points), (TRIALS, 3))]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    normals = normals / np.maximum(lengths, 1e-20)[:, None] * np.sign(normals @ up)[:, None]
+    below = ((centre - corners[:, 0]) * normals).sum(1) > -tolerance
+    for k in np.flatnonzero((lengths > 0) & (normals @ up > np.cos(np.radians(TABLE_TILT))) & below):
+        on = np.abs((points - corners[k, 0]) @ normals[k]) < tolerance
+        if on.sum() > most:
+            best, most = on, on.sum()
+    if best is None:
+        return None
+    for _ in range(5):
+        middle = points[best].mean(0)
+        normal = np.linalg.svd(points[best] - middle, full_matrices=False)[2][2]
+        normal *= np.sign(normal @ up)
+        best = np.abs((points - middle) @ normal) < tolerance
+    return normal, float(normal @ middle)
+
+
+def object_points(points: np.ndarray, centre: np.ndarray, table: bool) -> np.ndarray:
+    """[m] bool, the points around the centre, above the table where there is one: the largest group of points that hang
+    together, and others above or below it.
+
+    Args:
+        points: [m, 3] in the world's units.
+        centre: [3] the centre of the object.
+        table: Whether z = 0 is a table.
+    """
+    chosen = np.linalg.norm(points - centre, axis=1) < 0.5 * CAMERA_DISTANCE
+    if table:
+        chosen &= points[:, 2] > 1.5 * TABLE_TOLERANCE * CAMERA_DISTANCE
+    index = np.flatnonzero(chosen)
+    if len(index) <= NEAREST:
+        return chosen
+    tree = cKDTree(points[index])
+    spacing = np.median(tree.query(points[index], NEAREST + 1)[0][:, -1])
+    pairs = tree.query_pairs(LINK * spacing, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(index), len(index)))
+    groups = connected_components(graph, directed=False)[1]
+    sizes = np.bincount(groups)
+    largest = points[index[groups == sizes.argmax()], :2]
+    middle = np.median(largest, axis=0)
+    reach = STANDS_OVER * np.quantile(np.linalg.norm(largest - middle, axis=1), 0.9)
+    result = np.zeros(len(points), bool)
+    for group in np.flatnonzero(sizes >= SMALLEST_GROUP * len(index)):
+        members = index[groups == group]
+        if np.linalg.norm(np.median(points[members, :2], axis=0) - middle) < reach:
+            result[members] = True
+    return result

@@ -1,0 +1,48 @@
+"""splitnerf prepare."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from splitnerf.cli.exit_codes import DONE
+
+# What a step takes of the whole time, roughly.
+STEPS = {"frames": 0.02, "photos": 0.02, "features": 0.1, "matches": 0.4, "cameras": 0.2, "exposures": 0.03, "images": 0.03, "masks": 0.2}
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    parser = commands.add_parser(
+        "prepare", help="find cameras, masks and exposures of photographs",
+        description="Reads a folder of photographs, or a video, of one object that does not move, and writes DATA, which train "
+        "reads: images without lens distortion, masks, transforms.json, and prepare.html to look at. The same command goes on "
+        "where it was interrupted.",
+    )  # fmt: skip
+    parser.add_argument("photos", type=Path, metavar="PHOTOS", help="folder of photos, or a video file")
+    parser.add_argument("--out", type=Path, required=True, metavar="DATA", help="folder to write")
+    parser.add_argument("--masks", type=Path, metavar="DIR", help="masks of the photos, NAME.png, white on the object")
+    parser.add_argument(
+        "--max-size", type=int, default=0, metavar="N", help="longest edge of the written images in pixels (default: the photos')"
+    )
+    parser.add_argument("--frames", type=int, default=100, metavar="N", help="frames taken of a video (default: 100)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of all random choices (default: 0)")
+    parser.set_defaults(execute=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    from splitnerf.capture.job import PrepareSettings, prepare
+    from splitnerf.progress import Progress
+
+    settings = PrepareSettings(args.max_size, args.masks, args.frames, args.seed)
+    with Progress(0.0) as bar:
+        result = prepare(args.photos, args.out, settings, lambda step, share: bar.show(overall(step, share), step))
+    n, lost = len(result.world.scene.names), len(result.left_out)
+    print(f"{n} of {n + lost} photos, reprojection error {result.world.scene.error:.2f} pixels: {args.out}")
+    print(f"look at {args.out / 'prepare.html'}, then: splitnerf train {args.out}")
+    return DONE
+
+
+def overall(step: str, share: float) -> float:
+    """The share of all that is done when a share of a step is."""
+    names = list(STEPS)
+    return min(sum(STEPS[name] for name in names[: names.index(step)]) + share * STEPS[step], 1.0)

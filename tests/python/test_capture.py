@@ -1,0 +1,221 @@
+"""From photographs to data: each part against closed forms, and the whole on a painted ball."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+from table_scene import BALL, CAMERA, RADIUS, photograph, ring, write_photos
+
+from splitnerf.capture.exposure import find_exposures
+from splitnerf.capture.photographs import find_photographs, read_upright, sharpness
+from splitnerf.capture.poses import FLIP, Lens, Reconstruction
+from splitnerf.capture.world import CAMERA_DISTANCE, settle
+from splitnerf.cli import main
+from splitnerf.data.dataset import load_dataset
+from splitnerf.errors import InputError
+
+cv2 = pytest.importorskip("cv2")
+
+PLAIN = Lens(320, 240, 320.0, 320.0, 160.0, 120.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def found_scene(n: int = 12) -> tuple[Reconstruction, np.ndarray]:
+    """What structure from motion would find of the painted ball, and which of its points lie on it."""
+    random = np.random.default_rng(0)
+    ball = random.normal(size=(400, 3))
+    ball = BALL + RADIUS * ball / np.linalg.norm(ball, axis=1, keepdims=True)
+    ball = ball[ball[:, 2] > 0.15]
+    table = np.c_[random.uniform(-1, 1, (1500, 2)), np.zeros(1500)]
+    table = table[np.linalg.norm(table[:, :2], axis=1) > 0.5]
+    far = random.normal(size=(200, 3)) * 10 + 20
+    points = np.concatenate([ball, table, far])
+    poses = ring(n)
+    scene = Reconstruction(
+        [f"p_{i:02d}" for i in range(n)], poses, [PLAIN] * n, points, np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), 0.3, 1
+    )
+    return scene, np.arange(len(points)) < len(ball)
+
+
+def moved(scene: Reconstruction, seed: int) -> Reconstruction:
+    """The scene in another frame."""
+    random = np.random.default_rng(seed)
+    rotation = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    rotation *= np.sign(np.linalg.det(rotation))
+    scale, shift = 7.0, random.normal(size=3) * 5
+    poses = scene.poses.copy()
+    poses[:, :3, :3], poses[:, :3, 3] = rotation @ poses[:, :3, :3], scale * poses[:, :3, 3] @ rotation.T + shift
+    return Reconstruction(**{**scene.__dict__, "poses": poses, "points": scale * scene.points @ rotation.T + shift})
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_world_stands_on_its_table(seed):
+    scene, of_ball = found_scene()
+    world = settle(moved(scene, seed), 0)
+    assert world.table
+    heights = world.scene.points[:, 2]
+    scale = CAMERA_DISTANCE / 3.0
+    assert np.allclose(heights[of_ball], scale * scene.points[of_ball, 2], atol=0.01)
+    assert abs(heights[~of_ball][:500]).max() < 0.01
+    assert np.allclose(np.linalg.norm(world.scene.points[of_ball, :2], axis=1), scale * np.linalg.norm(scene.points[of_ball, :2], axis=1), atol=0.01)
+    assert (world.object_points == of_ball).mean() > 0.99
+    before, after = scene.camera_points(3, scene.points), world.scene.camera_points(3, world.scene.points)
+    assert np.allclose(after, scale * before, atol=1e-6)
+
+
+def test_without_a_table_up_is_the_cameras_mean():
+    scene, of_ball = found_scene()
+    alone = Reconstruction(**{**scene.__dict__, "points": scene.points[of_ball]})
+    world = settle(moved(alone, 0), 0)
+    assert not world.table
+    assert np.allclose(world.scene.points[:, 2], CAMERA_DISTANCE / 3.0 * (alone.points[:, 2] - BALL[2]), atol=0.03)
+
+
+def test_exposures_and_vignetting_come_back():
+    random = np.random.default_rng(1)
+    n, m = 12, 800
+    gains = np.exp(random.normal(scale=0.3, size=n))
+    gains /= np.exp(np.log(gains).mean())
+    radiance = random.uniform(0.05, 0.5, m)
+    photo, point = np.divmod(random.choice(n * m, 5000, replace=False), m)
+    radii = random.uniform(0, 1, 5000)
+    values = gains[photo] * (1 - 0.25 * radii**2 - 0.1 * radii**4) * radiance[point]
+    values *= np.exp(random.normal(scale=0.02, size=5000))
+    shiny = random.random(5000) < 0.05
+    values[shiny] *= 2
+    found = find_exposures(photo, point, values, radii, np.full(n, np.nan))
+    assert abs(np.log(found.gains / gains)).max() < 0.015
+    assert np.isclose(np.log(found.gains).mean(), 0, atol=1e-9)
+    for r in (0.5, 1.0):
+        factor = 1 + found.vignetting[0] * r**2 + found.vignetting[1] * r**4
+        assert abs(factor - (1 - 0.25 * r**2 - 0.1 * r**4)) < 0.02
+
+
+def test_exposures_without_observations_are_the_files():
+    by_file = np.array([1.0, 2.0, 4.0])
+    none = np.zeros(0, int)
+    found = find_exposures(none, none, np.zeros(0), np.zeros(0), by_file)
+    assert np.allclose(found.gains, [0.5, 1, 2], rtol=1e-4) and found.vignetting == (0.0, 0.0)
+
+
+def test_undistorted_photos_are_pinhole_images():
+    from splitnerf.capture.undistorted import pinhole_of, undistort
+
+    lens = Lens(320, 240, 300.0, 302.0, 165.0, 117.0, -0.08, 0.02, 0.001, -0.0008)
+    y, x = np.mgrid[:240, :320] + 0.5
+    bent = np.stack([(x - lens.cx) / lens.fx, (y - lens.cy) / lens.fy], axis=-1)
+    slopes = bent.copy()
+    for _ in range(60):  # the inverse of the distortion, by fixed points
+        u, v = slopes[..., 0], slopes[..., 1]
+        squared = u**2 + v**2
+        radial = 1 + lens.k1 * squared + lens.k2 * squared**2
+        across = np.stack([2 * lens.p1 * u * v + lens.p2 * (squared + 2 * u**2), lens.p1 * (squared + 2 * v**2) + 2 * lens.p2 * u * v], -1)
+        slopes = (bent - across) / radial[..., None]
+    pattern = lambda s: (127 + 60 * np.sin(25 * s[..., :1] + 3) * np.cos(22 * s[..., 1:]) + 30 * s[..., :1]).repeat(3, -1)  # noqa: E731
+    photo = np.round(pattern(slopes)).astype(np.uint8)
+    for max_size in (0, 160):
+        pinhole = pinhole_of(lens, max_size)
+        assert max(pinhole.width, pinhole.height) == (max_size or 320)
+        image = undistort(photo, lens, pinhole)
+        y, x = np.mgrid[: pinhole.height, : pinhole.width] + 0.5
+        expected = pattern(np.stack([(x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy], axis=-1))
+        assert abs(image - expected).max() < 2.5
+
+
+def test_vignetting_is_taken_out():
+    from splitnerf.capture.undistorted import without_vignetting
+    from splitnerf.data.images import linear_to_srgb
+
+    y, x = np.mgrid[:240, :320] + 0.5
+    squared = ((x - 160) ** 2 + (y - 120) ** 2) / (160**2 + 120**2)
+    linear = np.repeat((0.4 * (1 - 0.3 * squared))[..., None], 3, -1).astype(np.float32)
+    photo = (255 * linear_to_srgb(linear) + 0.5).astype(np.uint8)
+    photo[:10, :10] = 255
+    even = without_vignetting(photo, PLAIN, (-0.3, 0.0)).astype(int)
+    assert np.ptp(even[10:]) <= 2
+    assert (even[:10, :10] == 255).all()
+
+
+def test_masks_of_the_painted_ball():
+    from splitnerf.capture.masks import View, find_masks
+
+    scene, _ = found_scene()
+    world = settle(scene, 0)
+    views, truth = [], []
+    for i, pose in enumerate(scene.poses):
+        photo, ball = photograph(pose, 320.0, 320, 240)
+        camera = PLAIN.matrix @ np.linalg.inv(world.scene.poses[i] @ FLIP)[:3]
+        view = View(photo, camera, np.empty((0, 2)), np.empty((0, 2)))
+        places, depths = view.project(world.scene.points[~world.object_points][:1500])
+        dots = places[(depths > 0) & (places > 0).all(1) & (places < [320, 240]).all(1)]
+        hidden = np.array([ball[int(y), int(x)] for x, y in dots], bool)
+        views.append(View(photo, camera, np.empty((0, 2)), dots[~hidden]))
+        truth.append(ball)
+    masks = find_masks(views, world, lambda share: None)
+    overlap = [(mask & ball).sum() / (mask | ball).sum() for mask, ball in zip(masks, truth)]
+    assert np.mean(overlap) > 0.97 and min(overlap) > 0.93
+
+
+def test_files_tell_of_turns_and_exposures(tmp_path):
+    pixels = np.zeros((20, 30, 3), np.uint8)
+    pixels[:, :15] = 200
+    exif = Image.Exif()
+    exif[0x0112] = 6  # the camera was turned: rows run to the left
+    exif.get_ifd(0x8769).update({0x829A: 0.01, 0x829D: 2.0, 0x8827: 100, 0xA405: 26})
+    Image.fromarray(pixels).save(tmp_path / "a.jpg", exif=exif, quality=95)
+    (tmp_path / "b.jpg").write_bytes((tmp_path / "a.jpg").read_bytes())
+    Image.fromarray(pixels).save(tmp_path / "a.png")
+    first, second = find_photographs(tmp_path)
+    assert [first.name, second.name] == ["a_jpg", "a_png"]  # b.jpg is the same photo as a.jpg
+    assert (first.width, first.height) == (20, 30) and read_upright(first.path).shape == (30, 20, 3)
+    assert read_upright(first.path)[5].mean() > 150 > 50 > read_upright(first.path)[25].mean()
+    assert first.exposure == pytest.approx(0.25) and first.focal == pytest.approx(26 / np.hypot(36, 24) * np.hypot(20, 30))
+    assert (second.exposure, second.focal) == (None, None)
+
+
+@pytest.mark.parametrize("content, told", [(b"", "no photo that can be read"), (None, "holds no photos")])
+def test_bad_photos_are_named(tmp_path, content, told):
+    if content is not None:
+        (tmp_path / "a.jpg").write_bytes(content)
+    with pytest.raises(InputError, match=told):
+        find_photographs(tmp_path)
+
+
+def test_the_sharpest_frames_of_a_video(tmp_path):
+    from splitnerf.capture.video import write_frames
+
+    writer = cv2.VideoWriter(str(tmp_path / "v.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10, (160, 120))
+    sharp = photograph(ring(3)[0], 160.0, 160, 120)[0]
+    for number in range(12):
+        writer.write(sharp if number in (2, 5, 9) else cv2.GaussianBlur(sharp, (9, 9), 3))
+    writer.release()
+    write_frames(tmp_path / "v.avi", tmp_path / "frames", 3, lambda share: None)
+    frames = sorted((tmp_path / "frames").iterdir())
+    assert len(frames) == 3
+    blurred = sharpness(cv2.GaussianBlur(sharp, (9, 9), 3))
+    assert min(sharpness(cv2.imread(str(frame))) for frame in frames) > 3 * blurred
+
+
+def test_photos_to_data(tmp_path, capsys):
+    """Twenty photos through the command: cameras, masks and a page; the data load."""
+    pytest.importorskip("pycolmap")
+    truth = write_photos(tmp_path / "photos", 20)
+    assert main(["prepare", str(tmp_path / "photos"), "--out", str(tmp_path / "data")]) == 0
+    assert "20 of 20 photos" in capsys.readouterr().out
+    frames = json.loads((tmp_path / "data" / "transforms.json").read_text())["frames"]
+    poses = np.array([frame["transform_matrix"] for frame in frames])
+    # Centres relative to the ball's, in the cameras' distances, are what no similarity changes but a turn about z.
+    angle = np.unwrap(np.arctan2(poses[:, 1, 3], poses[:, 0, 3])) - np.unwrap(np.arctan2(truth[:, 1, 3], truth[:, 0, 3]))
+    assert np.ptp(angle) < 0.01
+    assert np.allclose(poses[:, 2, 3], truth[:, 2, 3] * CAMERA_DISTANCE / 3.0, atol=0.03)
+    overlap = []
+    for frame, pose in zip(frames, truth):
+        mask = np.asarray(Image.open(tmp_path / "data" / frame["mask_path"])) > 127
+        ball = photograph(pose, *CAMERA)[1]
+        overlap.append((mask & ball).sum() / (mask | ball).sum())
+    assert np.mean(overlap) > 0.95
+    dataset = load_dataset(tmp_path / "data")
+    assert len(dataset) == 17 and dataset.images[..., 3].mean() > 0.01
+    assert "20 of 20" in (tmp_path / "data" / "prepare.html").read_text()
