@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from PIL import Image
-from table_scene import BALL, CAMERA, RADIUS, photograph, ring, write_photos
+from table_scene import BALL, CAMERA, RADIUS, TABLE_RADIUS, photograph, ring, surface_colours, write_photos
 
 from splitnerf.capture.exposure import find_exposures
 from splitnerf.capture.photographs import find_photographs, read_upright, sharpness
@@ -219,3 +219,58 @@ def test_photos_to_data(tmp_path, capsys):
     dataset = load_dataset(tmp_path / "data")
     assert len(dataset) == 17 and dataset.images[..., 3].mean() > 0.01
     assert "20 of 20" in (tmp_path / "data" / "prepare.html").read_text()
+
+
+def test_surroundings_are_what_the_object_sees():
+    from splitnerf.capture.surroundings import HEIGHT, Shot, surroundings
+    from splitnerf.data.images import srgb_to_linear
+
+    shots, gains = [], np.exp(np.linspace(-0.3, 0.3, 12))
+    for pose, gain in zip(ring(12), gains):
+        photo, ball = photograph(pose, 200.0, 320, 240)
+        linear = np.minimum(gain * srgb_to_linear(photo / np.float32(255)), 1)
+        photo = np.round(255 * np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)).astype(np.uint8)
+        shots.append(Shot(photo, ball, pose, Lens(320, 240, 200.0, 200.0, 160.0, 120.0, 0, 0, 0, 0), gain))
+    found = surroundings(shots, BALL, 3.0, table=True)
+    v, u = np.meshgrid((np.arange(HEIGHT) + 0.5) / HEIGHT, (np.arange(2 * HEIGHT) + 0.5) / (2 * HEIGHT), indexing="ij")
+    theta, phi = v * np.pi, (0.5 - u) * 2 * np.pi
+    rays = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    at_table = BALL - BALL[2] / np.minimum(rays[..., 2:], -1e-9) * rays
+    radius = np.linalg.norm(at_table[..., :2], axis=-1)
+    expected = srgb_to_linear(surface_colours(at_table, rays, (rays[..., 2] < 0) & (radius < TABLE_RADIUS)).astype(np.float32))
+    seen = found[..., 3] > 0.9
+    far = seen & (rays[..., 2] > -0.05)
+    assert far.sum() > 50 and abs(np.log(found[far][:, :3] / expected[far])).max() < 0.1
+    near = seen & (radius > 0.8) & (radius < 1.4)
+    # The table's spots are as wide as a texel of the map and a texel is their median: they must match best where they are.
+    error = [abs(found[..., :3] - np.roll(expected, shift, axis=1))[near].mean() for shift in (-2, 0, 2)]
+    assert near.sum() > 200 and error[1] < 0.85 * min(error[0], error[2])
+    assert not seen[: HEIGHT // 4].any()  # no camera looks up
+
+
+def test_what_is_seen_pulls_the_light():
+    import torch
+
+    from splitnerf.data.environment import seen_at
+    from splitnerf.fields import EvaluatedLight, LightPyramid
+    from splitnerf.training.losses import SeenLight
+
+    surroundings = np.zeros((16, 32, 4), np.float32)
+    surroundings[8:] = [0.2, 0.4, 0.8, 1.0]
+    radiance, known = seen_at(surroundings, np.array([[0, 0, -1.0], [0, 0, 1.0], [0.6, 0, -0.8]]))
+    assert np.allclose(radiance[[0, 2]], [0.2, 0.4, 0.8]) and known.tolist() == [1, 0, 1]
+    light = LightPyramid(16)
+    seen = SeenLight(surroundings, torch.device("cpu"))
+    optimiser = torch.optim.Adam(light.parameters(), lr=0.05)
+    for _ in range(150):
+        optimiser.zero_grad()
+        evaluated = EvaluatedLight(light.evaluate())
+        loss = seen.loss(evaluated)
+        loss.backward()
+        evaluated.backward()
+        optimiser.step()
+    assert loss.item() < 0.02
+    down, up = torch.tensor([[0, 0, -1.0]]), torch.tensor([[0, 0, 1.0]])
+    none = torch.zeros(1, 1)
+    assert torch.allclose(light(down, none), torch.tensor([[0.2, 0.4, 0.8]]), rtol=0.05)
+    assert not torch.allclose(light(up, none), torch.tensor([[0.2, 0.4, 0.8]]), rtol=0.05)

@@ -263,3 +263,18 @@ def test_centred_derivatives_say_the_same_with_less_noise():
         assert of_still.std() < 1e-4  # a white light makes no noise
         assert of_calm.std() < 0.5 * of_plain.std()
         assert abs(of_calm.mean() - of_plain.mean()) < 4 * of_plain.std() / n**0.5
+
+
+def test_the_light_moves_to_what_photos_show():
+    """Pixels that say nothing leave the light to what is seen around the object, where that is known."""
+    surroundings = np.zeros((16, 32, 4), np.float32)
+    surroundings[8:] = [0.3, 0.6, 1.2, 1.0]
+    light = EnvironmentLight(torch.full((16, 32, 3), 0.6))
+    equations = LightEquations(light, share_of_rows=1.0, surroundings=surroundings)
+    for _ in range(12):
+        texels, shares = footprints(16, torch.nn.functional.normalize(torch.randn(40, 3, generator=torch.Generator().manual_seed(0)), dim=1))
+        slopes = torch.full((40, 1, 3), 1e-6)
+        equations.add(Rows(texels, shares, slopes, torch.ones(40, 3)), torch.full((40, 1, 3), 0.6), torch.zeros(40, 3))
+        equations.step(1.0)
+    radiance = light.radiance()
+    torch.testing.assert_close(radiance[10:15].mean((0, 1)), torch.tensor([0.3, 0.6, 1.2]), rtol=0.05, atol=0)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from PIL import Image
 
@@ -17,10 +18,12 @@ from splitnerf.capture.masks import View, find_masks
 from splitnerf.capture.page import write_page
 from splitnerf.capture.photographs import Photograph, find_photographs, read_upright, sharpness
 from splitnerf.capture.poses import Reconstruction, reconstruct
+from splitnerf.capture.surroundings import Shot, surroundings
 from splitnerf.capture.video import SUFFIXES, write_frames
 from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignetting
-from splitnerf.capture.world import World, settle
-from splitnerf.data.images import atomic_path, srgb_to_linear
+from splitnerf.capture.world import CAMERA_DISTANCE, World, settle
+from splitnerf.data.dataset import SURROUNDINGS
+from splitnerf.data.images import atomic_path, srgb_to_linear, write_image
 from splitnerf.errors import InputError
 from splitnerf.notes import note
 
@@ -65,7 +68,7 @@ class Prepared:
 
 
 def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable[[str, float], None]) -> Prepared:
-    """Writes `images/`, `masks/`, `transforms.json`, `points.ply` and `prepare.html`.
+    """Writes `images/`, `masks/`, `transforms.json`, `surroundings.exr` and `prepare.html`.
 
     What an interrupted call with the same photos has done in `out/work` is used again.
 
@@ -89,6 +92,7 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
     exposures = exposures_of(world.scene, by_name, report)
     shares = _write_images(world, exposures, by_name, out, settings, report)
     _write_transforms(world, exposures, out, settings)
+    write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
     write_page(out, world, exposures.gains, shares, left_out, source.resolve().name)
     return Prepared(world, exposures, left_out, shares)
 
@@ -211,8 +215,6 @@ def given_masks(world: World, views: list[View], settings: PrepareSettings) -> l
 
 def view_of(world: World, i: int, image: np.ndarray, max_size: int) -> View:
     """What the search for masks needs of photo `i`, whose undistorted image is given."""
-    import cv2
-
     scene = world.scene
     pinhole = pinhole_of(scene.lenses[i], max_size)
     scale = min(1.0, MASK_SIZE / max(image.shape[:2]))
@@ -229,10 +231,23 @@ def view_of(world: World, i: int, image: np.ndarray, max_size: int) -> View:
     return View(small, camera, places[of_object], places[~of_object])
 
 
+def surroundings_of(world: World, exposures: Exposures, out: Path, settings: PrepareSettings) -> np.ndarray:
+    """What the written images show around the object, see :func:`splitnerf.capture.surroundings.surroundings`."""
+    scene = world.scene
+    points = scene.points[world.object_points]
+    centre = np.median(points, axis=0) if len(points) else np.zeros(3)
+
+    def shots() -> Iterator[Shot]:
+        for i, name in enumerate(scene.names):
+            image, mask = (cv2.imread(str(out / folder / f"{name}.png"), cv2.IMREAD_UNCHANGED) for folder in ("images", "masks"))
+            lens = pinhole_of(scene.lenses[i], settings.max_size)
+            yield Shot(image[..., ::-1], mask > 127, scene.poses[i], lens, float(exposures.gains[i]))
+
+    return surroundings(shots(), centre, CAMERA_DISTANCE, world.table)
+
+
 def write_png(path: Path, image: np.ndarray) -> None:
     """An image [h, w] or [h, w, 3], uint8 or uint16, as PNG."""
-    import cv2
-
     with atomic_path(path) as temporary:
         coded, data = cv2.imencode(".png", image[..., ::-1] if image.ndim == 3 else image)
         if not coded:

@@ -68,7 +68,9 @@ def _masked(out: Path, name: str) -> Markup:
 def _plan(world: World, across: int, up: int) -> Markup:
     """The cameras and points as an SVG, seen along the third axis."""
     scene = world.scene
-    place = lambda p: (SIDE / 2 * (1 + p[..., across] / REACH), SIDE / 2 * (1 - p[..., up] / REACH))  # noqa: E731
+    middle = (scene.poses[:, :3, 3].min(0) + scene.poses[:, :3, 3].max(0)) / 2
+    middle[2] /= 2  # between the ground and the highest camera
+    place = lambda p: tuple(SIDE / 2 * (1 + s * (p[i] - middle[i]) / REACH) for i, s in ((across, 1), (up, -1)))  # noqa: E731
     shown = np.random.default_rng(0).permutation(len(scene.points))[:SHOWN_POINTS]
     parts = []
     for index in shown:

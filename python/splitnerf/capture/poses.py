@@ -182,11 +182,13 @@ def _taken_out(model, n_models: int) -> Reconstruction:
 @contextmanager
 def _quiet(pycolmap) -> Iterator[None]:
     """Keeps COLMAP's log to errors."""
-    level, pycolmap.logging.minloglevel = pycolmap.logging.minloglevel, pycolmap.logging.Level.ERROR.value
+    log = pycolmap.logging
+    before = log.minloglevel, log.alsologtostderr
+    log.minloglevel, log.alsologtostderr = log.Level.ERROR.value, False
     try:
         yield
     finally:
-        pycolmap.logging.minloglevel = level
+        log.minloglevel, log.alsologtostderr = before
 
 
 @contextmanager

@@ -221,6 +221,7 @@ class Losses:
     entropy_points: int = setting(384, "surface points of the entropy", unit="points", at_least=1)
     albedo_width: float = setting(0.6, "distance of log albedos that count as one", above=0)
     gloss_width: float = setting(0.2, "distance of roughness and metallic that count as one", above=0)
+    seen_weight: float = setting(0.02, "weight of the distance to the light that photos show around the object")
     neutral_queries: int = setting(256, "normals at which the light's chroma is taken", unit="normals", at_least=1)
     smoothness_weight: float = setting(0.01, "weight of how far normals of neighbouring surface points are apart")
     smoothness_points: int = setting(512, "surface points of that term", unit="points", at_least=1)

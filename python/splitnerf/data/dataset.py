@@ -12,11 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from splitnerf.data.environment import read_surroundings
 from splitnerf.data.frames import Frame, lens_intrinsics, read_frames
-from splitnerf.data.images import LDR_SUFFIXES, area_average, downscale_rgba, read_image
+from splitnerf.data.images import LDR_SUFFIXES, area_average, downscale_rgba, linear_to_srgb, read_image, srgb_to_linear
 from splitnerf.data.normalisation import estimate_box, transform_points
 from splitnerf.errors import InputError
 
+SURROUNDINGS = "surroundings.exr"
 HULL_VIEWS = 40
 SILHOUETTE_SIZE = 100
 
@@ -36,6 +38,8 @@ class Dataset:
         frame_names: Names of the images' files without extension, or of the view folders.
         image_paths: The image files.
         box_from_world: [4, 4] float64, uniform scale and translation from the data's world to the internal frame.
+        surroundings: [h, 2 h, 4] float32, equirectangular: linear radiance that the photos see around the object, and how
+            well it was seen, in [0, 1]; None where the data have no such map.
     """
 
     name: str
@@ -48,6 +52,7 @@ class Dataset:
     frame_names: list[str]
     image_paths: list[Path]
     box_from_world: np.ndarray
+    surroundings: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.images)
@@ -144,6 +149,7 @@ def load_dataset(root: str | os.PathLike, split: str = "train", downscale: int =
         frame_names=[frame.name for frame in frames],
         image_paths=[frame.image_path for frame in frames],
         box_from_world=box_from_world,
+        surroundings=read_surroundings(root / SURROUNDINGS) if (root / SURROUNDINGS).is_file() else None,
     )
 
 
@@ -232,6 +238,8 @@ def _load_image(frame: Frame, downscale: int) -> _Image:
         alpha = pixels[..., -1:]
     else:
         raise InputError(f"{path}: has no alpha channel and its frame no mask_path; save it with alpha or add a mask")
+    if frame.exposure != 1.0:
+        colour = linear_to_srgb(srgb_to_linear(colour) / np.float32(frame.exposure))
     rgba = downscale_rgba(np.concatenate([colour, alpha], axis=-1), downscale)
     silhouette = area_average(alpha[..., 0], _silhouette_factor(height, width)) > 0.5
     return _Image(rgba, silhouette, (height, width))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.images import HDR_SUFFIXES, area_average, read_radiance
+from splitnerf.data.images import HDR_SUFFIXES, area_average, read_image, read_radiance
 from splitnerf.errors import InputError
 from splitnerf.notes import note
 
@@ -50,6 +50,19 @@ def read_environment(path: str | os.PathLike) -> np.ndarray:
     return radiance
 
 
+def read_surroundings(path: str | os.PathLike) -> np.ndarray:
+    """[h, 2 h, 4] float32: an equirectangular map of linear radiance with a fourth channel in [0, 1], how well it is known.
+
+    Raises:
+        InputError: The file is no such map.
+    """
+    image = read_image(path)
+    good = image.ndim == 3 and image.shape[2] == 4 and image.shape[1] == 2 * image.shape[0]
+    if not good or not np.isfinite(image).all() or image.min() < 0 or image[..., 3].max() > 1:
+        raise InputError(f"{path}: is no map of radiance with a fourth channel in [0, 1]; run splitnerf prepare again")
+    return image.astype(np.float32)
+
+
 def sample_environment(radiance: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """Radiance from directions, interpolated bilinearly.
 
@@ -70,6 +83,22 @@ def sample_environment(radiance: np.ndarray, directions: np.ndarray) -> np.ndarr
         (1 - across) * radiance[top + k, left % width] + across * radiance[top + k, (left + 1) % width] for k in (0, 1)
     ]
     return ((1 - down) * rows[0] + down * rows[1]).astype(np.float32)
+
+
+def seen_at(surroundings: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What photos show around the object, in given directions.
+
+    Args:
+        surroundings: [h, 2 h, 4], see :func:`read_surroundings`.
+        directions: [n, 3].
+
+    Returns:
+        The radiance [n, 3], and how well it is known [n], in [0, 1]; the radiance is 0 where nothing is.
+    """
+    share = surroundings[..., 3:]
+    mean = sample_environment(np.concatenate([surroundings[..., :3] * share, share], axis=2), directions)
+    known = mean[..., 3]
+    return mean[..., :3] / np.maximum(known, 1e-6)[..., None], np.where(known > 1e-3, known, 0.0).astype(np.float32)
 
 
 def rotate_environment(radiance: np.ndarray, degrees: float) -> np.ndarray:

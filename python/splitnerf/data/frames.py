@@ -44,6 +44,7 @@ class Frame:
     mask_path: Path | None
     pose: np.ndarray
     lens: dict
+    exposure: float = 1.0
 
 
 def read_frames(root: Path, split: str) -> list[Frame]:
@@ -129,7 +130,7 @@ def _listed_frame(entry: dict, meta: dict, index: int, path: Path) -> Frame:
     image_path = _find_image(path.parent, str(_need(entry, "file_path", path, f" in frame {index}")), path)
     mask_path = path.parent / str(entry["mask_path"]) if "mask_path" in entry else None
     pose, lens = _read_camera(entry, meta, index, path, f"frame {index} ({image_path.name})")
-    return Frame(image_path.stem, image_path, mask_path, pose, lens)
+    return Frame(image_path.stem, image_path, mask_path, pose, lens, float(entry.get("exposure", 1.0)))
 
 
 def _read_entries(path: Path) -> tuple[dict, list[dict]]:

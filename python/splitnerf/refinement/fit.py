@@ -170,7 +170,7 @@ class Refinement:
             torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (asset.normals, asset.tangents, asset.uv)
         ]
         self.light = EnvironmentLight(torch.from_numpy(environment))
-        self.light_equations = LightEquations(self.light)
+        self.light_equations = LightEquations(self.light, surroundings=dataset.surroundings)
         self.random = np.random.default_rng(s.seed)
         self.unknowns = to_unknowns(self.texels.start)
         like = torch.zeros(N_UNKNOWNS)

@@ -11,10 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from splitnerf.data.environment import seen_at
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.light import EnvironmentLight, read, read_adjoint, sum_of_levels
 
@@ -22,6 +24,9 @@ WEIGHT = 1e-7  # of the prior beside the mean squared error of the photos in sRG
 BRIGHTNESS = 0.5  # deviation of the mean of the channels' log radiance from the coarser levels, on each level
 COLOUR = 0.4  # deviation of a channel's log radiance from that mean on the coarsest level; half of it on each next one
 TAILS = 3.0  # degrees of freedom of Student's t distribution
+WEIGHT_SEEN = 1e-3  # of the light that photos show, beside the mean squared error of the photos in sRGB units
+SEEN = 0.2  # deviation of its log radiance
+DARK = 1e-3  # radiance below it counts as dark
 N_PROBES = 4  # random vectors by which the diagonal is estimated
 DAMPING = 0.1  # share of a diagonal bound of the whole curvature (its rows' sums) that is added to that of some rays
 N_ITERATIONS = 15
@@ -49,10 +54,12 @@ class LightEquations:
     Args:
         light: The light that :meth:`step` moves.
         share_of_rows: The share of the rays from which the curvature comes.
+        surroundings: [h, 2 h, 4] what the photos show around the object, see :class:`splitnerf.data.dataset.Dataset`, or None.
     """
 
-    def __init__(self, light: EnvironmentLight, share_of_rows: float = 0.08):
+    def __init__(self, light: EnvironmentLight, share_of_rows: float = 0.08, surroundings: np.ndarray | None = None):
         self.light, self.share_of_rows = light, share_of_rows
+        self._seen = None if surroundings is None else seen_texels(light.height, surroundings)
         self._sizes = [level.numel() for level in light.levels]
         self._shapes = [level.shape for level in light.levels]
         self._n_texels = self._sizes[-1] // 3
@@ -121,17 +128,18 @@ class LightEquations:
         radiance = self.light.radiance().view(-1, 3)
         now = torch.cat([level.flatten() for level in self.light.levels])
         damping = DAMPING * self.bound * radiance / self.n_batches
+        away, held = self._from_seen(radiance)
 
         def curvature(vector: Tensor) -> Tensor:
             change = read(self._synthesis(vector) * radiance, rows.texels, rows.shares).view(n, k, 3)
             seen = (rows.slopes * change).sum(1) * rows.weights / n
             back = (rows.slopes * seen[:, None]).reshape(-1, 3)
             table = read_adjoint(back, rows.texels, rows.shares, self._n_texels) * radiance
-            return self._adjoint(table + damping * self._synthesis(vector))
+            return self._adjoint(table + (damping + held) * self._synthesis(vector))
 
         precisions = self._precisions(now)
         before = 1.0 / (self._diagonal(curvature) + WEIGHT / BRIGHTNESS**2)
-        down = self._adjoint(self.gradient * radiance) / self.n_batches + self._prior(now, precisions)
+        down = self._adjoint(self.gradient * radiance / self.n_batches + held * away) + self._prior(now, precisions)
         step = conjugate_gradients(
             lambda x: curvature(x) + self._prior(x, precisions), lambda x: before * x, -down, N_ITERATIONS
         )
@@ -139,6 +147,14 @@ class LightEquations:
         self.light.set_log_radiance((self._synthesis(now) + change).T.reshape(self._shapes[-1]))
         self.clear()
         return float(change.square().mean().sqrt())
+
+    def _from_seen(self, radiance: Tensor) -> tuple[Tensor, Tensor]:
+        """How far the log radiance of the texels [t, 3] is from what photos show, and the weights of its squares."""
+        if self._seen is None:
+            return torch.zeros_like(radiance), torch.zeros_like(radiance)
+        target, known = self._seen
+        away = radiance.log() - target
+        return away, WEIGHT_SEEN * known / (SEEN**2 + away.square() / TAILS)
 
     def _diagonal(self, curvature: Callable[[Tensor], Tensor]) -> Tensor:
         """An estimate of the curvature's diagonal, smoothed over neighbours. Source: Bekas, Kokiopoulou and Saad 2007."""
@@ -148,6 +164,19 @@ class LightEquations:
             total += signs * curvature(signs) / N_PROBES
         levels = [F.avg_pool2d(level.clamp(min=0), 3, 1, 1, count_include_pad=False) for level in self._levels(total)]
         return torch.cat([(level + 0.01 * level.mean()).flatten() for level in levels])
+
+
+def seen_texels(height: int, surroundings: np.ndarray) -> tuple[Tensor, Tensor]:
+    """The log radiance [t, 3] that photos show in the directions of a map's texels, and their weights [t, 1]: how well it is
+    known, times the texel's share of the sphere."""
+    theta = (np.arange(height) + 0.5) * np.pi / height
+    phi = (0.5 - (np.arange(2 * height) + 0.5) / (2 * height)) * 2 * np.pi
+    ring, up = np.sin(theta)[:, None], np.cos(theta)[:, None] * np.ones(2 * height)
+    directions = np.stack([ring * np.cos(phi), ring * np.sin(phi), up], axis=-1).reshape(-1, 3)
+    radiance, known = seen_at(surroundings, directions)
+    share = np.broadcast_to(ring / ring.sum() / (2 * height), up.shape).reshape(-1)
+    target = np.log(np.maximum(radiance, DARK))
+    return torch.from_numpy(target.astype(np.float32)), torch.from_numpy((known * share).astype(np.float32))[:, None]
 
 
 def parts_of(level: Tensor, number: int) -> tuple[Tensor, Tensor]:

@@ -35,7 +35,7 @@ from splitnerf.training.checkpoint import (
 )
 from splitnerf.training.finite import GradientWatch, check_state, explain_loss
 from splitnerf.training.graphs import GraphedStep
-from splitnerf.training.losses import Term
+from splitnerf.training.losses import SeenLight, Term
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
 from splitnerf.training.repeatable import same_bits
@@ -140,7 +140,8 @@ class Training:
         self.grid = make_grid(c, hull, device)
         self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
         step = GraphedStep if c.run.cuda_graphs and device.type == "cuda" else Step
-        self.take_step = step(self.model, self.grid, self.mesh, self.generator)
+        seen = None if dataset.surroundings is None else SeenLight(dataset.surroundings, self.generator.device)
+        self.take_step = step(self.model, self.grid, self.mesh, self.generator, seen)
         self.watch = GradientWatch(self.model.parameters())
         self.light: EvaluatedLight | None = None  # evaluated; None after its parameters moved
         self.environment: Tensor | None = None  # the light that weighs traced occlusion

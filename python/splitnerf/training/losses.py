@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import functools
+import math
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.config import Config
+from splitnerf.data.environment import seen_at
 from splitnerf.fields import EvaluatedLight, Light, LightPyramid
 from splitnerf.ops import (
     MeshScene,
@@ -24,6 +27,9 @@ from splitnerf.render.renderer import RenderedRays
 BRIGHTNESS_DEVIATION = 0.5  # of a texel's log radiance from the coarser levels
 COLOUR_DEVIATION = 0.2  # of its channels from their mean
 TAILS = 3.0  # degrees of freedom
+SEEN_TEXELS = 1024  # directions in which the light is compared with what photos show, at least
+SEEN_DEVIATION = 0.2  # of the log radiance
+RADIANCE_FLOOR = 1e-3  # radiance below it counts as dark
 ALBEDO_FLOOR = 0.01  # albedos below it count as the same black
 
 
@@ -135,6 +141,32 @@ def light_prior_loss(light: LightPyramid) -> Tensor:
         brightness = brightness.square().squeeze(1) / BRIGHTNESS_DEVIATION**2
         cost = cost + torch.log1p(brightness / TAILS).mean() + torch.log1p(colour / TAILS).mean()
     return cost
+
+
+class SeenLight:
+    """A term of the loss that holds the light near that which photos show around the object.
+
+    Args:
+        surroundings: [h, 2 h, 4] radiance and how well it is known, see :class:`splitnerf.data.dataset.Dataset`.
+        device: The light's device.
+    """
+
+    def __init__(self, surroundings: np.ndarray, device: torch.device):
+        self._surroundings, self._device = surroundings, device
+        self._target: Tensor | None = None
+
+    def loss(self, light: EvaluatedLight) -> Tensor:
+        """The mean over the sphere of the cost of the light's log radiance beside that of the photos.
+
+        The cost is that of Student's t distribution: what stands near is not what the object sees in that direction.
+        """
+        texels = light.maps.partition(SEEN_TEXELS, self._device)
+        if self._target is None:
+            radiance, known = (torch.from_numpy(x) for x in seen_at(self._surroundings, texels.directions.cpu().numpy()))
+            weights = known.to(self._device) * texels.solid_angles / (4 * math.pi)
+            self._target, self._weights = radiance.to(self._device).clamp(min=RADIANCE_FLOOR).log(), weights
+        apart = (texels.radiance.clamp(min=RADIANCE_FLOOR).log() - self._target) / SEEN_DEVIATION
+        return (torch.log1p(apart.square() / TAILS).mean(1) * self._weights).sum()
 
 
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:

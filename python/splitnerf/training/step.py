@@ -27,12 +27,16 @@ class Step:
     Args:
         model, grid, mesh: The scene, its occupancy grid and its newest mesh.
         generator: Random numbers for the losses' subsets.
+        seen: The light that photos show around the object; None where they show none.
     """
 
     n_discarded = 0  # steps whose results were not complete
 
-    def __init__(self, model: SceneModel, grid: OccupancyGrid, mesh: SurfaceMesh, generator: torch.Generator):
-        self.model, self.grid, self.mesh, self.generator = model, grid, mesh, generator
+    def __init__(
+        self, model: SceneModel, grid: OccupancyGrid, mesh: SurfaceMesh, generator: torch.Generator,
+        seen: losses.SeenLight | None = None,
+    ):  # fmt: skip
+        self.model, self.grid, self.mesh, self.generator, self.seen = model, grid, mesh, generator, seen
 
     def __call__(
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
@@ -63,7 +67,7 @@ class Step:
         :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
         ray = render_rays(self.model, light, found, shades_per_ray=c.sampling.shades_per_ray, capacity=capacity)
-        terms = loss_terms(self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress)
+        terms = loss_terms(self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen)
         self.model.zero_grad(set_to_none=True)
         losses.backward(terms)
         return ray, terms
@@ -80,6 +84,7 @@ class Step:
 def loss_terms(
     model: SceneModel, light: EvaluatedLight, batch: Batch, ray: RenderedRays, scene: MeshScene | None,
     environment: Tensor | None, generator: torch.Generator, step: int, progress: float,
+    seen: losses.SeenLight | None = None,
 ) -> dict[str, Term]:  # fmt: skip
     """The terms of the loss by name; the colour's term comes first.
 
@@ -90,6 +95,7 @@ def loss_terms(
         environment: [h, 2h, 3] linear radiance that weighs the traced occlusion; None: no occlusion is traced.
         generator: Random numbers for the losses' subsets.
         step, progress: The number of the step, and the training's progress in [0, 1].
+        seen: The light that photos show around the object; None where they show none.
 
     Source: SplitNeRF Eq. (3), (11), (18) and the losses named in :mod:`splitnerf.training.losses`.
     """
@@ -111,6 +117,8 @@ def loss_terms(
             terms["neutral"] = Term(c.losses.neutral_weight * since, losses.neutral_light_loss(light, c, generator))
         if c.losses.light_prior_weight and c.light.kind == "pyramid":
             terms["light_prior"] = Term(c.losses.light_prior_weight * since, losses.light_prior_loss(model.light))
+        if seen is not None and c.losses.seen_weight:
+            terms["seen_light"] = Term(c.losses.seen_weight * since, seen.loss(light))
     if c.losses.smoothness_weight:
         terms["smoothness"] = Term(c.losses.smoothness_weight, smoothness)
     if c.losses.entropy_weight and progress >= c.losses.priors_from:

@@ -1,0 +1,88 @@
+"""What photographs show around the object: the part of the environment that is seen directly, not in reflections.
+
+A pixel beside the object shows light that arrives from there at the object, too, where what it shows sends equal light to all
+sides. Where it shows the table, the object sees that point in another direction than the camera; what lies beyond is taken to
+be far away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import binary_dilation
+
+from splitnerf.capture.poses import FLIP, Lens
+from splitnerf.data.images import srgb_to_linear
+
+HEIGHT = 64  # rows of the map
+TABLE_REACH = 0.9  # of the table from the object's foot, in the cameras' distances
+HALO = 0.01  # width around the object that is left out, in the photo's width
+STRIDE = 3  # pixels: every so many are looked at in a row and a column
+CLIPPED = 254.5 / 255.0  # sRGB value from which a pixel only says that there was more light
+ENOUGH = 12  # pixels that make a direction fully seen
+
+
+class Shot(NamedTuple):
+    """One undistorted photo.
+
+    Attributes:
+        image: [h, w, 3] uint8 or uint16, sRGB.
+        mask: [h, w] bool, the object.
+        pose: [4, 4] camera-to-world, OpenGL axes.
+        lens: The pinhole camera.
+        exposure: The factor of the photo's linear values.
+    """
+
+    image: np.ndarray
+    mask: np.ndarray
+    pose: np.ndarray
+    lens: Lens
+    exposure: float
+
+
+def surroundings(shots: Iterable[Shot], centre: np.ndarray, distance: float, table: bool) -> np.ndarray:
+    """[h, 2 h, 4] float32 equirectangular: the median linear radiance of each direction and how well it was seen, in [0, 1].
+
+    Args:
+        shots: The photos.
+        centre: [3] the middle of the object.
+        distance: The cameras' distance from it.
+        table: Whether z = 0 is a table.
+    """
+    texels, values = [], []
+    for shot in shots:
+        at, radiance = _seen(shot, centre, distance, table)
+        texels.append(at), values.append(radiance)
+    texel, value = np.concatenate(texels), np.concatenate(values)
+    result = np.zeros((HEIGHT * 2 * HEIGHT, 4), np.float32)
+    order = np.argsort(texel, kind="stable")
+    for group in np.split(order, np.flatnonzero(np.diff(texel[order])) + 1):
+        radiance = value[group]
+        clipped = np.isinf(radiance).any(axis=1)
+        if len(group) and 2 * clipped.sum() < len(group):
+            share = min(1.0, (len(group) - clipped.sum()) / ENOUGH)
+            result[texel[group[0]]] = [*np.median(radiance[~clipped], axis=0), share]
+    return result.reshape(HEIGHT, 2 * HEIGHT, 4)
+
+
+def _seen(shot: Shot, centre: np.ndarray, distance: float, table: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The texels of a photo's pixels beside the object, and their radiance [n, 3], infinite where the photo is clipped."""
+    h, w = shot.mask.shape
+    beside = ~binary_dilation(shot.mask, iterations=max(1, round(HALO * w)))
+    y, x = (part[beside[::STRIDE, ::STRIDE]] for part in np.mgrid[0:h:STRIDE, 0:w:STRIDE])
+    lens = shot.lens
+    local = np.stack([(x + 0.5 - lens.cx) / lens.fx, (y + 0.5 - lens.cy) / lens.fy, np.ones(len(x))], axis=1)
+    rays = local @ (shot.pose @ FLIP)[:3, :3].T
+    if table:
+        origin = shot.pose[:3, 3]
+        points = origin - (origin[2] / np.where(rays[:, 2] < 0, rays[:, 2], -1e-9))[:, None] * rays
+        on_table = (rays[:, 2] < 0) & (np.linalg.norm(points[:, :2], axis=1) < TABLE_REACH * distance)
+        rays = np.where(on_table[:, None], points - centre, rays)
+    dx, dy, dz = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).T
+    row = (np.arccos(dz.clip(-1, 1)) / np.pi * HEIGHT).astype(int).clip(0, HEIGHT - 1)
+    column = ((0.5 - np.arctan2(dy, dx) / (2 * np.pi)) * 2 * HEIGHT).astype(int) % (2 * HEIGHT)
+    photo = shot.image[y, x] / np.float32(np.iinfo(shot.image.dtype).max)
+    radiance = np.where(photo >= CLIPPED, np.inf, srgb_to_linear(photo) / np.float32(shot.exposure))
+    return row * 2 * HEIGHT + column, radiance
