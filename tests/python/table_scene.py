@@ -44,19 +44,21 @@ def ring(n: int, distance: float = 3.0) -> np.ndarray:
     return np.array(poses)
 
 
-def painted(points: np.ndarray, seed: int) -> np.ndarray:
+def painted(points: np.ndarray, seed: int, frequency: float = 5.0) -> np.ndarray:
     """[..., 3] spots of three sizes."""
-    return sum(spots(points, 2.0**k * 5, seed + k) for k in range(3)) / 3
+    return sum(spots(points, 2.0**k * frequency, seed + k) for k in range(3)) / 3
 
 
-def surface_colours(at_table: np.ndarray, rays: np.ndarray, table: np.ndarray) -> np.ndarray:
+def surface_colours(at_table: np.ndarray, rays: np.ndarray, table: np.ndarray, frequency: float = 5.0) -> np.ndarray:
     """[..., 3] sRGB colours of points of the table where a ray meets it, else of what is far away."""
     colour = 0.3 + 0.2 * noise(rays, 2.0, 9)
-    colour[table] = painted(at_table[table], 1) * [1.0, 1.0, 0.5]
+    colour[table] = painted(at_table[table], 1, frequency) * [1.0, 1.0, 0.5]
     return colour
 
 
-def photograph(pose: np.ndarray, focal: float, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+def photograph(
+    pose: np.ndarray, focal: float, width: int, height: int, frequency: float = 5.0
+) -> tuple[np.ndarray, np.ndarray]:
     """A photo [h, w, 3] uint8 with the principal point in its middle, and the ball's mask [h, w] bool."""
     y, x = np.mgrid[:height, :width] + 0.5
     local = np.stack([(x - width / 2) / focal, -(y - height / 2) / focal, -np.ones_like(x)], axis=-1)
@@ -69,7 +71,7 @@ def photograph(pose: np.ndarray, focal: float, width: int, height: int) -> tuple
     at_ball = origin + (along - np.sqrt(np.maximum(inside, 0)))[..., None] * rays
     at_table = origin - (origin[2] / rays[..., 2])[..., None] * rays
     table = (rays[..., 2] < 0) & (np.linalg.norm(at_table[..., :2], axis=-1) < TABLE_RADIUS)
-    colour = surface_colours(at_table, rays, table)
+    colour = surface_colours(at_table, rays, table, frequency)
     colour[ball] = painted(at_ball[ball], 5) * [1.0, 0.4, 0.2]
     return (255 * colour.clip(0, 1) + 0.5).astype(np.uint8), ball
 

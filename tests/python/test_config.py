@@ -113,6 +113,7 @@ SETTINGS = {
     "losses.mask_weight": ("mask_weight", 1.0, 0.0, PAPER),
     "losses.neutral_weight": ("neutral_weight", 0.03, 0.0, OURS),
     "losses.light_prior_weight": ("light_prior_weight", 0.001, 0.0, OURS),
+    "losses.seen_weight": ("seen_weight", 0.02, 0.0, OURS),
     "losses.entropy_weight": ("entropy_weight", 0.002, 0.0, OURS),
     "losses.priors_from": ("priors_from", 0.5, 0.5, OURS),
     "losses.entropy_points": ("entropy_points", 384, 384, OURS),

@@ -15,7 +15,7 @@ LAYERS = [
     {"ablate"},
     {"workflow"},
     {"delivery"},
-    {"training"},
+    {"training", "capture"},
     {"outputs", "report"},
     {"evaluate", "refinement", "relight", "synth"},
     {"export", "render"},

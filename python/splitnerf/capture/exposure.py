@@ -50,7 +50,8 @@ def find_exposures(
     start = np.where(known, np.log(np.where(known, by_file, 1.0)), np.nan)
     start = np.nan_to_num(start - (start[known].mean() if known.any() else 0.0))
     good = (values > DARKEST) & (values < BRIGHTEST)
-    photo_of, point_of, radii, logs = photo_of[good], np.unique(point_of[good], return_inverse=True)[1], radii[good], np.log(values[good])
+    photo_of, radii, logs = photo_of[good], radii[good], np.log(values[good])
+    point_of = np.unique(point_of[good], return_inverse=True)[1]
     k, m = len(logs), point_of.max(initial=-1) + 1
     rows = np.arange(k)
     squares = np.stack([radii**2, radii**4], axis=1)

@@ -16,12 +16,12 @@ from PIL import Image
 from splitnerf.capture.exposure import Exposures, find_exposures
 from splitnerf.capture.masks import View, find_masks
 from splitnerf.capture.page import write_page
-from splitnerf.capture.photographs import Photograph, find_photographs, read_upright, sharpness
+from splitnerf.capture.photographs import Photograph, find_photographs, is_upright, read_upright, sharpness
 from splitnerf.capture.poses import Reconstruction, reconstruct
 from splitnerf.capture.surroundings import Shot, surroundings
 from splitnerf.capture.video import SUFFIXES, write_frames
 from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignetting
-from splitnerf.capture.world import CAMERA_DISTANCE, World, settle
+from splitnerf.capture.world import World, settle
 from splitnerf.data.dataset import SURROUNDINGS
 from splitnerf.data.images import atomic_path, srgb_to_linear, write_image
 from splitnerf.errors import InputError
@@ -131,18 +131,18 @@ def _upright_copies(photos: list[Photograph], work: Path) -> Path:
     for photo in photos:
         group = folder / f"lens_{lenses.index(photo.lens) + 1}"
         group.mkdir(parents=True, exist_ok=True)
-        with_exif = Image.Exif()
-        upright = photo.path.suffix.lower() in (".jpg", ".jpeg", ".png") and Image.open(photo.path).size == (photo.width, photo.height)
-        target = group / f"{photo.name}{photo.path.suffix.lower() if upright else '.png'}"
+        suffix = photo.path.suffix.lower()
+        as_is = suffix in (".jpg", ".jpeg", ".png") and is_upright(photo)
+        target = group / f"{photo.name}{suffix if as_is else '.png'}"
         if target.exists():
             continue
-        if upright:
+        if as_is:
             target.symlink_to(photo.path.resolve())
         else:
             with atomic_path(target) as temporary:
                 pixels = read_upright(photo.path)
                 pixels = pixels if pixels.dtype == np.uint8 else (pixels >> 8).astype(np.uint8)
-                Image.fromarray(pixels).save(temporary, format="PNG", exif=with_exif, compress_level=1)
+                Image.fromarray(pixels).save(temporary, format="PNG", compress_level=1)
     return folder
 
 
@@ -157,7 +157,8 @@ def exposures_of(scene: Reconstruction, by_name: dict[str, Photograph], report: 
         smooth = sum(padded[a : a + lens.height, b : b + lens.width] for a in range(3) for b in range(3)) / 9
         x, y = scene.observed[here].astype(int).T
         values[here] = smooth[y.clip(0, lens.height - 1), x.clip(0, lens.width - 1)]
-        radii[here] = np.linalg.norm(scene.observed[here] - [lens.cx, lens.cy], axis=1) / (0.5 * np.hypot(lens.width, lens.height))
+        half_diagonal = 0.5 * np.hypot(lens.width, lens.height)
+        radii[here] = np.linalg.norm(scene.observed[here] - [lens.cx, lens.cy], axis=1) / half_diagonal
         report("exposures", (i + 1) / len(scene.names))
     by_file = np.array([by_name[name].exposure or np.nan for name in scene.names])
     return find_exposures(scene.photo_of, scene.point_of, values, radii, by_file)
@@ -202,12 +203,13 @@ def given_masks(world: World, views: list[View], settings: PrepareSettings) -> l
             raise InputError(f"{settings.masks}: has no mask {name}.png; add it or leave --masks out")
         mask = read_upright(found[0])[..., 0]
         if mask.shape != (lens.height, lens.width):
-            raise InputError(f"{found[0]}: is {mask.shape[1]}x{mask.shape[0]}, its photo {lens.width}x{lens.height}; make them equal")
+            size = f"{mask.shape[1]}x{mask.shape[0]}"
+            raise InputError(f"{found[0]}: is {size}, its photo {lens.width}x{lens.height}; make them equal")
         masks.append(undistort(mask, lens, pinhole_of(lens, settings.max_size)) > np.iinfo(mask.dtype).max / 2)
-        scale = masks[-1].shape[1] / view.photo.shape[1]
-        at = lambda dots: masks[-1][tuple(((dots[:, ::-1] * scale).astype(int)).clip(0, np.array(masks[-1].shape) - 1).T)]  # noqa: E731
+        scale, last = masks[-1].shape[1] / view.photo.shape[1], np.array(masks[-1].shape) - 1
         for dots, sign in ((view.object_dots, 1), (view.other_dots, -1)):
-            score += sign * at(dots).mean() if len(dots) else 0.0
+            row, column = (dots[:, ::-1] * scale).astype(int).clip(0, last).T
+            score += sign * masks[-1][row, column].mean() if len(dots) else 0.0
     if score < 0:
         note(f"{settings.masks}: the masks are black on the object; they are turned around")
     return [mask if score >= 0 else ~mask for mask in masks]
@@ -239,11 +241,12 @@ def surroundings_of(world: World, exposures: Exposures, out: Path, settings: Pre
 
     def shots() -> Iterator[Shot]:
         for i, name in enumerate(scene.names):
-            image, mask = (cv2.imread(str(out / folder / f"{name}.png"), cv2.IMREAD_UNCHANGED) for folder in ("images", "masks"))
+            files = (str(out / folder / f"{name}.png") for folder in ("images", "masks"))
+            image, mask = (cv2.imread(file, cv2.IMREAD_UNCHANGED) for file in files)
             lens = pinhole_of(scene.lenses[i], settings.max_size)
             yield Shot(image[..., ::-1], mask > 127, scene.poses[i], lens, float(exposures.gains[i]))
 
-    return surroundings(shots(), centre, CAMERA_DISTANCE, world.table)
+    return surroundings(shots(), centre, world.table_radius)
 
 
 def write_png(path: Path, image: np.ndarray) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
@@ -93,8 +94,6 @@ def _widened(points: np.ndarray, table: bool) -> np.ndarray:
 
 def _filled(view: View, corners: np.ndarray) -> np.ndarray:
     """[h, w] bool, the convex outline of corners."""
-    import cv2
-
     places, depths = view.project(corners)
     region = np.zeros(view.photo.shape[:2], np.uint8)
     if (depths > 0).any():
@@ -105,8 +104,6 @@ def _filled(view: View, corners: np.ndarray) -> np.ndarray:
 
 def _grab(view: View, region: np.ndarray, certain: np.ndarray) -> np.ndarray:
     """[h, w] bool, what GrabCut finds in a region; `certain` is in it without question."""
-    import cv2
-
     trimap = np.where(region, cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
     radius = max(1, round(DOT * view.photo.shape[1]))
     for dots, kind in ((view.other_dots, cv2.GC_BGD), (view.object_dots, cv2.GC_FGD)):
@@ -124,7 +121,8 @@ def _grab(view: View, region: np.ndarray, certain: np.ndarray) -> np.ndarray:
 
 
 def hull_of(views: list[View], masks: list[np.ndarray], space: np.ndarray) -> tuple[np.ndarray, float]:
-    """The cells of a box [2, 3] (lowest and highest corner) that lie in nearly all masks: centres [k, 3], and a cell's width."""
+    """The cells of a box [2, 3] (its lowest and highest corner) that lie in nearly all masks: their centres [k, 3], and a
+    cell's width."""
     low, high = space
     size = float((high - low).max() / CELLS)
     axes = [np.arange(a + size / 2, b, size) for a, b in zip(low, high)]
@@ -142,8 +140,6 @@ def hull_of(views: list[View], masks: list[np.ndarray], space: np.ndarray) -> tu
 
 def _around(view: View, cells: np.ndarray, size: float, band: float) -> tuple[np.ndarray, np.ndarray]:
     """The region that may be the object, and that which certainly is: a hull's outline moved by a band's half width."""
-    import cv2
-
     h, w = view.photo.shape[:2]
     places, depths = view.project(cells)
     front = depths > 0
@@ -158,7 +154,5 @@ def _around(view: View, cells: np.ndarray, size: float, band: float) -> tuple[np
 
 
 def _disc(radius: float) -> np.ndarray:
-    import cv2
-
     size = 2 * max(1, round(radius)) + 1
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))

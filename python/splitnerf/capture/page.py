@@ -34,7 +34,7 @@ def write_page(
         title: The heading.
     """
     scene = world.scene
-    loader = jinja2.ChoiceLoader([jinja2.PackageLoader("splitnerf.capture", "."), jinja2.PackageLoader("splitnerf.report", ".")])
+    loader = jinja2.ChoiceLoader([jinja2.PackageLoader(f"splitnerf.{name}", ".") for name in ("capture", "report")])
     environment = jinja2.Environment(
         loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -50,8 +50,9 @@ def write_page(
         {"name": name, "picture": _masked(out, name), "exposure": f"{gain:.2f}"} for name, gain in zip(scene.names, gains)
     ]
     page = environment.get_template("prepare.html.j2").render(
-        title=title, tiles=tiles, plans=[_plan(world, 0, 1), _plan(world, 0, 2)], left_out=sorted(left_out.items()), photos=photos
-    )
+        title=title, tiles=tiles, plans=[_plan(world, 0, 1), _plan(world, 0, 2)], left_out=sorted(left_out.items()),
+        photos=photos,
+    )  # fmt: skip
     with atomic_path(out / "prepare.html") as temporary:
         temporary.write_text(page, encoding="utf-8")
 

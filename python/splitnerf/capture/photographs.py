@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from PIL import ExifTags, Image, ImageOps
 
@@ -78,10 +79,14 @@ def read_upright(path: Path) -> np.ndarray:
         return np.asarray(ImageOps.exif_transpose(image).convert("RGB"))
 
 
+def is_upright(photo: Photograph) -> bool:
+    """Whether the rows of the file are those of the photo."""
+    with _open(photo.path) as image:
+        return image.getexif().get(ExifTags.Base.Orientation, 1) == 1
+
+
 def sharpness(photo: np.ndarray) -> float:
     """The variance of the Laplacian of the luminance of a photo [H, W, 3], reduced to a common width, in 8-bit units."""
-    import cv2
-
     grey = cv2.cvtColor(np.ascontiguousarray(photo), cv2.COLOR_RGB2GRAY).astype(np.float32)
     grey *= 255.0 / np.iinfo(photo.dtype).max
     scale = min(1.0, SHARPNESS_WIDTH / max(grey.shape))

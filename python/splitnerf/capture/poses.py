@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pycolmap
 
 from splitnerf.capture.photographs import Photograph
 from splitnerf.errors import InputError
@@ -100,15 +101,13 @@ def reconstruct(
     Raises:
         InputError: Fewer than three photos fit together.
     """
-    import pycolmap
-
     database = folder / "features.db"
     extraction, pipeline = pycolmap.FeatureExtractionOptions(), pycolmap.IncrementalPipelineOptions()
     reader = pycolmap.ImageReaderOptions()
     reader.camera_model = "OPENCV"
     pipeline.random_seed = pipeline.mapper.random_seed = seed
     n = len(photos)
-    with _quiet(pycolmap):
+    with _quiet():
         with _counted(database, "keypoints", n, lambda share: report("features", share)):
             pycolmap.extract_features(
                 database, images, camera_mode=pycolmap.CameraMode.PER_FOLDER, reader_options=reader,
@@ -132,11 +131,11 @@ def reconstruct(
                 f"{photos[0].path.parent}: the photos do not fit together; take more, each with two thirds in common with "
                 "the next, of an object that does not move on a table with a pattern"
             )
-        model = _adjusted(pycolmap, model)
+        model = _adjusted(model)
     return _taken_out(model, len(models))
 
 
-def _adjusted(pycolmap, model):
+def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     """The model with everything refined at once, the principal points too, which the mapping holds at the photos' centres.
 
     Where few photos leave the principal points open, they stay at the centres.
@@ -155,13 +154,13 @@ def _adjusted(pycolmap, model):
     return refined
 
 
-def _is_central(camera) -> bool:
+def _is_central(camera: pycolmap.Camera) -> bool:
     """Whether a camera's principal point is near the middle of its photos."""
     size = np.array([camera.width, camera.height])
     return bool((np.abs(np.array(camera.params[2:4]) - size / 2) < CENTRAL * size).all())
 
 
-def _taken_out(model, n_models: int) -> Reconstruction:
+def _taken_out(model: pycolmap.Reconstruction, n_models: int) -> Reconstruction:
     numbers = {key: i for i, key in enumerate(sorted(model.points3D))}
     images = sorted((model.images[key] for key in model.reg_image_ids()), key=lambda image: image.name)
     poses, lenses, photo_of, point_of, observed = [], [], [], [], []
@@ -180,7 +179,7 @@ def _taken_out(model, n_models: int) -> Reconstruction:
 
 
 @contextmanager
-def _quiet(pycolmap) -> Iterator[None]:
+def _quiet() -> Iterator[None]:
     """Keeps COLMAP's log to errors."""
     log = pycolmap.logging
     before = log.minloglevel, log.alsologtostderr

@@ -2,7 +2,7 @@
 
 A pixel beside the object shows light that arrives from there at the object, too, where what it shows sends equal light to all
 sides. Where it shows the table, the object sees that point in another direction than the camera; what lies beyond is taken to
-be far away.
+be far away, and is hidden from the object where the table stands before it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from splitnerf.capture.poses import FLIP, Lens
 from splitnerf.data.images import srgb_to_linear
 
 HEIGHT = 64  # rows of the map
-TABLE_REACH = 0.9  # of the table from the object's foot, in the cameras' distances
 HALO = 0.01  # width around the object that is left out, in the photo's width
 STRIDE = 3  # pixels: every so many are looked at in a row and a column
 CLIPPED = 254.5 / 255.0  # sRGB value from which a pixel only says that there was more light
@@ -42,18 +41,17 @@ class Shot(NamedTuple):
     exposure: float
 
 
-def surroundings(shots: Iterable[Shot], centre: np.ndarray, distance: float, table: bool) -> np.ndarray:
+def surroundings(shots: Iterable[Shot], centre: np.ndarray, table_radius: float) -> np.ndarray:
     """[h, 2 h, 4] float32 equirectangular: the median linear radiance of each direction and how well it was seen, in [0, 1].
 
     Args:
         shots: The photos.
         centre: [3] the middle of the object.
-        distance: The cameras' distance from it.
-        table: Whether z = 0 is a table.
+        table_radius: The radius of the table z = 0 around the origin; 0 where there is none.
     """
     texels, values = [], []
     for shot in shots:
-        at, radiance = _seen(shot, centre, distance, table)
+        at, radiance = _seen(shot, centre, table_radius)
         texels.append(at), values.append(radiance)
     texel, value = np.concatenate(texels), np.concatenate(values)
     result = np.zeros((HEIGHT * 2 * HEIGHT, 4), np.float32)
@@ -67,7 +65,7 @@ def surroundings(shots: Iterable[Shot], centre: np.ndarray, distance: float, tab
     return result.reshape(HEIGHT, 2 * HEIGHT, 4)
 
 
-def _seen(shot: Shot, centre: np.ndarray, distance: float, table: bool) -> tuple[np.ndarray, np.ndarray]:
+def _seen(shot: Shot, centre: np.ndarray, table_radius: float) -> tuple[np.ndarray, np.ndarray]:
     """The texels of a photo's pixels beside the object, and their radiance [n, 3], infinite where the photo is clipped."""
     h, w = shot.mask.shape
     beside = ~binary_dilation(shot.mask, iterations=max(1, round(HALO * w)))
@@ -75,11 +73,13 @@ def _seen(shot: Shot, centre: np.ndarray, distance: float, table: bool) -> tuple
     lens = shot.lens
     local = np.stack([(x + 0.5 - lens.cx) / lens.fx, (y + 0.5 - lens.cy) / lens.fy, np.ones(len(x))], axis=1)
     rays = local @ (shot.pose @ FLIP)[:3, :3].T
-    if table:
-        origin = shot.pose[:3, 3]
-        points = origin - (origin[2] / np.where(rays[:, 2] < 0, rays[:, 2], -1e-9))[:, None] * rays
-        on_table = (rays[:, 2] < 0) & (np.linalg.norm(points[:, :2], axis=1) < TABLE_REACH * distance)
-        rays = np.where(on_table[:, None], points - centre, rays)
+    at = lambda origin: origin - (origin[2] / np.where(rays[:, 2] < 0, rays[:, 2], -1e-9))[:, None] * rays  # noqa: E731
+    meets = lambda points: (rays[:, 2] < 0) & (np.linalg.norm(points[:, :2], axis=1) < table_radius)  # noqa: E731
+    points = at(shot.pose[:3, 3])
+    on_table, hidden = meets(points), meets(at(centre))
+    shown = on_table | ~hidden
+    y, x = y[shown], x[shown]
+    rays = np.where(on_table[:, None], points - centre, rays)[shown]
     dx, dy, dz = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).T
     row = (np.arccos(dz.clip(-1, 1)) / np.pi * HEIGHT).astype(int).clip(0, HEIGHT - 1)
     column = ((0.5 - np.arctan2(dy, dx) / (2 * np.pi)) * 2 * HEIGHT).astype(int) % (2 * HEIGHT)

@@ -15,6 +15,7 @@ CAMERA_DISTANCE = 3.0  # of the median camera from the centre, in the world's un
 TABLE_TOLERANCE = 0.006  # distance of the table's points from their plane, in the cameras' distances
 TABLE_TILT = 40.0  # degrees between the table's normal and the mean of the cameras' upward axes
 TABLE_SHARE = 0.15  # of the points near the object that a plane needs to count as a table
+NEARLY_ALL = 0.95  # share of the table's points within its radius
 TRIALS = 2000
 NEAREST = 8  # the neighbour whose median distance is the spacing of the object's points
 SMALLEST_GROUP = 0.02  # share of the points above the table that a group needs
@@ -28,13 +29,19 @@ class World:
 
     Attributes:
         scene: The reconstruction in this frame.
-        table: Whether a table was found; it is then the plane z = 0.
+        table_radius: The radius around the origin within which nearly all points of the table lie, which is the plane z = 0;
+            0 where there is no table.
         object_points: [m] bool, the sparse points that belong to the object.
     """
 
     scene: Reconstruction
-    table: bool
+    table_radius: float
     object_points: np.ndarray
+
+    @property
+    def table(self) -> bool:
+        """Whether a table was found."""
+        return self.table_radius > 0
 
 
 def settle(found: Reconstruction, seed: int) -> World:
@@ -65,7 +72,11 @@ def settle(found: Reconstruction, seed: int) -> World:
     poses = found.poses.copy()
     poses[:, :3, :3], poses[:, :3, 3] = rotation @ found.poses[:, :3, :3], moved(found.poses[:, :3, 3])
     scene = replace(found, poses=poses, points=moved(found.points))
-    return World(scene, plane is not None, object_points(scene.points, moved(centre), plane is not None))
+    radius = 0.0
+    if plane is not None:
+        flat = np.abs(scene.points[:, 2]) < TABLE_TOLERANCE * CAMERA_DISTANCE
+        radius = float(np.quantile(np.linalg.norm(scene.points[flat, :2], axis=1), NEARLY_ALL))
+    return World(scene, radius, object_points(scene.points, moved(centre), plane is not None))
 
 
 def meeting_point(poses: np.ndarray) -> np.ndarray:

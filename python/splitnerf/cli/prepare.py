@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from importlib.util import find_spec
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.errors import InputError
+
+PACKAGES = {"pycolmap": "pycolmap", "cv2": "opencv-python-headless"}
 
 # What a step takes of the whole time, roughly.
-STEPS = {"frames": 0.02, "photos": 0.02, "features": 0.1, "matches": 0.4, "cameras": 0.2, "exposures": 0.03, "images": 0.03, "masks": 0.2}
+STEPS = {"frames": 0.02, "photos": 0.02, "features": 0.1, "matches": 0.4, "cameras": 0.2, "exposures": 0.03,
+         "images": 0.03, "masks": 0.2}  # fmt: skip
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -22,14 +27,18 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DATA", help="folder to write")
     parser.add_argument("--masks", type=Path, metavar="DIR", help="masks of the photos, NAME.png, white on the object")
     parser.add_argument(
-        "--max-size", type=int, default=0, metavar="N", help="longest edge of the written images in pixels (default: the photos')"
-    )
+        "--max-size", type=int, default=0, metavar="N",
+        help="longest edge of the written images in pixels (default: the photos')",
+    )  # fmt: skip
     parser.add_argument("--frames", type=int, default=100, metavar="N", help="frames taken of a video (default: 100)")
     parser.add_argument("--seed", type=int, default=0, help="seed of all random choices (default: 0)")
     parser.set_defaults(execute=run)
 
 
 def run(args: argparse.Namespace) -> int:
+    missing = [name for module, name in PACKAGES.items() if find_spec(module) is None]
+    if missing:
+        raise InputError(f"prepare needs {' and '.join(missing)}; pip install 'splitnerf[photos]'")
     from splitnerf.capture.job import PrepareSettings, prepare
     from splitnerf.progress import Progress
 

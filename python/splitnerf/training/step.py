@@ -67,7 +67,9 @@ class Step:
         :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
         ray = render_rays(self.model, light, found, shades_per_ray=c.sampling.shades_per_ray, capacity=capacity)
-        terms = loss_terms(self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen)
+        terms = loss_terms(
+            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen
+        )
         self.model.zero_grad(set_to_none=True)
         losses.backward(terms)
         return ray, terms
