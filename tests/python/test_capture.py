@@ -12,13 +12,14 @@ from PIL import Image
 from table_scene import BALL, CAMERA, RADIUS, TABLE_RADIUS, photograph, ring, surface_colours, write_photos
 
 from splitnerf.capture.exposure import find_exposures
+from splitnerf.capture.job import PrepareSettings, given_masks
 from splitnerf.capture.masks import View, find_masks
 from splitnerf.capture.photographs import find_photographs, read_upright, sharpness
 from splitnerf.capture.poses import FLIP, Lens, Reconstruction
 from splitnerf.capture.surroundings import HEIGHT, Shot, surroundings
 from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignetting
 from splitnerf.capture.video import write_frames
-from splitnerf.capture.world import CAMERA_DISTANCE, settle
+from splitnerf.capture.world import CAMERA_DISTANCE, World, settle
 from splitnerf.cli import main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import seen_at
@@ -149,7 +150,8 @@ def test_vignetting_is_taken_out():
     assert (even[:10, :10] == 255).all()
 
 
-def test_masks_of_the_painted_ball():
+def views_of_the_ball() -> tuple[World, list[View], list[np.ndarray]]:
+    """What the search for masks starts from, and the true masks."""
     scene, _ = found_scene()
     world = settle(scene, 0)
     views, truth = [], []
@@ -160,11 +162,35 @@ def test_masks_of_the_painted_ball():
         places, depths = view.project(world.scene.points[~world.object_points][:1500])
         dots = places[(depths > 0) & (places > 0).all(1) & (places < [320, 240]).all(1)]
         hidden = np.array([ball[int(y), int(x)] for x, y in dots], bool)
-        views.append(View(photo, camera, np.empty((0, 2)), dots[~hidden]))
+        views.append(View(photo, camera, view.project(world.scene.points[world.object_points])[0], dots[~hidden]))
         truth.append(ball)
+    return world, views, truth
+
+
+def test_masks_of_the_painted_ball():
+    world, views, truth = views_of_the_ball()
     masks = find_masks(views, world, lambda share: None)
     overlap = [(mask & ball).sum() / (mask | ball).sum() for mask, ball in zip(masks, truth)]
     assert np.mean(overlap) > 0.97 and min(overlap) > 0.93
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_given_masks_may_be_black_on_the_object(tmp_path, capsys, inverted):
+    world, views, truth = views_of_the_ball()
+    for name, ball in zip(world.scene.names, truth):
+        Image.fromarray(np.where(ball ^ inverted, 255, 0).astype(np.uint8)).save(tmp_path / f"{name}.png")
+    masks = given_masks(world, views, PrepareSettings(masks=tmp_path))
+    assert all((mask == ball).mean() > 0.999 for mask, ball in zip(masks, truth))
+    assert ("turned around" in capsys.readouterr().err) == inverted
+    (tmp_path / f"{world.scene.names[3]}.png").unlink()
+    with pytest.raises(InputError, match="has no mask p_03.png"):
+        given_masks(world, views, PrepareSettings(masks=tmp_path))
+
+
+def test_missing_packages_are_named(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr("splitnerf.cli.prepare.find_spec", lambda name: None)
+    assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "data")]) == 2
+    assert "splitnerf[photos]" in capsys.readouterr().err
 
 
 def test_files_tell_of_turns_and_exposures(tmp_path):
