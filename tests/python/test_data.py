@@ -13,9 +13,10 @@ from blender_data import ANGLE, SIZE, edit, make_blender, poses_around, set_pose
 
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
-from splitnerf.data.images import linear_to_srgb, write_image
+from splitnerf.data.images import linear_to_srgb, srgb_to_linear, write_image
 from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths, read_mesh
 from splitnerf.errors import InputError
+from splitnerf.refinement.pixels import covered_pixels
 
 REAL = Path(os.environ.get("SPLITNERF_DATA", "../shared/data"))
 
@@ -340,3 +341,27 @@ def test_real_scenes_fit_the_box_as_they_are(name):
         if truth.normal is not None:
             seen = truth.normal_mask & (view[..., 3] > 0.99)
             assert (truth.normal[seen] @ pose[:3, 2] > -0.1).mean() > 0.98
+
+
+def test_photos_are_brought_to_one_exposure(tmp_path):
+    root = make_blender(tmp_path, grey=0.5)
+    edit(root, lambda meta: [frame.update(exposure=[0.5, 1.0, 2.0][i % 3]) for i, frame in enumerate(meta["frames"])])
+    found = load_dataset(root)
+    linear = srgb_to_linear(np.float32(128 / 255))
+    for i, exposure in enumerate(found.exposures):
+        assert exposure == [0.5, 1.0, 2.0][i % 3]
+        inside = found.images[i][found.images[i, ..., 3] > 0.99][:, :3]
+        np.testing.assert_allclose(srgb_to_linear(inside), linear / exposure, rtol=0.01)
+    assert found.select([2, 4]).exposures.tolist() == [2.0, 1.0]
+    for wrong in ("bright", -1, 0, float("nan")):
+        edit(root, lambda meta: meta["frames"][1].update(exposure=wrong))
+        with pytest.raises(InputError, match="'exposure' of frame 1 must be a positive number"):
+            load_dataset(root)
+
+
+def test_clipped_pixels_of_a_short_exposure_are_known(tmp_path):
+    root = make_blender(tmp_path, grey=1.0)
+    edit(root, lambda meta: [frame.update(exposure=[0.8, 1.25][i % 2]) for i, frame in enumerate(meta["frames"])])
+    assert covered_pixels(load_dataset(root)).saturated.all()
+    edit(root, lambda meta: [frame.update(exposure=1.0) for frame in meta["frames"]])
+    assert not covered_pixels(load_dataset(make_blender(tmp_path / "grey", grey=0.97))).saturated.any()

@@ -32,12 +32,14 @@ class Dataset:
         root: The folder.
         split: "train" or "test".
         downscale: Integer factor by which the images were averaged down.
-        images: [n, H, W, 4] float32, sRGB in [0, 1], straight alpha.
+        images: [n, H, W, 4] float32, sRGB, straight alpha; brought to one exposure, at which colours are in [0, 1] but for
+            those of photos that were exposed less.
         poses: [n, 4, 4] float32 camera-to-world, OpenGL axes, internal frame.
         intrinsics: [n, 4] float32, (fx, fy, cx, cy) in pixels of the downscaled images; pixel centres at +0.5.
         frame_names: Names of the images' files without extension, or of the view folders.
         image_paths: The image files.
         box_from_world: [4, 4] float64, uniform scale and translation from the data's world to the internal frame.
+        exposures: [n] float64, the factors by which the images' linear values were divided; None stands for 1.
         surroundings: [h, 2 h, 4] float32, equirectangular: linear radiance that the photos see around the object, and how
             well it was seen, in [0, 1]; None where the data have no such map.
     """
@@ -52,7 +54,11 @@ class Dataset:
     frame_names: list[str]
     image_paths: list[Path]
     box_from_world: np.ndarray
+    exposures: np.ndarray | None = None
     surroundings: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        self.exposures = np.ones(len(self.images)) if self.exposures is None else self.exposures
 
     def __len__(self) -> int:
         return len(self.images)
@@ -89,6 +95,7 @@ class Dataset:
             images=self.images[views],
             poses=self.poses[views],
             intrinsics=self.intrinsics[views],
+            exposures=self.exposures[views],
             frame_names=[self.frame_names[i] for i in views],
             image_paths=[self.image_paths[i] for i in views],
         )
@@ -149,6 +156,7 @@ def load_dataset(root: str | os.PathLike, split: str = "train", downscale: int =
         frame_names=[frame.name for frame in frames],
         image_paths=[frame.image_path for frame in frames],
         box_from_world=box_from_world,
+        exposures=np.array([frame.exposure for frame in frames]),
         surroundings=read_surroundings(root / SURROUNDINGS) if (root / SURROUNDINGS).is_file() else None,
     )
 

@@ -24,6 +24,7 @@ from splitnerf.errors import InputError
 TEST_STRIDE = 8
 RIGID_TOLERANCE = 1e-3
 SMALLEST_LENS, LARGEST_LENS = 1e-6, 1e9  # bounds of a lens's numbers
+SMALLEST_EXPOSURE = 1e-4
 FARTHEST = 1e9  # largest distance from the origin, in the data's units
 
 
@@ -37,6 +38,7 @@ class Frame:
         mask_path: The mask file that replaces the image's alpha, or None.
         pose: [4, 4] float64 camera-to-world, OpenGL axes, in the data's world.
         lens: The lens's numbers that the data give: `camera_angle_x` (radians), `fl_x fl_y cx cy w h` (pixels).
+        exposure: The factor of the image's linear values.
     """
 
     name: str
@@ -130,7 +132,10 @@ def _listed_frame(entry: dict, meta: dict, index: int, path: Path) -> Frame:
     image_path = _find_image(path.parent, str(_need(entry, "file_path", path, f" in frame {index}")), path)
     mask_path = path.parent / str(entry["mask_path"]) if "mask_path" in entry else None
     pose, lens = _read_camera(entry, meta, index, path, f"frame {index} ({image_path.name})")
-    return Frame(image_path.stem, image_path, mask_path, pose, lens, float(entry.get("exposure", 1.0)))
+    exposure = entry.get("exposure", 1.0)
+    if not isinstance(exposure, (int, float)) or not SMALLEST_EXPOSURE <= exposure <= 1 / SMALLEST_EXPOSURE:
+        raise InputError(f"{path}: 'exposure' of frame {index} must be a positive number, got {str(exposure)[:40]}; repair it")
+    return Frame(image_path.stem, image_path, mask_path, pose, lens, float(exposure))
 
 
 def _read_entries(path: Path) -> tuple[dict, list[dict]]:

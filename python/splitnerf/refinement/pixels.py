@@ -10,11 +10,11 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import srgb_to_linear
+from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 
 MIN_ALPHA = 0.99  # of a pixel that the object covers
 NEARBY = 0.01  # pixels to either side over which a density is a mean
-SATURATED = 254.5 / 255.0  # sRGB value from which the photo says only that the light was at least so bright
+SATURATED = 254.5 / 255.0  # share of a photo's largest sRGB value from which it says only that there was so much light
 
 
 @dataclass
@@ -77,10 +77,11 @@ def pixels_of(dataset: Dataset, chosen: np.ndarray) -> Pixels:
     """The pixels of a split where `chosen` [photos, H, W] is true."""
     view, row, column = np.nonzero(chosen)
     colours = dataset.images[view, row, column, :3]
+    white = linear_to_srgb((1 / dataset.exposures).astype(np.float32))
     brightest = np.concatenate([brightest_around(photo)[mask] for photo, mask in zip(dataset.images, chosen)])
     return Pixels(
         view, np.stack([column, row], axis=1).astype(np.float32) + 0.5, srgb_to_linear(colours).astype(np.float32),
-        srgb_to_linear(brightest).astype(np.float32), colours >= SATURATED,
+        srgb_to_linear(brightest).astype(np.float32), colours >= SATURATED * white[view, None],
         dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics,
     )  # fmt: skip
 
