@@ -193,6 +193,13 @@ def test_missing_packages_are_named(monkeypatch, tmp_path, capsys):
     assert "splitnerf[photos]" in capsys.readouterr().err
 
 
+def test_other_files_are_not_written_over(tmp_path, capsys):
+    (tmp_path / "transforms.json").write_text("{}")
+    assert main(["prepare", str(tmp_path), "--out", str(tmp_path)]) == 2
+    assert "holds other files" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["transforms.json"]
+
+
 def test_files_tell_of_turns_and_exposures(tmp_path):
     pixels = np.zeros((20, 30, 3), np.uint8)
     pixels[:, :15] = 200

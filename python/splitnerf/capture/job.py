@@ -73,9 +73,11 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
     What an interrupted call with the same photos has done in `out/work` is used again.
 
     Raises:
-        InputError: The photos cannot be read, or do not fit together.
+        InputError: The photos cannot be read or do not fit together, or the folder holds other files.
     """
     work = out / "work"
+    if out.exists() and any(out.iterdir()) and not (work.is_dir() or (out / "frames").is_dir()):
+        raise InputError(f"{out}: holds other files; give a new folder")
     if source.suffix.lower() in SUFFIXES:
         write_frames(source, out / "frames", settings.frames, lambda share: report("frames", share))
     photos = find_photographs(out / "frames" if source.suffix.lower() in SUFFIXES else source)
