@@ -57,7 +57,7 @@ said() { # log, exit code: its last line, but of a compiler that failed the firs
 # Runs a command under a time limit, keeps its log, and adds the last line of that to the table.
 part() { # name, seconds, command
   local name=$1 limit=$(($2 * slower)) left=$((deadline - SECONDS)) log=$work/$1.log begin=$SECONDS result=done code
-  case " setup build info data ${GPU_PARTS:-$1} " in *" $1 "*) ;; *) return 1 ;; esac
+  case " setup build doctor data ${GPU_PARTS:-$1} " in *" $1 "*) ;; *) return 1 ;; esac
   shift 2
   if [ "$left" -lt 5 ]; then row "$name" "left out" 0 "no time left"; return 1; fi
   [ "$limit" -le "$left" ] || limit=$left
@@ -121,7 +121,8 @@ cd "$root" || exit 2
 part setup 90 bash -c setup
 CMAKE_PREFIX_PATH="$work/embree/usr" part build 200 "$run_python" -m pip --disable-pip-version-check install --no-index --no-deps \
   --no-build-isolation --no-cache-dir --force-reinstall "$root" -C build-dir="$work/build" -C cmake.define.SPLITNERF_CUDA=$cuda -v
-if part info 30 bash -c 'set -o pipefail; splitnerf info | paste -sd ";" | sed "s/;/; /g"'; then
+part doctor 60 splitnerf doctor
+if splitnerf info --settings >/dev/null; then
   part tests 130 bash -c gpu_tests
   if part data 60 bash -c data; then
     scene=$(tail -n 1 "$work/data.log") train=("$run_python" tests/bench/gpu_train.py)

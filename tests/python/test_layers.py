@@ -20,7 +20,7 @@ LAYERS = [
     {"evaluate", "refinement", "relight", "synth"},
     {"export", "render"},
     {"fields", "config"},
-    {"data"},
+    {"data", "doctor"},
     {"ops", "devices"},
     {"_core", "errors", "notes", "progress"},
 ]

@@ -10,11 +10,11 @@ import os
 import sys
 
 import splitnerf
-from splitnerf.cli import ablate, bench, demo, evaluate, export, info, prepare, refine, relight, synth, train
+from splitnerf.cli import ablate, bench, demo, doctor, evaluate, export, info, prepare, refine, relight, synth, train
 from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from splitnerf.errors import InputError
 
-COMMANDS = (prepare, train, export, refine, relight, evaluate, synth, ablate, bench, demo, info)
+COMMANDS = (prepare, train, export, refine, relight, evaluate, synth, ablate, bench, demo, doctor, info)
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "build_parser", "main"]
 
 

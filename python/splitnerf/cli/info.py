@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-import splitnerf
+from splitnerf.cli import doctor
 from splitnerf.cli.exit_codes import DONE
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("info", help="show versions, the build, and the settings of a preset")
+    parser = commands.add_parser("info", help="show the settings of a preset; without --settings the same as doctor")
     parser.add_argument(
         "--settings",
         metavar="PRESET",
@@ -21,20 +21,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    import torch
-
-    from splitnerf import _core
     from splitnerf.config import preset, settings_table
 
-    if args.settings:
-        print(settings_table(preset(args.settings)))
-        return DONE
-    print(f"splitnerf {splitnerf.__version__}")
-    print(f"torch {torch.__version__}, {torch.get_num_threads()} threads")
-    print(f"kernels: {_core.instruction_set()}")
-    architectures = _core.cuda_architectures()
-    print(f"CUDA kernels: {architectures or 'none (build without CUDA)'}")
-    print(
-        f"ray tracing: {'Embree ' + _core.embree_version() if _core.embree_version() else 'embreex (build without Embree)'}"
-    )
+    if not args.settings:
+        return doctor.run(args)
+    print(settings_table(preset(args.settings)))
     return DONE

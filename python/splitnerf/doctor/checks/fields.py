@@ -1,0 +1,98 @@
+"""Checks of the hash grid, the distance field and the optimiser."""
+
+from __future__ import annotations
+
+import torch
+
+from splitnerf.doctor.table import N, check, pattern, sphere
+from splitnerf.ops import HashGridSpec
+from splitnerf.ops._library import lib
+
+SPEC = HashGridSpec(n_levels=2, n_features=2, base_resolution=4, growth=2.0, log2_table_size=7)
+GRID = SPEC.arguments(2)
+BOX = 1.5
+
+
+def points() -> torch.Tensor:
+    return 0.52 + 0.45 * sphere(N)  # on no face of a cell
+
+
+def linear_table() -> torch.Tensor:
+    """x + 2 z and y at the nodes of the first level, which has an entry for each; 3 in the second, which is hashed."""
+    nodes = torch.cartesian_prod(*[torch.arange(5.0) / 4] * 3)
+    table = torch.full((SPEC.n_entries, 2), 3.0)
+    table[:125] = nodes @ torch.tensor([[1.0, 0.0], [0.0, 1.0], [2.0, 0.0]])
+    return table
+
+
+def linear_features(x: torch.Tensor) -> torch.Tensor:
+    constant = torch.full((len(x),), 3.0)
+    return torch.stack([x[:, 0] + 2 * x[:, 2], x[:, 1], constant, constant], 1)
+
+
+@check
+def hash_encode():
+    """A linear table gives its linear function, a constant one its constant."""
+    yield lib.hash_encode(points(), linear_table(), *GRID), linear_features(points())
+
+
+@check
+def hash_encode_jacobian():
+    """A linear table has its slopes, a constant one none."""
+    features, jacobian = lib.hash_encode_jacobian(points(), linear_table(), *GRID)
+    yield features, linear_features(points())
+    yield jacobian, torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0]])
+
+
+def difference_of_softplus(n_features: int) -> tuple[torch.Tensor, ...]:
+    """Weights of z + the first feature, since softplus(y) - softplus(-y) = y; a second output is 7."""
+    hidden = torch.zeros(2, 3 + n_features)
+    hidden[0, 2:4], hidden[1, 2:4] = 1.0, -1.0
+    return hidden, torch.zeros(2), torch.tensor([[1.0, -1.0], [0.0, 0.0]]), torch.tensor([0.0, 7.0])
+
+
+@check
+def sdf_layer():
+    """z + the first feature, and its gradient by the chain rule."""
+    x, features, jacobian = sphere(N), pattern(N, 4), pattern(N, 3, 4)
+    outputs, gradient = lib.sdf_layer(x, features, jacobian, *difference_of_softplus(4), 100.0, BOX)
+    yield outputs, torch.stack([x[:, 2] + features[:, 0], torch.full((N,), 7.0)], 1)
+    yield gradient, torch.tensor([0.0, 0.0, 1.0]) + jacobian[:, :, 0] / (2 * BOX)
+
+
+@check
+def sdf_values():
+    """z + a linear function of the grid."""
+    x = sphere(N)
+    values = lib.sdf_values(x, linear_table(), *difference_of_softplus(4), 100.0, *GRID, BOX)
+    yield values, x[:, 2] + linear_features(x / (2 * BOX) + 0.5)[:, 0]
+
+
+@check
+def sample_rays():
+    """Rays that cross a flat surface, each of whose 30 samples has some weight."""
+    rays_o, rays_d = torch.zeros(N, 3), torch.zeros(N, 3)
+    rays_o[:, 2], rays_d[:, 2] = 3.0, -1.0
+    cells, table = torch.ones(2, 2, 2, dtype=torch.uint8), torch.zeros(SPEC.n_entries, 2)
+    rays, starts, ends, offsets, evaluated = lib.sample_rays(
+        rays_o, rays_d, torch.zeros(N), cells, table, *difference_of_softplus(4), 100.0, *GRID, BOX, 0.1, 64, 10.0, 1.0,
+        0.0, 0.0, 10.0, 1.25,
+    )  # fmt: skip
+    yield rays, torch.arange(N).repeat_interleave(30)
+    yield starts, (1.5 + 0.1 * torch.arange(30)).repeat(N)
+    yield ends, (1.6 + 0.1 * torch.arange(30)).repeat(N)
+    yield offsets, 30 * torch.arange(N + 1)
+    yield evaluated, torch.full((N,), 30)
+
+
+@check
+def adamw_step_():
+    """The first step is lr against the gradient's sign, beside the decay; a copy in 16 bits follows."""
+    gradient = pattern(N) - 1
+    param, average, square, copy = torch.full((N,), 2.0), torch.zeros(N), torch.zeros(N), torch.zeros(N).half()
+    lib.adamw_step_(param, gradient, average, square, 0.1, 0.9, 0.99, 1e-15, 0.5, 1, False, copy)
+    moved = 2 * (1 - 0.1 * 0.5) - 0.1 * gradient.sign()
+    yield param, moved
+    yield average, 0.1 * gradient
+    yield square, 0.01 * gradient**2
+    yield copy, moved

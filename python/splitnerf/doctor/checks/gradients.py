@@ -1,0 +1,79 @@
+"""Checks of the backward passes by differences of the forward operators, which have checks of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from splitnerf.doctor.checks.fields import BOX, GRID, SPEC, points
+from splitnerf.doctor.checks.light import pyramid
+from splitnerf.doctor.checks.rays import between, offsets, plane_inputs, surface_inputs
+from splitnerf.doctor.checks.shading import LINEAR, up, views
+from splitnerf.doctor.table import CHECKS, N, column, lut, pattern, slopes, sphere
+from splitnerf.ops._library import lib
+
+
+def grid() -> tuple:
+    return points(), pattern(SPEC.n_entries, 2), *GRID
+
+
+def layer() -> tuple:
+    weights = pattern(5, 7) - 1, pattern(5), pattern(3, 5), pattern(3)
+    return sphere(N), pattern(N, 4), pattern(N, 3, 4), *weights, 2.0, BOX
+
+
+def material() -> tuple:
+    """Normals, views, albedo, roughness and metallic."""
+    return up(), views(), 0.6 * pattern(N, 3), column(0.5), column(0.4)
+
+
+def split_sum() -> tuple:
+    return *material(), pattern(N, 3), 2 * pattern(N, 3), column(0.7), column(0.6), lut(), 0, True
+
+
+def sums() -> tuple:
+    return *material(), *(k * pattern(N, 3) for k in (1.0, 0.1, 0.8, 0.05)), lut(), True
+
+
+def drawn_light() -> tuple:
+    directions = sphere(32)[:16].repeat(N, 1, 1)
+    return up(), views(), column(0.5), directions, pattern(N, 16), pattern(N, 16, 3)
+
+
+def shared_light() -> tuple:
+    light = sphere(64), pattern(64), pattern(64, 3), 0.5 * pattern(N, 64), pattern(N, 64, 3)
+    return up(), views(), column(0.5), *light
+
+
+# The inputs of the forward operator, and those to which the backward pass gives a gradient.
+BACKWARD: dict[str, tuple[Callable[[], tuple], tuple[int, ...]]] = {
+    "composite_backward": (lambda: (pattern(N), pattern(N, 3), offsets()), (0, 1)),
+    "hash_encode_backward": (grid, (1,)),
+    "hash_encode_jacobian_backward": (grid, (1,)),
+    "hash_encode_jacobian_backward_positions": (grid, (0,)),
+    "interpolate_backward": (lambda: (pattern(5, 3), *between()), (0,)),
+    "light_lookup_backward": (lambda: pyramid(pattern(64, 3)), (0, 1, 2, 3)),
+    "linear_to_srgb_backward": (lambda: (pattern(N) * LINEAR[1],), (0,)),
+    "monte_carlo_light_backward": (drawn_light, (0, 2, 5)),
+    "neus_weights_backward": (plane_inputs, (0, 1, 2)),
+    "prefilter_light_backward": (lambda: (sphere(N), column(0.5), sphere(256), pattern(256, 3)), (3,)),
+    "query_direction_backward": (lambda: (up(), views(), column(0.5), lut(), True), (0, 1, 2)),
+    "sdf_layer_backward": (layer, (1, 2, 3, 4, 5, 6)),
+    "shade_sums_backward": (sums, tuple(range(9))),
+    "split_sum_shade_backward": (split_sum, tuple(range(9))),
+    "summed_light_backward": (shared_light, (0, 2, 5)),
+    "surface_weights_backward": (lambda: surface_inputs(pattern(N, 3).flip(0)), (0, 1, 3)),
+}
+
+
+def by_differences(backward: str) -> Callable[[], Iterator[tuple]]:
+    """The check of a backward pass."""
+    forward, (inputs, wanted) = backward.split("_backward")[0], BACKWARD[backward]
+
+    def run() -> Iterator[tuple]:
+        """Differences of the forward operator."""
+        return slopes(getattr(lib, forward), inputs(), wanted)
+
+    return run
+
+
+CHECKS.update((name, by_differences(name)) for name in BACKWARD)

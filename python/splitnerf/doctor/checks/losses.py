@@ -1,0 +1,51 @@
+"""Checks of the losses; their gradients are outputs of the operators."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+
+from splitnerf.doctor.table import N, axis, check, column, pattern, slopes
+from splitnerf.ops._library import lib
+
+
+@check
+def pixel_losses():
+    """sRGB 0.5 half covering black against 0.6, and half an opacity where the mask is full: 0.35^2 and ln 2."""
+    grey = torch.tensor([[0.6, 0.6, 0.6, 1.0]]).repeat(N, 1)
+    inputs = 0.2140411 * torch.ones(N, 3), torch.full((N,), 0.5), grey, torch.zeros(N, 3), True
+    losses, by_mean, by_opacity, mask_by_opacity = lib.pixel_losses(*inputs)
+    yield losses, torch.tensor([0.35**2, math.log(2)])
+    yield from slopes(lambda *x: lib.pixel_losses(*x)[0][0], inputs, (0, 1), (by_mean, by_opacity))
+    yield from slopes(lambda *x: lib.pixel_losses(*x)[0][1], inputs, (1,), (mask_by_opacity,))
+
+
+@check
+def gradient_losses():
+    """Gradients of length 2, and neighbours whose normals stand 60 degrees apart: both losses are 1."""
+    gradients = torch.cat([axis(0.0, 0.0, 2.0, 16), axis(3**0.5, 0.0, 1.0, N - 16)])
+    inputs = gradients, pattern(16), torch.arange(N - 16) % 16
+    losses, *gradients = lib.gradient_losses(*inputs)
+    yield losses, torch.ones(2)
+    for i, gradient in enumerate(gradients):
+        yield from slopes(lambda *x: lib.gradient_losses(*x)[0][i], inputs, (0,), (gradient,))  # noqa: B023
+
+
+@check
+def material_losses():
+    """Metallic 0.3 at an albedo of 0.1: 0.3^2, 0.3 0.7, and 0.3 (1 - 0.1 / 0.4)."""
+    inputs = torch.full((N, 3), 0.1), column(0.3), pattern(N), False
+    losses, gradients = lib.material_losses(*inputs)
+    yield losses, torch.tensor([0.09, 0.21, 0.225])
+    for i, gradient in enumerate(gradients):
+        yield from slopes(lambda *x: lib.material_losses(*x)[0][i], inputs, (1,), (gradient[:, None],))  # noqa: B023
+
+
+@check
+def quadratic_entropy():
+    """Two equal heaps of points at a distance of 2: -ln((1 + 1 / e) / 2)."""
+    heaps = torch.cat([torch.zeros(N, 4), torch.ones(N, 4)])
+    entropy, gradient = lib.quadratic_entropy(heaps)
+    yield entropy, -math.log((1 + math.exp(-1)) / 2)
+    yield from slopes(lambda x: lib.quadratic_entropy(x)[0], (heaps,), (0,), (gradient,))

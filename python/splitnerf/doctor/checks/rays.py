@@ -1,0 +1,100 @@
+"""Checks of marching, NeuS weights and compositing."""
+
+from __future__ import annotations
+
+import torch
+
+from splitnerf.doctor.table import N, axis, check, pattern
+from splitnerf.ops._library import lib
+
+SHARPNESS = 8.0
+
+
+def offsets() -> torch.Tensor:
+    """Two rays of 16 and 22 samples, and one without between them."""
+    return torch.tensor([0, 16, 16, N])
+
+
+def plane() -> tuple[torch.Tensor, torch.Tensor]:
+    """Distances at both ends of the samples of rays that cross a flat surface at a right angle."""
+    ahead = torch.cat([0.8 - 0.1 * torch.arange(16), 1.0 - 0.1 * torch.arange(22)])
+    return ahead, ahead - 0.1
+
+
+def plane_weights() -> tuple[torch.Tensor, torch.Tensor]:
+    """Weights and opacities, (Phi(f_prev) - Phi(f_next)) / Phi(f_0) with Phi(f) = sigmoid(s f), as sums telescope."""
+    ahead, behind = (torch.sigmoid(SHARPNESS * f.double()) for f in plane())
+    first = torch.cat([ahead[:1].expand(16), ahead[16:17].expand(22)])
+    weights = (ahead - behind) / first
+    return weights, torch.stack([weights[:16].sum(), torch.zeros(()).double(), weights[16:].sum()])
+
+
+def plane_inputs() -> tuple:
+    return *plane(), torch.tensor(SHARPNESS), offsets(), 0.0
+
+
+@check
+def neus_weights():
+    """A flat surface, where the products of transmittances telescope."""
+    yield from zip(lib.neus_weights(*plane_inputs()), plane_weights())
+
+
+def surface_inputs(gradient: torch.Tensor) -> tuple:
+    numbers = torch.tensor(SHARPNESS), offsets(), torch.tensor(0.1), torch.tensor(1.0)
+    return plane()[0] - 0.05, gradient, axis(0.0, 0.0, -1.0, 3), *numbers, 0.0
+
+
+@check
+def surface_weights():
+    """The same flat surface, given by the distances at the samples' midpoints."""
+    normals, *rest = lib.surface_weights(*surface_inputs(axis(0.0, 0.0, 2.0)))
+    yield normals, axis(0.0, 0.0, 1.0)
+    yield from zip(rest, plane_weights())
+
+
+@check
+def composite():
+    """Sums of half of 0 ... 15, of nothing, and of half of 16 ... 37."""
+    values = torch.arange(float(N))[:, None] * torch.tensor([1.0, 2.0, 3.0])
+    sums = torch.tensor([60.0, 0.0, 291.5])[:, None] * torch.tensor([1.0, 2.0, 3.0])
+    yield lib.composite(torch.full((N,), 0.5), values, offsets()), sums
+
+
+@check
+def march_rays():
+    """Rays through a box whose first third is empty, the second occupied and the last opaque: ten samples each."""
+    rays_o = torch.cat([torch.full((N, 1), -3.0), pattern(N, 2) - 1], 1)
+    cells = torch.zeros(3, 3, 3, dtype=torch.uint8)
+    cells[1], cells[2] = 1, 2
+    rays, starts, ends, of_rays = lib.march_rays(rays_o, axis(1.0, 0.0, 0.0), torch.zeros(N), cells, 1.5, 0.1, 64)
+    yield rays, torch.arange(N).repeat_interleave(10)
+    yield starts, (2.5 + 0.1 * torch.arange(10)).repeat(N)
+    yield ends, (2.6 + 0.1 * torch.arange(10)).repeat(N)
+    yield of_rays, 10 * torch.arange(N + 1)
+
+
+@check
+def spread_samples():
+    """Rays of four samples with weights 2, 0, 0, 1 at 0, 1, 2, 4, and two marks: the outer ones are drawn."""
+    weights, t = torch.tensor([2.0, 0.0, 0.0, 1.0]).repeat(N), torch.tensor([0.0, 1.0, 2.0, 4.0]).repeat(N)
+    drawn = lib.spread_samples(weights, t, 4 * torch.arange(N + 1), torch.full((N,), 0.5), 10.0, 2)
+    rays = torch.arange(N)[:, None]
+    known = (
+        4 * rays + torch.tensor([0, 3]), 2 * rays + torch.tensor([0, 0, 0, 1]), 2 * rays + torch.tensor([0, 1, 1, 1]),
+        torch.tensor([0.0, 0.25, 0.5, 0.0]).repeat(N), 2 * rays, 2 * rays, rays.repeat(1, 2),
+        torch.tensor([2 * N, N, N]),
+    )  # fmt: skip
+    yield from ((found, expected.flatten()) for found, expected in zip(drawn, known))
+
+
+def between() -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    first = torch.arange(N) % 4
+    return first, first + 1, pattern(N) - 0.5
+
+
+@check
+def interpolate():
+    """Values that grow evenly from row to row."""
+    first, second, share = between()
+    slope = torch.tensor([1.0, 2.0, 3.0])
+    yield lib.interpolate(torch.arange(5.0)[:, None] * slope, first, second, share), (first + share)[:, None] * slope

@@ -1,0 +1,231 @@
+"""splitnerf doctor: here all is well, and what is wrong is found."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import sys
+from types import SimpleNamespace
+
+import pytest
+import torch
+from op_checks import has_cuda_kernel
+from pretend_gpu import pretend_gpu
+
+from splitnerf import _core
+from splitnerf.cli import main
+from splitnerf.cli.exit_codes import DONE, FAILED
+from splitnerf.doctor import machine, self_test
+from splitnerf.doctor.table import CHECKS
+from splitnerf.ops._library import lib
+
+OPERATORS = sorted(
+    name.split("::")[1] for name in torch._C._dispatch_get_all_op_names() if name.startswith("splitnerf::")
+)
+
+
+def outputs(name: str) -> list[int]:
+    """The numbers of what an operator returns, or of the arguments that it writes to."""
+    schema = getattr(lib, name).default._schema
+    written = [i for i, given in enumerate(schema.arguments) if given.alias_info and given.alias_info.is_write]
+    return written or list(range(len(schema.returns)))
+
+
+def off(x: torch.Tensor) -> torch.Tensor:
+    """A hundredth too large; a whole number by one, a truth turned round."""
+    return ~x if x.dtype == torch.bool else x * 1.01 if x.is_floating_point() else x + 1
+
+
+def spoil(monkeypatch, name: str, change, output: int = 0) -> None:
+    """Changes one output of an operator, once a call: within a device's context torch looks the operator up again."""
+    operator, within = getattr(lib, name), []
+
+    def spoilt(*arguments):
+        if within:
+            return operator(*arguments)
+        within.append(name)
+        result = operator(*arguments)
+        within.clear()
+        if result is None:
+            arguments[output].copy_(change(arguments[output]))
+            return None
+        if isinstance(result, torch.Tensor):
+            return change(result)
+        return tuple(change(x) if i == output else x for i, x in enumerate(result))
+
+    monkeypatch.setattr(lib, name, spoilt)
+
+
+def test_every_operator_has_a_check():
+    assert sorted(CHECKS) == OPERATORS
+    assert all(check.__doc__ for check in CHECKS.values())
+
+
+def test_what_is_traced_stays_on_the_cpu():
+    if not _core.cuda_architectures():
+        pytest.skip("build without CUDA")
+    assert {name for name in OPERATORS if not has_cuda_kernel(name)} == self_test.CPU_ALONE
+    assert set(self_test.operators("cuda")) == set(OPERATORS) - self_test.CPU_ALONE
+
+
+@pytest.mark.parametrize(("name", "output"), [(name, i) for name in OPERATORS for i in outputs(name)])
+def test_an_operator_that_is_off_is_found(monkeypatch, name, output):
+    spoil(monkeypatch, name, off, output)
+    (failure,) = self_test.failures("cpu", [name])
+    assert (failure.operator, failure.device) == (name, "cpu")
+    assert failure.said.startswith("found ") and ", expected " in failure.said and failure.known
+
+
+def test_a_failure_says_what_was_found(monkeypatch):
+    spoil(monkeypatch, "composite", lambda x: x + torch.tensor([[0.0, 0.0, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+    assert self_test.failures("cpu", ["composite"])[0].said == "found 189, expected 180"
+    monkeypatch.undo()
+    spoil(monkeypatch, "composite", lambda x: x * math.nan)
+    assert self_test.failures("cpu", ["composite"])[0].said == "found nan, expected 60"
+
+    def refuse(*arguments):
+        raise ValueError("composite: no\nkernel")
+
+    monkeypatch.setattr(lib, "composite", refuse)
+    assert self_test.failures("cpu", ["composite"])[0].said == "raised ValueError: composite: no kernel"
+
+
+def test_the_checks_make_their_inputs_on_the_device(monkeypatch):
+    with pretend_gpu(monkeypatch):
+        assert self_test.failures("cuda") == []
+
+
+@pytest.mark.skipif("cuda" not in machine.devices(), reason="no GPU that the kernels run on")
+def test_the_checks_pass_on_the_gpu():
+    assert self_test.failures("cuda") == []
+
+
+@pytest.mark.parametrize("command", ["doctor", "info"])
+def test_all_is_well_here(capsys, command):
+    assert main([command]) == DONE
+    said = capsys.readouterr().out
+    assert f"{len(OPERATORS)} operators, all as they should be" in said
+    for name in ("splitnerf", "Python", "torch", "kernels", "CUDA", "ray tracing", "memory", "disk"):
+        assert f"\n{name} " in f"\n{said}"
+    lines = [line for line in said.splitlines() if "->" not in line]
+    assert all(line[23] == " " and line[24] != " " for line in lines)  # values stand below each other
+
+
+def test_missing_packages_are_named_and_are_no_fault(capsys, monkeypatch):
+    monkeypatch.setattr(machine, "find_spec", lambda name: None)
+    monkeypatch.setattr("splitnerf.cli.doctor.self_test", lambda device: True)
+    assert main(["doctor"]) == DONE
+    said = capsys.readouterr().out
+    for package in machine.PACKAGES:
+        assert f"{package.name:24}missing: {package.brings} (pip install 'splitnerf[{package.extra}]')\n" in said
+    monkeypatch.setattr(machine, "find_spec", lambda name: name)
+    assert main(["doctor"]) == DONE
+    said = capsys.readouterr().out
+    assert "missing" not in said and all(f"{p.name:24}there: {p.brings}\n" in said for p in machine.PACKAGES)
+
+
+def test_a_failed_check_ends_with_what_to_do(capsys, monkeypatch):
+    monkeypatch.setattr(_core, "instruction_set", lambda: "avx512")
+    spoil(monkeypatch, "srgb_to_linear", off)
+    assert main(["doctor"]) == FAILED
+    said = capsys.readouterr().out
+    assert f"1 of {len(OPERATORS)} operators fail" in said
+    assert "  srgb_to_linear        found 1.01, expected 1 (The curve of IEC 61966-2-1 at three points.)" in said
+    advice = [line.split("-> ")[1] for line in said.split("operators fail")[1].splitlines() if "-> " in line]
+    assert "pip install --force-reinstall" in advice[0] and "SPLITNERF_ISA=avx2" in advice[1] and "report" in advice[2]
+
+
+def test_libraries_that_cannot_be_loaded(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "splitnerf.doctor.machine", None)
+    assert main(["doctor"]) == FAILED
+    assert "cannot be loaded" in (said := capsys.readouterr().out) and "-> install it again: pip install" in said
+
+
+def test_threads(monkeypatch):
+    monkeypatch.setattr(machine, "processors", lambda: 4)
+    monkeypatch.setattr(torch, "get_num_threads", lambda: 2)
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    assert machine.threads().advice == ""  # two threads for each core are of no use
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    assert "OMP_NUM_THREADS=2 leaves processors idle" in machine.threads().advice
+    monkeypatch.setattr(torch, "get_num_threads", lambda: 8)
+    assert machine.threads().advice.endswith("set OMP_NUM_THREADS=4")
+
+
+def test_processors_within_a_control_group(monkeypatch):
+    monkeypatch.setattr(machine.os, "sched_getaffinity", lambda pid: set(range(8)), raising=False)
+    for quota, count in (([], 8), (["max", "100000"], 8), (["250000", "100000"], 2), (["50000", "100000"], 1)):
+        monkeypatch.setattr(machine, "control_group", lambda name, quota=quota: quota)
+        assert machine.processors() == count
+
+
+def test_kernels_below_the_processor(monkeypatch):
+    monkeypatch.setattr(_core, "instruction_set", lambda: "avx2")
+    monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: "AVX512")
+    monkeypatch.setenv("SPLITNERF_ISA", "avx2")
+    assert machine.kernels().advice == "SPLITNERF_ISA=avx2 chose them: unset it"
+    monkeypatch.delenv("SPLITNERF_ISA")
+    assert machine.kernels().value == "avx2, slower than this processor's avx512"
+    assert "pip install" in machine.kernels().advice
+    monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: "AVX2")
+    assert machine.kernels().advice == "" and machine.lower_instruction_set() == "base"
+    monkeypatch.setattr(_core, "instruction_set", lambda: "base")
+    assert machine.lower_instruction_set() is None
+
+
+@pytest.mark.parametrize(
+    ("architectures", "capability", "covered"),
+    [
+        ("90-real", (9, 0), True), ("90-real", (10, 0), False), ("80-real, 90", (8, 6), True),
+        ("80-real, 90", (12, 0), True), ("80-real, 90", (7, 5), False), ("86-real", (8, 0), False),
+        ("80-virtual", (7, 5), False), ("90a-real", (9, 0), True), ("80-virtual", (8, 9), True),
+        ("100-real", (10, 3), True), ("", (9, 0), False),
+    ],
+)  # fmt: skip
+def test_which_gpus_kernels_run_on(architectures, capability, covered):
+    assert machine.covers(architectures, *capability) == covered
+
+
+def test_gpus(monkeypatch):
+    """A GPU with and without kernels for it, none, and one that torch does not see."""
+    monkeypatch.setattr(_core, "cuda_architectures", lambda: "90-real")
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "get_device_capability", lambda: (9, 0))
+    monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "Big GPU")
+    found = machine.cuda()
+    assert "kernels for 90-real" in found.value and "Big GPU" in found.value and not found.advice and not found.failed
+    assert machine.devices() == ["cpu", "cuda"]
+    monkeypatch.setattr(torch.cuda, "get_device_capability", lambda: (7, 5))
+    assert machine.cuda().failed and machine.cuda().advice.endswith("CMAKE_CUDA_ARCHITECTURES=75")
+    assert machine.devices() == ["cpu"]
+    monkeypatch.setattr(_core, "cuda_architectures", lambda: "")
+    assert not machine.cuda().failed and machine.cuda().advice.endswith("CMAKE_CUDA_ARCHITECTURES=75")
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    monkeypatch.setattr(torch.version, "cuda", None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    assert machine.cuda().value == "no kernels; torch for the CPU; no GPU" and not machine.cuda().advice
+    monkeypatch.setattr(shutil, "which", lambda name: f"/usr/bin/{name}")
+    assert "install torch for CUDA" in machine.cuda().advice
+    monkeypatch.setattr(torch.version, "cuda", "13.0")
+    assert "newer driver" in machine.cuda().advice
+
+
+def test_without_embree(monkeypatch):
+    monkeypatch.setattr(_core, "embree_version", lambda: "")
+    monkeypatch.setattr(machine, "find_spec", lambda name: name)
+    assert not machine.ray_tracing().failed and "libembree-dev" in machine.ray_tracing().advice
+    monkeypatch.setattr(machine, "find_spec", lambda name: None)
+    assert machine.ray_tracing().failed and machine.ray_tracing().advice == "pip install embreex"
+
+
+def test_little_memory_and_disk(monkeypatch, tmp_path):
+    total, free = machine.memory_bytes()
+    assert 0 < free <= total
+    limits = {"memory.max": [str(2 * 2**30)], "memory.stat": ["anon", str(2**29)]}
+    monkeypatch.setattr(machine, "control_group", limits.get)
+    assert machine.memory_bytes()[0] == min(total, 2 * 2**30) and machine.memory_bytes()[1] <= 1.5 * 2**30
+    assert "--downscale" in machine.memory().advice
+    monkeypatch.setattr(machine, "memory_bytes", lambda: (64 * 2**30, 32 * 2**30))
+    assert machine.memory().advice == "" and machine.memory().value.startswith("64.0 GiB, 32.0 GiB free")
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=2**20))
+    assert "--out" in machine.disk(tmp_path).advice
