@@ -14,7 +14,7 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 FUZZ_SECONDS ?= 600
 STABILITY_CASES ?= 10000000
 STABILITY_OPTIONS ?=
-READERS := json png exr hdr glb checkpoint
+READERS := json colmap neus png exr hdr glb checkpoint
 
 .PHONY: demo test test-slow install system gtest sanitize fuzz stability tables pytest mutants clean
 

@@ -185,7 +185,7 @@ def evaluate_scene(
         The contents of evaluation.json and the rendered maps.
     """
     predictions = [render_maps(model, grid, test, i) for i in range(len(test))]
-    truth = load_scene_truth(test.root)
+    truth = load_scene_truth(test.root, test.origin)
     light = model.light.panorama(model.config.export.environment_height).cpu().numpy()
     result = evaluate_maps(
         predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,12 +11,14 @@ import torch
 
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, load_dataset
-from splitnerf.data.frames import has_test_split
+from splitnerf.data.frames import has_test_split, split_rule
 from splitnerf.data.json_files import write_json
+from splitnerf.data.reading import Reading
 from splitnerf.data.truth import read_mesh
 from splitnerf.delivery import LAST_STAGE_FILES, discard_last_stage, finish, is_refined, score_run, write_run_report
 from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Evaluated, Protocol, choose_views, evaluation_path
+from splitnerf.notes import note_once
 from splitnerf.outputs import Exported, write_assets
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
@@ -23,20 +26,27 @@ from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_mo
 from splitnerf.training.loop import TrainedScene, check_repeatable, train
 from splitnerf.training.meshes import SurfaceMesh
 
+ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 RUN_FILES = (
     "config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
-    "evaluation.json", "report.html", *LAST_STAGE_FILES,
+    "evaluation.json", "report.html", ORIGIN, *LAST_STAGE_FILES,
 )  # fmt: skip
 
 
-def load_splits(data: Path, downscale: int) -> tuple[Dataset, Dataset | None]:
-    """The train split, and the test split or None.
+def load_splits(data: Path, downscale: int, reading: Reading = Reading()) -> tuple[Dataset, Dataset | None]:
+    """The train split, and the test split or None where no view is held out; a note says what is.
 
     Raises:
         InputError: The data cannot be used.
     """
-    test = load_dataset(data, "test", downscale) if has_test_split(data) else None
-    return load_dataset(data, "train", downscale), test
+    test = load_dataset(data, "test", downscale, reading) if has_test_split(data, reading) else None
+    train = load_dataset(data, "train", downscale, reading)
+    held_out = "no view is" if test is None else f"{len(test)} are"
+    note_once(f"{data}: {len(train)} views to train on, {held_out} held out for testing ({split_rule(data, reading)})")
+    if train.origin.any():
+        x, y, z = train.origin
+        note_once(f"{data}: the cameras are far from the origin; results are relative to {x:.10g} {y:.10g} {z:.10g}")
+    return train, test
 
 
 def prepare_run(run: Path, *, resume: bool, overwrite: bool) -> None:
@@ -78,8 +88,11 @@ def reconstruct(
         Diverged, EmptyMesh, OSError: See :func:`splitnerf.training.loop.train`.
     """
     check_repeatable(config, device)
-    dataset, test = load_splits(data, downscale)
+    dataset, test = load_splits(data, downscale, config.reading)
     prepare_run(run, resume=resume, overwrite=overwrite)
+    if dataset.origin.any():
+        meaning = "add it to positions to get those of the data"
+        write_json(run / ORIGIN, {"origin": dataset.origin.tolist(), "meaning": meaning})
     config.write(run / "config.toml")
     trained = train(dataset, config, run, device=device, resume=resume)
     if not trained.finished:
@@ -121,8 +134,8 @@ def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = N
         InputError: The run or the data cannot be used.
     """
     model, grid, content = load_run(run)
-    dataset, test = load_splits(data, protocol.downscale)
-    views, maps = choose_views(dataset if test is None else test, protocol)
+    dataset, test = load_splits(data, protocol.downscale, protocol.reading)
+    views, maps = choose_views((dataset if test is None else test).in_box(content["box_from_world"].numpy()), protocol)
     clock = time.monotonic()
     mesh = read_mesh(run / "mesh.ply") if (run / "mesh.ply").is_file() else None
     timings = {"training": content["seconds"]}
@@ -154,6 +167,8 @@ def export_run(
     model, _, content = load_run(run)
     box_from_world = content["box_from_world"].numpy()
     out.mkdir(parents=True, exist_ok=True)
+    if (run / ORIGIN).is_file() and out.resolve() != run.resolve():
+        shutil.copyfile(run / ORIGIN, out / ORIGIN)
     return write_assets(
         out, model, box_from_world, formats=formats, resolution=resolution, n_faces=n_faces, texture_size=texture_size
     )

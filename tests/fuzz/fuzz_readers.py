@@ -1,6 +1,6 @@
 """Fuzzes the readers: python tests/fuzz/fuzz_readers.py READER [libFuzzer's options]
 
-READER is json, png, exr, hdr, glb or checkpoint. The corpus begins with small valid files that the program writes
+READER is json, colmap, neus, png, exr, hdr, glb or checkpoint. The corpus begins with small valid files that the program writes
 itself; what libFuzzer adds to it lies in build/fuzz/READER. A reader may return or raise InputError with one line;
 anything else, more than -timeout seconds or more than -rss_limit_mb of memory is a finding, and its input is kept in
 build/fuzz.
@@ -34,7 +34,8 @@ from splitnerf.config import Config
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import read_environment
-from splitnerf.data.frames import read_camera_path
+from splitnerf.data.frames import read_frames
+from splitnerf.data.layouts.transforms import read_camera_path
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image, read_radiance, write_image
 from splitnerf.errors import InputError
@@ -109,6 +110,54 @@ class JsonReader(Reader):
         with contextlib.suppress(InputError):
             read_camera_path(path)
         load_dataset(self.folder)
+
+
+class ColmapReader(Reader):
+    """One of the files of a sparse model, which the first byte of an input names, beside the others as they were."""
+
+    files = ("cameras.bin", "images.bin", "cameras.txt", "images.txt")
+
+    def __init__(self, folder: Path):
+        super().__init__(folder)
+        write_scene(folder / "images")
+        camera, (w, h) = 1, (SIZE, SIZE)
+        images = [(i + 1, 1.0, 0.1 * i, 0.0, 0.0, 0.0, 0.0, 4.0, camera, f"r_{i}.png") for i in range(6)]
+        binary = [struct.pack("<I7dI", *image[:9]) + image[9].encode() + bytes(9) for image in images]
+        self.parts = [
+            struct.pack("<QIiQQ5d", 1, camera, 3, w, h, 20.0, 8.0, 8.0, 0.1, 0.01),
+            struct.pack("<Q", 6) + b"".join(binary),
+            f"# cameras\n{camera} RADIAL {w} {h} 20 8 8 0.1 0.01\n".encode(),
+            "".join(" ".join(map(str, image)) + "\n1 2 -1\n" for image in images).encode(),
+        ]  # fmt: skip
+
+    def corpus(self) -> list[bytes]:
+        return [bytes([i]) + part for i, part in enumerate(self.parts)]
+
+    def read(self, data: bytes) -> None:
+        chosen = data[0] % len(self.files) if data else 0
+        (self.folder / "sparse").mkdir(exist_ok=True)
+        for i, name in enumerate(self.files):
+            (self.folder / "sparse" / name).unlink(missing_ok=True)
+            if i // 2 == chosen // 2:  # binary files go before text
+                self.file(f"sparse/{name}", data[1:] if i == chosen else self.parts[i])
+        read_frames(self.folder, "train")
+
+
+class NeusReader(Reader):
+    """A file of cameras beside its images."""
+
+    def __init__(self, folder: Path):
+        super().__init__(folder)
+        write_scene(folder / "image")
+
+    def corpus(self) -> list[bytes]:
+        matrix = np.array([[20.0, 0, 8, 0], [0, 20, 8, 0], [0, 0, 1, 4], [0, 0, 0, 1]])
+        np.savez(self.folder / "seed.npz", **{f"world_mat_{i}": matrix for i in range(6)})
+        return [(self.folder / "seed.npz").read_bytes()]
+
+    def read(self, data: bytes) -> None:
+        self.file("cameras_sphere.npz", data)
+        read_frames(self.folder, "train")
 
 
 class ImageReader(Reader):
@@ -231,7 +280,7 @@ class CheckpointReader(Reader):
 
 
 READERS = {
-    "json": JsonReader, "png": PngReader, "exr": ExrReader, "hdr": HdrReader, "glb": GlbReader,
+    "json": JsonReader, "colmap": ColmapReader, "neus": NeusReader, "png": PngReader, "exr": ExrReader, "hdr": HdrReader, "glb": GlbReader,
     "checkpoint": CheckpointReader,
 }  # fmt: skip
 

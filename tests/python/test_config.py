@@ -38,6 +38,8 @@ SETTINGS = {
     "run.tensor_cores": ("tensor_cores", True, True, OURS),
     "run.preview_every": ("preview_every", 0.1, 0.1, OURS),
     "run.checkpoint_minutes": ("checkpoint_minutes", 2.0, 2.0, OURS),
+    "data.eval_mode": ("eval_mode", "auto", "auto", OURS),
+    "data.mask_kind": ("mask_kind", "auto", "auto", OURS),
     "surface.box": ("box", 1.5, 1.5, PAPER),
     "surface.n_levels": ("n_levels", 9, 16, PAPER),
     "surface.n_features": ("n_features", 2, 2, PAPER),
@@ -183,6 +185,8 @@ LIMITS = {
     "export.texture_size": "in [8, 32768]", "export.environment_height": "in [1, 8192]",
 }  # fmt: skip
 CHOICES = {
+    "data.eval_mode": "auto, all, fraction, filename",
+    "data.mask_kind": "auto, object, ignore",
     "surface.table_dtype": "float32, float16, bfloat16", "surface.normals": "analytic, finite_difference",
     "materials.inputs": "outputs, grid", "light.kind": "mlp, pyramid", "light.activation": "softplus, exp",
     "shading.method": "split, summed", "shading.fresnel": "exact, paper, code", "shading.query": "mean, reflection",

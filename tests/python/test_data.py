@@ -161,6 +161,14 @@ def test_object_beside_the_optical_axes_is_found(tmp_path):
     assert 0.8 < data.box_from_world[0, 0] * radius <= 1.05
 
 
+def test_another_internal_frame_changes_no_place_in_the_world(tmp_path):
+    data = load_dataset(make_blender(tmp_path / "far", (5.0, -3.0, 2.0), 0.05))
+    assert data.in_box(data.box_from_world.copy()) is data
+    other = data.in_box(np.diag([2.0, 2, 2, 1]) + 0.5 * np.eye(4, k=3))
+    assert other.world_poses == pytest.approx(data.world_poses, abs=1e-5)
+    assert other.poses[:, 0, 3] == pytest.approx(2 * data.world_poses[:, 0, 3] + 0.5, abs=1e-5)
+
+
 def test_splits_and_downscales_share_one_frame(tmp_path):
     root = make_blender(tmp_path / "far", (5.0, -3.0, 2.0), 0.05)
     frames = [load_dataset(root, split, factor).box_from_world for split in ("train", "test") for factor in (1, 3)]
@@ -194,6 +202,8 @@ def test_truth_maps(scene):
     assert empty.albedo is empty.roughness is empty.metallic is empty.normal is empty.normal_mask is None
     scene_truth = load_scene_truth(scene)
     assert scene_truth.light.shape == (4, 8, 3) and len(scene_truth.mesh.faces) == 12
+    moved = load_scene_truth(scene, np.array([100.0, -20, 3])).mesh
+    assert moved.vertices == pytest.approx(scene_truth.mesh.vertices - [100, -20, 3])
     assert load_scene_truth(scene / "test").light is None and load_scene_truth(scene / "test").mesh is None
 
 

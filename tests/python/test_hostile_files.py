@@ -14,6 +14,7 @@ import pytest
 import torch
 from blender_data import edit, make_blender, set_pose
 from gltf_builder import Gltf, triangle
+from PIL import Image
 from tiny_runs import tiny
 
 from splitnerf.training import loop as trainer
@@ -78,6 +79,18 @@ def test_images_that_claim_more_than_they_hold(tmp_path, suffix, content):
     path.write_bytes(content)
     with pytest.raises(InputError, match=f"image{suffix}: is said to be 4000x4000, too large for its file"):
         read_image(path)
+
+
+def test_an_image_of_too_many_pixels_is_not_called_damaged(tmp_path):
+    (tmp_path / "photo.png").write_bytes(png(20_000, 20_000) + bytes(300_000))
+    with pytest.raises(InputError, match="photo.png: is 20000x20000, the most is 134 megapixels of 4 channels; make it smaller"):
+        read_image(tmp_path / "photo.png")
+
+
+def test_a_black_mask_of_one_bit_a_pixel_is_as_small_as_that(tmp_path):
+    Image.new("1", (2000, 2000)).save(tmp_path / "mask.png", optimize=True)
+    assert (tmp_path / "mask.png").stat().st_size < 2000**2 / 4096
+    assert read_image(tmp_path / "mask.png").shape == (2000, 2000, 1)
 
 
 def test_an_image_whose_error_is_no_text(tmp_path):

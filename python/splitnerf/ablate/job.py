@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,5 +84,5 @@ def run_row(plan: Plan, scene: Path, row: Row, seed: int) -> dict:
         )
         if evaluation is None:
             raise Interrupted
-        evaluate_run(run, scene, plan.protocol, scores)
+        evaluate_run(run, scene, dataclasses.replace(plan.protocol, reading=config.reading), scores)
     return read_json(scores, "novel_view")

@@ -269,6 +269,6 @@ def _write_transforms(world: World, exposures: Exposures, out: Path, settings: P
             "fl_x": pinhole.fx, "fl_y": pinhole.fy, "cx": pinhole.cx, "cy": pinhole.cy,
             "exposure": float(exposures.gains[i]), "transform_matrix": scene.poses[i].tolist(),
         })  # fmt: skip
-    content = {"camera_model": "PINHOLE", "frames": frames}
+    content = {"camera_model": "PINHOLE", "mask_kind": "object", "frames": frames}
     with atomic_path(out / "transforms.json") as temporary:
         temporary.write_text(json.dumps(content, indent=1))

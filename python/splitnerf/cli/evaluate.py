@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.cli.summary import print_scores
 from splitnerf.errors import InputError
 
@@ -31,6 +32,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)"
     )
+    add_reading_options(parser, "as in training")
     parser.add_argument(
         "--spp", type=int, default=128, metavar="N", help="paths a pixel of what is path traced (default: 128)"
     )
@@ -117,7 +119,7 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
     from splitnerf.evaluate.jobs import Protocol, evaluate_asset, evaluation_path, is_asset
     from splitnerf.workflow import evaluate_run
 
-    protocol = Protocol(args.downscale, args.views, args.spp, args.lights, args.maps)
+    protocol = Protocol(args.downscale, args.views, args.spp, args.lights, args.maps, reading_of(args, target))
     if is_asset(target):
         evaluated = evaluate_asset(target, data, protocol, args.env)
         write_json(args.out or evaluation_path(target), evaluated.scores)

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.errors import InputError
 
 
@@ -23,6 +24,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)"
     )
+    add_reading_options(parser, "as in training")
     parser.add_argument("--sweeps", type=int, metavar="N", help="most steps of the fit (default: 16 without --minutes)")
     parser.add_argument("--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)")
     parser.add_argument("--resume", action="store_true", help="go on from the state that an interruption left")
@@ -45,7 +47,10 @@ def run(args: argparse.Namespace) -> int:
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
     settings = RefinementSettings(sweeps=sweeps, minutes=args.minutes, outline=not args.keep_shape)
-    refined = refine_run(args.run, args.data, out, downscale=args.downscale, settings=settings, resume=args.resume)
+    refined = refine_run(
+        args.run, args.data, out, downscale=args.downscale, settings=settings, resume=args.resume,
+        reading=reading_of(args, args.run),
+    )  # fmt: skip
     if refined is None:
         print(f"stopped; the state is in {out}. To go on, repeat the command with --resume.")
         return INTERRUPTED

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.errors import InputError
 
 
@@ -26,6 +27,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     cameras.add_argument("--data", type=Path, metavar="DATA", help="the cameras of a data set")
     cameras.add_argument("--path", type=Path, metavar="CAMERAS.json", help="the cameras of a file like transforms.json")
     add("--split", choices=["train", "test"], default="test", help="of --data (default: test)")
+    add_reading_options(parser, "as in training")
     add("--elevation", type=float, default=20.0, metavar="DEG", help="of the turntable's camera (default: 20)")
     add("--rotate", choices=["camera", "light"], default="camera", help="what the turntable turns (default: camera)")
     add("--out", type=Path, required=True, metavar="DIR", help="the folder to write to")
@@ -55,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
     def views_of(asset: Asset) -> list[View]:
         if args.data:
-            return data_views(args.data, args.split, size)
+            return data_views(args.data, args.split, size, reading_of(args, args.source))
         if args.path:
             return path_views(args.path, size)
         count = 1 if args.turntable is None else args.turntable

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.cli.reading import add_reading_options, reading_options
 from splitnerf.cli.summary import print_summary
 from splitnerf.errors import InputError
 
@@ -13,17 +14,18 @@ from splitnerf.errors import InputError
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "train", help="reconstruct an object from posed images",
-        description="Trains on DATA (NeRF-Blender layout, or a transforms.json with masks), fits the exported asset and its light "
+        description="Trains on DATA (transforms files, COLMAP's, NeuS's and other layouts, see docs/data.md), fits the exported asset and its light "
         "to the photos in a last stage, and writes mesh.glb, mesh.ply, environment.exr/.hdr, uncertainty.exr, evaluation.json and "
         "report.html into the run's folder.",
         epilog="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient "
         "alone skips its step. The message names where it came from, and the last checkpoint stands: --resume goes on "
         "from it.",
     )  # fmt: skip
-    parser.add_argument("data", type=Path, metavar="DATA", help="folder with transforms_train.json or transforms.json")
+    parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images with masks")
     parser.add_argument("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
     add_training_options(parser)
     parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
+    add_reading_options(parser, "what the data say or look like, else fraction")
     parser.add_argument("--resume", action="store_true", help="continue the run in --out from its checkpoint")
     parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
     parser.set_defaults(execute=run)
@@ -75,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     device = choose_device(args.device)
     run = args.out or Path("runs") / args.data.resolve().name
     settings = dict(parse_setting(text) for text in args.settings)
-    settings |= budget(args.steps, args.max_minutes)
+    settings |= budget(args.steps, args.max_minutes) | reading_options(args)
     if args.seed is not None:
         settings["run.seed"] = args.seed
     if args.no_refine:

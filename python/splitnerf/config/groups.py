@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from splitnerf.config.setting import setting
+from splitnerf.data.reading import EVAL_MODES, MASK_KINDS
 
 MIN_EXPORT_SIZE = 8  # nodes or texels along an edge
 LOSS_FORMS = ("square", "smooth_l1")
@@ -30,6 +31,18 @@ class Run:
     )
     preview_every: float = setting(0.1, "time between two previews", unit="share of the run")
     checkpoint_minutes: float = setting(2.0, "time between two checkpoints", unit="minutes")
+
+
+@dataclass(frozen=True)
+class Data:
+    """How the photos are read where they leave it open."""
+
+    eval_mode: str = setting(
+        "auto", "what is held out for testing; auto: what the data say, else a fraction", choices=EVAL_MODES
+    )
+    mask_kind: str = setting(
+        "auto", "mask files: white is the object, or black is to be ignored; auto: as they look", choices=MASK_KINDS
+    )
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from pathlib import Path
 import tomli_w
 
 from splitnerf.config.groups import (
+    Data,
     Export,
     Light,
     Losses,
@@ -26,6 +27,7 @@ from splitnerf.config.groups import (
     Surface,
 )
 from splitnerf.data.images import atomic_path
+from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 
 if sys.version_info >= (3, 11):
@@ -68,6 +70,7 @@ class Config:
     """
 
     run: Run = field(default_factory=Run)
+    data: Data = field(default_factory=Data)
     surface: Surface = field(default_factory=Surface)
     materials: Materials = field(default_factory=Materials)
     light: Light = field(default_factory=Light)
@@ -98,6 +101,11 @@ class Config:
         """The value of a setting by its name: ``group.name``, or its older name without a group."""
         group, _, key = OLD_NAMES.get(name, name).partition(".")
         return getattr(getattr(self, group), key)
+
+    @property
+    def reading(self) -> Reading:
+        """How the run reads its data."""
+        return Reading(self.data.eval_mode, self.data.mask_kind)
 
     @property
     def training_minutes(self) -> float:

@@ -7,20 +7,24 @@ import json
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from splitnerf.data.environment import read_surroundings
-from splitnerf.data.frames import Frame, lens_intrinsics, read_frames
-from splitnerf.data.images import LDR_SUFFIXES, area_average, downscale_rgba, linear_to_srgb, read_image, srgb_to_linear
-from splitnerf.data.normalisation import estimate_box, transform_points
+from splitnerf.data.frames import read_frames
+from splitnerf.data.layouts.frame import Frame
+from splitnerf.data.lens import lens_intrinsics
+from splitnerf.data.normalisation import MasksContradict, estimate_box, transform_points
+from splitnerf.data.photos import Photo, load_photo, silhouette_factor
+from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
+from splitnerf.notes import note_once
 
 SURROUNDINGS = "surroundings.exr"
 HULL_VIEWS = 40
-SILHOUETTE_SIZE = 100
+NEARLY_ALL, NEARLY_ALL_EDGE = 0.6, 0.5  # medians of what a mask keeps, and of the image's edge, if it is no object's
 
 
 @dataclass
@@ -39,6 +43,10 @@ class Dataset:
         frame_names: Names of the images' files without extension, or of the view folders.
         image_paths: The image files.
         box_from_world: [4, 4] float64, uniform scale and translation from the data's world to the internal frame.
+        known: [n, H, W] bool, the pixels that say something: not what a mask ignores, and not what an undistorted photo
+            does not cover; the others are 0 in `images`. None where all are known.
+        origin: [3] float64, the point of the data's files that is the origin of the data's world here; 0 but where the
+            files' origin is too far away for float32.
         exposures: [n] float64, the factors by which the images' linear values were divided; None stands for 1.
         surroundings: [h, 2 h, 4] float32, equirectangular: linear radiance that the photos see around the object, and how
             well it was seen, in [0, 1]; None where the data have no such map.
@@ -54,6 +62,8 @@ class Dataset:
     frame_names: list[str]
     image_paths: list[Path]
     box_from_world: np.ndarray
+    known: np.ndarray | None = None
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     exposures: np.ndarray | None = None
     surroundings: np.ndarray | None = None
 
@@ -87,12 +97,21 @@ class Dataset:
         poses[:, :3, 3] = self.transform_to_world(poses[:, :3, 3])
         return poses
 
+    def in_box(self, box_from_world: np.ndarray) -> Dataset:
+        """The split in another internal frame, such as that of a run; `box_from_world` is as in `Dataset`."""
+        if np.array_equal(box_from_world, self.box_from_world):
+            return self
+        poses = self.world_poses
+        poses[:, :3, 3] = transform_points(box_from_world, poses[:, :3, 3])
+        return replace(self, poses=poses.astype(np.float32), box_from_world=box_from_world)
+
     def select(self, views: Sequence[int]) -> Dataset:
         """The split reduced to these views, in this order."""
         views = list(views)
         return replace(
             self,
             images=self.images[views],
+            known=None if self.known is None else self.known[views],
             poses=self.poses[views],
             intrinsics=self.intrinsics[views],
             exposures=self.exposures[views],
@@ -101,16 +120,9 @@ class Dataset:
         )
 
 
-@dataclass
-class _Image:
-    """One image: [H, W, 4] downscaled, its mask at a size that no downscale changes, and the file's (height, width)."""
-
-    rgba: np.ndarray
-    silhouette: np.ndarray
-    size: tuple[int, int]
-
-
-def load_dataset(root: str | os.PathLike, split: str = "train", downscale: int = 1) -> Dataset:
+def load_dataset(
+    root: str | os.PathLike, split: str = "train", downscale: int = 1, reading: Reading = Reading()
+) -> Dataset:
     """Loads one split of a posed image set.
 
     The normalisation is always estimated from the train split, so that train and test share a frame.
@@ -119,12 +131,13 @@ def load_dataset(root: str | os.PathLike, split: str = "train", downscale: int =
         root: Folder of any layout.
         split: "train" or "test".
         downscale: Integer factor >= 1, averaged in premultiplied linear light.
+        reading: What the data leave open.
 
     Returns:
         The split as a `Dataset`.
 
     Raises:
-        InputError: The folder, its json, an image, a mask or a pose cannot be used.
+        InputError: The folder, its files, an image, a mask or a pose cannot be used.
     """
     root = Path(root)
     if split not in ("train", "test"):
@@ -132,30 +145,34 @@ def load_dataset(root: str | os.PathLike, split: str = "train", downscale: int =
     if downscale < 1 or int(downscale) != downscale:
         raise InputError(f"{root}: downscale must be a whole number of at least 1, got {downscale}")
     if not root.is_dir():
-        raise InputError(f"{root}: no such folder; give the folder that holds transforms_train.json or transforms.json")
-    frames = read_frames(root, split)
-    loaded = _load_images(frames, int(downscale))
+        raise InputError(f"{root}: no such folder; give the folder that holds the data")
+    downscale = int(downscale)
+    frames, origin = read_frames(root, split, reading)
+    _check_once(frames)
     if split == "train":
-        hull_frames, hull_images = spread(frames, HULL_VIEWS), spread(loaded, HULL_VIEWS)
+        photos, box_from_world, _ = _load_train(root, frames, downscale, reading.mask_kind)
     else:
-        hull_frames = spread(read_frames(root, "train"), HULL_VIEWS)
-        hull_images = _load_images(hull_frames, int(downscale))
-    box_from_world = _estimate_box(root, hull_frames, hull_images)
+        train = spread(read_frames(root, "train", reading)[0], HULL_VIEWS)
+        _, box_from_world, mask_kind = _load_train(root, train, downscale, reading.mask_kind)
+        photos = _load_photos(frames, downscale, mask_kind)
+        _check_masks(frames, photos)
 
-    intrinsics = np.stack([lens_intrinsics(frame.lens, image.size) for frame, image in zip(frames, loaded)]) / downscale
+    intrinsics = np.stack([lens_intrinsics(frame.lens, photo.size) for frame, photo in zip(frames, photos)]) / downscale
     poses = np.stack([frame.pose for frame in frames])
     poses[:, :3, 3] = poses[:, :3, 3] @ box_from_world[:3, :3].T + box_from_world[:3, 3]
     return Dataset(
         name=root.resolve().name,
         root=root,
         split=split,
-        downscale=int(downscale),
-        images=np.stack([image.rgba for image in loaded]),
+        downscale=downscale,
+        images=np.stack([photo.rgba for photo in photos]),
         poses=poses.astype(np.float32),
         intrinsics=intrinsics.astype(np.float32),
         frame_names=[frame.name for frame in frames],
         image_paths=[frame.image_path for frame in frames],
         box_from_world=box_from_world,
+        known=stack_known([photo.known for photo in photos], photos[0].rgba.shape[:2]),
+        origin=origin,
         exposures=np.array([frame.exposure for frame in frames]),
         surroundings=read_surroundings(root / SURROUNDINGS) if (root / SURROUNDINGS).is_file() else None,
     )
@@ -172,7 +189,8 @@ def dataset_fingerprint(dataset: Dataset) -> str:
     """
     digest = hashlib.sha256()
     digest.update(json.dumps([dataset.split, dataset.frame_names, list(dataset.images.shape)]).encode())
-    for values in (dataset.poses, dataset.intrinsics, dataset.images.mean(axis=(1, 2))):
+    shares = [] if dataset.known is None else [dataset.known.mean(axis=(1, 2))]
+    for values in (dataset.poses, dataset.intrinsics, dataset.images.mean(axis=(1, 2)), *shares):
         digest.update((np.round(values.astype(np.float64), 3) + 0.0).tobytes())
     return digest.hexdigest()[:16]
 
@@ -182,72 +200,107 @@ def spread(items: Sequence, count: int) -> list:
     return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, count).round().astype(int))]
 
 
-def _estimate_box(root: Path, frames: list[Frame], images: list[_Image]) -> np.ndarray:
-    height, width = images[0].size
-    factor = _silhouette_factor(height, width)
+def stack_known(known: Sequence[np.ndarray | None], shape: tuple[int, int]) -> np.ndarray | None:
+    """[n, H, W] of known pixels [H, W] of this shape, each None where all are known; None where all are None."""
+    if all(one is None for one in known):
+        return None
+    return np.stack([np.ones(shape, bool) if one is None else one for one in known])
+
+
+class _Contradiction(InputError):
+    """Masks of the object that cannot be of one object, seen from these poses."""
+
+
+def _load_train(root: Path, frames: list[Frame], downscale: int, mask_kind: str) -> tuple[list[Photo], np.ndarray, str]:
+    """The photos of the train split, or of a part of it, the similarity to the internal frame, and what the masks are
+    whose layout leaves it open: "object" or "ignore".
+
+    Where the user does not say it, masks are the object's unless they keep nearly all of the photos or contradict the
+    poses; a note says what was assumed.
+    """
+    kind = "ignore" if mask_kind == "ignore" else "object"
+    photos = _load_photos(frames, downscale, kind)
+    pairs = zip(spread(frames, HULL_VIEWS), spread(photos, HULL_VIEWS))
+    masks = [_kept(photo) for frame, photo in pairs if frame.mask_path is not None and frame.mask_kind == "auto"]
+    if mask_kind != "auto" or not masks:
+        return photos, _estimate_box(root, frames, photos), kind
+    kept, edge = np.median(masks, axis=0)
+    ignoring = (
+        f"{root}: its mask files are taken to ignore what is black, as {{}}; --mask-kind object if white is the object"
+    )
+    if kept > NEARLY_ALL and edge > NEARLY_ALL_EDGE:
+        note_once(ignoring.format(f"they keep {kept:.0%} of the photos"))
+        photos = _load_photos(frames, downscale, "ignore")
+        return photos, _estimate_box(root, frames, photos), "ignore"
+    try:
+        box_from_world = _estimate_box(root, frames, photos)
+    except _Contradiction as error:
+        try:
+            photos = _load_photos(frames, downscale, "ignore")
+            box_from_world = _estimate_box(root, frames, photos)
+        except InputError:
+            raise error from None
+        note_once(ignoring.format("masks of the object would contradict the poses"))
+        return photos, box_from_world, "ignore"
+    what = f"taken for the object's, white on {kept:.0%} of the photos"
+    note_once(f"{root}: its mask files are {what}; --mask-kind ignore if black is only to be ignored")
+    return photos, box_from_world, "object"
+
+
+def _estimate_box(root: Path, frames: list[Frame], photos: list[Photo]) -> np.ndarray:
+    """The similarity to the internal frame, from a part of the train split."""
+    _check_masks(frames, photos)
+    frames, photos = spread(frames, HULL_VIEWS), spread(photos, HULL_VIEWS)
+    height, width = photos[0].size
+    factor = silhouette_factor(height, width)
     try:
         return estimate_box(
-            np.stack([image.silhouette for image in images]),
+            np.stack([photo.silhouette for photo in photos]),
             np.stack([frame.pose for frame in frames]),
-            np.stack([lens_intrinsics(frame.lens, image.size) for frame, image in zip(frames, images)]) / factor,
+            np.stack([lens_intrinsics(frame.lens, photo.size) for frame, photo in zip(frames, photos)]) / factor,
+            stack_known([photo.seen for photo in photos], photos[0].silhouette.shape),
         )
+    except MasksContradict as error:
+        names = [frames[i].image_path.name for i in error.views]
+        where = f" (those of {', '.join(names[:5])} and the others)" if names else ""
+        raise _Contradiction(f"{root}: {error}{where}; check the poses and masks") from None
     except ValueError as error:
         raise InputError(f"{root}: {error}") from None
 
 
-def _silhouette_factor(height: int, width: int) -> int:
-    return max(1, min(height, width) // SILHOUETTE_SIZE)
+def _kept(photo: Photo) -> tuple[float, float]:
+    """The shares of the silhouette and of its edge that are white."""
+    s = photo.silhouette
+    return float(s.mean()), float(np.concatenate([s[0], s[-1], s[:, 0], s[:, -1]]).mean())
 
 
-def _load_images(frames: list[Frame], downscale: int) -> list[_Image]:
+def _load_photos(frames: list[Frame], downscale: int, mask_kind: str) -> list[Photo]:
     with ThreadPoolExecutor(max_workers=min(8, os.cpu_count() or 1)) as pool:
-        loaded = list(pool.map(lambda frame: _load_image(frame, downscale), frames))
-    size = loaded[0].size
-    for frame, image in zip(frames, loaded):
-        if image.size != size:
+        photos = list(pool.map(lambda frame: load_photo(frame, downscale, mask_kind), frames))
+    size = photos[0].size
+    for frame, photo in zip(frames, photos):
+        if photo.size != size:
             raise InputError(
-                f"{frame.image_path}: is {image.size[1]}x{image.size[0]}, but {frames[0].image_path.name} is "
+                f"{frame.image_path}: is {photo.size[1]}x{photo.size[0]}, but {frames[0].image_path.name} is "
                 f"{size[1]}x{size[0]}; make all images the same size"
             )
+    return photos
+
+
+def _check_once(frames: list[Frame]) -> None:
+    """Raises InputError where two frames have the same image."""
+    seen = set()
+    for frame in frames:
+        path = os.path.normpath(frame.image_path)
+        if path in seen:
+            raise InputError(f"{frame.image_path}: two frames have this image; remove one of them")
+        seen.add(path)
+
+
+def _check_masks(frames: list[Frame], photos: list[Photo]) -> None:
+    """Raises InputError where the masks show no object or nothing else."""
     folder = frames[0].image_path.parent
-    if not any(image.silhouette.any() for image in loaded):
+    if not any(photo.silhouette.any() for photo in photos):
         raise InputError(f"{folder}: every mask is empty, no pixel is foreground; check alpha or mask_path")
-    if all(image.silhouette.all() for image in loaded):
+    if all((photo.silhouette if photo.seen is None else photo.silhouette | ~photo.seen).all() for photo in photos):
         raise InputError(f"{folder}: every mask is full, no pixel is background; check alpha or mask_path")
-    return loaded
-
-
-def _check_pixels(pixels: np.ndarray, path: Path) -> None:
-    """Raises InputError where a photo or mask, which may be a file of floats by another name, leaves [0, 1]."""
-    if not (pixels.min() >= 0 and pixels.max() <= 1):  # false for NaN
-        raise InputError(f"{path}: has NaN, infinite or negative pixels or such above 1; save it as 8 or 16 bit PNG")
-
-
-def _load_image(frame: Frame, downscale: int) -> _Image:
-    path = frame.image_path
-    if path.suffix.lower() not in LDR_SUFFIXES:
-        raise InputError(f"{path}: training images must be PNG or JPEG; convert it")
-    pixels = read_image(path)
-    height, width, channels = pixels.shape
-    _check_pixels(pixels, path)
-    if downscale > min(height, width):
-        raise InputError(f"{path}: is {width}x{height}, too small for downscale {downscale}; use a smaller factor")
-    colour = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
-    if frame.mask_path is not None:
-        mask = read_image(frame.mask_path)
-        _check_pixels(mask, frame.mask_path)
-        if mask.shape[:2] != (height, width):
-            raise InputError(
-                f"{frame.mask_path}: is {mask.shape[1]}x{mask.shape[0]}, its image {path.name} is {width}x{height}; "
-                "make them the same size"
-            )
-        alpha = mask[..., :1]
-    elif channels in (2, 4):
-        alpha = pixels[..., -1:]
-    else:
-        raise InputError(f"{path}: has no alpha channel and its frame no mask_path; save it with alpha or add a mask")
-    if frame.exposure != 1.0:
-        colour = linear_to_srgb(srgb_to_linear(colour) / np.float32(frame.exposure))
-    rgba = downscale_rgba(np.concatenate([colour, alpha], axis=-1), downscale)
-    silhouette = area_average(alpha[..., 0], _silhouette_factor(height, width)) > 0.5
-    return _Image(rgba, silhouette, (height, width))

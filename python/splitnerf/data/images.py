@@ -20,7 +20,7 @@ LDR_SUFFIXES = (".png", ".jpg", ".jpeg")
 HDR_SUFFIXES = (".exr", ".hdr")
 SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"RIFF")  # RIFF: WebP
 LARGEST_IMAGE = 1 << 29  # values of an image in memory
-VALUES_PER_BYTE = 4096  # of a file; an image of one colour has a quarter of them
+VALUES_PER_BYTE = 8 * 1032  # of a file: of a PNG of one colour and one bit a pixel
 
 
 @contextmanager
@@ -244,12 +244,12 @@ def _read(path: Path, name: str) -> np.ndarray:
     try:
         spec = source.spec()
         n_values = spec.width * spec.height * spec.depth * spec.nchannels
-        if (
-            min(spec.width, spec.height) < 1
-            or spec.depth > 1
-            or n_values > min(LARGEST_IMAGE, VALUES_PER_BYTE * path.stat().st_size)
-        ):
-            raise InputError(f"{name}: is said to be {spec.width}x{spec.height}, too large for its file; replace it")
+        size = f"{spec.width}x{spec.height}"
+        if min(spec.width, spec.height) < 1 or spec.depth > 1 or n_values > VALUES_PER_BYTE * path.stat().st_size:
+            raise InputError(f"{name}: is said to be {size}, too large for its file; replace it")
+        if n_values > LARGEST_IMAGE:
+            most = f"the most is {LARGEST_IMAGE // spec.nchannels / 1e6:.0f} megapixels of {spec.nchannels} channels"
+            raise InputError(f"{name}: is {size}, {most}; make it smaller")
         pixels = source.read_image(0, 0, 0, spec.nchannels, "float")
         if pixels is None or source.has_error:
             raise InputError(f"{name}: truncated or damaged image ({_reason(source)}); replace it")

@@ -17,17 +17,26 @@ def read_json(path: Path, key: str) -> dict:
         key: A key that the object must have; only the message uses it.
 
     Raises:
-        InputError: The file is missing, is not valid json, or does not hold an object.
+        InputError: The file is missing or cannot be read, is not valid json, or does not hold an object.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file; check the path")
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError, RecursionError) as error:
+        content = json.loads(path.read_text(encoding="utf-8-sig"))  # some editors begin a file with a byte order mark
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give yourself the permission") from None
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is not valid json ({str(error).splitlines()[0]}); repair it") from None
     if not isinstance(content, dict):
         raise InputError(f"{path}: must hold a json object with '{key}'")
     return content
+
+
+def need(table: dict, key: str, path: Path, where: str = "") -> object:
+    """The value of a key. Raises InputError where it is missing; `where` follows the key in the message."""
+    if key not in table:
+        raise InputError(f"{path}: missing key '{key}'{where}; add it")
+    return table[key]
 
 
 def write_json(path: Path, content: dict) -> None:

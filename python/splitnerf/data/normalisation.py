@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 FITS_RADIUS = (0.4, 1.4)
 TARGET_RADIUS = 1.0
 COARSE, FINE = 32, 48
+SAME_PLACE = 1e-9  # distance of cameras, as a share of that from the origin
+PARALLEL = 1e-4  # mean squared sine below which optical axes do not say where they meet
 
 
-def estimate_box(silhouettes: np.ndarray, poses: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
+class MasksContradict(ValueError):
+    """No point of space projects into the masks.
+
+    Attributes:
+        views: The few views whose masks miss the point that the most other masks contain; none where many do.
+    """
+
+    def __init__(self, views: list[int]):
+        super().__init__("masks and poses contradict each other, no point lies in all masks")
+        self.views = views
+
+
+def estimate_box(
+    silhouettes: np.ndarray, poses: np.ndarray, intrinsics: np.ndarray, known: np.ndarray | None = None
+) -> np.ndarray:
     """Estimates the similarity from the data's world to the frame where the object fits the box [-1.5, 1.5]^3.
 
     A grid around the point nearest to all optical axes is carved by the masks, then a finer one around what is left.
@@ -19,26 +37,34 @@ def estimate_box(silhouettes: np.ndarray, poses: np.ndarray, intrinsics: np.ndar
         silhouettes: [n, H, W] bool, true on the object.
         poses: [n, 4, 4] camera-to-world, OpenGL axes.
         intrinsics: [n, 4], (fx, fy, cx, cy) in pixels of `silhouettes`.
+        known: [n, H, W] bool, the pixels that say something; None for all.
 
     Returns:
         [4, 4] float64, uniform scale and translation, or the identity.
 
     Raises:
-        ValueError: No point of space projects into the masks.
+        MasksContradict: No point of space projects into the masks.
+        ValueError: All cameras stand at one place.
     """
     n, height, width = silhouettes.shape
     poses, intrinsics = poses.astype(np.float64), intrinsics.astype(np.float64)
+    places = poses[:, :3, 3]
+    if np.ptp(places, axis=0).max() <= SAME_PLACE * max(1.0, np.abs(places).max()):
+        many = f"all {n} cameras stand at one place, as if nothing had estimated the poses; estimate them"
+        raise ValueError(many if n > 1 else "one view does not show the object's shape; add views from other sides")
     tables = np.zeros((n, height + 1, width + 1), dtype=np.int32)
     np.cumsum(np.cumsum(silhouettes, axis=1, dtype=np.int32), axis=2, out=tables[:, 1:, 1:])
-    centre = nearest_to_axes(poses)
+    views = [_View(*view) for view in zip(tables, poses, intrinsics, [None] * n if known is None else known)]
+    centre = first_centre(silhouettes, poses, intrinsics)
     depth = np.linalg.norm(poses[:, :3, 3] - centre, axis=1)
     half = np.full(3, (depth * 0.5 * np.hypot(width / intrinsics[:, 0], height / intrinsics[:, 1])).max())
     for resolution in (COARSE, FINE):
         cell = 2 * half.max() / resolution
-        points = _grid(centre, half, cell)
-        points = points[_inside(points, cell, tables, poses, intrinsics)]
-        if len(points) == 0:
-            raise ValueError("masks and poses contradict each other, no point lies in all masks; check the poses")
+        grid = _grid(centre, half, cell)
+        alive, n_seen = _inside(grid, cell, views)
+        if 2 * n_seen < n:
+            _check_agreement(grid, cell, views, n_seen)
+        points = grid[alive]
         low, high = points.min(axis=0), points.max(axis=0)
         centre, half = (low + high) / 2, (high - low) / 2 + cell
     if FITS_RADIUS[0] < np.linalg.norm(points, axis=1).max() <= FITS_RADIUS[1]:
@@ -55,21 +81,44 @@ def transform_points(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
     return (points @ matrix[:3, :3].T + matrix[:3, 3]).astype(points.dtype)
 
 
-def nearest_to_axes(poses: np.ndarray) -> np.ndarray:
-    """The point with the least sum of squared distances to all optical axes.
+def first_centre(silhouettes: np.ndarray, poses: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
+    """The point [3] nearest to all optical axes or, where these are about parallel, to the rays through the middles of
+    the silhouettes; arguments as for `estimate_box`, float64."""
+    origins, axes = poses[:, :3, 3], poses[:, :3, 2]
+    if spread_of(axes) > PARALLEL:
+        return nearest_to_rays(origins, axes)
+    filled = silhouettes.any(axis=(1, 2))
+    rows, columns = (np.arange(size) + 0.5 for size in silhouettes.shape[1:])
+    area = np.maximum(silhouettes.sum(axis=(1, 2)), 1)
+    x, y = silhouettes.sum(axis=1) @ columns / area, silhouettes.sum(axis=2) @ rows / area
+    fx, fy, cx, cy = intrinsics.T
+    local = np.stack([(x - cx) / fx, (cy - y) / fy, -np.ones_like(x)], axis=-1)
+    rays = np.einsum("nij,nj->ni", poses[:, :3, :3], local)
+    return nearest_to_rays(origins[filled], rays[filled]) if filled.any() else nearest_to_rays(origins, axes)
 
-    It solves sum (I - d d^T) x = sum (I - d d^T) o; a trace of the identity keeps parallel axes solvable.
+
+def spread_of(directions: np.ndarray) -> float:
+    """How far lines of directions [n, 3] are from parallel: the mean squared sine of their angles to their mean."""
+    d = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return float(np.linalg.eigvalsh(np.eye(3) - d.T @ d / len(d))[0])
+
+
+def nearest_to_rays(origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """The point with the least sum of squared distances to lines.
+
+    It solves sum (I - d d^T) x = sum (I - d d^T) o; a trace of the identity keeps parallel lines solvable.
 
     Args:
-        poses: [n, 4, 4] camera-to-world.
+        origins: [n, 3] points of the lines.
+        directions: [n, 3] of any length but 0.
 
     Returns:
         [3] point.
     """
-    axes, origins = poses[:, :3, 2], poses[:, :3, 3]
-    projections = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    d = directions / np.linalg.norm(directions, axis=1, keepdims=True)  # rounded ones outweigh the trace
+    projections = np.eye(3) - d[:, :, None] * d[:, None, :]
     right = np.einsum("nij,nj->i", projections, origins)
-    return np.linalg.solve(projections.sum(axis=0) + 1e-9 * len(poses) * np.eye(3), right)
+    return np.linalg.solve(projections.sum(axis=0) + 1e-9 * len(d) * np.eye(3), right)
 
 
 def _grid(centre: np.ndarray, half: np.ndarray, cell: float) -> np.ndarray:
@@ -77,31 +126,61 @@ def _grid(centre: np.ndarray, half: np.ndarray, cell: float) -> np.ndarray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def _inside(
-    points: np.ndarray, cell: float, tables: np.ndarray, poses: np.ndarray, intrinsics: np.ndarray
-) -> np.ndarray:
-    """Indices of the points that at most one view in twenty puts on background.
+@dataclass(frozen=True)
+class _View:
+    """A mask as a summed-area table [H + 1, W + 1], its camera, and its known pixels [H, W] or None for all."""
 
-    Points that few views see, far in front of or behind the object, are dropped: what stays is seen by at least three
-    quarters as many views as the best seen point.
+    table: np.ndarray
+    pose: np.ndarray
+    intrinsics: np.ndarray
+    known: np.ndarray | None
 
-    A point stands for its cell: it counts as foreground where any mask pixel within the projected half cell is one,
-    counted with a summed-area table.
-    """
-    n, height, width = tables.shape[0], tables.shape[1] - 1, tables.shape[2] - 1
-    alive = np.arange(len(points))
-    misses, seen = np.zeros(len(points), dtype=np.int32), np.zeros(len(points), dtype=np.int32)
-    for table, pose, (fx, fy, cx, cy) in zip(tables, poses, intrinsics):
-        local = (points[alive] - pose[:3, 3]) @ pose[:3, :3]
+    def judge(self, points: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
+        """Whether the view shows points [m, 3], and whether on foreground, [m] bool each.
+
+        A point stands for its cell: it counts as foreground where any mask pixel within the projected half cell is one,
+        counted with the summed-area table.
+        """
+        height, width = self.table.shape[0] - 1, self.table.shape[1] - 1
+        fx, fy, cx, cy = self.intrinsics
+        local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
         ahead = -local[:, 2] > 1e-6
         depth = np.where(ahead, -local[:, 2], 1.0)
         x, y = cx + fx * local[:, 0] / depth, cy - fy * local[:, 1] / depth
         visible = ahead & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+        if self.known is not None:
+            visible[visible] = self.known[y[visible].astype(int), x[visible].astype(int)]
         reach = 0.5 * cell * max(fx, fy) / depth
         x0, x1 = np.clip(x - reach, 0, width - 1).astype(int), np.clip(x + reach, 0, width - 1).astype(int) + 1
         y0, y1 = np.clip(y - reach, 0, height - 1).astype(int), np.clip(y + reach, 0, height - 1).astype(int) + 1
-        foreground = table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0] > 0
+        table = self.table
+        return visible, table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0] > 0
+
+
+def _inside(points: np.ndarray, cell: float, views: list[_View]) -> tuple[np.ndarray, int]:
+    """Indices of the points that at most one view in twenty puts on background, and how many views put the best of them
+    on foreground.
+
+    Points that few views see, far in front of or behind the object, are dropped: what stays is seen by at least three
+    quarters as many views as the best seen point.
+    """
+    alive = np.arange(len(points))
+    misses, seen = np.zeros(len(points), dtype=np.int32), np.zeros(len(points), dtype=np.int32)
+    for view in views:
+        visible, foreground = view.judge(points[alive], cell)
         misses[alive] += visible & ~foreground
         seen[alive] += visible & foreground
-        alive = alive[misses[alive] <= n // 20]
-    return alive[seen[alive] * 4 >= 3 * seen[alive].max(initial=1)]
+        alive = alive[misses[alive] <= len(views) // 20]
+    n_seen = int(seen[alive].max(initial=0))
+    return alive[seen[alive] * 4 >= 3 * max(1, n_seen)], n_seen
+
+
+def _check_agreement(points: np.ndarray, cell: float, views: list[_View], n_seen: int) -> None:
+    """Raises MasksContradict where the points that the masks leave, which `n_seen` views at most show, are not the
+    object: where none is left, or twice as many views put another point on foreground, which few others carved away."""
+    judged = [view.judge(points, cell) for view in views]
+    seen = np.sum([visible & foreground for visible, foreground in judged], axis=0)
+    best = seen.argmax()
+    if n_seen == 0 or 2 * n_seen < seen[best]:
+        missing = [i for i, (visible, foreground) in enumerate(judged) if visible[best] and not foreground[best]]
+        raise MasksContradict(missing if 3 * len(missing) < len(views) else [])

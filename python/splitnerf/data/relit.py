@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data import view_folders
+from splitnerf.data.layouts import view_folders
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import HDR_SUFFIXES, downscale_rgba
 from splitnerf.data.truth import read_map

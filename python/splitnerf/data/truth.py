@@ -6,7 +6,7 @@ Files, `r_N` standing for the image's own name, each optional:
     r_N_normal.exr   world-space normals, multiplied by coverage; alpha is the coverage
     r_N_normal.png   world-space normals, negative components clipped to 0, sRGB-encoded (the NeRF Blender scenes)
     light.hdr, mesh.ply   in the dataset's folder
-In view folders (:mod:`splitnerf.data.view_folders`) `albedo.png` and `normal.png` lie beside `rgba.png`.
+In view folders (:mod:`splitnerf.data.layouts.view_folders`) `albedo.png` and `normal.png` lie beside `rgba.png`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from splitnerf.data import view_folders
+from splitnerf.data.layouts import view_folders
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import area_average, downscale_rgba, read_hdr, read_image, srgb_to_linear
 from splitnerf.errors import InputError
@@ -55,17 +55,21 @@ class SceneTruth:
     mesh: trimesh.Trimesh | None = None
 
 
-def load_scene_truth(root: str | os.PathLike) -> SceneTruth:
+def load_scene_truth(root: str | os.PathLike, origin: np.ndarray | None = None) -> SceneTruth:
     """Loads `light.hdr` and `mesh.ply` from a dataset's folder where they exist.
+
+    Args:
+        root: The folder.
+        origin: [3] the point of the files' world that is the origin here, see `Dataset`; None for 0.
 
     Raises:
         InputError: One exists but cannot be used.
     """
     light, mesh = Path(root) / "light.hdr", Path(root) / "mesh.ply"
-    return SceneTruth(
-        light=read_hdr(light) if light.is_file() else None,
-        mesh=read_mesh(mesh) if mesh.is_file() else None,
-    )
+    truth = SceneTruth(read_hdr(light) if light.is_file() else None, read_mesh(mesh) if mesh.is_file() else None)
+    if truth.mesh is not None and origin is not None and origin.any():
+        truth.mesh.apply_translation(-origin)
+    return truth
 
 
 def read_mesh(path: str | os.PathLike) -> trimesh.Trimesh:

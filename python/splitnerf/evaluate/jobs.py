@@ -14,6 +14,7 @@ from splitnerf.data.environment import read_environment
 from splitnerf.data.frames import has_test_split
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.json_files import read_json
+from splitnerf.data.reading import Reading
 from splitnerf.data.relit import PROTOCOLS, relight_maps
 from splitnerf.data.truth import ViewTruth, load_scene_truth, load_view_truths
 from splitnerf.errors import InputError
@@ -34,6 +35,7 @@ class Protocol:
         spp: Paths a pixel of what is path traced.
         lights: "low" or "high" for a published relighting protocol, else None.
         maps: Folder of environment maps; None for those of the data.
+        reading: How the data are read.
     """
 
     downscale: int = 1
@@ -41,6 +43,7 @@ class Protocol:
     spp: int = 128
     lights: str | None = None
     maps: Path | None = None
+    reading: Reading = Reading()
 
 
 @dataclass
@@ -109,8 +112,8 @@ def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None 
         InputError: The file, the data or the light cannot be used.
     """
     asset = read_asset(path)
-    split = "test" if has_test_split(data) else "train"
-    views, maps = choose_views(load_dataset(data, split, protocol.downscale), protocol)
+    split = "test" if has_test_split(data, protocol.reading) else "train"
+    views, maps = choose_views(load_dataset(data, split, protocol.downscale, protocol.reading), protocol)
     env = environment_beside(path) if env is None else env
     return score_asset(asset, None if env is None else read_environment(env), views, maps, protocol.spp)
 
@@ -128,7 +131,7 @@ def score_asset(
         spp: Paths a pixel.
         seconds: The time that the asset took, to record.
     """
-    truths, truth = load_view_truths(views), load_scene_truth(views.root)
+    truths, truth = load_view_truths(views), load_scene_truth(views.root, views.origin)
     renderer = AssetRenderer(asset)
     predictions = asset_predictions(renderer, views, environment, spp)
     relit, relight_part = relit_scores(renderer, views, maps, spp)

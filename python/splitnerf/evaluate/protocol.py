@@ -31,9 +31,10 @@ def evaluate_maps(
 ) -> dict:
     """Scores the maps of the test views, the light and the mesh.
 
-    PSNR and SSIM are over sRGB on white, means over images. Albedo knows one free factor per channel and scene, since
-    light and albedo share it, see :func:`splitnerf.evaluate.similarity.scaled_scores`. Foreground is alpha > 0.9 in
-    prediction and truth.
+    PSNR and SSIM are over sRGB on white, means over images. Pixels that the photos do not know count in no PSNR of novel
+    views and are white in both images elsewhere. Albedo knows one free factor per channel and scene, since light and
+    albedo share it, see :func:`splitnerf.evaluate.similarity.scaled_scores`. Foreground is alpha > 0.9 in prediction
+    and truth.
 
     Args:
         predictions: Per view float32 maps: `rgb` [H, W, 3] sRGB straight, `alpha` [H, W], `albedo` [H, W, 3] linear,
@@ -56,12 +57,15 @@ def evaluate_maps(
     """
     if not len(predictions) == len(dataset) == len(truths):
         raise ValueError(f"{len(predictions)} predictions for {len(dataset)} images and {len(truths)} truths")
+    known = [None] * len(dataset) if dataset.known is None else dataset.known
     for prediction, image in zip(predictions, dataset.images):
         for key in prediction.keys() & {"rgb", "alpha"}:
             if prediction[key].shape[:2] != image.shape[:2]:
                 raise ValueError(
                     f"{key} of a prediction is {list(prediction[key].shape)}, image is {list(image.shape)}"
                 )
+    if dataset.known is not None:
+        predictions = [p | {"alpha": p["alpha"] * k} for p, k in zip(predictions, known)]
     foregrounds = [(p["alpha"] > OPAQUE) & (i[..., 3] > OPAQUE) for p, i in zip(predictions, dataset.images)]
     chamfer, f_score = (None, None) if mesh is None or mesh_truth is None else metrics.mesh_distances(mesh, mesh_truth)
 
@@ -79,7 +83,7 @@ def evaluate_maps(
         None if t.normal_mask is None else (p["alpha"] > OPAQUE) & t.normal_mask for p, t in zip(predictions, truths)
     ]
     return {
-        "novel_view": _novel_view(predictions, dataset.images, distance),
+        "novel_view": _novel_view(predictions, dataset.images, known, distance),
         "albedo": _albedo(predictions, truths, dataset.images, distance),
         "relight": relight,
         "normal_mae_deg": pooled("normal", opaque, metrics.normal_mae_deg),
@@ -93,15 +97,17 @@ def evaluate_maps(
     }
 
 
-def _novel_view(predictions: Sequence[Prediction], images: np.ndarray, distance: Distance | None) -> dict | None:
+def _novel_view(
+    predictions: Sequence[Prediction], images: np.ndarray, known: Sequence[np.ndarray | None], distance: Distance | None
+) -> dict | None:
     if not all("rgb" in prediction for prediction in predictions):
         return None
     return mean_scores(
         [
             image_scores(
-                over_background(p["rgb"], p["alpha"]), over_background(image[..., :3], image[..., 3]), distance
+                over_background(p["rgb"], p["alpha"]), over_background(image[..., :3], image[..., 3]), distance, k
             )
-            for p, image in zip(predictions, images)
+            for p, image, k in zip(predictions, images, known)
         ]
     )
 

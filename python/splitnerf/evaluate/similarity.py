@@ -35,11 +35,14 @@ class ScaledView:
     truth_alpha: np.ndarray
 
 
-def image_scores(image: np.ndarray, truth: np.ndarray, distance: Distance | None = None) -> dict:
-    """`psnr` in dB, `ssim` and `lpips` (None without `distance`) of [H, W, 3] sRGB images; the first is clipped."""
+def image_scores(
+    image: np.ndarray, truth: np.ndarray, distance: Distance | None = None, known: np.ndarray | None = None
+) -> dict:
+    """`psnr` in dB, `ssim` and `lpips` (None without `distance`) of [H, W, 3] sRGB images; the first is clipped. The
+    PSNR is over the pixels `known` [H, W] bool, None for all."""
     image = np.clip(image, 0, 1)
     return {
-        "psnr": metrics.psnr(image, truth),
+        "psnr": metrics.psnr(image, truth) if known is None else metrics.psnr(image[known], truth[known]),
         "ssim": metrics.ssim(image, truth),
         "lpips": None if distance is None else distance(image, truth),
     }

@@ -16,6 +16,7 @@ from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import area_average, write_image
 from splitnerf.data.json_files import write_json
+from splitnerf.data.reading import Reading
 from splitnerf.data.tensor_files import read_tensors, write_tensors
 from splitnerf.errors import InputError
 from splitnerf.export.bake import UnwrappedMesh, bake_occlusion
@@ -208,12 +209,13 @@ def forget_state(folder: Path) -> None:
 
 
 def refine_run(
-    run: Path, data: Path, out: Path, *, downscale: int, settings: RefinementSettings, resume: bool = False
-) -> Refined | None:
+    run: Path, data: Path, out: Path, *, downscale: int, settings: RefinementSettings, resume: bool = False,
+    reading: Reading = Reading(),
+) -> Refined | None:  # fmt: skip
     """Refines what training exported into a run; see :func:`refine_folder`."""
     source = source_of(run)
     read_source(source)
-    dataset = load_dataset(data, "train", downscale)
+    dataset = load_dataset(data, "train", downscale, reading)
     try:
         refined = refine_folder(source, dataset, out, settings, resume=resume)
     except InputError as error:

@@ -23,7 +23,7 @@ BATCH = 4096  # pixels
 
 
 def outline_pixels(dataset: Dataset) -> tuple[Pixels, np.ndarray]:
-    """The pixels near the edges of the masks, and their coverage [n] in the photos."""
+    """The known pixels near the edges of the masks, and their coverage [n] in the photos."""
     alpha = dataset.images[..., 3]
     partly = (alpha > 0.01) & (alpha < 0.99)
     inside = alpha > 0.5
@@ -33,6 +33,8 @@ def outline_pixels(dataset: Dataset) -> tuple[Pixels, np.ndarray]:
         pad[axis] = (0, 1)
         partly |= np.pad(change, pad)
     near = binary_dilation(partly, np.ones((1, 3, 3), bool))
+    if dataset.known is not None:
+        near &= dataset.known
     return pixels_of(dataset, near), alpha[near]
 
 

@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.asset import Asset
-from splitnerf.data.frames import lens_intrinsics, read_camera_path, read_frames
+from splitnerf.data.frames import read_frames
 from splitnerf.data.images import read_image
+from splitnerf.data.layouts.transforms import read_camera_path
+from splitnerf.data.lens import lens_intrinsics
+from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 
 DEFAULT_SIZE = 512
@@ -101,15 +104,17 @@ def look_at(centre: np.ndarray, azimuth: float, elevation: float, distance: floa
     return pose
 
 
-def data_views(root: Path, split: str, size: tuple[int, int | None] | None) -> list[View]:
-    """The cameras of a data set's split, in the data's own world; the images' size is the default.
+def data_views(
+    root: Path, split: str, size: tuple[int, int | None] | None, reading: Reading = Reading()
+) -> list[View]:
+    """The cameras of a data set's split, in the data's world; the images' size is the default.
 
     Raises:
         InputError: The data cannot be used, or the size has another shape than the images.
     """
     if not root.is_dir():
         raise InputError(f"{root}: no such folder; give the folder of a data set")
-    frames = read_frames(root, split)
+    frames, _ = read_frames(root, split, reading)
     height, width = read_image(frames[0].image_path).shape[:2]
     return [_lens_view(f.pose, f.lens | {"w": width, "h": height}, size, str(root), (width, height)) for f in frames]
 

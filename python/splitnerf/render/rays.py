@@ -56,7 +56,7 @@ class PixelSource:
     """Draws training rays: most of them near the objects' masks, the rest anywhere.
 
     Args:
-        dataset: The train split.
+        dataset: The train split; pixels that are not known are never drawn.
         foreground_share: Share of the rays, in [0, 1], that are drawn within a few pixels of a mask.
         generator: The random generator of the pixels; images and cameras are kept on its device.
     """
@@ -71,15 +71,29 @@ class PixelSource:
         self.height, self.width = dataset.height, dataset.width
         self.share, self.generator = foreground_share, generator
         margin = max(2, self.width // 50)
-        near = F.max_pool2d(self.masks[:, None], 2 * margin + 1, stride=1, padding=margin) > 0
+        near = F.max_pool2d(self.masks[:, None], 2 * margin + 1, stride=1, padding=margin)[:, 0] > 0
+        self.known = None  # numbers of the known pixels; None for all
+        if dataset.known is not None:
+            known = torch.from_numpy(dataset.known).to(self.device)
+            near, self.known = near & known, known.reshape(-1).nonzero().squeeze(1)
         self.foreground = near.reshape(-1).nonzero().squeeze(1)
+
+    @property
+    def possible(self) -> Tensor:
+        """[n, H, W] the largest coverage in [0, 1] that the photos allow: the masks, and 1 where nothing is known."""
+        if self.known is None:
+            return self.masks
+        possible = torch.ones_like(self.masks).view(-1)
+        possible[self.known] = self.masks.reshape(-1)[self.known]
+        return possible.view_as(self.masks)
 
     def draw(self, n: int) -> tuple[Tensor, Tensor, Tensor]:
         """Draws n rays: origins [n, 3], unit directions [n, 3] and pixels [n, 4] (sRGB in [0, 1], straight alpha)."""
         n_near = int(n * self.share) if len(self.foreground) else 0
         draw = {"generator": self.generator, "device": self.device}
         near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), **draw)]
-        anywhere = torch.randint(len(self.pixels), (n - n_near,), **draw)
+        anywhere = torch.randint(len(self.pixels if self.known is None else self.known), (n - n_near,), **draw)
+        anywhere = anywhere if self.known is None else self.known[anywhere]
         index = torch.cat([near, anywhere])
         row = index // self.width
         view, column = row // self.height, index - row * self.width

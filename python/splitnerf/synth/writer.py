@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data import view_folders
+from splitnerf.data.layouts import view_folders
 from splitnerf.data.images import linear_to_srgb, read_hdr, write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.data.relit import PREFIX, relit_path

@@ -136,7 +136,7 @@ class Training:
         self.optimiser = make_optimiser(self.model, c)
         hull = None
         if c.sampling.hull_until > 0:
-            hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.masks, source.poses, source.intrinsics)
+            hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.possible, source.poses, source.intrinsics)
         self.grid = make_grid(c, hull, device)
         self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
         step = GraphedStep if c.run.cuda_graphs and device.type == "cuda" else Step
@@ -312,5 +312,6 @@ def check_same_scene(content: dict, fingerprint: str, run: Path) -> None:
     """Raises InputError where a checkpoint was trained on other images."""
     if content["fingerprint"] != fingerprint:
         raise InputError(
-            f"{run / 'checkpoint.pt'}: was trained on other images or another --downscale; give those, or another --out"
+            f"{run / 'checkpoint.pt'}: was trained on other images, or with another --downscale or --eval-mode; give those, or "
+            "another --out"
         )

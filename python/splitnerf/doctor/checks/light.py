@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from splitnerf.doctor.table import N, axis, check, column, pattern, slopes, sphere
+from splitnerf.doctor.table import N, axis, check, column, slopes, sphere
 from splitnerf.ops import sh_projection, zonal_factors
 from splitnerf.ops._library import lib
 

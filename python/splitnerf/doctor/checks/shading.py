@@ -6,7 +6,7 @@ import math
 
 import torch
 
-from splitnerf.doctor.table import N, axis, check, column, lut, pattern, sphere
+from splitnerf.doctor.table import N, axis, check, column, lut, sphere
 from splitnerf.ops._library import lib
 
 LINEAR, SRGB = (0.001, 0.2140411, 1.0), (0.01292, 0.5, 1.0)  # the same colours

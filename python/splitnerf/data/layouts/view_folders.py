@@ -14,27 +14,36 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from splitnerf.data.json_files import read_json
+from splitnerf.data.json_files import need, read_json
+from splitnerf.data.layouts.frame import Frame, checked_pose
+from splitnerf.data.lens import read_lens
 from splitnerf.errors import InputError
 
 METADATA, PHOTO = "metadata.json", "rgba.png"
+SPLITS = ("train", "test")
 
 
-def present(root: Path, split: str = "train") -> bool:
-    """Whether `root` has a view folder of the split."""
-    return any((folder / METADATA).is_file() for folder in _folders(root, split))
+def present(root: Path) -> bool:
+    """Whether `root` has view folders to train on."""
+    return "train" in splits(root)
 
 
-def entries(root: Path, split: str) -> list[tuple[Path, dict, Path]]:
-    """Folder, metadata and metadata file of each view of a split, by number.
+def splits(root: Path) -> list[str]:
+    """The splits that have a view folder."""
+    return [split for split in SPLITS if any((folder / METADATA).is_file() for folder in _folders(root, split))]
+
+
+def read(root: Path, split: str | None) -> list[Frame]:
+    """The views of a split, or of both, by number.
 
     Raises:
-        InputError: The split has no folder, or a folder's metadata is missing or no json object.
+        InputError: The split has no folder, or a folder lacks its photo or usable metadata.
     """
-    folders = _folders(root, split)
+    chosen = splits(root) if split is None else [split]
+    folders = [folder for name in chosen for folder in _folders(root, name)]
     if not folders:
         raise InputError(f"{root}: has no view folder {split}_000 for the {split} split; add posed images")
-    return [(folder, read_json(folder / METADATA, "cam_transform_mat"), folder / METADATA) for folder in folders]
+    return [_read_view(folder) for folder in folders]
 
 
 def parse_matrix(text: object) -> object:
@@ -48,6 +57,16 @@ def parse_matrix(text: object) -> object:
 def format_matrix(pose) -> str:
     """The inverse of `parse_matrix`, for a [4, 4] array."""
     return ",".join(repr(float(value)) for row in pose for value in row)
+
+
+def _read_view(folder: Path) -> Frame:
+    path, image_path = folder / METADATA, folder / PHOTO
+    content = read_json(path, "cam_transform_mat")
+    pose = checked_pose(parse_matrix(need(content, "cam_transform_mat", path)), f"{path}: cam_transform_mat")
+    numbers = {"camera_angle_x": need(content, "cam_angle_x", path), "w": content.get("imw"), "h": content.get("imh")}
+    if not image_path.is_file():
+        raise InputError(f"{image_path}: no such image; add it or remove the folder")
+    return Frame(folder.name, image_path, pose, *read_lens(numbers, str(path)))
 
 
 def _folders(root: Path, split: str) -> list[Path]:

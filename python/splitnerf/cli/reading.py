@@ -1,0 +1,39 @@
+"""The options of all commands that read a data set."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from splitnerf.data.reading import Reading
+
+
+def add_reading_options(parser: argparse.ArgumentParser, default: str) -> None:
+    """Adds --eval-mode and --mask-kind; `default` says in their help what holds without them."""
+    parser.add_argument(
+        "--eval-mode", choices=["all", "fraction", "filename"],
+        help="what of the data is for testing: fraction, every 8th view; filename, the views with `test` or `eval` in "
+        f"their path, those with `train` train; all, no view is held out and all are evaluated (default: {default})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--mask-kind", choices=["object", "ignore"],
+        help="what mask files mean: object, white is the object; ignore, black is to be ignored and alpha is the "
+        f"object (default: {default})",
+    )  # fmt: skip
+
+
+def reading_options(args: argparse.Namespace) -> dict[str, str]:
+    """The settings that the options give, by name."""
+    given = {"data.eval_mode": args.eval_mode, "data.mask_kind": args.mask_kind}
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def reading_of(args: argparse.Namespace, target: Path) -> Reading:
+    """How to read data: as the options say, else as the run does that `target` is or is a file of, else by default."""
+    from splitnerf.config import Config
+
+    run = next((f for f in (target, *target.absolute().parents[:2]) if (f / "checkpoint.pt").is_file()), None)
+    config = Config() if run is None or not (run / "config.toml").is_file() else Config.read(run / "config.toml")
+    return config.replace(reading_options(args)).reading

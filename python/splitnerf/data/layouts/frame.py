@@ -1,0 +1,90 @@
+"""One posed image of any layout, and the checks that all layouts share."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.images import LDR_SUFFIXES
+from splitnerf.data.lens import Distortion
+from splitnerf.data.paths import is_file
+from splitnerf.errors import InputError
+from splitnerf.notes import note_once
+
+RIGID_TOLERANCE = 1e-3
+FARTHEST = 1e9  # largest distance from the origin, in the data's units
+OPENCV_AXES = np.diag([1.0, -1.0, -1.0, 1.0])  # from OpenGL's: y and z the other way
+
+
+@dataclass
+class Frame:
+    """One posed image.
+
+    Attributes:
+        name: The frame's name: the file's stem, or the folder's name where each view has its own folder.
+        image_path: The image file.
+        pose: [4, 4] float64 camera-to-world, OpenGL axes, in the data's world.
+        lens: The numbers of the pinhole that the data give: `camera_angle_x` (radians), `fl_x fl_y cx cy w h` (pixels).
+        distortion: What the image has to be freed from, or None.
+        mask_path: The mask file, or None.
+        mask_kind: What the mask is: "object" (white is the object; it replaces the image's alpha), "ignore" (black is
+            to be ignored), or "auto" where the layout leaves it open.
+        dynamic_mask_path: A file that is white where the image is to be ignored, or None.
+        exposure: The factor of the image's linear values.
+    """
+
+    name: str
+    image_path: Path
+    pose: np.ndarray
+    lens: dict
+    distortion: Distortion | None = None
+    mask_path: Path | None = None
+    mask_kind: str = "auto"
+    dynamic_mask_path: Path | None = None
+    exposure: float = 1.0
+
+
+def checked_pose(matrix: object, name: str) -> np.ndarray:
+    """[4, 4] float64 of what a file gives as a camera-to-world matrix, called `name` in messages.
+
+    Raises:
+        InputError: It is not a rigid motion of finite numbers.
+    """
+    try:
+        pose = np.array(matrix, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
+        pose = np.empty(0)
+    if pose.shape != (4, 4):
+        raise InputError(f"{name} is not a 4x4 matrix of numbers; repair it")
+    if not (np.abs(pose) <= FARTHEST).all():
+        raise InputError(f"{name} has NaN, infinite or endless entries; repair or remove the frame")
+    rotation = pose[:3, :3]
+    rigid = np.abs(rotation.T @ rotation - np.eye(3)).max() < RIGID_TOLERANCE and np.linalg.det(rotation) > 0
+    if not rigid or np.abs(pose[3] - [0, 0, 0, 1]).max() > RIGID_TOLERANCE:
+        raise InputError(f"{name} is not a rigid camera-to-world pose (scaled, sheared or mirrored); repair it")
+    return pose
+
+
+def listed_file(folder: Path, name: str, source: Path) -> Path:
+    """The path of a file that `source` lists relative to `folder`; notes once where it leads out of the folder."""
+    path = folder / name
+    if not os.path.abspath(path).startswith(os.path.join(os.path.abspath(folder), "")):
+        note_once(f"{source}: names files outside of its folder; they are read", f"{name!r} is one")
+    return path
+
+
+def listed_image(folder: Path, name: str, source: Path) -> Path:
+    """The image that `source` lists relative to `folder`, perhaps without its suffix.
+
+    Raises:
+        InputError: There is no such regular file.
+    """
+    for suffix in ("", *LDR_SUFFIXES):
+        if is_file(folder / f"{name}{suffix}"):
+            return listed_file(folder, f"{name}{suffix}", source)
+    raise InputError(
+        f"{folder / name}: no such image, though {source.name} lists it; add the image or remove the frame"
+    )

@@ -1,0 +1,121 @@
+"""The layout of NeuS (DTU, BlendedMVS): `cameras_sphere.npz`, `image/` and, unless the images have alpha, `mask/`.
+
+    world_mat_0, world_mat_1, ...   4 x 4 float, K [R | t] above a row 0 0 0 1: from the data's world to pixels, the
+                                    first pixel's centre at (0, 0), in the order of the images' names
+    image/, mask/                   PNG or JPEG, paired by the order of their names; white is the object
+
+The world is that of `world_mat`, in its own units; `scale_mat_0` ..., which say where the object is, are not needed.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import rq
+
+from splitnerf.data.images import LDR_SUFFIXES
+from splitnerf.data.layouts.frame import OPENCV_AXES, Frame, checked_pose
+from splitnerf.data.lens import read_lens
+from splitnerf.errors import InputError
+
+CAMERAS, IMAGES, MASKS = "cameras_sphere.npz", "image", "mask"
+LONGEST_MATRIX = 4096  # bytes of an array in the file
+LARGEST_SKEW = 1e-2  # of the pixels' grid
+
+
+def present(root: Path) -> bool:
+    """Whether a folder has the layout."""
+    return (root / CAMERAS).is_file()
+
+
+def splits(root: Path) -> None:
+    """None: the layout makes no splits."""
+    return None
+
+
+def read(root: Path, split: None = None) -> list[Frame]:
+    """All frames, by name.
+
+    Raises:
+        InputError: A file cannot be used, or the numbers of cameras, images and masks differ.
+    """
+    matrices = read_matrices(root / CAMERAS)
+    images, masks = _pictures(root / IMAGES), _pictures(root / MASKS)
+    for folder, found in ((IMAGES, images), (MASKS, masks)):
+        if len(found) != len(matrices) and (folder == IMAGES or found):
+            raise InputError(
+                f"{root / folder}: has {len(found)} images, {CAMERAS} has {len(matrices)} cameras; repair it"
+            )
+    frames = []
+    for i, (matrix, image) in enumerate(zip(matrices, images)):
+        name = f"{root / CAMERAS}: world_mat_{i}"
+        intrinsics, pose = decompose(matrix, name)
+        numbers = dict(zip(("fl_x", "fl_y", "cx", "cy"), intrinsics.tolist()))
+        frames.append(Frame(
+            image.stem, image, checked_pose(pose, name), read_lens(numbers, name)[0],
+            mask_path=masks[i] if masks else None, mask_kind="object",
+        ))  # fmt: skip
+    return frames
+
+
+def read_matrices(path: Path) -> list[np.ndarray]:
+    """The matrices `world_mat_0`, `world_mat_1`, ... [4, 4] of a file.
+
+    Raises:
+        InputError: It is no such file, or it claims to hold more than it does.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            parts = {
+                part.filename: part
+                for part in archive.infolist()
+                if re.fullmatch(r"world_mat_\d{1,6}\.npy", part.filename)
+            }
+            if any(part.file_size > LONGEST_MATRIX for part in parts.values()):
+                raise ValueError(f"a matrix has more than {LONGEST_MATRIX} bytes")
+            raw = {int(name[len("world_mat_") : -len(".npy")]): archive.read(part) for name, part in parts.items()}
+        found = {i: np.lib.format.read_array(io.BytesIO(data), allow_pickle=False) for i, data in raw.items()}
+    except Exception as error:  # zipfile and NumPy raise whatever they meet
+        raise InputError(f"{path}: cannot be read as a file of NumPy arrays ({error}); replace it") from None
+    if not found or sorted(found) != list(range(len(found))):
+        raise InputError(f"{path}: needs world_mat_0, world_mat_1 and so on without a gap; repair it")
+    return [found[i] for i in range(len(found))]
+
+
+def decompose(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """The pinhole of a projection: K [R | t] up to a factor.
+
+    Args:
+        matrix: [4, 4] or [3, 4], from the world to pixels whose first centre is (0, 0).
+        name: The name of the matrix for messages.
+
+    Returns:
+        [4] (fx, fy, cx, cy) with pixel centres at +0.5, and [4, 4] camera-to-world, OpenGL axes.
+
+    Raises:
+        InputError: It is no such projection.
+    """
+    usable = matrix.shape in ((4, 4), (3, 4)) and matrix.dtype.kind in "fiu"
+    part = matrix[:3].astype(np.float64) if usable else np.full((3, 4), np.nan)
+    if not np.isfinite(part).all() or not abs(np.linalg.det(part[:, :3])) > 1e-30:
+        raise InputError(f"{name} is not a 4x4 matrix K [R | t] of finite numbers; repair it")
+    part = part * np.sign(np.linalg.det(part[:, :3]))
+    upper, rotation = rq(part[:, :3])
+    signs = np.diag(np.sign(np.diag(upper)))
+    upper, rotation = upper @ signs, signs @ rotation
+    k = upper / upper[2, 2]
+    if abs(k[0, 1]) > LARGEST_SKEW * k[0, 0]:
+        raise InputError(f"{name} has skewed pixels, which are not read; rectify the images")
+    world_to_camera = np.eye(4)
+    world_to_camera[:3, :3], world_to_camera[:3, 3] = rotation, np.linalg.solve(upper, part[:, 3])
+    pose = np.linalg.inv(world_to_camera) @ OPENCV_AXES
+    return np.array([k[0, 0], k[1, 1], k[0, 2] + 0.5, k[1, 2] + 0.5]), pose
+
+
+def _pictures(folder: Path) -> list[Path]:
+    """The images of a folder by name; none where it does not exist."""
+    return sorted(path for path in folder.glob("*") if path.suffix.lower() in LDR_SUFFIXES and path.is_file())

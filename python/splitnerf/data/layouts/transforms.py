@@ -1,0 +1,158 @@
+"""Transforms files: NeRF-Blender, nerfstudio (Polycam, Metashape, Record3D and others through it) and instant-ngp.
+
+Files:
+    transforms_train.json, transforms_test.json   a file for each split (NeRF-Blender)
+    transforms.json                               all frames; `train_filenames`, `test_filenames` or `val_filenames` may
+                                                  list the splits
+
+Keys, those of a frame before those of the file:
+    frames[].file_path          the image, with or without suffix, relative to the file
+    frames[].transform_matrix   4 x 4 camera-to-world, OpenGL axes
+    frames[].mask_path          null or a mask
+    mask_kind                   what the masks mean, "object" or "ignore"; without it :mod:`splitnerf.data.dataset` finds out
+    frames[].exposure           the factor of the image's linear values, 1 where it is missing
+    camera_angle_x, or fl_x, fl_y, cx, cy, w, h   the pinhole
+    camera_model or is_fisheye, k1 ... k4, p1, p2 the distortion, see :mod:`splitnerf.data.lens`
+
+Beside an image NAME.png a file dynamic_mask_NAME.png is white where the image is to be ignored (instant-ngp).
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.json_files import need, read_json
+from splitnerf.data.layouts.frame import Frame, checked_pose, listed_file, listed_image
+from splitnerf.data.lens import RADIAL, TANGENTIAL, Distortion, read_lens
+from splitnerf.data.paths import is_file
+from splitnerf.data.reading import MASK_KINDS
+from splitnerf.errors import InputError
+
+SINGLE = "transforms.json"
+SPLITS = {"train": ("train_filenames",), "test": ("test_filenames", "val_filenames")}
+FOCAL = ("camera_angle_x", "fl_x", "fl_y")
+LENS = ("cx", "cy", "w", "h", "camera_model", "is_fisheye", *RADIAL, *TANGENTIAL)
+SMALLEST_EXPOSURE = 1e-4
+OTHER_LENSES = ("ftheta_p1", "latlong", "equirectangular", "rolling_shutter")  # of instant-ngp
+
+
+def present(root: Path) -> bool:
+    """Whether a folder has a transforms file."""
+    return any((root / name).is_file() for name in (SINGLE, *map(_own, SPLITS)))
+
+
+def splits(root: Path) -> list[str] | None:
+    """The splits that have a file of their own or a list in the single file; None for a single file without lists."""
+    if any((root / _own(split)).is_file() for split in SPLITS):
+        return [split for split in SPLITS if (root / _own(split)).is_file()]
+    meta, _ = _read_entries(root / SINGLE)
+    listed = [split for split in SPLITS if _listed(meta, split) is not None]
+    return listed or None
+
+
+def read(root: Path, split: str | None) -> list[Frame]:
+    """The frames of a split, or all, in the order of the files.
+
+    Raises:
+        InputError: A file is missing or unusable, or a frame has no image, no usable pose or no lens.
+    """
+    if split is None:
+        own = [root / _own(name) for name in SPLITS if (root / _own(name)).is_file()]
+        frames: dict[Path, Frame] = {}
+        for path in own or [root / SINGLE]:
+            for frame in _frames(path, None):
+                frames.setdefault(frame.image_path, frame)
+        return list(frames.values())
+    own = root / _own(split)
+    if not own.is_file() and not (root / SINGLE).is_file():
+        raise InputError(f"{root}: has neither {own.name} nor {SINGLE}; add posed images for the {split} split")
+    return _frames(own, None) if own.is_file() else _frames(root / SINGLE, split)
+
+
+def read_camera_path(path: Path) -> list[tuple[np.ndarray, dict]]:
+    """The cameras of a transforms file whose images need not exist, in its order.
+
+    Args:
+        path: JSON with `frames`, each with `transform_matrix`; `camera_angle_x` or `fl_x fl_y cx cy`, `w` and `h` in
+            each frame or for all.
+
+    Returns:
+        The pose [4, 4] float64 and the pinhole of each frame, as in `Frame`.
+
+    Raises:
+        InputError: The file has no frame, or one of them no usable pose or no lens.
+    """
+    meta, entries = _read_entries(path)
+    if not entries:
+        raise InputError(f"{path}: has no frames; add some")
+    return [_read_camera(entry, meta, i, path, f"frame {i}")[:2] for i, entry in enumerate(entries)]
+
+
+def _own(split: str) -> str:
+    return f"transforms_{split}.json"
+
+
+def _listed(meta: dict, split: str) -> set[str] | None:
+    """The names of a split's images that a single file lists; None where it does not."""
+    lists = [meta[key] for key in SPLITS[split] if meta.get(key)]
+    return {os.path.normpath(str(name)) for name in lists[0]} if lists and isinstance(lists[0], list) else None
+
+
+def _frames(path: Path, split: str | None) -> list[Frame]:
+    """The frames of a file; of a single file those that it lists for the split."""
+    meta, entries = _read_entries(path)
+    names = None if split is None else _listed(meta, split)
+    frames = [_read_frame(entry, meta, i, path) for i, entry in enumerate(entries)
+              if names is None or os.path.normpath(str(entry.get("file_path"))) in names]  # fmt: skip
+    if not frames:
+        raise InputError(f"{path}: has no frames{'' if split is None else f' for the {split} split'}; add posed images")
+    return frames
+
+
+def _read_entries(path: Path) -> tuple[dict, list[dict]]:
+    """A transforms file and its frames."""
+    meta = read_json(path, "frames")
+    entries = need(meta, "frames", path)
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise InputError(f"{path}: 'frames' must be a list of objects")
+    return meta, entries
+
+
+def _read_frame(entry: dict, meta: dict, index: int, path: Path) -> Frame:
+    image_path = listed_image(path.parent, str(need(entry, "file_path", path, f" in frame {index}")), path)
+    mask = entry.get("mask_path")
+    mask_path = None if mask is None else listed_file(path.parent, str(mask), path)
+    dynamic = image_path.with_name(f"dynamic_mask_{image_path.stem}.png")
+    pose, lens, distortion = _read_camera(entry, meta, index, path, f"frame {index} ({image_path.name})")
+    mask_kind = entry.get("mask_kind", meta.get("mask_kind", "auto"))
+    if mask_kind not in MASK_KINDS:
+        raise InputError(f"{path}: 'mask_kind' must be one of {', '.join(MASK_KINDS)}, got {str(mask_kind)[:40]!r}; repair it")
+    return Frame(
+        image_path.stem, image_path, pose, lens, distortion, mask_path, mask_kind,
+        dynamic_mask_path=dynamic if is_file(dynamic) else None, exposure=_read_exposure(entry, index, path),
+    )  # fmt: skip
+
+
+def _read_exposure(entry: dict, index: int, path: Path) -> float:
+    exposure = entry.get("exposure", 1.0)
+    if not isinstance(exposure, (int, float)) or not SMALLEST_EXPOSURE <= exposure <= 1 / SMALLEST_EXPOSURE:
+        raise InputError(f"{path}: 'exposure' of frame {index} must be a positive number, got {str(exposure)[:40]}; repair it")
+    return float(exposure)
+
+
+def _read_camera(
+    entry: dict, meta: dict, index: int, path: Path, name: str
+) -> tuple[np.ndarray, dict, Distortion | None]:
+    matrix = need(entry, "transform_matrix", path, f" in frame {index}")
+    pose = checked_pose(matrix, f"{path}: transform_matrix of {name}")
+    given = {key: meta.get(key) if entry.get(key) is None else entry[key] for key in (*LENS, *OTHER_LENSES)}
+    for key in OTHER_LENSES:
+        value = given.pop(key)
+        if any(value) if isinstance(value, list) else value:
+            raise InputError(f"{path}: '{key}' is not read; undistort the photos and leave it out")
+    own = any(entry.get(key) is not None for key in FOCAL)
+    focal = {key: (entry if own else meta).get(key) for key in FOCAL}
+    return pose, *read_lens(focal | given, str(path))

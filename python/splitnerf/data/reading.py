@@ -1,0 +1,24 @@
+"""How data are read where they leave it open: what is held out for testing, and what their masks mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+EVAL_MODES = ("auto", "all", "fraction", "filename")
+MASK_KINDS = ("auto", "object", "ignore")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How to read a data set.
+
+    Attributes:
+        eval_mode: What the test split is. "auto": what the data say, else as "fraction"; "all": all views, and the
+            train split too; "fraction": every 8th view; "filename": the views with `test` or `eval` in their path, the
+            others have `train` in it.
+        mask_kind: What mask files mean whose layout leaves it open. "object": white is the object; "ignore": black is
+            to be ignored; "auto": what the masks look like.
+    """
+
+    eval_mode: str = "auto"
+    mask_kind: str = "auto"

@@ -1,0 +1,336 @@
+"""Layouts are recognised by themselves, and the same cameras come out of each."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from blender_data import SIZE, edit, make_blender, sphere_alpha
+from layout_scenes import (
+    CENTRE, COLMAP_CAMERAS, COUNT, FOCAL, LENS, RADIUS, sphere_poses, world_to_camera, write_colmap, write_neus,
+    write_transforms,
+)  # fmt: skip
+
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.frames import has_test_split, read_frames
+from splitnerf.data.images import write_image
+from splitnerf.data.layouts.neus import decompose
+from splitnerf.data.lens import lens_intrinsics
+from splitnerf.data.reading import Reading
+from splitnerf.errors import InputError
+
+LAYOUTS = {
+    "transforms": lambda root: write_transforms(root),
+    "transforms with masks": lambda root: write_transforms(root, masks=True, suffix=".jpg"),
+    "NeuS": lambda root: write_neus(root),
+    "NeuS with alpha": lambda root: write_neus(root, masks=False),
+    "COLMAP, binary": lambda root: write_colmap(root, binary=True),
+    "COLMAP, text": lambda root: write_colmap(root, binary=False, masks=True),
+    "COLMAP of nerfstudio": lambda root: write_colmap(root, binary=True, place="colmap/sparse/0"),
+    "COLMAP, undistorted": lambda root: write_colmap(root, binary=False, place="sparse"),
+}
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_the_same_cameras_come_out_of_each_layout(tmp_path, name):
+    data = load_dataset(LAYOUTS[name](tmp_path))
+    poses = [pose for i, pose in enumerate(sphere_poses()) if i % 8]
+    assert data.frame_names == [f"v{i:02d}" for i in range(COUNT) if i % 8]
+    assert load_dataset(tmp_path, "test").frame_names == ["v00", "v08"] and has_test_split(tmp_path)
+    np.testing.assert_allclose(data.world_poses, poses, atol=1e-6)
+    np.testing.assert_allclose(data.intrinsics, np.broadcast_to(LENS, (len(data), 4)), rtol=1e-5)
+    assert data.known is None and not data.origin.any()
+    for pose, image in zip(poses, data.images):
+        assert np.array_equal(image[..., 3] > 0.5, sphere_alpha(pose, CENTRE, RADIUS) > 0.5)
+
+
+def test_a_folder_of_no_layout(tmp_path):
+    with pytest.raises(InputError, match="neither transforms_train.json nor .* cameras_sphere.npz, nor a COLMAP model"):
+        load_dataset(tmp_path)
+    assert has_test_split(tmp_path)  # so that loading says it
+
+
+def test_a_transforms_file_counts_before_the_model_it_was_made_of(tmp_path):
+    write_colmap(tmp_path, binary=True)
+    write_transforms(tmp_path, fl_x=2 * FOCAL)
+    assert load_dataset(tmp_path).intrinsics[0, 0] == pytest.approx(2 * FOCAL)
+
+
+def test_masks_of_colmap_are_found_by_both_names(tmp_path):
+    root = write_colmap(tmp_path, binary=True, masks=True)
+    for i in range(0, COUNT, 2):
+        (root / f"masks/v{i:02d}.png.png").rename(root / f"masks/v{i:02d}.png")
+    frames, _ = read_frames(root, "train")
+    assert all(frame.mask_path.is_file() and frame.mask_path.name.startswith(frame.name) for frame in frames)
+
+
+def test_the_largest_of_several_models_is_read(tmp_path, capsys):
+    write_colmap(tmp_path, binary=True, place="sparse/1")
+    (tmp_path / "sparse/0").mkdir()
+    (tmp_path / "sparse/0/cameras.bin").write_bytes(struct.pack("<Q", 0))
+    (tmp_path / "sparse/0/images.bin").write_bytes(struct.pack("<Q", 0))
+    assert len(load_dataset(tmp_path)) == COUNT - 2
+    assert f"{tmp_path}: has 2 COLMAP models; the largest is read" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_images_in_folders_have_their_masks_in_folders(tmp_path, binary):
+    """Here through a lens that bends, whose parameters a model names."""
+    cameras = {3: (3, "RADIAL", [SIZE, SIZE], [FOCAL, SIZE / 2, SIZE / 2, 0.05, 0.01])}
+    root = write_colmap(tmp_path, binary=binary, masks=True, cameras=cameras)
+    for folder, suffix in (("images", ".png"), ("masks", ".png.png")):
+        (root / folder / "left").mkdir()
+        (root / folder / f"v03{suffix}").rename(root / folder / f"left/v03{suffix}")
+    for path in (root / "sparse/0").iterdir():
+        path.write_bytes(path.read_bytes().replace(b"v03.png", b"left/v03.png"))
+    frames, _ = read_frames(root, "train", Reading("all"))
+    frame = next(frame for frame in frames if frame.name == "left/v03")
+    assert frame.image_path == root / "images/left/v03.png" and frame.mask_path == root / "masks/left/v03.png.png"
+    assert frame.distortion.radial == (0.05, 0.01, 0, 0) and not frame.distortion.fisheye
+
+
+@pytest.mark.parametrize(("number", "name", "parameters", "expected"), [
+    (2, "SIMPLE_RADIAL", [9.0, 4, 3, 0.1], ((9, 9, 4, 3), (0.1, 0, 0, 0), (0, 0), False)),
+    (4, "OPENCV", [9.0, 8, 4, 3, 0.1, 0.2, 0.3, 0.4], ((9, 8, 4, 3), (0.1, 0.2, 0, 0), (0.3, 0.4), False)),
+    (5, "OPENCV_FISHEYE", [9.0, 8, 4, 3, 0.1, 0.2, 0.3, 0.4], ((9, 8, 4, 3), (0.1, 0.2, 0.3, 0.4), (0, 0), True)),
+    (8, "SIMPLE_RADIAL_FISHEYE", [9.0, 4, 3, 0.1], ((9, 9, 4, 3), (0.1, 0, 0, 0), (0, 0), True)),
+    (9, "RADIAL_FISHEYE", [9.0, 4, 3, 0.1, 0.2], ((9, 9, 4, 3), (0.1, 0.2, 0, 0), (0, 0), True)),
+])  # fmt: skip
+@pytest.mark.parametrize("binary", [True, False])
+def test_each_camera_model_of_colmap(tmp_path, binary, number, name, parameters, expected):
+    frames, _ = read_frames(
+        write_colmap(tmp_path, binary=binary, cameras={1: (number, name, [SIZE, SIZE], parameters)}), "train"
+    )
+    bent = frames[0].distortion
+    assert tuple(lens_intrinsics(frames[0].lens, (SIZE, SIZE))) == pytest.approx(expected[0])
+    assert (bent.radial, bent.tangential, bent.fisheye) == expected[1:]
+
+
+BAD_MODELS = {
+    "another camera model": (dict.fromkeys((1, 7), (7, "FOV", [9, 9], [1.0] * 5)), "camera model FOV is not read"),
+    "no camera": ({5: COLMAP_CAMERAS[1], 6: COLMAP_CAMERAS[7]}, "has camera 1, which the model lacks"),
+    "no focal length": ({1: (1, "PINHOLE", [9, 9], [0.0, 1, 1, 1]), 7: COLMAP_CAMERAS[7]}, "camera 1: 'fl_x' must be"),
+    "NaN": ({1: (3, "RADIAL", [9, 9], [9, 4, 4, np.nan, 0]), 7: COLMAP_CAMERAS[7]}, "camera 1: 'k1' is no coefficient"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("binary", [True, False])
+@pytest.mark.parametrize("case", BAD_MODELS)
+def test_bad_models_of_colmap(tmp_path, case, binary):
+    cameras, message = BAD_MODELS[case]
+    root = write_colmap(tmp_path, binary=binary)
+    images = {path.name: path.read_bytes() for path in (root / "sparse/0").glob("images.*")}
+    write_colmap(root, binary=binary, cameras=cameras)
+    for name, content in images.items():
+        (root / "sparse/0" / name).write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        load_dataset(root)
+
+
+def test_a_model_that_names_no_image_or_a_missing_one(tmp_path):
+    root = write_colmap(tmp_path, binary=True)
+    (root / "images/v05.png").unlink()
+    with pytest.raises(InputError, match="v05.png: no such image, though images.bin lists it"):
+        load_dataset(root)
+    (root / "sparse/0/images.bin").write_bytes(struct.pack("<Q", 0))
+    with pytest.raises(InputError, match="images.bin: has no registered image"):
+        load_dataset(root)
+
+
+def test_a_projection_is_taken_apart():
+    k = np.array([[900.0, 0, 320.25], [0, 910.0, 239.75], [0, 0, 1]])
+    for pose in sphere_poses(5):
+        for factor in (1.0, -1.0, 1e-6, -3e5):
+            matrix = np.eye(4)
+            matrix[:3] = factor * (k @ world_to_camera(pose)[:3])
+            intrinsics, found = decompose(matrix, "it")
+            assert intrinsics == pytest.approx([900, 910, 320.75, 240.25]) and found == pytest.approx(pose, abs=1e-9)
+
+
+BAD_MATRICES = {
+    "words": lambda a: a.update(world_mat_2=np.full((4, 4), "one")),
+    "3x3": lambda a: a.update(world_mat_2=np.eye(3)),
+    "NaN": lambda a: a.update(world_mat_2=np.full((4, 4), np.nan)),
+    "flat": lambda a: a.update(world_mat_2=np.zeros((4, 4))),
+    "skewed": lambda a: a.update(world_mat_2=np.array([[9.0, 1, 0, 0], [0, 9, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])),
+    "a gap": lambda a: a.pop("world_mat_2"),
+    "too few": lambda a: a.pop(f"world_mat_{COUNT - 1}"),
+    "none": lambda a: [a.pop(f"world_mat_{i}") for i in range(COUNT)],
+    "large": lambda a: a.update(world_mat_2=np.zeros((400, 400))),
+    "an object": lambda a: a.update(world_mat_2=np.array([{}], dtype=object)),
+}
+
+
+@pytest.mark.parametrize("case", BAD_MATRICES)
+def test_bad_cameras_of_neus(tmp_path, case):
+    path = write_neus(tmp_path) / "cameras_sphere.npz"
+    arrays = dict(np.load(path))
+    BAD_MATRICES[case](arrays)
+    np.savez(path, **arrays)
+    message = "has more than 4096 bytes" if case == "large" else "cameras_sphere.npz|image: has 16 images"
+    with pytest.raises(InputError, match=message) as caught:
+        load_dataset(tmp_path)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_lists_of_nerfstudio_make_the_splits(tmp_path):
+    root = write_transforms(
+        tmp_path, train_filenames=[f"images/v{i:02d}.png" for i in range(10)], val_filenames=["./images/v12.png"]
+    )
+    assert load_dataset(root).frame_names == [f"v{i:02d}" for i in range(10)]
+    assert load_dataset(root, "test").frame_names == ["v12"] and has_test_split(root)
+    edit(root, lambda m: m.pop("val_filenames"), "transforms.json")
+    assert not has_test_split(root)
+
+
+# ---- what is held out ----
+
+
+def names(root, mode: str) -> tuple[list[str], list[str]]:
+    return tuple(
+        [frame.name for frame in read_frames(root, split, Reading(eval_mode=mode))[0]] for split in ("train", "test")
+    )
+
+
+def test_eval_modes_of_one_list(tmp_path):
+    root, every = write_transforms(tmp_path), [f"v{i:02d}" for i in range(COUNT)]
+    assert names(root, "all") == (every, every) and not has_test_split(root, Reading("all"))
+    assert (
+        names(root, "fraction")
+        == names(root, "auto")
+        == ([n for n in every if n not in ("v00", "v08")], ["v00", "v08"])
+    )
+    with pytest.raises(InputError, match="v00.png: its path names neither train nor test"):
+        names(root, "filename")
+
+
+def test_eval_modes_of_data_that_make_splits(tmp_path):
+    root = make_blender(tmp_path, train=6, test=3)
+    train, test = [f"r_{i}" for i in range(6)], [f"r_{i}" for i in range(3)]
+    assert names(root, "auto") == names(root, "filename") == (train, test)
+    assert names(root, "all") == (train + test, train + test)
+    assert names(root, "fraction") == ((train + test)[1:8], ["r_0", "r_2"])
+    edit(root, lambda m: m["frames"][1].update(file_path="./train/r_4"), "transforms_test.json")  # in both splits
+    assert names(root, "all")[0] == [*train, "r_0", "r_2"]
+
+
+@pytest.mark.parametrize(("path", "split"), [
+    ("images/test_001.png", "test"), ("images/train_001.png", "train"), ("test/latest.png", "test"),
+    ("Train/contest.png", "train"),
+    ("train/eval_3.png", "test"), ("test/train/0.png", "train"), ("testing/7.png", "test"),
+    ("latest/contest.png", None), ("train_test/0.png", None), ("test_train/test_0.png", "test"),
+])  # fmt: skip
+def test_words_in_paths(tmp_path, path, split):
+    root = write_transforms(tmp_path / "train")  # the folder's own name does not count
+    write_image(root / path, np.ones((SIZE, SIZE, 4)))
+    edit(root, lambda m: m["frames"].__setitem__(slice(1, None), []), "transforms.json")
+    edit(root, lambda m: m["frames"][0].update(file_path=path), "transforms.json")
+    if split is None:
+        with pytest.raises(InputError, match="its path names neither train nor test"):
+            names(root, "filename")
+        return
+    assert len(read_frames(root, split, Reading("filename"))[0]) == 1
+    other = "test" if split == "train" else "train"
+    with pytest.raises(
+        InputError, match=f"has no frames for the {other} split; no path of an image has the word {other}"
+    ):
+        read_frames(root, other, Reading("filename"))
+
+
+def test_one_frame_is_held_out_and_none_is_left(tmp_path):
+    root = write_transforms(tmp_path)
+    edit(root, lambda m: m["frames"].__setitem__(slice(1, None), []), "transforms.json")
+    with pytest.raises(InputError, match="no frames for the train split; add posed images, or give --eval-mode all"):
+        load_dataset(root)
+    with pytest.raises(InputError, match="one view does not show the object's shape"):
+        load_dataset(root, reading=Reading("all"))
+
+
+# ---- files of the data ----
+
+
+def test_a_byte_order_mark_is_no_damage(tmp_path):
+    path = write_transforms(tmp_path) / "transforms.json"
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert len(load_dataset(tmp_path)) == COUNT - 2
+
+
+def test_files_outside_of_the_folder_are_read_and_named_once(tmp_path, capsys):
+    root = write_transforms(tmp_path / "data", masks=True)
+    (root / "images").rename(tmp_path / "images")
+    for i, folder in ((0, ".."), (1, str(tmp_path)), *((i, "../data/..") for i in range(2, COUNT))):
+        edit(root, lambda m, i=i, f=folder: m["frames"][i].update(file_path=f"{f}/images/v{i:02d}"), "transforms.json")
+    assert len(load_dataset(root)) == COUNT - 2
+    notes = [line for line in capsys.readouterr().err.splitlines() if "outside of" in line]
+    assert notes == [f"splitnerf: note: {root}/transforms.json: names files outside of its folder; they are read "
+                     "('../images/v00.png' is one)"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "/etc/passwd", "../secret"])
+def test_what_is_no_image_stays_unread(tmp_path, name):
+    root = write_transforms(tmp_path / "data")
+    (tmp_path / "secret").write_text("a word that nobody may see")
+    edit(root, lambda m: m["frames"][1].update(file_path=name), "transforms.json")
+    with pytest.raises(InputError) as caught:
+        load_dataset(root)
+    assert "word" not in str(caught.value) and "root" not in str(caught.value).replace(str(tmp_path), "")
+
+
+def test_the_same_image_twice_is_named(tmp_path):
+    root = write_transforms(tmp_path)
+    edit(root, lambda m: m["frames"][9].update(file_path="./images/../images/v02"), "transforms.json")
+    with pytest.raises(InputError, match="v02.png: two frames have this image; remove one of them"):
+        load_dataset(root)
+
+
+def test_a_file_without_permission_is_not_called_damaged(tmp_path, monkeypatch):
+    root = write_transforms(tmp_path)
+
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.read_text", refuse)
+    with pytest.raises(InputError, match=r"transforms.json: cannot be read \(Permission denied\)"):
+        load_dataset(root)
+
+
+# ---- damage ----
+
+
+@pytest.mark.parametrize("kind", ["cameras.bin", "images.bin", "cameras.txt", "images.txt", "cameras_sphere.npz"])
+def test_damaged_files_are_refused_or_read(tmp_path, kind):
+    """Cut at any place, or with a few bytes changed: one line or data, nothing else, and no memory without end."""
+    root = write_neus(tmp_path) if kind.endswith("npz") else write_colmap(tmp_path, binary=kind.endswith("bin"))
+    path = root / kind if kind.endswith("npz") else root / "sparse/0" / kind
+    whole, random, refused = path.read_bytes(), np.random.default_rng(3), 0
+    for turn in range(150):
+        damaged = bytearray(whole)
+        if turn % 3 == 0:
+            del damaged[random.integers(len(whole)) :]
+        for place in random.integers(len(whole), size=turn % 3 * 2):
+            if place < len(damaged):
+                damaged[place] = random.integers(256)
+        path.write_bytes(damaged)
+        try:
+            read_frames(root, "train")
+        except InputError as error:
+            refused += 1
+            assert len(str(error).splitlines()) == 1 and str(tmp_path) in str(error)
+    assert refused > 30
+
+
+def test_counts_beyond_the_file_are_refused_at_once(tmp_path):
+    root = write_colmap(tmp_path, binary=True)
+    path = root / "sparse/0/images.bin"
+    whole = path.read_bytes()
+    path.write_bytes(struct.pack("<Q", 1 << 60) + whole[8:])
+    with pytest.raises(InputError, match="images.bin: damaged, it ends too early"):
+        load_dataset(root)
+    points = 8 + struct.calcsize("<I7dI") + len("v08.png") + 1
+    path.write_bytes(whole[:points] + struct.pack("<Q", 1 << 60) + whole[points + 8 :])
+    with pytest.raises(InputError, match="images.bin: damaged, it ends too early"):
+        load_dataset(root)
+    path.write_bytes(whole[: points - 8] + b"v" * 9999 + whole[points - 1 :])
+    with pytest.raises(InputError, match="images.bin: damaged, a name does not end"):
+        load_dataset(root)
