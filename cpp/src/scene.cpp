@@ -66,23 +66,22 @@ RTCRay make_ray(Vec3<float> origin, Vec3<float> direction, float t_far) {
 }
 
 // Fills a packet from the rays first, first + 1, ... and returns how many there were; lanes past the
-// end repeat the last ray, masked out.
+// end repeat the last ray, masked out like rays that cannot be traced.
 int load_packet(const float* origins, const float* directions, int64_t first, int64_t n_rays, float t_far,
                 RTCRay16& rays, int* valid) {
   const int count = static_cast<int>(min_of(kPacket, n_rays - first));
   for (int k = 0; k < kPacket; ++k) {
     const int64_t i = first + min_of(k, count - 1);
-    rays.org_x[k] = origins[i * 3];
-    rays.org_y[k] = origins[i * 3 + 1];
-    rays.org_z[k] = origins[i * 3 + 2];
-    rays.dir_x[k] = directions[i * 3];
-    rays.dir_y[k] = directions[i * 3 + 1];
-    rays.dir_z[k] = directions[i * 3 + 2];
+    Vec3<float> o = load3(origins + i * 3), d = load3(directions + i * 3);
+    const bool traced = can_be_traced(o, d, t_far);
+    if (!traced) o = {0.f, 0.f, 0.f}, d = {0.f, 0.f, 1.f};
+    rays.org_x[k] = o.x, rays.org_y[k] = o.y, rays.org_z[k] = o.z;
+    rays.dir_x[k] = d.x, rays.dir_y[k] = d.y, rays.dir_z[k] = d.z;
     rays.tnear[k] = 0.f;
-    rays.tfar[k] = t_far;
+    rays.tfar[k] = traced ? t_far : INFINITY;
     rays.mask[k] = ~0u;
     rays.flags[k] = 0;
-    valid[k] = k < count ? -1 : 0;
+    valid[k] = k < count && traced ? -1 : 0;
   }
   return count;
 }
@@ -123,7 +122,7 @@ void Scene::trace_visibility(const float* origins, const float* directions, int6
     for (int64_t packet = begin; packet < end; ++packet) {
       const int64_t first = packet * kPacket;
       const int count = load_packet(origins, directions, first, n_rays, t_far, rays, valid);
-      for (int k = 0; active && k < count; ++k) valid[k] = active[first + k] ? -1 : 0;
+      for (int k = 0; active && k < count; ++k) valid[k] &= active[first + k] ? -1 : 0;
       embree::occluded16(valid, scene, &rays);
       // Embree marks an occluded ray by tfar = -infinity and leaves masked lanes alone.
       for (int k = 0; k < count; ++k) visible[first + k] = valid[k] == 0 || !(rays.tfar[k] < 0.f);
@@ -136,14 +135,19 @@ void Scene::trace_fan(Vec3<float> origin, const float* x, const float* y, const 
   const RTCScene scene = embree_scene(impl_->tracer);
   alignas(64) RTCRay16 rays{};
   alignas(64) int valid[kPacket];
+  const bool starts = fits(origin);
+  if (!starts) origin = {0.f, 0.f, 0.f};
   for (int k = 0; k < kPacket; ++k) {
     rays.org_x[k] = origin.x, rays.org_y[k] = origin.y, rays.org_z[k] = origin.z;
     rays.tnear[k] = t_near, rays.mask[k] = ~0u;
   }
   for (int64_t first = 0; first < n; first += kPacket) {
     for (int k = 0; k < kPacket; ++k) {
-      rays.dir_x[k] = x[first + k], rays.dir_y[k] = y[first + k], rays.dir_z[k] = z[first + k];
-      rays.tfar[k] = INFINITY, valid[k] = active[first + k];
+      Vec3<float> d{x[first + k], y[first + k], z[first + k]};
+      const bool traced = starts && fits(d);
+      if (!traced) d = {0.f, 0.f, 1.f};
+      rays.dir_x[k] = d.x, rays.dir_y[k] = d.y, rays.dir_z[k] = d.z;
+      rays.tfar[k] = INFINITY, valid[k] = traced ? active[first + k] : 0;
     }
     embree::occluded16(valid, scene, &rays);
     for (int k = 0; k < kPacket; ++k) visible[first + k] = rays.tfar[k] < 0.f ? 0 : -1;
@@ -170,6 +174,7 @@ void Scene::trace_closest(const float* origins, const float* directions, int64_t
 }
 
 Hit Scene::trace_closest(Vec3<float> origin, Vec3<float> direction, float t_far) const {
+  if (!can_be_traced(origin, direction, t_far)) return {-1.f, 0, 0.f, 0.f};
   RTCRayHit query{};
   query.ray = make_ray(origin, direction, t_far);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -179,6 +184,7 @@ Hit Scene::trace_closest(Vec3<float> origin, Vec3<float> direction, float t_far)
 }
 
 bool Scene::occluded(Vec3<float> origin, Vec3<float> direction, float t_far) const {
+  if (!can_be_traced(origin, direction, t_far)) return false;
   RTCRay ray = make_ray(origin, direction, t_far);
   embree::occluded1(embree_scene(impl_->tracer), &ray);
   return ray.tfar < 0.f;

@@ -1,12 +1,25 @@
 // What every Scene holds, whichever library traces it.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <vector>
 
 #include "splitnerf/scene.h"
 
 namespace splitnerf {
+
+// Embree ends the process for numbers that are not finite, or whose products are not.
+inline constexpr float kFarthest = 1e12f;
+
+inline bool fits(Vec3<float> v) {  // false for NaN
+  return std::fabs(v.x) <= kFarthest && std::fabs(v.y) <= kFarthest && std::fabs(v.z) <= kFarthest;
+}
+
+// Whether a ray can be traced; one that cannot meets nothing.
+inline bool can_be_traced(Vec3<float> origin, Vec3<float> direction, float t_far) {
+  return fits(origin) && fits(direction) && t_far >= 0.f;
+}
 
 struct Scene::Impl {
   // Copies and validates the mesh; throws std::invalid_argument.

@@ -20,8 +20,9 @@ Scene::Impl::Impl(const float* vertex_data, int64_t vertex_count, const int32_t*
     throw std::invalid_argument("Scene: at most 2^32 - 1 triangles, got " + std::to_string(n_triangles));
   }
   for (int64_t i = 0; i < n_vertices * 3; ++i) {
-    if (!std::isfinite(vertex_data[i])) {
-      throw std::invalid_argument("Scene: vertex " + std::to_string(i / 3) + " is not finite");
+    if (!(std::fabs(vertex_data[i]) <= kFarthest)) {
+      throw std::invalid_argument("Scene: vertex " + std::to_string(i / 3) +
+                                  " is not finite, or farther than 1e12 from the origin");
     }
   }
   for (int64_t i = 0; i < n_triangles * 3; ++i) {

@@ -16,7 +16,18 @@ void Scene::trace_closest(const float* origins, const float* directions, int64_t
     throw std::runtime_error(
         "Scene: this build has no Embree and no trace callback is registered (set_trace_callback)");
   }
-  if (n_rays > 0) callback(*this, impl_->tracer, origins, directions, n_rays, t_far, hits);
+  std::vector<float> o(origins, origins + 3 * n_rays), d(directions, directions + 3 * n_rays);
+  std::vector<bool> traced(n_rays);
+  for (int64_t i = 0; i < n_rays; ++i) {
+    traced[i] = can_be_traced(load3(&o[3 * i]), load3(&d[3 * i]), t_far);
+    if (traced[i]) continue;
+    store3(&o[3 * i], Vec3<float>{0.f, 0.f, 0.f});
+    store3(&d[3 * i], Vec3<float>{0.f, 0.f, 1.f});
+  }
+  if (n_rays > 0) callback(*this, impl_->tracer, o.data(), d.data(), n_rays, t_far >= 0.f ? t_far : 0.f, hits);
+  for (int64_t i = 0; i < n_rays; ++i) {
+    if (!traced[i]) hits[i] = {-1.f, 0, 0.f, 0.f};
+  }
 }
 
 void Scene::trace_visibility(const float* origins, const float* directions, int64_t n_rays, float t_far,

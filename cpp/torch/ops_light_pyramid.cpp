@@ -6,6 +6,15 @@
 namespace splitnerf::glue {
 namespace {
 
+// The rows of a sparse matrix are walked without further checks.
+void check_rows(const char* op, const Tensor& offsets, const Tensor& columns, int64_t n_columns) {
+  const int64_t *row = in<int64_t>(offsets), n_rows = offsets.size(0) - 1;
+  bool ascend = row[0] >= 0 && row[n_rows] <= columns.size(0);
+  for (int64_t i = 0; i < n_rows; ++i) ascend &= row[i] <= row[i + 1];
+  require(ascend, op, "offsets must ascend within [0, " + std::to_string(columns.size(0)) + "]");
+  check_indices(op, "columns", columns, n_columns);
+}
+
 Tensor sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor transposed_offsets,
                       Tensor transposed_columns, Tensor transposed_weights, Tensor values) {
   const char* op = "sparse_product";
@@ -18,6 +27,7 @@ Tensor sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor tra
   checked(op, "transposed_columns", transposed_columns, {c.size(0)}, type.with(ScalarType::Int));
   checked(op, "transposed_weights", transposed_weights, {c.size(0)}, type);
   require(o.size(0) > 0, op, "offsets must hold at least one number");
+  if (type.on_cpu()) check_rows(op, o, c, x.size(0));  // to look at a GPU's numbers would mean waiting for it
   Tensor products = empty_like_type(x, {o.size(0) - 1, 3}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);

@@ -7,6 +7,8 @@
 namespace splitnerf::glue {
 namespace {
 
+constexpr double kMostSteps = 1 << 20;
+
 std::tuple<Tensor, Tensor, Tensor, Tensor> march_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells,
                                                       double box, double step, int64_t max_samples) {
   const char* op = "march_rays";
@@ -19,6 +21,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> march_rays(Tensor rays_o, Tensor rays
   const int64_t resolution = cells.size(0);
   const Tensor grid = checked(op, "cells", cells, {resolution, resolution, resolution}, type.with(ScalarType::Byte));
   require(box > 0 && step > 0, op, "box and step must be positive");
+  require(box <= kMostSteps * step, op, "box must be at most 2^20 steps");  // a ray may look at each of them
   const MarchOptions options{static_cast<float>(box), static_cast<float>(step), max_samples};
   const int64_t n_blocks = blocks_along(static_cast<int>(resolution));
   Tensor blocks = empty_like_type(o, {n_blocks, n_blocks, n_blocks}, ScalarType::Byte);

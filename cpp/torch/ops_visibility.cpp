@@ -45,15 +45,6 @@ std::tuple<Tensor, Tensor> vertex_grids(Tensor vertices, double radius, int64_t 
   return {starts, order};
 }
 
-// Numbers in [0, high): the grids are walked without further checks.
-void check_indices(const char* op, const char* name, const Tensor& t, int64_t high) {
-  const int32_t* values = in<int32_t>(t);
-  int32_t least = 0, most = 0;
-  for (int64_t i = 0, n = t.size(0) * t.size(1); i < n; ++i)
-    least = min_of(least, values[i]), most = max_of(most, values[i]);
-  require(least >= 0 && most < high, op, std::string(name) + " must hold numbers in [0, " + std::to_string(high) + ")");
-}
-
 // The cache as both readers take it.
 struct Cache {
   Kind type;
@@ -76,6 +67,7 @@ struct Cache {
     require(n_buckets() > 0 && (n_buckets() & (n_buckets() - 1)) == 0 && radius > 0, op,
             "starts must be [levels, 2^k + 1] and radius positive");
     if (!type.on_cpu()) return;  // to look at the numbers would mean waiting for the GPU
+    require(vertices.size(0) > 0, op, "vertices must hold at least one");
     check_indices(op, "starts", starts, vertices.size(0) + 1);
     check_indices(op, "order", order, vertices.size(0));
   }

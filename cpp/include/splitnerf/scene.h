@@ -19,11 +19,14 @@ struct Hit {
 class SPLITNERF_API Scene {
  public:
   // vertices [n_vertices, 3] float32, triangles [n_triangles, 3] int32 (both are copied). Throws
-  // std::invalid_argument for an empty mesh, an index out of range or a non-finite vertex.
+  // std::invalid_argument for an empty mesh, an index out of range, or a vertex that is not finite or farther than 1e12
+  // from the origin.
   Scene(const float* vertices, int64_t n_vertices, const int32_t* triangles, int64_t n_triangles);
   ~Scene();
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
+
+  // Rays that are not finite, or whose numbers exceed 1e12 (t_far aside), meet nothing.
 
   // visible[i] = 1 where the segment origin + t direction, t in (0, t_far), meets no triangle.
   // Rays go in packets of 16: neighbours in the arrays should be neighbours in space. A ray

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import torch
+from torch.autograd import forward_ad
 
 from splitnerf import _core
 
@@ -31,6 +32,23 @@ def refuse_gradients(ctx, op: str, **arguments: int) -> None:
             raise RuntimeError(f"{op}: no gradient to {name} is defined; see the table in docs/ops.md")
 
 
+class NoDuals(torch.library.Library):
+    """Registers kernels that raise where an argument carries a tangent; torch itself would lose it in silence."""
+
+    def impl(self, op_name, fn, *key, **options):
+        def refusing(keyset, *arguments, **others):
+            if forward_ad._current_level >= 0 and any(map(is_dual, arguments)):
+                raise RuntimeError(f"{op_name}: no forward derivative (jvp) is defined; see the table in docs/ops.md")
+            return fn(keyset, *arguments, **others)
+
+        super().impl(op_name, refusing, *key, **options)
+
+
+def is_dual(argument: object) -> bool:
+    """Whether an argument of an operator is a tensor with a tangent."""
+    return isinstance(argument, torch.Tensor) and forward_ad.unpack_dual(argument).tangent is not None
+
+
 def register(name: str, *, fake, backward=None, setup_context=None) -> None:
     """Registers the fake implementation and the gradient of ``splitnerf::name``.
 
@@ -42,4 +60,7 @@ def register(name: str, *, fake, backward=None, setup_context=None) -> None:
     def refuse(ctx, *grads):
         raise RuntimeError(f"{name}: no gradient is defined for this operator; see the table in docs/ops.md")
 
-    torch.library.register_autograd(qualified, backward or refuse, setup_context=setup_context)
+    torch.library.register_autograd(qualified, backward or refuse, setup_context=setup_context, lib=_FRAGMENT)
+
+
+_FRAGMENT = NoDuals("splitnerf", "FRAGMENT")

@@ -1,0 +1,132 @@
+"""Numbers that would end the process: the tracer's and a sparse matrix's. They are refused, or meet nothing."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+from gltf_builder import triangle
+
+from splitnerf.data.gltf import read_asset
+from splitnerf.errors import InputError
+from splitnerf.fields.visibility import bit_counts
+from splitnerf.ops import MeshScene, SparseMap, march_rays, occlusion_factors, sparse_product, trace_visibility
+from splitnerf.ops._library import lib
+
+BAD = [math.nan, math.inf, -math.inf, 1e19, 3e38]
+DOWN, ABOVE = torch.tensor([0.0, 0.0, -1.0]), torch.tensor([0.0, 0.0, 3.0])
+
+
+@pytest.fixture(scope="module")
+def ball() -> MeshScene:
+    mesh = trimesh.creation.icosphere(subdivisions=2)
+    return MeshScene(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e13, 1e18, 3e38])
+def test_vertices_out_of_reach_are_refused(tmp_path, value):
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, value, 0]], np.float32)
+    with pytest.raises(ValueError, match="Scene: vertex 2 is not finite, or farther than 1e12"):
+        MeshScene(vertices, np.array([[0, 1, 2]]))
+    if value == 1e18:
+        gltf = triangle()
+        gltf.node(mesh=0, scale=[value] * 3)
+        with pytest.raises(InputError, match="asset.glb: has vertices farther than 1e.12 from the origin"):
+            read_asset(gltf.write(tmp_path / "asset.glb"))
+
+
+@pytest.mark.parametrize("value", BAD)
+@pytest.mark.parametrize("which", ["origin", "direction"])
+def test_rays_that_are_none_meet_nothing_and_their_neighbours_what_they_met(ball, value, which):
+    """In a packet of 16 with others, alone, and in the last packet."""
+    origins, directions = ABOVE.repeat(35, 1), DOWN.repeat(35, 1)
+    bad = torch.zeros(35, dtype=torch.bool)
+    bad[[0, 7, 16, 34]] = True
+    (origins if which == "origin" else directions)[bad, 1] = value
+    assert torch.equal(trace_visibility(ball, origins, directions), bad)
+    triangles, _, _ = ball.trace_closest(origins.numpy(), directions.numpy())
+    assert np.array_equal(triangles < 0, bad.numpy())
+
+
+@pytest.mark.parametrize(
+    ("t_far", "meets"), [(math.nan, False), (-1.0, False), (-math.inf, False), (math.inf, True), (3e38, True)]
+)
+def test_lengths_that_are_none_meet_nothing(ball, t_far, meets):
+    assert bool(trace_visibility(ball, ABOVE[None], DOWN[None], t_far)) != meets
+
+
+@pytest.mark.parametrize("value", BAD)
+def test_points_that_are_none_leave_the_factors_of_others_alone(ball, value):
+    normals = torch.nn.functional.normalize(torch.randn(20, 3, generator=torch.Generator().manual_seed(0)), dim=1)
+    inputs = [1.0 * normals, normals.clone(), normals.clone(), torch.full((20, 1), 0.5), torch.ones(4, 8, 3)]
+    good = occlusion_factors(ball, *inputs, n_diffuse_rays=16, n_specular_rays=16, offset=0.01, seed=1)
+    for i in range(3):
+        changed = [part.clone() for part in inputs]
+        changed[i][4, 0] = value
+        found = occlusion_factors(ball, *changed, n_diffuse_rays=16, n_specular_rays=16, offset=0.01, seed=1)
+        others = torch.arange(20) != 4
+        assert all(torch.equal(a[others], b[others]) for a, b in zip(good, found))
+    if math.isfinite(value):
+        far = occlusion_factors(ball, *inputs, n_diffuse_rays=16, n_specular_rays=16, offset=value, seed=1)
+        assert all((part > 0.999).all() for part in far)  # nothing is met from there
+
+
+@pytest.mark.parametrize("value", BAD)
+def test_bits_of_points_that_are_none(ball, value):
+    """They are open wherever they count; those of others are as they were."""
+    normals = torch.nn.functional.normalize(torch.randn(20, 3, generator=torch.Generator().manual_seed(0)), dim=1)
+    directions = torch.nn.functional.normalize(torch.randn(64, 3, generator=torch.Generator().manual_seed(1)), dim=1)
+    good, hits = lib.visibility_bits(ball.handle, 0.5 * normals, normals, directions, 0.01, True)
+    points = 0.5 * normals
+    points[4, 0] = value
+    found, their_hits = lib.visibility_bits(ball.handle, points, normals, directions, 0.01, True)
+    others = torch.arange(20) != 4
+    assert torch.equal(good[others], found[others]) and torch.equal(hits[others], their_hits[others])
+    assert bit_counts(found[4:5, 1]) == 0 and (their_hits[4] < 0).all() and bit_counts(good[4:5, 1]) > 0
+
+
+MATRIX = SparseMap(
+    torch.tensor([0, 1, 3]), torch.tensor([0, 1, 2], dtype=torch.int32), torch.ones(3),
+    torch.tensor([0, 1, 2, 3]), torch.tensor([0, 1, 1], dtype=torch.int32), torch.ones(3),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    ({"columns": torch.tensor([0, 1, 3], dtype=torch.int32)}, r"columns must hold numbers in \[0, 3\)"),
+    ({"columns": torch.tensor([0, -1, 2], dtype=torch.int32)}, r"columns must hold numbers in \[0, 3\)"),
+    ({"columns": torch.tensor([0, 1 << 30, 2], dtype=torch.int32)}, r"columns must hold numbers in \[0, 3\)"),
+    ({"offsets": torch.tensor([0, 1, 4])}, r"offsets must ascend within \[0, 3\]"),
+    ({"offsets": torch.tensor([-1, 1, 3])}, r"offsets must ascend within \[0, 3\]"),
+    ({"offsets": torch.tensor([0, 4, 3])}, r"offsets must ascend within \[0, 3\]"),
+    ({"offsets": torch.tensor([0, -5, 3])}, r"offsets must ascend within \[0, 3\]"),
+])  # fmt: skip
+def test_a_sparse_matrix_names_what_there_is(change, message):
+    values = torch.rand(3, 3)
+    assert sparse_product(MATRIX, values).shape == (2, 3)
+    with pytest.raises(ValueError, match=message):
+        sparse_product(MATRIX._replace(**change), values)
+    if "columns" in change:  # the transpose is read in the backward pass
+        turned = MATRIX._replace(transposed_columns=change["columns"])
+        with pytest.raises(ValueError, match=r"columns must hold numbers in \[0, 2\)"):
+            sparse_product(turned, values.requires_grad_()).sum().backward()
+
+
+def test_a_march_has_an_end():
+    """A box of 2^40 units took longer than anyone waits."""
+    rays = torch.zeros(1, 3), torch.tensor([[1.0, 0.0, 0.0]]), torch.zeros(1), torch.ones(4, 4, 4, dtype=torch.uint8)
+    with pytest.raises(ValueError, match="march_rays: box must be at most 2.20 steps"):
+        march_rays(*rays, float(1 << 40), 0.1)
+
+
+def test_a_cache_without_vertices_is_refused():
+    """There is none to look up."""
+    none, integers = torch.zeros(0, 3), {"dtype": torch.int32}
+    cache = (
+        none, none, torch.zeros(2, 5, **integers), torch.zeros(2, 0, **integers), 0.1, torch.zeros(0, 2, 2, **integers),
+        torch.zeros(0, 0, **integers), none, torch.nn.functional.normalize(torch.ones(64, 3), dim=1),
+    )  # fmt: skip
+    with pytest.raises(ValueError, match="cached_visibility: vertices must hold at least one"):
+        lib.cached_visibility(ABOVE[None], -DOWN[None], *cache)
