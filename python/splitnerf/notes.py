@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 
+from splitnerf.errors import plain
+
 _said: set[str] = set()
 
 
 def note(text: str) -> None:
     """Writes one line to stderr, which names a file and the values that were repaired or left out."""
-    print(f"splitnerf: note: {text}", file=sys.stderr)
+    print(f"splitnerf: note: {plain(text)}", file=sys.stderr)
 
 
 def note_once(text: str, example: str = "") -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import functools
 import io
 import os
 from collections import OrderedDict
@@ -9,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from test_files import no_more_than
 from test_hostile_files import Calls, first, repack
 from tiny_runs import tiny
 
@@ -75,17 +78,24 @@ def test_a_missing_file_is_told(tmp_path):
 
 
 def test_a_disk_that_is_full_keeps_the_old_file(content, tmp_path, monkeypatch):
-    """torch tells it by its own kind of error, after a part is written."""
+    """torch tells it by its own kind of error, after a part is written; the words are those of the system."""
     path = tmp_path / "checkpoint.pt"
     path.write_bytes(b"old")
 
-    def fails(content, file):
-        Path(file).write_bytes(b"new")
-        raise RuntimeError("unexpected pos")
+    def fails(content, file, cause=None):
+        file.write(b"new")
+        try:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) if cause else ValueError
+        except (OSError, ValueError):
+            raise RuntimeError("unexpected pos")
 
-    monkeypatch.setattr(torch, "save", fails)
-    with pytest.raises(OSError, match="checkpoint.pt: the checkpoint could not be written .unexpected pos"):
-        checkpoint.save_checkpoint(path, config=tiny(), fingerprint="", state={})
+    for cause, words in ((False, "unexpected pos"), (True, "No space left on device")):
+        monkeypatch.setattr(torch, "save", functools.partial(fails, cause=cause))
+        with pytest.raises(OSError, match=f"checkpoint.pt: cannot be written .{words}.$"):
+            checkpoint.save_checkpoint(path, config=tiny(), fingerprint="", state={})
+    monkeypatch.undo()
+    with no_more_than(700), pytest.raises(OSError, match="checkpoint.pt: cannot be written .File too large.$"):
+        checkpoint.save_checkpoint(path, config=tiny(), fingerprint="", state={"x": torch.zeros(9999)})
     assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
 
 
@@ -140,6 +150,7 @@ ALLOWED = {
     ),
     "parameters whose sum is too large": lambda c: c["model"]["light.texels"].fill_(3e38),
     "the largest progress": lambda c: c.update(meshed_at=1.0, previewed_at=1.0, seconds=0.0, step=0),
+    "no mean of quality yet": lambda c: c.update(psnr_mean=None),
     "a mesh": lambda c: c.update(MESH),
     "a mesh of smaller numbers": lambda c: c.update(MESH, mesh_faces=MESH["mesh_faces"].int()),
     "light that a mesh sends": lambda c: c.update(MESH, occlusion_light=sent(4, 0, 2, 255, 4 * 256 - 1)),
@@ -200,6 +211,7 @@ REFUSED = {
     "light's noise in a column": (lambda c: c.update(light_noise=c["light_noise"][:, None]), "light_noise is missing"),
     "light's noise of NaN": (lambda c: c["light_noise"].fill_(torch.nan), "light_noise has NaN"),
     "a frame of single precision": (lambda c: c.update(box_from_world=torch.eye(4)), "box_from_world is missing"),
+    "a mean of quality that is a word": (lambda c: c.update(psnr_mean="high"), "psnr_mean is of another type"),
     "an unknown device": (lambda c: c.update(device="tpu"), "device is 'tpu'"),
     "cells of another shape": (lambda c: c.update(cells=c["cells"].flatten()), "cells is missing"),
     "too few values of cells": (lambda c: c.update(occupancy=c["occupancy"][1:]), "occupancy is missing"),

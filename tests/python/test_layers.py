@@ -21,8 +21,9 @@ LAYERS = [
     {"export", "render"},
     {"fields", "config"},
     {"data", "doctor"},
-    {"ops", "devices"},
-    {"_core", "errors", "notes", "progress"},
+    {"ops", "devices", "files"},
+    {"_core", "notes", "progress"},
+    {"errors"},
 ]
 
 

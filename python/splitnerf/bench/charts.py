@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from splitnerf.bench.provenance import header, provenance
-from splitnerf.data.images import atomic_path
 from splitnerf.errors import InputError
+from splitnerf.files import atomic_path
 
 COLUMNS = 3  # charts in a row of a picture
 MARGIN = 1.3  # factor by which the error axis extends beyond its points

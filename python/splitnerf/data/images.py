@@ -2,52 +2,30 @@
 
 from __future__ import annotations
 
+import io
 import os
+import struct
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 import torch
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from splitnerf import ops
 from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
+from splitnerf.files import atomic_path
 
+JPEG_QUALITY = 95
+SOFTWARE = "SplitNeRF"  # what an EXR says of the program that wrote it
 LDR_SUFFIXES = (".png", ".jpg", ".jpeg")
 HDR_SUFFIXES = (".exr", ".hdr")
 SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"RIFF")  # RIFF: WebP
 LARGEST_IMAGE = 1 << 29  # values of an image in memory
 VALUES_PER_BYTE = 8 * 1032  # of a file: of a PNG of one colour and one bit a pixel
-
-
-@contextmanager
-def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
-    """Yields a temporary name beside `path` that takes its place when the block succeeds.
-
-    On any error the temporary file is removed and the old file at `path` stays.
-
-    Args:
-        path: The file to write; missing parent folders are made.
-
-    Yields:
-        A path in the same folder, with the same suffix.
-    """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def read_image(path: str | os.PathLike) -> np.ndarray:
@@ -68,6 +46,14 @@ def read_image(path: str | os.PathLike) -> np.ndarray:
     if not is_file(path):
         raise InputError(f"{path}: no such image; check the path")
     return _read(path, str(path))
+
+
+def is_written_here(path: Path) -> bool:
+    """Whether a file is an EXR that this program wrote."""
+    with open(path, "rb") as file:
+        head = file.read(4096)
+    said = b"Software\0string\0" + struct.pack("<I", len(SOFTWARE)) + SOFTWARE.encode()
+    return head.startswith(SIGNATURES[2]) and said in head
 
 
 def decode_image(data: bytes, name: str) -> np.ndarray:
@@ -133,39 +119,29 @@ def write_image(path: str | os.PathLike, pixels: np.ndarray, *, half: bool = Fal
         OSError: The file cannot be written.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
-    pixels = np.asarray(pixels)
+    data = encode_image(pixels, path.suffix, str(path), half=half)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def encode_image(pixels: np.ndarray, suffix: str, name: str, *, half: bool = False) -> bytes:
+    """The bytes of an image file; `name` stands in messages, other arguments and errors as for `write_image`."""
+    suffix, pixels = suffix.lower(), np.asarray(pixels)
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
     if suffix not in LDR_SUFFIXES + HDR_SUFFIXES:
-        raise ValueError(f"{path}: unknown image format, use one of {', '.join(LDR_SUFFIXES + HDR_SUFFIXES)}")
+        raise ValueError(f"{name}: unknown image format, use one of {', '.join(LDR_SUFFIXES + HDR_SUFFIXES)}")
     if pixels.ndim != 3 or pixels.shape[2] not in (1, 3, 4) or 0 in pixels.shape:
-        raise ValueError(f"{path}: pixels must be [H, W, 1 | 3 | 4], got {list(pixels.shape)}")
+        raise ValueError(f"{name}: pixels must be [H, W, 1 | 3 | 4], got {list(pixels.shape)}")
     if not np.isfinite(pixels).all():
-        raise ValueError(f"{path}: pixels must be finite")
+        raise ValueError(f"{name}: pixels must be finite")
     if suffix in LDR_SUFFIXES:
-        pixels, kind = to_uint8(pixels), oiio.UINT8
-    else:
-        pixels, kind = pixels.astype(np.float32), oiio.HALF if half else oiio.FLOAT
-    height, width, channels = pixels.shape
-    spec = oiio.ImageSpec(width, height, channels, kind)
-    spec.attribute("oiio:UnassociatedAlpha", 1)
-    spec.attribute("oiio:ColorSpace", "sRGB" if suffix in LDR_SUFFIXES else "Linear")
-    with atomic_path(path) as temporary:
-        sink = oiio.ImageOutput.create(str(temporary))
-        if sink is None:
-            raise OSError(f"{path}: OpenImageIO cannot write it ({_reason(oiio)})")
-        written = sink.open(str(temporary), spec) and sink.write_image(np.ascontiguousarray(pixels))
-        closed = sink.close()
-        if not (written and closed):
-            raise OSError(f"{path}: writing failed ({_reason(sink)})")
+        return _encode_ldr(to_uint8(pixels), suffix)
+    return _encode_hdr(np.ascontiguousarray(pixels, dtype=np.float32), suffix, name, oiio.HALF if half else oiio.FLOAT)
 
 
 def encode_png(pixels: np.ndarray) -> bytes:
-    """Encodes an image as the bytes of a PNG file; arguments as for `write_image`."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "image.png"
-        write_image(path, pixels)
-        return path.read_bytes()
+    """The bytes of a PNG file; pixels as for `write_image`."""
+    return encode_image(pixels, ".png", "a picture")
 
 
 def to_uint8(pixels: np.ndarray) -> np.ndarray:
@@ -232,7 +208,49 @@ def over_background(srgb: np.ndarray, alpha: np.ndarray, background: float = 1.0
     return srgb * alpha[..., None] + background * (1 - alpha[..., None])
 
 
+def _encode_ldr(pixels: np.ndarray, suffix: str) -> bytes:
+    """PNG or JPEG of [H, W, 1 | 3 | 4] uint8. Pillow writes into memory: the other library's JPEG writer ends the
+    process, and its PNG writer says nothing, where a disk is full."""
+    image, data = Image.fromarray(pixels[..., 0] if pixels.shape[2] == 1 else pixels), io.BytesIO()
+    if suffix == ".png":
+        chunks = PngInfo()
+        chunks.add(b"sRGB", b"\0")
+        image.save(data, "png", pnginfo=chunks)
+    else:
+        image = image.convert("RGB") if pixels.shape[2] == 4 else image
+        image.save(data, "jpeg", quality=JPEG_QUALITY, subsampling=0)
+    return data.getvalue()
+
+
+def _encode_hdr(pixels: np.ndarray, suffix: str, name: str, kind: oiio.BASETYPE) -> bytes:
+    """EXR or HDR of [H, W, 1 | 3 | 4] float32, through a temporary folder. It is read again there, since its last part
+    is written without a check."""
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, kind)
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    spec.attribute("oiio:ColorSpace", "Linear")
+    spec.attribute("DateTime", "")  # else the time of writing: equal pixels, unequal files
+    spec.attribute("Software", SOFTWARE)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"image{suffix}"
+        sink = oiio.ImageOutput.create(str(path))
+        if sink is None:
+            raise OSError(f"{name}: OpenImageIO cannot write it ({_reason(oiio)})")
+        written = sink.open(str(path), spec) and sink.write_image(pixels)
+        if not (sink.close() and written):
+            raise OSError(f"{name}: writing into {folder} failed ({_reason(sink)})")
+        source = oiio.ImageInput.open(str(path))
+        if source is None or source.read_image(0, 0, 0, channels, "float") is None or source.has_error:
+            raise OSError(f"{name}: writing into {folder} failed; it may be full")
+        source.close()
+        return path.read_bytes()
+
+
 def _read(path: Path, name: str) -> np.ndarray:
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:  # a name that is not UTF-8, which OpenImageIO does not open
+        return decode_image(path.read_bytes(), name)
     with open(path, "rb") as file:
         if not file.read(16).startswith(SIGNATURES):
             raise InputError(f"{name}: cannot be read as an image (no PNG, JPEG, WebP, EXR or HDR file); replace it")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from splitnerf.data.images import atomic_path
 from splitnerf.errors import InputError
+from splitnerf.files import atomic_path
 
 
 def read_json(path: Path, key: str) -> dict:

@@ -10,7 +10,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from splitnerf.data.images import atomic_path
+from splitnerf.files import atomic_path
 
 GLOBALS = {"torch._utils _rebuild_tensor_v2", "collections OrderedDict"}  # STORAGES holds the storage types
 STORAGES = {f"torch {kind}Storage" for kind in ("Float", "Double", "Long", "Int", "Byte", "Bool")}
@@ -27,11 +27,12 @@ def write_tensors(path: Path, content: dict) -> None:
     Raises:
         OSError: The disk is full or the folder cannot be written; the old file is kept.
     """
-    with atomic_path(path) as temporary:
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
         try:
-            torch.save(on_cpu(content), temporary)
-        except RuntimeError as error:  # torch raises this when the disk is full
-            raise OSError(f"{path}: the checkpoint could not be written ({error})") from error
+            torch.save(on_cpu(content), file)
+        except RuntimeError as error:  # torch hides what the file raised behind words of its own
+            cause = error.__context__
+            raise cause if isinstance(cause, OSError) else OSError(f"{path}: cannot be written ({error})") from error
 
 
 def read_tensors(path: Path) -> dict:

@@ -12,8 +12,8 @@ from trimesh.visual.material import PBRMaterial
 from trimesh.visual.texture import TextureVisuals
 
 from splitnerf.data.asset import Asset
-from splitnerf.data.images import atomic_path
 from splitnerf.export.maps import encode_maps, y_up
+from splitnerf.files import atomic_path
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 

@@ -7,7 +7,8 @@ import os
 import numpy as np
 import trimesh
 
-from splitnerf.data.images import atomic_path, linear_to_srgb, to_uint8
+from splitnerf.data.images import linear_to_srgb, to_uint8
+from splitnerf.files import atomic_path
 
 
 def write_mesh_ply(

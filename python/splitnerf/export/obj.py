@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.asset import Asset
-from splitnerf.data.images import atomic_path, write_image
+from splitnerf.data.images import write_image
 from splitnerf.export.maps import encode_maps, y_up
+from splitnerf.files import atomic_path
 
 
 def write_obj(path: str | os.PathLike, asset: Asset) -> list[Path]:
@@ -42,7 +43,7 @@ def write_obj(path: str | os.PathLike, asset: Asset) -> list[Path]:
             write_image(written[-1], pixels / np.float32(255))
             lines.append(f"{key} {written[-1].name}")
     with atomic_path(written[1]) as temporary:
-        temporary.write_text("\n".join(lines) + "\n")
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="surrogateescape")
 
     corners = asset.triangles + 1
     blocks = [("v", y_up(asset.vertices)), ("vn", y_up(asset.normals))]
@@ -54,5 +55,5 @@ def write_obj(path: str | os.PathLike, asset: Asset) -> list[Path]:
     corner = "{0}//{0}" if asset.uv is None else "{0}/{0}/{0}"
     text += ["f " + " ".join(corner.format(i) for i in row) for row in corners.tolist()]
     with atomic_path(path) as temporary:
-        temporary.write_text("\n".join(text) + "\n")
+        temporary.write_text("\n".join(text) + "\n", encoding="utf-8", errors="surrogateescape")
     return written

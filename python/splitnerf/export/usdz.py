@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.asset import Asset
-from splitnerf.data.images import atomic_path, write_image
+from splitnerf.data.images import write_image
 from splitnerf.errors import InputError
 from splitnerf.export.maps import Maps, encode_maps, y_up
+from splitnerf.files import atomic_path
 
 
 def require_usd() -> None:
@@ -44,10 +45,11 @@ def write_usdz(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | No
         stage = Usd.Stage.CreateNew(str(stage_file))
         _fill(stage, asset, maps, Path(folder))
         stage.Save()
+        package = Path(folder) / "asset.usdz"
+        if not UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(stage_file)), str(package)):
+            raise OSError(f"{path}: the package could not be written in {folder}")
         with atomic_path(path) as temporary:
-            temporary.unlink()
-            if not UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(stage_file)), str(temporary)):
-                raise OSError(f"{path}: the package could not be written")
+            temporary.write_bytes(package.read_bytes())
 
 
 def _fill(stage: object, asset: Asset, maps: Maps, folder: Path) -> None:

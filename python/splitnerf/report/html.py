@@ -10,8 +10,9 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
-from splitnerf.data.images import atomic_path, linear_to_srgb, over_background
+from splitnerf.data.images import linear_to_srgb, over_background
 from splitnerf.evaluate.metrics import psnr
+from splitnerf.files import atomic_path
 from splitnerf.report.curves import line_chart
 from splitnerf.report.last_stage import last_stage_section
 from splitnerf.report.pictures import WHITE_PER_MEAN, data_uri, tonemapped, white_of
@@ -82,7 +83,7 @@ def write_report(
         ],
     )
     with atomic_path(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+        temporary.write_text(page, encoding="utf-8", errors="backslashreplace")
 
 
 def _rows(table: Mapping, prefix: str = "") -> list[tuple[str, str]]:

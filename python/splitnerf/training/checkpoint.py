@@ -127,6 +127,8 @@ def _check_content(content: dict) -> None:
     for key, largest in LARGEST.items():
         if not 0 <= content[key] <= largest:
             raise ValueError(f"{key} is {content[key]}")
+    if type(content.get("psnr_mean")) not in (float, type(None)):  # older checkpoints have none
+        raise ValueError("psnr_mean is of another type")
     config = config_of(content)
     if not 1 <= content["n_rays"] <= max(config.sampling.initial_rays, config.sampling.max_rays):
         raise ValueError(f"n_rays is {content['n_rays']}")
@@ -148,6 +150,9 @@ def _check_content(content: dict) -> None:
     check_tensor("cells", content.get("cells"), (resolution,) * 3, torch.uint8)
     _check_sizes(config, content["model"])
     check_tensor("box_from_world", content.get("box_from_world"), (4, 4), torch.float64)
+    box = content["box_from_world"]
+    if not (box[0, 0] > 0 and torch.equal(box[:, :3], box[0, 0] * torch.eye(4, 3).double()) and box[3, 3] == 1):
+        raise ValueError("box_from_world is not a uniform scale and a translation")
     vertices, faces = content.get("mesh_vertices"), content.get("mesh_faces")
     if vertices is not None or faces is not None:
         check_tensor("mesh_vertices", vertices, (-1, 3), torch.float32)

@@ -1,0 +1,174 @@
+"""How results are written: each file whole or not at all, and into a folder by one program at a time."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TextIO
+
+from splitnerf.errors import InputError
+from splitnerf.notes import note
+
+LOCK = "lock"  # the file in a folder that names the program which writes there
+PARTIAL = ".partial"  # part of the name of a file that is not yet whole
+_held: dict[Path, TextIO] = {}  # the locks of this program, by folder
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
+    """Yields a temporary name beside `path` that takes its place when the block succeeds.
+
+    On any error the temporary file is removed and the old file at `path` stays. The new file is on the disk before it
+    takes the name, so that a failure of power leaves the old one or the new one.
+
+    Args:
+        path: The file to write; missing parent folders are made.
+
+    Yields:
+        A path in the same folder, with the same suffix.
+
+    Raises:
+        OSError: The file cannot be written; the message names it, not the temporary one.
+    """
+    path = Path(path)
+    temporary = None
+    try:
+        _check_held(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=PARTIAL + path.suffix)
+        os.close(handle)
+        temporary = Path(name)
+        yield temporary
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        _synchronise(temporary)
+        os.replace(temporary, path)
+        with suppress(OSError):  # not every file system synchronises folders
+            _synchronise(path.parent)
+    except OSError as error:
+        if error.errno is None:  # a message of its own
+            raise
+        raise OSError(f"{path}: cannot be written ({reason(error)})") from error
+    finally:
+        if temporary is not None:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Makes a folder this program's own within the block; a file in it, `lock`, names the program meanwhile.
+
+    The lock ends with the program, however that ends, so that the next program takes the folder over; it removes what
+    the one before left half-written. A folder that the block leaves empty is removed, if it was not there before.
+
+    Args:
+        folder: The folder; made where it is missing. This program may hold it already.
+
+    Raises:
+        InputError: Another program holds the folder, or it cannot be made or written to.
+    """
+    key = folder.resolve()
+    if key in _held:
+        yield
+        return
+    made: list[Path] = []
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise InputError(f"{folder}: is a file; give --out a folder")
+        made += [parent for parent in (folder, *folder.parents) if not parent.exists()]
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = _taken(folder / LOCK)
+    except OSError as error:
+        _remove_empty(made)
+        raise InputError(f"{folder}: cannot be written to ({reason(error)}); give another --out") from None
+    _held[key] = lock
+    try:
+        remove_partial(folder)
+        yield
+    finally:
+        with suppress(OSError):
+            if _is_at(lock, folder / LOCK):
+                (folder / LOCK).unlink()
+        del _held[key]
+        lock.close()
+        _remove_empty(made)
+
+
+def remove_partial(folder: Path) -> None:
+    """Removes what a program that was killed left half-written in a folder, and in those in it."""
+    for pattern in (f".*{PARTIAL}*", f"*/.*{PARTIAL}*"):
+        for leftover in folder.glob(pattern):
+            leftover.unlink(missing_ok=True)
+
+
+def reason(error: OSError) -> str:
+    """What an error of the system says, without its number."""
+    return error.strerror or str(error)
+
+
+def _taken(path: Path) -> TextIO:
+    """The lock at a path, locked and signed. Raises InputError where another program has it, OSError where it cannot be
+    written."""
+    while True:
+        lock = open(path, "a+", encoding="utf-8")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.seek(0)
+            owner = lock.read().strip() or "another program"
+            lock.close()
+            raise InputError(f"{path.parent}: is in use by {owner}; wait for its end, or give another --out") from None
+        except OSError as error:
+            note(f"{path}: this file system has no locks ({reason(error)}); start no second run in the folder")
+        if _is_at(lock, path):
+            break
+        lock.close()  # its owner ended and removed it in between
+    try:
+        lock.truncate(0)
+        lock.write(f"pid {os.getpid()} on {socket.gethostname()}\n")
+        lock.flush()
+    except OSError:
+        path.unlink(missing_ok=True)
+        with suppress(OSError):
+            lock.close()
+        raise
+    return lock
+
+
+def _is_at(lock: TextIO, path: Path) -> bool:
+    """Whether the open file is the one at the path."""
+    try:
+        return os.path.samestat(os.fstat(lock.fileno()), os.stat(path))
+    except FileNotFoundError:
+        return False
+
+
+def _check_held(path: Path) -> None:
+    """Raises OSError where a folder that this program holds, and in which the path lies, was removed or replaced."""
+    parent = path.parent.resolve()
+    for folder, lock in _held.items():
+        if folder in (parent, *parent.parents) and not _is_at(lock, folder / LOCK):
+            raise OSError(f"{folder}: was removed while it was written to; nothing more is written there")
+
+
+def _synchronise(path: Path) -> None:
+    """Waits until a file, or the names in a folder, are on the disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    """Removes folders, the innermost first, until one is not empty."""
+    with suppress(OSError):
+        for folder in folders:
+            folder.rmdir()
