@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from dataclasses import asdict, replace
@@ -34,6 +33,7 @@ from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.report import write_report
 from splitnerf.training.loop import TrainedScene
+from splitnerf.training.metrics import METRICS, read_metrics
 from splitnerf.training.repeatable import same_bits
 
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
@@ -106,7 +106,8 @@ def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool) ->
         RuntimeError: Numbers are no longer finite; the run delivers what training exported.
         OSError: A file cannot be written.
     """
-    move_assets(run, run / TRAINED)
+    if not (run / STATE).is_file():  # else what stands in the run may be a result of the stage that goes on
+        move_assets(run, run / TRAINED)
     settings = RefinementSettings(
         sweeps=config.refinement_sweeps, minutes=config.refinement_minutes, seed=abs(config.run.seed) % (1 << 31)
     )
@@ -195,7 +196,6 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
         truth = {key: value for key, value in vars(truths[i]).items() if key != "name"}
         truth |= {"rgb": views.images[i, ..., :3], "alpha": views.images[i, ..., 3]}
         pages.append({"name": views.frame_names[i], "truth": truth, "prediction": prediction})
-    lines = (run / "metrics.jsonl").read_text().splitlines()
     write_report(
         run / "report.html",
         title=views.name,
@@ -204,7 +204,7 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
         last_stage=last_stage_page(run, views, predictions, shown, evaluated.scores) if is_refined(run) else None,
         lights=light_panels(model),
         light_truth=load_scene_truth(views.root).light,
-        history=[json.loads(line) for line in lines],
+        history=read_metrics(run / METRICS),
         timings=timings,
     )
 

@@ -28,6 +28,7 @@ from splitnerf.export.surface import Surface, surface_materials
 from splitnerf.export.textured import textured_asset
 from splitnerf.export.usdz import require_usd, write_usdz
 from splitnerf.ops import fibonacci_directions, prefilter_light
+from splitnerf.progress import tracked
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import render_view
@@ -184,7 +185,7 @@ def evaluate_scene(
     Returns:
         The contents of evaluation.json and the rendered maps.
     """
-    predictions = [render_maps(model, grid, test, i) for i in range(len(test))]
+    predictions = [render_maps(model, grid, test, i) for i in tracked(range(len(test)), "evaluation, view")]
     truth = load_scene_truth(test.root, test.origin)
     light = model.light.panorama(model.config.export.environment_height).cpu().numpy()
     result = evaluate_maps(

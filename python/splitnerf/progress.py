@@ -1,40 +1,87 @@
-"""The display of a long run's progress, and its handling of Ctrl-C."""
+"""The display of a long run's progress, and its handling of Ctrl-C and of other signals to end."""
 
 from __future__ import annotations
 
 import signal
 import sys
+import threading
 import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TypeVar
 
 from tqdm import tqdm
 
 LINE_EVERY = 10.0  # seconds between lines where the output is not a terminal
+Item = TypeVar("Item")
+
+
+def ending_signals() -> list[signal.Signals]:
+    """The signals that ask a program to end: Ctrl-C, SIGTERM, and that of a terminal which closes, unless nohup ignores
+    it."""
+    asking = [signal.SIGINT, signal.SIGTERM]
+    return asking if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else [*asking, signal.SIGHUP]
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """Within the block every signal to end raises KeyboardInterrupt, so that nothing is left half-written. Threads
+    beside the main one have no signals."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = {s: signal.signal(s, signal.default_int_handler) for s in ending_signals()}
+    try:
+        yield
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
 
 
 class Interrupt:
-    """Turns the first Ctrl-C (or SIGTERM) into a request; a second one ends the program at once."""
+    """Turns the first signal to end into a request; a second one acts as it did before."""
 
     def __enter__(self) -> Interrupt:
-        self.asked = False
-        self._previous = {s: signal.signal(s, self._ask) for s in (signal.SIGINT, signal.SIGTERM)}
+        self.asked = self._may_raise = False
+        self._previous = {s: signal.signal(s, self._ask) for s in ending_signals()}
         return self
+
+    def attempt(self, work: Callable[[], None]) -> None:
+        """Does work that may be left out: a request leaves it out, and ends it where it comes meanwhile."""
+        if self.asked:
+            return
+        try:
+            try:
+                self._may_raise = True
+                work()
+            finally:
+                self._may_raise = False
+        except _Abandoned:
+            pass
 
     def _ask(self, number, frame) -> None:
         self.asked = True
         signal.signal(number, self._previous[number])
+        if self._may_raise:
+            self._may_raise = False
+            raise _Abandoned
 
     def __exit__(self, *exception) -> None:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
 
 
+class _Abandoned(BaseException):
+    """A request ends work that may be left out."""
+
+
 class Progress:
     """Shows the share done, the time left and a text: as a bar on a terminal, elsewhere as a line every ten seconds."""
 
-    def __init__(self, start: float):
+    def __init__(self, start: float, leave: bool = True):
         self._is_terminal = sys.stderr.isatty()
         self._bar = tqdm(
-            total=100.0, initial=100.0 * start, file=sys.stderr, disable=not self._is_terminal,
+            total=100.0, initial=100.0 * start, file=sys.stderr, disable=not self._is_terminal, leave=leave,
             bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining} {postfix}",
         )  # fmt: skip
         self._start, self._started, self._told = start, time.monotonic(), 0.0
@@ -56,3 +103,11 @@ class Progress:
 
     def __exit__(self, *exception) -> None:
         self._bar.close()
+
+
+def tracked(items: Sequence[Item], what: str) -> Iterator[Item]:
+    """The items, with a display of how many are done; what takes less than ten seconds shows on a terminal alone."""
+    with Progress(0.0, leave=False) as bar:
+        for i, item in enumerate(items):
+            bar.show(i / len(items), f"{what} {i + 1} of {len(items)}")
+            yield item

@@ -5,30 +5,34 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 import torch
 
 from splitnerf.config import Config
-from splitnerf.data.dataset import Dataset, load_dataset
-from splitnerf.data.frames import has_test_split, split_rule
+from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
+from splitnerf.data.frames import has_test_split, refuse_data, split_rule
 from splitnerf.data.json_files import write_json
 from splitnerf.data.reading import Reading
 from splitnerf.data.truth import read_mesh
 from splitnerf.delivery import LAST_STAGE_FILES, discard_last_stage, finish, is_refined, score_run, write_run_report
 from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Evaluated, Protocol, choose_views, evaluation_path
+from splitnerf.files import atomic_path, held
 from splitnerf.notes import note_once
 from splitnerf.outputs import Exported, write_assets
+from splitnerf.refinement.job import STATE
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_model, restored_grid
-from splitnerf.training.loop import TrainedScene, check_repeatable, train
+from splitnerf.training.loop import TrainedScene, Training, check_repeatable, check_same_scene
 from splitnerf.training.meshes import SurfaceMesh
+from splitnerf.training.metrics import METRICS
 
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 RUN_FILES = (
-    "config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
+    "config.toml", "checkpoint.pt", METRICS, "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
     "evaluation.json", "report.html", ORIGIN, *LAST_STAGE_FILES,
 )  # fmt: skip
 
@@ -49,26 +53,48 @@ def load_splits(data: Path, downscale: int, reading: Reading = Reading()) -> tup
     return train, test
 
 
-def prepare_run(run: Path, *, resume: bool, overwrite: bool) -> None:
-    """Makes the run's folder.
+def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
+    """Checks what stands where a run is to be.
 
     Raises:
-        InputError: The folder holds a run, or the path is not a folder.
+        InputError: The folder holds a run or a data set, or the path is not a folder.
     """
     if run.exists() and not run.is_dir():
         raise InputError(f"{run}: is a file; give --out a folder")
-    present = [name for name in RUN_FILES if (run / name).exists()]
-    if present and overwrite:
-        discard_last_stage(run)
-        for name in RUN_FILES:
-            (run / name).unlink(missing_ok=True)
-        for preview in (run / "previews").glob("step_*.png"):
-            preview.unlink()
-    elif present and not resume:
+    refuse_data(run)
+    if not (resume or overwrite) and present_in(run):
         raise InputError(
             f"{run}: holds a run already; go on with --resume, replace it with --overwrite, or give another --out"
         )
-    run.mkdir(parents=True, exist_ok=True)
+
+
+def present_in(run: Path) -> list[str]:
+    """The files of a run that a folder holds."""
+    return [name for name in RUN_FILES if (run / name).exists()]
+
+
+def clear_run(run: Path) -> None:
+    """Deletes the files of a run, and nothing else."""
+    discard_last_stage(run)
+    for name in RUN_FILES:
+        (run / name).unlink(missing_ok=True)
+    for preview in (run / "previews").glob("step_*.png"):
+        preview.unlink()
+
+
+def begin_or_go_on(run: Path) -> tuple[bool, bool]:
+    """Whether to resume the run of a folder, or to overwrite it: one that ended before its first checkpoint."""
+    if (run / "checkpoint.pt").is_file():
+        return True, False
+    return False, set(present_in(run)) <= {"config.toml", METRICS}
+
+
+def is_finished(run: Path) -> bool:
+    """Whether a run has delivered what its checkpoint holds: the report is its last file, then its state goes."""
+    checkpoint, report = run / "checkpoint.pt", run / "report.html"
+    if not (checkpoint.is_file() and report.is_file()) or (run / STATE).exists():
+        return False
+    return report.stat().st_mtime_ns >= checkpoint.stat().st_mtime_ns
 
 
 def reconstruct(
@@ -84,20 +110,26 @@ def reconstruct(
     """Trains on a dataset and fills the run's folder. Returns the scene and, when finished, its evaluation.
 
     Raises:
-        InputError: The data, the settings or the run's folder cannot be used; nothing was written.
+        InputError: The data, the settings or the run's folder cannot be used; nothing was written or deleted.
         Diverged, EmptyMesh, OSError: See :func:`splitnerf.training.loop.train`.
     """
     check_repeatable(config, device)
-    dataset, test = load_splits(data, downscale, config.reading)
-    prepare_run(run, resume=resume, overwrite=overwrite)
-    if dataset.origin.any():
-        meaning = "add it to positions to get those of the data"
-        write_json(run / ORIGIN, {"origin": dataset.origin.tolist(), "meaning": meaning})
-    config.write(run / "config.toml")
-    trained = train(dataset, config, run, device=device, resume=resume)
-    if not trained.finished:
-        return trained, None
-    return trained, finish(trained, dataset, test, run, resume=resume)
+    with held(run):
+        check_run(run, resume=resume, overwrite=overwrite)
+        dataset, test = load_splits(data, downscale, config.reading)
+        training = Training(dataset, config, run, torch.device(device))
+        if resume:
+            training.restore()
+        if overwrite:
+            clear_run(run)
+        if dataset.origin.any():
+            meaning = "add it to positions to get those of the data"
+            write_json(run / ORIGIN, {"origin": dataset.origin.tolist(), "meaning": meaning})
+        config.write(run / "config.toml")
+        trained = training.complete()
+        if not trained.finished:
+            return trained, None
+        return trained, finish(trained, dataset, test, run, resume=resume)
 
 
 def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
@@ -135,15 +167,19 @@ def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = N
     """
     model, grid, content = load_run(run)
     dataset, test = load_splits(data, protocol.downscale, protocol.reading)
+    own = config_of(content).reading
+    known = dataset if own == protocol.reading else load_dataset(data, "train", protocol.downscale, own)
+    check_same_scene(content, dataset_fingerprint(known), run)
     views, maps = choose_views((dataset if test is None else test).in_box(content["box_from_world"].numpy()), protocol)
     clock = time.monotonic()
     mesh = read_mesh(run / "mesh.ply") if (run / "mesh.ply").is_file() else None
     timings = {"training": content["seconds"]}
-    evaluated = score_run(run, model, grid, views, mesh, timings, maps, protocol.spp)
-    timings["evaluation"] = time.monotonic() - clock
-    write_json(out or evaluation_path(run), evaluated.scores)
-    if out is None:
-        write_run_report(run, model, evaluated, timings)
+    with held(run) if out is None else nullcontext():
+        evaluated = score_run(run, model, grid, views, mesh, timings, maps, protocol.spp)
+        timings["evaluation"] = time.monotonic() - clock
+        write_json(out or evaluation_path(run), evaluated.scores)
+        if out is None:
+            write_run_report(run, model, evaluated, timings)
     return evaluated
 
 
@@ -164,11 +200,13 @@ def export_run(
     """
     if is_refined(run) and out.resolve() == run.resolve():
         raise InputError(f"{run}: delivers what its last stage fitted, which this would replace; give another --out")
+    refuse_data(out)
     model, _, content = load_run(run)
-    box_from_world = content["box_from_world"].numpy()
-    out.mkdir(parents=True, exist_ok=True)
-    if (run / ORIGIN).is_file() and out.resolve() != run.resolve():
-        shutil.copyfile(run / ORIGIN, out / ORIGIN)
-    return write_assets(
-        out, model, box_from_world, formats=formats, resolution=resolution, n_faces=n_faces, texture_size=texture_size
-    )
+    with held(out):
+        if (run / ORIGIN).is_file() and out.resolve() != run.resolve():
+            with atomic_path(out / ORIGIN) as temporary:
+                shutil.copyfile(run / ORIGIN, temporary)
+        return write_assets(
+            out, model, content["box_from_world"].numpy(), formats=formats, resolution=resolution, n_faces=n_faces,
+            texture_size=texture_size,
+        )  # fmt: skip

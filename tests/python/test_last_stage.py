@@ -18,7 +18,7 @@ from painted_ball import sky, with_textures
 from tiny_runs import train
 
 from splitnerf import delivery
-from splitnerf.cli import BAD_INPUT, DONE, INTERRUPTED, main
+from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
 from splitnerf.cli.summary import print_last_stage
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image
@@ -53,8 +53,8 @@ def run(scene, tmp_path_factory) -> Path:
 
 
 def bytes_of(run: Path, *names: str) -> list[bytes]:
-    """The files' contents, those of EXR files without their date."""
-    return [read_image(run / n).tobytes() if n.endswith(".exr") else (run / n).read_bytes() for n in names]
+    """The files' contents."""
+    return [(run / n).read_bytes() for n in names]
 
 
 # ---- what a run holds ----
@@ -164,6 +164,26 @@ def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_anot
     assert main(["train", str(scene), "--out", str(halves), "--resume"]) == DONE
     assert (halves / "trained" / "mesh.glb").stat().st_mtime_ns == trained and not (halves / "refinement.pt").exists()
     assert bytes_of(halves, *DELIVERED[:4]) == bytes_of(run, *DELIVERED[:4])
+
+
+@pytest.mark.parametrize("minutes", [0.0, 2.0])
+@pytest.mark.parametrize("place", ["refinement.job.write_environment", "delivery.score_run", "delivery.forget_state"])
+def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_another(
+    run, scene, tmp_path, monkeypatch, place, minutes
+):
+    """With a state of the last stage and without."""
+    killed, minutes = tmp_path / "run", ("--set", f"checkpoint_minutes={minutes}")
+
+    def fails(*_, **__):
+        raise MemoryError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"splitnerf.{place}", fails)
+        assert train(scene, killed, "--steps", "25", "--deterministic", *REFINED, *minutes) == FAILED
+    assert (killed / "mesh.glb").exists()
+    assert main(["train", str(scene), "--out", str(killed), "--resume"]) == DONE
+    names = (*DELIVERED[:4], *(f"trained/{name}" for name in ("mesh.glb", "environment.exr")))
+    assert bytes_of(killed, *names) == bytes_of(run, *names) and not (killed / "refinement.pt").exists()
 
 
 def test_more_steps_make_the_state_void(scene, tmp_path, monkeypatch):

@@ -7,7 +7,6 @@ import signal
 import threading
 import time
 from contextlib import nullcontext
-from io import StringIO
 from types import SimpleNamespace
 
 import pytest
@@ -180,7 +179,7 @@ def test_a_step_without_all_its_samples_leaves_nothing_behind(data, tmp_path, mo
     monkeypatch.setattr(training.take_step, "is_complete", lambda *_: complete)
     before = {name: value.clone() for name, value in training.model.state_dict().items()}
     training.refresh()
-    training.advance(StringIO(), SimpleNamespace(show=lambda *_: None))
+    training.advance(SimpleNamespace(show=lambda *_: None))
     moved = [name for name, value in training.model.state_dict().items() if not torch.equal(value, before[name])]
     assert training.step == 1 and bool(moved) == complete and (training.psnr_mean is not None) == complete
     assert any(leaf.grad is not None for leaf in training.light.leaves) == complete

@@ -12,7 +12,10 @@ import sys
 import splitnerf
 from splitnerf.cli import ablate, bench, demo, doctor, evaluate, export, info, prepare, refine, relight, synth, train
 from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
-from splitnerf.errors import InputError
+from splitnerf.cli.streams import lasting_streams
+from splitnerf.errors import InputError, plain
+from splitnerf.files import reason
+from splitnerf.progress import ended_by_signals
 
 COMMANDS = (prepare, train, export, refine, relight, evaluate, synth, ablate, bench, demo, doctor, info)
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "build_parser", "main"]
@@ -34,15 +37,33 @@ def main(argv: list[str] | None = None) -> int:
     # torch's OpenMP threads spin for milliseconds before they sleep; on a shared machine each barrier would then wait
     # for a whole time slice. A short spin costs nothing on an idle machine.
     os.environ.setdefault("GOMP_SPINCOUNT", "30000")
-    args = build_parser().parse_args(argv)
+    with lasting_streams():
+        args = build_parser().parse_args(argv)
+        with ended_by_signals():
+            code, words = execute(args)
+        if words:
+            print(f"splitnerf: {plain(words)}", file=sys.stderr)
+        return code
+
+
+def execute(args: argparse.Namespace) -> tuple[int, str]:
+    """Runs a command; returns the exit code and, where it failed, one line that says why."""
     try:
-        return args.execute(args)
+        code = args.execute(args)
+        sys.stdout.flush()
+        return code, ""
     except InputError as error:
-        print(f"splitnerf: {error}", file=sys.stderr)
-        return BAD_INPUT
+        return BAD_INPUT, str(error)
     except KeyboardInterrupt:
-        print("splitnerf: interrupted", file=sys.stderr)
-        return INTERRUPTED
-    except (RuntimeError, OSError) as error:
-        print(f"splitnerf: {error}", file=sys.stderr)
-        return FAILED
+        return INTERRUPTED, "interrupted"
+    except OSError as error:
+        where = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
+        return FAILED, f"{where}{reason(error)}"
+    except RuntimeError as error:
+        return FAILED, str(error)
+    except MemoryError as error:
+        return FAILED, f"not enough memory{f' ({error})' if str(error) else ''}; use smaller sizes"
+    except Exception as error:
+        if os.environ.get("SPLITNERF_TRACEBACK"):
+            raise
+        return FAILED, f"unexpected {type(error).__name__}: {error}; to report it, SPLITNERF_TRACEBACK=1 says where"

@@ -64,8 +64,9 @@ def run(args: argparse.Namespace) -> int:
 
     from splitnerf.ablate.job import Interrupted, Plan, ablate
     from splitnerf.ablate.table import csv_table, markdown_table
-    from splitnerf.data.images import atomic_path
+    from splitnerf.data.frames import refuse_data
     from splitnerf.evaluate.jobs import Protocol
+    from splitnerf.files import atomic_path, held
 
     scenes = {scene.resolve().name: scene for scene in args.data}
     if len(scenes) < len(args.data):
@@ -77,8 +78,10 @@ def run(args: argparse.Namespace) -> int:
                 temporary.write_text(text, encoding="utf-8")
 
     plan = Plan(list(scenes.values()), rows, args.seeds, Protocol(args.downscale, args.views, args.spp), args.out)
+    refuse_data(args.out)
     try:
-        scores = ablate(plan, show)
+        with held(args.out):
+            scores = ablate(plan, show)
     except Interrupted:
         print(f"stopped; the state is in {args.out}. To go on, repeat the command.")
         return INTERRUPTED

@@ -137,6 +137,7 @@ def run_whole(args: argparse.Namespace) -> int:
     from splitnerf.bench.whole import NAMES, configurations, whole
     from splitnerf.config import parse_setting
     from splitnerf.evaluate.jobs import Protocol
+    from splitnerf.files import held
 
     try:
         minutes = [float(text) for text in args.minutes.split(",")]
@@ -154,7 +155,8 @@ def run_whole(args: argparse.Namespace) -> int:
     configs = configurations(names, dict(parse_setting(text) for text in args.settings))
     protocol = Protocol(args.downscale, args.views, args.spp)
     try:
-        result = whole(scenes, configs, minutes, protocol, args.runs, print_now)
+        with held(args.runs):
+            result = whole(scenes, configs, minutes, protocol, args.runs, print_now)
     except Interrupted:
         print(f"stopped; the state is in {args.runs}. To go on, repeat the command.")
         return INTERRUPTED

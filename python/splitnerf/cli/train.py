@@ -7,7 +7,7 @@ from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
 from splitnerf.cli.reading import add_reading_options, reading_options
-from splitnerf.cli.summary import print_summary
+from splitnerf.cli.summary import print_scores, print_summary
 from splitnerf.errors import InputError
 
 
@@ -26,7 +26,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add_training_options(parser)
     parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
     add_reading_options(parser, "what the data say or look like, else fraction")
-    parser.add_argument("--resume", action="store_true", help="continue the run in --out from its checkpoint")
+    parser.add_argument(
+        "--resume", nargs="?", const=True, choices=["auto"], metavar="auto",
+        help="continue the run in --out from its checkpoint; auto: begin where there is none, leave a finished run alone",
+    )  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
     parser.set_defaults(execute=run)
 
@@ -65,16 +68,13 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.config import parse_setting, preset
-    from splitnerf.devices import choose_device
-    from splitnerf.training.checkpoint import config_of, load_checkpoint
-    from splitnerf.workflow import reconstruct
+    from splitnerf.config import parse_setting
+    from splitnerf.files import held
 
     if args.resume and args.overwrite:
         raise InputError("--resume and --overwrite exclude each other")
     if args.max_minutes is not None and args.max_minutes <= 0:
         raise InputError(f"--max-minutes must be positive, got {args.max_minutes}")
-    device = choose_device(args.device)
     run = args.out or Path("runs") / args.data.resolve().name
     settings = dict(parse_setting(text) for text in args.settings)
     settings |= budget(args.steps, args.max_minutes) | reading_options(args)
@@ -84,17 +84,33 @@ def run(args: argparse.Namespace) -> int:
         settings["refinement.enabled"] = False
     if args.deterministic:
         settings["run.deterministic"] = True
-    if args.resume:
-        if args.preset:
-            raise InputError("--preset cannot change in a run that is resumed")
+    with held(run):
+        return train_in(run, args, settings)
+
+
+def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object]) -> int:
+    """Trains in a folder that this program holds, and prints the outcome; returns the exit code."""
+    from splitnerf.config import preset
+    from splitnerf.devices import choose_device
+    from splitnerf.evaluate.jobs import read_evaluation
+    from splitnerf.training.checkpoint import config_of, load_checkpoint
+    from splitnerf.workflow import begin_or_go_on, is_finished, reconstruct
+
+    device = choose_device(args.device)
+    resume, overwrite = begin_or_go_on(run) if args.resume == "auto" else (bool(args.resume), args.overwrite)
+    base = preset(args.preset or ("cpu" if device.type == "cpu" else "fast"))
+    if resume:
         base = config_of(load_checkpoint(run / "checkpoint.pt"))
-    else:
-        base = preset(args.preset or ("cpu" if device.type == "cpu" else "fast"))
+        if args.preset and not (args.resume == "auto" and args.preset == base.run.preset):
+            raise InputError("--preset cannot change in a run that is resumed")
     config = base.replace(settings)
+    if args.resume == "auto" and config == base and is_finished(run):
+        print(f"{run}: is finished")
+        print_scores(read_evaluation(run))
+        return DONE
     trained, evaluation = reconstruct(
-        args.data, run, config, downscale=args.downscale, device=device, resume=args.resume,
-        overwrite=args.overwrite,
-    )  # fmt: skip
+        args.data, run, config, downscale=args.downscale, device=device, resume=resume, overwrite=overwrite
+    )
     if evaluation is None:
         where = "in the last stage" if trained.finished else f"at step {trained.step}"
         print(f"stopped {where}; the state is in {run}. To go on, repeat the command with --resume.")

@@ -68,6 +68,12 @@ def layout_of(root: Path) -> ModuleType | None:
     return next((layout for layout in LAYOUTS if layout.present(root)), None)
 
 
+def refuse_data(folder: Path) -> None:
+    """Raises InputError where a folder holds a data set: results would replace the truth beside the photos."""
+    if layout_of(folder) is not None:
+        raise InputError(f"{folder}: holds a data set, which results would replace; give another --out")
+
+
 def split_rule(root: Path, reading: Reading = Reading()) -> str:
     """How the views are split, in words for the user."""
     if reading.eval_mode == "auto":

@@ -8,6 +8,7 @@ import numpy as np
 
 from splitnerf.data.dataset import Dataset
 from splitnerf.evaluate.relight import render_view, straight_srgb
+from splitnerf.progress import tracked
 from splitnerf.render.path_traced import AssetRenderer
 
 ENVIRONMENTS = ("environment.exr", "environment.hdr")
@@ -35,7 +36,7 @@ def asset_predictions(
         `shading_normal`, with the normal map.
     """
     predictions = []
-    for index in range(len(dataset)):
+    for index in tracked(range(len(dataset)), "path tracing, view"):
         light = np.ones((2, 4, 3), np.float32) if environment is None else environment
         maps = render_view(renderer, dataset, index, light, spp)
         prediction = {key: maps[key] for key in ("alpha", "albedo", "roughness", "metallic")}

@@ -16,12 +16,14 @@ from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import area_average, write_image
 from splitnerf.data.json_files import write_json
+from splitnerf.data.frames import refuse_data
 from splitnerf.data.reading import Reading
 from splitnerf.data.tensor_files import read_tensors, write_tensors
 from splitnerf.errors import InputError
 from splitnerf.export.bake import UnwrappedMesh, bake_occlusion
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
+from splitnerf.files import held
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.refinement.fit import Refined, RefinementSettings, Stage
 from splitnerf.refinement.texels import check_form
@@ -214,12 +216,14 @@ def refine_run(
 ) -> Refined | None:  # fmt: skip
     """Refines what training exported into a run; see :func:`refine_folder`."""
     source = source_of(run)
-    read_source(source)
-    dataset = load_dataset(data, "train", downscale, reading)
-    try:
-        refined = refine_folder(source, dataset, out, settings, resume=resume)
-    except InputError as error:
-        raise InputError(f"{source / 'mesh.glb'} and {data}: {error}") from error
-    if refined is not None:
-        forget_state(out)
+    refuse_data(out)
+    with held(out):
+        read_source(source)
+        dataset = load_dataset(data, "train", downscale, reading)
+        try:
+            refined = refine_folder(source, dataset, out, settings, resume=resume)
+        except InputError as error:
+            raise InputError(f"{source / 'mesh.glb'} and {data}: {error}") from error
+        if refined is not None:
+            forget_state(out)
     return refined

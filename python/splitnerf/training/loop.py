@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -37,6 +36,7 @@ from splitnerf.training.finite import GradientWatch, check_state, explain_loss
 from splitnerf.training.graphs import GraphedStep
 from splitnerf.training.losses import SeenLight, Term
 from splitnerf.training.meshes import SurfaceMesh
+from splitnerf.training.metrics import METRICS, add_metrics, keep_metrics
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
 from splitnerf.training.repeatable import same_bits
 from splitnerf.training.schedule import light_moves, light_period, next_ray_count
@@ -86,8 +86,8 @@ def train(
     """Trains a scene and keeps a checkpoint, a log and previews in the run's folder.
 
     The schedule (learning rate, levels, annealing, meshes) follows the progress in [0, 1]: the larger of the share of
-    steps done and the share of minutes used. Ctrl-C ends the run with a checkpoint at the next step after which no
-    gradients of the light are pending.
+    steps done and the share of minutes used. Ctrl-C, SIGTERM and SIGHUP end the run with a checkpoint at the next step
+    after which no gradients of the light are pending.
 
     Args:
         dataset: The train split.
@@ -107,15 +107,7 @@ def train(
     training = Training(dataset, config, run, torch.device(device))
     if resume:
         training.restore()
-    with (
-        open(run / "metrics.jsonl", "a") as log, Interrupt() as interrupt, Progress(training.progress) as bar,
-        same_bits(config.run.deterministic), tensor_cores(config.run.tensor_cores), training.take_step.stream(),
-    ):  # fmt: skip
-        while training.progress < 1.0 and not (interrupt.asked and training.may_stop):
-            training.refresh()
-            training.advance(log, bar)
-        training.finish()
-    return training.result()
+    return training.complete()
 
 
 class Training:
@@ -165,12 +157,32 @@ class Training:
             self.environment = content["environment"].to(self.grid.device)
         for name in ("step", "seconds", "n_rays", "previewed_at"):
             setattr(self, name, content[name])
+        self.psnr_mean = content.get("psnr_mean")
         self.model.open_levels(self.progress)
         self.mesh.restore(content)
         if content["occlusion_light"]:
             self.model.occlusion.restore_light(content["occlusion_light"])
         self.first, self.resumed_at = self.step == 0, self.step
         self.started = time.monotonic() - self.seconds
+
+    def complete(self) -> TrainedScene:
+        """Trains to the end of the schedule, or until a signal asks to stop."""
+        c = self.config
+        keep_metrics(self.run / METRICS, self.step)
+        with (
+            Interrupt() as interrupt, Progress(self.progress) as bar, same_bits(c.run.deterministic),
+            tensor_cores(c.run.tensor_cores), self.take_step.stream(),
+        ):  # fmt: skip
+            if self.step:
+                interrupt.attempt(self.preview_if_due)  # that an interruption left out
+            while self.progress < 1.0 and not (interrupt.asked and self.may_stop):
+                self.refresh()
+                self.advance(bar)
+                interrupt.attempt(self.preview_if_due)
+                if time.monotonic() - self.saved_at > 60.0 * c.run.checkpoint_minutes and self.may_stop:
+                    self.save()
+            self.finish()
+        return self.result()
 
     def save(self) -> None:
         """Writes the checkpoint."""
@@ -179,10 +191,13 @@ class Training:
             self.run / "checkpoint.pt", config=self.config, fingerprint=self.fingerprint,
             state=dict(
                 step=self.step, seconds=self.seconds, n_rays=self.n_rays, previewed_at=self.previewed_at,
-                model=self.model.state_dict(), optimiser=self.optimiser.state_dict(), device=self.generator.device.type,
-                generator=self.generator.get_state(), torch_generator=torch.get_rng_state(), occupancy=self.grid.values,
-                cells=self.grid.cells, environment=self.environment, light_noise=self.model.light.loss_samples.state(),
-                occlusion_light=self.model.occlusion.cached_light(), box_from_world=torch.from_numpy(self.dataset.box_from_world), **self.mesh.state(),
+                psnr_mean=self.psnr_mean, model=self.model.state_dict(),
+                optimiser={"state": self.optimiser.state_dict()["state"]},  # the rates are those of settings and step
+                device=self.generator.device.type, generator=self.generator.get_state(),
+                torch_generator=torch.get_rng_state(), occupancy=self.grid.values, cells=self.grid.cells,
+                environment=self.environment, light_noise=self.model.light.loss_samples.state(),
+                occlusion_light=self.model.occlusion.cached_light(),
+                box_from_world=torch.from_numpy(self.dataset.box_from_world), **self.mesh.state(),
             ),
         )  # fmt: skip
         self.saved_at = time.monotonic()
@@ -224,9 +239,8 @@ class Training:
         if c.occlusion.indirect and step % c.occlusion.indirect_every == 0:
             model.refresh_indirect(self.light)
 
-    def advance(self, log: TextIO, bar: Progress) -> None:
-        """Makes one step: draws rays, takes gradients, moves parameters; writes logs, previews and checkpoints when
-        due."""
+    def advance(self, bar: Progress) -> None:
+        """Makes one step: draws rays, takes gradients, moves parameters; writes a line of the log when due."""
         c, light = self.config, self.light
         batch = draw_batch(self.source, self.n_rays, c)
         ray, terms = self.take_step(batch, light, self.environment, self.step, self.progress)
@@ -248,13 +262,13 @@ class Training:
         bar.show(self.progress, self.told(numbers.n_evaluated / len(batch.target)))
         if self.step % LOG_EVERY == 0 or self.step <= LOG_EVERY or self.progress >= 1.0:
             check_state(self.step, self.model, self.optimiser)
-            log.write(json.dumps(self.line(batch, terms, numbers)) + "\n")
-            log.flush()
-        if self.progress - self.previewed_at >= c.run.preview_every:
-            self.previewed_at = self.progress
+            add_metrics(self.run / METRICS, self.line(batch, terms, numbers))
+
+    def preview_if_due(self) -> None:
+        """Writes a preview where the last one is old enough."""
+        if self.progress - self.previewed_at >= self.config.run.preview_every:
             write_preview(self.run, self.model, self.grid, self.dataset, self.step)
-        if time.monotonic() - self.saved_at > 60.0 * c.run.checkpoint_minutes and self.may_stop:
-            self.save()
+            self.previewed_at = self.progress
 
     def read(self, ray: RenderedRays, terms: dict[str, Term]) -> StepNumbers:
         """Waits for the step once and reads its numbers."""

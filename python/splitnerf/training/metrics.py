@@ -1,0 +1,42 @@
+"""The lines of a run's metrics.jsonl."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from splitnerf.files import atomic_path, reason
+
+METRICS = "metrics.jsonl"
+
+
+def read_metrics(path: Path) -> list[dict]:
+    """The lines of a log that can be read; a program that was killed may have left half a line. None without a file."""
+    if not path.is_file():
+        return []
+    return [line for text in path.read_text(encoding="utf-8", errors="replace").splitlines() if (line := _parsed(text))]
+
+
+def keep_metrics(path: Path, step: int) -> None:
+    """Removes from a log the lines that cannot be read, and those after a step from which the run goes on: they come
+    again."""
+    lines = [json.dumps(line) for line in read_metrics(path) if line["step"] <= step]
+    with atomic_path(path) as temporary:
+        temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+
+
+def add_metrics(path: Path, line: dict) -> None:
+    """Adds a line. Raises OSError where it cannot be written; the folder may be gone."""
+    try:
+        with open(path, "a", encoding="utf-8") as log:
+            log.write(json.dumps(line) + "\n")
+    except OSError as error:
+        raise OSError(f"{path}: cannot be written ({reason(error)})") from error
+
+
+def _parsed(text: str) -> dict | None:
+    try:
+        line = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return line if isinstance(line, dict) and type(line.get("step")) is int else None

@@ -1,0 +1,473 @@
+"""A run survives what happens to it: signals, kills, full disks, damaged logs, readers that go away."""
+
+from __future__ import annotations
+
+import errno
+import multiprocessing
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from random import Random
+
+import pytest
+from test_files import HOLDS
+from test_train import flat, same
+from tiny_runs import SMALL, as_options, lines_of, tiny, train
+from tqdm import tqdm
+
+from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
+from splitnerf.cli.streams import lasting_streams
+from splitnerf.data.dataset import load_dataset
+from splitnerf.files import LOCK
+from splitnerf.progress import Interrupt, ended_by_signals
+from splitnerf.training import loop
+from splitnerf.training.checkpoint import load_checkpoint
+from splitnerf.training.metrics import METRICS, keep_metrics, read_metrics
+
+SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+
+
+@pytest.fixture
+def at_step(monkeypatch):
+    """A function that calls another when the given step begins."""
+
+    def set_up(step: int, action) -> None:
+        original = loop.Training.refresh
+
+        def refresh(training) -> None:
+            if training.step == step:
+                action()
+            original(training)
+
+        monkeypatch.setattr(loop.Training, "refresh", refresh)
+
+    return set_up
+
+
+# ---- signals ----
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_saves_after_the_steps_that_share_a_light(data, tmp_path, at_step, capsys, number):
+    """Four steps share one, and nothing else is made before the program ends."""
+    at_step(9, lambda: signal.raise_signal(number))
+    assert train(data, tmp_path / "run", "--steps", "40") == INTERRUPTED
+    assert "stopped at step 12; the state is in" in capsys.readouterr().out
+    assert load_checkpoint(tmp_path / "run/checkpoint.pt")["step"] == 12
+    assert not (tmp_path / "run/mesh.glb").exists() and not (tmp_path / "run" / LOCK).exists()
+
+
+def test_a_signal_ends_a_preview(data, tmp_path, monkeypatch):
+    """It may take longer than the second that there is; the run that goes on makes it."""
+    begun = []
+
+    def preview(run, model, grid, dataset, step) -> None:
+        begun.append(step)
+        if len(begun) == 1:
+            signal.raise_signal(signal.SIGTERM)
+            raise AssertionError("the preview goes on")
+
+    monkeypatch.setattr(loop, "write_preview", preview)
+    config = tiny(steps=8, preview_every=0.25)
+    assert not loop.train(load_dataset(data), config, tmp_path).finished
+    assert begun == [2] and load_checkpoint(tmp_path / "checkpoint.pt")["step"] == 4
+    assert loop.train(load_dataset(data), config, tmp_path, resume=True).finished
+    assert begun == [2, 4, 6, 8]
+
+
+def test_work_that_may_be_left_out_is_so_after_a_request():
+    done = []
+    with Interrupt() as interrupt:
+        interrupt.attempt(lambda: done.append(1))
+        with pytest.raises(ZeroDivisionError):
+            interrupt.attempt(lambda: 1 / 0)
+        signal.raise_signal(signal.SIGTERM)
+        interrupt.attempt(lambda: done.append(2))
+    assert done == [1]
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_elsewhere_leaves_nothing_half_written(data, tmp_path, monkeypatch, capsys, number):
+    """As Ctrl-C does: here while the meshes are exported."""
+    monkeypatch.setattr("splitnerf.delivery.write_assets", lambda *_, **__: signal.raise_signal(number))
+    assert train(data, tmp_path / "run", "--steps", "8") == INTERRUPTED
+    assert "interrupted" in capsys.readouterr().err and not (tmp_path / "run" / LOCK).exists()
+    monkeypatch.undo()
+    assert train(data, tmp_path / "run", "--resume") == DONE
+
+
+def test_nohup_is_left_to_ignore():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with ended_by_signals(), Interrupt() as interrupt:
+            signal.raise_signal(signal.SIGHUP)
+            assert not interrupt.asked and signal.getsignal(signal.SIGTERM) not in (signal.SIG_DFL, signal.SIG_IGN)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_thread_beside_the_main_one_runs_commands(capsys):
+    codes = []
+    thread = threading.Thread(target=lambda: codes.append(main(["info", "--settings"])))
+    thread.start()
+    thread.join()
+    assert codes == [DONE] and "learning_rate" in capsys.readouterr().out
+
+
+# ---- streams ----
+
+
+class Gone:
+    """A stream whose reader has gone."""
+
+    def __init__(self, number: int = errno.EPIPE):
+        self.number, self.tries = number, 0
+
+    def write(self, text: str) -> int:
+        self.tries += 1
+        raise OSError(self.number, os.strerror(self.number))
+
+    def flush(self) -> None:
+        raise OSError(self.number, os.strerror(self.number))
+
+    def isatty(self) -> bool:
+        return False
+
+    def fileno(self) -> int:
+        raise OSError("none")
+
+
+@pytest.mark.parametrize("number", [errno.EPIPE, errno.EIO, errno.ENOSPC])
+def test_a_run_goes_on_without_a_reader_of_its_words(data, tmp_path, monkeypatch, number):
+    stream = Gone(number)
+    monkeypatch.setattr(sys, "stderr", stream)
+    assert train(data, tmp_path / "run", "--steps", "8") == DONE
+    assert stream.tries and (tmp_path / "run/report.html").is_file()
+
+
+def test_results_that_find_no_room_are_an_error(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stdout", Gone(errno.ENOSPC))
+    assert main(["info"]) == FAILED and "splitnerf: No space left on device\n" == capsys.readouterr().err
+    monkeypatch.setattr(sys, "stdout", Gone(errno.EPIPE))
+    assert main(["info"]) == DONE
+
+
+STREAMS = """
+import os, sys
+os.close(0)
+from splitnerf.cli.streams import lasting_streams
+with lasting_streams():
+    with open(sys.argv[1], "w") as file:
+        assert file.fileno() > 2
+        print("words", file=sys.stderr)
+        print("results")
+        file.write("mine")
+"""
+
+
+@pytest.mark.parametrize("closed", [1, 2])
+def test_a_closed_stream_does_not_write_into_the_next_file(tmp_path, closed):
+    begin = f"import os, sys; os.close({closed}); os.execv(sys.executable, [sys.executable, '-c', *sys.argv[1:]])"
+    words = [sys.executable, "-c", begin, STREAMS, str(tmp_path / "file")]
+    program = subprocess.run(words, capture_output=True, text=True)
+    assert program.returncode == 0, program.stderr
+    assert (tmp_path / "file").read_text() == "mine"
+    assert (program.stdout, program.stderr) == (("results\n", "") if closed == 2 else ("", "words\n"))
+
+
+LEFT = """
+import sys
+from splitnerf.cli.streams import lasting_streams
+with lasting_streams():
+    print("results", flush=True)
+    sys.stdin.read()
+    print("more")
+"""
+
+
+def test_what_is_left_in_a_pipe_that_closed_is_dropped():
+    """Without a word at the program's end, and with exit code 0."""
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    program = subprocess.Popen([sys.executable, "-c", LEFT], env=buffered, text=True, **pipes)
+    assert program.stdout.readline() == "results\n"
+    program.stdout.close()
+    program.stdin.close()
+    assert program.stderr.read() == "" and program.wait() == 0
+
+
+def test_names_do_not_command_the_terminal(tmp_path, capsys):
+    name = tmp_path / "\x1b]0;owned\x07"
+    assert main(["evaluate", str(name)]) == BAD_INPUT
+    with lasting_streams():
+        print(f"results: {name}")
+    printed = capsys.readouterr()
+    assert "\x1b" not in printed.err + printed.out and r"\x1b]0;owned\x07" in printed.err and r"\x1b" in printed.out
+
+
+# ---- the folder ----
+
+
+def test_a_run_in_use_is_refused(data, tmp_path, capsys):
+    """Whatever would write there."""
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "4") == DONE
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    owner = subprocess.Popen([sys.executable, "-c", HOLDS, str(run)], stdout=subprocess.PIPE)
+    owner.stdout.readline()
+    capsys.readouterr()
+    try:
+        for words in (
+            ["train", data, "--out", run, "--resume"], ["train", data, "--out", run, "--overwrite"],
+            ["train", data, "--out", run, "--resume", "auto"], ["demo", "--out", run, "--overwrite"], ["export", run],
+            ["evaluate", run, "--data", data], ["refine", run, "--data", data, "--out", run],
+        ):  # fmt: skip
+            assert main([str(word) for word in words]) == BAD_INPUT
+            error = capsys.readouterr().err
+            assert f"in use by pid {owner.pid} on " in error and len(error.splitlines()) == 1
+    finally:
+        owner.kill()
+        owner.wait()
+    (run / LOCK).unlink()
+    shutil.rmtree(run / "sub")  # what the owner was writing
+    assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+
+
+def test_a_refused_run_leaves_the_folder_as_it_was(data, other_data, tmp_path, capsys):
+    """Refused when it goes on, or refused for its settings when it is to be replaced."""
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "4") == DONE
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    for words in (
+        [other_data, "--resume", "--steps", "9"], [data, "--resume", "--set", "n_levels=5"],
+        [data, "--resume", "--set", "grid_resolution=20"], [data, "--overwrite", "--set", "no_such=1"],
+        [data, "--overwrite", "--set", "box=0"], [data / "none", "--overwrite"],
+        [data, "--overwrite", "--downscale", "99"],
+    ):  # fmt: skip
+        assert main(["train", *map(str, words), "--out", str(run)]) == BAD_INPUT, words
+        assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}, words
+
+
+def test_a_run_whose_model_cannot_be_made_is_not_replaced(data, tmp_path, monkeypatch):
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "4") == DONE
+    before = (run / "checkpoint.pt").read_bytes()
+
+    def fails(*_) -> None:
+        raise MemoryError("32 TiB")
+
+    monkeypatch.setattr(loop, "SceneModel", fails)
+    assert train(data, run, "--overwrite") == FAILED
+    assert (run / "checkpoint.pt").read_bytes() == before and (run / "mesh.glb").is_file()
+
+
+@pytest.mark.parametrize("command", ["train", "demo", "export", "refine", "relight"])
+def test_data_are_not_replaced_by_results(data, begun, tmp_path, capsys, command):
+    run, folder = begun[0], Path(os.path.realpath(data))
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+    words = {
+        "train": ["train", data, "--overwrite"], "demo": ["demo", "--overwrite"], "export": ["export", run],
+        "refine": ["refine", run, "--data", data],
+        "relight": ["relight", run / "mesh.glb", "--env", data / "light.hdr", "--overwrite"],
+    }[command]  # fmt: skip
+    if command == "relight":
+        main(["export", str(run), "--formats", "glb", "--resolution", "32", "--texture-size", "16"])
+    capsys.readouterr()
+    assert main([*map(str, words), "--out", str(data)]) == BAD_INPUT
+    assert "holds a data set, which results would replace" in capsys.readouterr().err
+    assert before == {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+
+
+def test_the_demo_does_not_replace_a_run(data, tmp_path, capsys):
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "4") == DONE
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    for words in ([], ["--max-minutes", "-1", "--overwrite"], ["--seed", "99999999999999999999", "--overwrite"]):
+        assert main(["demo", "--out", str(run), *words]) == BAD_INPUT
+    assert "holds a run already" in capsys.readouterr().err
+    assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+
+
+def test_a_folder_that_was_removed_ends_a_run_with_one_line(data, tmp_path, at_step, capsys):
+    run = tmp_path / "run"
+
+    def remove() -> None:
+        run.rename(tmp_path / "elsewhere")
+
+    at_step(5, remove)
+    assert train(data, run, "--steps", "40") == FAILED
+    error = capsys.readouterr().err
+    assert "run/metrics.jsonl: cannot be written (No such file or directory)" in error and "Traceback" not in error
+    assert not run.exists()
+
+
+@pytest.mark.parametrize("victim", ["checkpoint.pt", "mesh.glb", "environment.exr", "evaluation.json", "report.html"])
+def test_a_full_disk_is_one_line_and_the_checkpoint_stays_whole(data, tmp_path, monkeypatch, capsys, victim):
+    run, write = tmp_path / "run", os.replace
+
+    def replace(source, target) -> None:
+        if Path(target).name == victim:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(source))
+        write(source, target)
+
+    monkeypatch.setattr(os, "replace", replace)
+    assert train(data, run, "--steps", "4") == FAILED
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert line == f"splitnerf: {run / victim}: cannot be written (No space left on device)"
+    assert not list(run.rglob(".*")) and not (run / victim).exists()
+    if victim != "checkpoint.pt":
+        assert load_checkpoint(run / "checkpoint.pt")["step"] == 4
+        monkeypatch.undo()
+        assert train(data, run, "--resume") == DONE
+
+
+# ---- resume ----
+
+
+def test_resume_auto_begins_goes_on_and_ends(data, tmp_path, at_step, capsys):
+    """The same command each time."""
+    run, words = tmp_path / "run", ("--steps", "16", "--preset", "cpu", "--resume", "auto")
+    at_step(5, lambda: signal.raise_signal(signal.SIGTERM))
+    assert train(data, run, *words) == INTERRUPTED
+    assert load_checkpoint(run / "checkpoint.pt")["step"] == 8
+    assert train(data, run, *words) == DONE
+    assert load_checkpoint(run / "checkpoint.pt")["step"] == 16
+    before = {path: path.stat().st_mtime_ns for path in run.rglob("*")}
+    capsys.readouterr()
+    assert train(data, run, *words) == DONE
+    printed = capsys.readouterr().out
+    assert "is finished" in printed and "novel views" in printed
+    assert before == {path: path.stat().st_mtime_ns for path in run.rglob("*")}
+    assert train(data, run, "--steps", "20", "--resume", "auto") == DONE
+    assert load_checkpoint(run / "checkpoint.pt")["step"] == 20
+    assert train(data, run, "--preset", "fast", "--resume", "auto") == BAD_INPUT
+    assert train(data, run, "--overwrite", "--resume", "auto") == BAD_INPUT
+
+
+def test_resume_auto_begins_again_before_the_first_checkpoint(data, tmp_path, at_step, monkeypatch, capsys):
+    """What an end before it left is no run yet; anything else is not touched."""
+    run = tmp_path / "run"
+
+    def fails() -> None:
+        raise MemoryError
+
+    at_step(2, fails)
+    assert train(data, run, "--steps", "4") == FAILED
+    assert {path.name for path in run.iterdir()} <= {"config.toml", METRICS, "previews"} and (run / METRICS).exists()
+    monkeypatch.undo()
+    assert train(data, run, "--steps", "4", "--resume", "auto") == DONE
+    assert [line["step"] for line in lines_of(run)] == [1, 2, 3, 4]
+    (run / "checkpoint.pt").unlink()
+    assert train(data, run, "--steps", "4", "--resume", "auto") == BAD_INPUT
+    assert "holds a run already" in capsys.readouterr().err and (run / "mesh.glb").is_file()
+
+
+def test_a_log_of_a_killed_run_is_mended(data, tmp_path):
+    """Its last line may be cut, and it may reach beyond the checkpoint from which the run goes on."""
+    run, dataset = tmp_path / "run", load_dataset(data)
+    run.mkdir()
+    loop.train(dataset, tiny(steps=8), run)
+    whole = (run / METRICS).read_bytes()
+    with open(run / METRICS, "ab") as log:
+        log.write(b'{"step": 9, "loss": 1.0}\n[1]\n\xff\n{"step": "x"}\n{"step": 10, "lo')
+    assert len(read_metrics(run / METRICS)) == 9
+    keep_metrics(run / METRICS, 8)
+    assert (run / METRICS).read_bytes() == whole
+    with open(run / METRICS, "ab") as log:
+        log.write(b'{"step": 9, "loss": 1.0}\n{"step": 10, "lo')
+    loop.train(dataset, tiny(steps=12), run, resume=True)
+    assert [line["step"] for line in lines_of(run)] == list(range(1, 13))
+
+
+def test_a_damaged_log_does_not_end_a_finished_run(data, tmp_path):
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "4") == DONE
+    (run / METRICS).write_text("damaged\n" + (run / METRICS).read_text())
+    assert main(["evaluate", str(run), "--data", str(data)]) == DONE
+    assert train(data, run, "--steps", "4", "--resume") == DONE
+    assert [line["step"] for line in lines_of(run)] == [1, 2, 3, 4]
+
+
+def test_a_run_of_many_parts_is_that_of_one(data, tmp_path, monkeypatch):
+    """Each begins from a checkpoint that was written between steps, as after kill -9."""
+    dataset = load_dataset(data)
+    config = tiny(steps=40, deterministic=True, mesh_every=0.15, grid_every=8, open_below=0.0, indirect_every=12,
+                  checkpoint_minutes=0.0)  # fmt: skip
+    for name in ("whole", "parts"):
+        (tmp_path / name).mkdir()
+    loop.train(dataset, config, tmp_path / "whole")
+    save = loop.Training.save
+
+    def saving(training) -> None:
+        save(training)
+        if training.step in (12, 24, 36):
+            raise KeyError
+
+    monkeypatch.setattr(loop.Training, "save", saving)
+    for part in range(3):
+        with pytest.raises(KeyError):
+            loop.train(dataset, config, tmp_path / "parts", resume=part > 0)
+    loop.train(dataset, config, tmp_path / "parts", resume=True)
+    whole, parts = (flat(load_checkpoint(tmp_path / name / "checkpoint.pt")) for name in ("whole", "parts"))
+    assert whole.keys() == parts.keys() and whole["step"] == 40
+    assert [key for key in whole if key != "seconds" and not same(whole[key], parts[key])] == []
+    logs = [[line | {"seconds": 0} for line in lines_of(tmp_path / name)] for name in ("whole", "parts")]
+    assert logs[0] == logs[1]
+
+
+FITTED = ("mesh.glb", "mesh.ply", "environment.exr", "environment.hdr", "uncertainty.exr", "trained/mesh.glb")
+
+
+def run_command(*words: str) -> None:
+    tqdm.set_lock(threading.RLock())  # its own would outlive a killed program
+    sys.exit(main(list(words)))
+
+
+def started(*words: str) -> BaseProcess:
+    """A program that runs a command, forked from one that has loaded the packages already."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["splitnerf.workflow", "torch._dynamo"])
+    process = context.Process(target=run_command, args=words)
+    process.start()
+    return process
+
+
+@pytest.mark.parametrize("n_kills", [5, pytest.param(30, marks=pytest.mark.slow)])
+def test_kills_end_with_the_bits_of_an_unbroken_run(data, tmp_path, n_kills):
+    """With -9 and at random moments: while it starts, trains, exports, in the last stage and in the scores."""
+    settings = SMALL | {"refine": True, "refinement_sweeps": 2, "checkpoint_minutes": 0.0, "mesh_every": 0.2}
+    photos = tmp_path / "photos"  # without the true mesh, whose distances take longer than all else
+    shutil.copytree(data, photos, ignore=shutil.ignore_patterns("mesh.ply"))
+    words = ["train", str(photos), "--steps", "40", "--deterministic", "--resume", "auto", *as_options(settings), "--out"]
+
+    def state(run: Path) -> dict[str, object]:
+        content = flat(load_checkpoint(run / "checkpoint.pt"))
+        return content | {"seconds": 0} | {name: (run / name).read_bytes() for name in FITTED}
+
+    started("info", "--settings").join()
+    whole, began = started(*words, str(tmp_path / "whole")), time.monotonic()
+    whole.join()
+    seconds, random, runs, kills = time.monotonic() - began, Random(0), 0, 0
+    assert whole.exitcode == DONE
+    expected = state(tmp_path / "whole")
+    while kills < n_kills:
+        runs, run = runs + 1, tmp_path / f"killed_{runs}"
+        while (process := started(*words, str(run))).join(random.uniform(0.1, 1.0) * seconds) or process.is_alive():
+            process.kill()
+            process.join()
+            kills += process.exitcode == -signal.SIGKILL
+            saved = (run / "checkpoint.pt").exists()
+            step = load_checkpoint(run / "checkpoint.pt")["step"] if saved else "none"
+            print(f"kill {kills}: run {runs}, checkpoint of step {step}, files {len(list(run.rglob('*')))}")
+        assert process.exitcode == DONE
+        found = state(run)
+        assert [key for key in expected if not same(expected[key], found[key])] == []
+        assert not list(run.rglob(".*")) and not (run / LOCK).exists()
+    print(f"{kills} kills of {runs} runs, each of which takes {seconds:.1f} s")
