@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 
 import cv2
@@ -10,11 +11,12 @@ import pytest
 import torch
 from PIL import Image
 from table_scene import BALL, CAMERA, RADIUS, TABLE_RADIUS, photograph, ring, surface_colours, write_photos
+from test_files import no_more_than
 
 from splitnerf.capture.exposure import find_exposures
-from splitnerf.capture.job import PrepareSettings, given_masks
+from splitnerf.capture.job import PrepareSettings, _begin, _upright_copies, given_masks
 from splitnerf.capture.masks import View, find_masks
-from splitnerf.capture.photographs import find_photographs, read_upright, sharpness
+from splitnerf.capture.photographs import find_photographs, read_upright, sharpness, write_png
 from splitnerf.capture.poses import FLIP, Lens, Reconstruction
 from splitnerf.capture.surroundings import HEIGHT, Shot, surroundings
 from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignetting
@@ -26,6 +28,7 @@ from splitnerf.data.environment import seen_at
 from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight, LightPyramid
+from splitnerf.files import LOCK, PARTIAL
 from splitnerf.training.losses import SeenLight
 
 
@@ -198,6 +201,32 @@ def test_other_files_are_not_written_over(tmp_path, capsys):
     assert main(["prepare", str(tmp_path), "--out", str(tmp_path)]) == 2
     assert "holds other files" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["transforms.json"]
+
+
+def test_a_folder_is_prepared_by_one_program(tmp_path, capsys):
+    """A second one is refused, and what a killed one left half-written among the photos is no photo."""
+    write_photos(tmp_path / "photos", 3)
+    out = tmp_path / "data"
+    (out / "work").mkdir(parents=True)
+    (out / LOCK).write_text("pid 1 on elsewhere")
+    with open(out / LOCK) as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert main(["prepare", str(tmp_path / "photos"), "--out", str(out)]) == 2
+    assert "in use by pid 1 on elsewhere" in capsys.readouterr().err
+    deep = out / "work/photos/lens_1" / f".p_00.x{PARTIAL}.png"
+    _begin(out / "work", find_photographs(tmp_path / "photos"), PrepareSettings())
+    deep.parent.mkdir(parents=True)
+    deep.touch()
+    _upright_copies(find_photographs(tmp_path / "photos"), out / "work")
+    assert len(list(deep.parent.iterdir())) == 3 and not deep.exists()
+
+
+def test_a_frame_without_room_is_an_error(tmp_path):
+    """And an image or mask, which one function writes."""
+    (tmp_path / "a.png").write_text("old")
+    with no_more_than(700), pytest.raises(OSError, match="a.png: cannot be written .File too large."):
+        write_png(tmp_path / "a.png", np.random.default_rng(0).integers(0, 255, (90, 90, 3), np.uint8))
+    assert (tmp_path / "a.png").read_text() == "old" and len(list(tmp_path.iterdir())) == 1
 
 
 def test_files_tell_of_turns_and_exposures(tmp_path):

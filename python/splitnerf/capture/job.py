@@ -16,15 +16,18 @@ from PIL import Image
 from splitnerf.capture.exposure import Exposures, find_exposures
 from splitnerf.capture.masks import View, find_masks
 from splitnerf.capture.page import write_page
-from splitnerf.capture.photographs import Photograph, find_photographs, is_upright, read_upright, sharpness
+from splitnerf.capture.photographs import (
+    Photograph, find_photographs, is_upright, read_upright, sharpness, write_png,
+)  # fmt: skip
 from splitnerf.capture.poses import Reconstruction, reconstruct
 from splitnerf.capture.surroundings import Shot, surroundings
 from splitnerf.capture.video import SUFFIXES, write_frames
 from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignetting
 from splitnerf.capture.world import World, settle
 from splitnerf.data.dataset import SURROUNDINGS
-from splitnerf.data.images import atomic_path, srgb_to_linear, write_image
+from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.errors import InputError
+from splitnerf.files import LOCK, atomic_path, held, remove_partial
 from splitnerf.notes import note
 
 MASK_SIZE = 800  # longest edge in pixels at which masks are found
@@ -76,27 +79,37 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         InputError: The photos cannot be read or do not fit together, or the folder holds other files.
     """
     work = out / "work"
-    if out.exists() and any(out.iterdir()) and not (work.is_dir() or (out / "frames").is_dir()):
+    if out.is_dir() and {path.name for path in out.iterdir()} - {LOCK} and not (work.is_dir() or (out / "frames").is_dir()):
         raise InputError(f"{out}: holds other files; give a new folder")
-    if source.suffix.lower() in SUFFIXES:
-        write_frames(source, out / "frames", settings.frames, lambda share: report("frames", share))
-    photos = find_photographs(out / "frames" if source.suffix.lower() in SUFFIXES else source)
-    _begin(work, photos, settings)
-    kept, left_out = _sorted_out(photos, report)
-    images = _upright_copies(kept, work)
-    found = reconstruct(kept, images, work, settings.seed, report)
-    placed = set(found.names)
-    left_out |= {p.name: "its camera was not found: too little in common with the others" for p in kept if p.name not in placed}
-    world = settle(found, settings.seed)
-    if settings.masks is None and world.object_points.sum() < MIN_OBJECT_POINTS:
-        raise InputError(f"{source}: no object stands out in the middle of the photos; give masks with --masks")
-    by_name = {photo.name: photo for photo in kept}
-    exposures = exposures_of(world.scene, by_name, report)
-    shares = _write_images(world, exposures, by_name, out, settings, report)
-    _write_transforms(world, exposures, out, settings)
-    write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
-    write_page(out, world, exposures.gains, shares, left_out, source.resolve().name)
+    with held(out):
+        photos = _photographs(source, out, settings, report)
+        _begin(work, photos, settings)
+        kept, left_out = _sorted_out(photos, report)
+        images = _upright_copies(kept, work)
+        found = reconstruct(kept, images, work, settings.seed, report)
+        placed = set(found.names)
+        lost = [photo.name for photo in kept if photo.name not in placed]
+        left_out |= dict.fromkeys(lost, "its camera was not found: too little in common with the others")
+        world = settle(found, settings.seed)
+        if settings.masks is None and world.object_points.sum() < MIN_OBJECT_POINTS:
+            raise InputError(f"{source}: no object stands out in the middle of the photos; give masks with --masks")
+        by_name = {photo.name: photo for photo in kept}
+        exposures = exposures_of(world.scene, by_name, report)
+        shares = _write_images(world, exposures, by_name, out, settings, report)
+        _write_transforms(world, exposures, out, settings)
+        write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
+        write_page(out, world, exposures.gains, shares, left_out, source.resolve().name)
     return Prepared(world, exposures, left_out, shares)
+
+
+def _photographs(
+    source: Path, out: Path, settings: PrepareSettings, report: Callable[[str, float], None]
+) -> list[Photograph]:
+    """The photos of a folder, or the frames of a video, which are written into `out/frames`."""
+    if source.suffix.lower() not in SUFFIXES:
+        return find_photographs(source)
+    write_frames(source, out / "frames", settings.frames, lambda share: report("frames", share))
+    return find_photographs(out / "frames")
 
 
 def _begin(work: Path, photos: list[Photograph], settings: PrepareSettings) -> None:
@@ -107,7 +120,8 @@ def _begin(work: Path, photos: list[Photograph], settings: PrepareSettings) -> N
     if work.exists() and (not marker.exists() or marker.read_text() != print_of_photos):
         shutil.rmtree(work)
     work.mkdir(parents=True, exist_ok=True)
-    marker.write_text(print_of_photos)
+    with atomic_path(marker) as temporary:
+        temporary.write_text(print_of_photos)
 
 
 def _sorted_out(photos: list[Photograph], report: Callable[[str, float], None]) -> tuple[list[Photograph], dict[str, str]]:
@@ -129,6 +143,7 @@ def _sorted_out(photos: list[Photograph], report: Callable[[str, float], None]) 
 def _upright_copies(photos: list[Photograph], work: Path) -> Path:
     """The folder `work/photos` with a folder for each lens; files that COLMAP reads as they are, are linked."""
     folder = work / "photos"
+    remove_partial(folder)  # COLMAP would read them as photos
     lenses = sorted({photo.lens for photo in photos})
     for photo in photos:
         group = folder / f"lens_{lenses.index(photo.lens) + 1}"
@@ -249,15 +264,6 @@ def surroundings_of(world: World, exposures: Exposures, out: Path, settings: Pre
             yield Shot(image[..., ::-1], mask > 127, scene.poses[i], lens, float(exposures.gains[i]))
 
     return surroundings(shots(), centre, world.table_radius)
-
-
-def write_png(path: Path, image: np.ndarray) -> None:
-    """An image [h, w] or [h, w, 3], uint8 or uint16, as PNG."""
-    with atomic_path(path) as temporary:
-        coded, data = cv2.imencode(".png", image[..., ::-1] if image.ndim == 3 else image)
-        if not coded:
-            raise OSError(f"{path}: the image could not be encoded")
-        temporary.write_bytes(data.tobytes())
 
 
 def _write_transforms(world: World, exposures: Exposures, out: Path, settings: PrepareSettings) -> None:

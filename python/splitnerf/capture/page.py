@@ -10,7 +10,7 @@ from markupsafe import Markup
 from PIL import Image
 
 from splitnerf.capture.world import CAMERA_DISTANCE, World
-from splitnerf.data.images import atomic_path
+from splitnerf.files import atomic_path
 from splitnerf.report.pictures import data_uri
 
 PICTURE_WIDTH = 240  # pixels

@@ -12,6 +12,7 @@ import numpy as np
 from PIL import ExifTags, Image, ImageOps
 
 from splitnerf.errors import InputError
+from splitnerf.files import atomic_path
 
 COMMON = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
 HEIC = (".heic", ".heif")
@@ -92,6 +93,15 @@ def sharpness(photo: np.ndarray) -> float:
     scale = min(1.0, SHARPNESS_WIDTH / max(grey.shape))
     small = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     return float(cv2.Laplacian(small, cv2.CV_32F).var())
+
+
+def write_png(path: Path, image: np.ndarray) -> None:
+    """An image [h, w] or [h, w, 3], uint8 or uint16, as PNG."""
+    with atomic_path(path) as temporary:
+        coded, data = cv2.imencode(".png", image[..., ::-1] if image.ndim == 3 else image)
+        if not coded:
+            raise OSError(f"{path}: the image could not be encoded")
+        temporary.write_bytes(data.tobytes())
 
 
 def _open(path: Path) -> Image.Image:

@@ -6,10 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import cv2
-import numpy as np
 
-from splitnerf.capture.photographs import sharpness
-from splitnerf.data.images import atomic_path
+from splitnerf.capture.photographs import sharpness, write_png
 from splitnerf.errors import InputError
 
 SUFFIXES = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm")
@@ -36,7 +34,7 @@ def write_frames(video: Path, folder: Path, n: int, report: Callable[[float], No
     for number in range(total + 1):
         read, frame = reader.read() if number < total else (False, None)
         if best is not None and (not read or number * n // total > window):
-            _write(folder / f"frame_{window + 1:05d}.png", best)
+            write_png(folder / f"frame_{window + 1:05d}.png", best[..., ::-1])
             best, most = None, -1.0
         if not read:
             break
@@ -46,9 +44,3 @@ def write_frames(video: Path, folder: Path, n: int, report: Callable[[float], No
             best, most = frame, sharp
         report((number + 1) / total)
     reader.release()
-
-
-def _write(path: Path, frame: np.ndarray) -> None:
-    with atomic_path(path) as temporary:
-        if not cv2.imwrite(str(temporary), frame):
-            raise OSError(f"{path}: the frame could not be written")
