@@ -176,10 +176,17 @@ LIMITS = {
     "occlusion.environment_height": "in [1, 8192]", "occlusion.directions": "a multiple of 32 in [64, 1024]",
     "occlusion.indirect_every": "in [1, 16777216]", "mesh.resolution": "in [8, 2048]",
     "sampling.initial_rays": "in [1, 1048576]", "sampling.max_rays": "in [1, 1048576]",
+    "surface.box": "in (0, 1024]", "surface.sphere_radius": "in [0, 1024]", "occlusion.offset": "in [0, 1024]",
+    "sampling.min_step": "in (0, 1024]", "sampling.max_step": "in [0, 1024]", "sampling.min_transmittance": "in [0, 1)",
+    "occlusion.rays": "in [1, 16777216]", "sampling.target_samples": "in [1, 16777216]",
+    "sampling.max_samples_per_ray": "in [1, 16777216]", "sampling.grid_every": "in [1, 16777216]",
+    "losses.light_samples": "in [2, 16777216]", "losses.light_queries": "in [1, 16777216]",
+    "losses.light_every": "in [1, 16777216]", "losses.light_lobe_samples": "in [1, 16777216]",
     "sampling.min_weight": "in [0, 1)", "sampling.shades_per_ray": "in [0, 1024]",
-    "sampling.grid_resolution": "in [1, 512]", "losses.entropy_points": "in [1, 16777216]",
+    "sampling.grid_resolution": "in [1, 512]", "losses.entropy_points": "in [1, 65536]",
     "losses.albedo_width": "in (0, 1e+30]", "losses.gloss_width": "in (0, 1e+30]",
-    "losses.neutral_queries": "in [1, 16777216]", "losses.smoothness_points": "in [1, 16777216]",
+    "losses.neutral_queries": "in [1, 1048576]", "losses.smoothness_points": "in [1, 1048576]",
+    "losses.eikonal_points": "in [0, 1048576]",
     "optimiser.light_step_every": "in [1, 64]", "refinement.share": "in [0, 1)",
     "refinement.sweeps": "in [1, 16777216]", "export.resolution": "in [8, 4096]",
     "export.texture_size": "in [8, 32768]", "export.environment_height": "in [1, 8192]",
@@ -323,10 +330,17 @@ def test_settings_cannot_change_in_place():
         ({"box": True}, "surface.box takes a value of type float, got True"),
         ({"indirect": 1}, "occlusion.indirect takes a value of type bool, got 1"),
         ({"light": {"resolution": {"x": 1}}}, "light.resolution takes a value of type int, got {'x': 1}"),
-        ({"surface.box": math.nan}, "surface.box must be in [0, 1e+30], got nan"),
-        ({"surface.box": math.inf}, "surface.box must be in [0, 1e+30], got inf"),
-        ({"surface.box": 10**40}, "surface.box must be in [0, 1e+30], got 1000"),
-        ({"surface.box": -0.1}, "surface.box must be in [0, 1e+30], got -0.1"),
+        ({"optimiser.weight_decay": math.nan}, "optimiser.weight_decay must be in [0, 1e+30], got nan"),
+        ({"optimiser.weight_decay": math.inf}, "optimiser.weight_decay must be in [0, 1e+30], got inf"),
+        ({"optimiser.weight_decay": 10**40}, "optimiser.weight_decay must be in [0, 1e+30], got 1000"),
+        ({"optimiser.weight_decay": -0.1}, "optimiser.weight_decay must be in [0, 1e+30], got -0.1"),
+        ({"box": 0}, "surface.box must be in (0, 1024], got 0.0"),
+        ({"min_step": 0, "max_step": 0}, "sampling.min_step must be in (0, 1024], got 0.0"),
+        ({"min_transmittance": 1}, "sampling.min_transmittance must be in [0, 1), got 1.0"),
+        ({"occlusion_offset": 1e19}, "occlusion.offset must be in [0, 1024], got 1e+19"),
+        ({"sphere_radius": 1e30}, "surface.sphere_radius must be in [0, 1024], got 1e+30"),
+        ({"light": "mlp", "light_samples": 1}, "losses.light_samples must be in [2, 16777216], got 1"),
+        ({"growth": 16.0, "n_levels": 32}, "a level of the hash grid needs fewer than 1073741824 cells"),
         ({"export.faces": -1}, "export.faces must be in [0, 16777216], got -1"),
         ({"export.faces": 16777217}, "export.faces must be in [0, 16777216], got 16777217"),
         ({"surface.n_levels": 0}, "surface.n_levels must be in [1, 32], got 0"),
@@ -472,3 +486,9 @@ def test_the_table_lists_every_setting_under_its_group(capsys):
         assert value == str(SETTINGS[name][2]).lower()
         columns = f"{name} = {value}", str(known["limits"]).removeprefix("in "), known["unit"], known["meaning"]
         assert re.split(" {2,}", line) == [column for column in columns if column]
+
+
+def test_a_whole_number_is_one_of_a_float():
+    """As `--set initial_variance=10` gives it; a float that is none otherwise stays away from torch."""
+    config = Config().replace({"initial_variance": 10, "losses": {"colour_weight": 3}})
+    check_same(values(config), values(Config()) | {"surface.initial_variance": 10.0, "losses.colour_weight": 3.0})

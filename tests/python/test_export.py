@@ -336,7 +336,7 @@ def test_export_goes_into_the_run_and_ply_needs_no_textures(run):
         (["--formats", "glb,fbx"], "--formats: unknown 'fbx'; there are glb, ply, obj, usdz"),
         (["--faces", "-5"], "--faces must be 0 or at least 100, got -5"),
         (["--texture-size", "4"], r"--texture-size must be in \[8, 8192\], got 4"),
-        (["--resolution", "2"], "--resolution must be at least 8, got 2"),
+        (["--resolution", "2"], r"--resolution must be in \[8, 4096\], got 2"),
     ],
 )
 def test_bad_options_are_one_line_and_write_nothing(tmp_path, run, options, message, capsys):

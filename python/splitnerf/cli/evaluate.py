@@ -84,21 +84,24 @@ def run(args: argparse.Namespace) -> int:
             print(f"{target}:")
         print_scores(scores)
     if args.table:
-        from splitnerf.data.images import atomic_path
         from splitnerf.evaluate.table import evaluation_table
+        from splitnerf.files import atomic_path
 
         with atomic_path(args.table) as temporary:
-            temporary.write_text(evaluation_table(evaluations), encoding="utf-8")
+            temporary.write_text(evaluation_table(evaluations), encoding="utf-8", errors="backslashreplace")
         print(f"table: {args.table}")
     return DONE
 
 
 def check_usage(args: argparse.Namespace) -> None:
-    """Refuses options that do not go together.
+    """Refuses options that do not go together, and files of other kinds in the place of results.
 
     Raises:
-        InputError: Two options exclude each other; the message names them.
+        InputError: Two options exclude each other, or a file would be lost; the message names them.
     """
+    from splitnerf.evaluate.jobs import holds_evaluation
+    from splitnerf.evaluate.table import holds_table
+
     given = [name for name in NEEDS_DATA if getattr(args, name) is not None]
     if not args.data and given:
         raise InputError(f"--{given[0]} needs --data; without it the scores written before are read")
@@ -111,6 +114,9 @@ def check_usage(args: argparse.Namespace) -> None:
             raise InputError(f"--{name} takes one run, got {len(args.targets)}; evaluate them one by one")
     if args.sheet is not None and args.sheet.suffix.lower() not in (".png", ".jpg"):
         raise InputError(f"{args.sheet}: a sheet must end in .png or .jpg")
+    for name, path, is_ours in (("table", args.table, holds_table), ("out", args.out, holds_evaluation)):
+        if path is not None and path.is_file() and path.stat().st_size and not is_ours(path):
+            raise InputError(f"{path}: is no earlier result, and would be replaced; give another --{name}")
 
 
 def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:

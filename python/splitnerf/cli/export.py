@@ -33,7 +33,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.config import MIN_EXPORT_SIZE
+    from splitnerf.config import FIELDS, MIN_EXPORT_SIZE
     from splitnerf.delivery import export_folder
     from splitnerf.outputs import FORMATS
     from splitnerf.workflow import export_run
@@ -46,8 +46,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--faces must be 0 or at least {MIN_FACES}, got {args.faces}")
     if args.texture_size is not None and not MIN_EXPORT_SIZE <= args.texture_size <= MAX_TEXTURE_SIZE:
         raise InputError(f"--texture-size must be in [{MIN_EXPORT_SIZE}, {MAX_TEXTURE_SIZE}], got {args.texture_size}")
-    if args.resolution is not None and args.resolution < MIN_EXPORT_SIZE:
-        raise InputError(f"--resolution must be at least {MIN_EXPORT_SIZE}, got {args.resolution}")
+    limits = FIELDS["export.resolution"].metadata["limits"]
+    if args.resolution is not None and not limits.allow(args.resolution):
+        raise InputError(f"--resolution must be {limits}, got {args.resolution}")
     out = args.out or export_folder(args.run)
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")

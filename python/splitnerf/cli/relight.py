@@ -78,8 +78,10 @@ def check_ranges(args: argparse.Namespace) -> None:
     Raises:
         InputError: A number is out of its range; the message names it.
     """
+    from splitnerf.render.path_traced import MOST_SPP
+
     limits = (
-        ("--spp", args.spp, 1, 1 << 20), ("--bounces", args.bounces, 0, 64), ("--fps", args.fps, 0.1, 50),
+        ("--spp", args.spp, 1, MOST_SPP), ("--bounces", args.bounces, 0, 64), ("--fps", args.fps, 0.1, 50),
         ("--exposure", args.exposure, -20, 20), ("--rotate-env", args.rotate_env, -3600, 3600),
         ("--seed", args.seed, 0, 1 << 31),
     )  # fmt: skip

@@ -14,6 +14,7 @@ from splitnerf.data.reading import EVAL_MODES, MASK_KINDS
 MIN_EXPORT_SIZE = 8  # nodes or texels along an edge
 LOSS_FORMS = ("square", "smooth_l1")
 LARGEST_SEED = (1 << 63) - 1
+FARTHEST = 1024.0  # scene units; the object is about two of them wide
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Data:
 class Surface:
     """The signed distance field: a hash grid whose levels open one by one, and a network of one hidden layer."""
 
-    box: float = setting(1.5, "half the edge of the scene's box", unit="scene units")
+    box: float = setting(1.5, "half the edge of the scene's box", unit="scene units", above=0, at_most=FARTHEST)
     n_levels: int = setting(9, "levels of the hash grid", at_least=1, at_most=32)
     n_features: int = setting(2, "features of a level", choices=(1, 2, 4, 8))
     base_resolution: int = setting(
@@ -69,7 +70,9 @@ class Surface:
     levels_open_by: float = setting(0.4, "time at which the finest level opens", unit="share of the run")
     width: int = setting(64, "neurons of the hidden layer", at_least=1, at_most=1024)
     outputs: int = setting(13, "outputs of the network, the distance among them", at_least=1, at_most=1024)
-    sphere_radius: float = setting(0.7, "radius of the sphere that training starts from", unit="scene units")
+    sphere_radius: float = setting(
+        0.7, "radius of the sphere that training starts from", unit="scene units", at_most=FARTHEST
+    )
     normals: str = setting(
         "analytic", "how the normals are derived from the distance; finite_difference: the paper",
         choices=("analytic", "finite_difference"),
@@ -151,12 +154,14 @@ class Occlusion:
     width: int = setting(64, "neurons of a hidden layer of the MLP", at_least=1, at_most=1024)
     layers: int = setting(2, "hidden layers of the MLP", at_least=1, at_most=16)
     share: float = setting(0.1, "share of the shaded samples whose factors the MLP learns", unit="share of the samples")
-    rays: int = setting(32, "rays for each of the two factors of a sample that the MLP learns", unit="rays")
+    rays: int = setting(32, "rays for each of the two factors of a sample that the MLP learns", unit="rays", at_least=1)
     ray_start: str = setting(
         "normal", "direction of the offset: along the normal, or along the ray (the released code)",
         choices=("normal", "ray"),
     )  # fmt: skip
-    offset: float = setting(0.0125, "distance from the surface at which occlusion rays start", unit="scene units")
+    offset: float = setting(
+        0.0125, "distance from the surface at which occlusion rays start", unit="scene units", at_most=FARTHEST
+    )
     environment_height: int = setting(
         32, "rows of the light's image that weighs the MLP's rays", unit="texels", at_least=1, at_most=1 << 13
     )
@@ -192,12 +197,12 @@ class Sampling:
 
     initial_rays: int = setting(1024, "rays of the first step", unit="rays", at_least=1, at_most=1 << 20)
     max_rays: int = setting(8192, "most rays of a step", unit="rays", at_least=1, at_most=1 << 20)
-    target_samples: int = setting(4608, "samples of a step that the number of rays aims at", unit="samples")
-    max_samples_per_ray: int = setting(1024, "most samples of a ray", unit="samples")
+    target_samples: int = setting(4608, "samples of a step that the number of rays aims at", unit="samples", at_least=1)
+    max_samples_per_ray: int = setting(1024, "most samples of a ray", unit="samples", at_least=1)
     step_scale: float = setting(2.0, "length of a sample times s, between min_step and max_step")
-    min_step: float = setting(0.01, "least length of a sample", unit="scene units")
-    max_step: float = setting(0.04, "largest length of a sample", unit="scene units")
-    min_transmittance: float = setting(1e-3, "transmittance at which a ray ends")
+    min_step: float = setting(0.01, "least length of a sample", unit="scene units", above=0, at_most=FARTHEST)
+    max_step: float = setting(0.04, "largest length of a sample", unit="scene units", at_most=FARTHEST)
+    min_transmittance: float = setting(1e-3, "transmittance at which a ray ends", below=1.0)
     min_weight: float = setting(1e-3, "weight below which samples are left out; 0 takes all", at_least=0.0, below=1.0)
     shades_per_ray: int = setting(
         4, "samples of a ray that are shaded, others interpolate; 0 shades all", unit="samples", at_most=1024
@@ -209,7 +214,7 @@ class Sampling:
     grid_resolution: int = setting(
         96, "cells of the occupancy grid along an edge", unit="cells", at_least=1, at_most=512
     )
-    grid_every: int = setting(32, "steps between refreshes of the occupancy grid", unit="steps")
+    grid_every: int = setting(32, "steps between refreshes of the occupancy grid", unit="steps", at_least=1)
     hull_until: float = setting(0.1, "time until which the masks' visual hull is sampled", unit="share of the run")
     foreground_share: float = setting(0.85, "share of the rays that are drawn near the masks", unit="share of the rays")
 
@@ -231,13 +236,15 @@ class Losses:
     light_prior_weight: float = setting(0.001, "weight of the distance to a smooth and grey light (of the pyramid)")
     entropy_weight: float = setting(0.002, "weight of the materials' quadratic entropy, from priors_from")
     priors_from: float = setting(0.5, "time from which materials are told apart", unit="share of the run")
-    entropy_points: int = setting(384, "surface points of the entropy", unit="points", at_least=1)
+    entropy_points: int = setting(384, "surface points of the entropy", unit="points", at_least=1, at_most=1 << 16)
     albedo_width: float = setting(0.6, "distance of log albedos that count as one", above=0)
     gloss_width: float = setting(0.2, "distance of roughness and metallic that count as one", above=0)
     seen_weight: float = setting(0.02, "weight of the distance to the light that photos show around the object")
-    neutral_queries: int = setting(256, "normals at which the light's chroma is taken", unit="normals", at_least=1)
+    neutral_queries: int = setting(
+        256, "normals at which the light's chroma is taken", unit="normals", at_least=1, at_most=1 << 20
+    )
     smoothness_weight: float = setting(0.01, "weight of how far normals of neighbouring surface points are apart")
-    smoothness_points: int = setting(512, "surface points of that term", unit="points", at_least=1)
+    smoothness_points: int = setting(512, "surface points of that term", unit="points", at_least=1, at_most=1 << 20)
     smoothness_radius: float = setting(0.02, "standard deviation of a neighbour's offset", unit="scene units")
     light_form: str = setting(
         "smooth_l1", "error of the light; square: the paper; smooth_l1: the released code", choices=LOSS_FORMS
@@ -249,16 +256,16 @@ class Losses:
         "directions of the light's consistency; uniform: the paper; uniform_and_queries: the released code",
         choices=("fibonacci", "uniform", "uniform_and_queries"),
     )  # fmt: skip
-    light_samples: int = setting(2048, "most directions of the light's consistency", unit="directions")
+    light_samples: int = setting(2048, "most directions of the light's consistency", unit="directions", at_least=2)
     light_noise: float = setting(
         0.1, "share of that term's squared error that its noise may make; 0: always light_samples"
     )
-    light_queries: int = setting(512, "directions at which the light is compared", unit="directions")
-    light_every: int = setting(1, "steps between two uses of the light's consistency", unit="steps")
+    light_queries: int = setting(512, "directions at which the light is compared", unit="directions", at_least=1)
+    light_every: int = setting(1, "steps between two uses of the light's consistency", unit="steps", at_least=1)
     light_lobe_below: float = setting(0.15, "roughness below which a lobe is sampled exactly")
-    light_lobe_samples: int = setting(16, "directions of such a lobe", unit="directions")
+    light_lobe_samples: int = setting(16, "directions of such a lobe", unit="directions", at_least=1)
     eikonal_points: int = setting(
-        256, "points of the eikonal term, uniform in the box, beside the rays' samples", unit="points"
+        256, "points of the eikonal term, uniform in the box, beside the rays' samples", unit="points", at_most=1 << 20
     )
 
 

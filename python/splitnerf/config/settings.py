@@ -26,9 +26,10 @@ from splitnerf.config.groups import (
     Shading,
     Surface,
 )
-from splitnerf.data.images import atomic_path
+from splitnerf.config.setting import LARGEST_FLOAT
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
+from splitnerf.files import atomic_path
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -36,6 +37,7 @@ else:
     import tomli as tomllib
 
 UNLIMITED = 10**9
+MOST_CELLS = 1 << 30  # along an edge of the hash grid's finest level
 SUMMED_DIRECTIONS = 256  # fewer do not resolve the lobes that `shading.method = summed` sums
 
 # Names that settings had before there were groups, where they differ from the name within the group.
@@ -134,18 +136,19 @@ class Config:
         changes: dict[str, dict[str, object]] = {}
         for name, value in _flat(settings):
             group, _, key = name.partition(".")
-            changes.setdefault(group, {})[key] = value
+            whole = FIELDS[name].type == "float" and type(value) is int and abs(value) <= LARGEST_FLOAT
+            changes.setdefault(group, {})[key] = float(value) if whole else value
         groups = {group: dataclasses.replace(getattr(self, group), **values) for group, values in changes.items()}
         return dataclasses.replace(self, **groups)
 
     def write(self, path: Path) -> None:
         with atomic_path(path) as temporary:
-            temporary.write_text(tomli_w.dumps(dataclasses.asdict(self)))
+            temporary.write_text(tomli_w.dumps(dataclasses.asdict(self)), encoding="utf-8")
 
     @staticmethod
     def read(path: Path) -> Config:
         try:
-            table = tomllib.loads(path.read_text())
+            table = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise InputError(f"{path}: not a readable run configuration ({error})") from error
         try:
@@ -167,6 +170,10 @@ RULES = (
         ),
         f"shading.method = summed needs occlusion.kind = bits with at least {SUMMED_DIRECTIONS} occlusion.directions, "
         "shading.compositing = linear and shading.fresnel = exact; set shading.method=split",
+    ),
+    (
+        lambda c: c.surface.base_resolution * c.surface.growth ** (c.surface.n_levels - 1) >= MOST_CELLS,
+        f"a level of the hash grid needs fewer than {MOST_CELLS} cells along an edge; lower surface.growth",
     ),
     (
         lambda c: c.run.deterministic and c.run.max_minutes > 0,

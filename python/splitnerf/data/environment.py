@@ -12,6 +12,7 @@ from splitnerf.errors import InputError
 from splitnerf.notes import note
 
 ASPECT_TOLERANCE = 0.02
+BRIGHTEST = 1e12  # W / m^2 / sr; the sun has 1e7
 NEGATIVE_SHARE = 1e-3  # largest share of the map's sum; resampling and compression leave so much
 
 
@@ -45,6 +46,8 @@ def read_environment(path: str | os.PathLike) -> np.ndarray:
             raise InputError(f"{path}: has negative pixels, {dark / max(total, 1e-30):.1%} of its light; re-export it")
         note(f"{path}: {negative.any(axis=2).sum()} pixels were slightly negative; set to 0")
         radiance = np.maximum(radiance, 0)
+    if radiance.max() > BRIGHTEST:
+        raise InputError(f"{path}: has pixels above {BRIGHTEST:g}, whose sums overflow; scale it down")
     if not radiance.any():
         raise InputError(f"{path}: is black and lights nothing; use another map")
     return radiance

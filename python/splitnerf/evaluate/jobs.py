@@ -22,7 +22,8 @@ from splitnerf.evaluate.asset import asset_predictions, environment_beside
 from splitnerf.evaluate.lpips import load_distance
 from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.evaluate.relight import RelitViews, relight, relight_scores
-from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.evaluate.table import COLUMNS, GROUPS, SCORES
+from splitnerf.render.path_traced import MOST_SPP, AssetRenderer
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,10 @@ class Protocol:
     lights: str | None = None
     maps: Path | None = None
     reading: Reading = Reading()
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.spp <= MOST_SPP:
+            raise InputError(f"--spp must be at least 1 and at most {MOST_SPP}, got {self.spp}")
 
 
 @dataclass
@@ -71,8 +76,6 @@ def choose_views(dataset: Dataset, protocol: Protocol) -> tuple[Dataset, dict[st
     Raises:
         InputError: The data do not hold what the protocol asks for.
     """
-    if protocol.spp < 1:
-        raise InputError(f"--spp must be at least 1, got {protocol.spp}")
     maps = relight_maps(dataset, protocol.maps, protocol.lights)
     count = protocol.views
     if count is None:
@@ -156,9 +159,31 @@ def read_evaluation(target: Path) -> dict:
     """The scores that an earlier evaluation of a run or a file wrote.
 
     Raises:
-        InputError: There are none.
+        InputError: There are none, or the file is not one of scores.
     """
     path = evaluation_path(target)
     if not path.is_file():
         raise InputError(f"{path}: no such evaluation; make it with `splitnerf evaluate {target} --data DATA`")
-    return read_json(path, "novel_view")
+    scores = read_json(path, "novel_view")
+    if not is_evaluation(scores):
+        raise InputError(f"{path}: is not an evaluation; make it with `splitnerf evaluate {target} --data DATA`")
+    return scores
+
+
+def holds_evaluation(path: Path) -> bool:
+    """Whether a file is an evaluation."""
+    try:
+        return is_evaluation(read_json(path, "novel_view"))
+    except InputError:
+        return False
+
+
+def is_evaluation(content: dict) -> bool:
+    """Whether contents of a file are scores as an evaluation writes them."""
+    groups = [content.get(key) for key, _ in GROUPS]
+    numbers = [content.get(key) for key, *_ in COLUMNS]
+    for group in groups:
+        if group is not None and not (isinstance(group, dict) and {key for key, *_ in SCORES} <= group.keys()):
+            return False
+        numbers += [group[key] for key, *_ in SCORES] if group else []
+    return "novel_view" in content and all(type(number) in (int, float, type(None)) for number in numbers)

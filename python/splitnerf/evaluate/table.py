@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 GROUPS = (("relight", "relight"), ("albedo", "albedo"), ("novel_view", "novel view"))
 SCORES = (("psnr", "PSNR", "{:.2f}"), ("ssim", "SSIM", "{:.3f}"), ("lpips", "LPIPS", "{:.3f}"))
@@ -41,6 +42,12 @@ def evaluation_table(evaluations: Sequence[tuple[str, dict]]) -> str:
     if len(rows) > 1:
         lines.append(["**mean**"] + [_mean([v[i] for _, v in rows], text) for i, text in enumerate(formats)])
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def holds_table(path: Path) -> bool:
+    """Whether a file is a table of scores."""
+    with open(path, "rb") as file:
+        return file.read(9) == b"| scene |"
 
 
 def _values(evaluation: dict) -> list[float | None]:

@@ -14,6 +14,7 @@ from splitnerf.data.layouts.transforms import read_camera_path
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
+from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_VIEWS
 
 DEFAULT_SIZE = 512
 HALF_FIELD = np.radians(19.8)  # half field of view of the shorter side: a 50 mm lens on a 36 mm wide sensor
@@ -46,8 +47,9 @@ def parse_size(text: str) -> tuple[int, int | None]:
         InputError: The text has another form, or a side is below 1 or above 16384.
     """
     parts = text.lower().split("x")
-    if len(parts) > 2 or not all(part.isascii() and part.isdigit() and 1 <= int(part) <= 16384 for part in parts):
-        raise InputError(f"--size must be W or WxH in pixels, 1 to 16384, got '{text}'")
+    digits = all(part.isascii() and part.isdigit() and len(part) < 10 for part in parts)
+    if len(parts) > 2 or not digits or not all(1 <= int(part) <= LARGEST_PICTURE for part in parts):
+        raise InputError(f"--size must be W or WxH in pixels, 1 to {LARGEST_PICTURE}, got '{text}'")
     return int(parts[0]), int(parts[1]) if len(parts) == 2 else None
 
 
@@ -76,8 +78,8 @@ def turntable(
     Raises:
         InputError: The count or the elevation is out of range.
     """
-    if count < 1:
-        raise InputError(f"--turntable must be at least 1, got {count}")
+    if not 1 <= count <= MOST_VIEWS:
+        raise InputError(f"--turntable must be at least 1 and at most {MOST_VIEWS}, got {count}")
     if not -90 < elevation < 90:
         raise InputError(f"--elevation must lie between -90 and 90 degrees, got {elevation:g}")
     width, height = size or (DEFAULT_SIZE, None)
@@ -125,13 +127,17 @@ def path_views(path: Path, size: tuple[int, int | None] | None) -> list[View]:
     Raises:
         InputError: The file cannot be used, or the size has another shape than its `w` and `h`.
     """
-    views = []
-    for pose, lens in read_camera_path(path):
+    views, cameras = [], read_camera_path(path)
+    if len(cameras) > MOST_VIEWS:
+        raise InputError(f"{path}: has {len(cameras)} cameras, more than {MOST_VIEWS}; split it")
+    for pose, lens in cameras:
         if ("w" in lens) != ("h" in lens):
             raise InputError(f"{path}: has only one of 'w' and 'h'; give both or none")
         if "fl_x" in lens and "w" not in lens:
             raise InputError(f"{path}: 'fl_x' is in pixels and needs 'w' and 'h'; add them")
         own = (int(lens["w"]), int(lens["h"])) if "w" in lens else None
+        if own and not all(1 <= side <= LARGEST_PICTURE for side in own):
+            raise InputError(f"{path}: 'w' and 'h' must lie between 1 and {LARGEST_PICTURE}, got {own[0]} and {own[1]}")
         views.append(_lens_view(pose, lens, size, str(path), own))
     return views
 

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from tqdm import tqdm
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.environment import read_environment, rotate_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.errors import InputError
+from splitnerf.files import held
 from splitnerf.relight.background import Background, compose
 from splitnerf.relight.cameras import View, bounding_sphere
 from splitnerf.relight.output import (
-    GIF, MP4, display_frame, prepare_folder, require_ffmpeg, write_frame, write_gif, write_mp4,
+    GIF, MP4, check_folder, display_frame, file_names, require_ffmpeg, write_frame, write_gif, write_mp4,
 )  # fmt: skip
 from splitnerf.render.path_traced import AssetRenderer
 
@@ -83,7 +86,7 @@ def relight(
         InputError: An argument cannot be used; then nothing was written or removed.
         OSError: A file cannot be written.
     """
-    folders = [out] if len(maps) == 1 else [out / path.stem for path in maps]
+    folders = [out] if len(maps) == 1 else [out / folder_name(path) for path in maps]
     if len(set(folders)) < len(folders):
         raise InputError(f"{out}: two maps have the same name and would share a folder; rename one")
     if settings.mp4:
@@ -93,10 +96,33 @@ def relight(
     asset = asset_of(source)
     views = views_of(asset)
     _check_animation(views, settings)
-    for folder in folders:
-        prepare_folder(folder, overwrite=overwrite)
+    names = file_names(len(views), gif=settings.gif, mp4=settings.mp4)
+    with ExitStack() as stack:
+        for folder in folders:
+            stack.enter_context(held(folder))
+        earlier = [check_folder(folder, names, overwrite=overwrite) for folder in folders]
+        render_frames(asset, lights, views, folders, background, settings)
+        for folder, own in zip(folders, earlier):
+            for name in own.difference(names):
+                (folder / name).unlink()
+    return folders
+
+
+def folder_name(path: Path) -> str:
+    """The name of a map's folder. Raises InputError where it would be another folder than one below --out."""
+    if not path.stem.strip("."):
+        raise InputError(f"{path}: has no name that a folder could have; rename the map")
+    return path.stem
+
+
+def render_frames(
+    asset: Asset, lights: list[np.ndarray], views: list[View], folders: list[Path], background: Background,
+    settings: Settings,
+) -> None:  # fmt: skip
+    """Renders all views under each light into its folder."""
     renderer = AssetRenderer(asset)
     ground = _lowest(asset) if settings.shadow_catcher else None
+    exposure = 2.0**settings.exposure
     with tqdm(total=len(lights) * len(views), unit="frame", file=sys.stderr, disable=None) as bar:
         for light, folder in zip(lights, folders):
             frames = []
@@ -106,7 +132,6 @@ def relight(
                     turned, view.pose, view.intrinsics, view.width, view.height, spp=settings.spp,
                     bounces=settings.bounces, seed=settings.seed + index, catcher_height=ground,
                 )  # fmt: skip
-                exposure = 2.0**settings.exposure
                 linear = compose(images, background.behind(view, turned, exposure), exposure)
                 write_frame(folder, index, linear, with_alpha=background.transparent)
                 if settings.gif or settings.mp4:
@@ -116,7 +141,6 @@ def relight(
                 write_gif(folder / GIF, frames, settings.fps)
             if settings.mp4:
                 write_mp4(folder / MP4, frames, settings.fps)
-    return folders
 
 
 def _check_animation(views: list[View], settings: Settings) -> None:

@@ -8,28 +8,42 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from splitnerf.data.images import atomic_path, linear_to_srgb, to_uint8, write_image
+from splitnerf.data.images import is_written_here, linear_to_srgb, to_uint8, write_image
+from splitnerf.data.frames import refuse_data
 from splitnerf.errors import InputError
+from splitnerf.files import atomic_path
 
 GIF, MP4 = "animation.gif", "animation.mp4"
-FRAME = re.compile(r"\d{3,}\.(png|exr)")
+FRAME = re.compile(r"\d{3,}\.exr")
 
 
-def prepare_folder(folder: Path, *, overwrite: bool) -> None:
-    """Removes the frames and animations of an earlier call, or refuses a folder that has some.
+def file_names(n_frames: int, *, gif: bool, mp4: bool) -> list[str]:
+    """The names of the files that a call writes into a folder."""
+    frames = [f"{index:03d}.{suffix}" for index in range(n_frames) for suffix in ("exr", "png")]
+    return frames + [GIF] * gif + [MP4] * mp4
+
+
+def own_files(folder: Path) -> set[str]:
+    """The names of the files in a folder that an earlier call wrote: frames whose EXR says so, and their animations."""
+    frames = [path for path in folder.glob("*.exr") if FRAME.fullmatch(path.name) and is_written_here(path)]
+    pictures = {name for path in frames for name in (path.name, f"{path.stem}.png")}
+    return {name for name in pictures | ({GIF, MP4} if frames else set()) if (folder / name).exists()}
+
+
+def check_folder(folder: Path, names: list[str], *, overwrite: bool) -> set[str]:
+    """The files of an earlier call in a folder where files of these names are to be.
 
     Raises:
-        InputError: It holds frames and `overwrite` is false, or is no folder.
+        InputError: There are some and `overwrite` is false, or a file of one of the names is none of them.
     """
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is a file; give --out a folder")
-    if not folder.exists():
-        return
-    present = [path for path in folder.iterdir() if path.name in (GIF, MP4) or FRAME.fullmatch(path.name)]
-    if present and not overwrite:
+    refuse_data(folder)
+    own = own_files(folder)
+    if own and not overwrite:
         raise InputError(f"{folder}: holds frames already; replace them with --overwrite, or give another --out")
-    for path in present:
-        path.unlink()
+    foreign = [name for name in names if name not in own and (folder / name).exists()]
+    if foreign:
+        raise InputError(f"{folder / foreign[0]}: is none that relight wrote, and would be lost; give another --out")
+    return own
 
 
 def write_frame(folder: Path, index: int, linear: np.ndarray, *, with_alpha: bool) -> None:
@@ -110,4 +124,6 @@ def write_mp4(path: Path, frames: list[np.ndarray], fps: float) -> None:
         writer.send(None)
         for frame in frames:
             writer.send(np.ascontiguousarray(frame[:height, :width]))
-        writer.close()
+        writer.close()  # says nothing where the disk was full
+        if imageio_ffmpeg.count_frames_and_secs(str(temporary))[0] != len(frames):
+            raise OSError(f"{path}: ffmpeg cannot write it; the disk may be full")

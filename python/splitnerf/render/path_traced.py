@@ -8,6 +8,7 @@ from splitnerf import _core
 from splitnerf.data.asset import Asset
 
 CLAMP_INDIRECT = 10.0
+MOST_SPP, LARGEST_PICTURE, MOST_VIEWS = 1 << 20, 1 << 14, 100_000  # paths a pixel, pixels of a side, pictures of a call
 
 
 class AssetRenderer:

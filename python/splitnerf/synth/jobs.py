@@ -16,7 +16,9 @@ from splitnerf.data.environment import read_environment, resize_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.relit import PREFIX
 from splitnerf.errors import InputError
+from splitnerf.files import LOCK, held
 from splitnerf.notes import note
+from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_SPP, MOST_VIEWS, AssetRenderer
 from splitnerf.synth.cameras import orbit, spiral
 from splitnerf.synth.placed import write_placed_glb
 from splitnerf.synth.writer import LAYOUTS, SceneWriter
@@ -61,9 +63,9 @@ class SynthSettings:
 
     def check(self) -> None:
         """Raises InputError where a setting has no meaning."""
-        for name in ("size", "train", "test", "spp"):
-            if getattr(self, name) < 1:
-                raise InputError(f"--{name} must be at least 1, got {getattr(self, name)}")
+        for name, most in (("size", LARGEST_PICTURE), ("train", MOST_VIEWS), ("test", MOST_VIEWS), ("spp", MOST_SPP)):
+            if not 1 <= getattr(self, name) <= most:
+                raise InputError(f"--{name} must be at least 1 and at most {most}, got {getattr(self, name)}")
         if self.seed < 0:
             raise InputError(f"--seed must not be negative, got {self.seed}")
         for name, known in (("layout", LAYOUTS), ("renderer", RENDERERS)):
@@ -93,7 +95,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
         OSError: A file cannot be written.
     """
     settings.check()
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+    if out.exists() and (not out.is_dir() or any(path.name != LOCK for path in out.iterdir())):
         raise InputError(f"{out}: exists and is not an empty folder; give another --out")
     names = [path.stem.removeprefix(PREFIX) for path in relight]
     if len(set(names)) < len(names):
@@ -109,17 +111,16 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
 
         renderer = BlenderRenderer(asset, centre, scale)
     else:
-        from splitnerf.render.path_traced import AssetRenderer
-
         renderer = AssetRenderer(normalised(original, centre, scale))
 
-    writer = SceneWriter(out, CAMERA_ANGLE_X, settings.layout)
-    writer.mesh((original.vertices - centre) * scale, original.triangles)
-    write_placed_glb(asset, out / "asset.glb", centre, scale)
-    stored = writer.light(maps[0])
-    stored_relight = {name: writer.light(environment, name) for name, environment in zip(names, maps[1:])}
-    render_views(renderer, writer, stored, stored_relight, settings)
-    writer.close()
+    with held(out):
+        writer = SceneWriter(out, CAMERA_ANGLE_X, settings.layout)
+        write_placed_glb(asset, out / "asset.glb", centre, scale)
+        writer.mesh((original.vertices - centre) * scale, original.triangles)
+        stored = writer.light(maps[0])
+        stored_relight = {name: writer.light(environment, name) for name, environment in zip(names, maps[1:])}
+        render_views(renderer, writer, stored, stored_relight, settings)
+        writer.close()
     return out
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.images import atomic_path
+from splitnerf.data.gltf.geometry import scene_roots
+from splitnerf.files import atomic_path
 
 HEADER = 20  # of the file and of its first chunk, which is the JSON
 
@@ -36,10 +37,9 @@ def write_placed_glb(source: Path, target: Path, centre: np.ndarray, scale: floa
     stored = [item for kind in ("buffers", "images") for item in document.get(kind, [])]
     if any(not item.get("uri", "data:").startswith("data:") for item in stored):
         return False
-    scene = document["scenes"][document.get("scene", 0)]
     x, y, z = (float(-value * scale) for value in centre)
-    root = {"name": "unit sphere", "children": scene["nodes"], "scale": [scale] * 3, "translation": [x, z, -y]}
-    scene["nodes"] = [len(document["nodes"])]
+    root = {"name": "unit sphere", "children": scene_roots(document), "scale": [scale] * 3, "translation": [x, z, -y]}
+    document["scenes"], document["scene"] = [{"nodes": [len(document["nodes"])]}], 0
     document["nodes"].append(root)
     for material in document.get("materials", []):
         material.pop("emissiveFactor", None)

@@ -162,7 +162,10 @@ class Document:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
             except binascii.Error:
                 raise InputError(f"{self.path}: holds a data URI that is not base64; export it again") from None
+        folder = self.path.parent.resolve()
         path = self.path.parent / unquote(uri)
+        if folder not in path.resolve().parents:
+            raise InputError(f"{self.path}: refers to {uri[:200]!r}, outside its folder; put the file there")
         if not is_file(path):
             raise InputError(f"{path}: no such file, though {self.path.name} refers to it; add it or export a GLB")
         if uri not in self._files:

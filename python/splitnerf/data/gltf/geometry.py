@@ -70,6 +70,15 @@ def scene_parts(document: Document) -> list[Part]:
     return parts
 
 
+def scene_roots(content: dict) -> list[int]:
+    """The nodes at the root of a file's default scene, or of all nodes where the file has no scene."""
+    if content.get("scenes"):
+        return content["scenes"][content.get("scene", 0)].get("nodes", [])
+    nodes = content.get("nodes", [])
+    children = {child for node in nodes for child in node.get("children", [])}
+    return [index for index in range(len(nodes)) if index not in children]
+
+
 def split_mirrored(part: Part, uv: np.ndarray) -> tuple[Part, np.ndarray]:
     """Doubles the vertices where texture coordinates [n, 2] meet their mirror image: the two sides have no tangent
     space in common (MikkTSpace parts them too)."""
@@ -93,12 +102,7 @@ def split_mirrored(part: Part, uv: np.ndarray) -> tuple[Part, np.ndarray]:
 
 def _world_matrices(document: Document) -> dict[int, np.ndarray]:
     """[4, 4] of every node of the default scene, or of all nodes where the file has no scene."""
-    nodes = document.get("nodes")
-    if document.get("scenes"):
-        roots = document.json["scenes"][document.json.get("scene", 0)].get("nodes", [])
-    else:
-        children = {child for node in nodes for child in node.get("children", [])}
-        roots = [index for index in range(len(nodes)) if index not in children]
+    nodes, roots = document.get("nodes"), scene_roots(document.json)
     matrices: dict[int, np.ndarray] = {}
     pending = [(root, np.eye(4)) for root in reversed(roots)]
     while pending:

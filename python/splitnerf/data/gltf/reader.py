@@ -15,6 +15,8 @@ from splitnerf.data.tangents import vertex_tangents
 from splitnerf.errors import InputError
 from splitnerf.notes import note
 
+FARTHEST = 1e12  # coordinates; the tracer's products of two stay finite
+
 
 def read_asset(path: str | os.PathLike) -> Asset:
     """Reads a glTF 2.0 file: all primitives of its scene as one mesh, y up turned to z up, (x, y, z) -> (x, -z, y).
@@ -81,6 +83,8 @@ def _read(document: Document) -> Asset:
     for values in (asset.vertices, asset.normals, asset.uv, asset.tangents):
         if values is not None and not np.isfinite(values).all():
             raise InputError(f"{path}: has NaN or infinite coordinates after its transforms; repair them")
+    if np.abs(asset.vertices).max() > FARTHEST:
+        raise InputError(f"{path}: has vertices farther than {FARTHEST:g} from the origin; scale it down")
     corners = asset.vertices[asset.triangles]
     if not np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
         raise InputError(f"{path}: no triangle has an area; export the mesh again")

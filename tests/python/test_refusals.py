@@ -1,0 +1,263 @@
+"""What cannot be done is refused in one line, before anything is lost."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+
+import numpy as np
+import pytest
+import torch
+from gltf_builder import Gltf, triangle
+from tiny_runs import train
+from torch.autograd import forward_ad
+
+from splitnerf import ops
+from splitnerf.cli import BAD_INPUT, DONE, FAILED, main
+from splitnerf.data.environment import read_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import write_image
+from splitnerf.errors import InputError
+
+
+@pytest.fixture
+def grey(tmp_path):
+    write_image(tmp_path / "grey.hdr", np.full((8, 16, 3), 0.5, np.float32))
+    return tmp_path / "grey.hdr"
+
+
+@pytest.fixture
+def asset(tmp_path):
+    return triangle().write(tmp_path / "asset.glb")
+
+
+def refused(capsys, *words: object) -> str:
+    """The one line, notes aside, of a command that is refused."""
+    capsys.readouterr()
+    assert main([str(word) for word in words]) == BAD_INPUT
+    (error,) = (line for line in capsys.readouterr().err.splitlines() if "note: " not in line)
+    assert error.startswith("splitnerf: ")
+    return error
+
+
+# ---- relight ----
+
+
+def relit(asset, *words: object) -> list[object]:
+    return ["relight", asset, "--size", "4", "--spp", "1", *words]
+
+
+def test_relight_replaces_only_its_own_pictures(tmp_path, asset, grey, capsys):
+    photos = tmp_path / "photos"
+    for i in range(3):
+        write_image(photos / f"{i:03d}.png", np.full((4, 4, 3), 0.5))
+        write_image(photos / f"{i:03d}.exr", np.full((4, 4, 3), 0.5))
+        content = (photos / f"{i:03d}.exr").read_bytes()
+        (photos / f"{i:03d}.exr").write_bytes(content.replace(b"SplitNeRF", b"Blender.."))
+    before = {path: path.read_bytes() for path in photos.iterdir()}
+    for words in ((), ("--overwrite",), ("--overwrite", "--turntable", "2")):
+        error = refused(capsys, *relit(asset, "--env", grey, "--out", photos, *words))
+        assert "000.exr: is none that relight wrote" in error
+    assert before == {path: path.read_bytes() for path in photos.iterdir()}
+    for name in ("000.png", "000.exr"):
+        (photos / name).unlink()
+    assert main(list(map(str, relit(asset, "--env", grey, "--out", photos)))) == DONE
+    assert main(list(map(str, relit(asset, "--env", grey, "--out", photos, "--overwrite")))) == DONE
+    assert all((photos / path.name).read_bytes() == content for path, content in before.items() if path.stem != "000")
+
+
+def test_an_overwriting_relight_without_room_keeps_the_pictures(tmp_path, asset, grey, monkeypatch, capsys):
+    words = list(map(str, relit(asset, "--env", grey, "--out", tmp_path / "out", "--turntable", "2")))
+    assert main(words) == DONE
+    before = {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+
+    def fails(_) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", fails)
+    assert main([*words, "--overwrite", "--seed", "5"]) == FAILED
+    assert "000.exr: cannot be written (No space left on device)" in capsys.readouterr().err
+    assert before == {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+
+
+def test_a_map_without_a_name_has_no_folder_of_its_own(tmp_path, asset, grey, capsys):
+    (tmp_path / "...hdr").write_bytes(grey.read_bytes())
+    words = relit(asset, "--env", grey, "--env", tmp_path / "...hdr", "--out", tmp_path / "a/b")
+    assert "...hdr: has no name that a folder could have" in refused(capsys, *words)
+    assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize(("path", "message"), [
+    ({"w": 0.5, "h": 0.5}, "'w' and 'h' must lie between 1 and 16384, got 0 and 0"),
+    ({"w": 1e9, "h": 1e9}, "'w' and 'h' must lie between 1 and 16384"),
+])  # fmt: skip
+def test_pictures_of_no_size_or_without_end(tmp_path, asset, grey, capsys, path, message):
+    frames = [{"transform_matrix": np.eye(4).tolist()}]
+    (tmp_path / "path.json").write_text(json.dumps(path | {"camera_angle_x": 1.0, "frames": frames}))
+    words = ["relight", asset, "--spp", "1", "--env", grey, "--path", tmp_path / "path.json", "--out", tmp_path / "out"]
+    assert message in refused(capsys, *words)
+
+
+def test_a_camera_path_has_an_end(tmp_path, asset, grey, capsys, monkeypatch):
+    monkeypatch.setattr("splitnerf.relight.cameras.MOST_VIEWS", 2)
+    frames = [{"transform_matrix": np.eye(4).tolist()}] * 3
+    (tmp_path / "path.json").write_text(json.dumps({"camera_angle_x": 1.0, "frames": frames}))
+    words = relit(asset, "--env", grey, "--path", tmp_path / "path.json", "--out", tmp_path / "out")
+    assert "path.json: has 3 cameras, more than 2; split it" in refused(capsys, *words)
+
+
+def test_numbers_of_pictures_and_paths_have_a_limit(tmp_path, asset, grey, capsys):
+    out = tmp_path / "out"
+    assert "--turntable must be at least 1 and at most 100000" in refused(
+        capsys, *relit(asset, "--env", grey, "--turntable", 10**9, "--out", out)
+    )
+    for option, value in (("--size", 100000), ("--spp", 3 * 10**9), ("--train", 10**9)):
+        words = ["synth", asset, "--light", grey, "--out", out, option, value]
+        assert f"{option} must be at least 1 and at most" in refused(capsys, *words)
+    for words in (["evaluate", asset, "--data", tmp_path], ["ablate", tmp_path]):
+        assert "--spp must be at least 1 and at most 1048576" in refused(capsys, *words, "--spp", 3 * 10**9)
+    assert "--resolution must be in [8, 4096], got 100000" in refused(
+        capsys, "export", tmp_path, "--resolution", 100000
+    )
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("brightest", [3e38, 2e12])
+def test_a_light_whose_sums_overflow(tmp_path, brightest):
+    radiance = np.full((4, 8, 3), 0.5, np.float32)
+    radiance[1, 2] = brightest
+    write_image(tmp_path / "a.exr", radiance)
+    with pytest.raises(InputError, match="a.exr: has pixels above 1e.12, whose sums overflow"):
+        read_environment(tmp_path / "a.exr")
+
+
+# ---- glTF ----
+
+
+def beside(gltf: Gltf, folder, uri: str):
+    """The asset with its buffer in a file of this name."""
+    content = gltf.json | {"buffers": [{"byteLength": len(gltf.binary), "uri": uri}]}
+    (folder / "asset.gltf").write_text(json.dumps(content))
+    return folder / "asset.gltf"
+
+
+@pytest.mark.parametrize("uri", [
+    "../secret.bin", "%2e%2e/secret.bin", "sub/../../secret.bin", "{root}/secret.bin", "link.bin",
+])  # fmt: skip
+def test_gltf_stays_below_its_folder(tmp_path, uri):
+    gltf = triangle()
+    folder = tmp_path / "asset"
+    (folder / "sub").mkdir(parents=True)
+    (tmp_path / "secret.bin").write_bytes(gltf.binary)
+    (folder / "link.bin").symlink_to(tmp_path / "secret.bin")
+    with pytest.raises(InputError, match="asset.gltf: refers to .*, outside its folder; put the file there"):
+        read_asset(beside(gltf, folder, uri.format(root=tmp_path)))
+    (folder / "sub/the data.bin").write_bytes(gltf.binary)
+    (folder / "inside.bin").symlink_to("sub/the data.bin")
+    for uri in ("sub/the%20data.bin", "./sub/../sub/the%20data.bin", "inside.bin"):
+        assert len(read_asset(beside(gltf, folder, uri)).triangles) == 1
+
+
+def test_gltf_reads_regular_files_alone(tmp_path):
+    os.mkfifo(tmp_path / "pipe.bin")
+    with pytest.raises(InputError, match="pipe.bin: no such file"):
+        read_asset(beside(triangle(), tmp_path, "pipe.bin"))
+
+
+def test_an_asset_without_scenes_makes_data(tmp_path, grey):
+    gltf = triangle()
+    gltf.json.pop("scenes", None)
+    gltf.json.pop("scene", None)
+    source = gltf.write(tmp_path / "asset.glb")
+    words = ["--size", "8", "--train", "1", "--test", "1", "--spp", "1", "--out", tmp_path / "data"]
+    assert main([str(word) for word in ("synth", source, "--light", grey, *words)]) == DONE
+    placed, original = read_asset(tmp_path / "data/asset.glb"), read_asset(source)
+    assert len(placed.triangles) == len(original.triangles) and np.abs(placed.vertices).max() <= 1.0001
+
+
+# ---- scores ----
+
+
+def test_scores_of_another_run_are_not_replaced(data, other_data, tmp_path, capsys):
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "4") == DONE
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    assert "was trained on other images" in refused(capsys, "evaluate", run, "--data", other_data)
+    for option, victim in (("--table", "checkpoint.pt"), ("--out", "checkpoint.pt"), ("--out", "config.toml")):
+        words = ["evaluate", run, "--data", data, option, run / victim]
+        assert f"{victim}: is no earlier result, and would be replaced" in refused(capsys, *words)
+    assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    (tmp_path / "empty.json").touch()
+    for _ in range(2):
+        words = ["evaluate", run, "--data", data, "--table", tmp_path / "t.md", "--out", tmp_path / "empty.json"]
+        assert main([str(word) for word in words]) == DONE
+
+
+@pytest.mark.parametrize("content", [
+    {"novel_view": 3}, {"novel_view": {"psnr": "high"}}, {"novel_view": {"psnr": "high", "ssim": 1, "lpips": None}},
+    {"novel_view": None, "f_score": []}, {"albedo": None}, {"novel_view": {}},
+])  # fmt: skip
+def test_scores_of_other_types(tmp_path, capsys, content):
+    (tmp_path / "evaluation.json").write_text(json.dumps(content))
+    error = refused(capsys, "evaluate", tmp_path, "--table", tmp_path / "t.md")
+    assert "evaluation.json: is not an evaluation" in error
+    (tmp_path / "evaluation.json").write_text(json.dumps({"novel_view": None, "f_score": 0.5}))
+    assert main(["evaluate", str(tmp_path)]) == DONE
+
+
+# ---- operators ----
+
+
+def test_forward_derivatives_raise():
+    """Torch itself loses the tangent of an operator without one, and says nothing."""
+    x = torch.tensor([0.5])
+    with pytest.raises(RuntimeError, match="linear_to_srgb: no forward derivative .jvp. is defined"):
+        torch.func.jvp(ops.linear_to_srgb, (x,), (torch.ones(1),))
+    with forward_ad.dual_level():
+        dual = forward_ad.make_dual(x, torch.ones(1))
+        for x_and_more in (dual, dual.clone().requires_grad_()):
+            with pytest.raises((RuntimeError, NotImplementedError)):
+                ops.linear_to_srgb(x_and_more)
+        assert torch.equal(ops.linear_to_srgb(x), ops.linear_to_srgb(x.clone()))  # no tangent, nothing lost
+    for op in ("srgb_to_linear", "composite"):
+        arguments = [x] if op == "srgb_to_linear" else [x, x[:, None], torch.tensor([0, 1])]
+        with pytest.raises(RuntimeError, match=f"{op}: no forward derivative"):
+            torch.func.jvp(lambda a: getattr(ops, op)(a, *arguments[1:]), (x,), (torch.ones(1),))
+
+
+# ---- errors that nobody foresaw ----
+
+
+@pytest.mark.parametrize(("error", "words"), [
+    (ValueError("no\nsuch"), "unexpected ValueError: no such"), (KeyError("a"), "unexpected KeyError: 'a'"),
+    (TypeError("x"), "unexpected TypeError: x"), (MemoryError(), "not enough memory; use smaller sizes"),
+    (MemoryError("of 3 GiB"), "not enough memory (of 3 GiB); use smaller sizes"),
+    (OSError(errno.EACCES, "Permission denied", "/a/b"), "/a/b: Permission denied"),
+    (RuntimeError("words"), "words"),
+])  # fmt: skip
+def test_any_error_is_one_line(monkeypatch, capsys, error, words):
+    def fails(*_):
+        raise error
+
+    monkeypatch.setattr("splitnerf.config.settings_table", fails)
+    assert main(["info", "--settings"]) == FAILED
+    printed = capsys.readouterr().err
+    assert printed.startswith(f"splitnerf: {words}") and len(printed.splitlines()) == 1
+    if "unexpected" in words:
+        monkeypatch.setenv("SPLITNERF_TRACEBACK", "1")
+        with pytest.raises(type(error)):
+            main(["info", "--settings"])
+
+
+def test_a_checkpoint_whose_frame_cannot_be_left(begun, tmp_path):
+    content = torch.load(begun[0] / "checkpoint.pt", weights_only=True)
+    changes = (
+        lambda box: box.zero_(), lambda box: box[0].neg_(), lambda box: box[3].fill_(1.0),
+        lambda box: box[0, 1].fill_(0.5),
+    )  # fmt: skip
+    for change in changes:
+        box = content["box_from_world"].clone()
+        change(box)
+        torch.save(content | {"box_from_world": box}, tmp_path / "checkpoint.pt")
+        assert main(["export", str(tmp_path)]) == BAD_INPUT
