@@ -88,6 +88,15 @@ def sample_environment(radiance: np.ndarray, directions: np.ndarray) -> np.ndarr
     return ((1 - down) * rows[0] + down * rows[1]).astype(np.float32)
 
 
+def directions_of_texels(height: int) -> tuple[np.ndarray, np.ndarray]:
+    """The directions [h, 2 h, 3] of the texels of an equirectangular map, and their solid angles [h, 2 h]."""
+    theta = (np.arange(height) + 0.5) * np.pi / height
+    phi = (0.5 - (np.arange(2 * height) + 0.5) / (2 * height)) * 2 * np.pi
+    ring, up = np.sin(theta)[:, None], np.broadcast_to(np.cos(theta)[:, None], (height, 2 * height))
+    areas = np.broadcast_to(ring / ring.sum() * 2 * np.pi / height, up.shape)
+    return np.stack([ring * np.cos(phi), ring * np.sin(phi), up], axis=-1), areas
+
+
 def seen_at(surroundings: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What photos show around the object, in given directions.
 

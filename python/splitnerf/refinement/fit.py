@@ -25,6 +25,7 @@ from splitnerf.data.tensor_files import check_tensor
 from splitnerf.errors import InputError
 from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
 from splitnerf.refinement.control_variate import centred, white_sums
+from splitnerf.refinement.lamps import CompactLamp, compact_lamp
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.like_texels import usual_gloss
@@ -104,6 +105,7 @@ class Refined:
             shape was kept.
         sweeps: What each sweep says.
         uncertainty: What the photos leave open.
+        lamp: The lamp that was made compact at the start, or None.
     """
 
     asset: Asset
@@ -111,6 +113,7 @@ class Refined:
     outline: list[float]
     sweeps: list[Sweep]
     uncertainty: Uncertainty
+    lamp: CompactLamp | None
 
 
 class Sweep(NamedTuple):
@@ -175,7 +178,7 @@ class Refinement:
         self.unknowns = to_unknowns(self.texels.start)
         like = torch.zeros(N_UNKNOWNS)
         like[ROUGHNESS], like[METALLIC] = s.like_roughness, s.like_metal
-        width = patch_width(dataset, self.texels)
+        width = self.patch_width = patch_width(dataset, self.texels)
         smooth = max(1.0, width / PATCH_PIXELS) ** 2 * per_unknown(s.smooth_albedo, s.smooth_gloss, s.smooth_normal)
         prior = Prior(
             pairs=self.texels.pairs, smooth=smooth,
@@ -184,6 +187,13 @@ class Refinement:
         self.equations = NormalEquations(self.unknowns, prior, s.keep)
         self.information = Information(self.texels, width, len(self.pixels))
         self.n_batches = self.n_sweeps = 0
+
+    def make_lamp_compact(self) -> CompactLamp | None:
+        """Brings the brightest glow of the light together where the albedo shows the edge of its shadow; None where not."""
+        light, lamp = compact_lamp(self.texels, self.light.radiance().numpy(), self.patch_width, self.settings.seed)
+        if lamp is not None:
+            self.light.set_radiance(torch.from_numpy(light))
+        return lamp
 
     def state(self) -> dict[str, object]:
         """All that further sweeps depend on beside the arguments, as tensors and plain values."""
@@ -316,7 +326,7 @@ class Stage:
         state: What :meth:`state` gave of a stage with the same other arguments, `sweeps` and `minutes` aside; None begins.
 
     Attributes:
-        outline, sweeps: See :class:`Refined`.
+        outline, sweeps, lamp: See :class:`Refined`.
 
     Raises:
         ValueError, KeyError, TypeError: The asset or the light has another form, or the state is another stage's.
@@ -336,9 +346,12 @@ class Stage:
             self.started -= float(state["seconds"])
         elif settings.outline:
             asset, self.outline = fit_outline(dataset, asset, settings.seed)
-        self.fit = Refinement(dataset, asset, environment, settings)
+        self.fit, self.lamp = Refinement(dataset, asset, environment, settings), None
         if state is not None:
             self.fit.restore(state["fit"])
+            self.lamp = None if state["lamp"] is None else CompactLamp(*state["lamp"])
+        elif settings.light_step > 0:
+            self.lamp = self.fit.make_lamp_compact()
 
     @property
     def seconds(self) -> float:
@@ -360,8 +373,10 @@ class Stage:
     def state(self) -> dict[str, object]:
         """What goes on from here, as tensors and plain values."""
         vertices = torch.from_numpy(np.ascontiguousarray(self.fit.texels.asset.vertices, np.float32))
-        return {"vertices": vertices, "outline": self.outline, "sweeps": [list(sweep) for sweep in self.sweeps],
-                "seconds": self.seconds, "fit": self.fit.state()}  # fmt: skip
+        return {
+            "vertices": vertices, "outline": self.outline, "sweeps": [list(sweep) for sweep in self.sweeps],
+            "lamp": None if self.lamp is None else list(self.lamp), "seconds": self.seconds, "fit": self.fit.state(),
+        }  # fmt: skip
 
     def result(self) -> Refined:
         """What the stage leaves."""
@@ -369,7 +384,7 @@ class Stage:
         left_over = max(self.sweeps[-1].error, 0.0)
         uncertainty = uncertainty_of(fit.information, fit.texels, left_over, float(fit.pixels.saturated.mean()))
         light = fit.light.radiance().detach().numpy()
-        return Refined(fit.texels.asset_with(fit.maps()), light, self.outline, self.sweeps, uncertainty)
+        return Refined(fit.texels.asset_with(fit.maps()), light, self.outline, self.sweeps, uncertainty, self.lamp)
 
 
 def refine(

@@ -29,7 +29,7 @@ from splitnerf.refinement.fit import Refined, RefinementSettings, Stage
 from splitnerf.refinement.texels import check_form
 
 TRAINED = "trained"  # the folder in a run of what training alone exported
-STATE, STATE_FORMAT = "refinement.pt", 1
+STATE, STATE_FORMAT = "refinement.pt", 2
 RECORD = "refinement.json"
 OCCLUSION_OFFSET = 0.006  # distance of a ray's start from the mesh, as a share of its extent
 LEAST_HEIGHT, LARGEST_HEIGHT = 8, 256  # rows of the light that is fitted
@@ -201,7 +201,8 @@ def decibels(error: float) -> float:
 def record_of(refined: Refined, seconds: float) -> dict:
     """The contents of refinement.json."""
     u = refined.uncertainty
-    return {"seconds": round(seconds, 1), "outline": refined.outline, "saturated": u.saturated, "noise": u.noise,
+    lamp = None if refined.lamp is None else refined.lamp._asdict()
+    return {"seconds": round(seconds, 1), "outline": refined.outline, "lamp": lamp, "saturated": u.saturated, "noise": u.noise,
             "sweeps": [sweep._asdict() for sweep in refined.sweeps]}  # fmt: skip
 
 

@@ -19,6 +19,10 @@ class EnvironmentLight:
     """
 
     def __init__(self, radiance: Tensor):
+        self.set_radiance(radiance)
+
+    def set_radiance(self, radiance: Tensor) -> None:
+        """Takes the map [h, 2 h, 3]."""
         self.set_log_radiance(radiance.clamp(min=math.exp(-LOG_LIMIT)).log().permute(2, 0, 1))
 
     def set_log_radiance(self, map_: Tensor) -> None:

@@ -16,7 +16,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf.data.environment import seen_at
+from splitnerf.data.environment import directions_of_texels, seen_at
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.light import EnvironmentLight, read, read_adjoint, sum_of_levels
 
@@ -169,14 +169,11 @@ class LightEquations:
 def seen_texels(height: int, surroundings: np.ndarray) -> tuple[Tensor, Tensor]:
     """The log radiance [t, 3] that photos show in the directions of a map's texels, and their weights [t, 1]: how well it is
     known, times the texel's share of the sphere."""
-    theta = (np.arange(height) + 0.5) * np.pi / height
-    phi = (0.5 - (np.arange(2 * height) + 0.5) / (2 * height)) * 2 * np.pi
-    ring, up = np.sin(theta)[:, None], np.cos(theta)[:, None] * np.ones(2 * height)
-    directions = np.stack([ring * np.cos(phi), ring * np.sin(phi), up], axis=-1).reshape(-1, 3)
+    directions, areas = (part.reshape(height * 2 * height, -1) for part in directions_of_texels(height))
     radiance, known = seen_at(surroundings, directions)
-    share = np.broadcast_to(ring / ring.sum() / (2 * height), up.shape).reshape(-1)
     target = np.log(np.maximum(radiance, DARK))
-    return torch.from_numpy(target.astype(np.float32)), torch.from_numpy((known * share).astype(np.float32))[:, None]
+    weights = known[:, None] * areas / (4 * np.pi)
+    return torch.from_numpy(target.astype(np.float32)), torch.from_numpy(weights.astype(np.float32))
 
 
 def parts_of(level: Tensor, number: int) -> tuple[Tensor, Tensor]:

@@ -173,13 +173,13 @@ def charts(asset: Asset) -> np.ndarray:
     return connected_components(coo_matrix((np.ones(len(edges)), edges.T), shape=(n, n)), directed=False)[1]
 
 
-def neighbours(covered: Texels, chart: np.ndarray, size: int) -> np.ndarray:
-    """[k, 2] pairs of covered texels beside or above each other in one chart; chart [m] is that of each texel."""
+def neighbours(covered: Texels, chart: np.ndarray, size: int, apart: int = 1) -> np.ndarray:
+    """[k, 2] pairs of covered texels beside or above each other, some texels apart in one chart; chart [m] is each texel's."""
     chart_map, number = (np.full(size * size, -1, np.int64) for _ in range(2))
     chart_map[covered.index], number[covered.index] = chart, np.arange(len(covered.index))
     chart_map, number = chart_map.reshape(size, size), number.reshape(size, size)
     pairs = []
-    for a, b in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+    for a, b in ((np.s_[:, apart:], np.s_[:, :-apart]), (np.s_[apart:], np.s_[:-apart])):
         same = (chart_map[a] == chart_map[b]) & (chart_map[a] >= 0)
         pairs.append(np.stack([number[a][same], number[b][same]], axis=1))
     return np.concatenate(pairs)
