@@ -18,7 +18,7 @@ from splitnerf.capture.job import PrepareSettings, _begin, _upright_copies, give
 from splitnerf.capture.masks import View, find_masks
 from splitnerf.capture.photographs import find_photographs, read_upright, sharpness, write_png
 from splitnerf.capture.poses import FLIP, Lens, Reconstruction
-from splitnerf.capture.surroundings import HEIGHT, Shot, surroundings
+from splitnerf.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
 from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignetting
 from splitnerf.capture.video import write_frames
 from splitnerf.capture.world import CAMERA_DISTANCE, World, settle
@@ -311,6 +311,10 @@ def test_surroundings_are_what_the_object_sees():
     error = [abs(found[..., :3] - np.roll(expected, shift, axis=1))[near].mean() for shift in (-2, 0, 2)]
     assert near.sum() > 200 and error[1] < 0.03 and error[1] < 0.5 * min(error[0], error[2])
     assert not seen[: HEIGHT // 4].any()  # no camera looks up
+    lower = found[HEIGHT // 2 :].reshape(-1, 4)
+    hidden = lower[:, 3] == np.float32(FAINT)  # under the ball
+    assert hidden.sum() > 100 and (lower[:, 3] > 0).all() and found[-1, 0, 3] == np.float32(FAINT)
+    assert np.allclose(lower[hidden, :3], np.median(lower[~hidden, :3], axis=0))
 
 
 def test_what_is_seen_pulls_the_light():

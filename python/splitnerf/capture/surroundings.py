@@ -21,6 +21,7 @@ HALO = 0.01  # width around the object that is left out, in the photo's width
 STRIDE = 3  # pixels: every so many are looked at in a row and a column
 CLIPPED = 254.5 / 255.0  # sRGB value from which a pixel only says that there was more light
 ENOUGH = 12  # pixels that make a direction fully seen
+FAINT = 0.1  # how well a direction that none of them shows is known by the others below the horizon
 
 
 class Shot(NamedTuple):
@@ -44,6 +45,8 @@ class Shot(NamedTuple):
 def surroundings(shots: Iterable[Shot], centre: np.ndarray, table_radius: float) -> np.ndarray:
     """[h, 2 h, 4] float32 equirectangular: the median linear radiance of each direction and how well it was seen, in [0, 1].
 
+    Directions below the horizon that no photo shows lie mostly under the object; they get the median of the others there.
+
     Args:
         shots: The photos.
         centre: [3] the middle of the object.
@@ -62,6 +65,10 @@ def surroundings(shots: Iterable[Shot], centre: np.ndarray, table_radius: float)
         if len(group) and 2 * clipped.sum() < len(group):
             share = min(1.0, (len(group) - clipped.sum()) / ENOUGH)
             result[texel[group[0]]] = [*np.median(radiance[~clipped], axis=0), share]
+    below = result[HEIGHT * HEIGHT :]
+    seen = below[:, 3] > 0
+    if seen.any():
+        below[~seen] = [*np.median(below[seen, :3], axis=0), FAINT]
     return result.reshape(HEIGHT, 2 * HEIGHT, 4)
 
 
