@@ -15,7 +15,7 @@ LAYERS = [
     {"ablate"},
     {"workflow"},
     {"delivery"},
-    {"training", "capture"},
+    {"training", "capture", "inspection"},
     {"outputs", "report"},
     {"evaluate", "refinement", "relight", "synth"},
     {"export", "render"},

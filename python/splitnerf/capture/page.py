@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import jinja2
 import numpy as np
 from markupsafe import Markup
 from PIL import Image
 
 from splitnerf.capture.world import CAMERA_DISTANCE, World
-from splitnerf.files import atomic_path
-from splitnerf.report.pictures import data_uri
+from splitnerf.report.page import write_html
+from splitnerf.report.pictures import photo_uri
+from splitnerf.report.plans import plan
 
 PICTURE_WIDTH = 240  # pixels
 OUTSIDE = 0.3  # brightness of what a mask leaves out
-SHOWN_POINTS = 4000
-SIDE = 400  # of a plan, in its own units
 REACH = 1.25 * CAMERA_DISTANCE  # half of a plan's edge, in the world's units
 
 
@@ -34,10 +32,6 @@ def write_page(
         title: The heading.
     """
     scene = world.scene
-    loader = jinja2.ChoiceLoader([jinja2.PackageLoader(f"splitnerf.{name}", ".") for name in ("capture", "report")])
-    environment = jinja2.Environment(
-        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
     tiles = [
         ("photos with a camera", f"{len(scene.names)} of {len(scene.names) + len(left_out)}"),
         ("reprojection error", f"{scene.error:.2f} pixels"),
@@ -49,12 +43,10 @@ def write_page(
     photos = [
         {"name": name, "picture": _masked(out, name), "exposure": f"{gain:.2f}"} for name, gain in zip(scene.names, gains)
     ]
-    page = environment.get_template("prepare.html.j2").render(
-        title=title, tiles=tiles, plans=[_plan(world, 0, 1), _plan(world, 0, 2)], left_out=sorted(left_out.items()),
-        photos=photos,
+    write_html(
+        out / "prepare.html", "splitnerf.capture", "prepare.html.j2",
+        title=title, tiles=tiles, plans=_plans(world), left_out=sorted(left_out.items()), photos=photos,
     )  # fmt: skip
-    with atomic_path(out / "prepare.html") as temporary:
-        temporary.write_text(page, encoding="utf-8")
 
 
 def _masked(out: Path, name: str) -> Markup:
@@ -63,25 +55,13 @@ def _masked(out: Path, name: str) -> Markup:
         size = (PICTURE_WIDTH, round(PICTURE_WIDTH * image.height / image.width))
         photo = np.asarray(image.convert("RGB").resize(size, Image.Resampling.BOX), np.float32) / 255
         inside = np.asarray(mask.convert("L").resize(size, Image.Resampling.BOX), np.float32)[..., None] / 255
-    return data_uri(photo * (OUTSIDE + (1 - OUTSIDE) * inside))
+    return photo_uri(photo * (OUTSIDE + (1 - OUTSIDE) * inside))
 
 
-def _plan(world: World, across: int, up: int) -> Markup:
-    """The cameras and points as an SVG, seen along the third axis."""
+def _plans(world: World) -> list[Markup]:
+    """The cameras and points from above and from the side."""
     scene = world.scene
     middle = (scene.poses[:, :3, 3].min(0) + scene.poses[:, :3, 3].max(0)) / 2
     middle[2] /= 2  # between the ground and the highest camera
-    place = lambda p: tuple(SIDE / 2 * (1 + s * (p[i] - middle[i]) / REACH) for i, s in ((across, 1), (up, -1)))  # noqa: E731
-    shown = np.random.default_rng(0).permutation(len(scene.points))[:SHOWN_POINTS]
-    parts = []
-    for index in shown:
-        x, y = place(scene.points[index])
-        if 0 <= x <= SIDE and 0 <= y <= SIDE:
-            kind = "object" if world.object_points[index] else "other"
-            parts.append(f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="0.8"/>')
-    for pose in scene.poses:
-        tip, ahead = pose[:3, 3], -pose[:3, 2]
-        (x0, y0), (x1, y1) = place(tip), place(tip + 0.3 * ahead)
-        parts.append(f'<circle class="camera" cx="{x0:.1f}" cy="{y0:.1f}" r="3"/>')
-        parts.append(f'<path class="camera" d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"/>')
-    return Markup(f'<svg viewBox="0 0 {SIDE} {SIDE}" role="img" aria-label="cameras and points">{"".join(parts)}</svg>')
+    kinds = ["camera"] * len(scene.poses), np.where(world.object_points, "object", "other")
+    return [plan((0, up), scene.poses, scene.points, kinds, middle, REACH) for up in (1, 2)]

@@ -52,15 +52,13 @@ def estimate_box(
     if np.ptp(places, axis=0).max() <= SAME_PLACE * max(1.0, np.abs(places).max()):
         many = f"all {n} cameras stand at one place, as if nothing had estimated the poses; estimate them"
         raise ValueError(many if n > 1 else "one view does not show the object's shape; add views from other sides")
-    tables = np.zeros((n, height + 1, width + 1), dtype=np.int32)
-    np.cumsum(np.cumsum(silhouettes, axis=1, dtype=np.int32), axis=2, out=tables[:, 1:, 1:])
-    views = [_View(*view) for view in zip(tables, poses, intrinsics, [None] * n if known is None else known)]
+    views = [MaskView.of(*view) for view in zip(silhouettes, poses, intrinsics, [None] * n if known is None else known)]
     centre = first_centre(silhouettes, poses, intrinsics)
     depth = np.linalg.norm(poses[:, :3, 3] - centre, axis=1)
     half = np.full(3, (depth * 0.5 * np.hypot(width / intrinsics[:, 0], height / intrinsics[:, 1])).max())
     for resolution in (COARSE, FINE):
         cell = 2 * half.max() / resolution
-        grid = _grid(centre, half, cell)
+        grid = cell_centres(centre, half, cell)
         alive, n_seen = _inside(grid, cell, views)
         if 2 * n_seen < n:
             _check_agreement(grid, cell, views, n_seen)
@@ -121,19 +119,30 @@ def nearest_to_rays(origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
     return np.linalg.solve(projections.sum(axis=0) + 1e-9 * len(d) * np.eye(3), right)
 
 
-def _grid(centre: np.ndarray, half: np.ndarray, cell: float) -> np.ndarray:
+def cell_centres(centre: np.ndarray, half: np.ndarray, cell: float) -> np.ndarray:
+    """[m, 3] the centres of cubic cells, `cell` wide, in the box around `centre` [3] with half edges `half` [3]."""
     axes = [c + (np.arange(int(np.ceil(2 * h / cell))) + 0.5) * cell - h for c, h in zip(centre, half)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 @dataclass(frozen=True)
-class _View:
+class MaskView:
     """A mask as a summed-area table [H + 1, W + 1], its camera, and its known pixels [H, W] or None for all."""
 
     table: np.ndarray
     pose: np.ndarray
     intrinsics: np.ndarray
     known: np.ndarray | None
+
+    @classmethod
+    def of(
+        cls, silhouette: np.ndarray, pose: np.ndarray, intrinsics: np.ndarray, known: np.ndarray | None
+    ) -> MaskView:
+        """The view of a mask [H, W] bool; the other arguments are those of `estimate_box` for one view."""
+        height, width = silhouette.shape
+        table = np.zeros((height + 1, width + 1), dtype=np.int32)
+        np.cumsum(np.cumsum(silhouette, axis=0, dtype=np.int32), axis=1, out=table[1:, 1:])
+        return cls(table, pose, intrinsics, known)
 
     def judge(self, points: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
         """Whether the view shows points [m, 3], and whether on foreground, [m] bool each.
@@ -157,7 +166,7 @@ class _View:
         return visible, table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0] > 0
 
 
-def _inside(points: np.ndarray, cell: float, views: list[_View]) -> tuple[np.ndarray, int]:
+def _inside(points: np.ndarray, cell: float, views: list[MaskView]) -> tuple[np.ndarray, int]:
     """Indices of the points that at most one view in twenty puts on background, and how many views put the best of them
     on foreground.
 
@@ -175,7 +184,7 @@ def _inside(points: np.ndarray, cell: float, views: list[_View]) -> tuple[np.nda
     return alive[seen[alive] * 4 >= 3 * max(1, n_seen)], n_seen
 
 
-def _check_agreement(points: np.ndarray, cell: float, views: list[_View], n_seen: int) -> None:
+def _check_agreement(points: np.ndarray, cell: float, views: list[MaskView], n_seen: int) -> None:
     """Raises MasksContradict where the points that the masks leave, which `n_seen` views at most show, are not the
     object: where none is left, or twice as many views put another point on foreground, which few others carved away."""
     judged = [view.judge(points, cell) for view in views]

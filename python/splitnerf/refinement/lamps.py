@@ -230,46 +230,6 @@ class Edge:
         return self.contrast - np.clip(change[:, 0] - change[:, 1], -LARGEST_CONTRAST, LARGEST_CONTRAST)
 
 
-class Edge:
-    """Pairs at the edge of the shadow of a glow's middle: the contrast of their albedo, and that of the light on them.
-
-    Args:
-        pairs: The pairs among which they are.
-        direction: [3] the middle.
-        light: [h, 2 h, 3] linear radiance.
-        glow: The glow in it.
-        seed: Of the choice of at most N_EDGE pairs.
-
-    Attributes:
-        contrast: [k] log albedo of the lit point less that of the other.
-    """
-
-    def __init__(self, pairs: Pairs, direction: np.ndarray, light: np.ndarray, glow: Glow, seed: int):
-        at, contrast = pairs.edge(direction)
-        chosen = np.random.default_rng(seed).permutation(len(at))[:N_EDGE]
-        self.contrast = contrast[chosen]
-        self._pairs, self._direction, self._power = pairs, direction, glow.power
-        points = (2 * at[chosen][:, None] + [0, 1]).reshape(-1)
-        lit = pairs.seen(direction, points[0::2])
-        self._points = np.where(lit[:, None], points.reshape(-1, 2), points.reshape(-1, 2)[:, ::-1]).reshape(-1)
-        self._behind = pairs.irradiance(self._points, *parts_of_light(light - glow.radiance, N_BEHIND))
-        self._before = self._behind + pairs.irradiance(self._points, *parts_of_light(glow.radiance, N_GLOW))
-
-    def __len__(self) -> int:
-        return len(self.contrast)
-
-    def lamp(self, radius: float) -> np.ndarray:
-        """[2 k] the irradiance of the points by a lamp of a radius in degrees in the place of the glow."""
-        powers = np.broadcast_to(self._power / N_LAMP, (N_LAMP, 3))
-        return self._pairs.irradiance(self._points, disc(self._direction, radius, N_LAMP), powers)
-
-    def left(self, lamp: np.ndarray) -> np.ndarray:
-        """[k] the contrasts that the albedo keeps where a lamp with an irradiance [2 k] takes the place of the glow."""
-        least = DARK * self._before.mean()
-        change = np.log(np.maximum(self._behind + lamp, least) / np.maximum(self._before, least)).reshape(-1, 2)
-        return self.contrast - np.clip(change[:, 0] - change[:, 1], -LARGEST_CONTRAST, LARGEST_CONTRAST)
-
-
 def compact_lamp(texels: AssetTexels, light: np.ndarray, apart: int, seed: int) -> tuple[np.ndarray, CompactLamp | None]:
     """The light with its brightest glow brought together, where the albedo says that it is a compact lamp.
 

@@ -15,13 +15,15 @@ MAX_POINTS = 400
 Series = Sequence[tuple[float, float]]
 
 
-def line_chart(title: str, series: Mapping[str, Series], *, log: bool = False) -> Markup:
-    """Draws lines over training steps.
+def line_chart(title: str, series: Mapping[str, Series], *, log: bool = False, across: str = "step") -> Markup:
+    """Draws lines, by default over training steps.
 
     Args:
         title: Heading of the chart.
-        series: Points (step, value) by name; points that are not finite, or not positive where `log`, are left out.
+        series: Points (x, value) by name, x >= 0; points that are not finite, or not positive where `log`,
+            are left out.
         log: Whether the vertical axis is logarithmic.
+        across: What x is.
 
     Returns:
         A `<figure>` with an SVG and a legend; empty where no point is left.
@@ -56,7 +58,7 @@ def line_chart(title: str, series: Mapping[str, Series], *, log: bool = False) -
             label = f"{tick / 1000:g}k" if tick >= 1000 else f"{tick:g}"
             x, y = place_x(tick), HEIGHT - BOTTOM + 16
             parts.append(f'<text x="{x:.1f}" y="{y}" text-anchor="middle">{label}</text>')
-    parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 3}" text-anchor="end">step</text>')
+    parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 3}" text-anchor="end">{across}</text>')
     legend = []
     for index, (name, points) in enumerate(kept.items()):
         colour = PALETTE[index % len(PALETTE)]

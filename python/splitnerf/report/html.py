@@ -6,15 +6,14 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 
-import jinja2
 import numpy as np
 from markupsafe import Markup
 
 from splitnerf.data.images import linear_to_srgb, over_background
 from splitnerf.evaluate.metrics import psnr
-from splitnerf.files import atomic_path
 from splitnerf.report.curves import line_chart
 from splitnerf.report.last_stage import last_stage_section
+from splitnerf.report.page import write_html
 from splitnerf.report.pictures import WHITE_PER_MEAN, data_uri, tonemapped, white_of
 
 COLUMNS = {
@@ -62,13 +61,12 @@ def write_report(
     Raises:
         OSError: The page cannot be written.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("splitnerf.report", "."), autoescape=True, undefined=jinja2.StrictUndefined
-    )
-    environment.trim_blocks = environment.lstrip_blocks = True
     tables = [{"name": name, "rows": _rows(table)} for name, table in summary.items()]
     total = sum(timings.values())
-    page = environment.get_template("report.html.j2").render(
+    write_html(
+        path,
+        "splitnerf.report",
+        "report.html.j2",
         title=title,
         tiles=tables[0] if tables else None,
         tables=tables[1:],
@@ -82,8 +80,6 @@ def write_report(
             for name, seconds in timings.items()
         ],
     )
-    with atomic_path(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", errors="backslashreplace")
 
 
 def _rows(table: Mapping, prefix: str = "") -> list[tuple[str, str]]:

@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import base64
+import io
 
 import numpy as np
 from markupsafe import Markup
+from PIL import Image
 
-from splitnerf.data.images import encode_png, linear_to_srgb
+from splitnerf.data.images import encode_png, linear_to_srgb, to_uint8
 
 WHITE_PER_MEAN = 3
+JPEG_QUALITY = 85
 
 
 def data_uri(pixels: np.ndarray) -> Markup:
     """The picture [H, W, 1 | 3 | 4] as a PNG within the page."""
     return Markup("data:image/png;base64," + base64.b64encode(encode_png(pixels)).decode())
+
+
+def photo_uri(pixels: np.ndarray) -> Markup:
+    """The photo [H, W, 3], sRGB in [0, 1], as a JPEG within the page: a tenth of a PNG's size."""
+    file = io.BytesIO()
+    Image.fromarray(to_uint8(pixels)).save(file, "JPEG", quality=JPEG_QUALITY)
+    return Markup("data:image/jpeg;base64," + base64.b64encode(file.getvalue()).decode())
 
 
 def white_of(radiance: np.ndarray) -> float:
