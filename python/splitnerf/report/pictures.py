@@ -21,7 +21,7 @@ def data_uri(pixels: np.ndarray) -> Markup:
 
 
 def photo_uri(pixels: np.ndarray) -> Markup:
-    """The photo [H, W, 3], sRGB in [0, 1], as a JPEG within the page: a tenth of a PNG's size."""
+    """The photo [H, W, 3], sRGB in [0, 1], as a JPEG within the page: a sixth of a PNG's size."""
     file = io.BytesIO()
     Image.fromarray(to_uint8(pixels)).save(file, "JPEG", quality=JPEG_QUALITY)
     return Markup("data:image/jpeg;base64," + base64.b64encode(file.getvalue()).decode())
