@@ -108,6 +108,13 @@ def test_a_sun_whose_glow_is_too_dim_gets_its_share(ball_over_plate):
     assert sun_to_sky(new) == pytest.approx(POWER.mean() / 0.3, rel=0.12)
 
 
+@pytest.mark.filterwarnings("error")
+def test_the_power_stays_where_all_is_too_dark_to_tell_it(ball_over_plate):
+    light = glowing_sky(12.0)
+    new, lamp = found(ball_over_plate, 0.04 * shaded_albedo(ball_over_plate, 0.3, light), light)
+    assert lamp.factor == 1.0 and np.isfinite(new).all()
+
+
 def test_a_broad_lamp_stays_as_it_is(ball_over_plate):
     light = glowing_sky(12.0)
     for albedo in (shaded_albedo(ball_over_plate, 20.0, light), np.full((SIZE, SIZE, 3), 0.4, np.float32)):

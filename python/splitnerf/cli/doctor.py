@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import splitnerf
@@ -61,7 +62,7 @@ def self_test(device: str) -> bool:
     return False
 
 
-def show(name: str, value: str, advice: list[str] = []) -> None:  # noqa: B006  (never changed)
+def show(name: str, value: str, advice: Sequence[str] = ()) -> None:
     """Prints a line of the list and what to do about it, at once: a crash that follows hides nothing."""
     print(f"{name:{WIDTH}}{value}", flush=True)
     for line in advice:

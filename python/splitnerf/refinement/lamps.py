@@ -63,7 +63,7 @@ class CompactLamp(NamedTuple):
         direction: [3] unit, a list.
         radius: Degrees.
         factor: The lamp's power beside the glow's, where the rest of the light stays.
-        pairs: The number of pairs at the shadow's edge.
+        pairs: The number of pairs at the shadow's edge that told direction and width.
     """
 
     direction: list[float]
@@ -254,11 +254,18 @@ def compact_lamp(texels: AssetTexels, light: np.ndarray, apart: int, seed: int) 
     gain = np.square(edge.contrast) - np.square(kept)
     if gain.mean() < MIN_SIGMAS * gain.std() / np.sqrt(len(gain)):
         return light, None
-    edge = Edge(Pairs(texels, FARTHER * max(2, apart), MIN_ALBEDO, seed), direction, light, glow, seed)
+    far = Edge(Pairs(texels, FARTHER * max(2, apart), MIN_ALBEDO, seed), direction, light, glow, seed)
+    found = CompactLamp(direction.tolist(), radius, power_factor(far), len(edge))
+    return with_lamp(light, glow, found), found
+
+
+def power_factor(edge: Edge) -> float:
+    """The factor of the glow's power by which a lamp leaves the least contrasts; 1 where pairs are too few to tell."""
+    if len(edge) < FEWEST:
+        return 1.0
     lamp = edge.lamp(POINT)
     costs = [np.log1p(np.square(edge.left(factor * lamp) / NEAR)).mean() for factor in FACTORS]
-    found = CompactLamp(direction.tolist(), radius, float(FACTORS[int(np.argmin(costs))]), len(edge))
-    return with_lamp(light, glow, found), found
+    return float(FACTORS[int(np.argmin(costs))])
 
 
 def with_lamp(light: np.ndarray, glow: Glow, lamp: CompactLamp) -> np.ndarray:
