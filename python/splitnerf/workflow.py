@@ -6,15 +6,17 @@ import shutil
 import time
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import torch
 
 from splitnerf.config import Config
+from splitnerf.config.settings import UNLIMITED
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split, refuse_data, split_rule
 from splitnerf.data.json_files import write_json
-from splitnerf.data.reading import Reading
+from splitnerf.data.reading import SEPARATED, Reading, is_separated
 from splitnerf.data.truth import read_mesh
 from splitnerf.delivery import LAST_STAGE_FILES, discard_last_stage, finish, is_refined, score_run, write_run_report
 from splitnerf.errors import InputError
@@ -25,6 +27,7 @@ from splitnerf.outputs import Exported, write_assets
 from splitnerf.refinement.job import STATE
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
+from splitnerf.separation.job import SHEET, discard_separated, separate
 from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_model, restored_grid
 from splitnerf.training.loop import TrainedScene, Training, check_repeatable, check_same_scene
 from splitnerf.training.meshes import SurfaceMesh
@@ -37,14 +40,17 @@ RUN_FILES = (
 )  # fmt: skip
 
 
-def load_splits(data: Path, downscale: int, reading: Reading = Reading()) -> tuple[Dataset, Dataset | None]:
-    """The train split, and the test split or None where no view is held out; a note says what is.
+def load_splits(
+    data: Path, downscale: int, reading: Reading = Reading(), *, masked: bool = True
+) -> tuple[Dataset, Dataset | None]:
+    """The train split, and the test split or None where no view is held out; a note says what is. Photos without masks are
+    refused if `masked`.
 
     Raises:
         InputError: The data cannot be used.
     """
-    test = load_dataset(data, "test", downscale, reading) if has_test_split(data, reading) else None
-    train = load_dataset(data, "train", downscale, reading)
+    test = load_dataset(data, "test", downscale, reading, masked=masked) if has_test_split(data, reading) else None
+    train = load_dataset(data, "train", downscale, reading, masked=masked)
     held_out = "no view is" if test is None else f"{len(test)} are"
     note_once(f"{data}: {len(train)} views to train on, {held_out} held out for testing ({split_rule(data, reading)})")
     if train.origin.any():
@@ -76,6 +82,7 @@ def present_in(run: Path) -> list[str]:
 def clear_run(run: Path) -> None:
     """Deletes the files of a run, and nothing else."""
     discard_last_stage(run)
+    discard_separated(run)
     for name in RUN_FILES:
         (run / name).unlink(missing_ok=True)
     for preview in (run / "previews").glob("step_*.png"):
@@ -116,7 +123,7 @@ def reconstruct(
     check_repeatable(config, device)
     with held(run):
         check_run(run, resume=resume, overwrite=overwrite)
-        dataset, test = load_splits(data, downscale, config.reading)
+        config, dataset, test = load_with_masks(data, run, config, downscale, overwrite)
         training = Training(dataset, config, run, torch.device(device))
         if resume:
             training.restore()
@@ -130,6 +137,31 @@ def reconstruct(
         if not trained.finished:
             return trained, None
         return trained, finish(trained, dataset, test, run, resume=resume)
+
+
+def load_with_masks(
+    data: Path, run: Path, config: Config, downscale: int, overwrite: bool
+) -> tuple[Config, Dataset, Dataset | None]:
+    """The splits of a dataset. Masks that photos lack are found first, and kept in the run's folder; what that takes of the
+    run's minutes is taken off the settings that are returned."""
+    folder, reading = run / SEPARATED, config.reading
+    if overwrite:
+        discard_separated(run)
+    if is_separated(folder):
+        reading = replace(reading, separated=folder)
+    train, test = load_splits(data, downscale, reading, masked=False)
+    if train.masked:
+        return config, train, test
+    note_once(f"{data}: nothing says where the object is; it is looked for in the middle of the photos, see {folder / SHEET}")
+    minutes = config.run.max_minutes * config.separation.share
+    steps = UNLIMITED if minutes > 0 else config.separation.steps
+    found = separate(train, test, folder, steps=steps, minutes=minutes, seed=config.run.seed)
+    table = "above a table" if found.table else "without a table under it"
+    note_once(f"{data}: the object, {table}, covers {found.share:.0%} of the photos")
+    if config.run.max_minutes > 0:
+        left = config.run.max_minutes - found.seconds / 60
+        config = config.replace({"run.max_minutes": max(left, 0.1 * config.run.max_minutes)})
+    return config, *load_splits(data, downscale, replace(reading, separated=folder))
 
 
 def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
@@ -167,7 +199,7 @@ def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = N
     """
     model, grid, content = load_run(run)
     dataset, test = load_splits(data, protocol.downscale, protocol.reading)
-    own = config_of(content).reading
+    own = replace(config_of(content).reading, separated=protocol.reading.separated)
     known = dataset if own == protocol.reading else load_dataset(data, "train", protocol.downscale, own)
     check_same_scene(content, dataset_fingerprint(known), run)
     views, maps = choose_views((dataset if test is None else test).in_box(content["box_from_world"].numpy()), protocol)

@@ -310,7 +310,7 @@ def test_mask_of_another_size(tmp_path):
         load_dataset(root)
 
 
-@pytest.mark.parametrize(("alpha", "reason"), [(0, "every mask is empty"), (1, "every mask is full")])
+@pytest.mark.parametrize(("alpha", "reason"), [(0, "every mask is empty"), (1, "nothing says where the object is")])
 def test_masks_without_an_object(scene, alpha, reason):
     for path in (scene / "train").iterdir():
         write_image(path, np.full((SIZE, SIZE, 4), float(alpha)))

@@ -15,7 +15,7 @@ LAYERS = [
     {"ablate"},
     {"workflow"},
     {"delivery"},
-    {"training", "capture", "inspection"},
+    {"training", "capture", "inspection", "separation"},
     {"outputs", "report"},
     {"evaluate", "refinement", "relight", "synth"},
     {"export", "render"},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,7 +34,9 @@ def reading_options(args: argparse.Namespace) -> dict[str, str]:
 def reading_of(args: argparse.Namespace, target: Path) -> Reading:
     """How to read data: as the options say, else as the run does that `target` is or is a file of, else by default."""
     from splitnerf.config import Config
+    from splitnerf.data.reading import SEPARATED, is_separated
 
     run = next((f for f in (target, *target.absolute().parents[:2]) if (f / "checkpoint.pt").is_file()), None)
     config = Config() if run is None or not (run / "config.toml").is_file() else Config.read(run / "config.toml")
-    return config.replace(reading_options(args)).reading
+    reading = config.replace(reading_options(args)).reading
+    return replace(reading, separated=run / SEPARATED) if run is not None and is_separated(run / SEPARATED) else reading

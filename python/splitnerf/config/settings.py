@@ -23,6 +23,7 @@ from splitnerf.config.groups import (
     Refinement,
     Run,
     Sampling,
+    Separation,
     Shading,
     Surface,
 )
@@ -58,6 +59,7 @@ RENAMED = {
     "losses.smoothness_weight": "normal_smoothness", "losses.light_form": "light_loss_form",
     "losses.occlusion_form": "occlusion_loss_form", "losses.metal_form": "metal_loss_form",
     "refinement.enabled": "refine", "refinement.share": "refinement_share", "refinement.sweeps": "refinement_sweeps",
+    "separation.share": "separation_share", "separation.steps": "separation_steps",
     "export.resolution": "export_resolution", "export.faces": "export_faces",
     "export.texture_size": "export_texture_size", "export.environment_height": "export_environment_height",
 }  # fmt: skip
@@ -73,6 +75,7 @@ class Config:
 
     run: Run = field(default_factory=Run)
     data: Data = field(default_factory=Data)
+    separation: Separation = field(default_factory=Separation)
     surface: Surface = field(default_factory=Surface)
     materials: Materials = field(default_factory=Materials)
     light: Light = field(default_factory=Light)

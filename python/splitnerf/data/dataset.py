@@ -16,7 +16,7 @@ from splitnerf.data.environment import read_surroundings
 from splitnerf.data.frames import read_frames
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
-from splitnerf.data.normalisation import MasksContradict, estimate_box, transform_points
+from splitnerf.data.normalisation import MasksContradict, box_of_views, estimate_box, transform_points
 from splitnerf.data.photos import Photo, load_photo, silhouette_factor
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -50,6 +50,7 @@ class Dataset:
         exposures: [n] float64, the factors by which the images' linear values were divided; None stands for 1.
         surroundings: [h, 2 h, 4] float32, equirectangular: linear radiance that the photos see around the object, and how
             well it was seen, in [0, 1]; None where the data have no such map.
+        masked: Whether alpha says where the object is; otherwise it is 1.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Dataset:
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     exposures: np.ndarray | None = None
     surroundings: np.ndarray | None = None
+    masked: bool = True
 
     def __post_init__(self) -> None:
         self.exposures = np.ones(len(self.images)) if self.exposures is None else self.exposures
@@ -121,7 +123,7 @@ class Dataset:
 
 
 def load_dataset(
-    root: str | os.PathLike, split: str = "train", downscale: int = 1, reading: Reading = Reading()
+    root: str | os.PathLike, split: str = "train", downscale: int = 1, reading: Reading = Reading(), *, masked: bool = True
 ) -> Dataset:
     """Loads one split of a posed image set.
 
@@ -132,6 +134,7 @@ def load_dataset(
         split: "train" or "test".
         downscale: Integer factor >= 1, averaged in premultiplied linear light.
         reading: What the data leave open.
+        masked: Whether photos without masks are refused. Without masks the frame is that of what all cameras look at.
 
     Returns:
         The split as a `Dataset`.
@@ -150,12 +153,18 @@ def load_dataset(
     frames, origin = read_frames(root, split, reading)
     _check_once(frames)
     if split == "train":
-        photos, box_from_world, _ = _load_train(root, frames, downscale, reading.mask_kind)
+        photos, box_from_world, _ = _load_train(root, frames, downscale, reading)
     else:
         train = spread(read_frames(root, "train", reading)[0], HULL_VIEWS)
-        _, box_from_world, mask_kind = _load_train(root, train, downscale, reading.mask_kind)
-        photos = _load_photos(frames, downscale, mask_kind)
-        _check_masks(frames, photos)
+        train_photos, box_from_world, mask_kind = _load_train(root, train, downscale, reading)
+        photos = _load_photos(frames, downscale, mask_kind, reading.separated)
+        if _has_masks(train_photos):
+            _check_masks(frames, photos)
+    if masked and not _has_masks(photos):
+        raise InputError(
+            f"{frames[0].image_path.parent}: nothing says where the object is (an alpha channel or mask_path); add masks, "
+            "or let `splitnerf train` find them"
+        )
 
     intrinsics = np.stack([lens_intrinsics(frame.lens, photo.size) for frame, photo in zip(frames, photos)]) / downscale
     poses = np.stack([frame.pose for frame in frames])
@@ -174,8 +183,16 @@ def load_dataset(
         known=stack_known([photo.known for photo in photos], photos[0].rgba.shape[:2]),
         origin=origin,
         exposures=np.array([frame.exposure for frame in frames]),
-        surroundings=read_surroundings(root / SURROUNDINGS) if (root / SURROUNDINGS).is_file() else None,
+        surroundings=_surroundings(root, reading),
+        masked=_has_masks(photos),
     )
+
+
+def _surroundings(root: Path, reading: Reading) -> np.ndarray | None:
+    """The map of what is around the object: the data's own, else that of what training separated."""
+    folders = [root] if reading.separated is None else [root, reading.separated]
+    path = next((folder / SURROUNDINGS for folder in folders if (folder / SURROUNDINGS).is_file()), None)
+    return None if path is None else read_surroundings(path)
 
 
 def dataset_fingerprint(dataset: Dataset) -> str:
@@ -211,18 +228,20 @@ class _Contradiction(InputError):
     """Masks of the object that cannot be of one object, seen from these poses."""
 
 
-def _load_train(root: Path, frames: list[Frame], downscale: int, mask_kind: str) -> tuple[list[Photo], np.ndarray, str]:
+def _load_train(root: Path, frames: list[Frame], downscale: int, reading: Reading) -> tuple[list[Photo], np.ndarray, str]:
     """The photos of the train split, or of a part of it, the similarity to the internal frame, and what the masks are
     whose layout leaves it open: "object" or "ignore".
 
     Where the user does not say it, masks are the object's unless they keep nearly all of the photos or contradict the
     poses; a note says what was assumed.
     """
-    kind = "ignore" if mask_kind == "ignore" else "object"
-    photos = _load_photos(frames, downscale, kind)
+    kind = "ignore" if reading.mask_kind == "ignore" else "object"
+    photos = _load_photos(frames, downscale, kind, reading.separated)
+    if not _has_masks(photos):
+        return photos, _box_of_views(root, frames, photos), kind
     pairs = zip(spread(frames, HULL_VIEWS), spread(photos, HULL_VIEWS))
     masks = [_kept(photo) for frame, photo in pairs if frame.mask_path is not None and frame.mask_kind == "auto"]
-    if mask_kind != "auto" or not masks:
+    if reading.mask_kind != "auto" or not masks:
         return photos, _estimate_box(root, frames, photos), kind
     kept, edge = np.median(masks, axis=0)
     ignoring = (
@@ -230,13 +249,13 @@ def _load_train(root: Path, frames: list[Frame], downscale: int, mask_kind: str)
     )
     if kept > NEARLY_ALL and edge > NEARLY_ALL_EDGE:
         note_once(ignoring.format(f"they keep {kept:.0%} of the photos"))
-        photos = _load_photos(frames, downscale, "ignore")
+        photos = _load_photos(frames, downscale, "ignore", reading.separated)
         return photos, _estimate_box(root, frames, photos), "ignore"
     try:
         box_from_world = _estimate_box(root, frames, photos)
     except _Contradiction as error:
         try:
-            photos = _load_photos(frames, downscale, "ignore")
+            photos = _load_photos(frames, downscale, "ignore", reading.separated)
             box_from_world = _estimate_box(root, frames, photos)
         except InputError:
             raise error from None
@@ -268,15 +287,37 @@ def _estimate_box(root: Path, frames: list[Frame], photos: list[Photo]) -> np.nd
         raise InputError(f"{root}: {error}") from None
 
 
+def _box_of_views(root: Path, frames: list[Frame], photos: list[Photo]) -> np.ndarray:
+    """The similarity to the internal frame of what all cameras look at."""
+    sizes = [photo.size for photo in photos]
+    try:
+        return box_of_views(
+            np.stack([frame.pose for frame in frames]),
+            np.stack([lens_intrinsics(frame.lens, size) for frame, size in zip(frames, sizes)]),
+            np.array(sizes),
+        )
+    except ValueError as error:
+        raise InputError(f"{root}: {error}") from None
+
+
+def _has_masks(photos: list[Photo]) -> bool:
+    """Whether photos say where the object is; a mask that is full everywhere says nothing."""
+    return any(photo.masked for photo in photos) and not all(_is_full(photo) for photo in photos)
+
+
+def _is_full(photo: Photo) -> bool:
+    return bool((photo.silhouette if photo.seen is None else photo.silhouette | ~photo.seen).all())
+
+
 def _kept(photo: Photo) -> tuple[float, float]:
     """The shares of the silhouette and of its edge that are white."""
     s = photo.silhouette
     return float(s.mean()), float(np.concatenate([s[0], s[-1], s[:, 0], s[:, -1]]).mean())
 
 
-def _load_photos(frames: list[Frame], downscale: int, mask_kind: str) -> list[Photo]:
+def _load_photos(frames: list[Frame], downscale: int, mask_kind: str, separated: Path | None) -> list[Photo]:
     with ThreadPoolExecutor(max_workers=min(8, os.cpu_count() or 1)) as pool:
-        photos = list(pool.map(lambda frame: load_photo(frame, downscale, mask_kind), frames))
+        photos = list(pool.map(lambda frame: load_photo(frame, downscale, mask_kind, separated), frames))
     size = photos[0].size
     for frame, photo in zip(frames, photos):
         if photo.size != size:
@@ -298,9 +339,12 @@ def _check_once(frames: list[Frame]) -> None:
 
 
 def _check_masks(frames: list[Frame], photos: list[Photo]) -> None:
-    """Raises InputError where the masks show no object or nothing else."""
-    folder = frames[0].image_path.parent
+    """Raises InputError where a photo has no mask though others have one, or no mask shows an object."""
+    for frame, photo in zip(frames, photos):
+        if not photo.masked:
+            raise InputError(
+                f"{frame.image_path}: has no alpha channel and its frame no mask_path, as others have; add a mask or remove it"
+            )
     if not any(photo.silhouette.any() for photo in photos):
+        folder = frames[0].image_path.parent
         raise InputError(f"{folder}: every mask is empty, no pixel is foreground; check alpha or mask_path")
-    if all((photo.silhouette if photo.seen is None else photo.silhouette | ~photo.seen).all() for photo in photos):
-        raise InputError(f"{folder}: every mask is full, no pixel is background; check alpha or mask_path")

@@ -9,6 +9,7 @@ import numpy as np
 FITS_RADIUS = (0.4, 1.4)
 TARGET_RADIUS = 1.0
 COARSE, FINE = 32, 48
+IN_VIEW = 0.8  # radius of what all cameras look at, as a share of what the narrower side of a photo shows
 SAME_PLACE = 1e-9  # distance of cameras, as a share of that from the origin
 PARALLEL = 1e-4  # mean squared sine below which optical axes do not say where they meet
 
@@ -48,10 +49,7 @@ def estimate_box(
     """
     n, height, width = silhouettes.shape
     poses, intrinsics = poses.astype(np.float64), intrinsics.astype(np.float64)
-    places = poses[:, :3, 3]
-    if np.ptp(places, axis=0).max() <= SAME_PLACE * max(1.0, np.abs(places).max()):
-        many = f"all {n} cameras stand at one place, as if nothing had estimated the poses; estimate them"
-        raise ValueError(many if n > 1 else "one view does not show the object's shape; add views from other sides")
+    _check_places(poses)
     views = [MaskView.of(*view) for view in zip(silhouettes, poses, intrinsics, [None] * n if known is None else known)]
     centre = first_centre(silhouettes, poses, intrinsics)
     depth = np.linalg.norm(poses[:, :3, 3] - centre, axis=1)
@@ -71,6 +69,39 @@ def estimate_box(
     box_from_world = np.diag([TARGET_RADIUS / radius] * 3 + [1.0])
     box_from_world[:3, 3] = -centre * TARGET_RADIUS / radius
     return box_from_world
+
+
+def box_of_views(poses: np.ndarray, intrinsics: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """The similarity that brings the middle of what all cameras look at to the origin, with a radius of 1.
+
+    Args:
+        poses: [n, 4, 4] camera-to-world, OpenGL axes.
+        intrinsics: [n, 4], (fx, fy, cx, cy) in pixels.
+        sizes: [n, 2] height and width of the photos in pixels.
+
+    Returns:
+        [4, 4] float64, uniform scale and translation.
+
+    Raises:
+        ValueError: All cameras stand at one place.
+    """
+    poses = poses.astype(np.float64)
+    _check_places(poses)
+    centre = nearest_to_rays(poses[:, :3, 3], poses[:, :3, 2])
+    distances = np.linalg.norm(poses[:, :3, 3] - centre, axis=1)
+    half = 0.5 * (sizes[:, ::-1] / intrinsics[:, :2]).min(axis=1)  # tangent of half the narrower angle
+    radius = IN_VIEW * np.median(distances * half)
+    box_from_world = np.diag([TARGET_RADIUS / radius] * 3 + [1.0])
+    box_from_world[:3, 3] = -centre * TARGET_RADIUS / radius
+    return box_from_world
+
+
+def _check_places(poses: np.ndarray) -> None:
+    """Raises ValueError where all cameras stand at one place."""
+    places = poses[:, :3, 3]
+    if np.ptp(places, axis=0).max() <= SAME_PLACE * max(1.0, np.abs(places).max()):
+        many = f"all {len(poses)} cameras stand at one place, as if nothing had estimated the poses; estimate them"
+        raise ValueError(many if len(poses) > 1 else "one view does not show the object's shape; add views from other sides")
 
 
 def transform_points(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import torch
+from torch.nn.functional import interpolate
 
 from splitnerf.data.images import LDR_SUFFIXES, area_average, downscale_rgba, linear_to_srgb, read_image, srgb_to_linear
 from splitnerf.data.layouts.frame import Frame
@@ -27,6 +29,7 @@ class Photo:
         silhouette: [h, w] bool, the mask at a size that no downscale changes.
         seen: [h, w] bool, what is known of it, or None for all.
         size: (height, width) of the file.
+        masked: Whether anything says where the object is; otherwise alpha is 1.
     """
 
     rgba: np.ndarray
@@ -34,6 +37,7 @@ class Photo:
     silhouette: np.ndarray
     seen: np.ndarray | None
     size: tuple[int, int]
+    masked: bool = True
 
 
 def silhouette_factor(height: int, width: int) -> int:
@@ -41,16 +45,17 @@ def silhouette_factor(height: int, width: int) -> int:
     return max(1, min(height, width) // SILHOUETTE_SIZE)
 
 
-def load_photo(frame: Frame, downscale: int, mask_kind: str) -> Photo:
+def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | None = None) -> Photo:
     """Reads a frame's image and masks, frees them from the lens's distortion, and averages them down.
 
     Args:
         frame: The frame.
         downscale: Integer factor of at least 1.
         mask_kind: "object" or "ignore": what the mask file is where the frame leaves it open.
+        separated: A folder with masks for frames that have none, named by :func:`separated_mask`; or None.
 
     Raises:
-        InputError: A file cannot be used, or nothing says where the object is.
+        InputError: A file cannot be used.
     """
     path = frame.image_path
     if path.suffix.lower() not in LDR_SUFFIXES:
@@ -69,26 +74,36 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str) -> Photo:
     if frame.dynamic_mask_path is not None:
         still = _read_mask(frame.dynamic_mask_path, frame, height, width) == 0
         known = still if known is None else known & still
-    if alpha is None:
-        ignoring = frame.mask_path is not None
-        missing = "a mask that only says what to ignore (black)" if ignoring else "no mask_path"
-        cure = "invert it if black is the object, else save the image" if ignoring else "save it"
-        raise InputError(f"{path}: has no alpha channel and its frame {missing}; {cure} with alpha or add a mask")
+    masked = alpha is not None
+    alpha = alpha if masked else np.ones_like(colour[..., :1])
     rgba = np.concatenate([colour, alpha], axis=-1)
     if frame.distortion is not None:
         rgba, known = _undistort(rgba, known, frame, straight=is_object and frame.mask_path is not None)
     if frame.exposure != 1.0:
         rgba[..., :3] = linear_to_srgb(srgb_to_linear(rgba[..., :3]) / np.float32(frame.exposure))
+    if not masked and separated is not None:
+        masked, rgba[..., 3] = True, resized_mask(read_image(separated / separated_mask(frame.image_path)), height, width)
     factor = silhouette_factor(height, width)
     silhouette = area_average(rgba[..., 3], factor) > 0.5
     rgba = downscale_rgba(rgba, downscale)
     if known is None or known.all():
-        return Photo(rgba, None, silhouette, None, (height, width))
+        return Photo(rgba, None, silhouette, None, (height, width), masked)
     share, known = known[..., 0].astype(np.float32), area_average(known[..., 0].astype(np.float32), downscale) > CERTAIN
     seen = area_average(share, factor) > CERTAIN
     if not known.any():
         raise InputError(f"{path}: its masks ignore all of it; remove the frame")
-    return Photo(rgba * known[..., None], known, silhouette & seen, seen, (height, width))
+    return Photo(rgba * known[..., None], known, silhouette & seen, seen, (height, width), masked)
+
+
+def separated_mask(image_path: Path) -> str:
+    """The name of the file with the mask that was found for an image."""
+    return f"{image_path.parent.name}_{image_path.stem}.png"
+
+
+def resized_mask(mask: np.ndarray, height: int, width: int) -> np.ndarray:
+    """[height, width] a mask [h, w, 1] in [0, 1], interpolated bilinearly."""
+    planes = torch.from_numpy(mask[None, None, ..., 0])
+    return interpolate(planes, (height, width), mode="bilinear", align_corners=False)[0, 0].numpy()
 
 
 def _read_pixels(path: Path) -> np.ndarray:

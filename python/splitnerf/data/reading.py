@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 EVAL_MODES = ("auto", "all", "fraction", "filename")
 MASK_KINDS = ("auto", "object", "ignore")
+SEPARATED = "separated"  # the folder of a run that holds masks found for photos without any
+SEPARATION = "separation.json"  # its last file
 
 
 @dataclass(frozen=True)
@@ -18,7 +21,14 @@ class Reading:
             others have `train` in it.
         mask_kind: What mask files mean whose layout leaves it open. "object": white is the object; "ignore": black is
             to be ignored; "auto": what the masks look like.
+        separated: The folder in which training wrote masks of photos that have none, see :mod:`splitnerf.separation`; or None.
     """
 
     eval_mode: str = "auto"
     mask_kind: str = "auto"
+    separated: Path | None = None
+
+
+def is_separated(folder: Path) -> bool:
+    """Whether a folder holds all masks that were found for photos without any."""
+    return (folder / SEPARATION).is_file()

@@ -1,0 +1,129 @@
+"""From photos without masks to a folder with masks and what is around the object."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.dataset import SURROUNDINGS, Dataset, spread
+from splitnerf.data.ground import find_table
+from splitnerf.data.images import read_image, write_image
+from splitnerf.data.json_files import write_json
+from splitnerf.data.photos import resized_mask, separated_mask
+from splitnerf.data.reading import SEPARATED, SEPARATION
+from splitnerf.errors import InputError
+from splitnerf.progress import Progress, ended_by_signals, tracked
+from splitnerf.separation.field import RadianceField
+from splitnerf.separation.masks import find_mask, surface_points, surroundings
+from splitnerf.separation.region import Region, Table, find_region
+from splitnerf.separation.training import train_field
+
+SHEET = "sheet.jpg"
+SHOWN, DIMMED = 12, 0.25  # photos on the sheet, and the factor of what is around the object
+NEAR_TABLE = 1.5  # distance from the middle within which points tell of the table, scene units
+MOST_POINTS = 20000  # of those that the search for the table takes
+
+
+@dataclass(frozen=True)
+class Separated:
+    """What was found.
+
+    Attributes:
+        table: Whether the object stands on a plane, or before a wall.
+        share: The mean share of the photos that the object covers.
+        seconds: The time that it took.
+    """
+
+    table: bool
+    share: float
+    seconds: float
+
+
+def discard_separated(run: Path) -> None:
+    """Deletes what a separation wrote into a run's folder."""
+    shutil.rmtree(run / SEPARATED, ignore_errors=True)
+
+
+def separate(
+    train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int
+) -> Separated:
+    """Writes a mask for each photo, `surroundings.exr`, and `sheet.jpg`, which shows some of the masks.
+
+    A radiance field of the whole place is trained on the photos. What it shows within what all cameras look at, above the
+    plane of a table if there is one, and hangs together in the middle, is the object.
+
+    Args:
+        train: The photos, without masks.
+        test: Photos that get masks but are not trained on; or None.
+        folder: The folder.
+        steps, minutes: See :func:`splitnerf.separation.training.train_field`.
+        seed: The seed of the random numbers.
+
+    Raises:
+        InputError: Nothing stands in the middle.
+    """
+    started = time.monotonic()
+    folder.mkdir(parents=True, exist_ok=True)
+    with ended_by_signals():
+        with Progress(0.0) as bar:
+            field = train_field(
+                train, steps=steps, minutes=minutes, seed=seed,
+                report=lambda share, told: bar.show(share, f"what is around the object, {told}"),
+            )  # fmt: skip
+        points = surface_points(field, train)
+        table = table_under(points, train, seed)
+        region = find_region(points, table)
+        if region is None:
+            raise InputError(f"{train.root}: nothing stands out in the middle of the photos; add masks of the object")
+        shares = [write_masks(field, region, split, folder) for split in (train, test) if split is not None]
+        write_image(folder / SURROUNDINGS, surroundings(field, region, points))
+        write_sheet(train, folder)
+        found = Separated(table is not None, float(np.mean(np.concatenate(shares))), time.monotonic() - started)
+        write_json(folder / SEPARATION, vars(found))
+    return found
+
+
+def table_under(points: np.ndarray, dataset: Dataset, seed: int) -> Table | None:
+    """The plane on which the object stands or, where there is none, the wall behind it; None without both.
+
+    Args:
+        points: [n, 3] what the photos show, scene units.
+        dataset: The photos.
+        seed: The seed of the search.
+    """
+    random = np.random.default_rng(seed)
+    near = points[np.linalg.norm(points, axis=1) < NEAR_TABLE]
+    near = near[random.permutation(len(near))[:MOST_POINTS]].astype(np.float64)
+    places = dataset.poses[:, :3, 3].astype(np.float64)
+    distance = float(np.median(np.linalg.norm(places, axis=1)))
+    for axis in (dataset.poses[:, :3, 1].mean(0), places.mean(0)):
+        plane = find_table(near, np.zeros(3), axis / np.linalg.norm(axis).clip(1e-9), distance, random)
+        if plane is not None:
+            return Table(*plane)
+    return None
+
+
+def write_masks(field: RadianceField, region: Region, split: Dataset, folder: Path) -> np.ndarray:
+    """Writes the masks of a split; returns the share [n] that each covers."""
+    shares = []
+    for i in tracked(range(len(split)), "masks, photo"):
+        mask = find_mask(field, region, split, i)
+        write_image(folder / separated_mask(split.image_paths[i]), mask)
+        shares.append(mask.mean())
+    return np.array(shares)
+
+
+def write_sheet(dataset: Dataset, folder: Path) -> None:
+    """`sheet.jpg`: some photos, dark where they do not show the object."""
+    rows, chosen = [], spread(range(len(dataset)), SHOWN)
+    for i in chosen:
+        photo = dataset.images[i, ..., :3]
+        mask = resized_mask(read_image(folder / separated_mask(dataset.image_paths[i])), *photo.shape[:2])
+        rows.append(photo * (DIMMED + (1 - DIMMED) * mask[..., None]))
+    columns = -(-len(rows) // 3)
+    rows += [np.zeros_like(rows[0])] * (3 * columns - len(rows))
+    write_image(folder / SHEET, np.concatenate([np.concatenate(rows[k * columns : (k + 1) * columns], 1) for k in range(3)]))

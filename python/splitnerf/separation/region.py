@@ -1,0 +1,113 @@
+"""Which part of space is the object: what stands in the middle, above the table if there is one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from scipy import ndimage
+from torch import Tensor
+
+CELLS = 96  # along an edge of the cube
+HALF = 1.6  # of that edge, scene units; parts that reach out of the ball of radius 1 may reach so far above a table
+LEAST_POINTS = 3  # seen in a cell that is taken
+ABOVE = 0.03  # height over the table at which things begin, scene units
+LARGEST_SHARE = 0.05  # of the largest part's cells that another part needs
+STANDS_OVER = 1.0  # horizontal distance of another part's middle from the largest one's, in the latter's radii
+GROWN = 2  # cells by which the region is larger than what was seen
+
+
+@dataclass(frozen=True)
+class Table:
+    """A plane: its unit normal [3], upward, and the product of the normal with the plane's points."""
+
+    normal: np.ndarray
+    offset: float
+
+    def heights(self, points: np.ndarray) -> np.ndarray:
+        """Heights [...] of points [..., 3] over the table."""
+        return points @ self.normal - self.offset
+
+
+class Region:
+    """Cells of the cube [-HALF, HALF]^3 that hold the object, and the table that bounds them.
+
+    Args:
+        cells: [CELLS, CELLS, CELLS] bool.
+        table: The table or None.
+    """
+
+    def __init__(self, cells: np.ndarray, table: Table | None):
+        self.cells, self.table = torch.from_numpy(cells), table
+
+    def middle(self) -> Tensor:
+        """[3] the middle of the cells."""
+        return ((self.cells.nonzero().float().mean(0) + 0.5) * (2 / CELLS) - 1) * HALF
+
+    def holds(self, points: Tensor) -> Tensor:
+        """[...] bool, whether points [..., 3] lie in the region."""
+        index = ((points * (0.5 / HALF) + 0.5) * CELLS).floor().long()
+        within = ((index >= 0) & (index < CELLS)).all(-1)
+        x, y, z = index.clamp(0, CELLS - 1).unbind(-1)
+        inside = within & self.cells[x, y, z]
+        if self.table is not None:
+            normal = torch.from_numpy(self.table.normal.astype(np.float32))
+            inside &= points @ normal > self.table.offset + 0.25 * ABOVE
+        return inside
+
+
+def find_region(points: np.ndarray, table: Table | None) -> Region | None:
+    """The object's region by the surface points [n, 3] that photos show, scene units; None where nothing stands in the
+    middle."""
+    if table is None:
+        chosen = np.linalg.norm(points, axis=1) < 1
+    else:
+        chosen = (np.abs(points).max(axis=1) < HALF) & (table.heights(points) > ABOVE)
+    index = ((points[chosen] * (0.5 / HALF) + 0.5) * CELLS).astype(int).clip(0, CELLS - 1)
+    counts = np.zeros((CELLS,) * 3, np.int32)
+    np.add.at(counts, tuple(index.T), 1)
+    parts, n_parts = ndimage.label(counts >= LEAST_POINTS, np.ones((3, 3, 3)))
+    if n_parts == 0:
+        return None
+    centres = ((np.argwhere(parts > 0) + 0.5) * (2 / CELLS) - 1) * HALF
+    near = np.linalg.norm(centres, axis=1) < 1
+    sizes = np.bincount(parts[parts > 0][near], minlength=n_parts + 1)[1:]  # what stands in the middle counts
+    if not sizes.any():
+        return None
+    places = [np.argwhere(parts == k + 1) for k in np.flatnonzero(sizes >= LARGEST_SHARE * sizes.max())]
+    main = max(places, key=len)
+    up = np.array([0.0, 0, 1]) if table is None else table.normal
+    across = lambda cells: cells - np.outer(cells @ up, up)  # noqa: E731
+    middle = np.median(across(main), axis=0)
+    reach = STANDS_OVER * np.quantile(np.linalg.norm(across(main) - middle, axis=1), 0.9)
+    taken = np.zeros_like(counts, bool)
+    for cells in places:
+        if np.linalg.norm(np.median(across(cells), axis=0) - middle) <= reach:
+            taken[tuple(cells.T)] = True
+    taken = filled(taken) if table is None else down_to(table, filled(taken))
+    return Region(ndimage.binary_dilation(taken, np.ones((3, 3, 3)), iterations=GROWN), table)
+
+
+def down_to(table: Table, cells: np.ndarray) -> np.ndarray:
+    """Cells [r, r, r] and those below them, as far as the table: photos from above show little of an object's lower sides."""
+    places = (np.argwhere(np.ones_like(cells)) + 0.5).astype(np.float32)
+    result, step = cells.copy().ravel(), table.normal.astype(np.float32)
+    open_ = np.flatnonzero(table.heights((places * (2 / CELLS) - 1) * HALF) > 0)
+    for k in range(1, CELLS):
+        index = (places[open_] + k * step).astype(int)
+        within = ((index >= 0) & (index < CELLS)).all(1)
+        open_, index = open_[within], index[within]
+        found = cells[tuple(index.T)]
+        result[open_[found]] = True
+        open_ = open_[~found]
+    return result.reshape(cells.shape)
+
+
+def filled(cells: np.ndarray) -> np.ndarray:
+    """Cells [r, r, r] and those between two of them along at least two axes: photos show surfaces alone."""
+    between = np.zeros(cells.shape, np.int8)
+    for axis in range(3):
+        before = np.maximum.accumulate(cells, axis)
+        between += before & np.flip(np.maximum.accumulate(np.flip(cells, axis), axis), axis)
+    return cells | (between >= 2)

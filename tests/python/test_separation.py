@@ -1,0 +1,242 @@
+"""Masks for photos without any: the field's parts by closed forms, the region, and a ball on a floor from end to end."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import torch
+from blender_data import look_at
+from tiny_runs import train
+
+from splitnerf.cli import main
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.ground import find_table
+from splitnerf.data.images import read_image, write_image
+from splitnerf.data.normalisation import box_of_views
+from splitnerf.data.photos import separated_mask
+from splitnerf.data.reading import SEPARATED, Reading
+from splitnerf.errors import InputError
+from splitnerf.separation import job, training
+from splitnerf.separation.field import (
+    RadianceField, RayMeasure, Rendered, contracted, resampled, search_loss, spread_loss, with_less_gradient,
+)  # fmt: skip
+from splitnerf.separation.region import Table, find_region
+
+SIZE, FOCAL = 40, 40.0
+
+
+def rendered(weights, edges, first_weights=None, first_edges=None):
+    weights, edges = torch.tensor([weights]), torch.tensor([edges])
+    first = (weights if first_weights is None else torch.tensor([first_weights])), (
+        edges if first_edges is None else torch.tensor([first_edges])
+    )
+    return Rendered(torch.zeros(1, 3), weights, edges[:, 1:], edges, *first)
+
+
+class TestField:
+    def test_contraction(self):
+        inside = torch.tensor([[0.3, -0.2, 0.5]])
+        assert torch.equal(contracted(inside), inside)
+        far = contracted(torch.tensor([[0.0, 4.0, 0.0], [1e6, 0, 0]]))
+        torch.testing.assert_close(far, torch.tensor([[0.0, 1.75, 0.0], [2.0, 0, 0]]))
+
+    def test_steps_are_even_near_the_middle_and_grow_with_the_distance(self):
+        measure = RayMeasure(torch.tensor([[3.0, 0, 0]]), torch.tensor([[-1.0, 0, 0]]))
+        distances = measure.distances(torch.linspace(0, 1, 401)[None])[0]
+        torch.testing.assert_close(distances[[0, -1]], torch.tensor([0.1, 300.0]), rtol=1e-4, atol=1e-4)
+        steps = distances.diff()
+        assert (steps > 0).all() and abs(float(distances[steps.argmin()]) - 3) < 0.05
+        assert steps[-1] > 100 * steps.min()
+
+    def test_samples_go_where_the_weights_are(self):
+        edges = torch.linspace(0, 1, 65)[None]
+        even = resampled(edges, torch.full((1, 64), 1 / 64), 16, False)
+        torch.testing.assert_close(even, torch.linspace(0, 1, 17)[None], atol=1e-5, rtol=0)
+        weights = torch.zeros(1, 64)
+        weights[0, 40] = 1
+        found = resampled(edges, weights, 32, False)
+        assert (found.diff() >= 0).all() and found[0, 0] == 0 and found[0, -1] == 1
+        assert ((found > edges[0, 39]) & (found < edges[0, 42])).sum() > 28
+
+    def test_spread_of_two_weights(self):
+        """Halves that fill [0, .1] and [.8, 1]: 2 w1 w2 .85 + (w1^2 .1 + w2^2 .2) / 3."""
+        loss = spread_loss(rendered([0.5, 0.0, 0.5], [0.0, 0.1, 0.8, 1.0]))
+        assert float(loss) == pytest.approx(0.5 * 0.85 + 0.25 * 0.3 / 3)
+
+    def test_search_must_bound_the_samples(self):
+        good = rendered([0.5, 0.5], [0.2, 0.3, 0.4], [0.0, 1.0, 0.0], [0.0, 0.1, 0.5, 1.0])
+        bad = rendered([0.5, 0.5], [0.2, 0.3, 0.4], [0.9, 0.1, 0.0], [0.0, 0.1, 0.5, 1.0])
+        assert float(search_loss(good)) == 0
+        assert float(search_loss(bad)) == pytest.approx(2 * 0.4**2 / 0.5, rel=1e-5)
+
+    def test_gradients_fall_near_the_camera(self):
+        values = torch.ones(1, 3, 1, requires_grad=True)
+        out = with_less_gradient(values, torch.tensor([[0.15, 0.75, 3.0]]))
+        assert torch.equal(out, values)
+        out.sum().backward()
+        torch.testing.assert_close(values.grad[0, :, 0], torch.tensor([0.01, 0.25, 1.0]))
+
+    def test_weights_sum_to_one_and_hidden_space_has_none(self):
+        torch.manual_seed(0)
+        field, o, d = RadianceField(), torch.tensor([[3.0, 0, 0]]), torch.tensor([[-1.0, 0, 0]])
+        with torch.no_grad():
+            field.trunk[2].bias[0] = 8.0  # fog everywhere
+            fog = field.render(o, d, 32, 16)
+            behind = field.render(o, d, 32, 16, hidden=lambda points: points[..., 0] > 0)
+        assert float(fog.weights.sum()) == pytest.approx(1, abs=1e-5) and float(fog.distances[0, fog.weights.argmax()]) < 1
+        assert float(behind.weights.sum()) == pytest.approx(1, abs=1e-5)
+        assert float(behind.distances[0, behind.weights.argmax()]) > 3
+
+
+class TestRegion:
+    @pytest.fixture
+    def points(self):
+        """A ball of radius .3 that stands on a floor, and a post at its edge."""
+        random = np.random.default_rng(0)
+        ball = random.normal(size=(6000, 3))
+        ball = 0.3 * ball / np.linalg.norm(ball, axis=1, keepdims=True)
+        floor = np.column_stack([random.uniform(-1.4, 1.4, (30000, 2)), np.full(30000, -0.3)])
+        post = np.array([0.75, 0, -0.3]) + random.uniform(0, 1, (900, 3)) * [0.1, 0.1, 0.3]
+        return np.concatenate([ball, floor, post]) + random.normal(size=(36900, 3)) * 0.004
+
+    def test_the_floor_is_found(self, points):
+        normal, offset = find_table(points, np.zeros(3), np.array([0.1, 0, 0.995]), 3.0, np.random.default_rng(0))
+        np.testing.assert_allclose(normal, [0, 0, 1], atol=2e-3)
+        assert offset == pytest.approx(-0.3, abs=2e-3)
+
+    def test_the_region_is_the_ball(self, points):
+        region = find_region(points, Table(np.array([0.0, 0, 1]), -0.3))
+        asked = torch.tensor([[0.0, 0, 0.3], [0.3, 0, 0], [0, 0, -0.3], [0.6, 0, -0.25], [0.8, 0.05, -0.15], [0, 0, 0.9], [0, 0, 0.0]])
+        assert region.holds(asked).tolist() == [True, True, False, False, False, False, True]
+        torch.testing.assert_close(region.middle(), torch.zeros(3), atol=0.05, rtol=0)
+
+    def test_nothing_in_the_middle(self):
+        assert find_region(np.array([[3.0, 0, 0]] * 10), None) is None
+
+
+def test_box_of_views():
+    centre = np.array([5.0, -2, 1])
+    around = [[3, 0, 1], [0, 3, 1], [-3, 0, 2], [0, -3, 0.5]]
+    poses = np.stack([look_at(centre + np.array(at, float), centre) for at in around])
+    box = box_of_views(poses, np.full((4, 4), 50.0), np.full((4, 2), 40))
+    np.testing.assert_allclose(box[:3, :3] @ centre + box[:3, 3], 0, atol=1e-6)
+    distance = np.median(np.linalg.norm(np.array(around), axis=1))
+    assert 1 / box[0, 0] == pytest.approx(0.8 * distance * 20 / 50)
+    with pytest.raises(ValueError, match="all 4 cameras stand at one place"):
+        box_of_views(poses[[0] * 4], np.full((4, 4), 50.0), np.full((4, 2), 40))
+
+
+CENTRE, RADIUS = np.array([0, 0, 0.35]), 0.35
+
+
+def pattern(points: np.ndarray, colour: list[float]) -> np.ndarray:
+    """A colour, brighter and darker in tiles that do not repeat."""
+    tiles = np.floor(4 * points) @ np.array([127.1, 311.7, 74.7])[: points.shape[-1]]
+    return np.array(colour) * (0.5 + 0.5 * np.modf(np.abs(np.sin(tiles) * 43.7))[0][..., None])
+
+
+def ball_on_floor(origins: np.ndarray, rays: np.ndarray, radius: float = RADIUS) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Colours [..., 3] of a patterned ball on a patterned floor, distances [...], and whether it is the ball [...]."""
+    apart = origins - CENTRE
+    half = (rays * apart).sum(-1)
+    inside = half**2 - ((apart**2).sum(-1) - radius**2)
+    t_ball = -half - np.sqrt(inside.clip(0))
+    t_floor = np.where(rays[..., 2] < 0, -origins[..., 2] / np.minimum(rays[..., 2], -1e-3), 200.0)
+    on_ball, on_floor = (origins + t[..., None] * rays for t in (t_ball, t_floor))
+    ground = np.where(rays[..., 2:] < 0, pattern(on_floor[..., :2], [0.2, 0.7, 0.3]), [0.5, 0.6, 0.9])
+    hit = (inside > 0) & (t_ball > 0)
+    return np.where(hit[..., None], pattern(on_ball - CENTRE, [0.9, 0.3, 0.2]), ground), np.where(hit, t_ball, t_floor), hit
+
+
+def write_ball_on_floor(root, n: int = 20) -> list[np.ndarray]:
+    """Photos without masks of the ball; returns the true masks."""
+    frames, masks = [], []
+    for i in range(n):
+        angle, height = 2.4 * i, 0.9 + 1.2 * (i % 5) / 4
+        pose = look_at(np.array([2.2 * np.cos(angle), 2.2 * np.sin(angle), height]), CENTRE)
+        y, x = np.mgrid[:SIZE, :SIZE] + 0.5
+        rays = np.stack([(x - SIZE / 2) / FOCAL, -(y - SIZE / 2) / FOCAL, -np.ones_like(x)], -1) @ pose[:3, :3].T
+        rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+        image, _, mask = ball_on_floor(np.broadcast_to(pose[:3, 3], rays.shape), rays)
+        write_image(root / f"images/p{i}.png", image)
+        frames.append({"file_path": f"images/p{i}.png", "transform_matrix": pose.tolist()})
+        masks.append(mask)
+    lens = {"fl_x": FOCAL, "fl_y": FOCAL, "cx": SIZE / 2, "cy": SIZE / 2, "w": SIZE, "h": SIZE}
+    (root / "transforms.json").write_text(json.dumps(lens | {"frames": frames}))
+    return masks
+
+
+class TrueField:
+    """The ball on its floor as a field that needs no training; the part that is hidden must be the ball."""
+
+    def __init__(self, world_from_box: np.ndarray):
+        self.scale, self.shift = world_from_box[0, 0], world_from_box[:3, 3]
+
+    def render(self, rays_o, rays_d, n_first, n, jitter=False, hidden=None):
+        origins, rays = rays_o.double().numpy() * self.scale + self.shift, rays_d.double().numpy()
+        if hidden is not None:
+            assert hidden(rays_o).all()  # it asks from the ball's middle
+        colour, t, _ = ball_on_floor(origins, rays, RADIUS if hidden is None else 0.0)
+        weights = torch.zeros(len(rays), n)
+        weights[:, 0] = 1
+        distances = torch.from_numpy(t / self.scale).float()[:, None].expand(-1, n)
+        return Rendered(torch.from_numpy(colour).float(), weights, distances, distances, weights, distances)
+
+
+class TestReading:
+    def test_photos_without_masks_are_refused_unless_allowed(self, tmp_path):
+        write_ball_on_floor(tmp_path, 8)
+        with pytest.raises(InputError, match="images: nothing says where the object is"):
+            load_dataset(tmp_path, reading=Reading("all"))
+        photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
+        assert not photos.masked and (photos.images[..., 3] == 1).all()
+        np.testing.assert_allclose(photos.transform_to_world(np.zeros(3)), [0, 0, 0.35], atol=0.01)
+
+    def test_found_masks_are_read(self, tmp_path):
+        masks = write_ball_on_floor(tmp_path / "data", 8)
+        for i, mask in enumerate(masks):
+            small = mask.reshape(SIZE // 2, 2, SIZE // 2, 2).mean((1, 3))
+            write_image(tmp_path / "found" / separated_mask(tmp_path / f"data/images/p{i}.png"), small)
+        photos = load_dataset(tmp_path / "data", reading=Reading("all", separated=tmp_path / "found"))
+        assert photos.masked
+        agree = (photos.images[..., 3] > 0.5) == np.stack(masks)
+        assert agree.mean() > 0.98
+
+
+def overlap(run, masks: list[np.ndarray]) -> float:
+    """The mean intersection over union of a run's found masks with the true ones."""
+    found = [read_image(run / SEPARATED / f"images_p{i}.png")[..., 0] > 0.5 for i in range(len(masks))]
+    return float(np.mean([(a & b).sum() / (a | b).sum() for a, b in zip(found, masks)]))
+
+
+def test_from_photos_without_masks_to_an_asset(tmp_path, capsys, monkeypatch):
+    """Trains with the masks by a field that is right, and scores the run again with them."""
+    masks, run = write_ball_on_floor(tmp_path / "data"), tmp_path / "run"
+    monkeypatch.setattr(job, "train_field", lambda dataset, **_: TrueField(dataset.world_from_box))
+    assert train(tmp_path / "data", run, "--eval-mode", "all", "--steps", "30") == 0
+    assert overlap(run, masks) > 0.9
+    assert (run / SEPARATED / "sheet.jpg").is_file() and (run / "mesh.glb").is_file()
+    floor = read_image(run / SEPARATED / "surroundings.exr")[36:48]
+    assert floor.shape[1:] == (128, 4) and floor[..., 1].mean() > 2 * floor[..., 0].mean() and floor[..., 3].mean() > 0.6
+    assert "above a table" in capsys.readouterr().err
+    assert main(["evaluate", str(run), "--data", str(tmp_path / "data"), "--spp", "1"]) == 0
+    (run / SEPARATED / "separation.json").unlink()
+    assert main(["evaluate", str(run), "--data", str(tmp_path / "data"), "--spp", "1"]) == 2
+
+
+def test_training_lowers_the_error(tmp_path, monkeypatch):
+    write_ball_on_floor(tmp_path, 8)
+    dataset, told = load_dataset(tmp_path, reading=Reading("all"), masked=False), []
+    monkeypatch.setattr(training, "RAYS", 128)
+    training.train_field(dataset, steps=150, minutes=0, seed=0, report=lambda share, text: told.append((share, text)))
+    psnr = [float(text.split()[3]) for _, text in told]
+    assert psnr[-1] > psnr[0] + 2 and told[-1][0] == 1 and len(told) == 150
+
+
+@pytest.mark.slow
+def test_the_trained_field_tells_the_ball_from_the_floor(tmp_path):
+    masks, run = write_ball_on_floor(tmp_path / "data", 40), tmp_path / "run"
+    assert train(tmp_path / "data", run, "--eval-mode", "all", "--steps", "30", "--set", "separation.steps=4000") == 0
+    assert overlap(run, masks) > 0.8
