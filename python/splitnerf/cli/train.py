@@ -21,7 +21,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "alone skips its step. The message names where it came from, and the last checkpoint stands: --resume goes on "
         "from it.",
     )  # fmt: skip
-    parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images with masks")
+    parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images; masks help, else the object is looked for")
     parser.add_argument("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
     add_training_options(parser)
     parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
