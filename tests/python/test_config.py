@@ -40,6 +40,8 @@ SETTINGS = {
     "run.checkpoint_minutes": ("checkpoint_minutes", 2.0, 2.0, OURS),
     "data.eval_mode": ("eval_mode", "auto", "auto", OURS),
     "data.mask_kind": ("mask_kind", "auto", "auto", OURS),
+    "separation.share": ("separation_share", 0.15, 0.15, OURS),
+    "separation.steps": ("separation_steps", 6000, 6000, OURS),
     "surface.box": ("box", 1.5, 1.5, PAPER),
     "surface.n_levels": ("n_levels", 9, 16, PAPER),
     "surface.n_features": ("n_features", 2, 2, PAPER),
@@ -188,6 +190,7 @@ LIMITS = {
     "losses.neutral_queries": "in [1, 1048576]", "losses.smoothness_points": "in [1, 1048576]",
     "losses.eikonal_points": "in [0, 1048576]",
     "optimiser.light_step_every": "in [1, 64]", "refinement.share": "in [0, 1)",
+    "separation.share": "in (0, 1)", "separation.steps": "in [1, 16777216]",
     "refinement.sweeps": "in [1, 16777216]", "export.resolution": "in [8, 4096]",
     "export.texture_size": "in [8, 32768]", "export.environment_height": "in [1, 8192]",
 }  # fmt: skip
@@ -206,9 +209,9 @@ CHOICES = {
 # By unit: the settings that have it.
 UNITS = {
     "steps": "run.steps occlusion.indirect_every sampling.grid_every losses.light_every optimiser.light_step_every "
-    "optimiser.warmup_steps refinement.sweeps",
+    "optimiser.warmup_steps separation.steps refinement.sweeps",
     "share of the run": "run.preview_every surface.levels_open_by surface.cos_anneal_by mesh.every sampling.hull_until "
-    "losses.priors_from refinement.share",
+    "losses.priors_from separation.share refinement.share",
     "minutes": "run.max_minutes run.checkpoint_minutes",
     "scene units": "surface.box surface.sphere_radius occlusion.offset sampling.min_step sampling.max_step "
     "losses.smoothness_radius",

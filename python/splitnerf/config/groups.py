@@ -51,7 +51,7 @@ class Separation:
     """How the object is found in photos that have no masks."""
 
     share: float = setting(0.15, "part of run.max_minutes that it takes", unit="share of the run", above=0, below=1)
-    steps: int = setting(6000, "optimiser steps without run.max_minutes", unit="steps", at_least=1, at_most=10**9)
+    steps: int = setting(6000, "optimiser steps where no minutes end the run", unit="steps", at_least=1)
 
 
 @dataclass(frozen=True)

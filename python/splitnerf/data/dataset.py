@@ -342,9 +342,10 @@ def _check_masks(frames: list[Frame], photos: list[Photo]) -> None:
     """Raises InputError where a photo has no mask though others have one, or no mask shows an object."""
     for frame, photo in zip(frames, photos):
         if not photo.masked:
-            raise InputError(
-                f"{frame.image_path}: has no alpha channel and its frame no mask_path, as others have; add a mask or remove it"
-            )
+            has, cure = "no mask_path, as others have", "add a mask or remove it"
+            if frame.mask_path is not None:
+                has, cure = "a mask that only says what to ignore (black)", "invert it if black is the object, else add one of it"
+            raise InputError(f"{frame.image_path}: has no alpha channel and its frame {has}; {cure}")
     if not any(photo.silhouette.any() for photo in photos):
         folder = frames[0].image_path.parent
         raise InputError(f"{folder}: every mask is empty, no pixel is foreground; check alpha or mask_path")
