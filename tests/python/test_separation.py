@@ -107,7 +107,7 @@ class TestRegion:
         assert offset == pytest.approx(-0.3, abs=2e-3)
 
     def test_the_region_is_the_ball(self, points):
-        region = find_region(points, Table(np.array([0.0, 0, 1]), -0.3))
+        region = find_region(points, Table.through(np.array([0.0, 0, 1]), -0.3, points))
         asked = torch.tensor([[0.0, 0, 0.3], [0.3, 0, 0], [0, 0, -0.3], [0.6, 0, -0.25], [0.8, 0.05, -0.15], [0, 0, 0.9], [0, 0, 0.0]])
         assert region.holds(asked).tolist() == [True, True, False, False, False, False, True]
         torch.testing.assert_close(region.middle(), torch.zeros(3), atol=0.05, rtol=0)

@@ -24,6 +24,7 @@ from splitnerf.separation.training import train_field
 
 SHEET = "sheet.jpg"
 SHOWN, DIMMED = 12, 0.25  # photos on the sheet, and the factor of what is around the object
+BEFORE_MIDDLE = 0.7  # how far before the middle of the views a wall may stand, scene units: seen from one side, it is vague
 NEAR_TABLE = 1.5  # distance from the middle within which points tell of the table, scene units
 MOST_POINTS = 20000  # of those that the search for the table takes
 
@@ -100,10 +101,11 @@ def table_under(points: np.ndarray, dataset: Dataset, seed: int) -> Table | None
     near = near[random.permutation(len(near))[:MOST_POINTS]].astype(np.float64)
     places = dataset.poses[:, :3, 3].astype(np.float64)
     distance = float(np.median(np.linalg.norm(places, axis=1)))
-    for axis in (dataset.poses[:, :3, 1].mean(0), places.mean(0)):
-        plane = find_table(near, np.zeros(3), axis / np.linalg.norm(axis).clip(1e-9), distance, random)
+    for axis, reach in ((dataset.poses[:, :3, 1].mean(0), 0.0), (places.mean(0), BEFORE_MIDDLE)):
+        axis = axis / np.linalg.norm(axis).clip(1e-9)
+        plane = find_table(near, reach * axis, axis, distance, random)
         if plane is not None:
-            return Table(*plane)
+            return Table.through(*plane, near)
     return None
 
 

@@ -12,7 +12,9 @@ from torch import Tensor
 CELLS = 96  # along an edge of the cube
 HALF = 1.6  # of that edge, scene units; parts that reach out of the ball of radius 1 may reach so far above a table
 LEAST_POINTS = 3  # seen in a cell that is taken
-ABOVE = 0.03  # height over the table at which things begin, scene units
+LEAST_HEIGHT, LARGEST_HEIGHT = 0.006, 0.06  # over the table, at which things begin, scene units
+ON_TABLE = 0.05  # height within which points are the table's, scene units
+NOISE = 2.5  # standard deviations of the table's points by which things stand out
 LARGEST_SHARE = 0.05  # of the largest part's cells that another part needs
 STANDS_OVER = 1.0  # horizontal distance of another part's middle from the largest one's, in the latter's radii
 GROWN = 2  # cells by which the region is larger than what was seen
@@ -20,10 +22,19 @@ GROWN = 2  # cells by which the region is larger than what was seen
 
 @dataclass(frozen=True)
 class Table:
-    """A plane: its unit normal [3], upward, and the product of the normal with the plane's points."""
+    """A plane: its unit normal [3], upward, the product of the normal with the plane's points, and the height over it at which
+    things begin, scene units."""
 
     normal: np.ndarray
     offset: float
+    height: float = LARGEST_HEIGHT
+
+    @classmethod
+    def through(cls, normal: np.ndarray, offset: float, points: np.ndarray) -> Table:
+        """The table on this plane, with a height by how far the points [n, 3] that photos show of it scatter."""
+        apart = np.abs(points @ normal - offset)
+        deviation = 1.4826 * float(np.median(apart[apart < ON_TABLE]))
+        return cls(normal, offset, min(max(NOISE * deviation, LEAST_HEIGHT), LARGEST_HEIGHT))
 
     def heights(self, points: np.ndarray) -> np.ndarray:
         """Heights [...] of points [..., 3] over the table."""
@@ -53,7 +64,7 @@ class Region:
         inside = within & self.cells[x, y, z]
         if self.table is not None:
             normal = torch.from_numpy(self.table.normal.astype(np.float32))
-            inside &= points @ normal > self.table.offset + 0.25 * ABOVE
+            inside &= points @ normal > self.table.offset + 0.5 * self.table.height
         return inside
 
 
@@ -63,7 +74,7 @@ def find_region(points: np.ndarray, table: Table | None) -> Region | None:
     if table is None:
         chosen = np.linalg.norm(points, axis=1) < 1
     else:
-        chosen = (np.abs(points).max(axis=1) < HALF) & (table.heights(points) > ABOVE)
+        chosen = (np.abs(points).max(axis=1) < HALF) & (table.heights(points) > table.height)
     index = ((points[chosen] * (0.5 / HALF) + 0.5) * CELLS).astype(int).clip(0, CELLS - 1)
     counts = np.zeros((CELLS,) * 3, np.int32)
     np.add.at(counts, tuple(index.T), 1)
