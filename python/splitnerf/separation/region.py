@@ -18,6 +18,7 @@ NOISE = 2.5  # standard deviations of the table's points by which things stand o
 LARGEST_SHARE = 0.05  # of the largest part's cells that another part needs
 STANDS_OVER = 1.0  # horizontal distance of another part's middle from the largest one's, in the latter's radii
 GROWN = 2  # cells by which the region is larger than what was seen
+LOW = 0.05  # height over a table up to which it is larger by one cell alone, scene units
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,12 @@ def find_region(points: np.ndarray, table: Table | None) -> Region | None:
         if np.linalg.norm(np.median(across(cells), axis=0) - middle) <= reach:
             taken[tuple(cells.T)] = True
     taken = filled(taken) if table is None else down_to(table, filled(taken))
-    return Region(ndimage.binary_dilation(taken, np.ones((3, 3, 3)), iterations=GROWN), table)
+    once, grown = (ndimage.binary_dilation(taken, np.ones((3, 3, 3)), iterations=n) for n in (1, GROWN))
+    if table is not None:  # beside the object's foot stands the table
+        centres = ((np.argwhere(np.ones_like(grown)) + 0.5) * (2 / CELLS) - 1) * HALF
+        low = (table.heights(centres) < LOW).reshape(grown.shape)
+        grown = np.where(low, once, grown)
+    return Region(grown, table)
 
 
 def down_to(table: Table, cells: np.ndarray) -> np.ndarray:
