@@ -82,7 +82,6 @@ def present_in(run: Path) -> list[str]:
 def clear_run(run: Path) -> None:
     """Deletes the files of a run, and nothing else."""
     discard_last_stage(run)
-    discard_separated(run)
     for name in RUN_FILES:
         (run / name).unlink(missing_ok=True)
     for preview in (run / "previews").glob("step_*.png"):
@@ -145,11 +144,11 @@ def load_with_masks(
     """The splits of a dataset. Masks that photos lack are found first, and kept in the run's folder; what that takes of the
     run's minutes is taken off the settings that are returned."""
     folder, reading = run / SEPARATED, config.reading
-    if overwrite:
-        discard_separated(run)
-    if is_separated(folder):
+    if is_separated(folder) and not overwrite:
         reading = replace(reading, separated=folder)
     train, test = load_splits(data, downscale, reading, masked=False)
+    if overwrite:
+        discard_separated(run)
     if train.masked:
         return config, train, test
     note_once(f"{data}: nothing says where the object is; it is looked for in the middle of the photos, see {folder / SHEET}")

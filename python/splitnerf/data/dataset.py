@@ -344,7 +344,8 @@ def _check_masks(frames: list[Frame], photos: list[Photo]) -> None:
         if not photo.masked:
             has, cure = "no mask_path, as others have", "add a mask or remove it"
             if frame.mask_path is not None:
-                has, cure = "a mask that only says what to ignore (black)", "invert it if black is the object, else add one of it"
+                has = "a mask that only says what to ignore (black)"
+                cure = "invert it if black is the object, else add one of it"
             raise InputError(f"{frame.image_path}: has no alpha channel and its frame {has}; {cure}")
     if not any(photo.silhouette.any() for photo in photos):
         folder = frames[0].image_path.parent
