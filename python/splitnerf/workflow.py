@@ -147,9 +147,9 @@ def load_with_masks(
     if is_separated(folder) and not overwrite:
         reading = replace(reading, separated=folder)
     train, test = load_splits(data, downscale, reading, masked=False)
-    if overwrite:
-        discard_separated(run)
     if train.masked:
+        if overwrite:
+            discard_separated(folder)
         return config, train, test
     note_once(f"{data}: nothing says where the object is; it is looked for in the middle of the photos, see {folder / SHEET}")
     minutes = config.run.max_minutes * config.separation.share

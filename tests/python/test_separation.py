@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -237,6 +238,14 @@ def test_training_lowers_the_error(tmp_path, monkeypatch):
     training.train_field(dataset, steps=150, minutes=0, seed=0, report=lambda share, text: told.append((share, text)))
     psnr = [float(text.split()[3]) for _, text in told]
     assert psnr[-1] > psnr[0] + 2 and told[-1][0] == 1 and len(told) == 150
+
+
+def test_numbers_that_are_not_finite_end_it(tmp_path, monkeypatch):
+    write_ball_on_floor(tmp_path, 8)
+    dataset = load_dataset(tmp_path, reading=Reading("all"), masked=False)
+    monkeypatch.setattr(training, "SPREAD_WEIGHT", math.nan)
+    with pytest.raises(RuntimeError, match="no longer finite at step 1"):
+        training.train_field(dataset, steps=5, minutes=0, seed=0, report=lambda share, text: None)
 
 
 @pytest.mark.slow

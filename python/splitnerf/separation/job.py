@@ -14,7 +14,7 @@ from splitnerf.data.ground import find_table
 from splitnerf.data.images import read_image, write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.data.photos import resized_mask, separated_mask
-from splitnerf.data.reading import SEPARATED, SEPARATION
+from splitnerf.data.reading import SEPARATION
 from splitnerf.errors import InputError
 from splitnerf.progress import Progress, ended_by_signals, tracked
 from splitnerf.separation.field import RadianceField
@@ -44,15 +44,15 @@ class Separated:
     seconds: float
 
 
-def discard_separated(run: Path) -> None:
-    """Deletes what a separation wrote into a run's folder."""
-    shutil.rmtree(run / SEPARATED, ignore_errors=True)
+def discard_separated(folder: Path) -> None:
+    """Deletes the folder of an earlier separation."""
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def separate(
     train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int
 ) -> Separated:
-    """Writes a mask for each photo, `surroundings.exr`, and `sheet.jpg`, which shows some of the masks.
+    """Writes a mask for each photo, `surroundings.exr`, and `sheet.jpg`, which shows some of the masks, into an empty folder.
 
     A radiance field of the whole place is trained on the photos. What it shows within what all cameras look at, above the
     plane of a table if there is one, and hangs together in the middle, is the object.
@@ -60,15 +60,15 @@ def separate(
     Args:
         train: The photos, without masks.
         test: Photos that get masks but are not trained on; or None.
-        folder: The folder.
+        folder: The folder; what is in it is deleted once the object is found.
         steps, minutes: See :func:`splitnerf.separation.training.train_field`.
         seed: The seed of the random numbers.
 
     Raises:
         InputError: Nothing stands in the middle.
+        RuntimeError: Numbers of the training are no longer finite.
     """
     started = time.monotonic()
-    folder.mkdir(parents=True, exist_ok=True)
     with ended_by_signals():
         with Progress(0.0) as bar:
             field = train_field(
@@ -80,6 +80,8 @@ def separate(
         region = find_region(points, table)
         if region is None:
             raise InputError(f"{train.root}: nothing stands out in the middle of the photos; add masks of the object")
+        discard_separated(folder)
+        folder.mkdir(parents=True)
         shares = [write_masks(field, region, split, folder) for split in (train, test) if split is not None]
         write_image(folder / SURROUNDINGS, surroundings(field, region, points))
         write_sheet(train, folder)

@@ -88,7 +88,7 @@ def find_region(points: np.ndarray, table: Table | None) -> Region | None:
     if not sizes.any():
         return None
     places = [np.argwhere(parts == k + 1) for k in np.flatnonzero(sizes >= LARGEST_SHARE * sizes.max())]
-    main = max(places, key=len)
+    main = np.argwhere(parts == sizes.argmax() + 1)
     up = np.array([0.0, 0, 1]) if table is None else table.normal
     across = lambda cells: cells - np.outer(cells @ up, up)  # noqa: E731
     middle = np.median(across(main), axis=0)

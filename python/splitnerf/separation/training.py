@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -30,6 +31,9 @@ def train_field(
         minutes: The time after which the training ends; 0: it makes all steps.
         seed: The seed of the random numbers.
         report: Called with the share done and what to tell of it.
+
+    Raises:
+        RuntimeError: Numbers are no longer finite.
     """
     torch.manual_seed(seed)
     source = PixelSource(dataset, 0.0, torch.Generator().manual_seed(seed))
@@ -49,8 +53,10 @@ def train_field(
         optimiser.step()
         step += 1
         squared = float(apart.detach().square().mean())
+        if not math.isfinite(squared):
+            raise RuntimeError(f"the field of what is around the object is no longer finite at step {step}; try another --seed")
         error = squared if error is None else 0.98 * error + 0.02 * squared
         used = (time.monotonic() - started) / (60 * minutes) if minutes else 0.0
         share = min(1.0, max(step / steps, used))
-        report(share, f"step {step} PSNR {-10 * torch.log10(torch.tensor(error)).item():.2f} dB")
+        report(share, f"step {step} PSNR {-10 * math.log10(max(error, 1e-10)):.2f} dB")
     return field
