@@ -244,7 +244,7 @@ def test_numbers_that_are_not_finite_end_it(tmp_path, monkeypatch):
     write_ball_on_floor(tmp_path, 8)
     dataset = load_dataset(tmp_path, reading=Reading("all"), masked=False)
     monkeypatch.setattr(training, "SPREAD_WEIGHT", math.nan)
-    with pytest.raises(RuntimeError, match="no longer finite at step 1"):
+    with pytest.raises(RuntimeError, match="no longer finite at step 2"):
         training.train_field(dataset, steps=5, minutes=0, seed=0, report=lambda share, text: None)
 
 
