@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,7 +24,8 @@ from splitnerf.separation import job, training
 from splitnerf.separation.field import (
     RadianceField, RayMeasure, Rendered, contracted, resampled, search_loss, spread_loss, with_less_gradient,
 )  # fmt: skip
-from splitnerf.separation.region import Table, find_region
+from splitnerf.separation.masks import find_mask
+from splitnerf.separation.region import CELLS, Region, Table, find_region
 
 SIZE, FOCAL = 40, 40.0
 
@@ -152,8 +154,8 @@ def ball_on_floor(origins: np.ndarray, rays: np.ndarray, radius: float = RADIUS)
     return np.where(hit[..., None], pattern(on_ball - CENTRE, [0.9, 0.3, 0.2]), ground), np.where(hit, t_ball, t_floor), hit
 
 
-def write_ball_on_floor(root, n: int = 20) -> list[np.ndarray]:
-    """Photos without masks of the ball; returns the true masks."""
+def write_ball_on_floor(root, n: int = 20, *, alpha: bool = False) -> list[np.ndarray]:
+    """Photos without masks of the ball, or with an alpha that is 1 everywhere; returns the true masks."""
     frames, masks = [], []
     for i in range(n):
         angle, height = 2.4 * i, 0.9 + 1.2 * (i % 5) / 4
@@ -162,7 +164,7 @@ def write_ball_on_floor(root, n: int = 20) -> list[np.ndarray]:
         rays = np.stack([(x - SIZE / 2) / FOCAL, -(y - SIZE / 2) / FOCAL, -np.ones_like(x)], -1) @ pose[:3, :3].T
         rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
         image, _, mask = ball_on_floor(np.broadcast_to(pose[:3, 3], rays.shape), rays)
-        write_image(root / f"images/p{i}.png", image)
+        write_image(root / f"images/p{i}.png", np.dstack([image, np.ones((SIZE, SIZE))]) if alpha else image)
         frames.append({"file_path": f"images/p{i}.png", "transform_matrix": pose.tolist()})
         masks.append(mask)
     lens = {"fl_x": FOCAL, "fl_y": FOCAL, "cx": SIZE / 2, "cy": SIZE / 2, "w": SIZE, "h": SIZE}
@@ -196,8 +198,9 @@ class TestReading:
         assert not photos.masked and (photos.images[..., 3] == 1).all()
         np.testing.assert_allclose(photos.transform_to_world(np.zeros(3)), [0, 0, 0.35], atol=0.01)
 
-    def test_found_masks_are_read(self, tmp_path):
-        masks = write_ball_on_floor(tmp_path / "data", 8)
+    @pytest.mark.parametrize("alpha", [False, True])
+    def test_found_masks_are_read(self, tmp_path, alpha):
+        masks = write_ball_on_floor(tmp_path / "data", 8, alpha=alpha)
         for i, mask in enumerate(masks):
             small = mask.reshape(SIZE // 2, 2, SIZE // 2, 2).mean((1, 3))
             write_image(tmp_path / "found" / separated_mask(tmp_path / f"data/images/p{i}.png"), small)
@@ -205,6 +208,15 @@ class TestReading:
         assert photos.masked
         agree = (photos.images[..., 3] > 0.5) == np.stack(masks)
         assert agree.mean() > 0.98
+
+
+@pytest.mark.parametrize("size", [(41, 55), (37, 93)])
+def test_masks_of_odd_sizes(tmp_path, size):
+    write_ball_on_floor(tmp_path, 8)
+    photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
+    odd = replace(photos, images=np.ones((8, *size, 4), np.float32))
+    region = Region(np.ones((CELLS,) * 3, bool), None)
+    assert find_mask(TrueField(photos.world_from_box), region, odd, 0).shape == size
 
 
 def overlap(run, masks: list[np.ndarray]) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 
 from splitnerf.capture.poses import FLIP, Lens
+from splitnerf.data.environment import texels_of_directions
 from splitnerf.data.images import srgb_to_linear
 
 HEIGHT = 64  # rows of the map
@@ -87,9 +88,6 @@ def _seen(shot: Shot, centre: np.ndarray, table_radius: float) -> tuple[np.ndarr
     shown = on_table | ~hidden
     y, x = y[shown], x[shown]
     rays = np.where(on_table[:, None], points - centre, rays)[shown]
-    dx, dy, dz = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).T
-    row = (np.arccos(dz.clip(-1, 1)) / np.pi * HEIGHT).astype(int).clip(0, HEIGHT - 1)
-    column = ((0.5 - np.arctan2(dy, dx) / (2 * np.pi)) * 2 * HEIGHT).astype(int) % (2 * HEIGHT)
     photo = shot.image[y, x] / np.float32(np.iinfo(shot.image.dtype).max)
     radiance = np.where(photo >= CLIPPED, np.inf, srgb_to_linear(photo) / np.float32(shot.exposure))
-    return row * 2 * HEIGHT + column, radiance
+    return texels_of_directions(rays, HEIGHT), radiance

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 import splitnerf
 from splitnerf.cli.exit_codes import DONE, FAILED
+from splitnerf.cli.findings import show
 
-WIDTH = 24  # of the names
 INSTALL_AGAIN = "install it again: pip install --force-reinstall --no-deps --no-build-isolation ."
 
 
@@ -60,10 +59,3 @@ def self_test(device: str) -> bool:
         advice.append(f"if that does not help, use other kernels: set SPLITNERF_ISA={lower}, and look again")
     show("", "results are wrong here:", [*advice, "report it, with all that is printed here"])
     return False
-
-
-def show(name: str, value: str, advice: Sequence[str] = ()) -> None:
-    """Prints a line of the list and what to do about it, at once: a crash that follows hides nothing."""
-    print(f"{name:{WIDTH}}{value}", flush=True)
-    for line in advice:
-        print(f"{'':{WIDTH}}-> {line}", flush=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from splitnerf.cli.doctor import show
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.findings import show
 from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.errors import InputError
 

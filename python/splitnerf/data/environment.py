@@ -97,6 +97,14 @@ def directions_of_texels(height: int) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([ring * np.cos(phi), ring * np.sin(phi), up], axis=-1), areas
 
 
+def texels_of_directions(directions: np.ndarray, height: int) -> np.ndarray:
+    """[n] int64, the texels [height, 2 height], counted row by row, in which directions [n, 3] lie; of any length above 0."""
+    x, y, z = directions.T
+    row = (np.arctan2(np.hypot(x, y), z) / np.pi * height).astype(np.int64).clip(0, height - 1)
+    column = ((0.5 - np.arctan2(y, x) / (2 * np.pi)) * 2 * height).astype(np.int64) % (2 * height)
+    return row * 2 * height + column
+
+
 def seen_at(surroundings: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What photos show around the object, in given directions.
 

@@ -52,7 +52,7 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
         frame: The frame.
         downscale: Integer factor of at least 1.
         mask_kind: "object" or "ignore": what the mask file is where the frame leaves it open.
-        separated: A folder with masks for frames that have none, named by :func:`separated_mask`; or None.
+        separated: A folder with masks for frames that have none or a full one, named by :func:`separated_mask`; or None.
 
     Raises:
         InputError: A file cannot be used.
@@ -76,12 +76,13 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
         known = still if known is None else known & still
     masked = alpha is not None
     alpha = alpha if masked else np.ones_like(colour[..., :1])
+    says_nothing = bool((alpha == 1).all())
     rgba = np.concatenate([colour, alpha], axis=-1)
     if frame.distortion is not None:
         rgba, known = _undistort(rgba, known, frame, straight=is_object and frame.mask_path is not None)
     if frame.exposure != 1.0:
         rgba[..., :3] = linear_to_srgb(srgb_to_linear(rgba[..., :3]) / np.float32(frame.exposure))
-    if not masked and separated is not None:
+    if says_nothing and separated is not None:
         masked, rgba[..., 3] = True, resized_mask(read_image(separated / separated_mask(frame.image_path)), height, width)
     factor = silhouette_factor(height, width)
     silhouette = area_average(rgba[..., 3], factor) > 0.5

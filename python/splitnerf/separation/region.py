@@ -90,7 +90,10 @@ def find_region(points: np.ndarray, table: Table | None) -> Region | None:
     places = [np.argwhere(parts == k + 1) for k in np.flatnonzero(sizes >= LARGEST_SHARE * sizes.max())]
     main = np.argwhere(parts == sizes.argmax() + 1)
     up = np.array([0.0, 0, 1]) if table is None else table.normal
-    across = lambda cells: cells - np.outer(cells @ up, up)  # noqa: E731
+
+    def across(cells: np.ndarray) -> np.ndarray:
+        return cells - np.outer(cells @ up, up)
+
     middle = np.median(across(main), axis=0)
     reach = STANDS_OVER * np.quantile(np.linalg.norm(across(main) - middle, axis=1), 0.9)
     taken = np.zeros_like(counts, bool)
