@@ -57,7 +57,7 @@ def make_folders(root):
 def test_blender_layout(scene):
     data = load_dataset(scene, "train")
     assert (data.name, len(data), data.images.shape) == ("ball", 12, (12, SIZE, SIZE, 4))
-    assert data.images.dtype == data.poses.dtype == data.intrinsics.dtype == np.float32
+    assert data.images[0].dtype == data.poses.dtype == data.intrinsics.dtype == np.float32
     assert data.frame_names[:2] == ["r_0", "r_1"]
     focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
     assert data.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])

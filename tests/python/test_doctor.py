@@ -12,7 +12,7 @@ import torch
 from op_checks import has_cuda_kernel
 from pretend_gpu import pretend_gpu
 
-from splitnerf import _core
+from splitnerf import _core, memory
 from splitnerf.cli import main
 from splitnerf.cli.exit_codes import DONE, FAILED
 from splitnerf.doctor import machine, self_test
@@ -222,7 +222,7 @@ def test_little_memory_and_disk(monkeypatch, tmp_path):
     total, free = machine.memory_bytes()
     assert 0 < free <= total
     limits = {"memory.max": [str(2 * 2**30)], "memory.stat": ["anon", str(2**29)]}
-    monkeypatch.setattr(machine, "control_group", limits.get)
+    monkeypatch.setattr(memory, "control_group", limits.get)
     assert machine.memory_bytes()[0] == min(total, 2 * 2**30) and machine.memory_bytes()[1] <= 1.5 * 2**30
     assert "--downscale" in machine.memory().advice
     monkeypatch.setattr(machine, "memory_bytes", lambda: (64 * 2**30, 32 * 2**30))

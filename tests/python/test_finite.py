@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -53,7 +54,9 @@ def test_a_nan_pixel_stops_the_run_and_is_named(data, begun):
     run, before = begun
     dataset = load_dataset(data)
     resumed = trainer.dataset_fingerprint
-    dataset.images[2, 12, 12, 0] = np.nan
+    images = np.array(dataset.images)
+    images[2, 12, 12, 0] = np.nan
+    dataset = replace(dataset, images=images)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(trainer, "dataset_fingerprint", lambda _: resumed(load_dataset(data)))
         with pytest.raises(Diverged, match=rf"loss is not finite \(colour.*image {dataset.frame_names[2]} \(1 of 2304"):

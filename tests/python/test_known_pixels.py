@@ -205,7 +205,7 @@ def halved(is_half):
 @pytest.mark.parametrize("share", [0.0, 0.8, 1.0])
 def test_training_draws_known_pixels_only(half_known, share):
     """The colours of the others say so here."""
-    images = half_known.images.copy()
+    images = np.array(half_known.images)
     images[~half_known.known] = [1, 0, 0, 1]
     source = PixelSource(dataclasses.replace(half_known, images=images), share, generator())
     pixels = source.draw(20_000)[2].numpy()

@@ -22,7 +22,7 @@ LAYERS = [
     {"fields", "config"},
     {"data", "doctor"},
     {"ops", "devices", "files"},
-    {"_core", "notes", "progress"},
+    {"_core", "memory", "notes", "progress"},
     {"errors"},
 ]
 

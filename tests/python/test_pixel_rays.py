@@ -105,7 +105,7 @@ def with_images(dataset: Dataset, images: np.ndarray) -> Dataset:
 @pytest.mark.parametrize(("share", "n_near"), [(0.0, 0), (0.75, 7), (1.0, 10)])
 def test_as_many_rays_are_drawn_as_asked(dataset, share, n_near):
     """Ten, three quarters of which are seven: these are all from the only view that has a mask."""
-    images = dataset.images.copy()
+    images = np.array(dataset.images)
     images[1:, ..., 3] = 0.0
     source = PixelSource(with_images(dataset, images), share, generator())
     origins, directions, pixels = source.draw(10)
@@ -125,7 +125,7 @@ def test_rays_follow_the_generator_they_were_given(dataset, share):
 
 def test_without_masks_rays_come_from_anywhere(dataset):
     """From each of the 1,920 pixels, about as often from each view."""
-    images = dataset.images.copy()
+    images = np.array(dataset.images)
     images[..., 3] = 0.0
     pixels = PixelSource(with_images(dataset, images), 0.9, generator()).draw(40_000)[2]
     assert len(pixels.unique(dim=0)) == 3 * HEIGHT * WIDTH

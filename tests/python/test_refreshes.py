@@ -359,7 +359,7 @@ def test_rays_are_drawn_near_the_masks_as_often_as_is_set(data, tmp_path):
 
 def test_the_hull_is_that_of_the_runs_box_and_cells(data, tmp_path):
     training = loop.Training(load_dataset(data), tiny(box=1.2, hull_until=0.1), tmp_path, torch.device("cpu"))
-    cameras = training.source.masks, training.source.poses, training.source.intrinsics
+    cameras = training.source.possible, training.source.poses, training.source.intrinsics
     hull = training.grid.hull.flatten()
     assert torch.equal(hull, visual_hull(16, 1.2, *cameras).flatten())
     assert not torch.equal(hull, visual_hull(16, 1.5, *cameras).flatten())

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def add_reading_options(parser: argparse.ArgumentParser, default: str) -> None:
-    """Adds --eval-mode and --mask-kind; `default` says in their help what holds without them."""
+    """Adds --eval-mode, --mask-kind and --max-memory; `default` says in their help what holds without them."""
     parser.add_argument(
         "--eval-mode", choices=["all", "fraction", "filename"],
         help="what of the data is for testing: fraction, every 8th view; filename, the views with `test` or `eval` in "
@@ -23,11 +23,15 @@ def add_reading_options(parser: argparse.ArgumentParser, default: str) -> None:
         help="what mask files mean: object, white is the object; ignore, black is to be ignored and alpha is the "
         f"object (default: {default})",
     )  # fmt: skip
+    parser.add_argument(
+        "--max-memory", type=float, metavar="GB",
+        help="memory that the photos may take; more are read from a file in TMPDIR (default: half of what is available)",
+    )  # fmt: skip
 
 
-def reading_options(args: argparse.Namespace) -> dict[str, str]:
+def reading_options(args: argparse.Namespace) -> dict[str, object]:
     """The settings that the options give, by name."""
-    given = {"data.eval_mode": args.eval_mode, "data.mask_kind": args.mask_kind}
+    given = {"data.eval_mode": args.eval_mode, "data.mask_kind": args.mask_kind, "data.max_memory": args.max_memory}
     return {name: value for name, value in given.items() if value is not None}
 
 

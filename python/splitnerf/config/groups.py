@@ -44,6 +44,9 @@ class Data:
     mask_kind: str = setting(
         "auto", "mask files: white is the object, or black is to be ignored; auto: as they look", choices=MASK_KINDS
     )
+    max_memory: float = setting(
+        0.0, "memory that the photos may take, more are read from a file; 0: half of what is available", unit="GB"
+    )
 
 
 @dataclass(frozen=True)

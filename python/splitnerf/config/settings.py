@@ -110,7 +110,7 @@ class Config:
     @property
     def reading(self) -> Reading:
         """How the run reads its data."""
-        return Reading(self.data.eval_mode, self.data.mask_kind)
+        return Reading(self.data.eval_mode, self.data.mask_kind, max_memory=self.data.max_memory)
 
     @property
     def training_minutes(self) -> float:

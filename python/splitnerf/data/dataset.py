@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,14 +15,17 @@ from splitnerf.data.environment import read_surroundings
 from splitnerf.data.frames import read_frames
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
+from splitnerf.data.loading import Loader
 from splitnerf.data.normalisation import MasksContradict, box_of_views, estimate_box, transform_points
-from splitnerf.data.photos import Photo, load_photo, silhouette_factor
+from splitnerf.data.photos import Photo, silhouette_factor
+from splitnerf.data.pixels import Photos
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.notes import note_once
 
 SURROUNDINGS = "surroundings.exr"
 HULL_VIEWS = 40
+MEAN_EDGE = 1000  # pixels along the shorter edge of a photo, about, from which a fingerprint takes every other one, or fewer
 NEARLY_ALL, NEARLY_ALL_EDGE = 0.6, 0.5  # medians of what a mask keeps, and of the image's edge, if it is no object's
 
 
@@ -37,7 +39,7 @@ class Dataset:
         split: "train" or "test".
         downscale: Integer factor by which the images were averaged down.
         images: [n, H, W, 4] float32, sRGB, straight alpha; brought to one exposure, at which colours are in [0, 1] but for
-            those of photos that were exposed less.
+            those of photos that were exposed less. Kept as bytes, see :class:`Photos`; an array may be given.
         poses: [n, 4, 4] float32 camera-to-world, OpenGL axes, internal frame.
         intrinsics: [n, 4] float32, (fx, fy, cx, cy) in pixels of the downscaled images; pixel centres at +0.5.
         frame_names: Names of the images' files without extension, or of the view folders.
@@ -57,7 +59,7 @@ class Dataset:
     root: Path
     split: str
     downscale: int
-    images: np.ndarray
+    images: Photos
     poses: np.ndarray
     intrinsics: np.ndarray
     frame_names: list[str]
@@ -70,6 +72,7 @@ class Dataset:
     masked: bool = True
 
     def __post_init__(self) -> None:
+        self.images = self.images if isinstance(self.images, Photos) else Photos(self.images)
         self.exposures = np.ones(len(self.images)) if self.exposures is None else self.exposures
 
     def __len__(self) -> int:
@@ -110,9 +113,11 @@ class Dataset:
     def select(self, views: Sequence[int]) -> Dataset:
         """The split reduced to these views, in this order."""
         views = list(views)
+        if views == list(range(len(self))):
+            return self
         return replace(
             self,
-            images=self.images[views],
+            images=self.images.select(views),
             known=None if self.known is None else self.known[views],
             poses=self.poses[views],
             intrinsics=self.intrinsics[views],
@@ -153,11 +158,14 @@ def load_dataset(
     frames, origin = read_frames(root, split, reading)
     _check_once(frames)
     if split == "train":
-        photos, box_from_world, _ = _load_train(root, frames, downscale, reading)
+        loader = Loader(root, frames, downscale, reading)
+        photos, box_from_world, _ = _load_train(root, loader, reading)
     else:
         train = spread(read_frames(root, "train", reading)[0], HULL_VIEWS)
-        train_photos, box_from_world, mask_kind = _load_train(root, train, downscale, reading)
-        photos = _load_photos(frames, downscale, mask_kind, reading.separated)
+        masks = Loader(root, train, downscale, reading, keep=False)
+        train_photos, box_from_world, mask_kind = _load_train(root, masks, reading)
+        loader = Loader(root, frames, downscale, reading)
+        photos = loader.load(mask_kind)
         if _has_masks(train_photos):
             _check_masks(frames, photos)
     if masked and not _has_masks(photos):
@@ -174,13 +182,13 @@ def load_dataset(
         root=root,
         split=split,
         downscale=downscale,
-        images=np.stack([photo.rgba for photo in photos]),
+        images=loader.photos,
         poses=poses.astype(np.float32),
         intrinsics=intrinsics.astype(np.float32),
         frame_names=[frame.name for frame in frames],
         image_paths=[frame.image_path for frame in frames],
         box_from_world=box_from_world,
-        known=stack_known([photo.known for photo in photos], photos[0].rgba.shape[:2]),
+        known=loader.known,
         origin=origin,
         exposures=np.array([frame.exposure for frame in frames]),
         surroundings=_surroundings(root, reading),
@@ -207,7 +215,9 @@ def dataset_fingerprint(dataset: Dataset) -> str:
     digest = hashlib.sha256()
     digest.update(json.dumps([dataset.split, dataset.frame_names, list(dataset.images.shape)]).encode())
     shares = [] if dataset.known is None else [dataset.known.mean(axis=(1, 2))]
-    for values in (dataset.poses, dataset.intrinsics, dataset.images.mean(axis=(1, 2)), *shares):
+    step = max(1, min(dataset.height, dataset.width) // MEAN_EDGE)
+    means = np.stack([dataset.images[i, ::step, ::step].mean(axis=(0, 1)) for i in range(len(dataset))])
+    for values in (dataset.poses, dataset.intrinsics, means, *shares):
         digest.update((np.round(values.astype(np.float64), 3) + 0.0).tobytes())
     return digest.hexdigest()[:16]
 
@@ -228,15 +238,15 @@ class _Contradiction(InputError):
     """Masks of the object that cannot be of one object, seen from these poses."""
 
 
-def _load_train(root: Path, frames: list[Frame], downscale: int, reading: Reading) -> tuple[list[Photo], np.ndarray, str]:
+def _load_train(root: Path, loader: Loader, reading: Reading) -> tuple[list[Photo], np.ndarray, str]:
     """The photos of the train split, or of a part of it, the similarity to the internal frame, and what the masks are
     whose layout leaves it open: "object" or "ignore".
 
     Where the user does not say it, masks are the object's unless they keep nearly all of the photos or contradict the
     poses; a note says what was assumed.
     """
-    kind = "ignore" if reading.mask_kind == "ignore" else "object"
-    photos = _load_photos(frames, downscale, kind, reading.separated)
+    frames, kind = loader.frames, "ignore" if reading.mask_kind == "ignore" else "object"
+    photos = loader.load(kind)
     if not _has_masks(photos):
         return photos, _box_of_views(root, frames, photos), kind
     pairs = zip(spread(frames, HULL_VIEWS), spread(photos, HULL_VIEWS))
@@ -249,13 +259,13 @@ def _load_train(root: Path, frames: list[Frame], downscale: int, reading: Readin
     )
     if kept > NEARLY_ALL and edge > NEARLY_ALL_EDGE:
         note_once(ignoring.format(f"they keep {kept:.0%} of the photos"))
-        photos = _load_photos(frames, downscale, "ignore", reading.separated)
+        photos = loader.load("ignore")
         return photos, _estimate_box(root, frames, photos), "ignore"
     try:
         box_from_world = _estimate_box(root, frames, photos)
     except _Contradiction as error:
         try:
-            photos = _load_photos(frames, downscale, "ignore", reading.separated)
+            photos = loader.load("ignore")
             box_from_world = _estimate_box(root, frames, photos)
         except InputError:
             raise error from None
@@ -313,19 +323,6 @@ def _kept(photo: Photo) -> tuple[float, float]:
     """The shares of the silhouette and of its edge that are white."""
     s = photo.silhouette
     return float(s.mean()), float(np.concatenate([s[0], s[-1], s[:, 0], s[:, -1]]).mean())
-
-
-def _load_photos(frames: list[Frame], downscale: int, mask_kind: str, separated: Path | None) -> list[Photo]:
-    with ThreadPoolExecutor(max_workers=min(8, os.cpu_count() or 1)) as pool:
-        photos = list(pool.map(lambda frame: load_photo(frame, downscale, mask_kind, separated), frames))
-    size = photos[0].size
-    for frame, photo in zip(frames, photos):
-        if photo.size != size:
-            raise InputError(
-                f"{frame.image_path}: is {photo.size[1]}x{photo.size[0]}, but {frames[0].image_path.name} is "
-                f"{size[1]}x{size[0]}; make all images the same size"
-            )
-    return photos
 
 
 def _check_once(frames: list[Frame]) -> None:

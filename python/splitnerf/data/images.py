@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import io
 import os
+import shutil
 import struct
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import OpenImageIO as oiio
@@ -25,6 +29,7 @@ LDR_SUFFIXES = (".png", ".jpg", ".jpeg")
 HDR_SUFFIXES = (".exr", ".hdr")
 SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"RIFF")  # RIFF: WebP
 LARGEST_IMAGE = 1 << 29  # values of an image in memory
+STORED = {"uint8": 8, "uint16": 16}  # bits of the values of files that are read as they are
 VALUES_PER_BYTE = 8 * 1032  # of a file: of a PNG of one colour and one bit a pixel
 
 
@@ -46,6 +51,30 @@ def read_image(path: str | os.PathLike) -> np.ndarray:
     if not is_file(path):
         raise InputError(f"{path}: no such image; check the path")
     return _read(path, str(path))
+
+
+def read_codes(path: str | os.PathLike) -> np.ndarray:
+    """Reads an image like `read_image`, but the values of 8- and 16-bit files as they are stored: uint8 or uint16."""
+    path = Path(path)
+    return _read(path, str(path), as_stored=True)
+
+
+class Header(NamedTuple):
+    """What a file says of its image: rows, columns, channels, and bits of a value (32 for floats)."""
+
+    height: int
+    width: int
+    channels: int
+    bits: int
+
+
+def read_header(path: str | os.PathLike) -> Header:
+    """What an image file says of itself, without its pixels. Raises InputError as `read_image` does."""
+    path = Path(path)
+    if not is_file(path):
+        raise InputError(f"{path}: no such image; check the path")
+    with _opened(path, str(path)) as (_, spec):
+        return Header(spec.height, spec.width, spec.nchannels, STORED.get(str(spec.format), 32))
 
 
 def is_written_here(path: Path) -> bool:
@@ -246,11 +275,28 @@ def _encode_hdr(pixels: np.ndarray, suffix: str, name: str, kind: oiio.BASETYPE)
         return path.read_bytes()
 
 
-def _read(path: Path, name: str) -> np.ndarray:
+def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
+    """[H, W, C], float32 or, where that is asked for and they are bytes or words, the values as they are stored."""
+    with _opened(path, name) as (source, spec):
+        kind = str(spec.format) if as_stored and str(spec.format) in STORED else "float"
+        pixels = source.read_image(0, 0, 0, spec.nchannels, kind)
+        if pixels is None or source.has_error:
+            raise InputError(f"{name}: truncated or damaged image ({_reason(source)}); replace it")
+    return np.ascontiguousarray(pixels).reshape(spec.height, spec.width, -1)
+
+
+@contextmanager
+def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.ImageSpec]]:
+    """An image file with its header read, whose size is no more than its bytes and the memory allow."""
     try:
         str(path).encode()
     except UnicodeEncodeError:  # a name that is not UTF-8, which OpenImageIO does not open
-        return decode_image(path.read_bytes(), name)
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / "image"
+            shutil.copyfile(path, copy)
+            with _opened(copy, name) as opened:
+                yield opened
+        return
     with open(path, "rb") as file:
         if not file.read(16).startswith(SIGNATURES):
             raise InputError(f"{name}: cannot be read as an image (no PNG, JPEG, WebP, EXR or HDR file); replace it")
@@ -268,12 +314,9 @@ def _read(path: Path, name: str) -> np.ndarray:
         if n_values > LARGEST_IMAGE:
             most = f"the most is {LARGEST_IMAGE // spec.nchannels / 1e6:.0f} megapixels of {spec.nchannels} channels"
             raise InputError(f"{name}: is {size}, {most}; make it smaller")
-        pixels = source.read_image(0, 0, 0, spec.nchannels, "float")
-        if pixels is None or source.has_error:
-            raise InputError(f"{name}: truncated or damaged image ({_reason(source)}); replace it")
+        yield source, spec
     finally:
         source.close()
-    return np.ascontiguousarray(pixels, dtype=np.float32).reshape(spec.height, spec.width, -1)
 
 
 def _reason(source) -> str:

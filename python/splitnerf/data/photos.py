@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,14 +10,16 @@ import numpy as np
 import torch
 from torch.nn.functional import interpolate
 
-from splitnerf.data.images import LDR_SUFFIXES, area_average, downscale_rgba, linear_to_srgb, read_image, srgb_to_linear
+from splitnerf.data.images import LDR_SUFFIXES, area_average, downscale_rgba, read_codes, read_header, read_image
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics, undistort
+from splitnerf.data.pixels import decoded, encoded
 from splitnerf.errors import InputError
 
 SILHOUETTE_SIZE = 100  # pixels, about, along the shorter edge of what the object is found from
 LEAST_COVERED = 0.25  # share of the undistorted image that the photo must cover
 CERTAIN = 0.999  # part of a pixel that must be known
+STRIP = 1 << 20  # pixels that are averaged down at once
 
 
 @dataclass
@@ -24,7 +27,8 @@ class Photo:
     """One photo.
 
     Attributes:
-        rgba: [H, W, 4] float32, downscaled, sRGB at an exposure of 1, straight alpha; 0 where the photo says nothing.
+        rgba: [H, W, 4] downscaled, sRGB at the photo's own exposure, straight alpha; 0 where the photo says nothing. Bytes
+            where the files hold bytes that nothing changes, else 16 bits; None where the pixels are kept elsewhere.
         known: [H, W] bool, the pixels that say something, or None for all.
         silhouette: [h, w] bool, the mask at a size that no downscale changes.
         seen: [h, w] bool, what is known of it, or None for all.
@@ -32,7 +36,7 @@ class Photo:
         masked: Whether anything says where the object is; otherwise alpha is 1.
     """
 
-    rgba: np.ndarray
+    rgba: np.ndarray | None
     known: np.ndarray | None
     silhouette: np.ndarray
     seen: np.ndarray | None
@@ -58,42 +62,40 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
         InputError: A file cannot be used.
     """
     path = frame.image_path
-    if path.suffix.lower() not in LDR_SUFFIXES:
-        raise InputError(f"{path}: training images must be PNG or JPEG; convert it")
     pixels = _read_pixels(path)
     height, width, channels = pixels.shape
-    if downscale > min(height, width):
-        raise InputError(f"{path}: is {width}x{height}, too small for downscale {downscale}; use a smaller factor")
     colour = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     alpha, known = pixels[..., -1:] if channels in (2, 4) else None, None
     is_object = (mask_kind if frame.mask_kind == "auto" else frame.mask_kind) == "object"
     if frame.mask_path is not None and is_object:
-        alpha = _read_mask(frame.mask_path, frame, height, width)
+        alpha = _read_mask(frame.mask_path)
     elif frame.mask_path is not None:
-        known = _read_mask(frame.mask_path, frame, height, width) > 0
+        known = _read_mask(frame.mask_path) > 0
     if frame.dynamic_mask_path is not None:
-        still = _read_mask(frame.dynamic_mask_path, frame, height, width) == 0
+        still = _read_mask(frame.dynamic_mask_path) == 0
         known = still if known is None else known & still
     masked = alpha is not None
-    alpha = alpha if masked else np.ones_like(colour[..., :1])
-    says_nothing = bool((alpha == 1).all())
-    rgba = np.concatenate([colour, alpha], axis=-1)
+    alpha = alpha if masked else np.full((height, width, 1), 255, np.uint8)
+    kind = np.uint8 if colour.dtype == alpha.dtype == np.uint8 else np.uint16
+    rgba = np.concatenate([encoded(colour, kind), encoded(alpha, kind)], axis=-1)
+    says_nothing = bool((rgba[..., 3] == np.iinfo(kind).max).all())
     if frame.distortion is not None:
-        rgba, known = _undistort(rgba, known, frame, straight=is_object and frame.mask_path is not None)
-    if frame.exposure != 1.0:
-        rgba[..., :3] = linear_to_srgb(srgb_to_linear(rgba[..., :3]) / np.float32(frame.exposure))
+        straight, known = _undistort(decoded(rgba), known, frame, straight=is_object and frame.mask_path is not None)
+        rgba = encoded(straight, np.uint16)
     if says_nothing and separated is not None:
-        masked, rgba[..., 3] = True, resized_mask(read_image(separated / separated_mask(frame.image_path)), height, width)
+        mask = resized_mask(read_image(separated / separated_mask(frame.image_path)), height, width)
+        masked, rgba[..., 3] = True, encoded(mask, rgba.dtype)
     factor = silhouette_factor(height, width)
-    silhouette = area_average(rgba[..., 3], factor) > 0.5
-    rgba = downscale_rgba(rgba, downscale)
+    silhouette = area_average(decoded(rgba[..., 3]), factor) > 0.5
+    rgba = _averaged(rgba, downscale)
     if known is None or known.all():
         return Photo(rgba, None, silhouette, None, (height, width), masked)
     share, known = known[..., 0].astype(np.float32), area_average(known[..., 0].astype(np.float32), downscale) > CERTAIN
     seen = area_average(share, factor) > CERTAIN
     if not known.any():
         raise InputError(f"{path}: its masks ignore all of it; remove the frame")
-    return Photo(rgba * known[..., None], known, silhouette & seen, seen, (height, width), masked)
+    rgba[~known] = 0
+    return Photo(rgba, known, silhouette & seen, seen, (height, width), masked)
 
 
 def separated_mask(image_path: Path) -> str:
@@ -107,23 +109,62 @@ def resized_mask(mask: np.ndarray, height: int, width: int) -> np.ndarray:
     return interpolate(planes, (height, width), mode="bilinear", align_corners=False)[0, 0].numpy()
 
 
+def check_files(frames: Sequence[Frame], downscale: int) -> tuple[tuple[int, int], bool]:
+    """The size (height, width) of all photos, and whether bytes hold their values exactly, by the files' headers alone.
+
+    Raises:
+        InputError: A file is missing or no image, photos or masks have another size than the first photo, or all are too
+            small for the downscale.
+    """
+    size, exact = None, downscale == 1 and all(frame.distortion is None for frame in frames)
+    for frame in frames:
+        path = frame.image_path
+        if path.suffix.lower() not in LDR_SUFFIXES:
+            raise InputError(f"{path}: training images must be PNG or JPEG; convert it")
+        height, width, _, bits = read_header(path)
+        if downscale > min(height, width):
+            raise InputError(f"{path}: is {width}x{height}, too small for downscale {downscale}; use a smaller factor")
+        size = size or (height, width)
+        if (height, width) != size:
+            raise InputError(
+                f"{path}: is {width}x{height}, but {frames[0].image_path.name} is {size[1]}x{size[0]}; make all images the "
+                "same size"
+            )
+        exact = exact and bits == 8
+        for mask_path in filter(None, (frame.mask_path, frame.dynamic_mask_path)):
+            mask = read_header(mask_path)
+            if mask[:2] != size:
+                raise InputError(
+                    f"{mask_path}: is {mask.width}x{mask.height}, its image {path.name} is {width}x{height}; make them the "
+                    "same size"
+                )
+            exact = exact and mask.bits == 8
+    return size, exact
+
+
 def _read_pixels(path: Path) -> np.ndarray:
-    """An image whose values lie in [0, 1]. Raises InputError where they do not, as in floats by another name."""
-    pixels = read_image(path)
-    if not (pixels.min() >= 0 and pixels.max() <= 1):  # false for NaN
+    """An image as it is stored, whose values lie in [0, 1] if they are floats. Raises InputError where they do not."""
+    pixels = read_codes(path)
+    if pixels.dtype.kind == "f" and not (pixels.min() >= 0 and pixels.max() <= 1):  # false for NaN
         raise InputError(f"{path}: has NaN, infinite or negative pixels or such above 1; save it as 8 or 16 bit PNG")
     return pixels
 
 
-def _read_mask(path: Path, frame: Frame, height: int, width: int) -> np.ndarray:
-    """[H, W, 1] of the size of the frame's image."""
-    mask = _read_pixels(path)
-    if mask.shape[:2] != (height, width):
-        raise InputError(
-            f"{path}: is {mask.shape[1]}x{mask.shape[0]}, its image {frame.image_path.name} is {width}x{height}; "
-            "make them the same size"
-        )
-    return mask[..., :1]
+def _read_mask(path: Path) -> np.ndarray:
+    """[H, W, 1] as it is stored."""
+    return _read_pixels(path)[..., :1]
+
+
+def _averaged(rgba: np.ndarray, factor: int) -> np.ndarray:
+    """An image [H, W, 4] of whole numbers, averaged down to 16 bits by strips, so that few floats are there at a time."""
+    if factor == 1:
+        return rgba
+    height, width = rgba.shape[0] // factor, rgba.shape[1] // factor
+    result, rows = np.empty((height, width, 4), np.uint16), max(1, STRIP // (factor * rgba.shape[1]))
+    for start in range(0, height, rows):
+        strip = rgba[start * factor : min(start + rows, height) * factor]
+        result[start : start + rows] = encoded(downscale_rgba(decoded(strip), factor), np.uint16)
+    return result
 
 
 def _undistort(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 EVAL_MODES = ("auto", "all", "fraction", "filename")
@@ -22,11 +22,13 @@ class Reading:
         mask_kind: What mask files mean whose layout leaves it open. "object": white is the object; "ignore": black is
             to be ignored; "auto": what the masks look like.
         separated: The folder in which training wrote masks of photos that have none, see :mod:`splitnerf.separation`; or None.
+        max_memory: GB that all photos may take in memory, more are read from a file; 0: half of what is available.
     """
 
     eval_mode: str = "auto"
     mask_kind: str = "auto"
     separated: Path | None = None
+    max_memory: float = field(default=0.0, compare=False)  # it changes no value
 
 
 def is_separated(folder: Path) -> bool:

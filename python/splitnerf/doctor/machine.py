@@ -14,6 +14,7 @@ import torch
 
 import splitnerf
 from splitnerf import _core
+from splitnerf.memory import control_group, memory_bytes
 
 INSTALL = "pip install --no-build-isolation ."
 ISAS = ("base", "avx2", "avx512")  # each holds those before it
@@ -85,14 +86,6 @@ def processors() -> int:
     return min(allowed, max(1, int(quota[0]) // int(quota[1]))) if quota and quota[0] != "max" else allowed
 
 
-def control_group(name: str) -> list[str]:
-    """The words of a limit of Linux's control group; none where there is no such limit."""
-    try:
-        return Path("/sys/fs/cgroup", name).read_text().split()
-    except OSError:
-        return []
-
-
 def kernels() -> Finding:
     """The instruction set of the operators' kernels beside the processor's."""
     used = _core.instruction_set()
@@ -161,20 +154,6 @@ def memory() -> Finding:
     total, free = (size / GIB for size in memory_bytes())
     value = f"{total:.1f} GiB, {free:.1f} GiB free; 100 photos of 400 x 400 take {TRAINING_GIB:.0f} GiB"
     return Finding("memory", value, "close other programs, or train with --downscale 2" if free < TRAINING_GIB else "")
-
-
-def memory_bytes() -> tuple[int, int]:
-    """Memory of the machine, or of the control group where it has less, and what of it is available."""
-    try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-        sizes = {name: int(rest.split()[0]) * 1024 for name, rest in (line.split(":") for line in lines)}
-        total, free = sizes["MemTotal"], sizes["MemAvailable"]
-    except OSError:  # not Linux: no number of what is available
-        total = free = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    limit, used = control_group("memory.max"), control_group("memory.stat")  # the latter begins: anon, bytes
-    if not limit or limit[0] == "max" or not used:
-        return total, free
-    return min(total, int(limit[0])), min(free, int(limit[0]) - int(used[1]))
 
 
 def disk(folder: Path) -> Finding:

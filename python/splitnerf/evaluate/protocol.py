@@ -9,6 +9,7 @@ import trimesh
 
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import over_background
+from splitnerf.data.pixels import Photos
 from splitnerf.data.truth import OPAQUE, ViewTruth
 from splitnerf.evaluate import metrics
 from splitnerf.evaluate.lpips import Distance
@@ -58,15 +59,14 @@ def evaluate_maps(
     if not len(predictions) == len(dataset) == len(truths):
         raise ValueError(f"{len(predictions)} predictions for {len(dataset)} images and {len(truths)} truths")
     known = [None] * len(dataset) if dataset.known is None else dataset.known
-    for prediction, image in zip(predictions, dataset.images):
+    shape = dataset.images.shape[1:]
+    for prediction in predictions:
         for key in prediction.keys() & {"rgb", "alpha"}:
-            if prediction[key].shape[:2] != image.shape[:2]:
-                raise ValueError(
-                    f"{key} of a prediction is {list(prediction[key].shape)}, image is {list(image.shape)}"
-                )
+            if prediction[key].shape[:2] != shape[:2]:
+                raise ValueError(f"{key} of a prediction is {list(prediction[key].shape)}, image is {list(shape)}")
     if dataset.known is not None:
         predictions = [p | {"alpha": p["alpha"] * k} for p, k in zip(predictions, known)]
-    foregrounds = [(p["alpha"] > OPAQUE) & (i[..., 3] > OPAQUE) for p, i in zip(predictions, dataset.images)]
+    foregrounds = [(p["alpha"] > OPAQUE) & (dataset.images[i, ..., 3] > OPAQUE) for i, p in enumerate(predictions)]
     chamfer, f_score = (None, None) if mesh is None or mesh_truth is None else metrics.mesh_distances(mesh, mesh_truth)
 
     def pooled(key: str, masks: Sequence[np.ndarray], error: Callable[[np.ndarray, np.ndarray], float]) -> float | None:
@@ -98,7 +98,7 @@ def evaluate_maps(
 
 
 def _novel_view(
-    predictions: Sequence[Prediction], images: np.ndarray, known: Sequence[np.ndarray | None], distance: Distance | None
+    predictions: Sequence[Prediction], images: Photos, known: Sequence[np.ndarray | None], distance: Distance | None
 ) -> dict | None:
     if not all("rgb" in prediction for prediction in predictions):
         return None
@@ -113,7 +113,7 @@ def _novel_view(
 
 
 def _albedo(
-    predictions: Sequence[Prediction], truths: Sequence[ViewTruth], images: np.ndarray, distance: Distance | None
+    predictions: Sequence[Prediction], truths: Sequence[ViewTruth], images: Photos, distance: Distance | None
 ) -> dict | None:
     known = [i for i, (p, t) in enumerate(zip(predictions, truths)) if "albedo" in p and t.albedo is not None]
     if not known:

@@ -85,7 +85,7 @@ def _rows(
     evaluation: dict,
     relit: RelitViews | None,
 ) -> Iterator[Row]:
-    alphas = dataset.images[..., 3]
+    alphas = {i: dataset.images[i, ..., 3] for i in shown}
     if all("rgb" in predictions[i] for i in shown):
         yield (
             "novel view",

@@ -185,7 +185,7 @@ class Refinement:
             flat=per_unknown(0.0, s.flat_gloss, s.flat_normal), groups=GROUPS, anchor=per_unknown(*[s.anchor] * 3), like=like,
         )  # fmt: skip
         self.equations = NormalEquations(self.unknowns, prior, s.keep)
-        self.information = Information(self.texels, width, len(self.pixels))
+        self.information = Information(self.texels, width, round(len(self.pixels) / self.pixels.share))
         self.n_batches = self.n_sweeps = 0
 
     def make_lamp_compact(self) -> CompactLamp | None:

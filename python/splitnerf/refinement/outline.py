@@ -20,22 +20,27 @@ RAYS = 32  # of a pixel
 LARGEST = 1.0  # pixels that a vertex may move in a round
 SMOOTH, ANCHOR = 0.3, 0.02  # weights of the differences of neighbours' moves and of the moves, in units of the mean curvature
 BATCH = 4096  # pixels
+MOST = 1 << 22  # pixels near the edges that a fit holds, about; each meets rays and rows of a matrix
 
 
 def outline_pixels(dataset: Dataset) -> tuple[Pixels, np.ndarray]:
-    """The known pixels near the edges of the masks, and their coverage [n] in the photos."""
-    alpha = dataset.images[..., 3]
-    partly = (alpha > 0.01) & (alpha < 0.99)
-    inside = alpha > 0.5
-    for axis in (1, 2):  # a mask without partly covered pixels has edges too
-        change = np.diff(inside, axis=axis)
-        pad = [(0, 0)] * 3
-        pad[axis] = (0, 1)
-        partly |= np.pad(change, pad)
-    near = binary_dilation(partly, np.ones((1, 3, 3), bool))
-    if dataset.known is not None:
-        near &= dataset.known
-    return pixels_of(dataset, near), alpha[near]
+    """The known pixels near the edges of the masks, or a random share of them, and their coverage [n] in the photos."""
+
+    def near_edge(i: int) -> np.ndarray:
+        alpha = dataset.images[i, ..., 3]
+        partly = (alpha > 0.01) & (alpha < 0.99)
+        inside = alpha > 0.5
+        for axis in (0, 1):  # a mask without partly covered pixels has edges too
+            change = np.diff(inside, axis=axis)
+            pad = [(0, 0)] * 2
+            pad[axis] = (0, 1)
+            partly |= np.pad(change, pad)
+        near = binary_dilation(partly, np.ones((3, 3), bool))
+        return near if dataset.known is None else near & dataset.known[i]
+
+    pixels = pixels_of(dataset, near_edge, MOST)
+    column, row = pixels.centre.astype(np.int64).T
+    return pixels, dataset.images[pixels.view, row, column, 3]
 
 
 def weld(vertices: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 
 MIN_ALPHA = 0.99  # of a pixel that the object covers
+MOST = 1 << 25  # covered pixels that a fit holds, about: 1.4 GB
 NEARBY = 0.01  # pixels to either side over which a density is a mean
 SATURATED = 254.5 / 255.0  # share of a photo's largest sRGB value from which it says only that there was so much light
 
@@ -30,6 +32,7 @@ class Pixels:
         saturated: [n, 3] bool, whether the photo gives a lower bound alone.
         poses: [views, 3, 4] float32 camera-to-world, OpenGL axes, the data's world frame.
         intrinsics: [views, 4] float32 fx, fy, cx, cy in pixels.
+        share: The share of the photos' pixels that these are, drawn at random.
     """
 
     view: np.ndarray
@@ -39,6 +42,7 @@ class Pixels:
     saturated: np.ndarray
     poses: np.ndarray
     intrinsics: np.ndarray
+    share: float = 1.0
 
     def __len__(self) -> int:
         return len(self.view)
@@ -73,17 +77,39 @@ def pixel_size(dataset: Dataset, vertices: np.ndarray) -> float:
     return float(distance / dataset.intrinsics[:, 0].mean())
 
 
-def pixels_of(dataset: Dataset, chosen: np.ndarray) -> Pixels:
-    """The pixels of a split where `chosen` [photos, H, W] is true."""
-    view, row, column = np.nonzero(chosen)
-    colours = dataset.images[view, row, column, :3]
+def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int, seed: int = 0) -> Pixels:
+    """Pixels of a split, photo by photo.
+
+    Args:
+        dataset: The split.
+        choose: Gives of a photo by its number the pixels [H, W] bool that are taken.
+        most: The number of pixels, about, beyond which a random share of them is taken: a pixel takes 43 bytes.
+        seed: The seed of that share.
+    """
+    chosen, count = [], 0
+    for i in range(len(dataset)):
+        mask = choose(i)
+        chosen.append(np.packbits(mask))  # an eighth of a byte a pixel
+        count += np.count_nonzero(mask)
+    share, random, size = min(1.0, most / max(count, 1)), np.random.default_rng(seed), dataset.height * dataset.width
     white = linear_to_srgb((1 / dataset.exposures).astype(np.float32))
-    brightest = np.concatenate([brightest_around(photo)[mask] for photo, mask in zip(dataset.images, chosen)])
-    return Pixels(
-        view, np.stack([column, row], axis=1).astype(np.float32) + 0.5, srgb_to_linear(colours).astype(np.float32),
-        srgb_to_linear(brightest).astype(np.float32), colours >= SATURATED * white[view, None],
-        dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics,
-    )  # fmt: skip
+    parts = []
+    for i, bits in enumerate(chosen):
+        numbers = np.flatnonzero(np.unpackbits(bits, count=size))
+        numbers = numbers[random.random(len(numbers)) < share] if share < 1 else numbers
+        if len(numbers) == 0:
+            continue
+        photo, (row, column) = dataset.images[i], np.divmod(numbers, dataset.width)
+        colours, brightest = photo[row, column, :3], brightest_around(photo)[row, column]
+        parts.append((
+            np.full(len(numbers), i), np.stack([column, row], axis=1).astype(np.float32) + 0.5,
+            srgb_to_linear(colours), srgb_to_linear(brightest), colours >= SATURATED * white[i],
+        ))  # fmt: skip
+    shapes = ((0,), (0, 2), (0, 3), (0, 3), (0, 3))
+    kinds = (np.int64, np.float32, np.float32, np.float32, bool)
+    arrays = [np.concatenate([np.zeros(shape, kind), *(part[k] for part in parts)], dtype=kind)
+              for k, (shape, kind) in enumerate(zip(shapes, kinds))]  # fmt: skip
+    return Pixels(*arrays, dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics, share)
 
 
 def brightest_around(photo: np.ndarray) -> np.ndarray:
@@ -93,8 +119,8 @@ def brightest_around(photo: np.ndarray) -> np.ndarray:
 
 
 def covered_pixels(dataset: Dataset) -> Pixels:
-    """The pixels of a split that the object covers."""
-    return pixels_of(dataset, dataset.images[..., 3] >= MIN_ALPHA)
+    """The pixels of a split that the object covers, or a random share of them."""
+    return pixels_of(dataset, lambda i: dataset.images[i, ..., 3] >= MIN_ALPHA, MOST)
 
 
 class PixelFilter:

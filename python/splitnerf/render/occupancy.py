@@ -11,6 +11,7 @@ from torch.nn.functional import logsigmoid
 
 from splitnerf.config import Config
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
+from splitnerf.render.masks import widened
 
 DENSITY_CUTOFF = 7.0  # where |f| > cutoff / s, the NeuS density is below e^-7 of its peak
 LIPSCHITZ = 1.25  # bound on |grad f|; the eikonal loss keeps it in practice
@@ -134,9 +135,9 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
     Args:
         resolution: Cells along an edge.
         box: Half size of the cube, scene units.
-        masks: [n, H, W] in [0, 1].
+        masks: [n, H, W] in [0, 1], or bool.
         poses: [n, 4, 4] camera-to-world, OpenGL axes.
-        intrinsics: [n, 4] fx, fy, cx, cy in pixels.
+        intrinsics: [n, 4] fx, fy, cx, cy in the masks' pixels.
     """
     grid = OccupancyGrid(resolution, box, device=masks.device)
     centres, cell = grid.centres(), 2 * box / resolution
@@ -149,10 +150,10 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
         x, y = cx + fx * camera[:, 0] / depth, cy - fy * camera[:, 1] / depth
         # The mask is widened by a cell's size in pixels, so that thin parts keep their cells.
         radius = int(math.ceil(fx * cell / max(1e-3, float(depth.median())))) if len(depth) else 0
-        wide = torch.nn.functional.max_pool2d(masks[i : i + 1, None], 2 * radius + 1, stride=1, padding=radius)[0, 0]
+        wide = widened(masks[i] > 0, radius)
         column, row = x.floor().long(), y.floor().long()
         seen = (depth > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
         keep = ~seen
-        keep[seen] = wide[row[seen], column[seen]] > 0
+        keep[seen] = wide[row[seen], column[seen]]
         inside[inside.clone()] = keep
     return inside.view((resolution,) * 3)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.pixels import PixelReader
 from splitnerf.devices import tensor_cores
+from splitnerf.render.masks import PixelRuns, reduced, runs_of, widened
+
+HULL_EDGE = 400  # pixels, about, along the shorter edge of the masks that make the hull
 
 
 def pixel_rays(pose: Tensor, intrinsics: Tensor, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
@@ -59,33 +64,36 @@ class PixelSource:
         dataset: The train split; pixels that are not known are never drawn.
         foreground_share: Share of the rays, in [0, 1], that are drawn within a few pixels of a mask.
         generator: The random generator of the pixels; images and cameras are kept on its device.
+
+    Attributes:
+        foreground: The known pixels near a mask.
+        known: The known pixels; None for all.
+        possible: [n, h, w] bool, where the photos may show the object: within the masks, and where nothing is known. Those
+            of large photos are smaller by `hull_factor`, a pixel being true where one within it is.
     """
 
     def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator):
         self.device = generator.device
-        images, self.poses, self.intrinsics = (
-            torch.from_numpy(x).to(self.device) for x in (dataset.images, dataset.poses, dataset.intrinsics)
-        )
-        self.pixels, self.masks = images.reshape(-1, 4), images[..., 3]
+        self.poses, self.intrinsics = (torch.from_numpy(x).to(self.device) for x in (dataset.poses, dataset.intrinsics))
+        self.pixels = PixelReader(dataset.images, self.device)
         self.matrices, self.origins = pixel_matrix(self.poses, self.intrinsics), self.poses[:, :3, 3].contiguous()
         self.height, self.width = dataset.height, dataset.width
         self.share, self.generator = foreground_share, generator
-        margin = max(2, self.width // 50)
-        near = F.max_pool2d(self.masks[:, None], 2 * margin + 1, stride=1, padding=margin)[:, 0] > 0
-        self.known = None  # numbers of the known pixels; None for all
-        if dataset.known is not None:
-            known = torch.from_numpy(dataset.known).to(self.device)
-            near, self.known = near & known, known.reshape(-1).nonzero().squeeze(1)
-        self.foreground = near.reshape(-1).nonzero().squeeze(1)
-
-    @property
-    def possible(self) -> Tensor:
-        """[n, H, W] the largest coverage in [0, 1] that the photos allow: the masks, and 1 where nothing is known."""
-        if self.known is None:
-            return self.masks
-        possible = torch.ones_like(self.masks).view(-1)
-        possible[self.known] = self.masks.reshape(-1)[self.known]
-        return possible.view_as(self.masks)
+        near, known, possible = [], [], []
+        self.hull_factor = max(1, min(self.height, self.width) // HULL_EDGE)
+        for i in range(len(dataset)):
+            mask = torch.from_numpy(dataset.images[i, ..., 3] > 0)
+            wide, seen = widened(mask, max(2, self.width // 50)), mask
+            if dataset.known is not None:
+                known_here = torch.from_numpy(np.array(dataset.known[i]))
+                wide, seen = wide & known_here, mask | ~known_here
+                known.append(runs_of(known_here))
+            near.append(runs_of(wide))
+            possible.append(reduced(seen, self.hull_factor))
+        self.possible = torch.stack(possible).to(self.device)
+        n_pixels = self.height * self.width
+        self.foreground = PixelRuns.of(near, n_pixels, self.device)
+        self.known = PixelRuns.of(known, n_pixels, self.device) if known else None
 
     def draw(self, n: int) -> tuple[Tensor, Tensor, Tensor]:
         """Draws n rays: origins [n, 3], unit directions [n, 3] and pixels [n, 4] (sRGB in [0, 1], straight alpha)."""
@@ -98,4 +106,4 @@ class PixelSource:
         row = index // self.width
         view, column = row // self.height, index - row * self.width
         y = row - view * self.height
-        return self.origins[view], through_pixels(self.matrices[view], column + 0.5, y + 0.5), self.pixels[index]
+        return self.origins[view], through_pixels(self.matrices[view], column + 0.5, y + 0.5), self.pixels.read(index, view)

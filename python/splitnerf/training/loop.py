@@ -128,7 +128,8 @@ class Training:
         self.optimiser = make_optimiser(self.model, c)
         hull = None
         if c.sampling.hull_until > 0:
-            hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.possible, source.poses, source.intrinsics)
+            lenses = source.intrinsics / source.hull_factor
+            hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.possible, source.poses, lenses)
         self.grid = make_grid(c, hull, device)
         self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
         step = GraphedStep if c.run.cuda_graphs and device.type == "cuda" else Step

@@ -1,0 +1,196 @@
+"""The photos' pixels: whole numbers in memory or in a file, floats where they are read."""
+
+from __future__ import annotations
+
+import mmap
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from weakref import WeakValueDictionary
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from splitnerf import ops
+from splitnerf.data.images import linear_to_srgb, srgb_to_linear
+from splitnerf.errors import InputError
+from splitnerf.memory import memory_bytes
+
+GB = 10**9
+SHARE = 0.5  # of the memory that is available, for photos where nothing is said
+_in_memory: WeakValueDictionary[int, np.ndarray] = WeakValueDictionary()  # the arrays of all photos that are there
+
+
+def decoded(codes: np.ndarray) -> np.ndarray:
+    """Whole numbers of 8 or 16 bits as float32 in [0, 1]; floats stay as they are."""
+    if codes.dtype.kind == "f":
+        return codes
+    return np.multiply(codes, np.float32(1 / np.iinfo(codes.dtype).max), dtype=np.float32)
+
+
+def encoded(values: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    """Values as numbers of another kind: floats in [0, 1] rounded, bytes exactly."""
+    if values.dtype == dtype or np.dtype(dtype).kind == "f":
+        return values if values.dtype == dtype else decoded(values)
+    if values.dtype == np.uint8:
+        return values.astype(np.uint16) * np.uint16(257)
+    return np.rint(values * np.float32(np.iinfo(dtype).max)).astype(dtype)
+
+
+class Photos:
+    """Photos of one size that are read like an array [n, H, W, 4] of float32: sRGB at an exposure of 1, straight alpha.
+
+    An index gives floats of what it names, whatever is kept: so take one photo, or some pixels, at a time. Nothing can be
+    written.
+
+    Args:
+        codes: [n, H, W, 4] uint8 or uint16, the values times 255 or 65535; or float32, the values. In memory or in a file.
+        exposures: [n] factors by which linear values are divided on reading; None stands for 1.
+    """
+
+    def __init__(self, codes: np.ndarray, exposures: np.ndarray | None = None):
+        self.codes, self.shape, self.file = codes, codes.shape, file_of(codes)
+        plain = exposures is None or bool((exposures == 1).all())
+        self.exposures = None if plain else np.asarray(exposures, np.float32)
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        return (self[i] for i in range(len(self)))
+
+    def __getitem__(self, index: object) -> np.ndarray:
+        first = index[0] if isinstance(index, tuple) else index
+        if self.file is not None and isinstance(first, (int, np.integer)):
+            size = self.codes.itemsize * int(np.prod(self.shape[1:]))
+            _ask_for(self.file, range(len(self))[first] * size, size)
+        values = decoded(self.codes[index])
+        forget_pages(self.codes)
+        if self.exposures is None:
+            return values
+        of_each = np.ones((len(self), 1, 1, 4), np.float32)
+        of_each[:, 0, 0, :3] = self.exposures[:, None]
+        factor = np.broadcast_to(of_each, self.shape)[index]
+        values, other = np.array(values), factor != 1
+        values[other] = linear_to_srgb(srgb_to_linear(values[other]) / factor[other])
+        return values
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self[:], dtype)
+
+    def select(self, views: Sequence[int]) -> Photos:
+        """These photos, in this order, kept where all of them are."""
+        codes = new_array((len(views), *self.shape[1:]), self.codes.dtype, self.file is not None)
+        for i, view in enumerate(views):
+            codes[i] = self.codes[view]
+            forget_pages(codes)
+        return Photos(codes, None if self.exposures is None else self.exposures[list(views)])
+
+
+class PixelReader:
+    """Reads single pixels of photos, on a device to which their numbers are copied.
+
+    Args:
+        photos: The photos.
+        device: The device.
+    """
+
+    def __init__(self, photos: Photos, device: torch.device):
+        codes = photos.codes
+        self.scale = 1.0 if codes.dtype.kind == "f" else 1 / np.iinfo(codes.dtype).max
+        self.file = file_of(codes) if device.type == "cpu" else None
+        codes = codes.view(np.int16) if codes.dtype == np.uint16 else codes  # tensors of which all devices can index
+        self.codes = torch.from_numpy(codes).to(device).view(-1, 4)
+        self.exposures = None if photos.exposures is None else torch.from_numpy(photos.exposures).to(device)
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    def read(self, index: Tensor, view: Tensor) -> Tensor:
+        """[k, 4] float32, pixels [k] counted through all photos, which are in photos `view` [k]."""
+        if self.file is not None:
+            size = 4 * self.codes.element_size()
+            for page in np.unique(index.numpy() * size // mmap.PAGESIZE).tolist():
+                _ask_for(self.file, page * mmap.PAGESIZE, size)
+        values = self.codes[index]
+        values = (values.int() & 0xFFFF if values.dtype == torch.int16 else values).float()
+        values = values * self.scale if self.scale != 1 else values
+        if self.exposures is None:
+            return values
+        factor = self.exposures[view][:, None]
+        colours = ops.linear_to_srgb(ops.srgb_to_linear(values[:, :3]) / factor)
+        return torch.cat([torch.where(factor == 1, values[:, :3], colours), values[:, 3:]], dim=1)
+
+
+def room_for_photos(max_memory: float) -> int:
+    """Bytes that photos may still take: of `max_memory` GB, or where that is 0 of half of the memory available."""
+    if max_memory > 0:
+        return int(max_memory * GB) - sum(array.nbytes for array in _in_memory.values())
+    return int(SHARE * memory_bytes()[1])
+
+
+def new_array(shape: tuple[int, ...], dtype: np.dtype, in_file: bool) -> np.ndarray:
+    """An array of zeros, in memory or in a file without a name, which ends with the array or the program.
+
+    Raises:
+        InputError: The disk has no room for it.
+    """
+    if not in_file:
+        array = np.zeros(shape, dtype)
+        _in_memory[id(array)] = array
+        return array
+    size, folder = int(np.prod(shape)) * np.dtype(dtype).itemsize, folder_of_files()
+    check_disk(size)
+    with tempfile.TemporaryFile(dir=folder) as file:
+        try:
+            if hasattr(os, "posix_fallocate"):  # else a disk that others fill ends the program without a word
+                os.posix_fallocate(file.fileno(), 0, size)
+            else:
+                os.truncate(file.fileno(), size)
+        except OSError as error:
+            raise InputError(f"{folder}: cannot hold {size / GB:.1f} GB of photos ({error.strerror}); {CURE}") from None
+        mapped = mmap.mmap(file.fileno(), size)
+    mapped.madvise(mmap.MADV_RANDOM)  # pixels are drawn one by one: reading ahead would read a hundred times as much
+    return np.frombuffer(mapped, dtype).reshape(shape)
+
+
+CURE = "give a larger --downscale or --max-memory, or set TMPDIR to a folder on a larger disk"
+
+
+def check_disk(size: int) -> None:
+    """Raises InputError where the disk of photos' files has not as many bytes."""
+    folder = folder_of_files()
+    free = shutil.disk_usage(folder).free
+    if free < size:
+        raise InputError(f"{folder}: has {free / GB:.1f} GB free, and photos would take {size / GB:.1f} GB; {CURE}")
+
+
+def folder_of_files() -> Path:
+    """The folder of photos' files: TMPDIR, else /var/tmp, which is on a disk where /tmp may be in memory."""
+    folder = Path(os.environ.get("TMPDIR", "/var/tmp"))
+    return folder if folder.is_dir() else Path(tempfile.gettempdir())
+
+
+def file_of(array: np.ndarray) -> mmap.mmap | None:
+    """The mapped file that an array lies in, or None."""
+    base = array
+    while isinstance(base, np.ndarray):
+        base = base.base
+    base = base.obj if isinstance(base, memoryview) else base
+    return base if isinstance(base, mmap.mmap) else None
+
+
+def forget_pages(array: np.ndarray) -> None:
+    """Takes the pages of a file that was written out of this program's memory; the system keeps or writes them."""
+    file = file_of(array)
+    if file is not None:
+        file.madvise(mmap.MADV_DONTNEED)
+
+
+def _ask_for(file: mmap.mmap, start: int, size: int) -> None:
+    """Has the system begin to read bytes of a file, so that its pages are not waited for one by one."""
+    begin = start - start % mmap.PAGESIZE
+    file.madvise(mmap.MADV_WILLNEED, begin, start + size - begin)

@@ -1,0 +1,67 @@
+"""Masks of many large photos: widened, and as runs of pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+
+def widened(mask: Tensor, radius: int) -> Tensor:
+    """[H, W] bool, the pixels within `radius` of one of `mask` [H, W] along rows and columns.
+
+    A mask that was widened by r, moved by up to r + 1 to both sides, leaves no gap: a few moves make any radius.
+    """
+    for axis in (0, 1):
+        reached = 0
+        while reached < min(radius, mask.shape[axis]):
+            step = min(radius - reached, reached + 1)
+            wide, size = mask.clone(), mask.shape[axis] - step
+            if size > 0:
+                wide.narrow(axis, step, size).logical_or_(mask.narrow(axis, 0, size))
+                wide.narrow(axis, 0, size).logical_or_(mask.narrow(axis, step, size))
+            mask, reached = wide, reached + step
+    return mask
+
+
+def reduced(mask: Tensor, factor: int) -> Tensor:
+    """[H // factor, W // factor] bool, the blocks with a pixel of `mask` [H, W] in them; incomplete blocks are cropped."""
+    height, width = mask.shape[0] // factor, mask.shape[1] // factor
+    blocks = mask[: height * factor, : width * factor].reshape(height, factor, width, factor)
+    return blocks.any(dim=3).any(dim=1)
+
+
+class PixelRuns:
+    """Pixels of a stack of photos in their order, as runs of neighbours: 16 bytes a run in place of 8 a pixel.
+
+    Indexed by ranks [k] it gives the pixels' numbers [k], as the list of them would.
+
+    Args:
+        starts, ends: [m] int64, the first pixel of each run, and the one after its last, counted through all photos.
+        device: Where the ranks are.
+    """
+
+    def __init__(self, starts: np.ndarray, ends: np.ndarray, device: torch.device):
+        last = np.cumsum(ends - starts)
+        self.count = int(last[-1]) if len(last) else 0
+        self.last, self.shift = (torch.from_numpy(x).to(device) for x in (last, ends - last))
+
+    @classmethod
+    def of(cls, runs: list[tuple[np.ndarray, np.ndarray]], n_pixels: int, device: torch.device) -> PixelRuns:
+        """The runs (see :func:`runs_of`) of photos with as many pixels."""
+        starts, ends = (np.concatenate([run[k] + i * n_pixels for i, run in enumerate(runs)]) for k in (0, 1))
+        return cls(starts, ends, device)
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, ranks: Tensor) -> Tensor:
+        return ranks + self.shift[torch.searchsorted(self.last, ranks, right=True)]
+
+
+def runs_of(mask: Tensor) -> tuple[np.ndarray, np.ndarray]:
+    """The first pixels of the runs of ones in a mask [H, W] bool, row by row, and the pixels after their last."""
+    flat = mask.cpu().numpy().reshape(-1)
+    changes = np.flatnonzero(flat[1:] != flat[:-1]) + 1
+    changes = np.concatenate([[0] if flat[0] else [], changes, [len(flat)] if flat[-1] else []]).astype(np.int64)
+    return changes[::2], changes[1::2]
