@@ -40,6 +40,7 @@ SETTINGS = {
     "run.checkpoint_minutes": ("checkpoint_minutes", 2.0, 2.0, OURS),
     "data.eval_mode": ("eval_mode", "auto", "auto", OURS),
     "data.mask_kind": ("mask_kind", "auto", "auto", OURS),
+    "data.max_memory": ("max_memory", 0.0, 0.0, OURS),
     "separation.share": ("separation_share", 0.15, 0.15, OURS),
     "separation.steps": ("separation_steps", 6000, 6000, OURS),
     "surface.box": ("box", 1.5, 1.5, PAPER),
@@ -208,6 +209,7 @@ CHOICES = {
 
 # By unit: the settings that have it.
 UNITS = {
+    "GB": "data.max_memory",
     "steps": "run.steps occlusion.indirect_every sampling.grid_every losses.light_every optimiser.light_step_every "
     "optimiser.warmup_steps separation.steps refinement.sweeps",
     "share of the run": "run.preview_every surface.levels_open_by surface.cos_anneal_by mesh.every sampling.hull_until "

@@ -1,0 +1,134 @@
+"""Photos are kept as whole numbers within a budget of memory, else in a file: the values are the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from blender_data import make_blender
+from tiny_runs import tiny
+
+from splitnerf.cli import main
+from splitnerf.cli.exit_codes import BAD_INPUT
+from splitnerf.data import loading, pixels
+from splitnerf.data.dataset import dataset_fingerprint, load_dataset
+from splitnerf.data.pixels import PixelReader, Photos, decoded, encoded, file_of
+from splitnerf.data.reading import Reading
+from splitnerf.errors import InputError
+from splitnerf.render.masks import PixelRuns, reduced, runs_of, widened
+from splitnerf.training import loop
+
+CPU = torch.device("cpu")
+
+
+@pytest.fixture
+def in_file(monkeypatch, tmp_path):
+    """A budget that no data set of the tests fits into, and the folder of the files."""
+    folder = tmp_path / "files"
+    folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(folder))
+    monkeypatch.setattr(loading, "WORK", 1)
+    return Reading(max_memory=5e-5), folder
+
+
+@pytest.fixture
+def random_codes():
+    return np.random.default_rng(0).integers(0, 256, (3, 5, 7, 4), np.uint8)
+
+
+@pytest.mark.parametrize(("dtype", "most"), [(np.uint8, 255), (np.uint16, 65535)])
+def test_codes_stand_for_the_values_they_are_rounded_from(dtype, most):
+    codes = np.arange(most + 1).astype(dtype)
+    assert np.array_equal(encoded(decoded(codes), dtype), codes)
+    values = np.random.default_rng(0).random(1000, np.float32)
+    assert np.abs(decoded(encoded(values, dtype)) - values).max() < 0.5001 / most
+
+
+def test_bytes_become_words_exactly():
+    codes = np.arange(256).astype(np.uint8)
+    assert np.allclose(decoded(encoded(codes, np.uint16)), codes / 255, atol=1e-7)
+
+
+def test_photos_in_a_file_train_as_those_in_memory(in_file, tmp_path):
+    """Equal bits of the pixels, of the fingerprint, and of what some steps learn."""
+    reading, folder = in_file
+    root, found = make_blender(tmp_path / "data", grey=0.5), []
+    for how in (Reading(), reading):
+        dataset = load_dataset(root, "train", 1, how)
+        run = tmp_path / f"run{len(found)}"
+        run.mkdir()
+        state = loop.train(dataset, tiny(steps=5, deterministic=True), run).model.state_dict()
+        found.append((dataset, state))
+    (memory, first), (file, second) = found
+    assert file_of(memory.images.codes) is None and file_of(file.images.codes) is not None
+    assert memory.images.codes.dtype == np.uint8 and list(folder.iterdir()) == []  # the file has no name
+    assert np.array_equal(memory.images, file.images) and dataset_fingerprint(memory) == dataset_fingerprint(file)
+    assert all(torch.equal(first[name], second[name]) for name in first)
+
+
+def test_the_budget_counts_what_is_there_already(random_codes):
+    before = pixels.room_for_photos(1.0)
+    array = pixels.new_array((10, 100, 100, 4), np.dtype(np.uint8), False)
+    assert before - pixels.room_for_photos(1.0) == array.nbytes == 400_000
+    del array
+    assert pixels.room_for_photos(1.0) == before
+
+
+def test_single_pixels_are_those_of_the_photos(random_codes):
+    exposures = np.array([1.0, 0.5, 2.0])
+    for codes in (random_codes, encoded(random_codes, np.uint16), decoded(random_codes)):
+        photos = Photos(codes, exposures)
+        index = torch.randperm(3 * 5 * 7)
+        read = PixelReader(photos, CPU).read(index, index // 35).numpy()
+        assert np.allclose(read, np.array(photos).reshape(-1, 4)[index.numpy()], atol=2e-6)
+
+
+def test_exposure_divides_linear_light(random_codes):
+    """A photo of twice the exposure shows half its light; alpha stays."""
+    photos = Photos(np.full((1, 1, 1, 4), 188, np.uint8), np.array([2.0]))
+    linear = ((188 / 255 + 0.055) / 1.055) ** 2.4 / 2
+    assert photos[0][0, 0] == pytest.approx([1.055 * linear ** (1 / 2.4) - 0.055] * 3 + [188 / 255], abs=1e-5)
+
+
+def test_a_selection_keeps_order_and_exposure(random_codes):
+    photos = Photos(random_codes, np.array([1.0, 0.5, 2.0]))
+    assert np.array_equal(photos.select([2, 0]), np.stack([photos[2], photos[0]]))
+
+
+def test_one_photo_must_fit(tmp_path):
+    with pytest.raises(InputError, match="one photo of .* takes .* GB while it is read.*--max-memory"):
+        load_dataset(make_blender(tmp_path / "data"), "train", 1, Reading(max_memory=1e-6))
+
+
+def test_a_full_disk_is_named_before_a_photo_is_read(in_file, monkeypatch, tmp_path):
+    reading, folder = in_file
+    monkeypatch.setattr(pixels.shutil, "disk_usage", lambda _: type("Usage", (), {"free": 10}))
+    with pytest.raises(InputError, match=f"{folder}: has 0.0 GB free.*TMPDIR"):
+        load_dataset(make_blender(tmp_path / "data"), "train", 1, reading)
+
+
+def test_a_negative_budget_is_refused(tmp_path, capsys):
+    root = make_blender(tmp_path / "data")
+    assert main(["train", str(root), "--out", str(tmp_path / "run"), "--max-memory", "-1"]) == BAD_INPUT
+    assert "max_memory" in capsys.readouterr().err and not (tmp_path / "run").exists()
+
+
+def test_runs_list_the_pixels_of_a_mask():
+    masks = torch.rand(4, 9, 13, generator=torch.Generator().manual_seed(0)) > 0.6
+    masks[1], masks[2] = False, True
+    runs = PixelRuns.of([runs_of(mask) for mask in masks], 9 * 13, CPU)
+    numbers = masks.reshape(-1).nonzero().squeeze(1)
+    assert len(runs) == len(numbers) and torch.equal(runs[torch.arange(len(runs))], numbers)
+
+
+@pytest.mark.parametrize("radius", [0, 1, 2, 3, 7, 40])
+def test_widened_masks_are_those_of_a_largest_value_around(radius):
+    mask = torch.rand(23, 31, generator=torch.Generator().manual_seed(1)) > 0.98
+    around = torch.nn.functional.max_pool2d(mask.float()[None], 2 * radius + 1, stride=1, padding=radius)[0] > 0
+    assert torch.equal(widened(mask, radius), around)
+
+
+def test_reduced_masks_lose_no_pixel():
+    mask = torch.zeros(10, 11, dtype=torch.bool)
+    mask[3, 7] = mask[9, 0] = True
+    assert reduced(mask, 2).nonzero().tolist() == [[1, 3], [4, 0]]
