@@ -58,8 +58,8 @@ class Loader:
             )
         if in_file and keep:
             note_once(
-                f"{root}: {len(frames)} photos take {size / GB:.2g} GB, more than the {max(room, 0) / GB:.2g} GB of memory left for "
-                f"photos (--max-memory): they are read from a file in {folder_of_files()}"
+                f"{root}: {len(frames)} photos take {size / GB:.2g} GB, more than the {max(room, 0) / GB:.2g} GB of memory left "
+                f"for photos (--max-memory): they are read from a file in {folder_of_files()}"
             )
         self.threads = max(1, min(THREADS, os.cpu_count() or 1, room // work))
         self.codes = new_array((*shape, 4), kind, in_file) if keep else None
