@@ -12,6 +12,7 @@ from splitnerf.cli import main
 from splitnerf.cli.exit_codes import BAD_INPUT
 from splitnerf.data import loading, pixels
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
+from splitnerf.data.images import read_image
 from splitnerf.data.pixels import PixelReader, Photos, decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -52,7 +53,7 @@ def test_bytes_become_words_exactly():
 def test_photos_in_a_file_train_as_those_in_memory(in_file, tmp_path):
     """Equal bits of the pixels, of the fingerprint, and of what some steps learn."""
     reading, folder = in_file
-    root, found = make_blender(tmp_path / "data", grey=0.5), []
+    root, found = make_blender(tmp_path / "data", aim=(0.2, 0.1, 0.1)), []  # no photo as another
     for how in (Reading(), reading):
         dataset = load_dataset(root, "train", 1, how)
         run = tmp_path / f"run{len(found)}"
@@ -62,6 +63,8 @@ def test_photos_in_a_file_train_as_those_in_memory(in_file, tmp_path):
     (memory, first), (file, second) = found
     assert file_of(memory.images.codes) is None and file_of(file.images.codes) is not None
     assert memory.images.codes.dtype == np.uint8 and list(folder.iterdir()) == []  # the file has no name
+    for path, photo in zip(memory.image_paths, memory.images):
+        assert np.allclose(photo, read_image(path), atol=1e-6)
     assert np.array_equal(memory.images, file.images) and dataset_fingerprint(memory) == dataset_fingerprint(file)
     assert all(torch.equal(first[name], second[name]) for name in first)
 
@@ -87,6 +90,7 @@ def test_exposure_divides_linear_light(random_codes):
     """A photo of twice the exposure shows half its light; alpha stays."""
     photos = Photos(np.full((1, 1, 1, 4), 188, np.uint8), np.array([2.0]))
     linear = ((188 / 255 + 0.055) / 1.055) ** 2.4 / 2
+    assert photos[0, 0, 0, 0] == photos[0][0, 0, 0] and photos[..., 3] == pytest.approx(188 / 255)
     assert photos[0][0, 0] == pytest.approx([1.055 * linear ** (1 / 2.4) - 0.055] * 3 + [188 / 255], abs=1e-5)
 
 

@@ -15,7 +15,6 @@ import torch
 from torch import Tensor
 
 from splitnerf import ops
-from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf.errors import InputError
 from splitnerf.memory import memory_bytes
 
@@ -74,9 +73,7 @@ class Photos:
         of_each = np.ones((len(self), 1, 1, 4), np.float32)
         of_each[:, 0, 0, :3] = self.exposures[:, None]
         factor = np.broadcast_to(of_each, self.shape)[index]
-        values, other = np.array(values), factor != 1
-        values[other] = linear_to_srgb(srgb_to_linear(values[other]) / factor[other])
-        return values
+        return at_unit_exposure(*(torch.from_numpy(np.array(x, order="C")) for x in (values, factor))).numpy()
 
     def __array__(self, dtype: object = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self[:], dtype)
@@ -120,9 +117,13 @@ class PixelReader:
         values = values * self.scale if self.scale != 1 else values
         if self.exposures is None:
             return values
-        factor = self.exposures[view][:, None]
-        colours = ops.linear_to_srgb(ops.srgb_to_linear(values[:, :3]) / factor)
-        return torch.cat([torch.where(factor == 1, values[:, :3], colours), values[:, 3:]], dim=1)
+        factor = self.exposures[view][:, None].expand(-1, 3)
+        return torch.cat([at_unit_exposure(values[:, :3], factor), values[:, 3:]], dim=1)
+
+
+def at_unit_exposure(values: Tensor, exposures: Tensor) -> Tensor:
+    """sRGB values as they were at an exposure of 1, where each was exposed by `exposures` of the same shape."""
+    return torch.where(exposures == 1, values, ops.linear_to_srgb(ops.srgb_to_linear(values) / exposures))
 
 
 def room_for_photos(max_memory: float) -> int:
