@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 import torch
 from blender_data import make_blender
-from tiny_runs import tiny
-
 from splitnerf.cli import main
 from splitnerf.cli.exit_codes import BAD_INPUT
 from splitnerf.data import loading, pixels
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.images import read_image
-from splitnerf.data.pixels import PixelReader, Photos, decoded, encoded, file_of
+from splitnerf.data.pixels import Photos, PixelReader, decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.render.masks import PixelRuns, reduced, runs_of, widened
 from splitnerf.training import loop
+from tiny_runs import tiny
 
 CPU = torch.device("cpu")
 
