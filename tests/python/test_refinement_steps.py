@@ -15,7 +15,7 @@ from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.like_texels import usual_gloss, weighted_medians
-from splitnerf.refinement.normal_equations import APART, EDGE, NormalEquations, Prior
+from splitnerf.refinement.normal_equations import APART, EDGE, METAL_APART, NormalEquations, Prior
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
 
 
@@ -71,6 +71,22 @@ def test_like_texels_pull_at_the_cost_that_is_written():
     assert found[2, 3] > 0.83  # what differs much moves by a tenth of the way
 
 
+def test_like_metal_pulls_at_a_bounded_cost_that_lets_go_of_what_is_far():
+    observed, like = torch.zeros(3, N_UNKNOWNS), torch.full((3, N_UNKNOWNS), torch.nan)
+    observed[:, 4], like[:, 4] = torch.tensor([0.6, 0.3, 0.0]), torch.tensor([0.7, 0.7, 1.0])
+    found = fitted(chain(like=0.5), observed, like)[:, 4]
+    at = found.clone().requires_grad_(True)
+    squared = ((at - like[:, 4]) / METAL_APART).square()
+    pull = 0.25 * METAL_APART**2 * (squared / (1 + squared)).sum()
+    assert torch.autograd.grad(0.5 * (at - observed[:, 4]).square().sum() + pull, at)[0].abs().max() < 1e-4
+    assert found[0] > 0.63 and 0.31 < found[1] < 0.4 and found[2] < 0.02
+
+
+def one_place(unknowns: torch.Tensor) -> np.ndarray:
+    """Texels that are all in one place."""
+    return np.ones((len(unknowns), 3), np.float32)
+
+
 def two_colours(metallic: float) -> tuple[torch.Tensor, torch.Tensor]:
     """Random unknowns of red and blue texels, six of ten with one roughness and metallic per colour, and which are red."""
     unknowns = torch.rand(5000, N_UNKNOWNS, generator=torch.Generator().manual_seed(0))
@@ -84,17 +100,28 @@ def two_colours(metallic: float) -> tuple[torch.Tensor, torch.Tensor]:
 
 def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
     unknowns, red = two_colours(metallic=0.2)
-    found = usual_gloss(unknowns, 0)
+    found = usual_gloss(unknowns, one_place(unknowns), 0)
     torch.testing.assert_close(found[:, 3], torch.where(red, 0.1, 0.9))
     assert found[:, [0, 1, 2, 4, 5, 6]].isnan().all()
-    assert torch.isfinite(usual_gloss(unknowns[red], 0)[:, 3]).all()  # one colour
+    assert torch.isfinite(usual_gloss(unknowns[red], one_place(unknowns[red]), 0)[:, 3]).all()  # one colour
 
 
 def test_a_colour_that_is_mostly_metal_draws_its_dielectrics_and_no_other_texel():
     unknowns, red = two_colours(metallic=0.9)
     drawn = red & (unknowns[:, 4] < 0.9)
-    found = usual_gloss(unknowns, 0)[:, 4]
+    found = usual_gloss(unknowns, one_place(unknowns), 0)[:, 4]
     assert drawn.sum() > 500 and (found[drawn] == 0.9).all() and found[~drawn].isnan().all()
+
+
+def test_enamel_of_the_colour_of_gold_elsewhere_stays_enamel():
+    """A ring of gold with islands, beside a ring of enamel with bars of gold; all have one colour."""
+    unknowns, positions = torch.full((6000, N_UNKNOWNS), 0.5), np.random.default_rng(0).random((6000, 3)) * 0.3
+    of_gold, few = torch.arange(6000) < 4000, torch.arange(6000) % 5 == 0
+    unknowns[:, 4] = torch.where(of_gold ^ few, 0.9, 0.1)
+    positions[~of_gold.numpy()] += [0.7, 0, 0]
+    found = usual_gloss(unknowns, positions, 0)[:, 4]
+    assert (found[of_gold & few] == 0.9).all() and found[~of_gold].isnan().all()
+    assert (usual_gloss(unknowns, one_place(unknowns), 0)[~of_gold & ~few, 4] == 0.9).all()  # the colour alone takes all
 
 
 def test_where_nothing_is_usual_nothing_pulls_and_nothing_brakes():
@@ -113,7 +140,7 @@ def test_a_colour_counts_for_those_nearby_and_not_for_those_farther_away():
     unknowns[:, 3] = torch.where(few, 0.7, 0.2)
     for grey, roughness in ((0.50, 0.2), (0.1, 0.7)):
         unknowns[:, :3] = torch.where(few, grey, 0.55)[:, None]
-        assert (usual_gloss(unknowns, 0)[few, 3] == roughness).all()
+        assert (usual_gloss(unknowns, one_place(unknowns), 0)[few, 3] == roughness).all()
     weights = np.array([[1.0, 1.0, 1.0], [0.0, 5.0, 1.0], [9.0, 1.0, 1.0]])
     assert weighted_medians(np.array([3.0, 1.0, 2.0]), weights).tolist() == [2.0, 1.0, 3.0]
 

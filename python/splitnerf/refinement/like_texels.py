@@ -1,43 +1,47 @@
-"""What texels of one colour have in common: a prior for roughness and metal of those about which the photos say little."""
+"""What like texels near each other have in common: a prior for roughness and metal of those about which the photos say little."""
 
 from __future__ import annotations
 
 import numpy as np
 import torch
 from scipy.cluster.vq import kmeans2, vq
+from scipy.spatial.distance import cdist
 from torch import Tensor
 
 from splitnerf.refinement.unknowns import METALLIC, ROUGHNESS
 
-N_COLOURS = 24
-N_SEEN = 20000  # texels by which colours and medians are found
+N_KINDS = 160
+N_SEEN = 20000  # texels by which kinds and medians are found
 REACH = 0.15  # deviation of the colours that count as one
-METAL = 0.5  # the usual metallic from which on a colour is a metal's
+NEAR = 0.08  # deviation of the places that count as one, as a share of the asset's extent
+METAL = 0.5  # the usual metallic from which on a kind of texels is metal
 
 
-def usual_gloss(unknowns: Tensor, seed: int) -> Tensor:
-    """What each texel's roughness and metallic would be by its colour alone: [m, n], NaN for all that has no such value.
+def usual_gloss(unknowns: Tensor, positions: np.ndarray, seed: int) -> Tensor:
+    """What each texel's roughness and metallic would be by its colour and place: [m, n], NaN for all that has no such value.
 
-    The usual roughness of a colour is a median over the texels, weighted by a Gaussian of the distance of their colours
-    from the centre of the colour's cluster. What the photos say of each has no weight: glossy texels would speak for all
-    of their colour.
+    Texels of like colour near each other are of one kind, and a kind's usual roughness is the median of the texels around,
+    weighted by a Gaussian of their distance from the kind's centre in colour and place. What the photos say of each has no
+    weight: glossy texels would speak for all of their kind.
 
     The usual metallic counts where it is metal, for texels with less. A metal in which little is mirrored looks like a
     dark dielectric, so that islands of one arise in a metal; the opposite is rare, and details of metal in the colour of
-    the cloth around them are not to be lost.
+    the cloth around them are not to be lost. Without the place, enamel would become metal where gold elsewhere has its colour.
 
     Args:
-        unknowns: See :mod:`splitnerf.refinement.unknowns`.
-        seed: The seed of the texels by which colours and medians are found.
+        unknowns: [m, n], see :mod:`splitnerf.refinement.unknowns`.
+        positions: [m, 3] the texels' points.
+        seed: The seed of the texels by which kinds and medians are found.
     """
     random = np.random.default_rng(seed)
-    colours = unknowns[:, :3].double().numpy()
-    seen = random.permutation(len(colours))[:N_SEEN]
-    apart = random.normal(scale=1e-3, size=(len(seen), 3))  # equal colours make no clusters
-    centres, _ = kmeans2(colours[seen] + apart, min(N_COLOURS, len(seen)), minit="++", seed=random)
-    label, _ = vq(colours, centres)
-    squared = np.square(colours[seen] - centres[:, None]).sum(2)
-    weights = np.exp((squared.min(1, keepdims=True) - squared) / (2 * REACH**2))
+    near = NEAR * max(float(np.ptp(positions, axis=0).max()), 1e-12)
+    likeness = np.hstack([unknowns[:, :3].double().numpy() / REACH, (positions - positions.mean(axis=0)) / near])
+    seen = random.permutation(len(likeness))[:N_SEEN]
+    apart = random.normal(scale=0.01, size=(len(seen), 6))  # equal texels make no clusters
+    centres, _ = kmeans2(likeness[seen] + apart, min(N_KINDS, len(seen)), minit="++", seed=random)
+    label, _ = vq(likeness, centres)
+    squared = cdist(centres, likeness[seen], "sqeuclidean")
+    weights = np.exp((squared.min(1, keepdims=True) - squared) / 2)
     usual = [weighted_medians(unknowns[:, unknown].numpy()[seen], weights)[label] for unknown in (ROUGHNESS, METALLIC)]
     result = torch.full_like(unknowns, torch.nan)
     roughness, metallic = map(torch.from_numpy, usual)

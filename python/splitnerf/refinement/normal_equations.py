@@ -8,9 +8,12 @@ import torch
 from torch import Tensor
 
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
+from splitnerf.refinement.unknowns import METALLIC
 
 EDGE = 0.05  # length of the differences between neighbours from which on they count as an edge
-APART = 0.3  # distance to the values of like texels from which on these pull less
+# Distances to the values of like texels from which on these pull less, the second for metallic: there a far value, unlike one
+# between, is what the photos of most texels say, and the pull ends.
+APART, METAL_APART = 0.3, 0.4
 
 
 class Prior(NamedTuple):
@@ -23,7 +26,7 @@ class Prior(NamedTuple):
             small differences are smoothed and edges are kept (Black and Anandan 1996).
         groups: Numbers of unknowns, in order, that have their edges in common.
         anchor: [n] weight of the distance to the start.
-        like: [n] weight of the distance to the values of like texels, at the same cost with APART in place of EDGE.
+        like: [n] weight of the distance d to the values of like texels, see :func:`likeness`.
     """
 
     pairs: Tensor
@@ -39,6 +42,17 @@ class Prior(NamedTuple):
         squared = ((unknowns[i] - unknowns[j]) / EDGE).square().split(self.groups, dim=1)
         lengths = torch.cat([part.sum(1, keepdim=True).expand_as(part) for part in squared], dim=1)
         return self.flat / (1.0 + lengths)
+
+
+def likeness(apart: Tensor) -> Tensor:
+    """[m, n] the weights by which squared distances [m, n] to the values of like texels have the gradient of their cost.
+
+    The costs are log(1 + (d / APART)^2), and for metallic (d / METAL_APART)^2 / (1 + (d / METAL_APART)^2), which is bounded
+    (Geman and McClure 1987).
+    """
+    weights = 1.0 / (1.0 + (apart / APART).square())
+    weights[:, METALLIC] = 1.0 / (1.0 + (apart[:, METALLIC] / METAL_APART).square()).square()
+    return weights
 
 
 class NormalEquations:
@@ -101,7 +115,7 @@ class NormalEquations:
         flat = prior.flatness(unknowns) * typical
         smooth = flat + prior.smooth * typical
         anchor, unlike = prior.anchor * typical, torch.where(like.isnan(), 0.0, unknowns - like)
-        pull = torch.where(like.isnan(), 0.0, prior.like * typical / (1.0 + (unlike / APART).square()))
+        pull = torch.where(like.isnan(), 0.0, prior.like * typical * likeness(unlike))
         system = self.curvature + torch.diag_embed(anchor + pull + 1e-12)
         of_pairs = sum(torch.zeros_like(unknowns).index_add_(0, end, smooth) for end in prior.pairs.unbind(1))
         inverses = torch.linalg.inv(system + torch.diag_embed(of_pairs))

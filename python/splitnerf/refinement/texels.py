@@ -72,6 +72,7 @@ class AssetTexels:
     Attributes:
         index: [m] int64 row * size + column, ascending.
         chart: [m] the number of each texel's chart.
+        positions: [m, 3] the texels' points on the mesh.
         start: [m, 8] the texture's values.
         pairs: [k, 2] int64 neighbours within a chart.
 
@@ -89,6 +90,7 @@ class AssetTexels:
         maps = [m.albedo_texture, m.roughness_metallic_texture, m.normal_texture]
         values = np.concatenate(maps, axis=2).reshape(-1, N_CHANNELS).astype(np.float32)
         self.index, self.chart = covered.index, charts(asset)[asset.triangles[covered.triangle, 0]]
+        self.positions = covered.interpolate(asset.vertices, asset.triangles)
         self.start = torch.from_numpy(values[covered.index])
         self.pairs = torch.from_numpy(neighbours(covered, self.chart, self.size))
 
