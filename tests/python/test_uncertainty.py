@@ -29,14 +29,14 @@ def row_of_texels(n: int) -> SimpleNamespace:
     return SimpleNamespace(index=np.arange(n), size=n, chart=np.zeros(n, np.int64))
 
 
-def seen(information: Information, texel: int, jacobian: torch.Tensor, times: int) -> None:
-    """Pixels whose rays both meet a texel, by the derivatives [2, 3, n] of the two."""
+def seen(information: Information, texel: int, jacobian: torch.Tensor, times: int, error: float = 0.0) -> None:
+    """Pixels whose rays both meet a texel, by the derivatives [2, 3, n] of the two, and their squared error."""
     texels, shares = torch.full((2 * times, 4), texel), torch.tensor([[1.0, 0, 0, 0]]).expand(2 * times, 4)
-    information.add(texels, shares, jacobian.repeat(times, 1, 1), torch.ones(2 * times, 3))
+    information.add(texels, shares, jacobian.repeat(times, 1, 1), torch.ones(2 * times, 3), torch.full((times,), error))
 
 
 def test_a_patch_that_no_photo_shows_may_have_any_value():
-    deviations = Information(row_of_texels(4), 1, 10).deviations(1e-4)
+    deviations = Information(row_of_texels(4), 1, 10).deviations(1e-4 - QUANTISATION)
     assert torch.allclose(deviations[:, :3], torch.full((4, 3), 12**-0.5))
     assert (deviations > UNKNOWN).all()
 
@@ -47,10 +47,24 @@ def test_the_deviation_is_that_of_the_least_squares_fit():
     jacobian = torch.zeros(2, 3, N_UNKNOWNS)
     jacobian[:, 1, 3] = 0.2
     seen(information, 1, jacobian, 100)  # each pixel twice
-    found = information.deviations(1e-4)
+    found = information.deviations(1e-4 - QUANTISATION)
     wanted = (50 * 0.2**2 / 1e-4 / PATCH_PIXELS**2 + 12) ** -0.5
     assert found[1, 1].item() == pytest.approx(wanted, rel=1e-3)
     assert found[1, 0].item() == pytest.approx(12**-0.5, rel=1e-3) and found[0, 1].item() == pytest.approx(12**-0.5, rel=1e-3)
+
+
+def test_less_is_known_where_the_fit_leaves_more():
+    """Four patches seen alike, one of them with ten times the error: 4 * 10 / 13 of the mean."""
+    information = Information(row_of_texels(4), 1, n_pixels=40_000)
+    jacobian = torch.zeros(2, 3, N_UNKNOWNS)
+    jacobian[:, 1, 3] = 0.2
+    for texel in range(4):
+        seen(information, texel, jacobian, 10_000, 1e-2 if texel == 2 else 1e-3)
+    shares = information.uneven()
+    assert shares.tolist() == pytest.approx([4 / 13, 4 / 13, 40 / 13, 4 / 13], rel=0.02)
+    found = information.deviations(1e-3)[:, 1]
+    of_data = (found**-2 - 12) ** -0.5
+    assert (of_data[2] / of_data[0]).item() == pytest.approx(10**0.5, rel=0.02)
 
 
 def test_unknowns_that_the_photos_mix_up_are_not_known_alone():
@@ -58,7 +72,7 @@ def test_unknowns_that_the_photos_mix_up_are_not_known_alone():
     jacobian = torch.zeros(2, 3, N_UNKNOWNS)
     jacobian[:, :, 3] = jacobian[:, :, 4] = 0.5
     seen(information, 0, jacobian, 1000)
-    assert (information.deviations(1e-4)[0, 1:3] > 0.2).all()
+    assert (information.deviations(1e-4 - QUANTISATION)[0, 1:3] > 0.2).all()
 
 
 def test_noise_of_the_derivatives_is_no_information():
@@ -66,7 +80,7 @@ def test_noise_of_the_derivatives_is_no_information():
     information = Information(row_of_texels(1), 1, 20_000)
     jacobian = 0.3 * torch.randn(40_000, 3, N_UNKNOWNS, generator=torch.Generator().manual_seed(0))
     texels, shares = torch.zeros(40_000, 4, dtype=torch.int64), torch.tensor([[1.0, 0, 0, 0]]).expand(40_000, 4)
-    information.add(texels, shares, jacobian, torch.ones(40_000, 3))
+    information.add(texels, shares, jacobian, torch.ones(40_000, 3), torch.zeros(20_000))
     square = 20_000 * 3 * 0.3**2
     assert information.sums.abs().max() < 0.03 * square
 

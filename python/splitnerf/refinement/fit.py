@@ -200,6 +200,7 @@ class Refinement:
         return {
             "unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient,
             "light": self.light.levels, "information": self.information.sums, "n_seen": self.information.n_seen,
+            "errors": self.information.errors,
             "random": self.random.bit_generator.state, "n_batches": self.n_batches, "n_sweeps": self.n_sweeps,
         }  # fmt: skip
 
@@ -210,10 +211,12 @@ class Refinement:
             ValueError, KeyError, TypeError: It is another fit's.
         """
         sums = {"unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient,
-                "information": self.information.sums}  # fmt: skip
+                "information": self.information.sums, "errors": self.information.errors}  # fmt: skip
         for name, tensor in sums.items():
             check_tensor(name, state[name], tuple(tensor.shape), torch.float32)
-        self.unknowns, self.information.sums = state["unknowns"], state["information"]
+        self.unknowns, self.information.sums, self.information.errors = (
+            state[name] for name in ("unknowns", "information", "errors")
+        )
         self.equations.curvature, self.equations.gradient = state["curvature"], state["gradient"]
         for level, stored in zip(self.light.levels, state["light"], strict=True):
             check_tensor("a level of the light", stored, tuple(level.shape), torch.float32)
@@ -286,9 +289,10 @@ class Refinement:
             [torch.autograd.grad(colours[:, c].sum(), unknowns, retain_graph=c < 2)[0] for c in range(3)], dim=1
         )
         self.equations.add(texels, shares, jacobian, weights_of_rays, of_other)
-        self.information.add(texels, shares, jacobian, weights_of_rays)
+        squared = (weights * errors[:, 0] * errors[:, 1]).mean(1)
+        self.information.add(texels, shares, jacobian, weights_of_rays, squared)
         self.n_batches += 1
-        return float((weights * errors[:, 0] * errors[:, 1]).mean())
+        return float(squared.mean())
 
     def sweep(self) -> tuple[float, list[float]]:
         """Gathers a share of all pixels and takes one step; returns the error and the step's size by unknown."""

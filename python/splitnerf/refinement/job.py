@@ -13,10 +13,10 @@ import numpy as np
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.environment import read_environment
+from splitnerf.data.frames import refuse_data
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import area_average, write_image
 from splitnerf.data.json_files import write_json
-from splitnerf.data.frames import refuse_data
 from splitnerf.data.reading import Reading
 from splitnerf.data.tensor_files import read_tensors, write_tensors
 from splitnerf.errors import InputError
@@ -29,7 +29,7 @@ from splitnerf.refinement.fit import Refined, RefinementSettings, Stage
 from splitnerf.refinement.texels import check_form
 
 TRAINED = "trained"  # the folder in a run of what training alone exported
-STATE, STATE_FORMAT = "refinement.pt", 2
+STATE, STATE_FORMAT = "refinement.pt", 3
 RECORD = "refinement.json"
 OCCLUSION_OFFSET = 0.006  # distance of a ray's start from the mesh, as a share of its extent
 LEAST_HEIGHT, LARGEST_HEIGHT = 8, 256  # rows of the light that is fitted
