@@ -18,7 +18,7 @@ from splitnerf.memory import control_group, memory_bytes
 
 INSTALL = "pip install --no-build-isolation ."
 ISAS = ("base", "avx2", "avx512")  # each holds those before it
-TRAINING_GIB, RUN_GIB = 3.0, 0.1  # memory and disk of a training of preset cpu on 100 photos of 400 x 400 pixels
+TRAINING_GIB, RUN_GIB = 3.0, 0.1  # memory of a training of preset cpu without its photos, and disk of its run
 GIB = 2.0**30
 
 
@@ -152,8 +152,11 @@ def ray_tracing() -> Finding:
 
 def memory() -> Finding:
     total, free = (size / GIB for size in memory_bytes())
-    value = f"{total:.1f} GiB, {free:.1f} GiB free; 100 photos of 400 x 400 take {TRAINING_GIB:.0f} GiB"
-    return Finding("memory", value, "close other programs, or train with --downscale 2" if free < TRAINING_GIB else "")
+    value = (
+        f"{total:.1f} GiB, {free:.1f} GiB free; a training takes {TRAINING_GIB:.0f} GiB, its photos up to half of what is free"
+        " (more are read from a file; --max-memory)"
+    )
+    return Finding("memory", value, "close other programs" if free < TRAINING_GIB else "")
 
 
 def disk(folder: Path) -> Finding:
