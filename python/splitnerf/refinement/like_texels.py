@@ -1,4 +1,4 @@
-"""What like texels near each other have in common: a prior for roughness and metal of those about which the photos say little."""
+"""What like texels have in common: a prior for roughness and metal of those about which the photos say little."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from torch import Tensor
 
 from splitnerf.refinement.unknowns import METALLIC, ROUGHNESS
 
-N_KINDS = 160
+N_COLOURS, N_KINDS = 24, 160  # kinds of texels by their colour, and by colour and place
 N_SEEN = 20000  # texels by which kinds and medians are found
 REACH = 0.15  # deviation of the colours that count as one
 NEAR = 0.08  # deviation of the places that count as one, as a share of the asset's extent
@@ -18,15 +18,12 @@ METAL = 0.5  # the usual metallic from which on a kind of texels is metal
 
 
 def usual_gloss(unknowns: Tensor, positions: np.ndarray, seed: int) -> Tensor:
-    """What each texel's roughness and metallic would be by its colour and place: [m, n], NaN for all that has no such value.
+    """What each texel's roughness and metallic would be by what is like it: [m, n], NaN for all that has no such value.
 
-    Texels of like colour near each other are of one kind, and a kind's usual roughness is the median of the texels around,
-    weighted by a Gaussian of their distance from the kind's centre in colour and place. What the photos say of each has no
-    weight: glossy texels would speak for all of their kind.
-
-    The usual metallic counts where it is metal, for texels with less. A metal in which little is mirrored looks like a
-    dark dielectric, so that islands of one arise in a metal; the opposite is rare, and details of metal in the colour of
-    the cloth around them are not to be lost. Without the place, enamel would become metal where gold elsewhere has its colour.
+    The usual roughness is that of a colour; the usual metallic that of a colour in a place. It counts where it is metal, for
+    texels with less: a metal in which little is mirrored looks like a dark dielectric, so that islands of one arise in a
+    metal; the opposite is rare, and details of metal in the colour of the cloth around them are not to be lost. Without the
+    place, enamel would become metal where gold elsewhere has its colour.
 
     Args:
         unknowns: [m, n], see :mod:`splitnerf.refinement.unknowns`.
@@ -35,20 +32,35 @@ def usual_gloss(unknowns: Tensor, positions: np.ndarray, seed: int) -> Tensor:
     """
     random = np.random.default_rng(seed)
     near = NEAR * max(float(np.ptp(positions, axis=0).max()), 1e-12)
-    likeness = np.hstack([unknowns[:, :3].double().numpy() / REACH, (positions - positions.mean(axis=0)) / near])
-    seen = random.permutation(len(likeness))[:N_SEEN]
-    apart = random.normal(scale=0.01, size=(len(seen), 6))  # equal texels make no clusters
-    centres, _ = kmeans2(likeness[seen] + apart, min(N_KINDS, len(seen)), minit="++", seed=random)
-    label, _ = vq(likeness, centres)
-    squared = cdist(centres, likeness[seen], "sqeuclidean")
-    weights = np.exp((squared.min(1, keepdims=True) - squared) / 2)
-    usual = [weighted_medians(unknowns[:, unknown].numpy()[seen], weights)[label] for unknown in (ROUGHNESS, METALLIC)]
+    colours = unknowns[:, :3].double().numpy() / REACH
+    placed = np.hstack([colours, (positions - positions.mean(axis=0)) / near])
     result = torch.full_like(unknowns, torch.nan)
-    roughness, metallic = map(torch.from_numpy, usual)
-    result[:, ROUGHNESS] = roughness
+    result[:, ROUGHNESS] = usual(unknowns[:, ROUGHNESS], colours, N_COLOURS, random)
+    metallic = usual(unknowns[:, METALLIC], placed, N_KINDS, random)
     islands = (metallic >= METAL) & (unknowns[:, METALLIC] < metallic)
     result[:, METALLIC] = torch.where(islands, metallic, torch.nan)
     return result
+
+
+def usual(values: Tensor, features: np.ndarray, n_kinds: int, random: np.random.Generator) -> Tensor:
+    """[m] the usual value of each texel's kind.
+
+    Texels of like features are of one kind. Its usual value is the median of the texels around, weighted by a Gaussian of
+    their distance from the kind's centre. What the photos say of each has no weight: glossy texels would speak for all.
+
+    Args:
+        values: [m].
+        features: [m, d], in units of the Gaussian's deviation.
+        n_kinds: The number of kinds.
+        random: What draws the texels by which kinds and medians are found.
+    """
+    seen = random.permutation(len(features))[:N_SEEN]
+    apart = random.normal(scale=0.01, size=(len(seen), features.shape[1]))  # equal texels make no clusters
+    centres, _ = kmeans2(features[seen] + apart, min(n_kinds, len(seen)), minit="++", seed=random)
+    label, _ = vq(features, centres)
+    squared = cdist(centres, features[seen], "sqeuclidean")
+    weights = np.exp((squared.min(1, keepdims=True) - squared) / 2)
+    return torch.from_numpy(weighted_medians(values.numpy()[seen], weights)[label])
 
 
 def weighted_medians(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
