@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+SHARE_OF_PHOTOS = 0.5  # of the memory that is available, where nothing is said
+
 
 def memory_bytes() -> tuple[int, int]:
     """Memory of the machine, or of the control group where it has less, and what of it is available."""

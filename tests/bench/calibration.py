@@ -10,11 +10,11 @@ The albedo has one factor per channel (median of the ratios), as light and albed
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import spearmanr
+from swap import Canvas
 
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
@@ -23,11 +23,7 @@ from splitnerf.refinement.texels import AssetTexels
 from splitnerf.refinement.uncertainty import Information, patch_width
 from splitnerf.refinement.unknowns import GAMMA
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from bench.swap import Canvas  # noqa: E402
-
 N_PARTS = 10
-NUMBER = "{:.3f}".format
 
 
 def true_errors(own: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -48,14 +44,17 @@ def means(values: np.ndarray, patch: np.ndarray) -> np.ndarray:
     return sums / np.bincount(patch)[:, None]
 
 
+def root_mean_squares(values: np.ndarray, parts: list[np.ndarray]) -> str:
+    """The root mean square of values [k] in each part, as cells of a table; a part is an array of numbers of values."""
+    return " | ".join(f"{np.sqrt(np.square(values[part]).mean()):.3f}" for part in parts)
+
+
 def rows_of(name: str, predicted: np.ndarray, error: np.ndarray) -> list[str]:
-    """Two rows of the table: the root mean square of prediction and error in each part of the texels, by prediction."""
+    """Two rows of the table: prediction and error in each part of the patches, which are sorted by prediction."""
     parts = np.array_split(np.argsort(predicted, kind="stable"), N_PARTS)
-    rms = lambda values: [NUMBER(np.sqrt(np.square(values[part]).mean())) for part in parts]  # noqa: E731
-    rank = spearmanr(predicted, error).statistic
     return [
-        f"| {name}, predicted | {' | '.join(rms(predicted))} | |",
-        f"| {name}, true | {' | '.join(rms(error))} | {rank:.2f} |",
+        f"| {name}, predicted | {root_mean_squares(predicted, parts)} | |",
+        f"| {name}, true | {root_mean_squares(error, parts)} | {spearmanr(predicted, error).statistic:.2f} |",
     ]
 
 

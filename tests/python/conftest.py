@@ -57,7 +57,7 @@ def ball() -> Asset:
 def painted(ball) -> tuple[Asset, Dataset]:
     """A ball with a colour and a roughness per side, and its photos."""
     texels = AssetTexels(ball)
-    height = heights(ball, texels)
+    height = heights(texels)
     values = texels.start.clone()
     values[:, :3] = torch.where(height > 0, torch.tensor([0.7, 0.25, 0.1]), torch.tensor([0.15, 0.3, 0.6]))
     values[:, 3:4] = torch.where(height > 0, 0.35, 0.7)

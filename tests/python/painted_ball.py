@@ -13,7 +13,6 @@ from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.tangents import vertex_tangents
-from splitnerf.export.bake import rasterise
 from splitnerf.export.unwrap import unwrap
 from splitnerf.refinement.texels import AssetTexels
 from splitnerf.render.path_traced import AssetRenderer
@@ -74,6 +73,6 @@ def photos(asset: Asset, environment: np.ndarray, n: int = 10, spp: int = 128) -
     )  # fmt: skip
 
 
-def heights(asset: Asset, texels: AssetTexels) -> torch.Tensor:
+def heights(texels: AssetTexels) -> torch.Tensor:
     """[m, 1] z of the covered texels."""
-    return torch.from_numpy(rasterise(asset.uv, asset.triangles, texels.size).interpolate(asset.vertices, asset.triangles))[:, 2:]
+    return torch.from_numpy(texels.positions)[:, 2:]

@@ -227,5 +227,6 @@ def test_little_memory_and_disk(monkeypatch, tmp_path):
     assert machine.memory().advice == "close other programs"
     monkeypatch.setattr(machine, "memory_bytes", lambda: (64 * 2**30, 32 * 2**30))
     assert machine.memory().advice == "" and machine.memory().value.startswith("64.0 GiB, 32.0 GiB free")
+    assert "photos up to 50% of what is free" in machine.memory().value
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=2**20))
     assert "--out" in machine.disk(tmp_path).advice

@@ -145,6 +145,17 @@ def test_each_batch_has_directions_of_its_own(painted):
     assert torch.equal(colours[0], colours[1]) and not torch.equal(colours[0], colours[2])
 
 
+def test_texels_know_their_points_on_the_mesh(painted):
+    """What a point of a triangle reads of its four texels' points is, nearly, the point."""
+    asset = painted[0]
+    texels, triangle = AssetTexels(asset), np.arange(len(asset.triangles))
+    third = np.full(len(triangle), 1 / 3)
+    at = texels.sample(triangle, third, third, asset.vertices[asset.triangles[:, 0]])
+    read = torch.from_numpy(texels.positions)[texels.rows(at.footprints)] * at.footprints.weights[..., None]
+    apart = (read.sum(1) - at.positions).norm(dim=1)
+    assert texels.positions.shape == (len(texels.index), 3) and apart.median() < 1e-4 and apart.max() < 0.05
+
+
 @pytest.fixture(scope="module")
 def refined(painted):
     """The ball from a wrong start, under the true light."""
@@ -161,7 +172,7 @@ def test_a_balls_albedo_is_found_and_its_roughness_approached(painted, refined):
     asset, (wrong, result) = painted[0], refined
     assets = (("true", asset), ("wrong", wrong), ("found", result.asset))
     values, sweeps = {name: AssetTexels(a).start for name, a in assets}, result.sweeps
-    height = heights(asset, AssetTexels(asset))[:, 0].abs()
+    height = heights(AssetTexels(asset))[:, 0].abs()
     seen = (height > 0.1) & (height < 0.8)
     error = lambda name: (values[name] - values["true"])[seen, :3].abs().mean().item()  # noqa: E731
     assert error("found") < 0.25 * error("wrong")

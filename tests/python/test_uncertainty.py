@@ -108,9 +108,7 @@ def test_a_ball_is_known_where_it_is_seen(painted):
     stage.advance()
     uncertainty = stage.result().uncertainty
     deviations = uncertainty.map.reshape(-1, 4)[stage.fit.texels.index]
-    from splitnerf.export.bake import rasterise
-
-    height = rasterise(asset.uv, asset.triangles, stage.fit.texels.size).interpolate(asset.vertices, asset.triangles)[:, 2]
+    height = stage.fit.texels.positions[:, 2]
     upper, lower = deviations[height > 0.5], deviations[height < -0.9]
     assert np.median(upper[:, 0]) < 0.05 and np.median(lower[:, 0]) > UNKNOWN[0]
     assert np.median(upper[:, 3]) < 0.7 * np.median(lower[:, 3])

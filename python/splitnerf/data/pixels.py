@@ -16,10 +16,9 @@ from torch import Tensor
 
 from splitnerf import ops
 from splitnerf.errors import InputError
-from splitnerf.memory import memory_bytes
+from splitnerf.memory import SHARE_OF_PHOTOS, memory_bytes
 
 GB = 10**9
-SHARE = 0.5  # of the memory that is available, for photos where nothing is said
 _in_memory: WeakValueDictionary[int, np.ndarray] = WeakValueDictionary()  # the arrays of all photos that are there
 
 
@@ -130,7 +129,7 @@ def room_for_photos(max_memory: float) -> int:
     """Bytes that photos may still take: of `max_memory` GB, or where that is 0 of half of the memory available."""
     if max_memory > 0:
         return int(max_memory * GB) - sum(array.nbytes for array in _in_memory.values())
-    return int(SHARE * memory_bytes()[1])
+    return int(SHARE_OF_PHOTOS * memory_bytes()[1])
 
 
 def new_array(shape: tuple[int, ...], dtype: np.dtype, in_file: bool) -> np.ndarray:

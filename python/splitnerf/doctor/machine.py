@@ -14,7 +14,7 @@ import torch
 
 import splitnerf
 from splitnerf import _core
-from splitnerf.memory import control_group, memory_bytes
+from splitnerf.memory import SHARE_OF_PHOTOS, control_group, memory_bytes
 
 INSTALL = "pip install --no-build-isolation ."
 ISAS = ("base", "avx2", "avx512")  # each holds those before it
@@ -153,7 +153,7 @@ def ray_tracing() -> Finding:
 def memory() -> Finding:
     total, free = (size / GIB for size in memory_bytes())
     value = (
-        f"{total:.1f} GiB, {free:.1f} GiB free; a training takes {TRAINING_GIB:.0f} GiB, its photos up to half of what is free"
+        f"{total:.1f} GiB, {free:.1f} GiB free; a training takes {TRAINING_GIB:.0f} GiB, its photos up to {SHARE_OF_PHOTOS:.0%} of what is free"
         " (more are read from a file; --max-memory)"
     )
     return Finding("memory", value, "close other programs" if free < TRAINING_GIB else "")

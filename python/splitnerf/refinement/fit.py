@@ -66,8 +66,8 @@ class RefinementSettings:
         smooth_albedo, smooth_gloss, smooth_normal: Weights of the differences between neighbours' steps where a texel is as wide
             as a pixel; those of finer texels are larger, so that a step is smooth over a pixel.
         flat_gloss, flat_normal: Weights of the differences between neighbours' values; edges cost little.
-        like_roughness: Weight of the difference between a texel's roughness and the usual one of its kind.
-        like_metal: Weight of the difference between a texel's metallic and the usual one of its kind, where that is metal.
+        like_roughness: Weight of the difference between a texel's roughness and the usual one of its colour.
+        like_metal: Weight of the difference between a texel's metallic and the usual one of its colour and place, where that is metal.
         anchor: Weight of the distance to the start.
         light_step: Share of the light's first Gauss-Newton step that is taken, less of the later ones; 0 keeps the light.
         outline: Whether vertices move first, so that the asset covers the pixels as the masks do.

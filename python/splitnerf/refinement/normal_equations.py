@@ -11,8 +11,7 @@ from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.unknowns import METALLIC
 
 EDGE = 0.05  # length of the differences between neighbours from which on they count as an edge
-# Distances to the values of like texels from which on these pull less, the second for metallic: there a far value, unlike one
-# between, is what the photos of most texels say, and the pull ends.
+# Distances to the values of like texels from which on these pull less; the second is for metallic, whose pull ends farther off.
 APART, METAL_APART = 0.3, 0.4
 
 

@@ -81,7 +81,8 @@ class Information:
         self.n_seen += len(one)
 
     def uneven(self) -> Tensor:
-        """[patches] the errors that the fit leaves in a patch, as shares of those that it leaves in all; 1 where there are none."""
+        """[patches] the errors that the fit leaves in a patch, as shares of those that it leaves in all; 1 where it
+        leaves none. The errors are those before all steps, the first ones too."""
         error, n = self.errors.unbind(1)
         mean = error.sum() / n.sum().clamp(min=1.0)
         if mean <= 0:
