@@ -100,16 +100,16 @@ def two_colours(metallic: float) -> tuple[torch.Tensor, torch.Tensor]:
 
 def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
     unknowns, red = two_colours(metallic=0.2)
-    found = usual_gloss(unknowns, one_place(unknowns), 0)
+    found = usual_gloss(unknowns, unknowns, one_place(unknowns), 0)
     torch.testing.assert_close(found[:, 3], torch.where(red, 0.1, 0.9))
     assert found[:, [0, 1, 2, 4, 5, 6]].isnan().all()
-    assert torch.isfinite(usual_gloss(unknowns[red], one_place(unknowns[red]), 0)[:, 3]).all()  # one colour
+    assert torch.isfinite(usual_gloss(unknowns[red], unknowns[red], one_place(unknowns[red]), 0)[:, 3]).all()  # one colour
 
 
 def test_a_colour_that_is_mostly_metal_draws_its_dielectrics_and_no_other_texel():
     unknowns, red = two_colours(metallic=0.9)
     drawn = red & (unknowns[:, 4] < 0.9)
-    found = usual_gloss(unknowns, one_place(unknowns), 0)[:, 4]
+    found = usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[:, 4]
     assert drawn.sum() > 500 and (found[drawn] == 0.9).all() and found[~drawn].isnan().all()
 
 
@@ -119,9 +119,18 @@ def test_enamel_of_the_colour_of_gold_elsewhere_stays_enamel():
     of_gold, few = torch.arange(6000) < 4000, torch.arange(6000) % 5 == 0
     unknowns[:, 4] = torch.where(of_gold ^ few, 0.9, 0.1)
     positions[~of_gold.numpy()] += [0.7, 0, 0]
-    found = usual_gloss(unknowns, positions, 0)[:, 4]
+    found = usual_gloss(unknowns, unknowns, positions, 0)[:, 4]
     assert (found[of_gold & few] == 0.9).all() and found[~of_gold].isnan().all()
-    assert (usual_gloss(unknowns, one_place(unknowns), 0)[~of_gold & ~few, 4] == 0.9).all()  # the colour alone takes all
+    assert (usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[~of_gold & ~few, 4] == 0.9).all()  # the colour alone takes all
+
+
+def test_metal_does_not_spread_by_what_it_turned_into_metal():
+    """Enamel, of which most texels have become metal since the start."""
+    start = torch.full((3000, N_UNKNOWNS), 0.1)
+    now = start.clone()
+    now[torch.arange(3000) % 3 > 0, 4] = 0.9
+    assert usual_gloss(now, start, one_place(now), 0)[:, 4].isnan().all()
+    assert (usual_gloss(now, now, one_place(now), 0)[now[:, 4] < 0.5, 4] == 0.9).all()
 
 
 def test_where_nothing_is_usual_nothing_pulls_and_nothing_brakes():
@@ -140,7 +149,7 @@ def test_a_colour_counts_for_those_nearby_and_not_for_those_farther_away():
     unknowns[:, 3] = torch.where(few, 0.7, 0.2)
     for grey, roughness in ((0.50, 0.2), (0.1, 0.7)):
         unknowns[:, :3] = torch.where(few, grey, 0.55)[:, None]
-        assert (usual_gloss(unknowns, one_place(unknowns), 0)[few, 3] == roughness).all()
+        assert (usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[few, 3] == roughness).all()
     weights = np.array([[1.0, 1.0, 1.0], [0.0, 5.0, 1.0], [9.0, 1.0, 1.0]])
     assert weighted_medians(np.array([3.0, 1.0, 2.0]), weights).tolist() == [2.0, 1.0, 3.0]
 

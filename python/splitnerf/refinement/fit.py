@@ -306,7 +306,7 @@ class Refinement:
             if not np.isfinite(moved):
                 raise RuntimeError(f"refinement: the light after {self.n_batches} batches is not finite; nothing was written")
         limits = torch.tensor(STEP_LIMITS)
-        like = usual_gloss(self.unknowns, self.texels.positions, s.seed)
+        like = usual_gloss(self.unknowns, self.equations.start, self.texels.positions, s.seed)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
         step = wanted - self.unknowns
         if not bool(torch.isfinite(step).all()):

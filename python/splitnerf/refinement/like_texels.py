@@ -17,16 +17,17 @@ NEAR = 0.08  # deviation of the places that count as one, as a share of the asse
 METAL = 0.5  # the usual metallic from which on a kind of texels is metal
 
 
-def usual_gloss(unknowns: Tensor, positions: np.ndarray, seed: int) -> Tensor:
+def usual_gloss(unknowns: Tensor, start: Tensor, positions: np.ndarray, seed: int) -> Tensor:
     """What each texel's roughness and metallic would be by what is like it: [m, n], NaN for all that has no such value.
 
-    The usual roughness is that of a colour; the usual metallic that of a colour in a place. It counts where it is metal, for
-    texels with less: a metal in which little is mirrored looks like a dark dielectric, so that islands of one arise in a
+    The usual roughness is that of a colour; the usual metallic that of a colour in a place, at the start: what the prior itself
+    turned into metal would turn its neighbours, step by step. It counts where it is metal, for texels with less: a metal in which little is mirrored looks like a dark dielectric, so that islands of one arise in a
     metal; the opposite is rare, and details of metal in the colour of the cloth around them are not to be lost. Without the
     place, enamel would become metal where gold elsewhere has its colour.
 
     Args:
         unknowns: [m, n], see :mod:`splitnerf.refinement.unknowns`.
+        start: [m, n] the unknowns before all steps.
         positions: [m, 3] the texels' points.
         seed: The seed of the texels by which kinds and medians are found.
     """
@@ -36,7 +37,7 @@ def usual_gloss(unknowns: Tensor, positions: np.ndarray, seed: int) -> Tensor:
     placed = np.hstack([colours, (positions - positions.mean(axis=0)) / near])
     result = torch.full_like(unknowns, torch.nan)
     result[:, ROUGHNESS] = usual(unknowns[:, ROUGHNESS], colours, N_COLOURS, random)
-    metallic = usual(unknowns[:, METALLIC], placed, N_KINDS, random)
+    metallic = usual(start[:, METALLIC], placed, N_KINDS, random)
     islands = (metallic >= METAL) & (unknowns[:, METALLIC] < metallic)
     result[:, METALLIC] = torch.where(islands, metallic, torch.nan)
     return result
