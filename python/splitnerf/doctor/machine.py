@@ -18,7 +18,7 @@ from splitnerf.memory import SHARE_OF_PHOTOS, control_group, memory_bytes
 
 INSTALL = "pip install --no-build-isolation ."
 ISAS = ("base", "avx2", "avx512")  # each holds those before it
-TRAINING_GIB, RUN_GIB = 3.0, 0.1  # memory of a training of preset cpu without its photos, and disk of its run
+TRAINING_GIB, RUN_GIB = 2.0, 0.1  # memory of a training of preset cpu without its photos, and disk of its run
 GIB = 2.0**30
 
 
