@@ -25,7 +25,8 @@ from splitnerf.separation.field import (
     RadianceField, RayMeasure, Rendered, contracted, resampled, search_loss, spread_loss, with_less_gradient,
 )  # fmt: skip
 from splitnerf.separation.masks import find_mask
-from splitnerf.separation.region import CELLS, Region, Table, find_region
+from splitnerf.separation.region import CELLS, Region, find_region
+from splitnerf.separation.table import Table
 
 SIZE, FOCAL = 40, 40.0
 

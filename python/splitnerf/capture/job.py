@@ -95,9 +95,7 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
             raise InputError(f"{source}: no object stands out in the middle of the photos; give masks with --masks")
         by_name = {photo.name: photo for photo in kept}
         exposures = exposures_of(world.scene, by_name, report)
-        shares = _write_images(world, exposures, by_name, out, settings, report)
-        _write_transforms(world, exposures, out, settings)
-        write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
+        shares = write_data(world, exposures, by_name, out, settings, report)
         write_page(out, world, exposures.gains, shares, left_out, source.resolve().name)
     return Prepared(world, exposures, left_out, shares)
 
@@ -179,6 +177,17 @@ def exposures_of(scene: Reconstruction, by_name: dict[str, Photograph], report: 
         report("exposures", (i + 1) / len(scene.names))
     by_file = np.array([by_name[name].exposure or np.nan for name in scene.names])
     return find_exposures(scene.photo_of, scene.point_of, values, radii, by_file)
+
+
+def write_data(
+    world: World, exposures: Exposures, by_name: dict[str, Photograph], out: Path, settings: PrepareSettings,
+    report: Callable[[str, float], None],
+) -> np.ndarray:  # fmt: skip
+    """Writes `images/`, `masks/`, `transforms.json` and `surroundings.exr`; returns the share that each mask covers."""
+    shares = _write_images(world, exposures, by_name, out, settings, report)
+    _write_transforms(world, exposures, out, settings)
+    write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
+    return shares
 
 
 def _write_images(

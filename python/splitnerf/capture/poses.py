@@ -142,10 +142,13 @@ def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     """
     for principal_points in (True, False):
         refined = pycolmap.Reconstruction(model)
-        options = pycolmap.BundleAdjustmentOptions()
+        options, chosen = pycolmap.BundleAdjustmentOptions(), pycolmap.BundleAdjustmentConfig()
         options.refine_principal_point, options.print_summary = principal_points, False
+        for image in refined.reg_image_ids():
+            chosen.add_image(image)
+        chosen.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
         for _ in range(2):
-            pycolmap.bundle_adjustment(refined, options)
+            pycolmap.create_default_bundle_adjuster(options, chosen, refined).solve()
             refined.update_point_3d_errors()
             for key in [k for k, point in refined.points3D.items() if point.error > MAX_ERROR or point.track.length() < 2]:
                 refined.delete_point3D(key)

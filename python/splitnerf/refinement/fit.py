@@ -48,6 +48,7 @@ from splitnerf.refinement.unknowns import (
 
 CLAMP_INDIRECT = 10.0
 SWEEPS_OF_LARGE_STEPS = 4  # after as many the light's steps are half as large: they average over the noise of sweeps
+SWEEP_PIXELS = 1 << 18  # of a sweep, at most: beyond, more steps are worth more than more pixels
 MIN_TONE = 0.02  # linear value below which errors weigh as at this one
 
 
@@ -58,7 +59,7 @@ class RefinementSettings:
     Attributes:
         sweeps: Gauss-Newton steps.
         minutes: Time after which no further sweep begins, the first one aside; 0 does not limit.
-        sweep_share: Pixels of a sweep as a share of all.
+        sweep_share: Pixels of a sweep as a share of all, at most SWEEP_PIXELS.
         pixels: Pixels of a batch.
         directions: Directions of a ray's point.
         bounces: Scattering events of the light that the asset sends to itself.
@@ -297,7 +298,7 @@ class Refinement:
     def sweep(self) -> tuple[float, list[float]]:
         """Gathers a share of all pixels and takes one step; returns the error and the step's size by unknown."""
         s, surface = self.settings, self.surface()
-        n_batches = max(1, round(s.sweep_share * len(self.pixels) / s.pixels))
+        n_batches = max(1, round(min(s.sweep_share * len(self.pixels), SWEEP_PIXELS) / s.pixels))
         error = float(np.mean([self.gather(surface) for _ in range(n_batches)]))
         if not np.isfinite(error):
             raise RuntimeError(f"refinement: the error of the photos is {error}; nothing was written")

@@ -18,8 +18,9 @@ from splitnerf.data.reading import SEPARATION
 from splitnerf.errors import InputError
 from splitnerf.progress import Progress, ended_by_signals, tracked
 from splitnerf.separation.field import RadianceField
-from splitnerf.separation.masks import find_mask, surface_points, surroundings
-from splitnerf.separation.region import Region, Table, find_region
+from splitnerf.separation.masks import find_mask, points_near, surface_points, surroundings
+from splitnerf.separation.region import Region, find_region
+from splitnerf.separation.table import Table
 from splitnerf.separation.training import train_field
 
 SHEET = "sheet.jpg"
@@ -80,6 +81,8 @@ def separate(
         region = find_region(points, table)
         if region is None:
             raise InputError(f"{train.root}: nothing stands out in the middle of the photos; add masks of the object")
+        if table is not None:
+            region = region.with_foot(*points_near(field, train, region))
         discard_separated(folder)
         folder.mkdir(parents=True)
         shares = [write_masks(field, region, split, folder) for split in (train, test) if split is not None]

@@ -14,14 +14,15 @@ from splitnerf.data.environment import directions_of_texels, texels_of_direction
 from splitnerf.data.images import srgb_to_linear
 from splitnerf.render.rays import image_rays
 from splitnerf.separation.field import RadianceField
-from splitnerf.separation.region import Region
+from splitnerf.separation.region import CELLS, HALF, Region
 
 SAMPLES = 64, 32  # of a ray, of the first search and of the second
 CHUNK = 4096  # rays
 LONGEST = 800  # edge of a mask in pixels
 COARSER = 4  # factor by which the first mask is smaller
 UNDECIDED = 0.02  # a coarse pixel is decided where it and its neighbours are this near to 0 or to 1
-POINTS = 5000  # surface points of a photo, about
+POINTS, DENSE = 5000, 80000  # pixels of a photo whose points are asked for, about: of all of it, and near the foot
+AROUND = 0.2  # distance from what stands on a table within which the table is looked at closely, scene units
 HEIGHT = 64  # of the map of the surroundings
 PATCHES = 16  # from pole to pole, in which points are counted
 FEW = 8  # points in a patch that tell it fully
@@ -41,14 +42,43 @@ def coverage(field: RadianceField, region: Region, rays_o: Tensor, rays_d: Tenso
 @torch.no_grad()
 def surface_points(field: RadianceField, dataset: Dataset) -> np.ndarray:
     """[n, 3] the points that the photos show, scene units: where half of a ray's light is gone."""
-    points = []
-    stride = max(1.0, math.sqrt(dataset.height * dataset.width / POINTS))
-    size = max(1, round(dataset.height / stride)), max(1, round(dataset.width / stride))
-    for rays_o, rays_d in (view_rays(dataset, i, size) for i in range(len(dataset))):
-        for o, d in zip(rays_o.split(CHUNK), rays_d.split(CHUNK)):
-            rendered = field.render(o, d, *SAMPLES)
-            at = (rendered.weights.cumsum(1) < 0.5).sum(1, keepdim=True).clamp(max=SAMPLES[1] - 1)
-            points.append(o + rendered.distances.gather(1, at) * d)
+    return np.concatenate([_points(field, *view_rays(dataset, i, _size(dataset, POINTS))) for i in range(len(dataset))])
+
+
+@torch.no_grad()
+def points_near(field: RadianceField, dataset: Dataset, region: Region) -> tuple[np.ndarray, np.ndarray]:
+    """More points [n, 3] around a region where it meets its table, and their colours [n, 3], sRGB."""
+    table, middle = region.table, region.middle()
+    normal = torch.from_numpy(table.normal.astype(np.float32))
+    cells = ((region.cells.nonzero().float() + 0.5) * (2 / CELLS) - 1) * HALF - middle
+    reach = float((cells - (cells @ normal)[:, None] * normal).norm(dim=1).max()) + AROUND
+    centre = middle - (middle @ normal - table.offset) * normal
+    points, colours, size = [], [], _size(dataset, DENSE)
+    for i in range(len(dataset)):
+        rays_o, rays_d = view_rays(dataset, i, size)
+        down = (rays_d @ normal).clamp(max=-1e-6)
+        meets = rays_o + ((table.offset - rays_o @ normal) / down)[:, None] * rays_d
+        near = ((meets - centre).norm(dim=1) < reach) & (rays_d @ normal < 0)
+        points.append(_points(field, rays_o[near], rays_d[near]))
+        rows, columns = (((torch.arange(n) + 0.5) * whole / n).long() for n, whole in zip(size, (dataset.height, dataset.width)))
+        photo = torch.from_numpy(np.asarray(dataset.images[i, ..., :3]))[rows][:, columns].reshape(-1, 3)
+        colours.append(photo[near].numpy())
+    return np.concatenate(points), np.concatenate(colours)
+
+
+def _size(dataset: Dataset, n: int) -> tuple[int, int]:
+    """The height and width of an image of about n pixels, or of the photos where these have fewer."""
+    stride = max(1.0, math.sqrt(dataset.height * dataset.width / n))
+    return max(1, round(dataset.height / stride)), max(1, round(dataset.width / stride))
+
+
+def _points(field: RadianceField, rays_o: Tensor, rays_d: Tensor) -> np.ndarray:
+    """[n, 3] where half of each ray's light is gone."""
+    points = [rays_o[:0]]
+    for o, d in zip(rays_o.split(CHUNK), rays_d.split(CHUNK)):
+        rendered = field.render(o, d, *SAMPLES)
+        at = (rendered.weights.cumsum(1) < 0.5).sum(1, keepdim=True).clamp(max=SAMPLES[1] - 1)
+        points.append(o + rendered.distances.gather(1, at) * d)
     return torch.cat(points).numpy()
 
 

@@ -2,56 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from scipy import ndimage
 from torch import Tensor
 
+from splitnerf.separation.foot import LOW, Foot, find_foot
+from splitnerf.separation.table import Table
+
 CELLS = 96  # along an edge of the cube
 HALF = 1.6  # of that edge, scene units; parts that reach out of the ball of radius 1 may reach so far above a table
 LEAST_POINTS = 3  # seen in a cell that is taken
-LEAST_HEIGHT, LARGEST_HEIGHT = 0.006, 0.06  # over the table, at which things begin, scene units
-ON_TABLE = 0.05  # height within which points are the table's, scene units
-NOISE = 2.5  # standard deviations of the table's points by which things stand out
 LARGEST_SHARE = 0.05  # of the largest part's cells that another part needs
 STANDS_OVER = 1.0  # horizontal distance of another part's middle from the largest one's, in the latter's radii
 GROWN = 2  # cells by which the region is larger than what was seen
-LOW = 0.05  # height over a table up to which it is larger by one cell alone, scene units
-
-
-@dataclass(frozen=True)
-class Table:
-    """A plane: its unit normal [3], upward, the product of the normal with the plane's points, and the height over it at which
-    things begin, scene units."""
-
-    normal: np.ndarray
-    offset: float
-    height: float = LARGEST_HEIGHT
-
-    @classmethod
-    def through(cls, normal: np.ndarray, offset: float, points: np.ndarray) -> Table:
-        """The table on this plane, with a height by how far the points [n, 3] that photos show of it scatter."""
-        apart = np.abs(points @ normal - offset)
-        deviation = 1.4826 * float(np.median(apart[apart < ON_TABLE]))
-        return cls(normal, offset, min(max(NOISE * deviation, LEAST_HEIGHT), LARGEST_HEIGHT))
-
-    def heights(self, points: np.ndarray) -> np.ndarray:
-        """Heights [...] of points [..., 3] over the table."""
-        return points @ self.normal - self.offset
 
 
 class Region:
-    """Cells of the cube [-HALF, HALF]^3 that hold the object, and the table that bounds them.
+    """Cells of the cube [-HALF, HALF]^3 that hold the object; near a table, its foot in place of cells.
 
     Args:
         cells: [CELLS, CELLS, CELLS] bool.
         table: The table or None.
+        foot: The object's foot; None where the cells go down to the table.
     """
 
-    def __init__(self, cells: np.ndarray, table: Table | None):
-        self.cells, self.table = torch.from_numpy(cells), table
+    def __init__(self, cells: np.ndarray, table: Table | None, foot: Foot | None = None):
+        self.cells, self.table, self.foot = torch.from_numpy(cells), table, foot
 
     def middle(self) -> Tensor:
         """[3] the middle of the cells."""
@@ -63,10 +40,17 @@ class Region:
         within = ((index >= 0) & (index < CELLS)).all(-1)
         x, y, z = index.clamp(0, CELLS - 1).unbind(-1)
         inside = within & self.cells[x, y, z]
-        if self.table is not None:
-            normal = torch.from_numpy(self.table.normal.astype(np.float32))
-            inside &= points @ normal > self.table.offset + 0.5 * self.table.height
-        return inside
+        if self.table is None:
+            return inside
+        heights = points @ torch.from_numpy(self.table.normal.astype(np.float32)) - self.table.offset
+        if self.foot is None:
+            return inside & (heights > 0.5 * self.table.height)
+        return torch.where(heights > LOW, inside, self.foot.holds(points) & (heights > -LOW))
+
+    def with_foot(self, points: np.ndarray, colours: np.ndarray) -> Region:
+        """The region, near its table by points [n, 3] that photos show there and their colours [n, 3]."""
+        held = self.holds(torch.from_numpy(points)).numpy() & (self.table.heights(points) > LOW)
+        return Region(self.cells.numpy(), self.table, find_foot(self.table, points, colours, points[held]))
 
 
 def find_region(points: np.ndarray, table: Table | None) -> Region | None:
@@ -101,11 +85,7 @@ def find_region(points: np.ndarray, table: Table | None) -> Region | None:
         if np.linalg.norm(np.median(across(cells), axis=0) - middle) <= reach:
             taken[tuple(cells.T)] = True
     taken = filled(taken) if table is None else down_to(table, filled(taken))
-    once, grown = (ndimage.binary_dilation(taken, np.ones((3, 3, 3)), iterations=n) for n in (1, GROWN))
-    if table is not None:  # beside the object's foot stands the table
-        centres = ((np.argwhere(np.ones_like(grown)) + 0.5) * (2 / CELLS) - 1) * HALF
-        low = (table.heights(centres) < LOW).reshape(grown.shape)
-        grown = np.where(low, once, grown)
+    grown = ndimage.binary_dilation(taken, np.ones((3, 3, 3)), iterations=GROWN)
     return Region(grown, table)
 
 

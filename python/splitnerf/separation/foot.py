@@ -1,0 +1,141 @@
+"""Where an object meets its table: told from many points that photos show, and by colour at the edge.
+
+One point near the table says little, as its height is less certain than a thin foot is high. The median height of all points
+over one cell of the table is certain enough: a plinth of three millimetres stands out. Its edge is where the colour changes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy import ndimage
+from skimage.segmentation import random_walker
+from torch import Tensor
+
+from splitnerf.separation.table import Table
+
+HALF = 1.6  # half the edge of the map, scene units
+FEWEST, MOST = 40, 320  # cells along that edge
+LOW = 0.06  # height over the table up to which the map decides, scene units
+BLUR = 1.5  # standard deviation of the weights with which neighbouring cells count, in cells
+ENOUGH = 10  # points in a cell that tell it fully; the cells are so large that most have as many
+LEAST_HEIGHT = 0.004  # over the table, at which cells stand out, scene units
+NOISE = 3.0  # standard deviations of the table's cells by which cells stand out
+GAP = 3  # cells that close holes in what stands over the foot
+WITHIN, BEYOND = 2, 4  # cells on both sides of the edge of what stands out, on which the colour decides
+CONTRAST = 130.0  # of colours that are unlike, see skimage.segmentation.random_walker
+
+
+class Foot:
+    """The part of a table that an object stands on or hides.
+
+    Args:
+        table: The table.
+        inside: [r, r] float32, positive on that part; rows along the first of `table.axes`.
+    """
+
+    def __init__(self, table: Table, inside: np.ndarray):
+        self._inside = torch.from_numpy(inside)
+        self._axes = torch.from_numpy(table.axes.astype(np.float32))
+
+    def holds(self, points: Tensor) -> Tensor:
+        """[...] bool, whether points [..., 3], scene units, lie over the foot."""
+        places = (points @ self._axes.T) * (1 / HALF)
+        asked = places.reshape(1, -1, 1, 2).flip(-1)
+        inside = torch.nn.functional.grid_sample(self._inside[None, None], asked, align_corners=False)
+        return (inside.view(points.shape[:-1]) > 0) & (places.abs() < 1).all(-1)
+
+
+def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: np.ndarray) -> Foot:
+    """The foot of an object.
+
+    Args:
+        table: The table.
+        points: [n, 3] what photos show near the table, scene units.
+        colours: [n, 3] the photos' colours there.
+        standing: [m, 3] points of the object above its foot.
+    """
+    heights = table.heights(points)
+    chosen = np.abs(heights) < LOW
+    heights, places, colours = heights[chosen], points[chosen] @ table.axes.T, colours[chosen]
+    n = _cells_for(places)
+    index = _index(places, n)
+    medians, counts = _medians(index, heights, n)
+    over = np.zeros(n * n, bool)
+    over[_index(standing @ table.axes.T, n)] = True
+    over = ndimage.binary_closing(np.pad(over.reshape(n, n), GAP + 1), iterations=GAP)[GAP + 1 : -GAP - 1, GAP + 1 : -GAP - 1]
+    stands_out = _standing_out(medians, counts, over)
+    colour = np.stack([_medians(index, channel, n)[0] for channel in colours.T], axis=-1)
+    return Foot(table, _by_colour(stands_out, colour))
+
+
+def _standing_out(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> np.ndarray:
+    """[r, r] bool, the cells that are higher than the table and hang together below what is over them.
+
+    Args:
+        medians, counts: [r, r] the median heights of points, and their numbers.
+        over: [r, r] bool, what the object stands or hangs over.
+    """
+    weights = np.minimum(counts / ENOUGH, 1.0)
+    others = (weights > 0) & ~over
+    deviation = 1.4826 * np.median(np.abs(_smoothed(medians, weights)[others])) if others.any() else 0.0
+    least = max(LEAST_HEIGHT, NOISE * deviation)
+    heights = medians.clip(0.0, 2 * least)  # the edge is half of the way up, however high the object is there
+    hidden = over & (counts == 0)
+    heights[hidden], weights[hidden] = 2 * least, 1.0
+    out = _smoothed(heights, weights) > least
+    parts, _ = ndimage.label(out)
+    own = np.unique(parts[over & out])
+    return ndimage.binary_fill_holes(np.isin(parts, own[own > 0]))
+
+
+def _by_colour(foot: np.ndarray, colour: np.ndarray) -> np.ndarray:
+    """[r, r] float32 in [-.5, .5]: a region [r, r] whose edge is moved to where the colour changes.
+
+    Source: Grady 2006 (Random Walks for Image Segmentation).
+    """
+    result = np.full(foot.shape, -0.5, np.float32)
+    if not foot.any():
+        return result
+    certain = ndimage.binary_erosion(foot, iterations=WITHIN)
+    parts, n = ndimage.label(foot)
+    thin = np.setdiff1d(np.arange(1, n + 1), parts[certain])
+    certain |= np.isin(parts, thin)
+    wide = ndimage.binary_dilation(foot, iterations=BEYOND)
+    window = tuple(slice(max(0, k.min() - 2), k.max() + 3) for k in np.nonzero(wide))
+    labels = np.where(certain, 1, np.where(wide, 0, 2))[window]
+    if (labels == 0).any() and (labels == 2).any():
+        shares = random_walker(
+            colour[window], labels, beta=CONTRAST, mode="cg_j", channel_axis=-1, return_full_prob=True
+        )[0]  # fmt: skip
+        result[window] = shares - 0.5
+        return result
+    return np.where(foot, 0.5, -0.5).astype(np.float32)
+
+
+def _cells_for(places: np.ndarray) -> int:
+    """The number of cells along the map's edge for points [n, 2] of the table."""
+    coarse = np.bincount(_index(places, FEWEST), minlength=FEWEST**2)
+    density = np.median(coarse[coarse > 0]) if len(places) else 0.0
+    return int(np.clip(FEWEST * np.sqrt(density / ENOUGH), FEWEST, MOST))
+
+
+def _index(places: np.ndarray, n: int) -> np.ndarray:
+    """The cells [k] of a map of n x n that hold places [k, 2] of the table."""
+    row, column = np.floor((places / HALF + 1) * (0.5 * n)).astype(int).clip(0, n - 1).T
+    return row * n + column
+
+
+def _medians(index: np.ndarray, values: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """[n, n] the medians of values [k] in their cells [k], 0 in cells without one, and the numbers of values."""
+    counts = np.bincount(index, minlength=n * n)
+    ordered = np.append(values[np.lexsort((values, index))], 0.0)
+    middle = np.cumsum(counts) - counts + counts // 2
+    medians = np.where(counts > 0, ordered[middle.clip(0, len(values))], 0.0)
+    return medians.reshape(n, n), counts.reshape(n, n)
+
+
+def _smoothed(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """[r, r] the weighted means around each cell; 0 where nothing near it has a weight."""
+    total = ndimage.gaussian_filter(weights, BLUR)
+    return np.where(total > 1e-3, ndimage.gaussian_filter(values * weights, BLUR) / np.maximum(total, 1e-3), 0.0)
