@@ -14,6 +14,7 @@ from splitnerf.config import Config
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, spread
 from splitnerf.data.environment import read_environment
+from splitnerf.data.exposures import EXPOSURES
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import over_background, read_image
 from splitnerf.data.json_files import read_json, write_json
@@ -148,7 +149,8 @@ def score_run(
     run: Path, model: SceneModel, grid: OccupancyGrid, views: Dataset, mesh: trimesh.Trimesh | None, timings: dict[str, float],
     maps: dict[str, Path], spp: int,
 ) -> Evaluated:  # fmt: skip
-    """Scores what a run delivers: the asset and its light by path tracing after a last stage, else the trained fields.
+    """Scores what a run delivers: the asset and its light by path tracing after a last stage, else the trained fields. Where
+    the run learned exposures, each view gets one by its own image.
 
     Args:
         run: The run's folder.
@@ -160,14 +162,15 @@ def score_run(
         spp: Paths a pixel.
     """
     asset = read_asset(run / "mesh.glb") if (run / "mesh.glb").is_file() else None
+    free = (run / EXPOSURES).is_file()
     if is_refined(run):
         timings["last stage"] = read_json(run / RECORD, "seconds")["seconds"]
         seconds = round(timings["training"] + timings["last stage"], 1)
-        evaluated = score_asset(asset, read_environment(run / "environment.exr"), views, maps, spp, seconds)
+        evaluated = score_asset(asset, read_environment(run / "environment.exr"), views, maps, spp, seconds, free)
         return replace(evaluated, scores=evaluated.scores | {"last_stage": last_stage_summary(run)})
     relit, relight = (None, None) if asset is None else relit_scores(AssetRenderer(asset), views, maps, spp)
     mesh = asset_mesh(asset) if mesh is None and asset is not None else mesh
-    scores, predictions = evaluate_scene(model, grid, views, mesh, timings["training"], relight, load_distance())
+    scores, predictions, views = evaluate_scene(model, grid, views, mesh, timings["training"], relight, load_distance(), free)
     return Evaluated(scores, views, predictions, load_view_truths(views), relit)
 
 

@@ -16,6 +16,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb, over_background, write_image
 from splitnerf.data.normalisation import transform_points
 from splitnerf.data.truth import load_scene_truth, load_view_truths
+from splitnerf.evaluate.exposure import exposed_like
 from splitnerf.evaluate.lpips import Distance
 from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.export.environment import write_environment
@@ -179,17 +180,20 @@ def evaluate_scene(
     seconds: float,
     relight: dict | None = None,
     distance: Distance | None = None,
-) -> tuple[dict, list[dict[str, np.ndarray]]]:
+    free_exposure: bool = False,
+) -> tuple[dict, list[dict[str, np.ndarray]], Dataset]:
     """Renders all test views from the fields and scores them; see :func:`splitnerf.evaluate.protocol.evaluate_maps`.
 
     Returns:
-        The contents of evaluation.json and the rendered maps.
+        The contents of evaluation.json, the rendered maps, and the views, with exposures that were fitted with `free_exposure`.
     """
     predictions = [render_maps(model, grid, test, i) for i in tracked(range(len(test)), "evaluation, view")]
+    if free_exposure:
+        test = exposed_like(test, predictions)
     truth = load_scene_truth(test.root, test.origin)
     light = model.light.panorama(model.config.export.environment_height).cpu().numpy()
     result = evaluate_maps(
         predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1),
         relight=relight, distance=distance,
     )  # fmt: skip
-    return result | {"scored": "fields"}, predictions
+    return result | {"scored": "fields"}, predictions, test

@@ -14,6 +14,7 @@ import torch
 from splitnerf.config import Config
 from splitnerf.config.settings import UNLIMITED
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
+from splitnerf.data.exposures import EXPOSURES, write_exposures
 from splitnerf.data.frames import has_test_split, refuse_data, split_rule
 from splitnerf.data.json_files import write_json
 from splitnerf.data.reading import SEPARATED, Reading, is_separated
@@ -36,7 +37,7 @@ from splitnerf.training.metrics import METRICS
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 RUN_FILES = (
     "config.toml", "checkpoint.pt", METRICS, "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
-    "evaluation.json", "report.html", ORIGIN, *LAST_STAGE_FILES,
+    "evaluation.json", "report.html", ORIGIN, EXPOSURES, *LAST_STAGE_FILES,
 )  # fmt: skip
 
 
@@ -135,6 +136,9 @@ def reconstruct(
         trained = training.complete()
         if not trained.finished:
             return trained, None
+        if trained.exposures is not None:
+            dataset = dataset.exposed(trained.exposures)
+            write_exposures(run, dataset)
         return trained, finish(trained, dataset, test, run, resume=resume)
 
 

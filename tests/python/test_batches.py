@@ -15,9 +15,9 @@ def drawn(seed: int = 0, **settings):
     config = tiny(box=1.3, eikonal_points=4000, smoothness_points=3000, smoothness_radius=0.05, **settings)
     source = SimpleNamespace(
         generator=torch.Generator().manual_seed(seed),
-        draw=lambda n: (torch.full((n, 3), 1.0), torch.full((n, 3), 2.0), torch.full((n, 4), 3.0)),
+        draw=lambda n: (torch.full((n, 3), 1.0), torch.full((n, 3), 2.0), torch.full((n, 4), 3.0), torch.arange(n) % 3),
     )
-    return draw_batch(source, 2000, config)
+    return draw_batch(source, 2000, config, torch.ones(3, 3))
 
 
 def test_rays_and_pixels_are_those_of_the_source():

@@ -41,6 +41,8 @@ SETTINGS = {
     "data.eval_mode": ("eval_mode", "auto", "auto", OURS),
     "data.mask_kind": ("mask_kind", "auto", "auto", OURS),
     "data.max_memory": ("max_memory", 0.0, 0.0, OURS),
+    "exposure.refine": ("exposure_refine", "auto", "auto", OURS),
+    "exposure.white_balance": ("exposure_white_balance", False, False, OURS),
     "separation.share": ("separation_share", 0.15, 0.15, OURS),
     "separation.steps": ("separation_steps", 6000, 6000, OURS),
     "surface.box": ("box", 1.5, 1.5, PAPER),
@@ -198,6 +200,7 @@ LIMITS = {
 CHOICES = {
     "data.eval_mode": "auto, all, fraction, filename",
     "data.mask_kind": "auto, object, ignore",
+    "exposure.refine": "auto, yes, no",
     "surface.table_dtype": "float32, float16, bfloat16", "surface.normals": "analytic, finite_difference",
     "materials.inputs": "outputs, grid", "light.kind": "mlp, pyramid", "light.activation": "softplus, exp",
     "shading.method": "split, summed", "shading.fresnel": "exact, paper, code", "shading.query": "mean, reflection",

@@ -100,7 +100,7 @@ def test_a_capacity_changes_roundings_alone(data):
     mesh.request(0.5)
     grid = SimpleNamespace(cells=torch.ones(16, 16, 16, dtype=torch.uint8))
     take_step = Step(model, grid, mesh, generator)
-    batch = draw_batch(source, 200, config)
+    batch = draw_batch(source, 200, config, torch.ones(len(dataset), 3))
     found = take_step.find(batch, 0.9)
     n = len(found.directions)
     padded_found = take_step.find(batch, 0.9, n + 77)

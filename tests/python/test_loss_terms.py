@@ -33,7 +33,9 @@ def rendered():
     origins = 3.0 * unit(torch.randn(n, 3, generator=g))
     directions = unit(0.4 * torch.randn(n, 3, generator=g) - origins)
     target = 0.9 * torch.rand(n, 4, generator=g)  # nowhere saturated
-    batch = Batch(origins, directions, target, torch.rand(n, 3, generator=g), torch.rand(n, generator=g), draw_probes(config, g))
+    background, jitter = torch.rand(n, 3, generator=g), torch.rand(n, generator=g)
+    photo = torch.zeros(n, dtype=torch.int64), torch.ones(n, 3)
+    batch = Batch(origins, directions, target, background, jitter, *photo, draw_probes(config, g))
     light = model.evaluate_light()
     ray = render_rays(model, light, find_samples(model, grid.cells, *batch.rays, probes=batch.probes))
     return config, batch, ray, loss_terms(model, light, batch, ray, None, None, g, 0, 0.0)

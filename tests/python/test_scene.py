@@ -340,6 +340,17 @@ class TestHull:
         far = (grid.centres()[:, :2].norm(dim=1) > RADIUS + 0.4).view(32, 32, 32)
         assert not hull[far].any()
 
+    def test_one_mask_of_many_that_is_cut_short_does_not_cut_the_hull(self):
+        size, focal, distance = 80, 50.0, 4.0
+        y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
+        disc = ((x - 40) ** 2 + (y - 40) ** 2) < (focal * RADIUS / math.sqrt(distance**2 - RADIUS**2)) ** 2
+        lenses = torch.tensor([[focal, focal, 40.0, 40.0]] * 40)
+        inside = (OccupancyGrid(32, 1.5).centres().norm(dim=1) < RADIUS).view(32, 32, 32)
+        for n_cut, whole in ((1, True), (4, False)):
+            masks = disc.float().expand(40, -1, -1).clone()
+            masks[:n_cut] *= y < 40
+            assert bool(visual_hull(32, 1.5, masks, orbit(40), lenses)[inside].all()) == whole
+
     def test_each_view_carves_by_its_own_mask_place_and_lens(self):
         """Faint masks: the sphere from +x, and its upper half from +y by a lens of its own."""
         size, distance = 160, 4.0

@@ -50,6 +50,17 @@ class Data:
 
 
 @dataclass(frozen=True)
+class Exposure:
+    """How bright the photos are beside each other."""
+
+    refine: str = setting(
+        "auto", "whether each photo's exposure is learned; auto: of photos that cameras wrote, which are JPEG or state exposures",
+        choices=("auto", "yes", "no"),
+    )  # fmt: skip
+    white_balance: bool = setting(False, "whether each channel has an exposure of its own")
+
+
+@dataclass(frozen=True)
 class Separation:
     """How the object is found in photos that have no masks."""
 

@@ -14,6 +14,7 @@ import tomli_w
 from splitnerf.config.groups import (
     Data,
     Export,
+    Exposure,
     Light,
     Losses,
     Materials,
@@ -59,6 +60,7 @@ RENAMED = {
     "losses.smoothness_weight": "normal_smoothness", "losses.light_form": "light_loss_form",
     "losses.occlusion_form": "occlusion_loss_form", "losses.metal_form": "metal_loss_form",
     "refinement.enabled": "refine", "refinement.share": "refinement_share", "refinement.sweeps": "refinement_sweeps",
+    "exposure.refine": "exposure_refine", "exposure.white_balance": "exposure_white_balance",
     "separation.share": "separation_share", "separation.steps": "separation_steps",
     "export.resolution": "export_resolution", "export.faces": "export_faces",
     "export.texture_size": "export_texture_size", "export.environment_height": "export_environment_height",
@@ -75,6 +77,7 @@ class Config:
 
     run: Run = field(default_factory=Run)
     data: Data = field(default_factory=Data)
+    exposure: Exposure = field(default_factory=Exposure)
     separation: Separation = field(default_factory=Separation)
     surface: Surface = field(default_factory=Surface)
     materials: Materials = field(default_factory=Materials)

@@ -24,6 +24,7 @@ from splitnerf.errors import InputError
 from splitnerf.notes import note_once
 
 SURROUNDINGS = "surroundings.exr"
+JPEG = (".jpg", ".jpeg")
 HULL_VIEWS = 40
 MEAN_EDGE = 1000  # pixels along the shorter edge of a photo, about, from which a fingerprint takes every other one, or fewer
 NEARLY_ALL, NEARLY_ALL_EDGE = 0.6, 0.5  # medians of what a mask keeps, and of the image's edge, if it is no object's
@@ -49,7 +50,7 @@ class Dataset:
             does not cover; the others are 0 in `images`. None where all are known.
         origin: [3] float64, the point of the data's files that is the origin of the data's world here; 0 but where the
             files' origin is too far away for float32.
-        exposures: [n] float64, the factors by which the images' linear values were divided; None stands for 1.
+        exposures: [n] or [n, 3] float64, the factors by which the images' linear values were divided; None stands for 1.
         surroundings: [h, 2 h, 4] float32, equirectangular: linear radiance that the photos see around the object, and how
             well it was seen, in [0, 1]; None where the data have no such map.
         masked: Whether alpha says where the object is; otherwise it is 1.
@@ -101,6 +102,15 @@ class Dataset:
         poses = self.poses.astype(np.float64)
         poses[:, :3, 3] = self.transform_to_world(poses[:, :3, 3])
         return poses
+
+    @property
+    def photographed(self) -> bool:
+        """Whether the images look as cameras write them: JPEG, or with exposures."""
+        return bool((self.exposures != 1).any()) or any(path.suffix.lower() in JPEG for path in self.image_paths)
+
+    def exposed(self, exposures: np.ndarray) -> Dataset:
+        """The split with other exposures [n] or [n, 3]."""
+        return replace(self, images=Photos(self.images.codes, exposures), exposures=exposures)
 
     def in_box(self, box_from_world: np.ndarray) -> Dataset:
         """The split in another internal frame, such as that of a run; `box_from_world` is as in `Dataset`."""

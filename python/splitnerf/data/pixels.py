@@ -46,13 +46,13 @@ class Photos:
 
     Args:
         codes: [n, H, W, 4] uint8 or uint16, the values times 255 or 65535; or float32, the values. In memory or in a file.
-        exposures: [n] factors by which linear values are divided on reading; None stands for 1.
+        exposures: [n] or [n, 3] factors by which linear values are divided on reading; None stands for 1.
     """
 
     def __init__(self, codes: np.ndarray, exposures: np.ndarray | None = None):
         self.codes, self.shape, self.file = codes, codes.shape, file_of(codes)
         plain = exposures is None or bool((exposures == 1).all())
-        self.exposures = None if plain else np.asarray(exposures, np.float32)
+        self.exposures = None if plain else per_channel(exposures).astype(np.float32)
 
     def __len__(self) -> int:
         return len(self.codes)
@@ -70,7 +70,7 @@ class Photos:
         if self.exposures is None:
             return values
         of_each = np.ones((len(self), 1, 1, 4), np.float32)
-        of_each[:, 0, 0, :3] = self.exposures[:, None]
+        of_each[:, 0, 0, :3] = self.exposures
         factor = np.broadcast_to(of_each, self.shape)[index]
         return at_unit_exposure(*(torch.from_numpy(np.array(x, order="C")) for x in (values, factor))).numpy()
 
@@ -100,24 +100,24 @@ class PixelReader:
         self.file = file_of(codes) if device.type == "cpu" else None
         codes = codes.view(np.int16) if codes.dtype == np.uint16 else codes  # tensors of which all devices can index
         self.codes = torch.from_numpy(codes).to(device).view(-1, 4)
-        self.exposures = None if photos.exposures is None else torch.from_numpy(photos.exposures).to(device)
 
     def __len__(self) -> int:
         return len(self.codes)
 
-    def read(self, index: Tensor, view: Tensor) -> Tensor:
-        """[k, 4] float32, pixels [k] counted through all photos, which are in photos `view` [k]."""
+    def read(self, index: Tensor) -> Tensor:
+        """[k, 4] float32, pixels [k] counted through all photos, sRGB at the photos' own exposures."""
         if self.file is not None:
             size = 4 * self.codes.element_size()
             for page in np.unique(index.numpy() * size // mmap.PAGESIZE).tolist():
                 _ask_for(self.file, page * mmap.PAGESIZE, size)
         values = self.codes[index]
         values = (values.int() & 0xFFFF if values.dtype == torch.int16 else values).float()
-        values = values * self.scale if self.scale != 1 else values
-        if self.exposures is None:
-            return values
-        factor = self.exposures[view][:, None].expand(-1, 3)
-        return torch.cat([at_unit_exposure(values[:, :3], factor), values[:, 3:]], dim=1)
+        return values * self.scale if self.scale != 1 else values
+
+
+def per_channel(exposures: np.ndarray) -> np.ndarray:
+    """[n, 3] exposures of photos [n] or [n, 3]."""
+    return np.broadcast_to(np.asarray(exposures).reshape(len(exposures), -1), (len(exposures), 3))
 
 
 def at_unit_exposure(values: Tensor, exposures: Tensor) -> Tensor:

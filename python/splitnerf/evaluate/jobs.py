@@ -18,6 +18,7 @@ from splitnerf.data.reading import Reading
 from splitnerf.data.relit import PROTOCOLS, relight_maps
 from splitnerf.data.truth import ViewTruth, load_scene_truth, load_view_truths
 from splitnerf.errors import InputError
+from splitnerf.evaluate.exposure import exposed_like
 from splitnerf.evaluate.asset import asset_predictions, environment_beside
 from splitnerf.evaluate.lpips import load_distance
 from splitnerf.evaluate.protocol import evaluate_maps
@@ -122,8 +123,9 @@ def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None 
 
 
 def score_asset(
-    asset: Asset, environment: np.ndarray | None, views: Dataset, maps: dict[str, Path], spp: int, seconds: float | None = None
-) -> Evaluated:
+    asset: Asset, environment: np.ndarray | None, views: Dataset, maps: dict[str, Path], spp: int, seconds: float | None = None,
+    free_exposure: bool = False,
+) -> Evaluated:  # fmt: skip
     """Scores an asset by path tracing.
 
     Args:
@@ -133,10 +135,13 @@ def score_asset(
         maps: Environment maps for relit views, by name; none for no such views.
         spp: Paths a pixel.
         seconds: The time that the asset took, to record.
+        free_exposure: Whether each photo has an exposure of its own, which is fitted.
     """
     truths, truth = load_view_truths(views), load_scene_truth(views.root, views.origin)
     renderer = AssetRenderer(asset)
     predictions = asset_predictions(renderer, views, environment, spp)
+    if free_exposure and environment is not None:
+        views = exposed_like(views, predictions)
     relit, relight_part = relit_scores(renderer, views, maps, spp)
     scores = evaluate_maps(
         predictions, views, truths, environment, truth.light, asset_mesh(asset), truth.mesh, seconds,

@@ -12,6 +12,7 @@ import numpy as np
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
+from splitnerf.data.exposures import with_exposures
 from splitnerf.data.environment import read_environment
 from splitnerf.data.frames import refuse_data
 from splitnerf.data.gltf import read_asset
@@ -220,7 +221,7 @@ def refine_run(
     refuse_data(out)
     with held(out):
         read_source(source)
-        dataset = load_dataset(data, "train", downscale, reading)
+        dataset = with_exposures(load_dataset(data, "train", downscale, reading), run)
         try:
             refined = refine_folder(source, dataset, out, settings, resume=resume)
         except InputError as error:

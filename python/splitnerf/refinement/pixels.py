@@ -12,6 +12,7 @@ from torch.nn import functional as F
 from splitnerf import _core
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb, srgb_to_linear
+from splitnerf.data.pixels import per_channel
 
 MIN_ALPHA = 0.99  # of a pixel that the object covers
 MOST = 1 << 25  # covered pixels that a fit holds, about: 1.4 GB
@@ -92,7 +93,7 @@ def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int, 
         chosen.append(np.packbits(mask))  # an eighth of a byte a pixel
         count += np.count_nonzero(mask)
     share, random, size = min(1.0, most / max(count, 1)), np.random.default_rng(seed), dataset.height * dataset.width
-    white = linear_to_srgb((1 / dataset.exposures).astype(np.float32))
+    white = linear_to_srgb((1 / per_channel(dataset.exposures)).astype(np.float32))
     parts = []
     for i, bits in enumerate(chosen):
         numbers = np.flatnonzero(np.unpackbits(bits, count=size))

@@ -16,6 +16,7 @@ from splitnerf.render.masks import widened
 DENSITY_CUTOFF = 7.0  # where |f| > cutoff / s, the NeuS density is below e^-7 of its peak
 LIPSCHITZ = 1.25  # bound on |grad f|; the eikonal loss keeps it in practice
 REFRESHED_SHARE = 0.1  # share of the cells far from the surface that an update evaluates
+WRONG_MASKS = 0.03  # share of the views that may miss a cell of the visual hull
 DECAY, MIN_CELL_OPACITY, ALL_CELLS_UNTIL = 0.95, 1e-3, 256
 
 
@@ -130,7 +131,8 @@ def evaluate(sdf: Callable[[Tensor], Tensor], points: Tensor) -> Tensor:
 
 
 def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intrinsics: Tensor) -> Tensor:
-    """[r, r, r] bool: the cells whose centre, within about a cell, projects into the mask of every view that sees it.
+    """[r, r, r] bool: the cells whose centre, within about a cell, projects into the mask of every view that sees it, but for a
+    few (:data:`WRONG_MASKS`): one mask that is cut short must not cut the object.
 
     Args:
         resolution: Cells along an edge.
@@ -141,10 +143,12 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
     """
     grid = OccupancyGrid(resolution, box, device=masks.device)
     centres, cell = grid.centres(), 2 * box / resolution
-    inside = torch.ones(len(centres), dtype=torch.bool, device=masks.device)
     n, height, width = masks.shape
+    allowed = int(WRONG_MASKS * n)
+    misses = torch.zeros(len(centres), dtype=torch.int32, device=masks.device)
     for i in range(n):
         fx, fy, cx, cy = intrinsics[i].tolist()
+        inside = (misses <= allowed).nonzero().squeeze(1)
         camera = (centres[inside] - poses[i, :3, 3]) @ poses[i, :3, :3]
         depth = -camera[:, 2]
         x, y = cx + fx * camera[:, 0] / depth, cy - fy * camera[:, 1] / depth
@@ -153,7 +157,5 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
         wide = widened(masks[i] > 0, radius)
         column, row = x.floor().long(), y.floor().long()
         seen = (depth > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        keep = ~seen
-        keep[seen] = wide[row[seen], column[seen]]
-        inside[inside.clone()] = keep
-    return inside.view((resolution,) * 3)
+        misses[inside[seen]] += ~wide[row[seen], column[seen]]
+    return (misses <= allowed).view((resolution,) * 3)

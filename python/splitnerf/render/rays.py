@@ -95,8 +95,9 @@ class PixelSource:
         self.foreground = PixelRuns.of(near, n_pixels, self.device)
         self.known = PixelRuns.of(known, n_pixels, self.device) if known else None
 
-    def draw(self, n: int) -> tuple[Tensor, Tensor, Tensor]:
-        """Draws n rays: origins [n, 3], unit directions [n, 3] and pixels [n, 4] (sRGB in [0, 1], straight alpha)."""
+    def draw(self, n: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Draws n rays: origins [n, 3], unit directions [n, 3], pixels [n, 4] (sRGB of the photos as they are, in [0, 1], straight
+        alpha) and the photos' numbers [n]."""
         n_near = int(n * self.share) if len(self.foreground) else 0
         draw = {"generator": self.generator, "device": self.device}
         near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), **draw)]
@@ -106,4 +107,5 @@ class PixelSource:
         row = index // self.width
         view, column = row // self.height, index - row * self.width
         y = row - view * self.height
-        return self.origins[view], through_pixels(self.matrices[view], column + 0.5, y + 0.5), self.pixels.read(index, view)
+        rays_d = through_pixels(self.matrices[view], column + 0.5, y + 0.5)
+        return self.origins[view], rays_d, self.pixels.read(index), view

@@ -10,6 +10,7 @@ import torch
 from torch.nn.functional import smooth_l1_loss
 
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.pixels import at_unit_exposure, per_channel
 from splitnerf.render.rays import PixelSource
 from splitnerf.separation.field import RadianceField, search_loss, spread_loss
 
@@ -37,16 +38,18 @@ def train_field(
     """
     torch.manual_seed(seed)
     source = PixelSource(dataset, 0.0, torch.Generator().manual_seed(seed))
+    exposures = torch.from_numpy(per_channel(dataset.exposures).astype("float32"))
     field = RadianceField()
     optimiser = torch.optim.Adam(field.parameters(), lr=RATE, betas=(0.9, 0.99), eps=1e-15, fused=True)
     started, share, step, error = time.monotonic(), 0.0, 0, None
     while share < 1.0:
         for group in optimiser.param_groups:
             group["lr"] = RATE * min(1.0, (step + 1) / WARM_UP) * LAST_RATE**share
-        rays_o, rays_d, target = source.draw(RAYS)
+        rays_o, rays_d, target, view = source.draw(RAYS)
+        colour = at_unit_exposure(target[:, :3], exposures[view]).clamp(max=1)
         rendered = field.render(rays_o, rays_d, FIRST, SECOND, jitter=True)
-        apart = rendered.colour - target[:, :3].clamp(max=1)
-        loss = smooth_l1_loss(rendered.colour, target[:, :3].clamp(max=1), beta=0.1)
+        apart = rendered.colour - colour
+        loss = smooth_l1_loss(rendered.colour, colour, beta=0.1)
         loss = loss + search_loss(rendered) + SPREAD_WEIGHT * spread_loss(rendered)
         optimiser.zero_grad(set_to_none=True)
         loss.backward()

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from splitnerf.config import Config
+from splitnerf.data.pixels import at_unit_exposure
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import ProbePoints
 
@@ -17,9 +18,11 @@ class Batch(NamedTuple):
 
     Attributes:
         rays_o, rays_d: [n, 3] origins (scene units) and unit directions.
-        target: [n, 4] sRGB values of the photos in [0, 1], straight alpha.
+        target: [n, 4] sRGB values of the photos as they are, in [0, 1], straight alpha.
         background: [n, 3] random sRGB colours in [0, 1), behind the photo and the rendering alike.
         jitter: [n] offsets of each ray's samples in [0, 1), as shares of a sample's length.
+        view: [n] int64, the photos' numbers.
+        exposure: [n, 3] the factors of the photos' linear values.
         probes: Other points that the losses evaluate.
     """
 
@@ -28,6 +31,8 @@ class Batch(NamedTuple):
     target: Tensor
     background: Tensor
     jitter: Tensor
+    view: Tensor
+    exposure: Tensor
     probes: ProbePoints
 
     @property
@@ -36,12 +41,19 @@ class Batch(NamedTuple):
         return self.rays_o, self.rays_d, self.jitter
 
 
-def draw_batch(source: PixelSource, n_rays: int, config: Config) -> Batch:
-    """Rays through ``n_rays`` random pixels, drawn by the source's generator."""
+def draw_batch(source: PixelSource, n_rays: int, config: Config, exposures: Tensor) -> Batch:
+    """Rays through ``n_rays`` random pixels, drawn by the source's generator; `exposures` [views, 3] are the photos'.
+
+    Where samples are added as sRGB, colours at another exposure are not known: the photos are brought to an exposure of 1.
+    """
     g = source.generator
-    rays_o, rays_d, target = source.draw(n_rays)
+    rays_o, rays_d, target, view = source.draw(n_rays)
+    exposure = exposures[view]
+    if config.shading.compositing == "srgb":
+        target = torch.cat([at_unit_exposure(target[:, :3], exposure), target[:, 3:]], dim=1)
+        exposure = torch.ones_like(exposure)
     background, jitter = (torch.rand(*shape, generator=g, device=g.device) for shape in ((n_rays, 3), (n_rays,)))
-    return Batch(rays_o, rays_d, target, background, jitter, draw_probes(config, g))
+    return Batch(rays_o, rays_d, target, background, jitter, view, exposure, draw_probes(config, g))
 
 
 def draw_probes(config: Config, generator: torch.Generator) -> ProbePoints:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -32,6 +33,7 @@ from splitnerf.training.checkpoint import (
     restored_grid,
     save_checkpoint,
 )
+from splitnerf.training.exposure import BEGIN, PhotoExposures
 from splitnerf.training.finite import GradientWatch, check_state, explain_loss
 from splitnerf.training.graphs import GraphedStep
 from splitnerf.training.losses import SeenLight, Term
@@ -49,7 +51,7 @@ ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the o
 @dataclass
 class TrainedScene:
     """The scene that a finished or interrupted training leaves in memory; `n_new` of its steps were made since it began or
-    was resumed."""
+    was resumed. `exposures` are the photos' [n, 3] where they were learned, else None."""
 
     model: SceneModel
     grid: OccupancyGrid
@@ -58,6 +60,7 @@ class TrainedScene:
     seconds: float
     finished: bool
     n_new: int
+    exposures: np.ndarray | None
 
 
 class StepNumbers(NamedTuple):
@@ -124,6 +127,7 @@ class Training:
         torch.manual_seed(c.run.seed)
         self.generator = torch.Generator(device).manual_seed(c.run.seed)
         self.source = source = PixelSource(dataset, c.sampling.foreground_share, self.generator)
+        self.exposures = PhotoExposures(dataset, c, device)
         self.model = SceneModel(c).to(device)
         self.optimiser = make_optimiser(self.model, c)
         hull = None
@@ -159,6 +163,8 @@ class Training:
         for name in ("step", "seconds", "n_rays", "previewed_at"):
             setattr(self, name, content[name])
         self.psnr_mean = content.get("psnr_mean")
+        if "exposures" in content:
+            self.exposures.restore(content["exposures"])
         self.model.open_levels(self.progress)
         self.mesh.restore(content)
         if content["occlusion_light"]:
@@ -192,7 +198,7 @@ class Training:
             self.run / "checkpoint.pt", config=self.config, fingerprint=self.fingerprint,
             state=dict(
                 step=self.step, seconds=self.seconds, n_rays=self.n_rays, previewed_at=self.previewed_at,
-                psnr_mean=self.psnr_mean, model=self.model.state_dict(),
+                psnr_mean=self.psnr_mean, exposures=self.exposures.sums, model=self.model.state_dict(),
                 optimiser={"state": self.optimiser.state_dict()["state"]},  # the rates are those of settings and step
                 device=self.generator.device.type, generator=self.generator.get_state(),
                 torch_generator=torch.get_rng_state(), occupancy=self.grid.values, cells=self.grid.cells,
@@ -243,7 +249,7 @@ class Training:
     def advance(self, bar: Progress) -> None:
         """Makes one step: draws rays, takes gradients, moves parameters; writes a line of the log when due."""
         c, light = self.config, self.light
-        batch = draw_batch(self.source, self.n_rays, c)
+        batch = draw_batch(self.source, self.n_rays, c, self.exposures.factors)
         ray, terms = self.take_step(batch, light, self.environment, self.step, self.progress)
         if light_moves(c, self.step):
             light.backward()
@@ -256,6 +262,8 @@ class Training:
                 raise explain_loss(self.step, numbers.values, self.dataset, batch, self.model, ray)
             if self.watch.allows(self.step, numbers.largest_gradient):
                 self.optimiser.step()
+            if self.exposures.learned and self.progress > BEGIN:
+                self.exposures.learn(batch.view, batch.target, ray.mean, ray.opacity)
             psnr = -10.0 * math.log10(max(numbers.values["colour"], 1e-10))
             self.psnr_mean = psnr if self.psnr_mean is None else 0.95 * self.psnr_mean + 0.05 * psnr
         self.n_rays = next_ray_count(self.n_rays, numbers.n_samples, c)
@@ -314,7 +322,11 @@ class Training:
 
     def result(self) -> TrainedScene:
         """The scene as the training leaves it in memory."""
-        return TrainedScene(self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0, self.step - self.resumed_at)
+        exposures = self.exposures.factors.cpu().numpy().astype(np.float64) if self.exposures.learned else None
+        return TrainedScene(
+            self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0, self.step - self.resumed_at,
+            exposures,
+        )  # fmt: skip
 
 
 def check_repeatable(config: Config, device: torch.device | str) -> None:

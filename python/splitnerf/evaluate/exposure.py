@@ -1,0 +1,33 @@
+"""The exposures of photos that a run was not trained on, by its own images of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.images import srgb_to_linear
+from splitnerf.data.pixels import per_channel
+from splitnerf.data.truth import OPAQUE
+
+DARKEST, BRIGHTEST = 0.01, 0.95  # linear values that count
+
+
+def exposed_like(views: Dataset, predictions: Sequence[dict[str, np.ndarray]]) -> Dataset:
+    """Views whose exposure is that at which they are nearest to predictions: one factor a photo, the median of the ratios of
+    luminance where the object covers both; photos without such pixels stay.
+
+    Args:
+        views: The photos.
+        predictions: Maps per view, `rgb` [H, W, 3] sRGB and `alpha` [H, W].
+    """
+    factors = np.ones(len(views))
+    for i, maps in enumerate(predictions):
+        photo = views.images[i]
+        ours, theirs = (srgb_to_linear(x.astype(np.float32)).mean(-1) for x in (maps["rgb"], photo[..., :3]))
+        counts = (photo[..., 3] > OPAQUE) & (maps["alpha"] > OPAQUE)
+        counts &= (ours > DARKEST) & (theirs > DARKEST) & (theirs < BRIGHTEST)
+        if counts.any():
+            factors[i] = np.exp(np.median(np.log(theirs[counts] / ours[counts])))
+    return views.exposed(per_channel(views.exposures) * factors[:, None])

@@ -1,0 +1,73 @@
+"""The exposures of photos, learned while the scene is: no file tells them, or not exactly."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from splitnerf.config import Config
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.tensor_files import check_tensor
+from splitnerf.ops import srgb_to_linear
+
+KEEP = 0.998  # share of the sums that outlives a step
+ENOUGH = 50.0  # pixels of a photo that count as much as the start
+DARKEST, BRIGHTEST = 0.01, 0.95  # linear values of a photo's pixels that count
+FARTHEST = 1.0  # of a pixel's log from the rendering's: more is no exposure
+COVERED = 0.95  # alpha and opacity of pixels that count
+BEGIN = 0.02  # progress from which exposures are learned
+
+
+class PhotoExposures:
+    """The factor of each photo's linear values, per channel: what the photos' pixels have of those rendered, in the mean of the
+    logarithms over the pixels of past steps.
+
+    After each step the logarithms are moved to the mean that they had at the start: images do not tell the light's brightness
+    from that of all photos.
+
+    Args:
+        dataset: The photos; their exposures are the start.
+        config: The settings of the group `exposure`.
+        device: The device of the training.
+
+    Attributes:
+        learned: Whether exposures are learned at all.
+        sums: [n, 4] float32, of the logarithms and of the pixels.
+    """
+
+    def __init__(self, dataset: Dataset, config: Config, device: torch.device):
+        refine = config.exposure.refine
+        self.learned = config.shading.compositing == "linear" and (refine == "yes" or (refine == "auto" and dataset.photographed))
+        self.white_balance = config.exposure.white_balance
+        start = torch.from_numpy(dataset.exposures).float().reshape(len(dataset), -1).expand(-1, 3)
+        self.start = start.to(device).log()
+        self.sums = torch.zeros(len(dataset), 4, device=device)
+
+    def learn(self, view: Tensor, target: Tensor, mean: Tensor, opacity: Tensor) -> None:
+        """Takes in the pixels of a step.
+
+        Args:
+            view: [k] the photos' numbers.
+            target: [k, 4] sRGB values of the photos as they are, straight alpha.
+            mean: [k, 3] linear values of the rendering at an exposure of 1.
+            opacity: [k] of the rendering.
+        """
+        photo = srgb_to_linear(target[:, :3])
+        counts = (target[:, 3] > COVERED) & (opacity.detach() > COVERED)
+        counts &= ((photo > DARKEST) & (photo < BRIGHTEST)).all(1)
+        apart = photo.clamp(min=DARKEST).log() - mean.detach().clamp(min=1e-4).log() - self.start[view]
+        if not self.white_balance:
+            apart = apart.mean(1, keepdim=True).expand(-1, 3)
+        values = torch.cat([apart.clamp(-FARTHEST, FARTHEST), torch.ones_like(apart[:, :1])], dim=1)
+        self.sums.mul_(KEEP).index_add_(0, view, torch.where(counts[:, None], values, 0.0))
+
+    @property
+    def factors(self) -> Tensor:
+        """[n, 3] the factors of the photos' linear values."""
+        logs = self.sums[:, :3] / (self.sums[:, 3:] + ENOUGH)
+        return (self.start + logs - logs.mean(0)).exp()
+
+    def restore(self, sums: Tensor) -> None:
+        """Takes back the sums that a checkpoint kept. Raises ValueError where they are of other photos."""
+        check_tensor("exposures", sums, tuple(self.sums.shape), torch.float32)
+        self.sums = sums.to(self.sums.device)

@@ -1,0 +1,161 @@
+"""Exposures of photos that training learns: their estimate, the loss at a photo's own exposure, and the files of a run."""
+
+from __future__ import annotations
+
+import json
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+from blender_data import make_blender
+from tiny_runs import tiny, train
+
+from splitnerf.cli import main
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.exposures import EXPOSURES, with_exposures
+from splitnerf.data.images import linear_to_srgb, srgb_to_linear
+from splitnerf.data.pixels import per_channel
+from splitnerf.errors import InputError
+from splitnerf.evaluate.exposure import exposed_like
+from splitnerf.ops import pixel_losses
+from splitnerf.training.batches import draw_batch
+from splitnerf.training.exposure import ENOUGH, PhotoExposures
+
+CPU = torch.device("cpu")
+
+
+def photos(exposures, photographed: bool = True):
+    """Photos that state exposures, as far as learning them asks."""
+    exposures = np.array(exposures, float)
+
+    class Photos(SimpleNamespace):
+        def __len__(self) -> int:
+            return len(exposures)
+
+    return Photos(exposures=exposures, photographed=photographed)
+
+
+def settings(**changes):
+    return tiny(**{"exposure.refine": "yes"} | changes)
+
+
+def seen(n: int, factors: torch.Tensor, seed: int = 0, high: float = 0.4):
+    """Pixels of photos with these factors [views, 3]: view, target, mean and opacity."""
+    g = torch.Generator().manual_seed(seed)
+    view = torch.randint(len(factors), (n,), generator=g)
+    mean = 0.05 + (high - 0.05) * torch.rand(n, 3, generator=g)
+    photo = (mean * factors[view]).clamp(max=1)
+    target = torch.cat([torch.from_numpy(linear_to_srgb(photo.numpy())), torch.ones(n, 1)], dim=1)
+    return view, target, mean, torch.ones(n)
+
+
+class TestLearning:
+    @pytest.mark.parametrize("white_balance", [False, True])
+    def test_factors_come_back(self, white_balance):
+        """Each as far as its pixels outweigh the start, moved to a geometric mean of 1."""
+        true = torch.tensor([[0.6, 0.7, 0.8], [1.0, 1.0, 1.0], [1.6, 1.5, 1.2]])
+        found = PhotoExposures(photos([1, 1, 1]), settings(**{"exposure.white_balance": white_balance}), CPU)
+        for step in range(40):
+            found.learn(*seen(20_000, true, step))
+        logs = true.log() if white_balance else true.log().mean(1, keepdim=True).expand(-1, 3)
+        expected = (logs - logs.mean(0)).exp()
+        torch.testing.assert_close(found.factors, expected, rtol=2e-3, atol=0)
+        torch.testing.assert_close(found.factors.log().mean(0), torch.zeros(3), atol=1e-5, rtol=0)
+
+    def test_the_mean_stays_that_of_the_start(self):
+        found = PhotoExposures(photos([0.5, 1, 4]), settings(), CPU)
+        torch.testing.assert_close(found.factors[:, 0], torch.tensor([0.5, 1, 4]))
+        found.learn(*seen(20_000, torch.tensor([[1.0], [2.0], [3.0]]).expand(-1, 3), high=0.3))
+        torch.testing.assert_close(found.factors.log().mean(0), torch.full((3,), math.log(2) / 3), atol=1e-5, rtol=0)
+
+    def test_few_pixels_say_little(self):
+        found = PhotoExposures(photos([1, 1]), settings(), CPU)
+        n = int(ENOUGH)
+        view, target, mean, opacity = seen(2 * n, torch.tensor([[1.0] * 3, [1.5] * 3]))
+        view, target = torch.arange(2).repeat_interleave(n), target.clone()
+        target[:, :3] = torch.from_numpy(linear_to_srgb((mean * torch.tensor([1.0, 1.5])[view][:, None]).numpy()))
+        found.learn(view, target, mean, opacity)
+        assert float((found.factors[1, 0] / found.factors[0, 0]).log()) == pytest.approx(0.5 * math.log(1.5), rel=1e-3)
+
+    def test_what_is_clipped_dark_or_beside_the_object_says_nothing(self):
+        found = PhotoExposures(photos([1, 1]), settings(), CPU)
+        view, target, mean, opacity = seen(4000, torch.tensor([[1.0] * 3, [2.0] * 3]))
+        for bad in (dict(target=torch.cat([torch.ones(4000, 3), target[:, 3:]], 1)), dict(target=torch.cat([target[:, :3] * 0.01, target[:, 3:]], 1)),
+                    dict(target=target * torch.tensor([1, 1, 1, 0.5])), dict(opacity=0.5 * opacity)):  # fmt: skip
+            found.learn(**dict(view=view, target=target, mean=mean, opacity=opacity) | bad)
+        assert torch.equal(found.factors, torch.ones(2, 3)) and not found.sums.any()
+
+    @pytest.mark.parametrize("refine, photographed, compositing, learned", [
+        ("auto", True, "linear", True), ("auto", False, "linear", False), ("yes", False, "linear", True),
+        ("no", True, "linear", False), ("yes", True, "srgb", False),
+    ])  # fmt: skip
+    def test_when_they_are_learned(self, refine, photographed, compositing, learned):
+        config = settings(**{"exposure.refine": refine, "shading.compositing": compositing, "shading.method": "split"})
+        assert PhotoExposures(photos([1, 1], photographed), config, CPU).learned == learned
+
+    def test_sums_of_other_photos_are_refused(self):
+        found = PhotoExposures(photos([1, 1]), settings(), CPU)
+        with pytest.raises(ValueError, match="exposures"):
+            found.restore(torch.zeros(3, 4))
+
+
+class TestLoss:
+    def batch(self, exposure: float, **changes):
+        target = torch.tensor([[0.5, 0.6, 1.0, 1.0]])
+        source = SimpleNamespace(
+            generator=torch.Generator().manual_seed(0), draw=lambda n: (target[:, :3], target[:, :3], target, torch.zeros(1, dtype=torch.int64))
+        )  # fmt: skip
+        return draw_batch(source, 1, tiny(**changes), torch.full((1, 3), exposure))
+
+    def test_a_photo_is_compared_at_its_own_exposure(self):
+        """A rendering at an exposure of 1 that is right has no error, and what is clipped asks only for as much light."""
+        batch = self.batch(0.5)
+        mean = torch.from_numpy(srgb_to_linear(batch.target[:, :3].numpy())) / 0.5
+        mean[0, 2] = 7.0
+        colour, _ = pixel_losses(mean * batch.exposure, torch.ones(1), batch.target, batch.background)
+        assert float(colour) < 1e-10
+        dim = mean.detach() * torch.tensor([1, 1, 0.2])
+        assert float(pixel_losses(dim * batch.exposure, torch.ones(1), batch.target, batch.background)[0]) > 0.005
+
+    def test_srgb_samples_are_compared_at_an_exposure_of_one(self):
+        batch = self.batch(0.5, compositing="srgb", shading="split")
+        assert torch.equal(batch.exposure, torch.ones(1, 3))
+        linear = srgb_to_linear(np.float32([0.5, 0.6]))
+        np.testing.assert_allclose(srgb_to_linear(batch.target[0, :2].numpy()), 2 * linear, rtol=1e-4)
+
+
+def test_views_get_the_exposure_at_which_they_are_nearest(tmp_path):
+    views = load_dataset(make_blender(tmp_path))
+    maps = []
+    for i in range(len(views)):
+        linear = srgb_to_linear(views.images[i, ..., :3]) / (1.5, 0.7)[i % 2]
+        maps.append({"rgb": linear_to_srgb(linear), "alpha": views.images[i, ..., 3]})
+    found = exposed_like(views, maps)
+    expected = [(1.5, 0.7)[i % 2] for i in range(len(views))]
+    np.testing.assert_allclose(found.exposures, per_channel(np.array(expected)), rtol=1e-3)
+    blank = [{"rgb": m["rgb"], "alpha": 0 * m["alpha"]} for m in maps]
+    np.testing.assert_array_equal(exposed_like(views, blank).exposures, 1)
+
+
+class TestRun:
+    def test_a_run_keeps_what_it_learned(self, tmp_path, capsys):
+        data, run = make_blender(tmp_path / "data"), tmp_path / "run"
+        arguments = "--steps", "30", "--set", "exposure.refine=yes"
+        assert train(data, run, *arguments) == 0
+        stored = json.loads((run / EXPOSURES).read_text())["exposures"]
+        views = load_dataset(data)
+        assert list(stored) == views.frame_names and np.shape(list(stored.values())) == (len(views), 3)
+        exposed = with_exposures(views, run)
+        np.testing.assert_allclose(exposed.exposures, list(stored.values()))
+        np.testing.assert_allclose(np.log(exposed.exposures).mean(0), 0, atol=1e-5)
+        assert main(["evaluate", str(run), "--data", str(data), "--spp", "1"]) == 0
+        (run / EXPOSURES).write_text(json.dumps({"exposures": {"other": [1, 1, 1]}}))
+        with pytest.raises(InputError, match="is not of these photos"):
+            with_exposures(views, run)
+        capsys.readouterr()
+        assert main(["refine", str(run), "--data", str(data), "--out", str(tmp_path / "again"), "--sweeps", "1"]) == 2
+        assert "is not of these photos" in capsys.readouterr().err
+        assert train(data, run, "--steps", "30", "--overwrite") == 0 and not (run / EXPOSURES).exists()
+        assert with_exposures(views, run) is views
