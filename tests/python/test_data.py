@@ -13,7 +13,7 @@ from blender_data import ANGLE, SIZE, edit, make_blender, poses_around, set_pose
 
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
-from splitnerf.data.images import linear_to_srgb, srgb_to_linear, write_image
+from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
 from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths, read_mesh
 from splitnerf.errors import InputError
 from splitnerf.refinement.pixels import covered_pixels
@@ -375,3 +375,26 @@ def test_clipped_pixels_of_a_short_exposure_are_known(tmp_path):
     assert covered_pixels(load_dataset(root)).saturated.all()
     edit(root, lambda meta: [frame.update(exposure=1.0) for frame in meta["frames"]])
     assert not covered_pixels(load_dataset(make_blender(tmp_path / "grey", grey=0.97))).saturated.any()
+
+
+@pytest.mark.parametrize("peak", [0.5, 40.0])
+def test_linear_photos_of_floats(tmp_path, peak):
+    """EXR files with associated alpha: their radiance comes back at an exposure of 1, also far above 1; none is clipped."""
+    root, linear = make_blender(tmp_path), []
+    for i in range(12):
+        rgba = read_image(root / f"train/r_{i}.png")
+        rgba[..., :3] = np.random.default_rng(i).uniform(0.01, peak, rgba.shape[:2] + (3,))
+        linear.append(rgba.copy())
+        write_image(root / f"train/r_{i}.exr", np.dstack([rgba[..., :3] * rgba[..., 3:], rgba[..., 3]]))
+        (root / f"train/r_{i}.png").unlink()
+    edit(root, lambda meta: [frame.update(file_path=f"./train/r_{i}.exr") for i, frame in enumerate(meta["frames"])])
+    found = load_dataset(root)
+    assert not found.photographed and found.images.codes.dtype == np.uint16
+    white = linear_to_srgb((1 / found.exposures).astype(np.float32))
+    for i, truth in enumerate(linear):
+        inside = truth[..., 3] > 0.99
+        np.testing.assert_allclose(srgb_to_linear(found.images[i][inside][:, :3]), truth[inside][:, :3], rtol=5e-3, atol=1e-4 * peak)
+        assert (found.images[i][inside][:, :3] < 0.99 * white[i]).all()
+    write_image(root / "train/r_0.exr", np.full((*linear[0].shape[:2], 4), -1.0, np.float32))
+    with pytest.raises(InputError, match="negative pixels"):
+        load_dataset(root)

@@ -13,6 +13,7 @@ import numpy as np
 
 from splitnerf.data.environment import read_surroundings
 from splitnerf.data.frames import read_frames
+from splitnerf.data.images import HDR_SUFFIXES
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.loading import Loader
@@ -106,7 +107,10 @@ class Dataset:
     @property
     def photographed(self) -> bool:
         """Whether the images look as cameras write them: JPEG, or with exposures."""
-        return bool((self.exposures != 1).any()) or any(path.suffix.lower() in JPEG for path in self.image_paths)
+        suffixes = [path.suffix.lower() for path in self.image_paths]
+        return any(suffix in JPEG for suffix in suffixes) or any(
+            suffix not in HDR_SUFFIXES and (exposure != 1).any() for suffix, exposure in zip(suffixes, self.exposures)
+        )
 
     def exposed(self, exposures: np.ndarray) -> Dataset:
         """The split with other exposures [n] or [n, 3]."""
@@ -200,7 +204,7 @@ def load_dataset(
         box_from_world=box_from_world,
         known=loader.known,
         origin=origin,
-        exposures=np.array([frame.exposure for frame in frames]),
+        exposures=loader.exposures,
         surroundings=_surroundings(root, reading),
         masked=_has_masks(photos),
     )

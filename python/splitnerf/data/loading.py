@@ -35,6 +35,7 @@ class Loader:
 
     Attributes:
         frames: The frames.
+        exposures: [n] float64, the factors of the photos' linear values, as they are kept.
 
     Raises:
         InputError: A file cannot be used, or neither memory nor disk have room for the photos.
@@ -65,6 +66,7 @@ class Loader:
         self.codes = new_array((*shape, 4), kind, in_file) if keep else None
         self._known = new_array(shape, np.dtype(bool), in_file) if keep and hides else None
         self.known: np.ndarray | None = None
+        self.exposures = np.array([frame.exposure for frame in frames])
 
     def load(self, mask_kind: str) -> list[Photo]:
         """Reads the photos, whose pixels it keeps.
@@ -77,6 +79,7 @@ class Loader:
         """
         with ThreadPoolExecutor(max_workers=self.threads) as pool:
             photos = list(pool.map(lambda i: self._load(i, mask_kind), range(len(self.frames))))
+        self.exposures = np.array([frame.exposure * photo.scale for frame, photo in zip(self.frames, photos)])
         self.known = None
         if self._known is not None and any(photo.seen is not None for photo in photos):
             self.known = self._known
@@ -86,7 +89,7 @@ class Loader:
     @property
     def photos(self) -> Photos:
         """The pixels."""
-        return Photos(self.codes, np.array([frame.exposure for frame in self.frames]))
+        return Photos(self.codes, self.exposures)
 
     def _load(self, i: int, mask_kind: str) -> Photo:
         photo = load_photo(self.frames[i], self.downscale, mask_kind, self.separated)

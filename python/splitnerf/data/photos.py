@@ -10,7 +10,9 @@ import numpy as np
 import torch
 from torch.nn.functional import interpolate
 
-from splitnerf.data.images import LDR_SUFFIXES, area_average, downscale_rgba, read_codes, read_header, read_image
+from splitnerf.data.images import (
+    HDR_SUFFIXES, LDR_SUFFIXES, area_average, downscale_rgba, linear_to_srgb, read_codes, read_header, read_image,
+)  # fmt: skip
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics, undistort
 from splitnerf.data.pixels import decoded, encoded
@@ -19,6 +21,8 @@ from splitnerf.errors import InputError
 SILHOUETTE_SIZE = 100  # pixels, about, along the shorter edge of what the object is found from
 LEAST_COVERED = 0.25  # share of the undistorted image that the photo must cover
 CERTAIN = 0.999  # part of a pixel that must be known
+PEAK = 0.9  # the largest linear value of a photo of floats as it is kept, below that of a clipped one
+LEAST_ALPHA = 1e-4
 STRIP = 1 << 20  # pixels that are averaged down at once
 
 
@@ -34,6 +38,7 @@ class Photo:
         seen: [h, w] bool, what is known of it, or None for all.
         size: (height, width) of the file.
         masked: Whether anything says where the object is; otherwise alpha is 1.
+        scale: The factor by which linear values were multiplied, so that those of a file of floats lie below 1; else 1.
     """
 
     rgba: np.ndarray | None
@@ -42,6 +47,7 @@ class Photo:
     seen: np.ndarray | None
     size: tuple[int, int]
     masked: bool = True
+    scale: float = 1.0
 
 
 def silhouette_factor(height: int, width: int) -> int:
@@ -62,7 +68,7 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
         InputError: A file cannot be used.
     """
     path = frame.image_path
-    pixels = _read_pixels(path)
+    pixels, scale = _read_photo(path)
     height, width, channels = pixels.shape
     colour = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     alpha, known = pixels[..., -1:] if channels in (2, 4) else None, None
@@ -89,13 +95,13 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
     silhouette = area_average(decoded(rgba[..., 3]), factor) > 0.5
     rgba = _averaged(rgba, downscale)
     if known is None or known.all():
-        return Photo(rgba, None, silhouette, None, (height, width), masked)
+        return Photo(rgba, None, silhouette, None, (height, width), masked, scale)
     share, known = known[..., 0].astype(np.float32), area_average(known[..., 0].astype(np.float32), downscale) > CERTAIN
     seen = area_average(share, factor) > CERTAIN
     if not known.any():
         raise InputError(f"{path}: its masks ignore all of it; remove the frame")
     rgba[~known] = 0
-    return Photo(rgba, known, silhouette & seen, seen, (height, width), masked)
+    return Photo(rgba, known, silhouette & seen, seen, (height, width), masked, scale)
 
 
 def separated_mask(image_path: Path) -> str:
@@ -119,8 +125,8 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[tuple[int, int
     size, exact = None, downscale == 1 and all(frame.distortion is None for frame in frames)
     for frame in frames:
         path = frame.image_path
-        if path.suffix.lower() not in LDR_SUFFIXES:
-            raise InputError(f"{path}: training images must be PNG or JPEG; convert it")
+        if path.suffix.lower() not in LDR_SUFFIXES + HDR_SUFFIXES:
+            raise InputError(f"{path}: training images must be PNG, JPEG, EXR or HDR; convert it")
         height, width, _, bits = read_header(path)
         if downscale > min(height, width):
             raise InputError(f"{path}: is {width}x{height}, too small for downscale {downscale}; use a smaller factor")
@@ -140,6 +146,26 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[tuple[int, int
                 )
             exact = exact and mask.bits == 8
     return size, exact
+
+
+def _read_photo(path: Path) -> tuple[np.ndarray, float]:
+    """An image as it is stored, or the sRGB values of one of floats, which are linear radiance, straight alpha; and the factor
+    by which these were multiplied, so that the largest is PEAK.
+
+    Raises:
+        InputError: Floats are negative, infinite or NaN.
+    """
+    pixels = read_codes(path)
+    if pixels.dtype.kind != "f":
+        return pixels, 1.0
+    if not (pixels.min() >= 0 and pixels.max() < np.inf):  # false for NaN
+        raise InputError(f"{path}: has NaN, infinite or negative pixels; clean or re-export it")
+    n_colours = 3 if pixels.shape[2] >= 3 else 1
+    colour, alpha = pixels[..., :n_colours], pixels[..., -1:]
+    if pixels.shape[2] in (2, 4):  # EXR's alpha is associated
+        colour = colour / np.maximum(alpha, LEAST_ALPHA)
+    scale = min(1.0, PEAK / max(float(colour.max()), 1e-6))
+    return np.concatenate([linear_to_srgb(colour * np.float32(scale)), pixels[..., n_colours:].clip(0, 1)], axis=-1), scale
 
 
 def _read_pixels(path: Path) -> np.ndarray:
