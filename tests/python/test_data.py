@@ -398,3 +398,17 @@ def test_linear_photos_of_floats(tmp_path, peak):
     write_image(root / "train/r_0.exr", np.full((*linear[0].shape[:2], 4), -1.0, np.float32))
     with pytest.raises(InputError, match="negative pixels"):
         load_dataset(root)
+
+
+def test_photos_with_the_curve_of_their_camera(tmp_path):
+    root = make_blender(tmp_path, grey=0.5)
+    edit(root, lambda meta: meta.update(gamma=2.2))
+    edit(root, lambda meta: meta["frames"][1].update(gamma=0))
+    found = load_dataset(root)
+    for i, linear in ((0, (128 / 255) ** 2.2), (1, float(srgb_to_linear(np.float32(128 / 255))))):
+        inside = found.images[i][found.images[i, ..., 3] > 0.99][:, :3]
+        np.testing.assert_allclose(srgb_to_linear(inside), linear, rtol=1e-3)
+    for wrong in ("sRGB", -1, 0.5, float("nan")):
+        edit(root, lambda meta, wrong=wrong: meta.update(gamma=wrong))
+        with pytest.raises(InputError, match="'gamma' must be 0"):
+            load_dataset(root)

@@ -68,7 +68,7 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
         InputError: A file cannot be used.
     """
     path = frame.image_path
-    pixels, scale = _read_photo(path)
+    pixels, scale = _read_photo(path, frame.gamma)
     height, width, channels = pixels.shape
     colour = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     alpha, known = pixels[..., -1:] if channels in (2, 4) else None, None
@@ -136,7 +136,7 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[tuple[int, int
                 f"{path}: is {width}x{height}, but {frames[0].image_path.name} is {size[1]}x{size[0]}; make all images the "
                 "same size"
             )
-        exact = exact and bits == 8
+        exact = exact and bits == 8 and frame.gamma == 0
         for mask_path in filter(None, (frame.mask_path, frame.dynamic_mask_path)):
             mask = read_header(mask_path)
             if mask[:2] != size:
@@ -148,19 +148,27 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[tuple[int, int
     return size, exact
 
 
-def _read_photo(path: Path) -> tuple[np.ndarray, float]:
-    """An image as it is stored, or the sRGB values of one of floats, which are linear radiance, straight alpha; and the factor
-    by which these were multiplied, so that the largest is PEAK.
+def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
+    """The sRGB values of an image, straight alpha, and the factor by which their linear values were multiplied.
+
+    Floats are linear radiance; the factor then makes the largest PEAK. Whole numbers are sRGB, or follow the camera's curve.
+
+    Args:
+        path: The image.
+        gamma: The exponent that gives linear values, or 0 for sRGB's curve.
 
     Raises:
         InputError: Floats are negative, infinite or NaN.
     """
     pixels = read_codes(path)
+    n_colours = 3 if pixels.shape[2] >= 3 else 1
     if pixels.dtype.kind != "f":
-        return pixels, 1.0
+        if gamma == 0:
+            return pixels, 1.0
+        values = decoded(pixels)
+        return np.concatenate([linear_to_srgb(values[..., :n_colours] ** np.float32(gamma)), values[..., n_colours:]], axis=-1), 1.0
     if not (pixels.min() >= 0 and pixels.max() < np.inf):  # false for NaN
         raise InputError(f"{path}: has NaN, infinite or negative pixels; clean or re-export it")
-    n_colours = 3 if pixels.shape[2] >= 3 else 1
     colour, alpha = pixels[..., :n_colours], pixels[..., -1:]
     if pixels.shape[2] in (2, 4):  # EXR's alpha is associated
         colour = colour / np.maximum(alpha, LEAST_ALPHA)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.images import LDR_SUFFIXES
+from splitnerf.data.images import HDR_SUFFIXES, LDR_SUFFIXES
 from splitnerf.data.lens import Distortion
 from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
@@ -34,6 +34,7 @@ class Frame:
             to be ignored), or "auto" where the layout leaves it open.
         dynamic_mask_path: A file that is white where the image is to be ignored, or None.
         exposure: The factor of the image's linear values.
+        gamma: The exponent of its values that gives linear ones; 0 where its curve is sRGB's.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Frame:
     mask_kind: str = "auto"
     dynamic_mask_path: Path | None = None
     exposure: float = 1.0
+    gamma: float = 0.0
 
 
 def checked_pose(matrix: object, name: str) -> np.ndarray:
@@ -82,7 +84,7 @@ def listed_image(folder: Path, name: str, source: Path) -> Path:
     Raises:
         InputError: There is no such regular file.
     """
-    for suffix in ("", *LDR_SUFFIXES):
+    for suffix in ("", *LDR_SUFFIXES, *HDR_SUFFIXES):
         if is_file(folder / f"{name}{suffix}"):
             return listed_file(folder, f"{name}{suffix}", source)
     raise InputError(

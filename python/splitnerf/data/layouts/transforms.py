@@ -11,6 +11,7 @@ Keys, those of a frame before those of the file:
     frames[].mask_path          null or a mask
     mask_kind                   what the masks mean, "object" or "ignore"; without it :mod:`splitnerf.data.dataset` finds out
     frames[].exposure           the factor of the image's linear values, 1 where it is missing
+    gamma                       linear values are those of the image to this power, where the camera's curve is not sRGB's
     camera_angle_x, or fl_x, fl_y, cx, cy, w, h   the pinhole
     camera_model or is_fisheye, k1 ... k4, p1, p2 the distortion, see :mod:`splitnerf.data.lens`
 
@@ -36,6 +37,7 @@ SPLITS = {"train": ("train_filenames",), "test": ("test_filenames", "val_filenam
 FOCAL = ("camera_angle_x", "fl_x", "fl_y")
 LENS = ("cx", "cy", "w", "h", "camera_model", "is_fisheye", *RADIAL, *TANGENTIAL)
 SMALLEST_EXPOSURE = 1e-4
+LARGEST_GAMMA = 5.0
 OTHER_LENSES = ("ftheta_p1", "latlong", "equirectangular", "rolling_shutter")  # of instant-ngp
 
 
@@ -133,6 +135,7 @@ def _read_frame(entry: dict, meta: dict, index: int, path: Path) -> Frame:
     return Frame(
         image_path.stem, image_path, pose, lens, distortion, mask_path, mask_kind,
         dynamic_mask_path=dynamic if is_file(dynamic) else None, exposure=_read_exposure(entry, index, path),
+        gamma=_read_gamma(entry.get("gamma", meta.get("gamma", 0.0)), path),
     )  # fmt: skip
 
 
@@ -141,6 +144,14 @@ def _read_exposure(entry: dict, index: int, path: Path) -> float:
     if not isinstance(exposure, (int, float)) or not SMALLEST_EXPOSURE <= exposure <= 1 / SMALLEST_EXPOSURE:
         raise InputError(f"{path}: 'exposure' of frame {index} must be a positive number, got {str(exposure)[:40]}; repair it")
     return float(exposure)
+
+
+def _read_gamma(gamma: object, path: Path) -> float:
+    if not isinstance(gamma, (int, float)) or not (gamma == 0 or 1 <= gamma <= LARGEST_GAMMA):
+        raise InputError(
+            f"{path}: 'gamma' must be 0 (sRGB's curve) or a number from 1 to {LARGEST_GAMMA:g}, got {str(gamma)[:40]}; repair it"
+        )
+    return float(gamma)
 
 
 def _read_camera(
