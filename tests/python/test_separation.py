@@ -22,8 +22,9 @@ from splitnerf.data.reading import SEPARATED, Reading
 from splitnerf.errors import InputError
 from splitnerf.separation import job, training
 from splitnerf.separation.field import (
-    RadianceField, RayMeasure, Rendered, contracted, resampled, search_loss, spread_loss, with_less_gradient,
+    RadianceField, RayMeasure, Rendered, contracted, depth_loss, resampled, search_loss, spread_loss, with_less_gradient,
 )  # fmt: skip
+from splitnerf.separation.foot import find_foot
 from splitnerf.separation.masks import find_mask
 from splitnerf.separation.region import CELLS, Region, find_region
 from splitnerf.separation.table import Table
@@ -266,3 +267,58 @@ def test_the_trained_field_tells_the_ball_from_the_floor(tmp_path):
     masks, run = write_ball_on_floor(tmp_path / "data", 40), tmp_path / "run"
     assert train(tmp_path / "data", run, "--eval-mode", "all", "--steps", "30", "--set", "separation.steps=4000") == 0
     assert overlap(run, masks) > 0.8
+
+
+def test_sightings_hold_the_surface(tmp_path):
+    """The cost of a field's weights is their distance from the known place, in the rays' measure, whose inverse is exact."""
+    o, d = torch.tensor([[3.0, 0, 0.2]] * 3), torch.nn.functional.normalize(torch.tensor([[-1.0, 0.1, 0]] * 3), dim=1)
+    measure = RayMeasure(o, d)
+    distances = torch.tensor([[0.5], [2.9], [100.0]])
+    torch.testing.assert_close(measure.distances(measure.at(distances)), distances, rtol=1e-4, atol=1e-4)
+    spread = rendered([0.5, 0.0, 0.5], [0.0, 0.2, 0.8, 1.0])
+    assert float(depth_loss(spread, torch.tensor([0.1]))) == pytest.approx(0.5 * 0.8)
+    assert float(depth_loss(rendered([1.0, 0.0, 0.0], [0.0, 0.2, 0.8, 1.0]), torch.tensor([0.1]))) == pytest.approx(0, abs=1e-7)
+
+
+class TestFoot:
+    TABLE = Table(np.array([0.0, 0.6, 0.8]), -0.1)
+
+    def scene(self, height: float, noise: float):
+        """Points of a table and of a round plinth of radius .4 on it, their colours, and points of what stands on the plinth."""
+        random = np.random.default_rng(0)
+        at = random.uniform(-0.8, 0.8, (300_000, 2))
+        plinth = np.linalg.norm(at, axis=1) < 0.4
+        heights = np.where(plinth, height, 0.0) + random.normal(size=len(at)) * noise
+        points = at @ self.TABLE.axes + (self.TABLE.offset + heights)[:, None] * self.TABLE.normal
+        colours = np.where(plinth[:, None], [0.3, 0.3, 0.3], 0.5 + 0.3 * np.sin(40 * at[:, :1] + [0, 1, 2]))
+        post = random.uniform(-0.1, 0.1, (500, 2)) @ self.TABLE.axes + (self.TABLE.offset + 0.3) * self.TABLE.normal
+        return points, colours, post
+
+    def over(self, radius: float, height: float) -> torch.Tensor:
+        angle = np.linspace(0, 2 * np.pi, 60)
+        at = radius * np.stack([np.cos(angle), np.sin(angle)], 1)
+        return torch.from_numpy((at @ self.TABLE.axes + (self.TABLE.offset + height) * self.TABLE.normal).astype(np.float32))
+
+    def test_a_plinth_lower_than_the_noise_of_points_is_found(self):
+        foot = find_foot(self.TABLE, *self.scene(0.012, 0.012))
+        assert foot.holds(self.over(0.2, 0.0)).all() and foot.holds(self.over(0.38, 0.01)).all()
+        assert not foot.holds(self.over(0.42, 0.01)).any() and not foot.holds(self.over(0.7, 0.0)).any()
+        assert not foot.holds(self.over(5.0, 0.0)).any()
+
+    def test_without_a_plinth_it_is_what_stands_there(self):
+        foot = find_foot(self.TABLE, *self.scene(0.0, 0.003))
+        assert not foot.holds(self.over(0.2, 0.0)).any()
+
+    def test_nothing_shown(self):
+        foot = find_foot(self.TABLE, np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
+        assert not foot.holds(self.over(0.2, 0.0)).any()
+
+    def test_the_region_goes_by_its_foot_near_the_table(self):
+        points, colours, post = self.scene(0.012, 0.006)
+        column = post + np.linspace(0, 0.5, len(post))[:, None] * self.TABLE.normal
+        region = find_region(np.concatenate([points, *[column] * 20]), Table.through(self.TABLE.normal, self.TABLE.offset, points))
+        shown = np.concatenate([points, column]).astype(np.float32)
+        region = region.with_foot(shown, np.concatenate([colours, 0 * column]))
+        assert region.holds(self.over(0.38, 0.01)).all() and region.holds(self.over(0.05, 0.4)).all()
+        assert not region.holds(self.over(0.38, 0.2)).any() and not region.holds(self.over(0.42, 0.01)).any()
+        assert not region.holds(self.over(0.1, -0.2)).any()

@@ -14,12 +14,12 @@ import numpy as np
 from PIL import Image
 
 from splitnerf.capture.exposure import Exposures, find_exposures
-from splitnerf.capture.masks import View, find_masks
+from splitnerf.capture.masks import find_masks, given_masks
 from splitnerf.capture.page import write_page
 from splitnerf.capture.photographs import (
     Photograph, find_photographs, is_upright, read_upright, sharpness, write_png,
 )  # fmt: skip
-from splitnerf.capture.poses import Reconstruction, reconstruct
+from splitnerf.capture.poses import Lens, Reconstruction, reconstruct
 from splitnerf.capture.surroundings import Shot, surroundings
 from splitnerf.capture.video import SUFFIXES, write_frames
 from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignetting
@@ -28,11 +28,8 @@ from splitnerf.data.dataset import SURROUNDINGS
 from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.errors import InputError
 from splitnerf.files import LOCK, atomic_path, held, remove_partial
-from splitnerf.notes import note
 
-MASK_SIZE = 800  # longest edge in pixels at which masks are found
 BLURRED = 0.12  # share of the median sharpness below which a photo is left out
-MIN_OBJECT_POINTS = 20
 DARK = 0.02  # sRGB value that 1 % of a photo's pixels must exceed
 
 
@@ -91,8 +88,6 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         lost = [photo.name for photo in kept if photo.name not in placed]
         left_out |= dict.fromkeys(lost, "its camera was not found: too little in common with the others")
         world = settle(found, settings.seed)
-        if settings.masks is None and world.object_points.sum() < MIN_OBJECT_POINTS:
-            raise InputError(f"{source}: no object stands out in the middle of the photos; give masks with --masks")
         by_name = {photo.name: photo for photo in kept}
         exposures = exposures_of(world.scene, by_name, report)
         shares = write_data(world, exposures, by_name, out, settings, report)
@@ -184,79 +179,24 @@ def write_data(
     report: Callable[[str, float], None],
 ) -> np.ndarray:  # fmt: skip
     """Writes `images/`, `masks/`, `transforms.json` and `surroundings.exr`; returns the share that each mask covers."""
-    shares = _write_images(world, exposures, by_name, out, settings, report)
-    _write_transforms(world, exposures, out, settings)
-    write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
-    return shares
-
-
-def _write_images(
-    world: World, exposures: Exposures, by_name: dict[str, Photograph], out: Path, settings: PrepareSettings,
-    report: Callable[[str, float], None],
-) -> np.ndarray:  # fmt: skip
-    """Writes pinhole images and masks; returns the share that each mask covers."""
-    scene = world.scene
+    scene, pinholes = world.scene, [pinhole_of(lens, settings.max_size) for lens in world.scene.lenses]
     for folder in ("images", "masks"):
         (out / folder).mkdir(exist_ok=True)
-    views = []
-    for i, name in enumerate(scene.names):
-        pinhole = pinhole_of(scene.lenses[i], settings.max_size)
+    for i, (name, pinhole) in enumerate(zip(scene.names, pinholes)):
         photo = without_vignetting(read_upright(by_name[name].path), scene.lenses[i], exposures.vignetting)
-        image = undistort(photo, scene.lenses[i], pinhole)
-        write_png(out / "images" / f"{name}.png", image)
-        views.append(view_of(world, i, image, settings.max_size))
+        write_png(out / "images" / f"{name}.png", undistort(photo, scene.lenses[i], pinhole))
         report("images", (i + 1) / len(scene.names))
-    masks = given_masks(world, views, settings) if settings.masks else find_masks(views, world, lambda x: report("masks", x))
-    for i, (name, mask) in enumerate(zip(scene.names, masks)):
-        pinhole = pinhole_of(scene.lenses[i], settings.max_size)
-        size = (pinhole.width, pinhole.height)
-        large = Image.fromarray((255 * mask).astype(np.uint8)).resize(size, Image.Resampling.BILINEAR)
+    if settings.masks is None:
+        _write_transforms(world, exposures, pinholes, out, masked=False)
+        masks = find_masks(out, world, settings.seed, lambda share: report("masks", share))
+    else:
+        masks = given_masks(world, settings.masks, settings.max_size)
+    for name, pinhole, mask in zip(scene.names, pinholes, masks):
+        large = Image.fromarray((255 * mask + 0.5).astype(np.uint8)).resize((pinhole.width, pinhole.height), Image.Resampling.BILINEAR)
         write_png(out / "masks" / f"{name}.png", np.asarray(large))
+    _write_transforms(world, exposures, pinholes, out, masked=True)
+    write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
     return np.array([mask.mean() for mask in masks])
-
-
-def given_masks(world: World, views: list[View], settings: PrepareSettings) -> list[np.ndarray]:
-    """The masks of a folder as the undistorted photos have them; those that are black on the object are turned around.
-
-    Raises:
-        InputError: A photo has no mask, or one of another size.
-    """
-    scene, masks, score = world.scene, [], 0.0
-    for i, (name, view) in enumerate(zip(scene.names, views)):
-        lens = scene.lenses[i]
-        found = [path for path in sorted(settings.masks.iterdir()) if path.name.split(".")[0] == name]
-        if not found:
-            raise InputError(f"{settings.masks}: has no mask {name}.png; add it or leave --masks out")
-        mask = read_upright(found[0])[..., 0]
-        if mask.shape != (lens.height, lens.width):
-            size = f"{mask.shape[1]}x{mask.shape[0]}"
-            raise InputError(f"{found[0]}: is {size}, its photo {lens.width}x{lens.height}; make them equal")
-        masks.append(undistort(mask, lens, pinhole_of(lens, settings.max_size)) > np.iinfo(mask.dtype).max / 2)
-        scale, last = masks[-1].shape[1] / view.photo.shape[1], np.array(masks[-1].shape) - 1
-        for dots, sign in ((view.object_dots, 1), (view.other_dots, -1)):
-            row, column = (dots[:, ::-1] * scale).astype(int).clip(0, last).T
-            score += sign * masks[-1][row, column].mean() if len(dots) else 0.0
-    if score < 0:
-        note(f"{settings.masks}: the masks are black on the object; they are turned around")
-    return [mask if score >= 0 else ~mask for mask in masks]
-
-
-def view_of(world: World, i: int, image: np.ndarray, max_size: int) -> View:
-    """What the search for masks needs of photo `i`, whose undistorted image is given."""
-    scene = world.scene
-    pinhole = pinhole_of(scene.lenses[i], max_size)
-    scale = min(1.0, MASK_SIZE / max(image.shape[:2]))
-    small = image if image.dtype == np.uint8 else (image >> 8).astype(np.uint8)
-    size = (round(image.shape[1] * scale), round(image.shape[0] * scale))
-    small = cv2.resize(small, size, interpolation=cv2.INTER_AREA)
-    zoom = np.diag([size[0] / pinhole.width, size[1] / pinhole.height, 1.0])
-    flip = np.diag([1.0, -1.0, -1.0, 1.0])
-    camera = zoom @ pinhole.matrix @ np.linalg.inv(scene.poses[i] @ flip)[:3]
-    seen = scene.point_of[scene.photo_of == i]
-    view = View(small, camera, np.empty((0, 2)), np.empty((0, 2)))
-    places, _ = view.project(scene.points[seen])
-    of_object = world.object_points[seen]
-    return View(small, camera, places[of_object], places[~of_object])
 
 
 def surroundings_of(world: World, exposures: Exposures, out: Path, settings: PrepareSettings) -> np.ndarray:
@@ -275,14 +215,15 @@ def surroundings_of(world: World, exposures: Exposures, out: Path, settings: Pre
     return surroundings(shots(), centre, world.table_radius)
 
 
-def _write_transforms(world: World, exposures: Exposures, out: Path, settings: PrepareSettings) -> None:
-    scene, frames = world.scene, []
-    for i, name in enumerate(scene.names):
-        pinhole = pinhole_of(scene.lenses[i], settings.max_size)
+def _write_transforms(world: World, exposures: Exposures, pinholes: list[Lens], out: Path, *, masked: bool) -> None:
+    """`transforms.json`, with the masks that stand beside it or without."""
+    frames = []
+    for i, (name, pinhole) in enumerate(zip(world.scene.names, pinholes)):
+        mask = {"mask_path": f"masks/{name}.png"} if masked else {}
         frames.append({
-            "file_path": f"images/{name}.png", "mask_path": f"masks/{name}.png", "w": pinhole.width, "h": pinhole.height,
+            "file_path": f"images/{name}.png", **mask, "w": pinhole.width, "h": pinhole.height,
             "fl_x": pinhole.fx, "fl_y": pinhole.fy, "cx": pinhole.cx, "cy": pinhole.cy,
-            "exposure": float(exposures.gains[i]), "transform_matrix": scene.poses[i].tolist(),
+            "exposure": float(exposures.gains[i]), "transform_matrix": world.scene.poses[i].tolist(),
         })  # fmt: skip
     content = {"camera_model": "PINHOLE", "mask_kind": "object", "frames": frames}
     with atomic_path(out / "transforms.json") as temporary:

@@ -18,7 +18,9 @@ from splitnerf.errors import InputError
 EXHAUSTIVE = 250  # photos up to which each is matched with each other one
 OVERLAP = 15  # neighbours in the order of names with which a photo is matched beyond that
 MIN_PHOTOS = 3
-MAX_ERROR = 4.0  # pixels of reprojection beyond which an observation is dropped after the last adjustment
+MAX_ERROR, SHORTEST = 2.0, 3  # pixels of reprojection and photos of a point beyond and below which the adjustment drops it
+OUTLIER = 0.5  # pixels of reprojection from which on an observation counts less
+ADJUSTMENTS = 3
 CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # between OpenCV's and OpenGL's camera axes
 
@@ -138,19 +140,23 @@ def reconstruct(
 def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     """The model with everything refined at once, the principal points too, which the mapping holds at the photos' centres.
 
-    Where few photos leave the principal points open, they stay at the centres.
+    Points that are no points, such as highlights and mirrored lamps, fit nearly: a loss with heavy tails (Cauchy's) keeps
+    them from pulling at the cameras. Where few photos leave the principal points open, they stay at the centres.
     """
     for principal_points in (True, False):
         refined = pycolmap.Reconstruction(model)
         options, chosen = pycolmap.BundleAdjustmentOptions(), pycolmap.BundleAdjustmentConfig()
         options.refine_principal_point, options.print_summary = principal_points, False
+        options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
+        options.ceres.loss_function_scale = OUTLIER
         for image in refined.reg_image_ids():
             chosen.add_image(image)
         chosen.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-        for _ in range(2):
+        for _ in range(ADJUSTMENTS):
             pycolmap.create_default_bundle_adjuster(options, chosen, refined).solve()
             refined.update_point_3d_errors()
-            for key in [k for k, point in refined.points3D.items() if point.error > MAX_ERROR or point.track.length() < 2]:
+            points = refined.points3D.items()
+            for key in [k for k, point in points if point.error > MAX_ERROR or point.track.length() < SHORTEST]:
                 refined.delete_point3D(key)
         if all(_is_central(camera) for camera in refined.cameras.values()):
             break

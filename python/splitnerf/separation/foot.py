@@ -106,7 +106,7 @@ def _by_colour(foot: np.ndarray, colour: np.ndarray) -> np.ndarray:
     labels = np.where(certain, 1, np.where(wide, 0, 2))[window]
     if (labels == 0).any() and (labels == 2).any():
         shares = random_walker(
-            colour[window], labels, beta=CONTRAST, mode="cg_j", channel_axis=-1, return_full_prob=True
+            colour[window], labels, beta=CONTRAST, mode="cg_j", tol=1e-5, channel_axis=-1, return_full_prob=True
         )[0]  # fmt: skip
         result[window] = shares - 0.5
         return result

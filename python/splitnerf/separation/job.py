@@ -77,20 +77,32 @@ def separate(
                 report=lambda share, told: bar.show(share, f"what is around the object, {told}"),
             )  # fmt: skip
         points = surface_points(field, train)
-        table = table_under(points, train, seed)
-        region = find_region(points, table)
-        if region is None:
-            raise InputError(f"{train.root}: nothing stands out in the middle of the photos; add masks of the object")
-        if table is not None:
-            region = region.with_foot(*points_near(field, train, region))
+        region, points = find_object(field, train, table_under(points, train, seed), points)
         discard_separated(folder)
         folder.mkdir(parents=True)
         shares = [write_masks(field, region, split, folder) for split in (train, test) if split is not None]
         write_image(folder / SURROUNDINGS, surroundings(field, region, points))
         write_sheet(train, folder)
-        found = Separated(table is not None, float(np.mean(np.concatenate(shares))), time.monotonic() - started)
+        found = Separated(region.table is not None, float(np.mean(np.concatenate(shares))), time.monotonic() - started)
         write_json(folder / SEPARATION, vars(found))
     return found
+
+
+def find_object(
+    field: RadianceField, photos: Dataset, table: Table | None, points: np.ndarray | None = None
+) -> tuple[Region, np.ndarray]:
+    """What stands in the middle of the photos, and the points [n, 3] that they show, which may be given.
+
+    Raises:
+        InputError: Nothing stands there.
+    """
+    points = surface_points(field, photos) if points is None else points
+    if table is not None:
+        table = Table.through(table.normal, table.offset, points[np.linalg.norm(points, axis=1) < NEAR_TABLE].astype(np.float64))
+    region = find_region(points, table)
+    if region is None:
+        raise InputError(f"{photos.root}: nothing stands out in the middle of the photos; add masks of the object")
+    return region if table is None else region.with_foot(*points_near(field, photos, region)), points
 
 
 def table_under(points: np.ndarray, dataset: Dataset, seed: int) -> Table | None:
