@@ -322,3 +322,10 @@ class TestFoot:
         assert region.holds(self.over(0.38, 0.01)).all() and region.holds(self.over(0.05, 0.4)).all()
         assert not region.holds(self.over(0.38, 0.2)).any() and not region.holds(self.over(0.42, 0.01)).any()
         assert not region.holds(self.over(0.1, -0.2)).any()
+
+    def test_what_seems_to_lie_below_the_table_is_on_it(self):
+        region = Region(np.ones((CELLS,) * 3, bool), self.TABLE)
+        o, d = torch.tensor([[0.0, 2, 2], [0.0, 2, 2], [0.0, -3, -3]]), torch.tensor([[0.0, -0.6, -0.8], [0.0, 0.6, 0.8], [0.0, -0.6, -0.8]])
+        found = region.above_table(o, d, torch.tensor([[1.0, 9.0]] * 3))
+        torch.testing.assert_close(found, torch.tensor([[1.0, 2.9], [1.0, 9.0], [1.0, 9.0]]))
+        assert torch.equal(Region(np.ones((CELLS,) * 3, bool), None).above_table(o, d, found), found)

@@ -2,6 +2,7 @@
 
 One point near the table says little, as its height is less certain than a thin foot is high. The median height of all points
 over one cell of the table is certain enough: a plinth of three millimetres stands out. Its edge is where the colour changes.
+Below an overhang, cameras see the table at a grazing angle alone, and what they see there is vague: single points decide.
 """
 
 from __future__ import annotations
@@ -21,29 +22,35 @@ BLUR = 1.5  # standard deviation of the weights with which neighbouring cells co
 ENOUGH = 10  # points in a cell that tell it fully; the cells are so large that most have as many
 LEAST_HEIGHT = 0.004  # over the table, at which cells stand out, scene units
 NOISE = 3.0  # standard deviations of the table's cells by which cells stand out
+SPARSE = 0.1  # smoothed weight of a cell below which nothing is known of it
+VAGUE = 0.03  # height over the table from which a point below an overhang is the object's, scene units
 GAP = 3  # cells that close holes in what stands over the foot
 WITHIN, BEYOND = 2, 4  # cells on both sides of the edge of what stands out, on which the colour decides
 CONTRAST = 130.0  # of colours that are unlike, see skimage.segmentation.random_walker
 
 
 class Foot:
-    """The part of a table that an object stands on or hides.
+    """The part of a table that an object stands on, and that over which it hangs.
 
     Args:
         table: The table.
-        inside: [r, r] float32, positive on that part; rows along the first of `table.axes`.
+        inside: [r, r] float32, positive where the object stands; rows along the first of `table.axes`.
+        below: [r, r] float32, positive where the object hides the table from above.
     """
 
-    def __init__(self, table: Table, inside: np.ndarray):
-        self._inside = torch.from_numpy(inside)
+    def __init__(self, table: Table, inside: np.ndarray, below: np.ndarray):
+        self._maps = torch.from_numpy(np.stack([inside, below]))
         self._axes = torch.from_numpy(table.axes.astype(np.float32))
+        self._normal, self._offset = torch.from_numpy(table.normal.astype(np.float32)), table.offset
 
     def holds(self, points: Tensor) -> Tensor:
-        """[...] bool, whether points [..., 3], scene units, lie over the foot."""
+        """[...] bool, whether points [..., 3] near the table, scene units, belong to the object."""
         places = (points @ self._axes.T) * (1 / HALF)
         asked = places.reshape(1, -1, 1, 2).flip(-1)
-        inside = torch.nn.functional.grid_sample(self._inside[None, None], asked, align_corners=False)
-        return (inside.view(points.shape[:-1]) > 0) & (places.abs() < 1).all(-1)
+        maps = torch.nn.functional.grid_sample(self._maps[None], asked, align_corners=False)[0]
+        inside, below = maps.view(2, *points.shape[:-1]) > 0
+        heights = points @ self._normal - self._offset
+        return (inside | (below & (heights > VAGUE))) & (places.abs() < 1).all(-1)
 
 
 def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: np.ndarray) -> Foot:
@@ -51,7 +58,7 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
 
     Args:
         table: The table.
-        points: [n, 3] what photos show near the table, scene units.
+        points: [n, 3] what photos show near the table from above, scene units.
         colours: [n, 3] the photos' colours there.
         standing: [m, 3] points of the object above its foot.
     """
@@ -64,9 +71,9 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
     over = np.zeros(n * n, bool)
     over[_index(standing @ table.axes.T, n)] = True
     over = ndimage.binary_closing(np.pad(over.reshape(n, n), GAP + 1), iterations=GAP)[GAP + 1 : -GAP - 1, GAP + 1 : -GAP - 1]
-    stands_out = _standing_out(medians, counts, over)
     colour = np.stack([_medians(index, channel, n)[0] for channel in colours.T], axis=-1)
-    return Foot(table, _by_colour(stands_out, colour))
+    inside = _by_colour(_standing_out(medians, counts, over), colour)
+    return Foot(table, inside, np.where(over & (counts == 0), 1.0, -1.0).astype(np.float32))
 
 
 def _standing_out(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> np.ndarray:
@@ -81,12 +88,11 @@ def _standing_out(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> 
     deviation = 1.4826 * np.median(np.abs(_smoothed(medians, weights)[others])) if others.any() else 0.0
     least = max(LEAST_HEIGHT, NOISE * deviation)
     heights = medians.clip(0.0, 2 * least)  # the edge is half of the way up, however high the object is there
+    out = (_smoothed(heights, weights) > least) & (_smoothed(weights, np.ones_like(weights)) > SPARSE)
     hidden = over & (counts == 0)
-    heights[hidden], weights[hidden] = 2 * least, 1.0
-    out = _smoothed(heights, weights) > least
-    parts, _ = ndimage.label(out)
-    own = np.unique(parts[over & out])
-    return ndimage.binary_fill_holes(np.isin(parts, own[own > 0]))
+    parts, _ = ndimage.label(out | hidden)
+    own = np.unique(parts[over & (parts > 0)])
+    return np.isin(parts, own[own > 0]) & out
 
 
 def _by_colour(foot: np.ndarray, colour: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ LONGEST = 800  # edge of a mask in pixels
 COARSER = 4  # factor by which the first mask is smaller
 UNDECIDED = 0.02  # a coarse pixel is decided where it and its neighbours are this near to 0 or to 1
 POINTS, DENSE = 5000, 80000  # pixels of a photo whose points are asked for, about: of all of it, and near the foot
+STEEP = 0.4  # sine of the elevation from which a camera looks at the table from above; less where few look so
 AROUND = 0.2  # distance from what stands on a table within which the table is looked at closely, scene units
 HEIGHT = 64  # of the map of the surroundings
 PATCHES = 16  # from pole to pole, in which points are counted
@@ -34,8 +35,8 @@ def coverage(field: RadianceField, region: Region, rays_o: Tensor, rays_d: Tenso
     found = []
     for o, d in zip(rays_o.split(CHUNK), rays_d.split(CHUNK)):
         rendered = field.render(o, d, *SAMPLES)
-        points = o[:, None] + rendered.distances[..., None] * d[:, None]
-        found.append((rendered.weights * region.holds(points)).sum(1))
+        distances = region.above_table(o, d, rendered.distances)
+        found.append((rendered.weights * region.holds(o[:, None] + distances[..., None] * d[:, None])).sum(1))
     return torch.cat(found)
 
 
@@ -47,18 +48,20 @@ def surface_points(field: RadianceField, dataset: Dataset) -> np.ndarray:
 
 @torch.no_grad()
 def points_near(field: RadianceField, dataset: Dataset, region: Region) -> tuple[np.ndarray, np.ndarray]:
-    """More points [n, 3] around a region where it meets its table, and their colours [n, 3], sRGB."""
+    """More points [n, 3] around a region where it meets its table, as seen from above, and their colours [n, 3], sRGB."""
     table, middle = region.table, region.middle()
     normal = torch.from_numpy(table.normal.astype(np.float32))
     cells = ((region.cells.nonzero().float() + 0.5) * (2 / CELLS) - 1) * HALF - middle
     reach = float((cells - (cells @ normal)[:, None] * normal).norm(dim=1).max()) + AROUND
     centre = middle - (middle @ normal - table.offset) * normal
     points, colours, size = [], [], _size(dataset, DENSE)
+    axes = torch.from_numpy(dataset.poses[:, :3, 2])
+    steep = min(STEEP, 0.7 * float((axes @ normal).median()))
     for i in range(len(dataset)):
         rays_o, rays_d = view_rays(dataset, i, size)
         down = (rays_d @ normal).clamp(max=-1e-6)
         meets = rays_o + ((table.offset - rays_o @ normal) / down)[:, None] * rays_d
-        near = ((meets - centre).norm(dim=1) < reach) & (rays_d @ normal < 0)
+        near = ((meets - centre).norm(dim=1) < reach) & (rays_d @ normal < -steep)
         points.append(_points(field, rays_o[near], rays_d[near]))
         rows, columns = (((torch.arange(n) + 0.5) * whole / n).long() for n, whole in zip(size, (dataset.height, dataset.width)))
         photo = torch.from_numpy(np.asarray(dataset.images[i, ..., :3]))[rows][:, columns].reshape(-1, 3)

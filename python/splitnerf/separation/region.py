@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import torch
 from scipy import ndimage
@@ -12,7 +14,7 @@ from splitnerf.separation.table import Table
 
 CELLS = 96  # along an edge of the cube
 HALF = 1.6  # of that edge, scene units; parts that reach out of the ball of radius 1 may reach so far above a table
-LEAST_POINTS = 3  # seen in a cell that is taken
+LEAST_POINTS = 2  # seen in a cell that is taken
 LARGEST_SHARE = 0.05  # of the largest part's cells that another part needs
 STANDS_OVER = 1.0  # horizontal distance of another part's middle from the largest one's, in the latter's radii
 GROWN = 2  # cells by which the region is larger than what was seen
@@ -47,6 +49,15 @@ class Region:
             return inside & (heights > 0.5 * self.table.height)
         return torch.where(heights > LOW, inside, self.foot.holds(points) & (heights > -LOW))
 
+    def above_table(self, rays_o: Tensor, rays_d: Tensor, distances: Tensor) -> Tensor:
+        """Distances [n, k] along rays [n, 3], at most those of the table: what seems to lie below it is on it, vague or mirrored."""
+        if self.table is None:
+            return distances
+        normal = torch.from_numpy(self.table.normal.astype(np.float32))
+        height, fall = rays_o @ normal - self.table.offset, -(rays_d @ normal)
+        table = torch.where((fall > 0) & (height > 0), height / fall.clamp(min=1e-6), math.inf)
+        return torch.minimum(distances, table[:, None])
+
     def with_foot(self, points: np.ndarray, colours: np.ndarray) -> Region:
         """The region, near its table by points [n, 3] that photos show there and their colours [n, 3]."""
         held = self.holds(torch.from_numpy(points)).numpy() & (self.table.heights(points) > LOW)
@@ -63,7 +74,9 @@ def find_region(points: np.ndarray, table: Table | None) -> Region | None:
     index = ((points[chosen] * (0.5 / HALF) + 0.5) * CELLS).astype(int).clip(0, CELLS - 1)
     counts = np.zeros((CELLS,) * 3, np.int32)
     np.add.at(counts, tuple(index.T), 1)
-    parts, n_parts = ndimage.label(counts >= LEAST_POINTS, np.ones((3, 3, 3)))
+    shown = counts >= LEAST_POINTS
+    parts, n_parts = ndimage.label(ndimage.binary_dilation(shown), np.ones((3, 3, 3)))  # gaps of two cells part nothing
+    parts[~shown] = 0
     if n_parts == 0:
         return None
     centres = ((np.argwhere(parts > 0) + 0.5) * (2 / CELLS) - 1) * HALF
