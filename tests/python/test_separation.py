@@ -22,10 +22,10 @@ from splitnerf.data.reading import SEPARATED, Reading
 from splitnerf.errors import InputError
 from splitnerf.separation import job, training
 from splitnerf.separation.field import (
-    RadianceField, RayMeasure, Rendered, contracted, depth_loss, resampled, search_loss, spread_loss, with_less_gradient,
+    RadianceField, RayMeasure, Rendered, contracted, resampled, search_loss, spread_loss, with_less_gradient,
 )  # fmt: skip
 from splitnerf.separation.foot import find_foot
-from splitnerf.separation.masks import find_mask
+from splitnerf.separation.masks import find_mask, with_mirrors
 from splitnerf.separation.region import CELLS, Region, find_region
 from splitnerf.separation.table import Table
 
@@ -269,17 +269,6 @@ def test_the_trained_field_tells_the_ball_from_the_floor(tmp_path):
     assert overlap(run, masks) > 0.8
 
 
-def test_sightings_hold_the_surface(tmp_path):
-    """The cost of a field's weights is their distance from the known place, in the rays' measure, whose inverse is exact."""
-    o, d = torch.tensor([[3.0, 0, 0.2]] * 3), torch.nn.functional.normalize(torch.tensor([[-1.0, 0.1, 0]] * 3), dim=1)
-    measure = RayMeasure(o, d)
-    distances = torch.tensor([[0.5], [2.9], [100.0]])
-    torch.testing.assert_close(measure.distances(measure.at(distances)), distances, rtol=1e-4, atol=1e-4)
-    spread = rendered([0.5, 0.0, 0.5], [0.0, 0.2, 0.8, 1.0])
-    assert float(depth_loss(spread, torch.tensor([0.1]))) == pytest.approx(0.5 * 0.8)
-    assert float(depth_loss(rendered([1.0, 0.0, 0.0], [0.0, 0.2, 0.8, 1.0]), torch.tensor([0.1]))) == pytest.approx(0, abs=1e-7)
-
-
 class TestFoot:
     TABLE = Table(np.array([0.0, 0.6, 0.8]), -0.1)
 
@@ -329,3 +318,37 @@ class TestFoot:
         found = region.above_table(o, d, torch.tensor([[1.0, 9.0]] * 3))
         torch.testing.assert_close(found, torch.tensor([[1.0, 2.9], [1.0, 9.0], [1.0, 9.0]]))
         assert torch.equal(Region(np.ones((CELLS,) * 3, bool), None).above_table(o, d, found), found)
+
+
+class TestMirrors:
+    def region(self, table: Table | None = None) -> Region:
+        """A slab of solid cells at x = 0, |y| < .8, .2 < z < .9."""
+        centres = ((np.indices((CELLS,) * 3) + 0.5) * (2 / CELLS) - 1) * 1.6
+        solid = (np.abs(centres[0]) < 0.03) & (np.abs(centres[1]) < 0.8) & (centres[2] > 0.2) & (centres[2] < 0.9)
+        return Region(solid, table, None, solid)
+
+    def test_solid_cells_block_rays_above_a_table(self):
+        o = torch.tensor([[3.0, 0, 0.5], [3.0, 1.0, 0.5], [3.0, 0, 0.3], [3.0, 0, 1.2]])
+        d = torch.tensor([[-1.0, 0, 0]] * 4)
+        assert self.region().blocks(o, d).tolist() == [True, False, True, False]
+        assert self.region(Table(np.array([0.0, 0, 1]), 0.35)).blocks(o, d).tolist() == [True, False, False, False]
+
+    def test_a_mask_gets_what_is_solid_but_no_rims(self):
+        """Seen along x: the right half of the slab is missing from the mask, and a rim of four pixels on the left."""
+        n = 80
+        y, z = torch.meshgrid(torch.linspace(-1, 1, n // 2), torch.linspace(1.2, 0, n // 2), indexing="xy")
+        o = torch.stack([torch.full_like(y, 3.0), y, z], -1).reshape(-1, 3)
+        mask = torch.zeros(n, n)
+        mask[22:64, 12:40] = 1
+        found = with_mirrors(mask, self.region(), o, torch.tensor([[-1.0, 0, 0]]).expand(len(o), 3))
+        assert found[30:60, 42:68].min() == 1 and torch.equal(found[:, :12], mask[:, :12]) and found[:, 76:].max() == 0
+        assert torch.equal(with_mirrors(mask, Region(np.zeros((CELLS,) * 3, bool), None), o, o), mask)
+
+    def test_cells_that_several_photos_show_are_solid(self):
+        random = np.random.default_rng(0)
+        wall = np.column_stack([random.normal(size=400) * 0.002, random.uniform(-0.3, 0.3, (400, 2))])
+        lonely = np.tile([[0.5, 0.5, 0.5]], (400, 1)) + random.normal(size=(400, 3)) * 0.002
+        photos = [np.concatenate([wall, lonely if i == 3 else wall]) for i in range(4)]
+        region = find_region(np.concatenate(photos), None, 4)
+        o, d = torch.tensor([[3.0, 0.1, 0.1], [3.0, 0.5, 0.5]]), torch.tensor([[-1.0, 0, 0]] * 2)
+        assert region.blocks(o, d).tolist() == [True, False]

@@ -10,13 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from splitnerf.capture.photographs import read_upright
 from splitnerf.capture.poses import FLIP
 from splitnerf.capture.undistorted import pinhole_of, undistort
 from splitnerf.capture.world import World
-from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.data.dataset import load_dataset
 from splitnerf.data.normalisation import transform_points
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -24,15 +23,13 @@ from splitnerf.notes import note
 from splitnerf.separation.job import find_object
 from splitnerf.separation.masks import find_mask
 from splitnerf.separation.table import Table
-from splitnerf.separation.training import Sightings, train_field
+from splitnerf.separation.training import train_field
 
-STEPS = 5000  # of the field
+STEPS = 5500  # of the field
 
 
 def find_masks(out: Path, world: World, seed: int, report: Callable[[float], None]) -> list[np.ndarray]:
     """[h, w] masks in [0, 1] of the photos of `out/transforms.json`, in their order, at a size of their own.
-
-    The sparse points hold the field's surfaces, but for the object's: where it mirrors, they are none.
 
     Args:
         out: The folder of the undistorted photos.
@@ -45,10 +42,7 @@ def find_masks(out: Path, world: World, seed: int, report: Callable[[float], Non
     """
     photos = load_dataset(out, "train", 1, Reading("all"), masked=False)
     to_box = photos.box_from_world
-    field = train_field(
-        photos, steps=STEPS, minutes=0.0, seed=seed, report=lambda share, _: report(0.8 * share),
-        sightings=sightings_of(world, photos),
-    )  # fmt: skip
+    field = train_field(photos, steps=STEPS, minutes=0.0, seed=seed, report=lambda share, _: report(0.8 * share))
     table = Table(np.array([0.0, 0, 1]), float(to_box[2, 3])) if world.table else None
     region, _ = find_object(field, photos, table)
     masks = []
@@ -56,18 +50,6 @@ def find_masks(out: Path, world: World, seed: int, report: Callable[[float], Non
         masks.append(find_mask(field, region, photos, i))
         report(0.8 + 0.2 * (i + 1) / len(photos))
     return masks
-
-
-def sightings_of(world: World, photos: Dataset) -> Sightings:
-    """The sparse points beside the object, as the photos see them, in the frame of the photos."""
-    scene = world.scene
-    beside = ~world.object_points[scene.point_of]
-    points = transform_points(photos.box_from_world, scene.points[scene.point_of[beside]])
-    places = transform_points(photos.box_from_world, scene.poses[scene.photo_of[beside]][:, :3, 3])
-    apart = points - places
-    distances = np.linalg.norm(apart, axis=1)
-    numbers = (places, apart / np.maximum(distances, 1e-9)[:, None], distances)
-    return Sightings(*(torch.from_numpy(x.astype(np.float32)) for x in numbers))
 
 
 def given_masks(world: World, folder: Path, max_size: int) -> list[np.ndarray]:

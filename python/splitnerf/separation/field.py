@@ -151,11 +151,6 @@ class RayMeasure:
         """Distances [n, k] from the camera of values u [n, k] in [0, 1]."""
         return self.nearest + CORE * torch.sinh(self.low + u * (self.high - self.low))
 
-    def at(self, distances: Tensor) -> Tensor:
-        """Values [n, k] in [0, 1] of distances [n, k] from the camera."""
-        u = (torch.asinh((distances - self.nearest) / CORE) - self.low) / (self.high - self.low)
-        return u.clamp(0, 1)
-
     def points(self, edges: Tensor) -> Tensor:
         """[n, k, 3] the middles of intervals with these limits [n, k + 1]."""
         t = self.distances(0.5 * (edges[:, 1:] + edges[:, :-1]))
@@ -197,12 +192,6 @@ def search_loss(rendered: Rendered) -> Tensor:
     bound = cumulative.gather(1, high) - cumulative.gather(1, low)
     w = rendered.weights.detach()
     return ((w - bound).clamp(min=0).square() / (w + 1e-7)).sum(1).mean()
-
-
-def depth_loss(rendered: Rendered, measured: Tensor) -> Tensor:
-    """How far from its known place on a ray, `measured` [n] in the rays' measure, its weights stand."""
-    middles = 0.5 * (rendered.edges[:, 1:] + rendered.edges[:, :-1])
-    return (rendered.weights * (middles - measured[:, None]).abs()).sum(1).mean()
 
 
 def spread_loss(rendered: Rendered) -> Tensor:

@@ -92,7 +92,7 @@ def _standing_out(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> 
     hidden = over & (counts == 0)
     parts, _ = ndimage.label(out | hidden)
     own = np.unique(parts[over & (parts > 0)])
-    return np.isin(parts, own[own > 0]) & out
+    return ndimage.binary_fill_holes(np.isin(parts, own[own > 0])) & ~hidden
 
 
 def _by_colour(foot: np.ndarray, colour: np.ndarray) -> np.ndarray:

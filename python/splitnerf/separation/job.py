@@ -99,7 +99,7 @@ def find_object(
     points = surface_points(field, photos) if points is None else points
     if table is not None:
         table = Table.through(table.normal, table.offset, points[np.linalg.norm(points, axis=1) < NEAR_TABLE].astype(np.float64))
-    region = find_region(points, table)
+    region = find_region(points, table, len(photos))
     if region is None:
         raise InputError(f"{photos.root}: nothing stands out in the middle of the photos; add masks of the object")
     return region if table is None else region.with_foot(*points_near(field, photos, region)), points

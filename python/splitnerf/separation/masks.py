@@ -20,6 +20,7 @@ SAMPLES = 64, 32  # of a ray, of the first search and of the second
 CHUNK = 4096  # rays
 LONGEST = 800  # edge of a mask in pixels
 COARSER = 4  # factor by which the first mask is smaller
+RIM = 3  # every other pixel beside a mask in which solid cells say nothing
 UNDECIDED = 0.02  # a coarse pixel is decided where it and its neighbours are this near to 0 or to 1
 POINTS, DENSE = 5000, 80000  # pixels of a photo whose points are asked for, about: of all of it, and near the foot
 STEEP = 0.4  # sine of the elevation from which a camera looks at the table from above; less where few look so
@@ -103,13 +104,33 @@ def find_mask(field: RadianceField, region: Region, dataset: Dataset, index: int
     )
     coarse = coverage(field, region, *view_rays(dataset, index, small)).view(1, 1, *small)
     most, least = max_pool2d(coarse, 3, 1, 1), -max_pool2d(-coarse, 3, 1, 1)
+    half = -(-size[0] // 2), -(-size[1] // 2)
     undecided = interpolate(((most > UNDECIDED) & (least < 1 - UNDECIDED)).float(), size, mode="nearest").view(-1)
     mask = (interpolate(coarse, size, mode="bilinear", align_corners=False) > 0.5).float().view(-1)
     chosen = undecided.nonzero().squeeze(1)
     rays_o, rays_d = view_rays(dataset, index, size)
     if len(chosen):
         mask[chosen] = coverage(field, region, rays_o[chosen], rays_d[chosen])
-    return mask.view(size).clamp(0, 1).numpy()
+    return with_mirrors(mask.view(size).clamp(0, 1), region, *view_rays(dataset, index, half)).numpy()
+
+
+def with_mirrors(mask: Tensor, region: Region, rays_o: Tensor, rays_d: Tensor) -> Tensor:
+    """A mask [h, w] with what of its outside other photos show to be solid, but for a rim as wide as they are vague.
+
+    Args:
+        mask: The coverage of a view.
+        region: The object.
+        rays_o, rays_d: [h/2 w/2, 3] the view's rays, of every other pixel.
+    """
+    half = -(-mask.shape[0] // 2), -(-mask.shape[1] // 2)
+    outside = (interpolate(mask[None, None], half, mode="area")[0, 0] < 0.5).view(-1).nonzero().squeeze(1)
+    blocked = torch.zeros(half[0] * half[1])
+    blocked[outside] = torch.cat([region.blocks(o, d) for o, d in zip(rays_o[outside].split(CHUNK), rays_d[outside].split(CHUNK))] or [outside]).float()
+    planes = blocked.view(1, 1, *half)
+    edge = 2 * RIM + 1
+    core = -max_pool2d(-planes, edge, 1, RIM)  # opened: thin rims go
+    opened = max_pool2d(core, edge, 1, RIM)
+    return torch.maximum(mask, interpolate(opened, mask.shape, mode="nearest")[0, 0])
 
 
 @torch.no_grad()

@@ -17,6 +17,8 @@ HALF = 1.6  # of that edge, scene units; parts that reach out of the ball of rad
 LEAST_POINTS = 2  # seen in a cell that is taken
 LARGEST_SHARE = 0.05  # of the largest part's cells that another part needs
 STANDS_OVER = 1.0  # horizontal distance of another part's middle from the largest one's, in the latter's radii
+SEVERAL = 2  # photos that show a surface in a cell that is solid
+REACH = 1.0  # distance from a ray's point next to the origin within which solid cells block it, scene units
 GROWN = 2  # cells by which the region is larger than what was seen
 
 
@@ -27,10 +29,12 @@ class Region:
         cells: [CELLS, CELLS, CELLS] bool.
         table: The table or None.
         foot: The object's foot; None where the cells go down to the table.
+        solid: [CELLS, CELLS, CELLS] bool, the cells in which several photos show the object's surface; None: none are known.
     """
 
-    def __init__(self, cells: np.ndarray, table: Table | None, foot: Foot | None = None):
+    def __init__(self, cells: np.ndarray, table: Table | None, foot: Foot | None = None, solid: np.ndarray | None = None):
         self.cells, self.table, self.foot = torch.from_numpy(cells), table, foot
+        self.solid = torch.from_numpy(np.zeros_like(cells) if solid is None else solid)
 
     def middle(self) -> Tensor:
         """[3] the middle of the cells."""
@@ -38,16 +42,24 @@ class Region:
 
     def holds(self, points: Tensor) -> Tensor:
         """[...] bool, whether points [..., 3] lie in the region."""
-        index = ((points * (0.5 / HALF) + 0.5) * CELLS).floor().long()
-        within = ((index >= 0) & (index < CELLS)).all(-1)
-        x, y, z = index.clamp(0, CELLS - 1).unbind(-1)
-        inside = within & self.cells[x, y, z]
+        inside = _at(self.cells, points)
         if self.table is None:
             return inside
         heights = points @ torch.from_numpy(self.table.normal.astype(np.float32)) - self.table.offset
         if self.foot is None:
             return inside & (heights > 0.5 * self.table.height)
         return torch.where(heights > LOW, inside, self.foot.holds(points) & (heights > -LOW))
+
+    def blocks(self, rays_o: Tensor, rays_d: Tensor) -> Tensor:
+        """[n] bool, whether rays [n, 3] pass through a solid cell above the table's foot: an object that mirrors its surroundings
+        looks as if one saw through it, but photos from elsewhere show its surface."""
+        middle = -(rays_o * rays_d).sum(1, keepdim=True)
+        steps = torch.arange(-REACH, REACH, HALF / CELLS)
+        points = rays_o[:, None] + (middle + steps)[..., None] * rays_d[:, None]
+        solid = _at(self.solid, points)
+        if self.table is not None:
+            solid &= points @ torch.from_numpy(self.table.normal.astype(np.float32)) - self.table.offset > LOW
+        return solid.any(1)
 
     def above_table(self, rays_o: Tensor, rays_d: Tensor, distances: Tensor) -> Tensor:
         """Distances [n, k] along rays [n, 3], at most those of the table: what seems to lie below it is on it, vague or mirrored."""
@@ -61,12 +73,26 @@ class Region:
     def with_foot(self, points: np.ndarray, colours: np.ndarray) -> Region:
         """The region, near its table by points [n, 3] that photos show there and their colours [n, 3]."""
         held = self.holds(torch.from_numpy(points)).numpy() & (self.table.heights(points) > LOW)
-        return Region(self.cells.numpy(), self.table, find_foot(self.table, points, colours, points[held]))
+        foot = find_foot(self.table, points, colours, points[held])
+        return Region(self.cells.numpy(), self.table, foot, self.solid.numpy())
 
 
-def find_region(points: np.ndarray, table: Table | None) -> Region | None:
-    """The object's region by the surface points [n, 3] that photos show, scene units; None where nothing stands in the
-    middle."""
+def _at(cells: Tensor, points: Tensor) -> Tensor:
+    """[...] the values of cells [CELLS, CELLS, CELLS] bool at points [..., 3]; false beside them."""
+    index = ((points * (0.5 / HALF) + 0.5) * CELLS).floor().long()
+    within = ((index >= 0) & (index < CELLS)).all(-1)
+    x, y, z = index.clamp(0, CELLS - 1).unbind(-1)
+    return within & cells[x, y, z]
+
+
+def find_region(points: np.ndarray, table: Table | None, n_photos: int = 1) -> Region | None:
+    """The object's region; None where nothing stands in the middle.
+
+    Args:
+        points: [n, 3] surface points that photos show, scene units, as many of each photo, photo by photo.
+        table: The table or None.
+        n_photos: The number of photos.
+    """
     if table is None:
         chosen = np.linalg.norm(points, axis=1) < 1
     else:
@@ -99,7 +125,9 @@ def find_region(points: np.ndarray, table: Table | None) -> Region | None:
             taken[tuple(cells.T)] = True
     taken = filled(taken) if table is None else down_to(table, filled(taken))
     grown = ndimage.binary_dilation(taken, np.ones((3, 3, 3)), iterations=GROWN)
-    return Region(grown, table)
+    photo = np.repeat(np.arange(n_photos), -(-len(points) // n_photos))[: len(points)][chosen]
+    seen_by = np.bincount(np.unique(np.ravel_multi_index(tuple(index.T), taken.shape) * n_photos + photo) // n_photos, minlength=taken.size)
+    return Region(grown, table, None, (seen_by.reshape(taken.shape) >= SEVERAL) & grown)
 
 
 def down_to(table: Table, cells: np.ndarray) -> np.ndarray:

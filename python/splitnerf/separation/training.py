@@ -5,42 +5,25 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from typing import NamedTuple
 
 import torch
-from torch import Tensor
 from torch.nn.functional import smooth_l1_loss
 
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import at_unit_exposure, per_channel
 from splitnerf.render.rays import PixelSource
-from splitnerf.separation.field import RadianceField, RayMeasure, depth_loss, search_loss, spread_loss
+from splitnerf.separation.field import RadianceField, search_loss, spread_loss
 
 RAYS = 1024  # of a step
 FIRST, SECOND = 64, 32  # samples of a ray
 SPREAD_WEIGHT = 0.01
-SIGHTINGS, DEPTH_WEIGHT = 256, 1.0  # of a step
 RATE, LAST_RATE = 1e-2, 0.03  # the learning rate, and its share at the end
 WARM_UP = 100  # steps
 
 
-class Sightings(NamedTuple):
-    """Points whose places are known, each as a camera sees it.
-
-    Attributes:
-        rays_o, rays_d: [k, 3] the cameras' places (scene units) and the unit directions to the points.
-        distances: [k] of the points from the cameras.
-    """
-
-    rays_o: Tensor
-    rays_d: Tensor
-    distances: Tensor
-
-
 def train_field(
-    dataset: Dataset, *, steps: int, minutes: float, seed: int, report: Callable[[float, str], None],
-    sightings: Sightings | None = None,
-) -> RadianceField:  # fmt: skip
+    dataset: Dataset, *, steps: int, minutes: float, seed: int, report: Callable[[float, str], None]
+) -> RadianceField:
     """Trains a field on whole photos.
 
     Args:
@@ -49,7 +32,6 @@ def train_field(
         minutes: The time after which the training ends; 0: it makes all steps.
         seed: The seed of the random numbers.
         report: Called with the share done and what to tell of it.
-        sightings: Points that hold the field's surfaces; or None.
 
     Raises:
         RuntimeError: Numbers are no longer finite.
@@ -69,8 +51,6 @@ def train_field(
         apart = rendered.colour - colour
         loss = smooth_l1_loss(rendered.colour, colour, beta=0.1)
         loss = loss + search_loss(rendered) + SPREAD_WEIGHT * spread_loss(rendered)
-        if sightings is not None:
-            loss = loss + DEPTH_WEIGHT * loss_of_depths(field, sightings, source.generator)
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
         optimiser.step()
@@ -84,11 +64,3 @@ def train_field(
         report(share, f"step {step} PSNR {-10 * math.log10(max(error, 1e-10)):.2f} dB")
     return field
 
-
-def loss_of_depths(field: RadianceField, sightings: Sightings, generator: torch.Generator) -> Tensor:
-    """What the field's surfaces miss of some points, and its search of those surfaces."""
-    chosen = torch.randint(len(sightings.distances), (SIGHTINGS,), generator=generator)
-    rays_o, rays_d = sightings.rays_o[chosen], sightings.rays_d[chosen]
-    measured = RayMeasure(rays_o, rays_d).at(sightings.distances[chosen, None])[:, 0]
-    rendered = field.render(rays_o, rays_d, FIRST, SECOND, jitter=True)
-    return depth_loss(rendered, measured) + search_loss(rendered)
