@@ -196,4 +196,5 @@ def evaluate_scene(
         predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1),
         relight=relight, distance=distance,
     )  # fmt: skip
+    result |= {"exposures": "fitted"} if free_exposure else {}
     return result | {"scored": "fields"}, predictions, test

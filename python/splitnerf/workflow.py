@@ -136,6 +136,7 @@ def reconstruct(
         trained = training.complete()
         if not trained.finished:
             return trained, None
+        (run / EXPOSURES).unlink(missing_ok=True)
         if trained.exposures is not None:
             dataset = dataset.exposed(trained.exposures)
             write_exposures(run, dataset)

@@ -21,7 +21,7 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.exposure import exposed_like
 from splitnerf.ops import pixel_losses
 from splitnerf.training.batches import draw_batch
-from splitnerf.training.exposure import ENOUGH, PhotoExposures
+from splitnerf.training.exposure import ENOUGH, ERROR, PhotoExposures
 
 CPU = torch.device("cpu")
 
@@ -60,7 +60,8 @@ class TestLearning:
         for step in range(40):
             found.learn(*seen(20_000, true, step))
         logs = true.log() if white_balance else true.log().mean(1, keepdim=True).expand(-1, 3)
-        expected = (logs - logs.mean(0)).exp()
+        logs = logs - logs.mean(0)
+        expected = (logs * (1 - ERROR**2 / logs.square().mean(0))).exp()
         torch.testing.assert_close(found.factors, expected, rtol=2e-3, atol=0)
         torch.testing.assert_close(found.factors.log().mean(0), torch.zeros(3), atol=1e-5, rtol=0)
 
@@ -77,7 +78,14 @@ class TestLearning:
         view, target = torch.arange(2).repeat_interleave(n), target.clone()
         target[:, :3] = torch.from_numpy(linear_to_srgb((mean * torch.tensor([1.0, 1.5])[view][:, None]).numpy()))
         found.learn(view, target, mean, opacity)
-        assert float((found.factors[1, 0] / found.factors[0, 0]).log()) == pytest.approx(0.5 * math.log(1.5), rel=1e-3)
+        half = 0.25 * math.log(1.5)  # of both photos, from their mean
+        assert float(found.factors[1, 0].log()) == pytest.approx(half * (1 - ERROR**2 / half**2), rel=1e-3)
+
+    def test_what_is_no_larger_than_the_error_changes_nothing(self):
+        found = PhotoExposures(photos([1, 2, 1]), settings(), CPU)
+        for step in range(20):
+            found.learn(*seen(20_000, torch.tensor([[0.96], [2.1], [1.03]]).expand(-1, 3), step, high=0.3))
+        torch.testing.assert_close(found.factors[:, 0], torch.tensor([1.0, 2, 1]))
 
     def test_what_is_clipped_dark_or_beside_the_object_says_nothing(self):
         found = PhotoExposures(photos([1, 1]), settings(), CPU)
@@ -146,7 +154,7 @@ class TestRun:
         assert train(data, run, *arguments) == 0
         stored = json.loads((run / EXPOSURES).read_text())["exposures"]
         views = load_dataset(data)
-        assert list(stored) == views.frame_names and np.shape(list(stored.values())) == (len(views), 3)
+        assert list(stored) == [f"train/{name}.png" for name in views.frame_names] and np.shape(list(stored.values())) == (len(views), 3)
         exposed = with_exposures(views, run)
         np.testing.assert_allclose(exposed.exposures, list(stored.values()))
         np.testing.assert_allclose(np.log(exposed.exposures).mean(0), 0, atol=1e-5)

@@ -25,7 +25,7 @@ from splitnerf.separation.field import (
     RadianceField, RayMeasure, Rendered, contracted, resampled, search_loss, spread_loss, with_less_gradient,
 )  # fmt: skip
 from splitnerf.separation.foot import find_foot
-from splitnerf.separation.masks import find_mask, with_mirrors
+from splitnerf.separation.masks import _points, find_mask, with_mirrors
 from splitnerf.separation.region import CELLS, Region, find_region
 from splitnerf.separation.table import Table
 
@@ -352,3 +352,7 @@ class TestMirrors:
         region = find_region(np.concatenate(photos), None, 4)
         o, d = torch.tensor([[3.0, 0.1, 0.1], [3.0, 0.5, 0.5]]), torch.tensor([[-1.0, 0, 0]] * 2)
         assert region.blocks(o, d).tolist() == [True, False]
+
+
+def test_no_rays_give_no_points():
+    assert _points(RadianceField(), torch.empty(0, 3), torch.empty(0, 3)).shape == (0, 3)

@@ -12,8 +12,8 @@ from splitnerf.errors import InputError
 PACKAGES = {"pycolmap": "pycolmap", "cv2": "opencv-python-headless"}
 
 # What a step takes of the whole time, roughly.
-STEPS = {"frames": 0.02, "photos": 0.02, "features": 0.1, "matches": 0.4, "cameras": 0.2, "exposures": 0.03,
-         "images": 0.03, "masks": 0.2}  # fmt: skip
+STEPS = {"frames": 0.02, "photos": 0.01, "features": 0.03, "matches": 0.1, "cameras": 0.1, "exposures": 0.02,
+         "images": 0.02, "masks": 0.7}  # fmt: skip
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:

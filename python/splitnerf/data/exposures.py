@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,13 @@ MEANING = "the factors of each photo's linear red, green and blue; their geometr
 
 def write_exposures(run: Path, dataset: Dataset) -> None:
     """Writes the exposures of a split."""
-    factors = dict(zip(map(str, dataset.frame_names), np.round(dataset.exposures, 6).tolist()))
+    factors = dict(zip(_names(dataset), np.round(dataset.exposures, 6).tolist()))
     write_json(run / EXPOSURES, {"meaning": MEANING, "exposures": factors})
+
+
+def _names(dataset: Dataset) -> list[str]:
+    """The images' paths in the data's folder."""
+    return [os.path.relpath(path, dataset.root) for path in dataset.image_paths]
 
 
 def with_exposures(dataset: Dataset, run: Path) -> Dataset:
@@ -31,7 +37,7 @@ def with_exposures(dataset: Dataset, run: Path) -> Dataset:
         return dataset
     stored = read_json(path, "exposures")["exposures"]
     try:
-        factors = np.array([stored[name] for name in dataset.frame_names], np.float64)
+        factors = np.array([stored[name] for name in _names(dataset)], np.float64)
     except (KeyError, TypeError, ValueError):
         factors = np.zeros(0)
     if factors.shape != (len(dataset), 3) or not (np.isfinite(factors) & (factors > 0)).all():

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from splitnerf.data.images import HDR_SUFFIXES
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.photos import Photo, check_files, load_photo
 from splitnerf.data.pixels import GB, Photos, encoded, folder_of_files, forget_pages, new_array, room_for_photos
@@ -18,7 +19,7 @@ from splitnerf.errors import InputError
 from splitnerf.notes import note_once
 
 THREADS = 8
-WORK, WORK_BENT = 24, 110  # bytes a pixel of the file, while a photo is read; with a lens to undistort
+WORK, WORK_BENT = 24, 110  # bytes a pixel of the file, while a photo is read; where it is turned into floats
 
 
 class Loader:
@@ -46,7 +47,7 @@ class Loader:
         (height, width), exact = check_files(frames, downscale)
         shape = (len(frames), height // downscale, width // downscale)
         kind, hides = np.dtype(np.uint8 if exact else np.uint16), any(map(_may_hide, frames))
-        work = height * width * (WORK if all(frame.distortion is None for frame in frames) else WORK_BENT)
+        work = height * width * (WORK_BENT if any(map(_needs_floats, frames)) else WORK)
         size = keep * int(np.prod(shape)) * (4 * kind.itemsize + hides)
         room = room_for_photos(reading.max_memory)
         in_file = size + work > room
@@ -99,6 +100,11 @@ class Loader:
         if self._known is not None and photo.known is not None:
             self._known[i] = photo.known
         return replace(photo, rgba=None, known=None)
+
+
+def _needs_floats(frame: Frame) -> bool:
+    """Whether a photo is turned into floats while it is read."""
+    return frame.distortion is not None or frame.gamma != 0 or frame.image_path.suffix.lower() in HDR_SUFFIXES
 
 
 def _may_hide(frame: Frame) -> bool:

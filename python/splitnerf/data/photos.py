@@ -21,8 +21,8 @@ from splitnerf.errors import InputError
 SILHOUETTE_SIZE = 100  # pixels, about, along the shorter edge of what the object is found from
 LEAST_COVERED = 0.25  # share of the undistorted image that the photo must cover
 CERTAIN = 0.999  # part of a pixel that must be known
-PEAK = 0.9  # the largest linear value of a photo of floats as it is kept, below that of a clipped one
-LEAST_ALPHA = 1e-4
+PEAK, BRIGHT = 0.9, 0.999  # a photo of floats is kept so that this share of its values lies below this one; 1 counts as clipped
+LEAST_ALPHA = 0.01
 STRIP = 1 << 20  # pixels that are averaged down at once
 
 
@@ -151,7 +151,7 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[tuple[int, int
 def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
     """The sRGB values of an image, straight alpha, and the factor by which their linear values were multiplied.
 
-    Floats are linear radiance; the factor then makes the largest PEAK. Whole numbers are sRGB, or follow the camera's curve.
+    Floats are linear radiance; the factor then brings nearly all below PEAK, and what is above 1 is clipped. Whole numbers are sRGB, or follow the camera's curve.
 
     Args:
         path: The image.
@@ -171,9 +171,10 @@ def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
         raise InputError(f"{path}: has NaN, infinite or negative pixels; clean or re-export it")
     colour, alpha = pixels[..., :n_colours], pixels[..., -1:]
     if pixels.shape[2] in (2, 4):  # EXR's alpha is associated
-        colour = colour / np.maximum(alpha, LEAST_ALPHA)
-    scale = min(1.0, PEAK / max(float(colour.max()), 1e-6))
-    return np.concatenate([linear_to_srgb(colour * np.float32(scale)), pixels[..., n_colours:].clip(0, 1)], axis=-1), scale
+        colour = np.where(alpha > LEAST_ALPHA, colour / np.maximum(alpha, LEAST_ALPHA), 0.0)
+    scale = min(1.0, PEAK / max(float(np.quantile(colour, BRIGHT)), 1e-6))
+    kept = linear_to_srgb((colour * np.float32(scale)).clip(0, 1))
+    return np.concatenate([kept, pixels[..., n_colours:].clip(0, 1)], axis=-1), scale
 
 
 def _read_pixels(path: Path) -> np.ndarray:

@@ -11,12 +11,12 @@ from splitnerf.data.images import srgb_to_linear
 from splitnerf.data.pixels import per_channel
 from splitnerf.data.truth import OPAQUE
 
-DARKEST, BRIGHTEST = 0.01, 0.95  # linear values that count
+DARKEST, BRIGHTEST = 0.01, 0.95  # linear values of a photo as it is that count
 
 
 def exposed_like(views: Dataset, predictions: Sequence[dict[str, np.ndarray]]) -> Dataset:
     """Views whose exposure is that at which they are nearest to predictions: one factor a photo, the median of the ratios of
-    luminance where the object covers both; photos without such pixels stay.
+    the channels' means where the object covers both; photos without such pixels stay.
 
     Args:
         views: The photos.
@@ -25,9 +25,11 @@ def exposed_like(views: Dataset, predictions: Sequence[dict[str, np.ndarray]]) -
     factors = np.ones(len(views))
     for i, maps in enumerate(predictions):
         photo = views.images[i]
-        ours, theirs = (srgb_to_linear(x.astype(np.float32)).mean(-1) for x in (maps["rgb"], photo[..., :3]))
+        ours, theirs = (srgb_to_linear(x.astype(np.float32)) for x in (maps["rgb"], photo[..., :3]))
         counts = (photo[..., 3] > OPAQUE) & (maps["alpha"] > OPAQUE)
-        counts &= (ours > DARKEST) & (theirs > DARKEST) & (theirs < BRIGHTEST)
+        exposed = theirs * per_channel(views.exposures)[i].astype(np.float32)
+        counts &= ((exposed > DARKEST) & (exposed < BRIGHTEST)).all(-1)
+        ours, theirs = (x.mean(-1).clip(1e-4) for x in (ours, theirs))
         if counts.any():
             factors[i] = np.exp(np.median(np.log(theirs[counts] / ours[counts])))
     return views.exposed(per_channel(views.exposures) * factors[:, None])

@@ -147,6 +147,7 @@ def score_asset(
         predictions, views, truths, environment, truth.light, asset_mesh(asset), truth.mesh, seconds,
         relight=relight_part, distance=load_distance(),
     )  # fmt: skip
+    scores |= {"exposures": "fitted"} if free_exposure else {}
     return Evaluated(scores | {"scored": "asset", "spp": spp}, views, predictions, truths, relit)
 
 

@@ -296,7 +296,7 @@ class Refinement:
         return float(squared.mean())
 
     def sweep(self) -> tuple[float, list[float]]:
-        """Gathers a share of all pixels and takes one step; returns the error and the step's size by unknown."""
+        """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step; returns the error and the step's size by unknown."""
         s, surface = self.settings, self.surface()
         n_batches = max(1, round(min(s.sweep_share * len(self.pixels), SWEEP_PIXELS) / s.pixels))
         error = float(np.mean([self.gather(surface) for _ in range(n_batches)]))

@@ -145,7 +145,7 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
     centres, cell = grid.centres(), 2 * box / resolution
     n, height, width = masks.shape
     allowed = int(WRONG_MASKS * n)
-    misses = torch.zeros(len(centres), dtype=torch.int32, device=masks.device)
+    misses, sights = torch.zeros(2, len(centres), dtype=torch.int32, device=masks.device)
     for i in range(n):
         fx, fy, cx, cy = intrinsics[i].tolist()
         inside = (misses <= allowed).nonzero().squeeze(1)
@@ -158,4 +158,5 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
         column, row = x.floor().long(), y.floor().long()
         seen = (depth > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
         misses[inside[seen]] += ~wide[row[seen], column[seen]]
-    return (misses <= allowed).view((resolution,) * 3)
+        sights[inside[seen]] += 1
+    return ((misses <= allowed) & (misses <= WRONG_MASKS * sights)).view((resolution,) * 3)

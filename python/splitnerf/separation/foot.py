@@ -63,7 +63,7 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
         standing: [m, 3] points of the object above its foot.
     """
     heights = table.heights(points)
-    chosen = np.abs(heights) < LOW
+    chosen = (np.abs(heights) < LOW) & (np.abs(points @ table.axes.T) < HALF).all(1)
     heights, places, colours = heights[chosen], points[chosen] @ table.axes.T, colours[chosen]
     n = _cells_for(places)
     index = _index(places, n)
@@ -72,6 +72,9 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
     over[_index(standing @ table.axes.T, n)] = True
     over = ndimage.binary_closing(np.pad(over.reshape(n, n), GAP + 1), iterations=GAP)[GAP + 1 : -GAP - 1, GAP + 1 : -GAP - 1]
     colour = np.stack([_medians(index, channel, n)[0] for channel in colours.T], axis=-1)
+    weights = np.minimum(counts, 1.0)
+    around = np.stack([_smoothed(channel, weights) for channel in np.moveaxis(colour, -1, 0)], axis=-1)
+    colour = np.where(counts[..., None] > 0, colour, around)
     inside = _by_colour(_standing_out(medians, counts, over), colour)
     return Foot(table, inside, np.where(over & (counts == 0), 1.0, -1.0).astype(np.float32))
 
@@ -110,7 +113,7 @@ def _by_colour(foot: np.ndarray, colour: np.ndarray) -> np.ndarray:
     wide = ndimage.binary_dilation(foot, iterations=BEYOND)
     window = tuple(slice(max(0, k.min() - 2), k.max() + 3) for k in np.nonzero(wide))
     labels = np.where(certain, 1, np.where(wide, 0, 2))[window]
-    if (labels == 0).any() and (labels == 2).any():
+    if (labels == 0).any() and (labels == 2).any() and colour[window].std() > 0:
         shares = random_walker(
             colour[window], labels, beta=CONTRAST, mode="cg_j", tol=1e-5, channel_axis=-1, return_full_prob=True
         )[0]  # fmt: skip

@@ -80,6 +80,8 @@ def _points(field: RadianceField, rays_o: Tensor, rays_d: Tensor) -> np.ndarray:
     """[n, 3] where half of each ray's light is gone."""
     points = [rays_o[:0]]
     for o, d in zip(rays_o.split(CHUNK), rays_d.split(CHUNK)):
+        if len(o) == 0:
+            break
         rendered = field.render(o, d, *SAMPLES)
         at = (rendered.weights.cumsum(1) < 0.5).sum(1, keepdim=True).clamp(max=SAMPLES[1] - 1)
         points.append(o + rendered.distances.gather(1, at) * d)
@@ -125,7 +127,8 @@ def with_mirrors(mask: Tensor, region: Region, rays_o: Tensor, rays_d: Tensor) -
     half = -(-mask.shape[0] // 2), -(-mask.shape[1] // 2)
     outside = (interpolate(mask[None, None], half, mode="area")[0, 0] < 0.5).view(-1).nonzero().squeeze(1)
     blocked = torch.zeros(half[0] * half[1])
-    blocked[outside] = torch.cat([region.blocks(o, d) for o, d in zip(rays_o[outside].split(CHUNK), rays_d[outside].split(CHUNK))] or [outside]).float()
+    for chosen in outside.split(CHUNK):
+        blocked[chosen] = region.blocks(rays_o[chosen], rays_d[chosen]).float()
     planes = blocked.view(1, 1, *half)
     edge = 2 * RIM + 1
     core = -max_pool2d(-planes, edge, 1, RIM)  # opened: thin rims go

@@ -55,8 +55,9 @@ class Region:
         looks as if one saw through it, but photos from elsewhere show its surface."""
         middle = -(rays_o * rays_d).sum(1, keepdim=True)
         steps = torch.arange(-REACH, REACH, HALF / CELLS)
-        points = rays_o[:, None] + (middle + steps)[..., None] * rays_d[:, None]
-        solid = _at(self.solid, points)
+        distances = middle + steps
+        points = rays_o[:, None] + distances[..., None] * rays_d[:, None]
+        solid = _at(self.solid, points) & (distances > 0)
         if self.table is not None:
             solid &= points @ torch.from_numpy(self.table.normal.astype(np.float32)) - self.table.offset > LOW
         return solid.any(1)

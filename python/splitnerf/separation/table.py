@@ -25,7 +25,8 @@ class Table:
     def through(cls, normal: np.ndarray, offset: float, points: np.ndarray) -> Table:
         """The table on this plane, with a height by how far the points [n, 3] that photos show of it scatter."""
         apart = np.abs(points @ normal - offset)
-        deviation = 1.4826 * float(np.median(apart[apart < ON_TABLE]))
+        near = apart[apart < ON_TABLE]
+        deviation = 1.4826 * float(np.median(near)) if len(near) else ON_TABLE
         return cls(normal, offset, min(max(NOISE * deviation, LEAST_HEIGHT), LARGEST_HEIGHT))
 
     def heights(self, points: np.ndarray) -> np.ndarray:

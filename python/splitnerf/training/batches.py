@@ -18,7 +18,7 @@ class Batch(NamedTuple):
 
     Attributes:
         rays_o, rays_d: [n, 3] origins (scene units) and unit directions.
-        target: [n, 4] sRGB values of the photos as they are, in [0, 1], straight alpha.
+        target: [n, 4] sRGB values of the photos as they are, straight alpha; at an exposure of 1 where samples are added as sRGB.
         background: [n, 3] random sRGB colours in [0, 1), behind the photo and the rendering alike.
         jitter: [n] offsets of each ray's samples in [0, 1), as shares of a sample's length.
         view: [n] int64, the photos' numbers.

@@ -13,6 +13,7 @@ from splitnerf.ops import srgb_to_linear
 KEEP = 0.998  # share of the sums that outlives a step
 ENOUGH = 50.0  # pixels of a photo that count as much as the start
 DARKEST, BRIGHTEST = 0.01, 0.95  # linear values of a photo's pixels that count
+ERROR = 0.06  # of the logarithms, as the rendering is not the object: measured .05 on two captures with known exposures
 FARTHEST = 1.0  # of a pixel's log from the rendering's: more is no exposure
 COVERED = 0.95  # alpha and opacity of pixels that count
 BEGIN = 0.02  # progress from which exposures are learned
@@ -22,7 +23,8 @@ class PhotoExposures:
     """The factor of each photo's linear values, per channel: what the photos' pixels have of those rendered, in the mean of the
     logarithms over the pixels of past steps.
 
-    After each step the logarithms are moved to the mean that they had at the start: images do not tell the light's brightness
+    They are drawn to the start as far as their spread over the photos is no larger than their error (James and Stein 1961), so that
+    exposures that were right stay as they were. After each step the logarithms are moved to the mean that they had at the start: images do not tell the light's brightness
     from that of all photos.
 
     Args:
@@ -65,7 +67,9 @@ class PhotoExposures:
     def factors(self) -> Tensor:
         """[n, 3] the factors of the photos' linear values."""
         logs = self.sums[:, :3] / (self.sums[:, 3:] + ENOUGH)
-        return (self.start + logs - logs.mean(0)).exp()
+        logs = logs - logs.mean(0)
+        share = 1 - ERROR**2 / logs.square().mean(0).clamp(min=ERROR**2)
+        return (self.start + share * logs).exp()
 
     def restore(self, sums: Tensor) -> None:
         """Takes back the sums that a checkpoint kept. Raises ValueError where they are of other photos."""

@@ -163,7 +163,7 @@ class Training:
         for name in ("step", "seconds", "n_rays", "previewed_at"):
             setattr(self, name, content[name])
         self.psnr_mean = content.get("psnr_mean")
-        if "exposures" in content:
+        if self.exposures.learned and "exposures" in content:
             self.exposures.restore(content["exposures"])
         self.model.open_levels(self.progress)
         self.mesh.restore(content)
