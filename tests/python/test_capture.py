@@ -266,7 +266,7 @@ def test_the_sharpest_frames_of_a_video(tmp_path):
     assert min(sharpness(cv2.imread(str(frame))) for frame in frames) > 0.5 * sharpness(sharp)
 
 
-@pytest.mark.parametrize("steps, least", [(300, 0.8), pytest.param(capture_masks.STEPS, 0.95, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("steps, least", [(900, 0.9), pytest.param(capture_masks.STEPS, 0.95, marks=pytest.mark.slow)])
 def test_photos_to_data(tmp_path, capsys, monkeypatch, steps, least):
     """Twenty photos through the command: cameras, masks and a page; the data load."""
     monkeypatch.setattr(capture_masks, "STEPS", steps)
