@@ -36,7 +36,7 @@ def write_floats(path: Path, pixels: np.ndarray) -> None:
     assert sink.write_image(pixels) and sink.close()
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -0.5, 2.0])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -0.5])
 def test_an_image_with_a_bad_pixel_is_refused_and_named(data, tmp_path, capsys, value):
     shutil.copytree(data, tmp_path / "data")
     dataset = load_dataset(tmp_path / "data")
