@@ -298,6 +298,24 @@ class TestFoot:
         foot = find_foot(self.TABLE, *self.scene(0.0, 0.003))
         assert not foot.holds(self.over(0.2, 0.0)).any()
 
+    def test_below_an_overhang_points_decide_by_their_height(self):
+        """No photo shows the table within .3 from above; the object hangs over it."""
+        points, colours, _ = self.scene(0.0, 0.003)
+        shown = np.linalg.norm(points @ self.TABLE.axes.T, axis=1) > 0.3
+        random = np.random.default_rng(1)
+        hanging = random.uniform(-0.4, 0.4, (4000, 2))
+        hanging = hanging[np.linalg.norm(hanging, axis=1) < 0.35] @ self.TABLE.axes + (self.TABLE.offset + 0.3) * self.TABLE.normal
+        foot = find_foot(self.TABLE, points[shown], colours[shown], hanging)
+        assert foot.holds(self.over(0.2, 0.05)).all() and not foot.holds(self.over(0.2, 0.01)).any()
+        assert not foot.holds(self.over(0.5, 0.05)).any()
+
+    def test_what_stands_apart_is_not_the_foot(self):
+        points, colours, post = self.scene(0.012, 0.003)
+        apart = np.linalg.norm(points @ self.TABLE.axes.T - [0.6, 0.6], axis=1) < 0.1
+        foot = find_foot(self.TABLE, points + apart[:, None] * 0.02 * self.TABLE.normal, colours, post)
+        beside = torch.from_numpy((np.array([[0.6, 0.6]]) @ self.TABLE.axes + self.TABLE.offset * self.TABLE.normal).astype(np.float32))
+        assert foot.holds(self.over(0.2, 0.0)).all() and not foot.holds(beside).any()
+
     def test_nothing_shown(self):
         foot = find_foot(self.TABLE, np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
         assert not foot.holds(self.over(0.2, 0.0)).any()
@@ -347,11 +365,11 @@ class TestMirrors:
     def test_cells_that_several_photos_show_are_solid(self):
         random = np.random.default_rng(0)
         wall = np.column_stack([random.normal(size=400) * 0.002, random.uniform(-0.3, 0.3, (400, 2))])
-        lonely = np.tile([[0.5, 0.5, 0.5]], (400, 1)) + random.normal(size=(400, 3)) * 0.002
+        lonely = np.column_stack([random.normal(size=400) * 0.002, random.uniform([-0.3, 0.3], [0.3, 0.5], (400, 2))])
         photos = [np.concatenate([wall, lonely if i == 3 else wall]) for i in range(4)]
         region = find_region(np.concatenate(photos), None, 4)
-        o, d = torch.tensor([[3.0, 0.1, 0.1], [3.0, 0.5, 0.5]]), torch.tensor([[-1.0, 0, 0]] * 2)
-        assert region.blocks(o, d).tolist() == [True, False]
+        o, d = torch.tensor([[3.0, 0.1, 0.1], [3.0, 0.1, 0.4]]), torch.tensor([[-1.0, 0, 0]] * 2)
+        assert region.blocks(o, d).tolist() == [True, False] and region.holds(torch.tensor([[0.0, 0.1, 0.4]])).all()
 
 
 def test_no_rays_give_no_points():
