@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -14,6 +15,7 @@ from PIL import Image
 from table_scene import BALL, CAMERA, RADIUS, TABLE_RADIUS, photograph, ring, surface_colours, write_photos
 from test_files import no_more_than
 
+from splitnerf.capture import job as capture_job
 from splitnerf.capture import masks as capture_masks
 from splitnerf.capture.exposure import find_exposures
 from splitnerf.capture.job import PrepareSettings, _begin, _upright_copies
@@ -338,3 +340,26 @@ def test_what_is_seen_pulls_the_light():
     none = torch.zeros(1, 1)
     assert torch.allclose(light(down, none), torch.tensor([[0.2, 0.4, 0.8]]), rtol=0.05)
     assert not torch.allclose(light(up, none), torch.tensor([[0.2, 0.4, 0.8]]), rtol=0.05)
+
+
+def test_photos_of_two_sizes_are_refused_before_any_work(tmp_path, capsys):
+    write_photos(tmp_path / "photos", 4)
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (90, 60, 3), np.uint8)).save(tmp_path / "photos" / "small.png")
+    assert main(["prepare", str(tmp_path / "photos"), "--out", str(tmp_path / "data")]) == 2
+    assert "small.png is 60x90; give photos of one size" in capsys.readouterr().err
+
+
+def test_data_whose_masks_are_not_found_are_not_left(tmp_path, monkeypatch):
+    world, _ = seen_world()
+    monkeypatch.setattr(capture_job, "read_upright", lambda path: np.zeros((240, 320, 3), np.uint8))
+
+    def refused(*_):
+        assert "mask_path" not in (tmp_path / "transforms.json").read_text()
+        raise InputError("nothing stands out")
+
+    monkeypatch.setattr(capture_job, "find_masks", refused)
+    exposures = find_exposures(*[np.zeros(0, int)] * 2, *[np.zeros(0)] * 2, np.ones(len(world.scene.names)))
+    photos = {name: SimpleNamespace(path=tmp_path) for name in world.scene.names}
+    with pytest.raises(InputError, match="nothing stands out"):
+        capture_job.write_data(world, exposures, photos, tmp_path, PrepareSettings(), lambda step, share: None)
+    assert not (tmp_path / "transforms.json").exists()

@@ -198,16 +198,14 @@ LIMITS = {
     "export.texture_size": "in [8, 32768]", "export.environment_height": "in [1, 8192]",
 }  # fmt: skip
 CHOICES = {
-    "data.eval_mode": "auto, all, fraction, filename",
-    "data.mask_kind": "auto, object, ignore",
-    "exposure.refine": "auto, yes, no",
-    "surface.table_dtype": "float32, float16, bfloat16", "surface.normals": "analytic, finite_difference",
-    "materials.inputs": "outputs, grid", "light.kind": "mlp, pyramid", "light.activation": "softplus, exp",
-    "shading.method": "split, summed", "shading.fresnel": "exact, paper, code", "shading.query": "mean, reflection",
-    "shading.compositing": "linear, srgb", "occlusion.kind": "mlp, bits, off", "occlusion.ray_start": "normal, ray",
-    "sampling.occupancy": "distance, average", "losses.light_form": "square, smooth_l1",
-    "losses.occlusion_form": "square, smooth_l1", "losses.metal_form": "square, smooth_l1",
+    "data.eval_mode": "auto, all, fraction, filename", "data.mask_kind": "auto, object, ignore",
+    "exposure.refine": "auto, yes, no", "surface.table_dtype": "float32, float16, bfloat16",
+    "surface.normals": "analytic, finite_difference", "materials.inputs": "outputs, grid", "light.kind": "mlp, pyramid",
+    "light.activation": "softplus, exp", "shading.method": "split, summed", "shading.fresnel": "exact, paper, code",
+    "shading.query": "mean, reflection", "shading.compositing": "linear, srgb", "occlusion.kind": "mlp, bits, off",
+    "occlusion.ray_start": "normal, ray", "sampling.occupancy": "distance, average",
     "losses.light_set": "fibonacci, uniform, uniform_and_queries",
+    **dict.fromkeys(["losses.light_form", "losses.occlusion_form", "losses.metal_form"], "square, smooth_l1"),
 }  # fmt: skip
 
 # By unit: the settings that have it.

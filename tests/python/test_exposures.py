@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from blender_data import make_blender
+from blender_data import edit, make_blender
 from tiny_runs import tiny, train
 
 from splitnerf.cli import main
@@ -20,6 +20,7 @@ from splitnerf.data.pixels import per_channel
 from splitnerf.errors import InputError
 from splitnerf.evaluate.exposure import exposed_like
 from splitnerf.ops import pixel_losses
+from splitnerf.training import exposure
 from splitnerf.training.batches import draw_batch
 from splitnerf.training.exposure import ENOUGH, ERROR, PhotoExposures
 
@@ -90,8 +91,9 @@ class TestLearning:
     def test_what_is_clipped_dark_or_beside_the_object_says_nothing(self):
         found = PhotoExposures(photos([1, 1]), settings(), CPU)
         view, target, mean, opacity = seen(4000, torch.tensor([[1.0] * 3, [2.0] * 3]))
-        for bad in (dict(target=torch.cat([torch.ones(4000, 3), target[:, 3:]], 1)), dict(target=torch.cat([target[:, :3] * 0.01, target[:, 3:]], 1)),
-                    dict(target=target * torch.tensor([1, 1, 1, 0.5])), dict(opacity=0.5 * opacity)):  # fmt: skip
+        clipped, dark = (torch.cat([x, target[:, 3:]], 1) for x in (torch.ones(4000, 3), 0.01 * target[:, :3]))
+        beside = target * torch.tensor([1, 1, 1, 0.5])
+        for bad in (dict(target=clipped), dict(target=dark), dict(target=beside), dict(opacity=0.5 * opacity)):
             found.learn(**dict(view=view, target=target, mean=mean, opacity=opacity) | bad)
         assert torch.equal(found.factors, torch.ones(2, 3)) and not found.sums.any()
 
@@ -112,9 +114,8 @@ class TestLearning:
 class TestLoss:
     def batch(self, exposure: float, **changes):
         target = torch.tensor([[0.5, 0.6, 1.0, 1.0]])
-        source = SimpleNamespace(
-            generator=torch.Generator().manual_seed(0), draw=lambda n: (target[:, :3], target[:, :3], target, torch.zeros(1, dtype=torch.int64))
-        )  # fmt: skip
+        drawn = target[:, :3], target[:, :3], target, torch.zeros(1, dtype=torch.int64)
+        source = SimpleNamespace(generator=torch.Generator().manual_seed(0), draw=lambda n: drawn)
         return draw_batch(source, 1, tiny(**changes), torch.full((1, 3), exposure))
 
     def test_a_photo_is_compared_at_its_own_exposure(self):
@@ -148,16 +149,25 @@ def test_views_get_the_exposure_at_which_they_are_nearest(tmp_path):
 
 
 class TestRun:
-    def test_a_run_keeps_what_it_learned(self, tmp_path, capsys):
+    def test_exposures_that_are_right_leave_no_file(self, tmp_path):
+        """Photos of one exposure: what is learned is within its error, so the scores are those of the stated exposures."""
         data, run = make_blender(tmp_path / "data"), tmp_path / "run"
-        arguments = "--steps", "30", "--set", "exposure.refine=yes"
+        assert train(data, run, "--steps", "30", "--set", "exposure.refine=yes") == 0
+        assert not (run / EXPOSURES).exists() and "exposures" not in json.loads((run / "evaluation.json").read_text())
+
+    def test_a_run_keeps_what_it_learned(self, tmp_path, capsys, monkeypatch):
+        monkeypatch.setattr(exposure, "ERROR", 1e-4)
+        data, run = make_blender(tmp_path / "data"), tmp_path / "run"
+        edit(data, lambda meta: [frame.update(exposure=1 + i % 3) for i, frame in enumerate(meta["frames"])])
+        arguments = "--steps", "60", "--set", "exposure.refine=yes"
         assert train(data, run, *arguments) == 0
+        assert json.loads((run / "evaluation.json").read_text())["exposures"] == "fitted"
         stored = json.loads((run / EXPOSURES).read_text())["exposures"]
         views = load_dataset(data)
-        assert list(stored) == [f"train/{name}.png" for name in views.frame_names] and np.shape(list(stored.values())) == (len(views), 3)
+        assert list(stored) == [f"train/{name}.png" for name in views.frame_names]
         exposed = with_exposures(views, run)
         np.testing.assert_allclose(exposed.exposures, list(stored.values()))
-        np.testing.assert_allclose(np.log(exposed.exposures).mean(0), 0, atol=1e-5)
+        np.testing.assert_allclose(np.log(exposed.exposures).mean(0), math.log(6) / 3, atol=1e-5)
         assert main(["evaluate", str(run), "--data", str(data), "--spp", "1"]) == 0
         (run / EXPOSURES).write_text(json.dumps({"exposures": {"other": [1, 1, 1]}}))
         with pytest.raises(InputError, match="is not of these photos"):
@@ -165,5 +175,6 @@ class TestRun:
         capsys.readouterr()
         assert main(["refine", str(run), "--data", str(data), "--out", str(tmp_path / "again"), "--sweeps", "1"]) == 2
         assert "is not of these photos" in capsys.readouterr().err
-        assert train(data, run, "--steps", "30", "--overwrite") == 0 and not (run / EXPOSURES).exists()
+        arguments = "--steps", "30", "--set", "exposure.refine=no", "--overwrite"
+        assert train(data, run, *arguments) == 0 and not (run / EXPOSURES).exists()
         assert with_exposures(views, run) is views

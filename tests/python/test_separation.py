@@ -358,9 +358,9 @@ class TestMirrors:
         o = torch.stack([torch.full_like(y, 3.0), y, z], -1).reshape(-1, 3)
         mask = torch.zeros(n, n)
         mask[22:64, 12:40] = 1
-        found = with_mirrors(mask, self.region(), o, torch.tensor([[-1.0, 0, 0]]).expand(len(o), 3))
+        found = with_mirrors(mask, self.region(), (n // 2, n // 2), o, torch.tensor([[-1.0, 0, 0]]).expand(len(o), 3))
         assert found[30:60, 42:68].min() == 1 and torch.equal(found[:, :12], mask[:, :12]) and found[:, 76:].max() == 0
-        assert torch.equal(with_mirrors(mask, Region(np.zeros((CELLS,) * 3, bool), None), o, o), mask)
+        assert torch.equal(with_mirrors(mask, Region(np.zeros((CELLS,) * 3, bool), None), (n // 2, n // 2), o, o), mask)
 
     def test_cells_that_several_photos_show_are_solid(self):
         random = np.random.default_rng(0)

@@ -30,6 +30,7 @@ from splitnerf.errors import InputError
 from splitnerf.files import LOCK, atomic_path, held, remove_partial
 
 BLURRED = 0.12  # share of the median sharpness below which a photo is left out
+TRANSFORMS = "transforms.json"
 DARK = 0.02  # sRGB value that 1 % of a photo's pixels must exceed
 
 
@@ -82,6 +83,7 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         photos = _photographs(source, out, settings, report)
         _begin(work, photos, settings)
         kept, left_out = _sorted_out(photos, report)
+        _check_sizes(kept)
         images = _upright_copies(kept, work)
         found = reconstruct(kept, images, work, settings.seed, report)
         placed = set(found.names)
@@ -131,6 +133,14 @@ def _sorted_out(photos: list[Photograph], report: Callable[[str, float], None]) 
         elif s < BLURRED * np.median(sharp):
             reasons[photo.name] = f"blurred: {100 * s / np.median(sharp):.0f} % of the others' sharpness"
     return [photo for photo in photos if photo.name not in reasons], reasons
+
+
+def _check_sizes(photos: list[Photograph]) -> None:
+    """Raises InputError where photos are of different sizes, which training does not take."""
+    for photo in photos:
+        if (photo.width, photo.height) != (photos[0].width, photos[0].height):
+            sizes = [f"{p.path.name} is {p.width}x{p.height}" for p in (photos[0], photo)]
+            raise InputError(f"{photo.path.parent}: {sizes[0]}, {sizes[1]}; give photos of one size")
 
 
 def _upright_copies(photos: list[Photograph], work: Path) -> Path:
@@ -188,12 +198,16 @@ def write_data(
         report("images", (i + 1) / len(scene.names))
     if settings.masks is None:
         _write_transforms(world, exposures, pinholes, out, masked=False)
-        masks = find_masks(out, world, settings.seed, lambda share: report("masks", share))
+        try:
+            masks = find_masks(out, world, settings.seed, lambda share: report("masks", share))
+        except BaseException:
+            (out / TRANSFORMS).unlink()  # data without their masks are half of the data
+            raise
     else:
         masks = given_masks(world, settings.masks, settings.max_size)
     for name, pinhole, mask in zip(scene.names, pinholes, masks):
-        large = Image.fromarray((255 * mask + 0.5).astype(np.uint8)).resize((pinhole.width, pinhole.height), Image.Resampling.BILINEAR)
-        write_png(out / "masks" / f"{name}.png", np.asarray(large))
+        small, size = Image.fromarray((255 * mask + 0.5).astype(np.uint8)), (pinhole.width, pinhole.height)
+        write_png(out / "masks" / f"{name}.png", np.asarray(small.resize(size, Image.Resampling.BILINEAR)))
     _write_transforms(world, exposures, pinholes, out, masked=True)
     write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
     return np.array([mask.mean() for mask in masks])
@@ -226,5 +240,5 @@ def _write_transforms(world: World, exposures: Exposures, pinholes: list[Lens], 
             "exposure": float(exposures.gains[i]), "transform_matrix": world.scene.poses[i].tolist(),
         })  # fmt: skip
     content = {"camera_model": "PINHOLE", "mask_kind": "object", "frames": frames}
-    with atomic_path(out / "transforms.json") as temporary:
+    with atomic_path(out / TRANSFORMS) as temporary:
         temporary.write_text(json.dumps(content, indent=1))

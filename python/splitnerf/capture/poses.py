@@ -18,6 +18,7 @@ from splitnerf.errors import InputError
 EXHAUSTIVE = 250  # photos up to which each is matched with each other one
 OVERLAP = 15  # neighbours in the order of names with which a photo is matched beyond that
 MIN_PHOTOS = 3
+FEW = 10  # photos up to which points that two of them show are kept
 MAX_ERROR, SHORTEST = 2.0, 3  # pixels of reprojection and photos of a point beyond and below which the adjustment drops it
 OUTLIER = 0.5  # pixels of reprojection from which on an observation counts less
 ADJUSTMENTS = 3
@@ -143,6 +144,7 @@ def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     Points that are no points, such as highlights and mirrored lamps, fit nearly: a loss with heavy tails (Cauchy's) keeps
     them from pulling at the cameras. Where few photos leave the principal points open, they stay at the centres.
     """
+    shortest = SHORTEST if model.num_reg_images() > FEW else 2
     for principal_points in (True, False):
         refined = pycolmap.Reconstruction(model)
         options, chosen = pycolmap.BundleAdjustmentOptions(), pycolmap.BundleAdjustmentConfig()
@@ -156,7 +158,7 @@ def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
             pycolmap.create_default_bundle_adjuster(options, chosen, refined).solve()
             refined.update_point_3d_errors()
             points = refined.points3D.items()
-            for key in [k for k, point in points if point.error > MAX_ERROR or point.track.length() < SHORTEST]:
+            for key in [k for k, point in points if point.error > MAX_ERROR or point.track.length() < shortest]:
                 refined.delete_point3D(key)
         if all(_is_central(camera) for camera in refined.cameras.values()):
             break

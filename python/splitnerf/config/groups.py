@@ -54,7 +54,8 @@ class Exposure:
     """How bright the photos are beside each other."""
 
     refine: str = setting(
-        "auto", "whether each photo's exposure is learned; auto: of photos that cameras wrote, which are JPEG or state exposures",
+        "auto",
+        "whether each photo's exposure is learned; auto: of photos that cameras wrote, which are JPEG or state exposures",
         choices=("auto", "yes", "no"),
     )  # fmt: skip
     white_balance: bool = setting(False, "whether each channel has an exposure of its own")

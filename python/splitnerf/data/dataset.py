@@ -13,7 +13,6 @@ import numpy as np
 
 from splitnerf.data.environment import read_surroundings
 from splitnerf.data.frames import read_frames
-from splitnerf.data.images import HDR_SUFFIXES
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.loading import Loader
@@ -52,6 +51,8 @@ class Dataset:
         origin: [3] float64, the point of the data's files that is the origin of the data's world here; 0 but where the
             files' origin is too far away for float32.
         exposures: [n] or [n, 3] float64, the factors by which the images' linear values were divided; None stands for 1.
+        stated: [n] float64, the exposures that the data state; None stands for 1. Those of files of floats are kept at another
+            one of `exposures`.
         surroundings: [h, 2 h, 4] float32, equirectangular: linear radiance that the photos see around the object, and how
             well it was seen, in [0, 1]; None where the data have no such map.
         masked: Whether alpha says where the object is; otherwise it is 1.
@@ -70,12 +71,13 @@ class Dataset:
     known: np.ndarray | None = None
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     exposures: np.ndarray | None = None
+    stated: np.ndarray | None = None
     surroundings: np.ndarray | None = None
     masked: bool = True
 
     def __post_init__(self) -> None:
         self.images = self.images if isinstance(self.images, Photos) else Photos(self.images)
-        self.exposures = np.ones(len(self.images)) if self.exposures is None else self.exposures
+        self.exposures, self.stated = (np.ones(len(self.images)) if x is None else x for x in (self.exposures, self.stated))
 
     def __len__(self) -> int:
         return len(self.images)
@@ -107,10 +109,7 @@ class Dataset:
     @property
     def photographed(self) -> bool:
         """Whether the images look as cameras write them: JPEG, or with exposures."""
-        suffixes = [path.suffix.lower() for path in self.image_paths]
-        return any(suffix in JPEG for suffix in suffixes) or any(
-            suffix not in HDR_SUFFIXES and (exposure != 1).any() for suffix, exposure in zip(suffixes, self.exposures)
-        )
+        return bool((self.stated != 1).any()) or any(path.suffix.lower() in JPEG for path in self.image_paths)
 
     def exposed(self, exposures: np.ndarray) -> Dataset:
         """The split with other exposures [n] or [n, 3]."""
@@ -136,6 +135,7 @@ class Dataset:
             poses=self.poses[views],
             intrinsics=self.intrinsics[views],
             exposures=self.exposures[views],
+            stated=self.stated[views],
             frame_names=[self.frame_names[i] for i in views],
             image_paths=[self.image_paths[i] for i in views],
         )
@@ -205,6 +205,7 @@ def load_dataset(
         known=loader.known,
         origin=origin,
         exposures=loader.exposures,
+        stated=np.array([frame.exposure for frame in frames]),
         surroundings=_surroundings(root, reading),
         masked=_has_masks(photos),
     )

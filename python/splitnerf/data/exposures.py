@@ -12,7 +12,7 @@ from splitnerf.data.json_files import read_json, write_json
 from splitnerf.errors import InputError
 
 EXPOSURES = "exposures.json"
-MEANING = "the factors of each photo's linear red, green and blue; their geometric mean is that of the exposures that the data state"
+MEANING = "factors of each photo's linear red, green and blue, with the geometric mean of those that the data state"
 
 
 def write_exposures(run: Path, dataset: Dataset) -> None:

@@ -151,7 +151,8 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[tuple[int, int
 def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
     """The sRGB values of an image, straight alpha, and the factor by which their linear values were multiplied.
 
-    Floats are linear radiance; the factor then brings nearly all below PEAK, and what is above 1 is clipped. Whole numbers are sRGB, or follow the camera's curve.
+    Floats are linear radiance; the factor then brings nearly all below PEAK, and what is above 1 is clipped. Whole numbers are
+    sRGB, or follow the camera's curve.
 
     Args:
         path: The image.
@@ -166,7 +167,8 @@ def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
         if gamma == 0:
             return pixels, 1.0
         values = decoded(pixels)
-        return np.concatenate([linear_to_srgb(values[..., :n_colours] ** np.float32(gamma)), values[..., n_colours:]], axis=-1), 1.0
+        colour = linear_to_srgb(values[..., :n_colours] ** np.float32(gamma))
+        return np.concatenate([colour, values[..., n_colours:]], axis=-1), 1.0
     if not (pixels.min() >= 0 and pixels.max() < np.inf):  # false for NaN
         raise InputError(f"{path}: has NaN, infinite or negative pixels; clean or re-export it")
     colour, alpha = pixels[..., :n_colours], pixels[..., -1:]

@@ -79,7 +79,7 @@ def _view(split: Dataset, index: int, factor: int) -> View:
         colour=colour,
         mask=mask,
         known=known,
-        exposure=exposure,
+        exposure=float(split.stated[index]),
         share=float(mask.sum() / max(1, known.sum())),
         cut=float((mask & edge).sum() / max(1, edge.sum())),
         clipped=float(clipped.mean()) if len(clipped) else 0.0,

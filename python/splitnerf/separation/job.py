@@ -122,7 +122,7 @@ def table_under(points: np.ndarray, dataset: Dataset, seed: int) -> Table | None
         axis = axis / np.linalg.norm(axis).clip(1e-9)
         plane = find_table(near, reach * axis, axis, distance, random)
         if plane is not None:
-            return Table.through(*plane, near)
+            return Table(*plane)
     return None
 
 

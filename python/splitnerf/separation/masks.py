@@ -14,7 +14,7 @@ from splitnerf.data.environment import directions_of_texels, texels_of_direction
 from splitnerf.data.images import srgb_to_linear
 from splitnerf.render.rays import image_rays
 from splitnerf.separation.field import RadianceField
-from splitnerf.separation.region import CELLS, HALF, Region
+from splitnerf.separation.region import Region
 
 SAMPLES = 64, 32  # of a ray, of the first search and of the second
 CHUNK = 4096  # rays
@@ -52,7 +52,7 @@ def points_near(field: RadianceField, dataset: Dataset, region: Region) -> tuple
     """More points [n, 3] around a region where it meets its table, as seen from above, and their colours [n, 3], sRGB."""
     table, middle = region.table, region.middle()
     normal = torch.from_numpy(table.normal.astype(np.float32))
-    cells = ((region.cells.nonzero().float() + 0.5) * (2 / CELLS) - 1) * HALF - middle
+    cells = region.centres() - middle
     reach = float((cells - (cells @ normal)[:, None] * normal).norm(dim=1).max()) + AROUND
     centre = middle - (middle @ normal - table.offset) * normal
     points, colours, size = [], [], _size(dataset, DENSE)
@@ -113,18 +113,18 @@ def find_mask(field: RadianceField, region: Region, dataset: Dataset, index: int
     rays_o, rays_d = view_rays(dataset, index, size)
     if len(chosen):
         mask[chosen] = coverage(field, region, rays_o[chosen], rays_d[chosen])
-    return with_mirrors(mask.view(size).clamp(0, 1), region, *view_rays(dataset, index, half)).numpy()
+    return with_mirrors(mask.view(size).clamp(0, 1), region, half, *view_rays(dataset, index, half)).numpy()
 
 
-def with_mirrors(mask: Tensor, region: Region, rays_o: Tensor, rays_d: Tensor) -> Tensor:
+def with_mirrors(mask: Tensor, region: Region, half: tuple[int, int], rays_o: Tensor, rays_d: Tensor) -> Tensor:
     """A mask [h, w] with what of its outside other photos show to be solid, but for a rim as wide as they are vague.
 
     Args:
         mask: The coverage of a view.
         region: The object.
-        rays_o, rays_d: [h/2 w/2, 3] the view's rays, of every other pixel.
+        half: The height and width of an image of every other pixel.
+        rays_o, rays_d: [half, 3] the view's rays through that image.
     """
-    half = -(-mask.shape[0] // 2), -(-mask.shape[1] // 2)
     outside = (interpolate(mask[None, None], half, mode="area")[0, 0] < 0.5).view(-1).nonzero().squeeze(1)
     blocked = torch.zeros(half[0] * half[1])
     for chosen in outside.split(CHUNK):

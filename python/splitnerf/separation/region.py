@@ -38,7 +38,11 @@ class Region:
 
     def middle(self) -> Tensor:
         """[3] the middle of the cells."""
-        return ((self.cells.nonzero().float().mean(0) + 0.5) * (2 / CELLS) - 1) * HALF
+        return self.centres().mean(0)
+
+    def centres(self) -> Tensor:
+        """[n, 3] the centres of the cells, scene units."""
+        return ((self.cells.nonzero().float() + 0.5) * (2 / CELLS) - 1) * HALF
 
     def holds(self, points: Tensor) -> Tensor:
         """[...] bool, whether points [..., 3] lie in the region."""
@@ -127,7 +131,8 @@ def find_region(points: np.ndarray, table: Table | None, n_photos: int = 1) -> R
     taken = filled(taken) if table is None else down_to(table, filled(taken))
     grown = ndimage.binary_dilation(taken, np.ones((3, 3, 3)), iterations=GROWN)
     photo = np.repeat(np.arange(n_photos), -(-len(points) // n_photos))[: len(points)][chosen]
-    seen_by = np.bincount(np.unique(np.ravel_multi_index(tuple(index.T), taken.shape) * n_photos + photo) // n_photos, minlength=taken.size)
+    sights = np.unique(np.ravel_multi_index(tuple(index.T), taken.shape) * n_photos + photo)  # each photo once in a cell
+    seen_by = np.bincount(sights // n_photos, minlength=taken.size)
     return Region(grown, table, None, (seen_by.reshape(taken.shape) >= SEVERAL) & grown)
 
 

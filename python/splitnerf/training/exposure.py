@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -23,9 +24,9 @@ class PhotoExposures:
     """The factor of each photo's linear values, per channel: what the photos' pixels have of those rendered, in the mean of the
     logarithms over the pixels of past steps.
 
-    They are drawn to the start as far as their spread over the photos is no larger than their error (James and Stein 1961), so that
-    exposures that were right stay as they were. After each step the logarithms are moved to the mean that they had at the start: images do not tell the light's brightness
-    from that of all photos.
+    They are drawn to the start as far as their spread over the photos is no larger than their error (James and Stein 1961), so
+    that exposures that were right stay as they were. After each step the logarithms are moved to the mean that they had at the
+    start: images do not tell the light's brightness from that of all photos.
 
     Args:
         dataset: The photos; their exposures are the start.
@@ -34,15 +35,17 @@ class PhotoExposures:
 
     Attributes:
         learned: Whether exposures are learned at all.
+        factors: [n, 3] float32, of the photos' linear values.
         sums: [n, 4] float32, of the logarithms and of the pixels.
     """
 
     def __init__(self, dataset: Dataset, config: Config, device: torch.device):
-        refine = config.exposure.refine
-        self.learned = config.shading.compositing == "linear" and (refine == "yes" or (refine == "auto" and dataset.photographed))
+        wanted = {"yes": True, "no": False, "auto": dataset.photographed}[config.exposure.refine]
+        self.learned = wanted and config.shading.compositing == "linear"
         self.white_balance = config.exposure.white_balance
         start = torch.from_numpy(dataset.exposures).float().reshape(len(dataset), -1).expand(-1, 3)
         self.start = start.to(device).log()
+        self.factors = self.start.exp()
         self.sums = torch.zeros(len(dataset), 4, device=device)
 
     def learn(self, view: Tensor, target: Tensor, mean: Tensor, opacity: Tensor) -> None:
@@ -62,16 +65,23 @@ class PhotoExposures:
             apart = apart.mean(1, keepdim=True).expand(-1, 3)
         values = torch.cat([apart.clamp(-FARTHEST, FARTHEST), torch.ones_like(apart[:, :1])], dim=1)
         self.sums.mul_(KEEP).index_add_(0, view, torch.where(counts[:, None], values, 0.0))
+        self._update()
 
-    @property
-    def factors(self) -> Tensor:
-        """[n, 3] the factors of the photos' linear values."""
+    def _update(self) -> None:
         logs = self.sums[:, :3] / (self.sums[:, 3:] + ENOUGH)
         logs = logs - logs.mean(0)
         share = 1 - ERROR**2 / logs.square().mean(0).clamp(min=ERROR**2)
-        return (self.start + share * logs).exp()
+        self.factors = (self.start + share * logs).exp()
+
+    @property
+    def found(self) -> np.ndarray | None:
+        """[n, 3] float64, the exposures where they are others than at the start; None where nothing was learned."""
+        if not self.learned or torch.equal(self.factors, self.start.exp()):
+            return None
+        return self.factors.cpu().numpy().astype(np.float64)
 
     def restore(self, sums: Tensor) -> None:
         """Takes back the sums that a checkpoint kept. Raises ValueError where they are of other photos."""
         check_tensor("exposures", sums, tuple(self.sums.shape), torch.float32)
         self.sums = sums.to(self.sums.device)
+        self._update()

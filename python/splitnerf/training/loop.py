@@ -322,10 +322,9 @@ class Training:
 
     def result(self) -> TrainedScene:
         """The scene as the training leaves it in memory."""
-        exposures = self.exposures.factors.cpu().numpy().astype(np.float64) if self.exposures.learned else None
         return TrainedScene(
             self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0, self.step - self.resumed_at,
-            exposures,
+            self.exposures.found,
         )  # fmt: skip
 
 
