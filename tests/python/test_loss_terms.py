@@ -66,6 +66,15 @@ def test_colours_that_are_added_in_linear_light_are_compared_in_srgb(rendered):
     assert (linear.colour - ray.colour).abs().max() > 0.1
 
 
+def test_colours_are_compared_at_the_exposures_of_their_photos(rendered):
+    """Half of the exposure and twice the light are the same."""
+    config, batch, ray, _ = rendered
+    model, linear = SceneModel(config), dataclasses.replace(ray, linear=True)
+    same = batch._replace(exposure=0.5 * torch.ones_like(batch.exposure)), dataclasses.replace(linear, mean=2 * ray.mean)
+    terms = [loss_terms(model, model.evaluate_light(), *case, None, None, generator(2), 0, 0.0) for case in ((batch, linear), same)]
+    assert weighted(terms[1], "colour") == pytest.approx(weighted(terms[0], "colour"), rel=1e-6)
+
+
 def test_gradients_are_averaged_over_points(rendered):
     _, _, ray, terms = rendered
     expected = 0.1 * (ray.gradients.norm(dim=1) - 1.0).square().mean().item()

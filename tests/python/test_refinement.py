@@ -18,6 +18,7 @@ from splitnerf.data.images import linear_to_srgb
 from splitnerf.errors import InputError
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
+from splitnerf.refinement import fit as fit_module
 from splitnerf.refinement.fit import Refinement, RefinementSettings, refine, srgb_slope
 from splitnerf.refinement.job import fitting_height
 from splitnerf.refinement.outline import fit_outline
@@ -275,3 +276,12 @@ def test_the_command_writes_an_asset_and_says_what_is_wrong(tmp_path, capsys, pa
     new = read_asset(run / "refined" / "mesh.glb")
     assert new.materials[0].albedo_texture.shape == (SIZE, SIZE, 3)
     assert (run / "refined" / "environment.exr").is_file() and (run / "refined" / "refinement.json").is_file()
+
+
+def test_a_sweep_has_no_more_pixels_than_it_may(painted, monkeypatch):
+    asset, data = painted
+    fit = Refinement(data, asset, sky(), RefinementSettings(light_step=0.0, pixels=100, sweep_share=1.0))
+    assert len(fit.pixels) > 600
+    monkeypatch.setattr(fit_module, "SWEEP_PIXELS", 300)
+    fit.sweep()
+    assert fit.n_batches == 3
