@@ -22,7 +22,7 @@ from splitnerf.evaluate.exposure import exposed_like
 from splitnerf.ops import pixel_losses
 from splitnerf.training import exposure
 from splitnerf.training.batches import draw_batch
-from splitnerf.training.exposure import ENOUGH, ERROR, PhotoExposures
+from splitnerf.training.exposure import COLOUR_ERROR, ENOUGH, ERROR, PhotoExposures
 
 CPU = torch.device("cpu")
 
@@ -60,9 +60,10 @@ class TestLearning:
         found = PhotoExposures(photos([1, 1, 1]), settings(**{"exposure.white_balance": white_balance}), CPU)
         for step in range(40):
             found.learn(*seen(20_000, true, step))
-        logs = true.log() if white_balance else true.log().mean(1, keepdim=True).expand(-1, 3)
-        logs = logs - logs.mean(0)
-        expected = (logs * (1 - ERROR**2 / logs.square().mean(0))).exp()
+        logs = true.log() - true.log().mean(0)
+        level = logs.mean(1, keepdim=True).expand(-1, 3)
+        parts = [(level, ERROR)] + white_balance * [(logs - level, COLOUR_ERROR)]
+        expected = sum(x * (1 - error**2 / x.square().mean()) for x, error in parts).exp()
         torch.testing.assert_close(found.factors, expected, rtol=2e-3, atol=0)
         torch.testing.assert_close(found.factors.log().mean(0), torch.zeros(3), atol=1e-5, rtol=0)
 
@@ -99,11 +100,15 @@ class TestLearning:
 
     @pytest.mark.parametrize("refine, photographed, compositing, learned", [
         ("auto", True, "linear", True), ("auto", False, "linear", False), ("yes", False, "linear", True),
-        ("no", True, "linear", False), ("yes", True, "srgb", False),
+        ("no", True, "linear", False), ("auto", True, "srgb", False),
     ])  # fmt: skip
     def test_when_they_are_learned(self, refine, photographed, compositing, learned):
         config = settings(**{"exposure.refine": refine, "shading.compositing": compositing, "shading.method": "split"})
         assert PhotoExposures(photos([1, 1], photographed), config, CPU).learned == learned
+
+    def test_srgb_samples_and_exposures_exclude_each_other(self):
+        with pytest.raises(InputError, match="exposure.refine = yes needs shading.compositing = linear"):
+            settings(**{"shading.compositing": "srgb", "shading.method": "split"})
 
     def test_sums_of_other_photos_are_refused(self):
         found = PhotoExposures(photos([1, 1]), settings(), CPU)

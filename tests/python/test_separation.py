@@ -245,6 +245,27 @@ def test_from_photos_without_masks_to_an_asset(tmp_path, capsys, monkeypatch):
     assert main(["evaluate", str(run), "--data", str(tmp_path / "data"), "--spp", "1"]) == 2
 
 
+def test_photos_in_other_units_of_radiance(tmp_path, monkeypatch):
+    """The field sees them at an exposure of 1 in the mean; the surroundings are in their units."""
+    write_ball_on_floor(tmp_path / "data")
+    photos = load_dataset(tmp_path / "data", reading=Reading("all"), masked=False)
+    given, around = [], []
+
+    def train_field(dataset, **_):
+        given.append(dataset)
+        return TrueField(dataset.world_from_box)
+
+    monkeypatch.setattr(job, "train_field", train_field)
+    for factor in (1.0, 0.01):
+        exposed = photos.exposed(factor * np.where(np.arange(len(photos)) % 2, 2.0, 0.5))
+        job.separate(exposed, None, tmp_path / "found", steps=1, minutes=0, seed=0)
+        around.append(read_image(tmp_path / "found/surroundings.exr"))
+    np.testing.assert_allclose(given[1].exposures, given[0].exposures)
+    np.testing.assert_allclose(given[1].images[:2], given[0].images[:2], atol=1e-6)
+    np.testing.assert_allclose(around[1][..., :3], 100 * around[0][..., :3], rtol=1e-2)
+    np.testing.assert_array_equal(around[1][..., 3], around[0][..., 3])
+
+
 def test_training_lowers_the_error(tmp_path, monkeypatch):
     write_ball_on_floor(tmp_path, 8)
     dataset, told = load_dataset(tmp_path, reading=Reading("all"), masked=False), []

@@ -178,6 +178,10 @@ RULES = (
         "shading.compositing = linear and shading.fresnel = exact; set shading.method=split",
     ),
     (
+        lambda c: c.exposure.refine == "yes" and c.shading.compositing != "linear",
+        "exposure.refine = yes needs shading.compositing = linear; set exposure.refine=no",
+    ),
+    (
         lambda c: c.surface.base_resolution * c.surface.growth ** (c.surface.n_levels - 1) >= MOST_CELLS,
         f"a level of the hash grid needs fewer than {MOST_CELLS} cells along an edge; lower surface.growth",
     ),

@@ -70,6 +70,8 @@ def separate(
         RuntimeError: Numbers of the training are no longer finite.
     """
     started = time.monotonic()
+    usual = float(np.exp(np.log(train.exposures).mean()))  # the field knows colours in [0, 1]
+    train, test = (split and split.exposed(split.exposures / usual) for split in (train, test))
     with ended_by_signals():
         with Progress(0.0) as bar:
             field = train_field(
@@ -81,7 +83,8 @@ def separate(
         discard_separated(folder)
         folder.mkdir(parents=True)
         shares = [write_masks(field, region, split, folder) for split in (train, test) if split is not None]
-        write_image(folder / SURROUNDINGS, surroundings(field, region, points))
+        around = surroundings(field, region, points)
+        write_image(folder / SURROUNDINGS, around / np.float32([usual] * 3 + [1]))
         write_sheet(train, folder)
         found = Separated(region.table is not None, float(np.mean(np.concatenate(shares))), time.monotonic() - started)
         write_json(folder / SEPARATION, vars(found))

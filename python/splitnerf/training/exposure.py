@@ -15,6 +15,7 @@ KEEP = 0.998  # share of the sums that outlives a step
 ENOUGH = 50.0  # pixels of a photo that count as much as the start
 DARKEST, BRIGHTEST = 0.01, 0.95  # linear values of a photo's pixels that count
 ERROR = 0.06  # of the logarithms, as the rendering is not the object: measured .05 on two captures with known exposures
+COLOUR_ERROR = 0.06  # the same of the channels beside their mean
 FARTHEST = 1.0  # of a pixel's log from the rendering's: more is no exposure
 COVERED = 0.95  # alpha and opacity of pixels that count
 BEGIN = 0.02  # progress from which exposures are learned
@@ -24,8 +25,8 @@ class PhotoExposures:
     """The factor of each photo's linear values, per channel: what the photos' pixels have of those rendered, in the mean of the
     logarithms over the pixels of past steps.
 
-    They are drawn to the start as far as their spread over the photos is no larger than their error (James and Stein 1961), so
-    that exposures that were right stay as they were. After each step the logarithms are moved to the mean that they had at the
+    Their mean over the channels, and the channels beside it, are each drawn to the start as far as their spread over the photos
+    is no larger than their error (James and Stein 1961), so that what was right stays as it was. After each step the logarithms are moved to the mean that they had at the
     start: images do not tell the light's brightness from that of all photos.
 
     Args:
@@ -61,8 +62,6 @@ class PhotoExposures:
         counts = (target[:, 3] > COVERED) & (opacity.detach() > COVERED)
         counts &= ((photo > DARKEST) & (photo < BRIGHTEST)).all(1)
         apart = photo.clamp(min=DARKEST).log() - mean.detach().clamp(min=1e-4).log() - self.start[view]
-        if not self.white_balance:
-            apart = apart.mean(1, keepdim=True).expand(-1, 3)
         values = torch.cat([apart.clamp(-FARTHEST, FARTHEST), torch.ones_like(apart[:, :1])], dim=1)
         self.sums.mul_(KEEP).index_add_(0, view, torch.where(counts[:, None], values, 0.0))
         self._update()
@@ -70,8 +69,11 @@ class PhotoExposures:
     def _update(self) -> None:
         logs = self.sums[:, :3] / (self.sums[:, 3:] + ENOUGH)
         logs = logs - logs.mean(0)
-        share = 1 - ERROR**2 / logs.square().mean(0).clamp(min=ERROR**2)
-        self.factors = (self.start + share * logs).exp()
+        level = logs.mean(1, keepdim=True)
+        found = drawn(level, ERROR)
+        if self.white_balance:
+            found = found + drawn(logs - level, COLOUR_ERROR)
+        self.factors = (self.start + found).exp()
 
     @property
     def found(self) -> np.ndarray | None:
@@ -85,3 +87,8 @@ class PhotoExposures:
         check_tensor("exposures", sums, tuple(self.sums.shape), torch.float32)
         self.sums = sums.to(self.sums.device)
         self._update()
+
+
+def drawn(logs: Tensor, error: float) -> Tensor:
+    """Numbers of mean 0 that have this error, drawn to 0: by James and Stein's rule with the mean of their squares."""
+    return (1 - error**2 / logs.square().mean().clamp(min=error**2)) * logs
