@@ -337,6 +337,17 @@ class TestFoot:
         beside = torch.from_numpy((np.array([[0.6, 0.6]]) @ self.TABLE.axes + self.TABLE.offset * self.TABLE.normal).astype(np.float32))
         assert foot.holds(self.over(0.2, 0.0)).all() and not foot.holds(beside).any()
 
+    @pytest.mark.parametrize("place, raised, held", [(0.36, -0.012, True), (0.44, 0.02, False)])
+    def test_where_heights_are_wrong_colour_decides(self, place, raised, held):
+        """A notch in the plinth's edge, and a bump of the table beside it."""
+        points, colours, post = self.scene(0.012, 0.003)
+        at = points @ self.TABLE.axes.T
+        wrong = (np.linalg.norm(at - [place, 0], axis=1) < 0.05) & ((np.linalg.norm(at, axis=1) < 0.4) == held)
+        foot = find_foot(self.TABLE, points + wrong[:, None] * raised * self.TABLE.normal, colours, post)
+        asked = np.array([[place, 0.0]]) @ self.TABLE.axes + (self.TABLE.offset + 0.005) * self.TABLE.normal
+        assert bool(foot.holds(torch.from_numpy(asked.astype(np.float32)))) == held
+        assert foot.holds(self.over(0.3, 0.0)).all() and not foot.holds(self.over(0.5, 0.01)).any()
+
     def test_nothing_shown(self):
         foot = find_foot(self.TABLE, np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
         assert not foot.holds(self.over(0.2, 0.0)).any()

@@ -1,7 +1,8 @@
 """Where an object meets its table: told from many points that photos show, and by colour at the edge.
 
 One point near the table says little, as its height is less certain than a thin foot is high. The median height of all points
-over one cell of the table is certain enough: a plinth of three millimetres stands out. Its edge is where the colour changes.
+over one cell of the table is more certain: a plinth of three millimetres stands out, but for notches of its edge. So heights are
+a hint to each cell, and neighbours of one colour belong together.
 Below an overhang, cameras see the table at a grazing angle alone, and what they see there is vague: single points decide.
 """
 
@@ -10,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 import torch
 from scipy import ndimage
-from skimage.segmentation import random_walker
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import spsolve
 from torch import Tensor
 
 from splitnerf.separation.table import Table
@@ -25,8 +27,10 @@ NOISE = 3.0  # standard deviations of the table's cells by which cells stand out
 SPARSE = 0.1  # smoothed weight of a cell below which nothing is known of it
 VAGUE = 0.03  # height over the table from which a point below an overhang is the object's, scene units
 GAP = 3  # cells that close holes in what stands over the foot
-WITHIN, BEYOND = 2, 4  # cells on both sides of the edge of what stands out, on which the colour decides
-CONTRAST = 130.0  # of colours that are unlike, see skimage.segmentation.random_walker
+HINT = 0.02  # what the height of a cell counts beside a neighbour of its own colour
+CONTRAST = 33.0  # of colours that are unlike: their squared distance is over the colours' variance
+LEAST_TIE = 1e-4  # between neighbours, however unlike
+
 
 
 class Foot:
@@ -75,12 +79,14 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
     weights = np.minimum(counts, 1.0)
     around = np.stack([_smoothed(channel, weights) for channel in np.moveaxis(colour, -1, 0)], axis=-1)
     colour = np.where(counts[..., None] > 0, colour, around)
-    inside = _by_colour(_standing_out(medians, counts, over), colour)
-    return Foot(table, inside, np.where(over & (counts == 0), 1.0, -1.0).astype(np.float32))
+    hidden = over & (counts == 0)
+    known = (_smoothed(weights, np.ones_like(weights)) > SPARSE) & ~hidden
+    inside = _by_colour(_by_height(medians, counts, over), colour, known)
+    return Foot(table, inside, np.where(hidden, 1.0, -1.0).astype(np.float32))
 
 
-def _standing_out(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> np.ndarray:
-    """[r, r] bool, the cells that are higher than the table and hang together below what is over them.
+def _by_height(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> np.ndarray:
+    """[r, r] in [-1, 1], how far cells are higher than the table, if they hang together below what is over them; negative where not.
 
     Args:
         medians, counts: [r, r] the median heights of points, and their numbers.
@@ -90,36 +96,42 @@ def _standing_out(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> 
     others = (weights > 0) & ~over
     deviation = 1.4826 * np.median(np.abs(_smoothed(medians, weights)[others])) if others.any() else 0.0
     least = max(LEAST_HEIGHT, NOISE * deviation)
-    heights = medians.clip(0.0, 2 * least)  # the edge is half of the way up, however high the object is there
-    out = (_smoothed(heights, weights) > least) & (_smoothed(weights, np.ones_like(weights)) > SPARSE)
+    heights = _smoothed(medians.clip(0.0, 2 * least), weights)  # the edge is half of the way up, however high the object is there
     hidden = over & (counts == 0)
-    parts, _ = ndimage.label(out | hidden)
+    parts, _ = ndimage.label(((heights > least) & (_smoothed(weights, np.ones_like(weights)) > SPARSE)) | hidden)
     own = np.unique(parts[over & (parts > 0)])
-    return ndimage.binary_fill_holes(np.isin(parts, own[own > 0])) & ~hidden
+    apart = (heights - least) / least
+    return np.where(np.isin(parts, own[own > 0]), apart, -np.abs(apart))
 
 
-def _by_colour(foot: np.ndarray, colour: np.ndarray) -> np.ndarray:
-    """[r, r] float32 in [-.5, .5]: a region [r, r] whose edge is moved to where the colour changes.
+def _by_colour(hints: np.ndarray, colour: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """[r, r] float32 in [-.5, .5], positive in the cells that hints put there, and in neighbours of one colour with them.
 
-    Source: Grady 2006 (Random Walks for Image Segmentation).
+    Args:
+        hints: [r, r] positive where a cell belongs there, negative where not, by how certain this is.
+        colour: [r, r, 3] the cells' colours.
+        known: [r, r] bool, the cells that have one; the others get -.5.
+
+    Source: Grady 2005 (Multilabel random walker image segmentation using prior models).
     """
-    result = np.full(foot.shape, -0.5, np.float32)
-    if not foot.any():
-        return result
-    certain = ndimage.binary_erosion(foot, iterations=WITHIN)
-    parts, n = ndimage.label(foot)
-    thin = np.setdiff1d(np.arange(1, n + 1), parts[certain])
-    certain |= np.isin(parts, thin)
-    wide = ndimage.binary_dilation(foot, iterations=BEYOND)
-    window = tuple(slice(max(0, k.min() - 2), k.max() + 3) for k in np.nonzero(wide))
-    labels = np.where(certain, 1, np.where(wide, 0, 2))[window]
-    if (labels == 0).any() and (labels == 2).any() and colour[window].std() > 0:
-        shares = random_walker(
-            colour[window], labels, beta=CONTRAST, mode="cg_j", tol=1e-5, channel_axis=-1, return_full_prob=True
-        )[0]  # fmt: skip
-        result[window] = shares - 0.5
-        return result
-    return np.where(foot, 0.5, -0.5).astype(np.float32)
+    if not known.any():
+        return np.full(hints.shape, -0.5, np.float32)
+    number = np.cumsum(known).reshape(known.shape) - 1
+    variance = max(float(colour[known].var(axis=0).sum()), 1e-6)
+    rows, columns, ties = [], [], []
+    for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        both = known[one] & known[other]
+        unlike = np.square(colour[one] - colour[other]).sum(-1)[both] / variance
+        rows.append(number[one][both])
+        columns.append(number[other][both])
+        ties.append(np.exp(-CONTRAST * unlike) + LEAST_TIE)
+    rows, columns, ties, n = *(np.concatenate(x) for x in (rows, columns, ties)), int(known.sum())
+    upper = coo_matrix((ties, (rows, columns)), (n, n)).tocsr()
+    joined, counted = upper + upper.T, HINT * np.abs(hints[known]) + 1e-9
+    system = diags(np.asarray(joined.sum(1)).ravel() + counted) - joined
+    result = np.full(hints.shape, -0.5, np.float32)
+    result[known] = spsolve(system.tocsc(), HINT * hints[known].clip(0)) - 0.5
+    return result
 
 
 def _cells_for(places: np.ndarray) -> int:
