@@ -1,8 +1,8 @@
-"""What is lost by a table that is far away: an asset on its table, in the light that its middle sees, and without the table.
+"""How much a rendering changes where the table becomes a part of the distant light, and where there is no table.
 
     python tests/bench/near_table.py CAPTURE OUT [--samples 64] [--threads N]
 
-CAPTURE holds truth/: asset.glb, table.jpg, light.hdr, cameras.json (object_min, object_max, table_radius, exposures) and
+CAPTURE holds truth/: asset.glb, table.jpg, light.hdr, cameras.json (object_min, object_max, table_radius, each frame's exposure) and
 scene/transforms_test.json. OUT gets the environment that the object's middle sees (seen.exr), the views as EXR, and a sheet.
 Prints the PSNR of the views over white, in sRGB at the capture's exposure, and the relative root mean square of the radiance on
 the object. Needs bpy 5 (`splitnerf[blender]`).

@@ -27,6 +27,7 @@ from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignett
 from splitnerf.capture.video import write_frames
 from splitnerf.capture.world import CAMERA_DISTANCE, World, settle
 from splitnerf.cli import main
+from splitnerf.cli.prepare import STEPS, overall
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import seen_at
 from splitnerf.data.images import linear_to_srgb, srgb_to_linear
@@ -363,3 +364,10 @@ def test_data_whose_masks_are_not_found_are_not_left(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="nothing stands out"):
         capture_job.write_data(world, exposures, photos, tmp_path, PrepareSettings(), lambda step, share: None)
     assert not (tmp_path / "transforms.json").exists()
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_the_bar_grows_to_its_end(given):
+    shares = [overall(step, share, given) for step in STEPS for share in (0.0, 0.5, 1.0)]
+    assert shares[0] == 0 and shares[-1] == pytest.approx(1) and shares == sorted(shares)
+    assert overall("masks", 0.0, given) > (0.8 if given else 0.0) and overall("masks", 0.0, False) < 0.5

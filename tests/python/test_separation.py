@@ -25,7 +25,7 @@ from splitnerf.separation.field import (
     RadianceField, RayMeasure, Rendered, contracted, resampled, search_loss, spread_loss, with_less_gradient,
 )  # fmt: skip
 from splitnerf.separation.foot import find_foot
-from splitnerf.separation.masks import _points, find_mask, with_mirrors
+from splitnerf.separation.masks import _points, at_edges, find_mask, with_mirrors
 from splitnerf.separation.region import CELLS, Region, find_region
 from splitnerf.separation.table import Table
 
@@ -258,8 +258,9 @@ def test_photos_in_other_units_of_radiance(tmp_path, monkeypatch):
     monkeypatch.setattr(job, "train_field", train_field)
     for factor in (1.0, 0.01):
         exposed = photos.exposed(factor * np.where(np.arange(len(photos)) % 2, 2.0, 0.5))
-        job.separate(exposed, None, tmp_path / "found", steps=1, minutes=0, seed=0)
+        job.separate(exposed, exposed.select([0, 1]), tmp_path / "found", steps=1, minutes=0, seed=0)
         around.append(read_image(tmp_path / "found/surroundings.exr"))
+    assert np.log(given[1].exposures).mean() == pytest.approx(0, abs=1e-9)
     np.testing.assert_allclose(given[1].exposures, given[0].exposures)
     np.testing.assert_allclose(given[1].images[:2], given[0].images[:2], atol=1e-6)
     np.testing.assert_allclose(around[1][..., :3], 100 * around[0][..., :3], rtol=1e-2)
@@ -293,11 +294,11 @@ def test_the_trained_field_tells_the_ball_from_the_floor(tmp_path):
 class TestFoot:
     TABLE = Table(np.array([0.0, 0.6, 0.8]), -0.1)
 
-    def scene(self, height: float, noise: float):
-        """Points of a table and of a round plinth of radius .4 on it, their colours, and points of what stands on the plinth."""
+    def scene(self, height: float, noise: float, radius: float = 0.4):
+        """Points of a table and of a round plinth on it, their colours, and points of the post on the plinth."""
         random = np.random.default_rng(0)
         at = random.uniform(-0.8, 0.8, (300_000, 2))
-        plinth = np.linalg.norm(at, axis=1) < 0.4
+        plinth = np.linalg.norm(at, axis=1) < radius
         heights = np.where(plinth, height, 0.0) + random.normal(size=len(at)) * noise
         points = at @ self.TABLE.axes + (self.TABLE.offset + heights)[:, None] * self.TABLE.normal
         colours = np.where(plinth[:, None], [0.3, 0.3, 0.3], 0.5 + 0.3 * np.sin(40 * at[:, :1] + [0, 1, 2]))
@@ -314,6 +315,32 @@ class TestFoot:
         assert foot.holds(self.over(0.2, 0.0)).all() and foot.holds(self.over(0.38, 0.01)).all()
         assert not foot.holds(self.over(0.42, 0.01)).any() and not foot.holds(self.over(0.7, 0.0)).any()
         assert not foot.holds(self.over(5.0, 0.0)).any()
+
+    def test_a_foot_of_the_tables_colour_is_found_by_its_height(self):
+        points, colours, post = self.scene(0.03, 0.004, radius=0.13)
+        foot = find_foot(self.TABLE, points, np.full_like(colours, 0.5), post)
+        assert foot.holds(self.over(0.1, 0.0)).all() and not foot.holds(self.over(0.2, 0.0)).any()
+
+    def test_on_a_coarse_map_neighbours_reach_no_farther(self):
+        points, colours, post = self.scene(0.03, 0.004)
+        few = slice(None, None, 16)
+        foot = find_foot(self.TABLE, points[few], np.full_like(colours[few], 0.5), post)
+        assert foot.holds(self.over(0.33, 0.0)).all() and not foot.holds(self.over(0.5, 0.0)).any()
+
+    def test_what_no_photo_shows_within_the_foot_is_the_foots(self):
+        points, colours, _ = self.scene(0.012, 0.003)
+        radius = np.linalg.norm(points @ self.TABLE.axes.T, axis=1)
+        shown = radius > 0.2
+        post = points[(radius > 0.25) & (radius < 0.3)] + 0.3 * self.TABLE.normal
+        foot = find_foot(self.TABLE, points[shown], colours[shown], post)
+        assert foot.holds(self.over(0.1, 0.0)).all() and foot.holds(self.over(0.3, 0.0)).all()
+
+    def test_a_sparse_rim_is_not_cut_off(self):
+        points, colours, post = self.scene(0.012, 0.003)
+        radius = np.linalg.norm(points @ self.TABLE.axes.T, axis=1)
+        thin = (radius > 0.3) & (radius < 0.4) & (np.arange(len(points)) % 20 > 0)
+        foot = find_foot(self.TABLE, points[~thin], colours[~thin], post)
+        assert foot.holds(self.over(0.375, 0.0)).float().mean() > 0.9 and not foot.holds(self.over(0.45, 0.0)).any()
 
     def test_without_a_plinth_it_is_what_stands_there(self):
         foot = find_foot(self.TABLE, *self.scene(0.0, 0.003))
@@ -368,6 +395,28 @@ class TestFoot:
         found = region.above_table(o, d, torch.tensor([[1.0, 9.0]] * 3))
         torch.testing.assert_close(found, torch.tensor([[1.0, 2.9], [1.0, 9.0], [1.0, 9.0]]))
         assert torch.equal(Region(np.ones((CELLS,) * 3, bool), None).above_table(o, d, found), found)
+
+
+class TestOutline:
+    def test_it_moves_to_where_the_colours_change(self):
+        y, x = np.mgrid[:40, :40] + 0.5
+        true = np.hypot(x - 20, y - 20) < 10
+        photo = np.where(true[..., None], [0.6, 0.3, 0.2], [0.4, 0.5, 0.5]) + 0.02 * np.random.default_rng(0).normal(size=(40, 40, 3))
+        moved = np.clip(11.5 - np.hypot(x - 20.5, y - 20), 0, 1)
+        found = at_edges(moved.astype(np.float32), photo.astype(np.float32))
+        assert (moved > 0.5).sum() > 1.1 * true.sum() and ((found > 0.5) == true).mean() > 0.99
+
+    def test_no_farther_than_a_band(self):
+        mask = np.zeros((40, 40), np.float32)
+        mask[:, :20] = 1  # goes on beyond the photo's edges
+        photo = np.where(np.arange(40)[None, :, None] < 30, 0.2, 0.8) * np.ones((40, 1, 3))
+        found = at_edges(mask, photo.astype(np.float32))
+        assert (found[:, :17] == 1).all() and (found[:, 23:] == 0).all() and found.shape == mask.shape
+
+    @pytest.mark.parametrize("value", [0.0, 1.0])
+    def test_without_an_edge(self, value):
+        mask = np.full((8, 9), value, np.float32)
+        np.testing.assert_array_equal(at_edges(mask, np.ones((8, 9, 3), np.float32)), mask)
 
 
 class TestMirrors:

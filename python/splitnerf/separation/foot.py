@@ -1,8 +1,8 @@
 """Where an object meets its table: told from many points that photos show, and by colour at the edge.
 
 One point near the table says little, as its height is less certain than a thin foot is high. The median height of all points
-over one cell of the table is more certain: a plinth of three millimetres stands out, but for notches of its edge. So heights are
-a hint to each cell, and neighbours of one colour belong together.
+over one cell of the table is more certain: a plinth of three millimetres stands out, but its edge has notches. So the height of a
+cell is only a hint, and neighbouring cells of one colour belong together.
 Below an overhang, cameras see the table at a grazing angle alone, and what they see there is vague: single points decide.
 """
 
@@ -11,11 +11,10 @@ from __future__ import annotations
 import numpy as np
 import torch
 from scipy import ndimage
-from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import spsolve
 from torch import Tensor
 
 from splitnerf.separation.table import Table
+from splitnerf.separation.walker import random_walk
 
 HALF = 1.6  # half the edge of the map, scene units
 FEWEST, MOST = 40, 320  # cells along that edge
@@ -27,10 +26,9 @@ NOISE = 3.0  # standard deviations of the table's cells by which cells stand out
 SPARSE = 0.1  # smoothed weight of a cell below which nothing is known of it
 VAGUE = 0.03  # height over the table from which a point below an overhang is the object's, scene units
 GAP = 3  # cells that close holes in what stands over the foot
-HINT = 0.02  # what the height of a cell counts beside a neighbour of its own colour
-CONTRAST = 33.0  # of colours that are unlike: their squared distance is over the colours' variance
-LEAST_TIE = 1e-4  # between neighbours, however unlike
-
+HINT = 0.02  # what the height of a cell counts beside a neighbour of its own colour, on a map of MOST cells along the edge
+UNDER = 10.0  # how much more it counts where the cell is high and the object is over it
+CONTRAST = 33.0  # of colours, see :func:`splitnerf.separation.walker.random_walk`
 
 
 class Foot:
@@ -80,13 +78,16 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
     around = np.stack([_smoothed(channel, weights) for channel in np.moveaxis(colour, -1, 0)], axis=-1)
     colour = np.where(counts[..., None] > 0, colour, around)
     hidden = over & (counts == 0)
-    known = (_smoothed(weights, np.ones_like(weights)) > SPARSE) & ~hidden
-    inside = _by_colour(_by_height(medians, counts, over), colour, known)
+    weights = _smoothed(weights, np.ones_like(weights))
+    known = (weights > SPARSE) & ~hidden
+    inside = random_walk(HINT * (MOST / n) ** 2 * _by_height(medians, counts, over), colour, known, CONTRAST) - 0.5
+    inside[ndimage.binary_fill_holes((inside > 0) | hidden) & ~known & ~hidden] = 0.5  # no photo shows it: it is within the foot
     return Foot(table, inside, np.where(hidden, 1.0, -1.0).astype(np.float32))
 
 
 def _by_height(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> np.ndarray:
-    """[r, r] in [-1, 1], how far cells are higher than the table, if they hang together below what is over them; negative where not.
+    """[r, r]: positive where cells are higher than the table and connected to what is under the object, else negative; the size
+    says how clearly.
 
     Args:
         medians, counts: [r, r] the median heights of points, and their numbers.
@@ -97,41 +98,12 @@ def _by_height(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> np.
     deviation = 1.4826 * np.median(np.abs(_smoothed(medians, weights)[others])) if others.any() else 0.0
     least = max(LEAST_HEIGHT, NOISE * deviation)
     heights = _smoothed(medians.clip(0.0, 2 * least), weights)  # the edge is half of the way up, however high the object is there
-    hidden = over & (counts == 0)
-    parts, _ = ndimage.label(((heights > least) & (_smoothed(weights, np.ones_like(weights)) > SPARSE)) | hidden)
+    told = _smoothed(weights, np.ones_like(weights)) > SPARSE
+    parts, _ = ndimage.label(((heights > least) & told) | (over & (counts == 0)))
     own = np.unique(parts[over & (parts > 0)])
-    apart = (heights - least) / least
-    return np.where(np.isin(parts, own[own > 0]), apart, -np.abs(apart))
-
-
-def _by_colour(hints: np.ndarray, colour: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """[r, r] float32 in [-.5, .5], positive in the cells that hints put there, and in neighbours of one colour with them.
-
-    Args:
-        hints: [r, r] positive where a cell belongs there, negative where not, by how certain this is.
-        colour: [r, r, 3] the cells' colours.
-        known: [r, r] bool, the cells that have one; the others get -.5.
-
-    Source: Grady 2005 (Multilabel random walker image segmentation using prior models).
-    """
-    if not known.any():
-        return np.full(hints.shape, -0.5, np.float32)
-    number = np.cumsum(known).reshape(known.shape) - 1
-    variance = max(float(colour[known].var(axis=0).sum()), 1e-6)
-    rows, columns, ties = [], [], []
-    for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        both = known[one] & known[other]
-        unlike = np.square(colour[one] - colour[other]).sum(-1)[both] / variance
-        rows.append(number[one][both])
-        columns.append(number[other][both])
-        ties.append(np.exp(-CONTRAST * unlike) + LEAST_TIE)
-    rows, columns, ties, n = *(np.concatenate(x) for x in (rows, columns, ties)), int(known.sum())
-    upper = coo_matrix((ties, (rows, columns)), (n, n)).tocsr()
-    joined, counted = upper + upper.T, HINT * np.abs(hints[known]) + 1e-9
-    system = diags(np.asarray(joined.sum(1)).ravel() + counted) - joined
-    result = np.full(hints.shape, -0.5, np.float32)
-    result[known] = spsolve(system.tocsc(), HINT * hints[known].clip(0)) - 0.5
-    return result
+    clearly = (heights - least) / least
+    hints = np.where(np.isin(parts, own[own > 0]), clearly, np.where(told, -np.abs(clearly), np.minimum(clearly, 0.0)))
+    return np.where(over & (hints > 0), UNDER * hints, hints)
 
 
 def _cells_for(places: np.ndarray) -> int:

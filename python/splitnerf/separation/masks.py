@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import torch
+from scipy import ndimage
 from torch import Tensor
 from torch.nn.functional import interpolate, max_pool2d
 
@@ -15,12 +16,16 @@ from splitnerf.data.images import srgb_to_linear
 from splitnerf.render.rays import image_rays
 from splitnerf.separation.field import RadianceField
 from splitnerf.separation.region import Region
+from splitnerf.separation.walker import random_walk
 
 SAMPLES = 64, 32  # of a ray, of the first search and of the second
 CHUNK = 4096  # rays
 LONGEST = 800  # edge of a mask in pixels
 COARSER = 4  # factor by which the first mask is smaller
 RIM = 3  # every other pixel beside a mask in which solid cells say nothing
+BAND = 3  # pixels on both sides of a mask's edge, in which the photo's colours move it
+HINT, CERTAIN = 0.1, 50.0  # what the mask counts there beside a neighbour of the pixel's own colour, and beyond
+CONTRAST = 10.0  # of colours, see :func:`splitnerf.separation.walker.random_walk`
 UNDECIDED = 0.02  # a coarse pixel is decided where it and its neighbours are this near to 0 or to 1
 POINTS, DENSE = 5000, 80000  # pixels of a photo whose points are asked for, about: of all of it, and near the foot
 STEEP = 0.4  # sine of the elevation from which a camera looks at the table from above; less where few look so
@@ -113,7 +118,18 @@ def find_mask(field: RadianceField, region: Region, dataset: Dataset, index: int
     rays_o, rays_d = view_rays(dataset, index, size)
     if len(chosen):
         mask[chosen] = coverage(field, region, rays_o[chosen], rays_d[chosen])
-    return with_mirrors(mask.view(size).clamp(0, 1), region, half, *view_rays(dataset, index, half)).numpy()
+    mask = with_mirrors(mask.view(size).clamp(0, 1), region, half, *view_rays(dataset, index, half)).numpy()
+    photo = torch.from_numpy(np.asarray(dataset.images[index, ..., :3])).permute(2, 0, 1)
+    return at_edges(mask, interpolate(photo[None], size, mode="area")[0].permute(1, 2, 0).numpy())
+
+
+def at_edges(mask: np.ndarray, photo: np.ndarray) -> np.ndarray:
+    """A mask [h, w] whose outline is moved, by a few pixels at most, to where the photo's [h, w, 3] colours change."""
+    inside = mask > 0.5
+    near = ndimage.binary_dilation(inside, iterations=BAND) & ~ndimage.binary_erosion(inside, iterations=BAND, border_value=1)
+    hints = np.where(near, HINT * (2 * mask - 1), np.where(inside, CERTAIN, -CERTAIN))
+    shares = random_walk(hints, photo, ndimage.binary_dilation(near), CONTRAST)
+    return np.where(near, shares, inside).astype(np.float32)
 
 
 def with_mirrors(mask: Tensor, region: Region, half: tuple[int, int], rays_o: Tensor, rays_d: Tensor) -> Tensor:
