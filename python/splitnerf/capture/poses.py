@@ -15,8 +15,8 @@ import pycolmap
 from splitnerf.capture.photographs import Photograph
 from splitnerf.errors import InputError
 
-LONGEST, MOST_FEATURES = 2000, 4096  # edge of a photo in which features are looked for in pixels, and how many: photos of 16
-# megapixels take 7 s each and give twice as many, with which an adjustment of 66 photos takes a quarter of an hour
+LONGEST = 2000  # edge in pixels of the photos in which features are looked for: 16 megapixels take 7 s each
+MOST_FEATURES = 4096  # of a photo: more take longer in all that follows
 EXHAUSTIVE = 250  # photos up to which each is matched with each other one
 OVERLAP = 15  # neighbours in the order of names with which a photo is matched beyond that
 MIN_PHOTOS = 3
