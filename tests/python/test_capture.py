@@ -18,7 +18,7 @@ from test_files import no_more_than
 from splitnerf.capture import job as capture_job
 from splitnerf.capture import masks as capture_masks
 from splitnerf.capture.exposure import find_exposures
-from splitnerf.capture.job import PrepareSettings, _begin, _upright_copies
+from splitnerf.capture.job import PrepareSettings, _begin, _upright_copies, _without_camera
 from splitnerf.capture.masks import dots_of, given_masks
 from splitnerf.capture.photographs import find_photographs, read_upright, sharpness, write_png
 from splitnerf.capture.poses import FLIP, Lens, Reconstruction
@@ -371,3 +371,11 @@ def test_the_bar_grows_to_its_end(given):
     shares = [overall(step, share, given) for step in STEPS for share in (0.0, 0.5, 1.0)]
     assert shares[0] == 0 and shares[-1] == pytest.approx(1) and shares == sorted(shares)
     assert overall("masks", 0.0, given) > (0.8 if given else 0.0) and overall("masks", 0.0, False) < 0.5
+
+
+@pytest.mark.parametrize("placed, told", [("abcdefghi", False), ("abcdefg", True)])
+def test_many_photos_without_a_camera_are_told_of(tmp_path, capsys, placed, told):
+    photos = [SimpleNamespace(name=name) for name in "abcdefghij"]
+    assert list(_without_camera(photos, list(placed), tmp_path)) == sorted(set("abcdefghij") - set(placed))
+    said = capsys.readouterr().err
+    assert ("3 of 10 photos do not fit together" in said) == told and len(said.splitlines()) == told

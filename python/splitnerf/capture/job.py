@@ -28,7 +28,9 @@ from splitnerf.data.dataset import SURROUNDINGS
 from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.errors import InputError
 from splitnerf.files import LOCK, atomic_path, held, remove_partial
+from splitnerf.notes import note
 
+FEW_LOST = 0.2  # share of the photos without a camera from which a note tells of them
 BLURRED = 0.12  # share of the median sharpness below which a photo is left out
 TRANSFORMS = "transforms.json"
 DARK = 0.02  # sRGB value that 1 % of a photo's pixels must exceed
@@ -86,9 +88,7 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         _check_sizes(kept)
         images = _upright_copies(kept, work)
         found = reconstruct(kept, images, work, settings.seed, report)
-        placed = set(found.names)
-        lost = [photo.name for photo in kept if photo.name not in placed]
-        left_out |= dict.fromkeys(lost, "its camera was not found: too little in common with the others")
+        left_out |= _without_camera(kept, found.names, source)
         world = settle(found, settings.seed)
         by_name = {photo.name: photo for photo in kept}
         exposures = exposures_of(world.scene, by_name, report)
@@ -164,6 +164,17 @@ def _upright_copies(photos: list[Photograph], work: Path) -> Path:
                 pixels = pixels if pixels.dtype == np.uint8 else (pixels >> 8).astype(np.uint8)
                 Image.fromarray(pixels).save(temporary, format="PNG", compress_level=1)
     return folder
+
+
+def _without_camera(photos: list[Photograph], placed: list[str], source: Path) -> dict[str, str]:
+    """Why photos are left out whose names are not among those with a camera; a note where they are many."""
+    lost = sorted({photo.name for photo in photos} - set(placed))
+    if len(lost) > FEW_LOST * len(photos):
+        note(
+            f"{source}: {len(lost)} of {len(photos)} photos do not fit together with the others; take more between them, and leave "
+            "the object where it stands (on a turntable it moves against what is around it, and so does its light)"
+        )
+    return dict.fromkeys(lost, "its camera was not found: too little in common with the others")
 
 
 def exposures_of(scene: Reconstruction, by_name: dict[str, Photograph], report: Callable[[str, float], None]) -> Exposures:
