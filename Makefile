@@ -1,6 +1,7 @@
 # make demo   installs what is missing, builds, and reconstructs an embedded scene
 # make test   installs, builds, and runs gtest and pytest
-# make sanitize   builds gtest with AddressSanitizer and UndefinedBehaviorSanitizer and runs it
+# make sanitize   builds gtest with AddressSanitizer and UndefinedBehaviorSanitizer, and the GPU's kernels with ThreadSanitizer
+# make faults   plants faults in the GPU's kernels and says what finds each
 # make stability   asks each operator STABILITY_CASES times and writes docs/benchmarks/stability.md; more in STABILITY_OPTIONS
 # make tables   says which tables under docs/ are stale
 # make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
@@ -14,9 +15,10 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 FUZZ_SECONDS ?= 600
 STABILITY_CASES ?= 10000000
 STABILITY_OPTIONS ?=
+CMAKE_TESTS = $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 READERS := json colmap neus png exr hdr glb checkpoint
 
-.PHONY: demo test test-slow install system gtest sanitize fuzz stability tables pytest mutants clean
+.PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -24,14 +26,22 @@ demo: install
 test: install gtest pytest
 
 gtest: install
-	$(BIN)/cmake -S . -B $(BUILD) -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
+	$(CMAKE_TESTS) -B $(BUILD)
 	$(BIN)/cmake --build $(BUILD) -j $(JOBS)
-	$(BUILD)/splitnerf_tests --gtest_brief=1
+	$(BUILD)/tests/splitnerf_tests --gtest_brief=1
+	$(BUILD)/tests/splitnerf_cuda_tests --gtest_brief=1
 
 sanitize: install
-	$(BIN)/cmake -S . -B build/sanitize -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON -DSPLITNERF_SANITIZE=ON
+	$(CMAKE_TESTS) -B build/sanitize -DCMAKE_BUILD_TYPE=RelWithDebInfo -DSPLITNERF_SANITIZE=address,undefined
 	$(BIN)/cmake --build build/sanitize -j $(JOBS)
-	UBSAN_OPTIONS=print_stacktrace=1 build/sanitize/splitnerf_tests --gtest_brief=1
+	UBSAN_OPTIONS=print_stacktrace=1 build/sanitize/tests/splitnerf_tests --gtest_brief=1
+	UBSAN_OPTIONS=print_stacktrace=1 build/sanitize/tests/splitnerf_cuda_tests --gtest_brief=1
+	$(CMAKE_TESTS) -B build/races -DCMAKE_BUILD_TYPE=RelWithDebInfo -DSPLITNERF_SANITIZE=thread
+	$(BIN)/cmake --build build/races -j $(JOBS) --target splitnerf_cuda_tests
+	build/races/tests/splitnerf_cuda_tests --gtest_brief=1 --gtest_repeat=1
+
+faults: install
+	PATH=$(abspath $(BIN)):$$PATH $(BIN)/python tests/cuda/faults.py
 
 fuzz: install
 	$(BIN)/python -m pip install --quiet -e '.[fuzz]' --no-build-isolation

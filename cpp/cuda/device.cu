@@ -8,7 +8,7 @@ constexpr int kScanThreads = 1024;
 // One block: there are no more rays than that.
 __global__ void __launch_bounds__(kScanThreads) scan_kernel(int64_t n, int64_t* offsets) {
   constexpr int kWarps = kScanThreads / Warp::size;
-  __shared__ int64_t totals[kWarps];
+  SPLITNERF_SHARED(int64_t, totals, [kWarps]);
   const Warp warp;
   const int number = threadIdx.x / Warp::size;
   int64_t carried = 0;
@@ -42,8 +42,7 @@ void clear_bytes(const Queue& queue, const char* op, void* first, int64_t bytes)
 }
 
 void sum_counts(const Queue& queue, const char* op, int64_t n, int64_t* offsets) {
-  scan_kernel<<<1, kScanThreads, 0, queue.stream>>>(n, offsets);
-  check(cudaGetLastError(), op);
+  launch(queue, op, scan_kernel, 1, kScanThreads, 0, n, offsets);
 }
 
 }  // namespace splitnerf::cuda

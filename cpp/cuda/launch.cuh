@@ -9,6 +9,13 @@
 #include "splitnerf/run.h"
 #include "splitnerf/run_cuda.h"
 
+// What tests replace, which compile kernels for the CPU: a launch, a variable in a block's shared memory, and that memory itself.
+#ifndef SPLITNERF_LAUNCH
+#define SPLITNERF_LAUNCH(kernel, grid, block, bytes, stream) kernel<<<grid, block, bytes, stream>>>
+#define SPLITNERF_SHARED(type, name, dims) __shared__ type name dims
+#define SPLITNERF_DYNAMIC_SHARED(name) extern __shared__ __align__(16) unsigned char name[]
+#endif
+
 namespace splitnerf::cuda {
 
 inline constexpr int kBlock = 256;       // threads
@@ -24,6 +31,14 @@ inline unsigned blocks_for(int64_t n, int64_t per_block = kBlock) {
   return static_cast<unsigned>(blocks);
 }
 
+// Puts a kernel into the stream, with `bytes` of shared memory for each block; throws where that fails.
+template <class... Parameters, class... Arguments>
+void launch(const Queue& queue, const char* op, void (*kernel)(Parameters...), dim3 grid, unsigned block, size_t bytes,
+            const Arguments&... arguments) {
+  SPLITNERF_LAUNCH(kernel, grid, block, bytes, queue.stream)(arguments...);
+  check(cudaGetLastError(), op);
+}
+
 // One thread for each index.
 template <class Body> __global__ void __launch_bounds__(kBlock) for_each_kernel(int64_t n, const Body body) {
   const int64_t i = int64_t(blockIdx.x) * kBlock + threadIdx.x;
@@ -31,8 +46,7 @@ template <class Body> __global__ void __launch_bounds__(kBlock) for_each_kernel(
 }
 template <class Body> void for_each(const Queue& queue, const char* op, int64_t n, const Body& body) {
   if (n <= 0) return;
-  for_each_kernel<<<blocks_for(n), kBlock, 0, queue.stream>>>(n, body);
-  check(cudaGetLastError(), op);
+  launch(queue, op, for_each_kernel<Body>, blocks_for(n), kBlock, 0, n, body);
 }
 
 // One thread for each pair; a row of blocks works on one j, and the rows follow one another.
@@ -42,8 +56,7 @@ template <class Body> __global__ void __launch_bounds__(kBlock) for_each_pair_ke
 }
 template <class Body> void for_each_pair(const Queue& queue, const char* op, int64_t n, int m, const Body& body) {
   if (n <= 0 || m <= 0) return;
-  for_each_pair_kernel<<<dim3(blocks_for(n), m), kBlock, 0, queue.stream>>>(n, body);
-  check(cudaGetLastError(), op);
+  launch(queue, op, for_each_pair_kernel<Body>, dim3(blocks_for(n), m), kBlock, 0, n, body);
 }
 
 // A warp as the group of threads of splitnerf/group.h.
@@ -77,15 +90,14 @@ template <class Body> __global__ void __launch_bounds__(kBlock) for_each_group_k
 }
 template <class Body> void for_each_group(const Queue& queue, const char* op, int64_t n, const Body& body) {
   if (n <= 0) return;
-  for_each_group_kernel<<<blocks_for(n, kBlock / Warp::size), kBlock, 0, queue.stream>>>(n, body);
-  check(cudaGetLastError(), op);
+  launch(queue, op, for_each_group_kernel<Body>, blocks_for(n, kBlock / Warp::size), kBlock, 0, n, body);
 }
 
 // ---- sums ----
 
 // Sums of the threads of a block, in its first thread.
 template <int N> __device__ void add_up_block(double (&sums)[N]) {
-  __shared__ double of_warps[N][kBlock / Warp::size];
+  SPLITNERF_SHARED(double, of_warps, [N][kBlock / Warp::size]);
   const Warp warp;
   for (int k = 0; k < N; ++k) {
     const double sum = warp.sum(sums[k]);
@@ -117,12 +129,8 @@ __global__ void __launch_bounds__(kBlock) finish_kernel(int n_parts, const Body 
 template <class Body> void add_up(const Queue& queue, const char* op, int64_t n, const Body& body) {
   const auto blocks = min_of<int64_t>((n + kBlock - 1) / kBlock, kSumBlocks);
   double* parts = queue.scratch<double>(max_of<int64_t>(blocks, 1) * Body::n_sums);
-  if (blocks > 0) {
-    add_up_kernel<<<static_cast<unsigned>(blocks), kBlock, 0, queue.stream>>>(n, body, parts);
-    check(cudaGetLastError(), op);
-  }
-  finish_kernel<<<1, kBlock, 0, queue.stream>>>(static_cast<int>(blocks), body, parts);
-  check(cudaGetLastError(), op);
+  if (blocks > 0) launch(queue, op, add_up_kernel<Body>, static_cast<unsigned>(blocks), kBlock, 0, n, body, parts);
+  launch(queue, op, finish_kernel<Body>, 1, kBlock, 0, static_cast<int>(blocks), body, parts);
 }
 
 // ---- the launcher ----

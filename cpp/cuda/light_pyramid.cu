@@ -27,8 +27,9 @@ __global__ void __launch_bounds__(kThreads)
     lookup_backward_kernel(int64_t n, const LightPyramid<T> pyramid, const ShRecurrence<T> recurrence,
                            const T* directions, const T* roughness, const T* grad_radiance, T* grad_directions,
                            T* grad_roughness, T* grad_levels, T* grad_sh) {
-  __shared__ T basis[kShCoefficients][kPoints + 1];
-  __shared__ Vec3<T> light[kPoints], constant[kPoints];
+  SPLITNERF_SHARED(T, basis, [kShCoefficients][kPoints + 1]);
+  SPLITNERF_SHARED(Vec3<T>, light, [kPoints]);
+  SPLITNERF_SHARED(Vec3<T>, constant, [kPoints]);
   const int coefficient = threadIdx.x;
   Vec3<T> sum{T(0), T(0), T(0)};
   for (int64_t first = int64_t(blockIdx.x) * kPoints; first < n; first += int64_t(gridDim.x) * kPoints) {
@@ -69,10 +70,8 @@ void light_lookup_backward(const Queue& queue, const LightPyramid<T>& pyramid, i
   clear(queue, op, grad_sh, 3 * kShCoefficients);
   if (n == 0) return;
   constexpr unsigned kMostBlocks = 1024;  // each adds once to every coefficient
-  lookup_backward_kernel<<<min_of(blocks_for(n, kPoints), kMostBlocks), kThreads, 0, queue.stream>>>(
-      n, pyramid, *pyramid.recurrence, directions, roughness, grad_radiance, grad_directions, grad_roughness,
-      grad_levels, grad_sh);
-  check(cudaGetLastError(), op);
+  launch(queue, op, lookup_backward_kernel<T>, min_of(blocks_for(n, kPoints), kMostBlocks), kThreads, 0, n, pyramid,
+         *pyramid.recurrence, directions, roughness, grad_radiance, grad_directions, grad_roughness, grad_levels, grad_sh);
 }
 
 template void light_lookup_backward<float>(const Queue&, const LightPyramid<float>&, int64_t, const float*,

@@ -11,7 +11,7 @@ constexpr int kItems = 2;   // of a thread, so that a source once read serves tw
 // make(i) is item i; keep(part, i, item) takes it when it has met all sources of the part.
 template <class T, class Sources, class Make, class Keep>
 __device__ void meet_sources(int64_t n_items, int n_parts, const Sources& sources, const Make& make, const Keep& keep) {
-  __shared__ LobeSource<T> tile[kTile];
+  SPLITNERF_SHARED(LobeSource<T>, tile, [kTile]);
   const int64_t mine = int64_t(blockIdx.x) * kTile * kItems + threadIdx.x;
   decltype(make(0)) items[kItems];
   for (int k = 0; k < kItems; ++k) items[k] = make(min_of<int64_t>(mine + k * kTile, n_items - 1));
@@ -63,26 +63,28 @@ dim3 grid_for(int64_t n_items, int n_parts) {
 template <class T>
 void prefilter_light(const Queue& queue, int64_t n_queries, const T* query_dirs, const T* roughness, int64_t n_lights,
                      const T* light_dirs, const T* light, T* gbar, T* total) {
+  const char* op = "prefilter_light";
   if (n_queries == 0) return;
   const int n_parts = lobe_parts(n_queries, n_lights);
   T* parts = queue.scratch<T>(4 * n_parts * n_queries);
-  gather_kernel<T><<<grid_for(n_queries, n_parts), kTile, 0, queue.stream>>>(
-      {n_queries, query_dirs, roughness, nullptr, nullptr}, {n_lights, light_dirs, light}, n_parts, parts);
-  check(cudaGetLastError(), "prefilter_light");
-  for_each(queue, "prefilter_light", n_queries, GatherFinishBody<T>{n_queries, n_parts, parts, gbar, total});
+  const QueryList<T> queries{n_queries, query_dirs, roughness, nullptr, nullptr};
+  const LightList<T> lights{n_lights, light_dirs, light};
+  launch(queue, op, gather_kernel<T>, grid_for(n_queries, n_parts), kTile, 0, queries, lights, n_parts, parts);
+  for_each(queue, op, n_queries, GatherFinishBody<T>{n_queries, n_parts, parts, gbar, total});
 }
 
 template <class T>
 void prefilter_light_backward(const Queue& queue, int64_t n_queries, const T* query_dirs, const T* roughness,
                               const T* total, const T* grad_gbar, int64_t n_lights, const T* light_dirs,
                               T* grad_light) {
+  const char* op = "prefilter_light_backward";
   if (n_lights == 0) return;
   const int n_parts = lobe_parts(n_lights, n_queries);
   T* parts = queue.scratch<T>(3 * n_parts * n_lights);
-  scatter_kernel<T><<<grid_for(n_lights, n_parts), kTile, 0, queue.stream>>>(
-      {n_lights, light_dirs, nullptr}, {n_queries, query_dirs, roughness, total, grad_gbar}, n_parts, parts);
-  check(cudaGetLastError(), "prefilter_light_backward");
-  for_each(queue, "prefilter_light_backward", n_lights, ScatterFinishBody<T>{n_lights, n_parts, parts, grad_light});
+  const LightList<T> lights{n_lights, light_dirs, nullptr};
+  const QueryList<T> queries{n_queries, query_dirs, roughness, total, grad_gbar};
+  launch(queue, op, scatter_kernel<T>, grid_for(n_lights, n_parts), kTile, 0, lights, queries, n_parts, parts);
+  for_each(queue, op, n_lights, ScatterFinishBody<T>{n_lights, n_parts, parts, grad_light});
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                                                    \

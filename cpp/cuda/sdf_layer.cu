@@ -47,7 +47,7 @@ template <class T> SdfLayer<T> prepare(const Queue& queue, const char* op, const
 // ---- tiles ----
 
 template <class T> __device__ SdfTile<T> shared_tile(const SdfLayer<T>& layer) {
-  extern __shared__ __align__(16) unsigned char memory[];
+  SPLITNERF_DYNAMIC_SHARED(memory);
   // A column more, so that neither rows nor columns meet in one bank.
   return {reinterpret_cast<T*>(memory), static_cast<int>(blockDim.x) + 1, static_cast<int>(layer.n_inputs),
           static_cast<int>(layer.n_outputs)};
@@ -204,11 +204,10 @@ void sdf_values(const Queue& queue, const SdfField<T>& field, int64_t n, const T
     field.table.template read_as<T>([&](auto* table) {
       const auto kernel = values_kernel<T, decltype(count)::n, Pointee<decltype(table)>>;
       const TileSize tile = tile_size<T>(op, field.weights.n_inputs, kernel);
-      kernel<<<blocks_for(n, tile.points), tile.points, tile.bytes, queue.stream>>>(n, field_grid(field, table), layer,
-                                                                                    positions, values);
+      launch(queue, op, kernel, blocks_for(n, tile.points), tile.points, tile.bytes, n, field_grid(field, table), layer,
+             positions, values);
     });
   });
-  check(cudaGetLastError(), op);
 }
 
 template <class T>
@@ -224,12 +223,11 @@ void sample_rays(const Queue& queue, const SdfField<T>& field, const MarchOption
       field.table.template read_as<T>([&](auto* table) {
         const auto kernel = walk_kernel<T, decltype(count)::n, Pointee<decltype(table)>>;
         const TileSize tile = tile_size<T>(op, field.weights.n_inputs, kernel);
-        kernel<<<blocks_for(n_rays, tile.points), tile.points, tile.bytes, queue.stream>>>(
-            n_rays, field_grid(field, table), layer, march, cells, rules, rays_o, rays_d, jitter, most, starts,
-            offsets + 1, n_evaluated);
+        launch(queue, op, kernel, blocks_for(n_rays, tile.points), tile.points, tile.bytes, n_rays,
+               field_grid(field, table), layer, march, cells, rules, rays_o, rays_d, jitter, most, starts, offsets + 1,
+               n_evaluated);
       });
     });
-    check(cudaGetLastError(), op);
   }
   sum_counts(queue, op, n_rays, offsets);
   const PackedSamples<T> to = allocate(read_number(queue, offsets + n_rays));
@@ -244,9 +242,8 @@ void sdf_layer(const Queue& queue, const SdfWeights<T>& weights, int64_t n, cons
   const SdfLayer<T> layer = prepare(queue, op, weights);
   const auto kernel = layer_kernel<T>;
   const TileSize tile = tile_size<T>(op, SdfTile<T>::forward_rows(weights.n_inputs, weights.n_outputs), kernel);
-  kernel<<<blocks_for(n, tile.points), tile.points, tile.bytes, queue.stream>>>(n, layer, positions, features, jacobian,
-                                                                                outputs, gradient);
-  check(cudaGetLastError(), op);
+  launch(queue, op, kernel, blocks_for(n, tile.points), tile.points, tile.bytes, n, layer, positions, features, jacobian,
+         outputs, gradient);
 }
 
 template <class T>
@@ -261,11 +258,9 @@ void sdf_layer_backward(const Queue& queue, const SdfWeights<T>& weights, int64_
   const int n_sums = static_cast<int>(std::min<int64_t>((n + tile.points - 1) / tile.points, kMostSums));
   T* sums = queue.scratch<T>(std::max(n_sums, 1) * sdf_weight_count(layer));
   clear(queue, op, sums, n_sums * sdf_weight_count(layer));
-  if (n_sums > 0) {
-    kernel<<<n_sums, tile.points, tile.bytes, queue.stream>>>(n, layer, positions, features, jacobian, grad_outputs,
-                                                              grad_gradient, grad_features, grad_jacobian, sums);
-    check(cudaGetLastError(), op);
-  }
+  if (n_sums > 0)
+    launch(queue, op, kernel, n_sums, tile.points, tile.bytes, n, layer, positions, features, jacobian, grad_outputs,
+           grad_gradient, grad_features, grad_jacobian, sums);
   for_each(queue, op, sdf_weight_count(layer),
            FinishBody<T>{layer, n_sums, sums, grad_hidden, grad_hidden_bias, grad_out, grad_out_bias});
 }

@@ -8,19 +8,20 @@ namespace splitnerf::glue {
 namespace {
 
 std::tuple<Tensor, Tensor, Tensor, Tensor> pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background,
-                                                        bool linear) {
+                                                        Tensor whole, bool linear) {
   const char* op = "pixel_losses";
   const Kind type = real_kind(op, "mean", mean);
   const Tensor m = checked(op, "mean", mean, {kAny, 3}, type);
   const int64_t n = m.size(0);
   const Tensor o = checked(op, "opacity", opacity, {n}, type), t = checked(op, "target", target, {n, 4}, type);
-  const Tensor b = checked(op, "background", background, {n, 3}, type);
+  const Tensor b = checked(op, "background", background, {n, 3}, type),
+               w = checked(op, "whole", whole, {n}, type.with(ScalarType::Bool));
   Tensor losses = empty_like_type(m, {2}, type), colour_by_mean = torch::stable::empty_like(m);
   Tensor colour_by_opacity = empty_like_type(m, {n}, type), mask_by_opacity = empty_like_type(m, {n}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, n,
-               make_pixel_losses(n, in<T>(m), in<T>(o), in<T>(t), in<T>(b), linear, out<T>(losses),
+               make_pixel_losses(n, in<T>(m), in<T>(o), in<T>(t), in<T>(b), in<bool>(w), linear, out<T>(losses),
                                  out<T>(colour_by_mean), out<T>(colour_by_opacity), out<T>(mask_by_opacity)));
   });
   return {losses, colour_by_mean, colour_by_opacity, mask_by_opacity};
@@ -94,7 +95,7 @@ std::tuple<Tensor, Tensor> quadratic_entropy(Tensor x) {
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
-      "pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background, bool linear) -> (Tensor, Tensor, "
+      "pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background, Tensor whole, bool linear) -> (Tensor, Tensor, "
       "Tensor, Tensor)");
   m.def("gradient_losses(Tensor gradients, Tensor weights, Tensor beside) -> (Tensor, Tensor, Tensor)");
   m.def("material_losses(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1) -> (Tensor, Tensor)");

@@ -295,7 +295,8 @@ class World:
 
     def pixels(self) -> tuple:
         r = self.sizes.rays
-        return self.rand(r, 3, seed=52), self.rand(r, seed=53), self.rand(r, 4, seed=54), self.rand(r, 3, seed=55), True
+        numbers = self.rand(r, 3, seed=52), self.rand(r, seed=53), self.rand(r, 4, seed=54), self.rand(r, 3, seed=55)
+        return *numbers, self.rand(r, seed=58) < 0.1, True
 
     def normals_beside(self) -> tuple:
         """Gradients of all samples, then of points beside some of them."""

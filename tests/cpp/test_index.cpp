@@ -77,8 +77,7 @@ TEST(Index, CoordinatesThatAreNotOrdinary) {
     for (const float x : {1e-45f, -1e-45f, INFINITY, -INFINITY, NAN, 3e38f, -3e38f, -0.f}) {
       const CellAxis<float> axis = cell_axis(resolution, x);
       EXPECT_LT(axis.node, uint32_t(resolution)) << x;
-      if (x == x) EXPECT_TRUE(axis.f >= 0 && axis.f <= 1) << x;
-      if (x != x) EXPECT_TRUE(axis.f != axis.f);
+      EXPECT_TRUE(x == x ? axis.f >= 0 && axis.f <= 1 : axis.f != axis.f) << x;
     }
   }
 }

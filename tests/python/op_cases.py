@@ -108,7 +108,7 @@ def pixel_inputs(n: int = 60, dtype=torch.float64) -> tuple:
     target = rand(n, 4, seed=3)
     target[::7, :2] = 1.0
     parts = 1.7 * rand(n, 3) - 0.1, 1.004 * rand(n, seed=1) - 0.002, target, rand(n, 3, seed=4)
-    return tuple(part.to(dtype) for part in parts)
+    return *(part.to(dtype) for part in parts), torch.arange(n) % 3 == 1
 
 
 def field_gradients(dtype=torch.float64) -> tuple:

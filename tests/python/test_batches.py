@@ -7,15 +7,20 @@ from types import SimpleNamespace
 import torch
 from tiny_runs import tiny
 
+from splitnerf.render.edges import EdgePixels
+from splitnerf.render.rays import DrawnRays
 from splitnerf.training.batches import draw_batch
 
 
-def drawn(seed: int = 0, **settings):
-    """A batch whose origins are 1, directions 2 and pixels 3."""
+def drawn(seed: int = 0, edges: EdgePixels | None = None, **settings):
+    """A batch whose origins are 1, directions 2 and pixels 3, which are the first ones of three photos."""
     config = tiny(box=1.3, eikonal_points=4000, smoothness_points=3000, smoothness_radius=0.05, **settings)
     source = SimpleNamespace(
         generator=torch.Generator().manual_seed(seed),
-        draw=lambda n: (torch.full((n, 3), 1.0), torch.full((n, 3), 2.0), torch.full((n, 4), 3.0), torch.arange(n) % 3),
+        edges=edges,
+        draw=lambda n: DrawnRays(
+            torch.full((n, 3), 1.0), torch.full((n, 3), 2.0), torch.full((n, 4), 3.0), torch.arange(n) % 3, torch.arange(n)
+        ),
     )
     return draw_batch(source, 2000, config, torch.ones(3, 3))
 
@@ -38,6 +43,15 @@ def test_what_is_drawn_fills_its_range():
     assert batch.probes.chosen.shape == (3000,) and shifts.shape == (3000, 3)
     assert shifts.mean(0).abs().max() < 0.005
     torch.testing.assert_close(shifts.T.cov(), 0.05**2 * torch.eye(3), rtol=0, atol=0.1 * 0.05**2)
+
+
+def test_whole_pixels_are_seen_before_what_lies_behind_them():
+    """And all others before random colours, which do not change by that."""
+    numbers, behind = torch.tensor([0, 7, 8, 1999]), torch.arange(12.0).view(4, 3)
+    batch, plain = drawn(edges=EdgePixels(numbers, behind)), drawn()
+    assert torch.equal(batch.whole.nonzero()[:, 0], numbers) and not plain.whole.any()
+    assert torch.equal(batch.background[numbers], behind)
+    assert torch.equal(batch.background[~batch.whole], plain.background[~batch.whole])
 
 
 def test_without_smoothness_no_neighbours_are_drawn():

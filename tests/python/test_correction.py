@@ -171,9 +171,10 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     grid.cells = cells
     step, g = Step(model, grid, SurfaceMesh(model), generator(3)), generator(4)
     rays = torch.tensor([[4.0, 0.01 * i, 0] for i in range(30)]), torch.tensor([[-1.0, 0, 0]] * 30)
-    pixels = torch.rand(30, 4, generator=g), torch.rand(30, 3, generator=g), torch.rand(30, generator=g)
+    jitter = torch.rand(30, generator=g)
+    pixels = torch.rand(30, 4, generator=g), torch.rand(30, 3, generator=g), torch.zeros(30, dtype=torch.bool)
     photo = torch.zeros(30, dtype=torch.int64), torch.ones(30, 3)
-    batch = Batch(*rays, *pixels, *photo, draw_probes(model.config, g))
+    batch = Batch(*rays, *pixels, jitter, *photo, draw_probes(model.config, g))
     gradients = []
     for _ in range(2):
         ray, _ = step(batch, model.evaluate_light(), None, 1, 0.0)

@@ -15,7 +15,9 @@ from pretend_gpu import pretend_gpu
 from splitnerf import _core, memory
 from splitnerf.cli import main
 from splitnerf.cli.exit_codes import DONE, FAILED
+from splitnerf.cli.train import device_for
 from splitnerf.doctor import machine, self_test
+from splitnerf.doctor.choice import fit_device
 from splitnerf.doctor.table import CHECKS
 from splitnerf.ops._library import lib
 
@@ -230,3 +232,50 @@ def test_little_memory_and_disk(monkeypatch, tmp_path):
     assert "photos up to 50% of what is free" in machine.memory().value
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=2**20))
     assert "--out" in machine.disk(tmp_path).advice
+
+
+class TestChoice:
+    """--device auto: a GPU that passed every operator's test, else the CPU; why is said."""
+
+    @pytest.fixture
+    def gpu(self, monkeypatch):
+        """A machine with a GPU that is right; the changes of the arguments make it otherwise."""
+
+        def make(built="90-real", there=True, capability=(9, 0), failed=()):
+            monkeypatch.setattr(_core, "cuda_architectures", lambda: built)
+            monkeypatch.setattr(torch.cuda, "is_available", lambda: there)
+            monkeypatch.setattr(torch.cuda, "get_device_capability", lambda: capability)
+            monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "Big GPU")
+            monkeypatch.setattr(torch.cuda, "current_device", lambda: 0)
+            tested = [self_test.Failure(name, "cuda", "found 1, expected 2", "it") for name in failed]
+            monkeypatch.setattr("splitnerf.doctor.choice.failures", lambda device: tested if device == "cuda" else None)
+
+        return make
+
+    def test_a_gpu_that_passes_is_taken(self, gpu):
+        gpu()
+        assert fit_device() == ("cuda", f"the Big GPU passes the test of {len(self_test.operators('cuda'))} operators")
+
+    @pytest.mark.parametrize(
+        ("changes", "why"),
+        [
+            ({"built": ""}, "this build has no GPU kernels"), ({"there": False}, "torch finds no GPU"),
+            ({"capability": (8, 6)}, "this build has no kernels for the Big GPU"),
+            ({"failed": ["composite"]}, "the Big GPU fails the test of composite (splitnerf doctor)"),
+            ({"failed": ["composite", "adamw_step_", "sdf_layer"]},
+             "the Big GPU fails the test of composite and 2 more (splitnerf doctor)"),
+        ],
+    )  # fmt: skip
+    def test_else_the_cpu_is(self, gpu, changes, why):
+        gpu(**changes)
+        assert fit_device() == ("cpu", why)
+
+    def test_the_command_says_which(self, gpu, capsys):
+        gpu(failed=["composite"])
+        assert device_for("auto", False) == "cpu" and device_for("cuda", False) == "cuda" and device_for("cpu", True) == "cpu"
+        assert "note: trains on the CPU: the Big GPU fails the test of composite" in capsys.readouterr().err
+        gpu()
+        assert device_for("auto", False) == "cuda"
+        assert "note: trains on the GPU: the Big GPU passes" in capsys.readouterr().err
+        assert device_for("auto", True) == "cpu"
+        assert "note: trains on the CPU: no GPU repeats bits" in capsys.readouterr().err

@@ -21,6 +21,8 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.exposure import exposed_like
 from splitnerf.ops import pixel_losses
 from splitnerf.training import exposure
+from splitnerf.render.edges import EdgePixels
+from splitnerf.render.rays import DrawnRays
 from splitnerf.training.batches import draw_batch
 from splitnerf.training.exposure import COLOUR_ERROR, ENOUGH, ERROR, PhotoExposures
 
@@ -117,10 +119,11 @@ class TestLearning:
 
 
 class TestLoss:
-    def batch(self, exposure: float, **changes):
+    def batch(self, exposure: float, edges=None, **changes):
         target = torch.tensor([[0.5, 0.6, 1.0, 1.0]])
-        drawn = target[:, :3], target[:, :3], target, torch.zeros(1, dtype=torch.int64)
-        source = SimpleNamespace(generator=torch.Generator().manual_seed(0), draw=lambda n: drawn)
+        first = torch.zeros(1, dtype=torch.int64)
+        drawn = DrawnRays(target[:, :3], target[:, :3], target, first, first)
+        source = SimpleNamespace(generator=torch.Generator().manual_seed(0), draw=lambda n: drawn, edges=edges)
         return draw_batch(source, 1, tiny(**changes), torch.full((1, 3), exposure))
 
     def test_a_photo_is_compared_at_its_own_exposure(self):
@@ -134,8 +137,12 @@ class TestLoss:
         assert float(pixel_losses(dim * batch.exposure, torch.ones(1), batch.target, batch.background)[0]) > 0.005
 
     def test_srgb_samples_are_compared_at_an_exposure_of_one(self):
-        batch = self.batch(0.5, compositing="srgb", shading="split")
-        assert torch.equal(batch.exposure, torch.ones(1, 3))
+        """And so is what lies behind the object at the masks' edges."""
+        edges = EdgePixels(torch.zeros(1, dtype=torch.int64), torch.tensor([[0.2, 0.3, 0.4]]))
+        batch = self.batch(0.5, edges, compositing="srgb", shading="split")
+        assert torch.equal(batch.exposure, torch.ones(1, 3)) and batch.whole.item()
+        behind = srgb_to_linear(np.float32([0.2, 0.3, 0.4]))
+        np.testing.assert_allclose(srgb_to_linear(batch.background[0].numpy()), 2 * behind, rtol=1e-4)
         linear = srgb_to_linear(np.float32([0.5, 0.6]))
         np.testing.assert_allclose(srgb_to_linear(batch.target[0, :2].numpy()), 2 * linear, rtol=1e-4)
 

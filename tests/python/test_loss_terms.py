@@ -35,7 +35,7 @@ def rendered():
     target = 0.9 * torch.rand(n, 4, generator=g)  # nowhere saturated
     background, jitter = torch.rand(n, 3, generator=g), torch.rand(n, generator=g)
     photo = torch.zeros(n, dtype=torch.int64), torch.ones(n, 3)
-    batch = Batch(origins, directions, target, background, jitter, *photo, draw_probes(config, g))
+    batch = Batch(origins, directions, target, background, torch.zeros(n, dtype=torch.bool), jitter, *photo, draw_probes(config, g))
     light = model.evaluate_light()
     ray = render_rays(model, light, find_samples(model, grid.cells, *batch.rays, probes=batch.probes))
     return config, batch, ray, loss_terms(model, light, batch, ray, None, None, g, 0, 0.0)

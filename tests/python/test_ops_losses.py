@@ -10,7 +10,9 @@ from op_cases import field_gradients, pixel_inputs, rand
 from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 
 from splitnerf.bench import reference
-from splitnerf.ops import gradient_losses, material_losses, pixel_losses, quadratic_entropy
+from splitnerf.ops import (
+    gradient_losses, linear_to_srgb, material_losses, pixel_losses, quadratic_entropy, srgb_to_linear,
+)  # fmt: skip
 
 
 def same_as(ours: tuple, theirs: tuple, leaves: tuple, twins: tuple) -> None:
@@ -43,6 +45,21 @@ def test_a_clipped_photo_asks_only_for_enough():
     assert pixel_losses(0.5 * torch.ones(4, 3), opacity, target, torch.zeros(4, 3), linear=False)[
         0
     ].item() == pytest.approx(0.25)
+
+
+def test_a_whole_pixel_is_compared_with_what_the_camera_added_up():
+    """A white wall behind a grey object that fills .3 of a pixel: as light, not as sRGB; the mask's alpha says nothing of it."""
+    mean, opacity, behind = torch.full((1, 3), 0.2), torch.tensor([0.3]), torch.ones(1, 3)
+    seen = linear_to_srgb(0.3 * mean + 0.7 * srgb_to_linear(behind))
+    whole = torch.ones(1, dtype=torch.bool)
+    for alpha in (0.0, 1.0):
+        target = torch.cat([seen, torch.tensor([[alpha]])], dim=1)
+        colour, mask = pixel_losses(mean, opacity, target, behind, whole)
+        assert colour.item() == pytest.approx(0, abs=1e-12)
+        assert mask.item() == pytest.approx(-0.1 * math.log(0.3 if alpha else 0.7), rel=1e-6)
+        assert pixel_losses(mean, opacity, target, behind)[0].item() > 1e-3
+        srgb = pixel_losses(seen, opacity, target, behind, whole, linear=False)[0].item()
+        assert srgb == pytest.approx((0.7 * (1 - seen[0, 0].item())) ** 2, rel=1e-5)
 
 
 # ---- gradients ----

@@ -10,6 +10,10 @@ from stability.precise import mp, vector
 PAIRS = 6
 
 
+def linear_of(x):
+    return x / mp.mpf("12.92") if x <= mp.mpf("0.04045") else ((x + mp.mpf("0.055")) / mp.mpf("1.055")) ** mp.mpf("2.4")
+
+
 def srgb(x):
     return (
         mp.mpf("12.92") * x
@@ -20,15 +24,18 @@ def srgb(x):
 
 def pixel_losses(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
     saturated, colour, mask = mp.mpf(254) / 255, {True: [], False: []}, []
-    for mean, opacity, target, background in zip(*(row[n] for n in ("mean", "opacity", "target", "background"))):
+    names = ("mean", "opacity", "target", "background", "whole")
+    for mean, opacity, target, background, whole in zip(*(row[n] for n in names)):
         o, (*photo, a) = mp.mpf(float(opacity)), vector(target)
         for m, t, b in zip(vector(mean), photo, vector(background)):
             for linear, terms in colour.items():
-                c = srgb(m) if linear else m
+                mixed, behind = whole and linear, linear_of(b)
+                c = behind + o * (m - behind) if mixed else m
+                c = srgb(c) if linear else c
                 c = min(c, mp.mpf(1)) if t >= saturated else c
-                terms.append(((b + o * (c - b)) - (b + a * (t - b))) ** 2)
+                terms.append(((c if mixed else b + o * (c - b)) - (t if whole else b + a * (t - b))) ** 2)
         o = min(max(o, mp.mpf("1e-3")), 1 - mp.mpf("1e-3"))
-        mask.append(-(a * mp.log(o) + (1 - a) * mp.log(1 - o)))
+        mask.append((mp.mpf("-0.1") if whole else -1) * (a * mp.log(o) + (1 - a) * mp.log(1 - o)))
     mean_mask = mp.fsum(mask) / len(mask)
     linear, encoded = (mp.fsum(terms) / len(terms) for terms in colour.values())
     return {"colour": [linear], "mask": [mean_mask], "colour of sRGB": [encoded], "mask of sRGB": [mean_mask]}

@@ -34,18 +34,20 @@ def draw_pixels(draw: Draw, n: int) -> Rows:
         "opacity": draw.mixed((0.0, 1e-7, 1e-3, 1 - 1e-3, 1.0), draw.uniform(n, BATCH)),
         "target": target,
         "background": draw.shares(n, BATCH, 3),
+        "whole": draw.chance(0.3, n, BATCH),
     }
 
 
 def pixels(rows: Rows, shared: Rows) -> Rows:
-    names = ("mean", "opacity", "target", "background")
+    names = ("mean", "opacity", "target", "background", "whole")
     linear = batches(rows, names, ops.pixel_losses, ("colour", "mask"))
     encoded = batches(rows, names, lambda *x: ops.pixel_losses(*x, linear=False), ("colour of sRGB", "mask of sRGB"))
     return linear | encoded
 
 
 def repaired_pixels(rows: Rows) -> Rows:
-    return {name: x.clamp(0, 1e6 if name == "mean" else 1) for name, x in rows.items()}
+    tops = {"mean": 1e6, "opacity": 1, "target": 1, "background": 1}
+    return rows | {name: rows[name].clamp(0, top) for name, top in tops.items()}
 
 
 def draw_gradients(draw: Draw, n: int) -> Rows:

@@ -12,29 +12,37 @@ namespace splitnerf {
 inline constexpr double kSaturated = 254.0 / 255.0;  // of a photo's channel: the truth is at least as bright
 inline constexpr double kLeastOpacity = 1e-3;        // in the mask's logarithms
 
+inline constexpr double kMaskOfWhole = 0.1;          // what the mask of a whole pixel counts
+
 // Squared error of a pixel against the photo, both over one background, summed over the channels, and the cross entropy of
 // its opacity against the mask, with their gradients. Where the photo is saturated the colour is clipped like it.
 //   C = b + o (c - b),  c = sRGB(mean)                   Source: SplitNeRF Eq. (3); the mask: NeuS Eq. (17).
+// A whole pixel's photo is what the camera saw, object and background together, whose light it added up; the background is
+// what it would have seen without the object:
+//   C = sRGB(B + o (mean - B)),  sRGB(B) = b
 template <class T> struct PixelLosses {
   T colour, mask;
   Vec3<T> colour_by_mean;
   T colour_by_opacity, mask_by_opacity;
 };
 template <class T>
-SPLITNERF_HD PixelLosses<T> pixel_losses(Vec3<T> mean, T opacity, const T* target, Vec3<T> background, bool linear) {
+SPLITNERF_HD PixelLosses<T> pixel_losses(Vec3<T> mean, T opacity, const T* target, Vec3<T> background, bool whole,
+                                         bool linear) {
   PixelLosses<T> out{};
-  const T alpha = target[3];
   for (int k = 0; k < 3; ++k) {
-    ValueAndSlope<T> c = linear ? srgb_from_linear(mean[k]) : ValueAndSlope<T>{mean[k], T(1)};
+    const bool mixed = whole && linear;  // object and background before the curve, else behind it
+    const T b = mixed ? linear_from_srgb(background[k]) : background[k], x = mixed ? lerp(b, mean[k], opacity) : mean[k];
+    ValueAndSlope<T> c = linear ? srgb_from_linear(x) : ValueAndSlope<T>{x, T(1)};
     if (target[k] >= T(kSaturated) && c.value > T(1)) c = {T(1), T(0)};
-    const T b = background[k], error = lerp(b, c.value, opacity) - lerp(b, target[k], alpha);
+    const T error = (mixed ? c.value : lerp(b, c.value, opacity)) - (whole ? target[k] : lerp(b, target[k], target[3]));
     out.colour += square(error);
     out.colour_by_mean[k] = T(2) * error * opacity * c.slope;
-    out.colour_by_opacity += T(2) * error * (c.value - b);
+    out.colour_by_opacity += T(2) * error * (mixed ? c.slope * (mean[k] - b) : c.value - b);
   }
-  const T o = clamp(opacity, T(kLeastOpacity), T(1) - T(kLeastOpacity));
-  out.mask = -(alpha * std::log(o) + (T(1) - alpha) * std::log1p(-o));
-  out.mask_by_opacity = o == opacity ? (o - alpha) / (o * (T(1) - o)) : T(0);
+  const T o = clamp(opacity, T(kLeastOpacity), T(1) - T(kLeastOpacity)), a = target[3];
+  const T weight = whole ? T(kMaskOfWhole) : T(1);
+  out.mask = -weight * (a * std::log(o) + (T(1) - a) * std::log1p(-o));
+  out.mask_by_opacity = o == opacity ? weight * (o - a) / (o * (T(1) - o)) : T(0);
   return out;
 }
 

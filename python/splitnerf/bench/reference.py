@@ -231,6 +231,11 @@ def linear_to_srgb(linear: Tensor) -> Tensor:
     return torch.where(linear <= 0.0031308, 12.92 * linear.clamp(min=0), power)
 
 
+def srgb_to_linear(srgb: Tensor) -> Tensor:
+    power = ((srgb.clamp(min=0.04045) + 0.055) / 1.055) ** 2.4
+    return torch.where(srgb <= 0.04045, srgb / 12.92, power)
+
+
 # ---- light ----
 
 
@@ -372,14 +377,20 @@ def cached_occlusion(
 # ---- losses ----
 
 
-def pixel_losses(mean, opacity, target, background, linear: bool) -> tuple[Tensor, Tensor]:
+def pixel_losses(mean, opacity, target, background, whole, linear: bool) -> tuple[Tensor, Tensor]:
     """Squared error over a background, one-sided where the photo is clipped, and cross entropy of the mask."""
-    colour = linear_to_srgb(mean) if linear else mean
-    colour = torch.where(target[:, :3] >= 254 / 255, colour.clamp(max=1), colour)
-    o, a = opacity[:, None], target[:, 3:]
-    error = colour * o + background * (1 - o) - (target[:, :3] * a + background * (1 - a))
-    mask = F.binary_cross_entropy(opacity.clamp(1e-3, 1 - 1e-3), target[:, 3])
-    return error.square().mean(), mask
+    o, a, w = opacity[:, None], target[:, 3:], whole[:, None]
+
+    def clipped(linear_or_not: Tensor) -> Tensor:
+        colour = linear_to_srgb(linear_or_not) if linear else linear_or_not
+        return torch.where(target[:, :3] >= 254 / 255, colour.clamp(max=1), colour)
+
+    over = clipped(mean) * o + background * (1 - o)
+    if linear:
+        over = torch.where(w, clipped(mean * o + srgb_to_linear(background) * (1 - o)), over)
+    error = over - torch.where(w, target[:, :3], target[:, :3] * a + background * (1 - a))
+    mask = F.binary_cross_entropy(opacity.clamp(1e-3, 1 - 1e-3), target[:, 3], reduction="none")
+    return error.square().mean(), torch.where(whole, 0.1 * mask, mask).mean()
 
 
 def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple[Tensor, Tensor]:

@@ -43,8 +43,8 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
     parser.add_argument("--max-minutes", type=float, metavar="M", help="time of training and last stage; the schedule fits itself to it")
     parser.add_argument(
-        "--device", choices=["cpu", "cuda"], default="cpu",
-        help="where to train (default: cpu; see docs/cuda.md)",
+        "--device", choices=["auto", "cpu", "cuda"], default="auto",
+        help="where to train; auto: on the GPU if it passes the operators' test, else on the CPU (default: auto)",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, help="of all random numbers (default: 0)")
     parser.add_argument(
@@ -96,7 +96,7 @@ def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object]) -
     from splitnerf.training.checkpoint import config_of, load_checkpoint
     from splitnerf.workflow import begin_or_go_on, is_finished, reconstruct
 
-    device = choose_device(args.device)
+    device = choose_device(device_for(args.device, settings.get("run.deterministic", False)))
     resume, overwrite = begin_or_go_on(run) if args.resume == "auto" else (bool(args.resume), args.overwrite)
     base = preset(args.preset or ("cpu" if device.type == "cpu" else "fast"))
     if resume:
@@ -117,6 +117,18 @@ def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object]) -
         return INTERRUPTED
     print_summary(run, evaluation, trained.step, trained.seconds)
     return DONE
+
+
+def device_for(wanted: str, deterministic: bool) -> str:
+    """The name of the device that is asked for; for ``auto`` of one that is fit, and a note says which and why."""
+    from splitnerf.doctor.choice import fit_device
+    from splitnerf.notes import note
+
+    if wanted != "auto":
+        return wanted
+    device, why = ("cpu", "no GPU repeats bits") if deterministic else fit_device()
+    note(f"trains on the {'GPU' if device == 'cuda' else 'CPU'}: {why}")
+    return device
 
 
 def budget(steps: int | None, minutes: float | None) -> dict[str, object]:

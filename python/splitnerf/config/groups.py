@@ -255,6 +255,10 @@ class Losses:
     binary_metal_weight: float = setting(0.003, "weight of metallic between 0 and 1, from priors_from")
     dark_metal_weight: float = setting(0.002, "weight of metals that reflect less than any does")
     mask_weight: float = setting(1.0, "weight of the masks")
+    edge_pixels: int = setting(
+        2, "pixels on each side of a mask's edge that are compared whole, with what lies behind the object; 0: the mask is "
+        "exact. Of photos whose masks are files of their own", unit="pixels", at_least=0, at_most=64,
+    )  # fmt: skip
     neutral_weight: float = setting(0.03, "weight of the diffuse light's log chroma")
     light_prior_weight: float = setting(0.001, "weight of the distance to a smooth and grey light (of the pyramid)")
     entropy_weight: float = setting(0.002, "weight of the materials' quadratic entropy, from priors_from")

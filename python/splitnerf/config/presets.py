@@ -39,7 +39,7 @@ PAPER = dict(
         light_form="square", light_set="uniform", light_samples=8129, light_noise=0.0, light_queries=8129,
         light_lobe_below=0.0, eikonal_points=0,
         # beyond the paper
-        neutral_weight=0.0, light_prior_weight=0.0, seen_weight=0.0, entropy_weight=0.0, binary_metal_weight=0.0,
+        edge_pixels=0, neutral_weight=0.0, light_prior_weight=0.0, seen_weight=0.0, entropy_weight=0.0, binary_metal_weight=0.0,
         dark_metal_weight=0.0, smoothness_weight=0.0,
     ),
     optimiser=dict(warmup_steps=500, final_learning_rate=0.1),

@@ -56,6 +56,7 @@ class Dataset:
         surroundings: [h, 2 h, 4] float32, equirectangular: linear radiance that the photos see around the object, and how
             well it was seen, in [0, 1]; None where the data have no such map.
         masked: Whether alpha says where the object is; otherwise it is 1.
+        whole: Whether the colours are those of the whole photos, also where alpha is less than 1.
     """
 
     name: str
@@ -74,6 +75,7 @@ class Dataset:
     stated: np.ndarray | None = None
     surroundings: np.ndarray | None = None
     masked: bool = True
+    whole: bool = False
 
     def __post_init__(self) -> None:
         self.images = self.images if isinstance(self.images, Photos) else Photos(self.images)
@@ -208,6 +210,7 @@ def load_dataset(
         stated=np.array([frame.exposure for frame in frames]),
         surroundings=_surroundings(root, reading),
         masked=_has_masks(photos),
+        whole=all(photo.whole for photo in photos),
     )
 
 

@@ -38,6 +38,7 @@ class Photo:
         seen: [h, w] bool, what is known of it, or None for all.
         size: (height, width) of the file.
         masked: Whether anything says where the object is; otherwise alpha is 1.
+        whole: Whether the colours are those of the whole photo, also where alpha is less than 1.
         scale: The factor by which linear values were multiplied, so that those of a file of floats lie below 1; else 1.
     """
 
@@ -47,6 +48,7 @@ class Photo:
     seen: np.ndarray | None
     size: tuple[int, int]
     masked: bool = True
+    whole: bool = False
     scale: float = 1.0
 
 
@@ -84,24 +86,26 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
     alpha = alpha if masked else np.full((height, width, 1), 255, np.uint8)
     kind = np.uint8 if colour.dtype == alpha.dtype == np.uint8 else np.uint16
     rgba = np.concatenate([encoded(colour, kind), encoded(alpha, kind)], axis=-1)
+    whole = is_object and frame.mask_path is not None
     says_nothing = bool((rgba[..., 3] == np.iinfo(kind).max).all())
     if frame.distortion is not None:
-        straight, known = _undistort(decoded(rgba), known, frame, straight=is_object and frame.mask_path is not None)
+        straight, known = _undistort(decoded(rgba), known, frame, straight=whole)
         rgba = encoded(straight, np.uint16)
     if says_nothing and separated is not None:
         mask = resized_mask(read_image(separated / separated_mask(frame.image_path)), height, width)
-        masked, rgba[..., 3] = True, encoded(mask, rgba.dtype)
+        masked, whole, rgba[..., 3] = True, True, encoded(mask, rgba.dtype)
     factor = silhouette_factor(height, width)
     silhouette = area_average(decoded(rgba[..., 3]), factor) > 0.5
     rgba = _averaged(rgba, downscale)
+    whole &= downscale == 1  # averages are of the object's colours alone
     if known is None or known.all():
-        return Photo(rgba, None, silhouette, None, (height, width), masked, scale)
+        return Photo(rgba, None, silhouette, None, (height, width), masked, whole, scale)
     share, known = known[..., 0].astype(np.float32), area_average(known[..., 0].astype(np.float32), downscale) > CERTAIN
     seen = area_average(share, factor) > CERTAIN
     if not known.any():
         raise InputError(f"{path}: its masks ignore all of it; remove the frame")
     rgba[~known] = 0
-    return Photo(rgba, known, silhouette & seen, seen, (height, width), masked, scale)
+    return Photo(rgba, known, silhouette & seen, seen, (height, width), masked, whole, scale)
 
 
 def separated_mask(image_path: Path) -> str:

@@ -12,7 +12,7 @@ from splitnerf.ops._library import lib, refuse_gradients, register
 
 
 def pixel_losses(
-    mean: Tensor, opacity: Tensor, target: Tensor, background: Tensor, *, linear: bool = True
+    mean: Tensor, opacity: Tensor, target: Tensor, background: Tensor, whole: Tensor | None = None, *, linear: bool = True
 ) -> tuple[Tensor, Tensor]:
     """Mean squared sRGB error of pixels against photos over the same background, and the cross entropy with their
     masks.
@@ -25,6 +25,9 @@ def pixel_losses(
         opacity: [n] opacities in [0, 1].
         target: [n, 4] sRGB values of the photos in [0, 1], straight alpha.
         background: [n, 3] sRGB colours in [0, 1].
+        whole: [n] bool, the pixels whose photo is what the camera saw, the object and the background together (both added up
+            as light, if ``linear``): there the background is what it would have seen without the object, the target's alpha
+            says nothing of the colour, and the mask counts a tenth. None: no pixel.
         linear: Whether ``mean`` is linear; otherwise it is sRGB.
 
     Returns:
@@ -36,7 +39,8 @@ def pixel_losses(
 
     Source: SplitNeRF Eq. (3); NeuS Eq. (17).
     """
-    colour, mask = lib.pixel_losses(mean, opacity, target, background, linear)[0].unbind()
+    whole = torch.zeros_like(opacity, dtype=torch.bool) if whole is None else whole
+    colour, mask = lib.pixel_losses(mean, opacity, target, background, whole, linear)[0].unbind()
     return colour, mask
 
 
@@ -118,7 +122,7 @@ def _pixel_backward(ctx, grad, *_):
     refuse_gradients(ctx, "pixel_losses", target=2, background=3)
     colour_by_mean, colour_by_opacity, mask_by_opacity = ctx.saved_tensors
     by_opacity = torch.addcmul(colour_by_opacity * grad[0], mask_by_opacity, grad[1])
-    return colour_by_mean * grad[0], by_opacity, None, None, None
+    return colour_by_mean * grad[0], by_opacity, None, None, None, None
 
 
 def _gradient_backward(ctx, grad, *_):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -10,6 +12,7 @@ from torch.nn import functional as F
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import PixelReader
 from splitnerf.devices import tensor_cores
+from splitnerf.render.edges import EdgePixels
 from splitnerf.render.masks import PixelRuns, reduced, runs_of, widened
 
 HULL_EDGE = 400  # pixels, about, along the shorter edge of the masks that make the hull
@@ -57,6 +60,23 @@ def image_rays(pose: Tensor, intrinsics: Tensor, height: int, width: int) -> tup
     return pixel_rays(pose, intrinsics, x.reshape(-1), y.reshape(-1))
 
 
+class DrawnRays(NamedTuple):
+    """Rays through pixels of photos.
+
+    Attributes:
+        rays_o, rays_d: [n, 3] origins and unit directions.
+        pixels: [n, 4] sRGB of the photos as they are, in [0, 1], straight alpha.
+        view: [n] int64, the photos' numbers.
+        index: [n] int64, the pixels' numbers, counted through all photos.
+    """
+
+    rays_o: Tensor
+    rays_d: Tensor
+    pixels: Tensor
+    view: Tensor
+    index: Tensor
+
+
 class PixelSource:
     """Draws training rays: most of them near the objects' masks, the rest anywhere.
 
@@ -64,21 +84,26 @@ class PixelSource:
         dataset: The train split; pixels that are not known are never drawn.
         foreground_share: Share of the rays, in [0, 1], that are drawn within a few pixels of a mask.
         generator: The random generator of the pixels; images and cameras are kept on its device.
+        edge_pixels: The width on each side of the masks' edges in pixels of `edges`; 0: none.
 
     Attributes:
+        edges: The pixels along the masks' edges; None where there are none, or the photos' colours outside are not known.
         foreground: The known pixels near a mask.
         known: The known pixels; None for all.
         possible: [n, h, w] bool, where the photos may show the object: within the masks, and where nothing is known. Those
             of large photos are smaller by `hull_factor`, a pixel being true where one within it is.
     """
 
-    def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator):
+    def __init__(
+        self, dataset: Dataset, foreground_share: float, generator: torch.Generator, edge_pixels: int = 0
+    ):
         self.device = generator.device
         self.poses, self.intrinsics = (torch.from_numpy(x).to(self.device) for x in (dataset.poses, dataset.intrinsics))
         self.pixels = PixelReader(dataset.images, self.device)
         self.matrices, self.origins = pixel_matrix(self.poses, self.intrinsics), self.poses[:, :3, 3].contiguous()
         self.height, self.width = dataset.height, dataset.width
         self.share, self.generator = foreground_share, generator
+        self.edges = EdgePixels.of(dataset, edge_pixels, self.device) if edge_pixels and dataset.whole else None
         near, known, possible = [], [], []
         self.hull_factor = max(1, min(self.height, self.width) // HULL_EDGE)
         for i in range(len(dataset)):
@@ -95,9 +120,8 @@ class PixelSource:
         self.foreground = PixelRuns.of(near, n_pixels, self.device)
         self.known = PixelRuns.of(known, n_pixels, self.device) if known else None
 
-    def draw(self, n: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Draws n rays: origins [n, 3], unit directions [n, 3], pixels [n, 4] (sRGB of the photos as they are, in [0, 1], straight
-        alpha) and the photos' numbers [n]."""
+    def draw(self, n: int) -> DrawnRays:
+        """Draws n rays."""
         n_near = int(n * self.share) if len(self.foreground) else 0
         draw = {"generator": self.generator, "device": self.device}
         near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), **draw)]
@@ -108,4 +132,4 @@ class PixelSource:
         view, column = row // self.height, index - row * self.width
         y = row - view * self.height
         rays_d = through_pixels(self.matrices[view], column + 0.5, y + 0.5)
-        return self.origins[view], rays_d, self.pixels.read(index), view
+        return DrawnRays(self.origins[view], rays_d, self.pixels.read(index), view, index)

@@ -19,7 +19,9 @@ class Batch(NamedTuple):
     Attributes:
         rays_o, rays_d: [n, 3] origins (scene units) and unit directions.
         target: [n, 4] sRGB values of the photos as they are, straight alpha; at an exposure of 1 where samples are added as sRGB.
-        background: [n, 3] random sRGB colours in [0, 1), behind the photo and the rendering alike.
+        background: [n, 3] random sRGB colours in [0, 1), behind the photo and the rendering alike; of whole pixels what the
+            photo would show without the object.
+        whole: [n] bool, the pixels along the masks' edges, whose colours are compared whole.
         jitter: [n] offsets of each ray's samples in [0, 1), as shares of a sample's length.
         view: [n] int64, the photos' numbers.
         exposure: [n, 3] the factors of the photos' linear values.
@@ -30,6 +32,7 @@ class Batch(NamedTuple):
     rays_d: Tensor
     target: Tensor
     background: Tensor
+    whole: Tensor
     jitter: Tensor
     view: Tensor
     exposure: Tensor
@@ -47,13 +50,21 @@ def draw_batch(source: PixelSource, n_rays: int, config: Config, exposures: Tens
     Where samples are added as sRGB, colours at another exposure are not known: the photos are brought to an exposure of 1.
     """
     g = source.generator
-    rays_o, rays_d, target, view = source.draw(n_rays)
-    exposure = exposures[view]
+    drawn = source.draw(n_rays)
+    target, exposure = drawn.pixels, exposures[drawn.view]
+    background, jitter = (torch.rand(*shape, generator=g, device=g.device) for shape in ((n_rays, 3), (n_rays,)))
+    if source.edges is None:
+        whole = torch.zeros(n_rays, dtype=torch.bool, device=g.device)
+    else:
+        whole, behind = source.edges.at(drawn.index)
+        background = torch.where(whole[:, None], behind, background)
     if config.shading.compositing == "srgb":
         target = torch.cat([at_unit_exposure(target[:, :3], exposure), target[:, 3:]], dim=1)
+        background = torch.where(whole[:, None], at_unit_exposure(background, exposure), background)
         exposure = torch.ones_like(exposure)
-    background, jitter = (torch.rand(*shape, generator=g, device=g.device) for shape in ((n_rays, 3), (n_rays,)))
-    return Batch(rays_o, rays_d, target, background, jitter, view, exposure, draw_probes(config, g))
+    return Batch(
+        drawn.rays_o, drawn.rays_d, target, background, whole, jitter, drawn.view, exposure, draw_probes(config, g)
+    )
 
 
 def draw_probes(config: Config, generator: torch.Generator) -> ProbePoints:

@@ -126,7 +126,9 @@ class Training:
         self.fingerprint = dataset_fingerprint(dataset)
         torch.manual_seed(c.run.seed)
         self.generator = torch.Generator(device).manual_seed(c.run.seed)
-        self.source = source = PixelSource(dataset, c.sampling.foreground_share, self.generator)
+        self.source = source = PixelSource(
+            dataset, c.sampling.foreground_share, self.generator, c.losses.edge_pixels
+        )
         self.exposures = PhotoExposures(dataset, c, device)
         self.model = SceneModel(c).to(device)
         self.optimiser = make_optimiser(self.model, c)

@@ -102,7 +102,9 @@ def loss_terms(
     Source: SplitNeRF Eq. (3), (11), (18) and the losses named in :mod:`splitnerf.training.losses`.
     """
     c = model.config
-    colour, mask = pixel_losses(ray.mean * batch.exposure, ray.opacity, batch.target, batch.background, linear=ray.linear)
+    colour, mask = pixel_losses(
+        ray.mean * batch.exposure, ray.opacity, batch.target, batch.background, batch.whole, linear=ray.linear
+    )
     eikonal, smoothness = gradient_losses(ray.gradients, ray.weights.detach(), ray.beside)
     metal, binary_metal, dark_metal = material_losses(
         ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.losses.metal_form == "smooth_l1"

@@ -12,12 +12,14 @@ namespace splitnerf {
 template <class T> struct PixelLossesBody {
   static constexpr int n_sums = 2;
   const T *mean, *opacity, *target, *background;
+  const bool* whole;
   bool linear;
   T per_value, per_ray;  // 1 over the number of values and of rays, as the means are taken
   T *losses, *colour_by_mean, *colour_by_opacity, *mask_by_opacity;
 
   SPLITNERF_HD void operator()(int64_t i, double* sums) const {
-    const auto pixel = pixel_losses(load3(mean + 3 * i), opacity[i], target + 4 * i, load3(background + 3 * i), linear);
+    const auto pixel =
+        pixel_losses(load3(mean + 3 * i), opacity[i], target + 4 * i, load3(background + 3 * i), whole[i], linear);
     sums[0] += double(pixel.colour), sums[1] += double(pixel.mask);
     store3(colour_by_mean + 3 * i, pixel.colour_by_mean * per_value);
     colour_by_opacity[i] = pixel.colour_by_opacity * per_value;
@@ -30,12 +32,13 @@ template <class T> struct PixelLossesBody {
 SPLITNERF_ON_GPU(PixelLossesBody);
 template <class T>
 PixelLossesBody<T> make_pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, const T* background,
-                                     bool linear, T* losses, T* colour_by_mean, T* colour_by_opacity,
+                                     const bool* whole, bool linear, T* losses, T* colour_by_mean, T* colour_by_opacity,
                                      T* mask_by_opacity) {
   return {mean,
           opacity,
           target,
           background,
+          whole,
           linear,
           T(1) / T(max_of<int64_t>(3 * n, 1)),
           T(1) / T(max_of<int64_t>(n, 1)),

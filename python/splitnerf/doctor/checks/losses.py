@@ -12,11 +12,13 @@ from splitnerf.ops._library import lib
 
 @check
 def pixel_losses():
-    """sRGB 0.5 half covering black against 0.6, and half an opacity where the mask is full: 0.35^2 and ln 2."""
-    grey = torch.tensor([[0.6, 0.6, 0.6, 1.0]]).repeat(N, 1)
-    inputs = 0.2140411 * torch.ones(N, 3), torch.full((N,), 0.5), grey, torch.zeros(N, 3), True
+    """sRGB 0.5 half covering black against 0.6, and half an opacity where the mask is full: 0.35^2 and ln 2. Of each second
+    pixel, a whole one, twice that radiance half covers black: 0.1^2, and a tenth of ln 2."""
+    grey, whole = torch.tensor([[0.6, 0.6, 0.6, 1.0]]).repeat(N, 1), torch.arange(N) % 2 == 1
+    mean = 0.2140411 * torch.where(whole, 2.0, 1.0)[:, None].repeat(1, 3)
+    inputs = mean, torch.full((N,), 0.5), grey, torch.zeros(N, 3), whole, True
     losses, by_mean, by_opacity, mask_by_opacity = lib.pixel_losses(*inputs)
-    yield losses, torch.tensor([0.35**2, math.log(2)])
+    yield losses, torch.tensor([(0.35**2 + 0.1**2) / 2, 0.55 * math.log(2)])
     yield from slopes(lambda *x: lib.pixel_losses(*x)[0][0], inputs, (0, 1), (by_mean, by_opacity))
     yield from slopes(lambda *x: lib.pixel_losses(*x)[0][1], inputs, (1,), (mask_by_opacity,))
 

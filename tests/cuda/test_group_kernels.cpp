@@ -1,13 +1,14 @@
-// The bodies that a warp runs on the GPU, run by as many threads here, against what the CPU makes of them.
+// Kernels of a warp an item, against what the CPU makes of them.
 #include <tuple>
 
 #include "check.h"
-#include "lanes.h"
+#include "gpu.h"
 #include "splitnerf/bodies/light_pyramid.h"
 #include "splitnerf/bodies/losses.h"
 #include "splitnerf/bodies/monte_carlo.h"
 #include "splitnerf/bodies/rays.h"
 #include "splitnerf/ops_cpu.h"
+#include "splitnerf/ops_cuda.h"
 
 namespace splitnerf {
 namespace {
@@ -21,7 +22,7 @@ struct Rays {
 
   Rays() {
     Random random(3);
-    for (const int length : {0, 1, 8, 9, 50, 0, 16, 7, 33}) {
+    for (const int length : {0, 1, 31, 32, 33, 70, 0, 64, 101, 9, 2}) {
       const Vec3<double> d = random.direction();
       directions.insert(directions.end(), {d.x, d.y, d.z});
       for (int i = 0; i < length; ++i) {
@@ -45,7 +46,7 @@ struct Rays {
   }
 };
 
-TEST(GroupBodies, NeusWeightsAndTheirGradients) {
+TEST(GroupKernels, NeusWeightsAndTheirGradients) {
   const Rays r;
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
   Random random(1);
@@ -58,9 +59,9 @@ TEST(GroupBodies, NeusWeightsAndTheirGradients) {
     cpu::run(r.packed().n_rays,
              NeusWeightsBackwardBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(),
                                              gw.data(), go.data(), prev.data(), next.data(), s.data()});
-    for_each_by_lanes<8>(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
+    on_gpu(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
                                                                     least, w8.data(), o8.data()});
-    for_each_by_lanes<8>(r.packed().n_rays, NeusWeightsBackwardBody<double>{
+    on_gpu(r.packed().n_rays, NeusWeightsBackwardBody<double>{
                                                 r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(),
                                                 gw.data(), go.data(), prev8.data(), next8.data(), s8.data()});
     expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
@@ -68,24 +69,24 @@ TEST(GroupBodies, NeusWeightsAndTheirGradients) {
   }
 }
 
-// A warp's width, and a NaN, which every sample behind it must see.
-TEST(GroupBodies, NeusWeightsByThirtyTwoLanesPassANanOn) {
+// A NaN, which every sample behind it must see.
+TEST(GroupKernels, NeusWeightsPassANanOn) {
   Rays r;
-  r.f_next[size_t(r.offsets[4]) + 5] = std::nan("");
+  r.f_next[size_t(r.offsets[5]) + 5] = std::nan("");
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
   std::vector<double> w(n, 9), o(n_rays), w32(n, 7), o32(n_rays);
   cpu::run(r.packed().n_rays,
            NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, 0., w.data(), o.data()});
-  for_each_by_lanes<32>(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
+  on_gpu(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
                                                                    0., w32.data(), o32.data()});
   for (size_t i = 0; i < n; ++i) {
     EXPECT_EQ(std::isnan(w32[i]), std::isnan(w[i])) << i;
     if (!std::isnan(w[i])) { EXPECT_NEAR(w32[i], w[i], 1e-14) << i; }
   }
-  EXPECT_TRUE(std::isnan(o32[4]));
+  EXPECT_TRUE(std::isnan(o32[5]));
 }
 
-TEST(GroupBodies, SurfaceWeightsAndTheirGradients) {
+TEST(GroupKernels, SurfaceWeightsAndTheirGradients) {
   const Rays r;
   const SurfaceSamples<double> in = r.surface();
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
@@ -96,8 +97,8 @@ TEST(GroupBodies, SurfaceWeightsAndTheirGradients) {
   cpu::run(in.rays.n_rays, SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(),
                                                               to_sdf.data(), to_gradient.data(), to_s.data()});
   std::vector<double> normals8(3 * n, 7), w8(n, 7), o8(n_rays), to_sdf8(n, 7), to_gradient8(3 * n, 7), to_s8(n_rays);
-  for_each_by_lanes<8>(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals8.data(), w8.data(), o8.data()});
-  for_each_by_lanes<8>(in.rays.n_rays,
+  on_gpu(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals8.data(), w8.data(), o8.data()});
+  on_gpu(in.rays.n_rays,
                        SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(), to_sdf8.data(),
                                                           to_gradient8.data(), to_s8.data()});
   expect_near(normals8, normals, 0), expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
@@ -105,7 +106,7 @@ TEST(GroupBodies, SurfaceWeightsAndTheirGradients) {
   expect_near(to_sdf8, to_sdf, 1e-13), expect_near(to_gradient8, to_gradient, 1e-13), expect_near(to_s8, to_s, 1e-13);
 }
 
-TEST(GroupBodies, CompositeAndItsGradients) {
+TEST(GroupKernels, CompositeAndItsGradients) {
   const Rays r;
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays), channels = 5;
   Random random(4);
@@ -115,23 +116,22 @@ TEST(GroupBodies, CompositeAndItsGradients) {
   cpu::run(r.packed().n_rays, CompositeBody<double>{r.packed(), channels, w.data(), v.data(), sums.data()});
   cpu::run(r.packed().n_rays,
            CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(), g.data(), to_w.data(), to_v.data()});
-  for_each_by_lanes<8>(r.packed().n_rays,
+  on_gpu(r.packed().n_rays,
                        CompositeBody<double>{r.packed(), channels, w.data(), v.data(), sums8.data()});
-  for_each_by_lanes<8>(r.packed().n_rays, CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(),
+  on_gpu(r.packed().n_rays, CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(),
                                                                         g.data(), to_w8.data(), to_v8.data()});
   expect_near(sums8, sums, 1e-14), expect_near(to_w8, to_w, 0), expect_near(to_v8, to_v, 0);
 }
 
-// The counts of all rays, their sums, what stands where nothing else will, then what each ray fills, against the one pass of
-// the CPU; with as much room as is needed, and with more.
-TEST(GroupBodies, SpreadSamples) {
+// With as much room as is needed, and with more.
+TEST(GroupKernels, SpreadSamples) {
   const Rays r;
   const int64_t n = r.n(), n_rays = r.packed().n_rays;
   Random random(12);
   const auto w = random.uniforms(size_t(n)), phase = random.uniforms(size_t(n_rays));
   std::vector<double> t(n);
   for (int64_t i = 0; i < n; ++i) t[i] = (i ? t[i - 1] : 0) + random.uniform(0.01, 0.2);
-  const SpreadSizes room{200, n_rays, 160};
+  const SpreadSizes room{500, n_rays, 400};
   for (const auto& [per_ray, gap, fixed] : std::initializer_list<std::tuple<int, double, const SpreadSizes*>>{
            {0, 0.15, nullptr}, {1, 0.15, nullptr}, {4, INFINITY, nullptr}, {4, 0.15, &room}, {1, INFINITY, &room}}) {
     using Indices = std::vector<int64_t>;
@@ -149,24 +149,12 @@ TEST(GroupBodies, SpreadSamples) {
     cpu::spread_samples(r.packed(), w.data(), t.data(), phase.data(), gap, per_ray, sizes, one.first.data(),
                         one.second.data(), one.share.data(),
                         {[&](const SpreadSizes& s) { return one.allocate(s); }, fixed});
-    Indices drawn(n_rays + 1), stretches(n_rays + 1), filled(n_rays + 1);
-    const SpreadCountBody<double> count{
-        r.packed(),           w.data(),         t.data(), phase.data(), gap, per_ray, drawn.data() + 1,
-        stretches.data() + 1, filled.data() + 1};
-    for (int64_t i = 0; i < n_rays; ++i) {
-      count(i);
-      for (Indices* sums : {&drawn, &stretches, &filled}) (*sums)[i + 1] += (*sums)[i];
-    }
     int64_t counted[3];
-    SpreadSizesBody{&drawn.back(), &filled.back(), &stretches.back(), counted}(0);
+    Gpu gpu;
+    cuda::spread_samples(gpu.queue(), r.packed(), w.data(), t.data(), phase.data(), gap, per_ray, counted,
+                         two.first.data(), two.second.data(), two.share.data(),
+                         {[&](const SpreadSizes& s) { return two.allocate(s); }, fixed});
     EXPECT_TRUE(std::equal(counted, counted + 3, sizes));
-    const Spread to = two.allocate(fixed ? *fixed : SpreadSizes{counted[0], counted[1], counted[2]});
-    const SpreadUnusedBody<double> unused{r.packed(), 0, to, two.first.data(), two.second.data(), two.share.data()};
-    for (int64_t i = 0; i < unused.count(); ++i) unused(i);
-    const SpreadFillBody<double> fill{r.packed(),       w.data(),          t.data(),         phase.data(),  gap,
-                                      per_ray,          drawn.data(),      stretches.data(), filled.data(), to,
-                                      two.first.data(), two.second.data(), two.share.data()};
-    for (int64_t i = n_rays; i-- > 0;) fill(i);
     EXPECT_EQ(two.shaded, one.shaded);
     EXPECT_EQ(two.first, one.first);
     EXPECT_EQ(two.second, one.second);
@@ -179,7 +167,7 @@ TEST(GroupBodies, SpreadSamples) {
 }
 
 // Offsets that nobody has checked: nothing outside the arrays is touched.
-TEST(GroupBodies, OffsetsOutOfRangeAreKeptInside) {
+TEST(GroupKernels, OffsetsOutOfRangeAreKeptInside) {
   const std::vector<int64_t> offsets{-5, 3, 1, 99};
   const PackedRays rays{3, 4, offsets.data()};
   const int64_t first[3] = {0, 3, 1}, count[3] = {3, 0, 3};
@@ -219,7 +207,7 @@ struct Marched {
   }
 };
 
-TEST(GroupBodies, MarchingTakesTheSamplesOfTheCpuInItsOrder) {
+TEST(GroupKernels, MarchingTakesTheSamplesOfTheCpuInItsOrder) {
   for (const double filled : {0.0, 0.02, 0.4}) {
     for (const int64_t most : {1024, 5}) {
       March m(filled);
@@ -228,7 +216,7 @@ TEST(GroupBodies, MarchingTakesTheSamplesOfTheCpuInItsOrder) {
       Marched one(m.n()), lanes(m.n());
       cpu::run(m.n(), MarchCountBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
                                             one.offsets.data() + 1});
-      for_each_by_lanes<8>(m.n(), MarchCountBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
+      on_gpu(m.n(), MarchCountBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
                                                         lanes.offsets.data() + 1});
       for (Marched* marched : {&one, &lanes})
         for (int64_t r = 0; r < m.n(); ++r) marched->offsets[r + 1] += marched->offsets[r];
@@ -238,7 +226,7 @@ TEST(GroupBodies, MarchingTakesTheSamplesOfTheCpuInItsOrder) {
       cpu::run(m.n(), MarchFillBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
                                            one.offsets.data(), one.ray_indices.data(), one.t_starts.data(),
                                            one.t_ends.data()});
-      for_each_by_lanes<8>(m.n(), MarchFillBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
+      on_gpu(m.n(), MarchFillBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
                                                        lanes.offsets.data(), lanes.ray_indices.data(),
                                                        lanes.t_starts.data(), lanes.t_ends.data()});
       EXPECT_EQ(lanes.ray_indices, one.ray_indices);
@@ -248,19 +236,19 @@ TEST(GroupBodies, MarchingTakesTheSamplesOfTheCpuInItsOrder) {
   }
 }
 
-TEST(GroupBodies, OccupiedBlocks) {
+TEST(GroupKernels, OccupiedBlocks) {
   const March m(0.001);
   const int n = blocks_along(m.resolution);
   std::vector<uint8_t> one(size_t(n) * n * n), lanes(one.size(), 9);
   cpu::run(int64_t(one.size()), OccupiedBlocksBody{m.cells.data(), m.resolution, n, one.data()});
-  for_each_by_lanes<8>(int64_t(one.size()), OccupiedBlocksBody{m.cells.data(), m.resolution, n, lanes.data()});
+  on_gpu(int64_t(one.size()), OccupiedBlocksBody{m.cells.data(), m.resolution, n, lanes.data()});
   for (size_t i = 0; i < one.size(); ++i) EXPECT_EQ(lanes[i] != 0, one[i] != 0) << i;
   EXPECT_TRUE(std::count(one.begin(), one.end(), 0) > 0 && std::count(one.begin(), one.end(), 0) < int64_t(one.size()));
 }
 
 // ---- light ----
 
-TEST(GroupBodies, MonteCarloSumsAndTheirGradients) {
+TEST(GroupKernels, MonteCarloSumsAndTheirGradients) {
   const int64_t n = 5;
   const int k = 21;
   Random random(9);
@@ -268,11 +256,10 @@ TEST(GroupBodies, MonteCarloSumsAndTheirGradients) {
   const auto share = random.uniforms(n, 0, 1);
   std::vector<double> dirs(3 * n * k), pdf(n * k), dirs8(dirs.size()), pdf8(pdf.size());
   cpu::run(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs.data(), pdf.data()});
-  for_each_by_lanes<8>(
-      n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs8.data(), pdf8.data()});
+  on_gpu(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs8.data(), pdf8.data()});
   expect_near(dirs8, dirs, 0), expect_near(pdf8, pdf, 0);
   cpu::run(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs.data()});
-  for_each_by_lanes<8>(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs8.data()});
+  on_gpu(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs8.data()});
   expect_near(dirs8, dirs, 0);
 
   const auto radiance = random.uniforms(3 * n * k), g = random.uniforms(3 * kLightSums * n, -1);
@@ -283,9 +270,8 @@ TEST(GroupBodies, MonteCarloSumsAndTheirGradients) {
   cpu::run(n, DrawnLightBody<double>{k, normals.data(), views.data(), rho.data(), light, sums.data()});
   cpu::run(n, DrawnLightBackwardBody<double>{k, normals.data(), views.data(), rho.data(), light, g.data(), to_n.data(),
                                              to_rho.data(), receive});
-  for_each_by_lanes<8>(
-      n, SumLightBody<double, DrawnLight<double>>{k, normals.data(), views.data(), rho.data(), light, sums8.data()});
-  for_each_by_lanes<8>(n,
+  on_gpu(n, SumLightBody<double, DrawnLight<double>>{k, normals.data(), views.data(), rho.data(), light, sums8.data()});
+  on_gpu(n,
                        SumLightBackwardBody<double, DrawnLight<double>, ToDrawnLight<double>>{k,
                                                                                               normals.data(),
                                                                                               views.data(),
@@ -299,7 +285,7 @@ TEST(GroupBodies, MonteCarloSumsAndTheirGradients) {
   expect_near(to_light8, to_light, 0);
 }
 
-TEST(GroupBodies, SummedLightAndItsGradients) {
+TEST(GroupKernels, SummedLightAndItsGradients) {
   const int64_t n = 40;
   const int k = 19;
   Random random(11);
@@ -315,9 +301,9 @@ TEST(GroupBodies, SummedLightAndItsGradients) {
     cpu::run(n, SharedLightBody<double>{k, normals.data(), views.data(), rho.data(), {light}, sums.data()});
     cpu::run(n, SharedLightBackwardBody<double>{k, normals.data(), views.data(), rho.data(), {light}, g.data(),
                                                 to_n.data(), to_rho.data(), receive});
-    for_each_by_lanes<8>(n, SumLightBody<double, ArrivingLight<double>>{
+    on_gpu(n, SumLightBody<double, ArrivingLight<double>>{
                                 k, normals.data(), views.data(), rho.data(), {light}, sums8.data()});
-    for_each_by_lanes<8>(n, SumLightBackwardBody<double, ArrivingLight<double>, ToSharedLight<double>>{
+    on_gpu(n, SumLightBackwardBody<double, ArrivingLight<double>, ToSharedLight<double>>{
                                 k,
                                 normals.data(),
                                 views.data(),
@@ -332,14 +318,14 @@ TEST(GroupBodies, SummedLightAndItsGradients) {
   }
 }
 
-TEST(GroupBodies, QuadraticEntropy) {
+TEST(GroupKernels, QuadraticEntropy) {
   Random random(17);
   const int64_t n = 21;
   for (const int64_t channels : {1, 8, 11}) {
     const auto x = random.uniforms(n * channels, -1);
     std::vector<double> one(n * (channels + 1)), lanes(one.size());
     cpu::run(n, PairLikenessBody<double>{n, channels, x.data(), one.data()});
-    for_each_by_lanes<8>(n, PairLikenessBody<double>{n, channels, x.data(), lanes.data()});
+    on_gpu(n, PairLikenessBody<double>{n, channels, x.data(), lanes.data()});
     expect_near(lanes, one, 1e-13);
     // E = -ln(sum k / n^2) and its gradient, from the rows of sums.
     double entropy, total, expected = 0;
@@ -354,7 +340,7 @@ TEST(GroupBodies, QuadraticEntropy) {
   }
 }
 
-TEST(GroupBodies, SparseProduct) {
+TEST(GroupKernels, SparseProduct) {
   Random random(13);
   const int64_t n_rows = 6, n_columns = 30;
   std::vector<int64_t> offsets{0};
@@ -367,7 +353,7 @@ TEST(GroupBodies, SparseProduct) {
   const SparseRows<double> matrix{offsets.data(), columns.data(), weights.data()};
   std::vector<double> one(3 * n_rows), lanes(3 * n_rows);
   cpu::run(n_rows, SparseProductBody<double>{matrix, values.data(), one.data()});
-  for_each_by_lanes<8>(n_rows, SparseProductBody<double>{matrix, values.data(), lanes.data()});
+  on_gpu(n_rows, SparseProductBody<double>{matrix, values.data(), lanes.data()});
   expect_near(lanes, one, 1e-14);
 }
 

@@ -1,0 +1,111 @@
+"""Plants a fault in the kernels, one at a time, and says what finds it.
+
+    python tests/cuda/faults.py [NAME ...]
+
+Each fault is planted in a copy of the sources, built into the tests of tests/cuda/ with the sanitizer that it is meant for, and
+has to make them fail. Needs cmake, ninja and GoogleTest; about half an hour on one core. Exit code 1 where a fault is not found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[2]
+WORK = ROOT / "build" / "faults"
+CUDA, BODIES = "cpp/cuda/", "cpp/include/splitnerf/"
+
+
+class Fault(NamedTuple):
+    """A change of one file, and the build that finds it: "" (values and what a GPU refuses), "address" or "thread"."""
+
+    name: str
+    finder: str
+    file: str
+    old: str
+    new: str
+
+
+FAULTS = (
+    Fault("scan: no barrier before the warps' totals are read", "", CUDA + "device.cu",
+          "totals[number] = total;\n    __syncthreads();", "totals[number] = total;"),
+    Fault("scan: no barrier after they were read", "thread", CUDA + "device.cu",
+          "carried += warp.sum(of_warp);\n    __syncthreads();", "carried += warp.sum(of_warp);"),
+    Fault("sums of a block: no barrier between its warps", "", CUDA + "launch.cuh",
+          "= sum;\n  }\n  __syncthreads();", "= sum;\n  }"),
+    Fault("light's gradient: no barrier after the tile was cleared", "thread", CUDA + "light_pyramid.cu",
+          "= T(0);\n    __syncthreads();", "= T(0);"),
+    Fault("prefilter: no barrier before the next tile is written", "", CUDA + "prefilter.cu",
+          "items[k].add(source);\n    }\n    __syncthreads();", "items[k].add(source);\n    }"),
+    Fault("layer's gradient: no barrier between units and their sums", "", CUDA + "sdf_layer.cu",
+          "sdf_units_backward(layer, tile, unit, p);\n      __syncthreads();", "sdf_units_backward(layer, tile, unit, p);"),
+    Fault("a warp's running sum starts with the own value in lane 0", "", CUDA + "launch.cuh",
+          "    if (lane() == 0) running = T(0);\n", ""),
+    Fault("a thread an item: one item too many", "address", CUDA + "launch.cuh",
+          "  if (i < n) body(i);\n}\ntemplate <class Body> void for_each(", "  if (i <= n) body(i);\n}\ntemplate <class Body> void for_each("),
+    Fault("layer: a full tile is written where it has fewer points", "address", CUDA + "sdf_layer.cu",
+          "for (int k = threadIdx.x; k < here * tile.n_outputs; k += blockDim.x)",
+          "for (int k = threadIdx.x; k < int(blockDim.x) * tile.n_outputs; k += blockDim.x)"),
+    Fault("a gradient that blocks share is added to without an atomic", "thread", BODIES + "accumulate.h",
+          "  atomicAdd(to, value);", "  *to += value;"),
+    Fault("sparse product: only one lane takes part in the sum", "", BODIES + "bodies/light_pyramid.h",
+          "    sum = sum3(group, sum);", "    if (group.lane() == 0) sum = sum3(group, sum);"),
+)  # fmt: skip
+
+
+def build(finder: str) -> Path:
+    """Builds the tests with a sanitizer; the path of their program."""
+    folder = WORK / (finder or "plain")
+    subprocess.run(
+        ["cmake", "-S", WORK / "source", "-B", folder, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=RelWithDebInfo",
+         "-DSPLITNERF_BUILD_PYTHON=OFF", "-DSPLITNERF_BUILD_TESTS=ON", f"-DSPLITNERF_SANITIZE={finder}"],
+        check=True, stdout=subprocess.DEVNULL,
+    )  # fmt: skip
+    subprocess.run(["cmake", "--build", folder, "--target", "splitnerf_cuda_tests"], check=True, stdout=subprocess.DEVNULL)
+    return folder / "tests" / "splitnerf_cuda_tests"
+
+
+def first_finding(program: Path) -> str | None:
+    """The first line that tells of a failure; None where all tests pass."""
+    options = {"ASAN_OPTIONS": "halt_on_error=1", "TSAN_OPTIONS": "halt_on_error=1"}
+    done = subprocess.run([program, "--gtest_brief=1"], capture_output=True, text=True, env=os.environ | options)
+    if done.returncode == 0:
+        return None
+    lines = (done.stdout + done.stderr).splitlines()
+    marks = ("ERROR: AddressSanitizer", "WARNING: ThreadSanitizer", "what():", "[  FAILED  ]")
+    return next((line.strip() for mark in marks for line in lines if mark in line), f"exit code {done.returncode}")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="parts of names of the faults to plant (default: all)")
+    names = parser.parse_args().names
+    chosen = [fault for fault in FAULTS if not names or any(name in fault.name for name in names)]
+    shutil.rmtree(WORK / "source", ignore_errors=True)
+    for folder in ("cpp", "tests", "third_party"):
+        shutil.copytree(ROOT / folder, WORK / "source" / folder)
+    shutil.copy(ROOT / "CMakeLists.txt", WORK / "source")
+    missed = 0
+    for finder in sorted({fault.finder for fault in chosen}):
+        if (found := first_finding(build(finder))) is not None:
+            sys.exit(f"faults.py: without a fault the tests fail: {found}")
+        for fault in (fault for fault in chosen if fault.finder == finder):
+            path = WORK / "source" / fault.file
+            right = path.read_text()
+            if right.count(fault.old) != 1:
+                sys.exit(f"faults.py: {fault.file} has the text of '{fault.name}' {right.count(fault.old)} times, not once")
+            path.write_text(right.replace(fault.old, fault.new))
+            found = first_finding(build(finder))
+            path.write_text(right)
+            missed += found is None
+            print(f"{fault.name}: {found or 'NOT FOUND'}", flush=True)
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

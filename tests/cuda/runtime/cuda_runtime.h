@@ -1,0 +1,4 @@
+// CUDA's header of that name, on the CPU.
+#pragma once
+
+#include "cuda_on_cpu.h"

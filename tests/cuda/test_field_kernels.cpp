@@ -1,0 +1,235 @@
+// Kernels of the distance field and its hash grid, against the CPU.
+#include "check.h"
+#include "gpu.h"
+#include "splitnerf/march.h"
+#include "splitnerf/ops_cpu.h"
+#include "splitnerf/ops_cuda.h"
+
+namespace splitnerf {
+namespace {
+
+// ---- hash grid ----
+
+// Numbers in [-1, 1] as a table stores them; of 16 bits any that are finite and not above 1.
+template <class S> std::vector<S> drawn_entries(Random& random, size_t n) {
+  if constexpr (std::is_floating_point_v<S>) {
+    return random.uniforms<S>(n, -1);
+  } else {
+    const int one = std::is_same_v<S, Half> ? 0x3c00 : 0x3f80;
+    std::vector<S> out(n);
+    for (S& x : out) x.bits = static_cast<uint16_t>(random.below(one + 1) | random.below(2) << 15);
+    return out;
+  }
+}
+
+// S: what the table stores.
+template <class T, int F, class S = T> void check_hash_grid(double tolerance) {
+  const HashGridShape shape{4, F, 4, 1.7, 8};  // two dense levels, two hashed ones
+  const int n_active = 3;
+  HashLevel levels[kMaxLevels];
+  const int64_t n_entries = hash_levels(shape, levels), columns = shape.n_levels * F;
+  for (const int64_t n : {0, 1, 256, 601}) {
+    Random random(F);
+    const auto positions = random.uniforms<T>(3 * n, -0.1, 1.1);
+    const auto table = drawn_entries<S>(random, n_entries * F);
+    const auto g = random.uniforms<T>(n * columns, -1), gj = random.uniforms<T>(3 * n * columns, -1);
+    Gpu gpu;
+    auto features = unwritten<T>(n * columns), jacobian = unwritten<T>(3 * n * columns), features1 = features,
+         jacobian1 = jacobian;
+    cpu::hash_encode(shape, n_active, n, positions.data(), table.data(), features.data(), jacobian.data());
+    cuda::hash_encode(gpu.queue(), shape, n_active, n, positions.data(), table.data(), features1.data(), jacobian1.data());
+    expect_near(features1, features, tolerance), expect_near(jacobian1, jacobian, tolerance);
+    auto alone = unwritten<T>(n * columns);
+    cuda::hash_encode<T>(gpu.queue(), shape, n_active, n, positions.data(), table.data(), alone.data(), nullptr);
+    EXPECT_EQ(alone, features1);
+
+    for (const T* to_jacobian : {static_cast<const T*>(nullptr), gj.data()}) {
+      auto to_table = unwritten<T>(n_entries * F), to_table1 = to_table;
+      cpu::hash_encode_backward(shape, n_active, n, positions.data(), g.data(), to_jacobian, to_table.data());
+      cuda::hash_encode_backward(gpu.queue(), shape, n_active, n, positions.data(), g.data(), to_jacobian, to_table1.data());
+      expect_near(to_table1, to_table, tolerance);
+    }
+    auto to_positions = unwritten<T>(3 * n), to_positions1 = to_positions;
+    cpu::hash_encode_backward_positions(shape, n_active, n, positions.data(), table.data(), g.data(), gj.data(),
+                                        to_positions.data());
+    cuda::hash_encode_backward_positions(gpu.queue(), shape, n_active, n, positions.data(), table.data(), g.data(),
+                                         gj.data(), to_positions1.data());
+    expect_near(to_positions1, to_positions, tolerance);
+  }
+}
+
+TEST(FieldKernels, HashGrid) {
+  check_hash_grid<double, 1>(1e-13), check_hash_grid<double, 2>(1e-13);
+  check_hash_grid<double, 4>(1e-13), check_hash_grid<double, 8>(1e-13);
+  check_hash_grid<float, 1>(2e-5), check_hash_grid<float, 2>(2e-5), check_hash_grid<float, 4>(2e-5),
+      check_hash_grid<float, 8>(2e-5);
+}
+TEST(FieldKernels, HashGridOf16Bits) {
+  check_hash_grid<float, 1, Half>(2e-5), check_hash_grid<float, 2, Half>(2e-5), check_hash_grid<float, 8, Half>(2e-5);
+  check_hash_grid<float, 2, Bfloat16>(2e-5), check_hash_grid<float, 4, Bfloat16>(2e-5);
+}
+
+// ---- the network ----
+
+constexpr HashGridShape kShape{3, 2, 4, 1.7, 8};
+
+struct Network {
+  int n_features = kShape.n_levels * kShape.n_features, n_inputs = 3 + n_features, width, n_outputs;
+  std::vector<double> hidden, hidden_bias, out, out_bias;
+  SdfWeights<double> weights;
+
+  explicit Network(Random& random, int width = 21, int n_outputs = 5) : width(width), n_outputs(n_outputs) {
+    hidden = random.uniforms(width * n_inputs, -0.5, 0.5), hidden_bias = random.uniforms(width, -0.1, 0.1);
+    out = random.uniforms(n_outputs * width, -1), out_bias = random.uniforms(n_outputs, -1);
+    weights = {n_inputs, width, n_outputs, hidden.data(), hidden_bias.data(), out.data(), out_bias.data(), 20., 1.5};
+  }
+};
+
+// The last size gives each of the 256 blocks of 64 points a second tile, the last of them not full.
+void check_layer(int width, int n_outputs, std::initializer_list<int64_t> sizes) {
+  for (const int64_t n : sizes) {
+    Random random(1);
+    const Network net(random, width, n_outputs);
+    const int c = net.n_features;
+    const auto x = random.uniforms(3 * n, -1), f = random.uniforms(n * c, -1), j = random.uniforms(3 * n * c, -1);
+    const auto go = random.uniforms(n * n_outputs, -1), gg = random.uniforms(3 * n, -1);
+    Gpu gpu;
+    auto outputs = unwritten<double>(n * n_outputs), gradient = unwritten<double>(3 * n), outputs1 = outputs,
+         gradient1 = gradient;
+    cpu::sdf_layer(net.weights, n, x.data(), f.data(), j.data(), outputs.data(), gradient.data());
+    cuda::sdf_layer(gpu.queue(), net.weights, n, x.data(), f.data(), j.data(), outputs1.data(), gradient1.data());
+    expect_near(outputs1, outputs, 1e-13), expect_near(gradient1, gradient, 1e-13);
+
+    struct Grads {
+      std::vector<double> features, jacobian, hidden, hidden_bias, out, out_bias;
+    };
+    Grads a{unwritten<double>(n * c),       unwritten<double>(3 * n * c), unwritten<double>(net.hidden.size()),
+            unwritten<double>(width),       unwritten<double>(net.out.size()), unwritten<double>(n_outputs)};
+    Grads b = a;
+    cpu::sdf_layer_backward(net.weights, n, x.data(), f.data(), j.data(), go.data(), gg.data(), a.features.data(),
+                            a.jacobian.data(), a.hidden.data(), a.hidden_bias.data(), a.out.data(), a.out_bias.data());
+    cuda::sdf_layer_backward(gpu.queue(), net.weights, n, x.data(), f.data(), j.data(), go.data(), gg.data(),
+                             b.features.data(), b.jacobian.data(), b.hidden.data(), b.hidden_bias.data(), b.out.data(),
+                             b.out_bias.data());
+    expect_near(b.features, a.features, 1e-12), expect_near(b.jacobian, a.jacobian, 1e-13);
+    expect_near(b.hidden, a.hidden, 1e-12), expect_near(b.hidden_bias, a.hidden_bias, 1e-12);
+    expect_near(b.out, a.out, 1e-12), expect_near(b.out_bias, a.out_bias, 1e-12);
+  }
+}
+TEST(FieldKernels, SdfLayerAndItsGradients) { check_layer(21, 5, {0, 1, 64, 131}); }
+TEST(FieldKernels, SdfLayerOfMoreTilesThanBlocks) { check_layer(8, 2, {2 * 64 * 256 + 17}); }
+
+// A tile of doubles of so many numbers only fits with 32 points, one of more does not fit at all.
+TEST(FieldKernels, SdfLayerOfManyOutputs) {
+  check_layer(16, 350, {0, 1, 70});
+  Random random(1);
+  const Network net(random, 8, 1000);
+  Gpu gpu;
+  std::vector<double> out(1000), three(3);
+  EXPECT_THROW(cuda::sdf_layer(gpu.queue(), net.weights, 1, three.data(), three.data(), three.data(), out.data(),
+                               three.data()),
+               std::invalid_argument);
+}
+
+struct Field {
+  Network net;
+  std::vector<double> table;
+
+  explicit Field(Random& random) : net(random) {
+    HashLevel levels[kMaxLevels];
+    table = random.uniforms(hash_levels(kShape, levels) * kShape.n_features, -1);
+  }
+  SdfField<double> view() const { return {kShape, 2, table.data(), net.weights}; }
+};
+
+TEST(FieldKernels, SdfValues) {
+  for (const int64_t n : {0, 1, 64, 200}) {
+    Random random(2);
+    const Field field(random);
+    const auto x = random.uniforms(3 * n, -1.7, 1.7);
+    auto values = unwritten<double>(n), values1 = values;
+    Gpu gpu;
+    cpu::sdf_values(field.view(), n, x.data(), values.data());
+    cuda::sdf_values(gpu.queue(), field.view(), n, x.data(), values1.data());
+    expect_near(values1, values, 1e-12);
+  }
+}
+
+// Up to more rays than the one block of a scan has threads.
+TEST(FieldKernels, SampledRays) {
+  for (const int64_t n : {0, 1, 30, 1031}) {
+    Random random(4);
+    const Field field(random);
+    const auto d = random.directions(n), jitter = random.uniforms(n);
+    std::vector<double> o(3 * n);
+    for (int64_t i = 0; i < 3 * n; ++i) o[i] = -2 * d[i] + random.uniform(-0.5, 0.5);
+    const std::vector<uint8_t> cells(6 * 6 * 6, uint8_t(Cell::kOccupied));
+    const OccupancyCells occupancy(cells.data(), 6);
+    const MarchOptions march{1.5f, 0.04f, 1024};
+    const SampleRules<double> rules{20, 1, 0.001, -std::log(0.001), 1e-3, 0.2, 3};
+    struct Result {
+      std::vector<int64_t> offsets, evaluated, indices;
+      std::vector<double> starts, ends;
+      PackedSamples<double> allocate(int64_t kept) {
+        indices = unwritten<int64_t>(kept), starts = ends = unwritten<double>(kept);
+        return {indices.data(), starts.data(), ends.data()};
+      }
+    };
+    Result a{unwritten<int64_t>(n + 1), unwritten<int64_t>(n), {}, {}, {}}, b = a;
+    Gpu gpu;
+    cpu::sample_rays<double>(field.view(), march, occupancy.view(), rules, n, o.data(), d.data(), jitter.data(),
+                             a.offsets.data(), a.evaluated.data(), [&](int64_t kept) { return a.allocate(kept); });
+    cuda::sample_rays<double>(gpu.queue(), field.view(), march, occupancy.view(), rules, n, o.data(), d.data(),
+                              jitter.data(), b.offsets.data(), b.evaluated.data(),
+                              [&](int64_t kept) { return b.allocate(kept); });
+    EXPECT_EQ(b.offsets, a.offsets);
+    EXPECT_EQ(b.evaluated, a.evaluated);
+    EXPECT_EQ(b.indices, a.indices);
+    expect_near(b.starts, a.starts, 1e-14), expect_near(b.ends, a.ends, 1e-14);
+    if (n > 1) { EXPECT_GT(b.starts.size(), size_t(n)); }
+  }
+}
+
+// ---- the optimiser ----
+
+// Rows of which each second one has no gradient.
+template <class T> void check_adamw(double tolerance, int64_t rows, int64_t columns, bool sparse) {
+  const int64_t n = rows * columns;
+  Random random(static_cast<uint32_t>(columns));
+  const AdamwRule<T> rule(0.1, 0.9, 0.99, 1e-8, 0.2, 3);
+  auto grad = random.uniforms<T>(n, -1);
+  for (int64_t i = 0; i < n; ++i)
+    if (i / columns % 2 == 0 || random.below(3) == 0) grad[i] = T(0);
+  const auto param = random.uniforms<T>(n, -1), m = random.uniforms<T>(n, -1), v = random.uniforms<T>(n);
+  auto param1 = param, m1 = m, v1 = v, param2 = param, m2 = m, v2 = v;
+  std::vector<Half> half1(n), half2(n);
+  std::vector<Bfloat16> bfloat1(n), bfloat2(n);
+  for (int64_t i = 0; i < n; ++i) {
+    half1[i] = half2[i] = narrow<Half>(float(param[i]));
+    bfloat1[i] = bfloat2[i] = narrow<Bfloat16>(float(param[i]));
+  }
+  const AdamwArrays<T> x{n,         columns,   sparse,       param1.data(), grad.data(),
+                         m1.data(), v1.data(), half1.data(), bfloat1.data()};
+  cpu::run(n, AdamwBody<T>{rule, x});
+  on_gpu(n, AdamwBody<T>{rule, {n, columns, sparse, param2.data(), grad.data(), m2.data(), v2.data(), half2.data(),
+                                bfloat2.data()}});
+  expect_near(param2, param1, tolerance), expect_near(m2, m1, tolerance), expect_near(v2, v1, tolerance);
+  for (int64_t i = 0; i < n; ++i) {
+    for (const Half x : {half1[i], half2[i]}) EXPECT_NEAR(widen(x), param1[i], 1e-3 * (1 + std::abs(param1[i]))) << i;
+    for (const Bfloat16 x : {bfloat1[i], bfloat2[i]})
+      EXPECT_NEAR(widen(x), param1[i], 8e-3 * (1 + std::abs(param1[i]))) << i;
+    if (sparse && i / columns % 2 == 0) { EXPECT_TRUE(param2[i] == param[i] && m2[i] == m[i] && v2[i] == v[i]) << i; }
+  }
+}
+
+TEST(FieldKernels, Adamw) {
+  for (const int64_t rows : {0, 1, 61})
+    for (const int64_t columns : {1, 2, 3, 8, 70})
+      for (const bool sparse : {false, true}) {
+        check_adamw<double>(1e-14, rows, columns, sparse);
+        check_adamw<float>(1e-6, rows, columns, sparse);
+      }
+}
+
+}  // namespace
+}  // namespace splitnerf

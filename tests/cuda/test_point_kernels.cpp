@@ -1,0 +1,198 @@
+// Kernels of a thread an item, and sums over items, against the CPU.
+#include "check.h"
+#include "gpu.h"
+#include "splitnerf/bodies/elementwise.h"
+#include "splitnerf/light_tables.h"
+#include "splitnerf/ops_cpu.h"
+
+namespace splitnerf {
+namespace {
+
+// ---- shading ----
+
+TEST(PointKernels, SplitSumShading) {
+  for (const int64_t n : {0, 1, 300})
+    for (const int channels : {1, 3})
+      for (const FresnelMode mode : {FresnelMode::kExact, FresnelMode::kPaper, FresnelMode::kCode})
+        for (const bool compensate : {false, true}) {
+          Random random(5);
+          const auto normals = random.directions(n), views = random.directions(n), albedo = random.uniforms(3 * n);
+          const auto rho = random.uniforms(n), metallic = random.uniforms(n), specular = random.uniforms(3 * n);
+          const auto diffuse = random.uniforms(3 * n), o_s = random.uniforms(n * channels),
+                     o_d = random.uniforms(n * channels), g = random.uniforms(3 * n, -1);
+          const ShadeArrays<const double> in{normals.data(),  views.data(),   albedo.data(), rho.data(), metallic.data(),
+                                             specular.data(), diffuse.data(), o_s.data(),    o_d.data()};
+          auto radiance = unwritten<double>(3 * n), grad = unwritten<double>(17 * n + 2 * n * channels);
+          auto radiance1 = radiance, grad1 = grad;
+          const auto parts = [&](double* p) {
+            return ShadeArrays<double>{p,          p + 3 * n,  p + 6 * n,
+                                       p + 9 * n,  p + 10 * n, p + 11 * n,
+                                       p + 14 * n, p + 17 * n, p + 17 * n + n * channels};
+          };
+          const ShadeOptions options{mode, compensate};
+          cpu::run(n, ShadeBody<double>{brdf_lut(), options, channels, in, radiance.data()});
+          cpu::run(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad.data())});
+          on_gpu(n, ShadeBody<double>{brdf_lut(), options, channels, in, radiance1.data()});
+          on_gpu(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad1.data())});
+          expect_near(radiance1, radiance, 1e-14), expect_near(grad1, grad, 1e-13);
+        }
+}
+
+TEST(PointKernels, SummedShading) {
+  for (const int64_t n : {0, 1, 300})
+    for (const bool compensate : {false, true}) {
+      Random random(15);
+      const auto normals = random.directions(n), views = random.directions(n), albedo = random.uniforms(3 * n);
+      const auto rho = random.uniforms(n), metallic = random.uniforms(n), sums = random.uniforms(12 * n),
+                 g = random.uniforms(3 * n, -1);
+      const SummedArrays<const double> in{normals.data(),      views.data(),        albedo.data(),
+                                          rho.data(),          metallic.data(),     sums.data(),
+                                          sums.data() + 3 * n, sums.data() + 6 * n, sums.data() + 9 * n};
+      auto radiance = unwritten<double>(3 * n), grad = unwritten<double>(23 * n), radiance1 = radiance, grad1 = grad;
+      const auto parts = [&](double* p) {
+        return SummedArrays<double>{p,          p + 3 * n,  p + 6 * n,  p + 9 * n, p + 10 * n,
+                                    p + 11 * n, p + 14 * n, p + 17 * n, p + 20 * n};
+      };
+      cpu::run(n, ShadeSumsBody<double>{brdf_lut(), compensate, in, radiance.data()});
+      cpu::run(n, ShadeSumsBackwardBody<double>{brdf_lut(), compensate, in, g.data(), parts(grad.data())});
+      on_gpu(n, ShadeSumsBody<double>{brdf_lut(), compensate, in, radiance1.data()});
+      on_gpu(n, ShadeSumsBackwardBody<double>{brdf_lut(), compensate, in, g.data(), parts(grad1.data())});
+      expect_near(radiance1, radiance, 1e-14), expect_near(grad1, grad, 1e-13);
+    }
+}
+
+TEST(PointKernels, QueryDirectionsAndShares) {
+  for (const int64_t n : {0, 1, 300})
+    for (const bool mean : {false, true}) {
+      Random random(25);
+      const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n),
+                 albedo = random.uniforms(3 * n), metallic = random.uniforms(n), g = random.uniforms(3 * n, -1);
+      auto out = unwritten<double>(3 * n), grad = unwritten<double>(7 * n), share = unwritten<double>(n), out1 = out,
+           grad1 = grad, share1 = share;
+      const auto forward = [&](double* to) {
+        return QueryDirectionBody<double>{brdf_lut(), mean, normals.data(), views.data(), rho.data(), to};
+      };
+      const auto backward = [&](double* to) {
+        return QueryDirectionBackwardBody<double>{brdf_lut(), mean,     normals.data(), views.data(), rho.data(),
+                                                  g.data(),   to,       to + 3 * n,     to + 6 * n};
+      };
+      const auto shares = [&](double* to) {
+        return SpecularShareBody<double>{brdf_lut(),    normals.data(),  views.data(), albedo.data(),
+                                         rho.data(),    metallic.data(), to};
+      };
+      cpu::run(n, forward(out.data())), cpu::run(n, backward(grad.data())), cpu::run(n, shares(share.data()));
+      on_gpu(n, forward(out1.data())), on_gpu(n, backward(grad1.data())), on_gpu(n, shares(share1.data()));
+      expect_near(out1, out, 1e-14), expect_near(grad1, grad, 1e-13), expect_near(share1, share, 1e-14);
+    }
+}
+
+TEST(PointKernels, SrgbCurve) {
+  for (const int64_t n : {0, 1, 256, 700}) {
+    Random random(35);
+    const auto x = random.uniforms(n, -0.1, 1.5), g = random.uniforms(n, -1);
+    auto a = unwritten<double>(n), b = a, c = a, a1 = a, b1 = a, c1 = a;
+    cpu::run(n, LinearToSrgbBody<double>{x.data(), a.data()});
+    cpu::run(n, LinearToSrgbBackwardBody<double>{x.data(), g.data(), b.data()});
+    cpu::run(n, SrgbToLinearBody<double>{x.data(), c.data()});
+    on_gpu(n, LinearToSrgbBody<double>{x.data(), a1.data()});
+    on_gpu(n, LinearToSrgbBackwardBody<double>{x.data(), g.data(), b1.data()});
+    on_gpu(n, SrgbToLinearBody<double>{x.data(), c1.data()});
+    expect_near(a1, a, 1e-14), expect_near(b1, b, 1e-14), expect_near(c1, c, 1e-14);
+  }
+}
+
+TEST(PointKernels, Interpolation) {
+  for (const int64_t n : {0, 1, 300}) {
+    Random random(45);
+    const int64_t m = 40, channels = 3;
+    std::vector<int64_t> first(n), second(n);
+    for (int64_t i = 0; i < n; ++i) first[i] = random.below(m + 4) - 2, second[i] = random.below(m);
+    const auto share = random.uniforms(n), values = random.uniforms(m * channels), g = random.uniforms(n * channels, -1);
+    auto out = unwritten<double>(n * channels), out1 = out;
+    std::vector<double> grad(m * channels), grad1(grad);
+    cpu::run(n * channels, InterpolateBody<double>{m, channels, first.data(), second.data(), share.data(), values.data(), out.data()});
+    on_gpu(n * channels, InterpolateBody<double>{m, channels, first.data(), second.data(), share.data(), values.data(), out1.data()});
+    cpu::run(n * channels, InterpolateBackwardBody<double>{m, channels, first.data(), second.data(), share.data(), g.data(), grad.data()});
+    on_gpu(n * channels, InterpolateBackwardBody<double>{m, channels, first.data(), second.data(), share.data(), g.data(), grad1.data()});
+    expect_near(out1, out, 1e-15), expect_near(grad1, grad, 1e-13);
+  }
+}
+
+// ---- sums ----
+
+TEST(PointKernels, PixelLosses) {
+  for (const int64_t n : {0, 1, 256, 700})
+    for (const bool linear : {false, true}) {
+      Random random(55);
+      const auto mean = random.uniforms(3 * n, 0, 1.5), opacity = random.uniforms(n), target = random.uniforms(4 * n),
+                 background = random.uniforms(3 * n);
+      const std::unique_ptr<bool[]> whole(new bool[n]);
+      for (int64_t i = 0; i < n; ++i) whole[i] = random.below(2) == 1;
+      const auto run = [&](const auto& launch) {
+        std::vector<std::vector<double>> out{unwritten<double>(2), unwritten<double>(3 * n), unwritten<double>(n),
+                                             unwritten<double>(n)};
+        launch(make_pixel_losses(n, mean.data(), opacity.data(), target.data(), background.data(),
+                                 whole.get(), linear, out[0].data(), out[1].data(), out[2].data(), out[3].data()));
+        return out;
+      };
+      const auto a = run([&](const auto& body) { cpu::run(n, body); }), b = run([&](const auto& body) { on_gpu(n, body); });
+      for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
+    }
+}
+
+// There are at most 512 blocks of 256 threads, so that the last size gives some threads a second item.
+TEST(PointKernels, GradientLosses) {
+  for (const int64_t m : {0, 1, 256, 700, 512 * 256 + 300}) {
+    Random random(65);
+    const int64_t n_weights = m + 5, n = n_weights + m;
+    const auto gradients = random.uniforms(3 * n, -1), weights = random.uniforms(n_weights);
+    std::vector<int64_t> beside(m);
+    for (int64_t& i : beside) i = random.below(int(n_weights));
+    const auto run = [&](const auto& launch) {
+      std::vector<std::vector<double>> out{unwritten<double>(2), unwritten<double>(3 * n), unwritten<double>(3 * n),
+                                           unwritten<double>(1)};
+      launch(n, EikonalBody<double>{gradients.data(), 1.0 / double(n), out[0].data(), out[1].data(), out[2].data()});
+      launch(m, NormalPairsBody<double>{n, n_weights, m, gradients.data(), weights.data(), beside.data(),
+                                        out[0].data() + 1, out[2].data(), out[3].data()});
+      launch(3 * n, ScaleBody<double>{out[3].data(), out[2].data()});
+      return out;
+    };
+    const auto a = run([](int64_t n, const auto& body) { cpu::run(n, body); });
+    const auto b = run([](int64_t n, const auto& body) { on_gpu(n, body); });
+    for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-12);
+  }
+}
+
+TEST(PointKernels, MaterialLosses) {
+  for (const int64_t n : {0, 1, 256, 700})
+    for (const bool smooth : {false, true}) {
+      Random random(75);
+      const auto albedo = random.uniforms(3 * n), metallic = random.uniforms(n), shares = random.uniforms(n);
+      const auto run = [&](const auto& launch) {
+        std::vector<std::vector<double>> out{unwritten<double>(3), unwritten<double>(3 * n), unwritten<double>(1)};
+        launch(MaterialLossesBody<double>{n, albedo.data(), metallic.data(), shares.data(), smooth, out[0].data(),
+                                          out[1].data(), out[2].data()});
+        return out;
+      };
+      const auto a = run([&](const auto& body) { cpu::run(n, body); }), b = run([&](const auto& body) { on_gpu(n, body); });
+      for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
+    }
+}
+
+TEST(PointKernels, EntropyOfRows) {
+  const int64_t n = 700, channels = 3;
+  Random random(85);
+  const auto rows = random.uniforms(n * (channels + 1), 0.1, 1);
+  const auto run = [&](const auto& launch) {
+    std::vector<std::vector<double>> out{unwritten<double>(1), unwritten<double>(1), unwritten<double>(n * channels)};
+    launch(n, EntropyBody<double>{n, channels, rows.data(), out[0].data(), out[1].data()});
+    launch(n * channels, EntropyGradientBody<double>{channels, rows.data(), out[1].data(), out[2].data()});
+    return out;
+  };
+  const auto a = run([](int64_t n, const auto& body) { cpu::run(n, body); });
+  const auto b = run([](int64_t n, const auto& body) { on_gpu(n, body); });
+  for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
+}
+
+}  // namespace
+}  // namespace splitnerf
