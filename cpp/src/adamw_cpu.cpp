@@ -11,7 +11,13 @@ template <class T> void run(int64_t, const AdamwBody<T>& body) {
   parallel_for(x.n / x.columns, max_of<int64_t>(1, kNumbers / x.columns),
                [&](int64_t begin, int64_t end) { kernels<T>().adamw_step(body.rule, x, begin, end); });
 }
+template <class T> void run(int64_t, const AdamwListBody<T>& body) {
+  for (int k = 0; k < body.n_arrays; ++k) run(body.arrays[k].x.n, body.arrays[k]);
+}
+
 template void run<float>(int64_t, const AdamwBody<float>&);
 template void run<double>(int64_t, const AdamwBody<double>&);
+template void run<float>(int64_t, const AdamwListBody<float>&);
+template void run<double>(int64_t, const AdamwListBody<double>&);
 
 }  // namespace splitnerf::cpu

@@ -1,5 +1,6 @@
-// A step of AdamW as a torch operator that writes to its arguments.
+// A step of AdamW as torch operators that write to their arguments: of one parameter, and of many in one launch.
 #include <optional>
+#include <vector>
 
 #include "device.h"
 
@@ -29,38 +30,91 @@ template <class T> T* written(const char* op, const char* name, Tensor& t, const
   return reinterpret_cast<T*>(t.mutable_data_ptr());
 }
 
+// What all parameters of a step share.
+struct Settings {
+  double beta1, beta2, eps;
+};
+
+// A parameter's arrays and rule, checked. The gradient is contiguous and lives as long as the caller's.
+template <class T>
+AdamwBody<T> step_of(const char* op, Tensor& param, const Tensor& grad, Tensor& exp_avg, Tensor& exp_avg_sq, double lr,
+                     const Settings& all, double weight_decay, int64_t step, bool sparse, Tensor* copy,
+                     const Kind& kind) {
+  const auto in_range = [&](const char* name, bool fits, const char* range, double got) {
+    require(fits, op, std::string(name) + " must be " + range + ", got " + std::to_string(got));
+  };
+  in_range("lr", lr >= 0, "at least 0", lr), in_range("eps", all.eps >= 0, "at least 0", all.eps);
+  in_range("beta1", all.beta1 >= 0 && all.beta1 < 1, "in [0, 1)", all.beta1);
+  in_range("beta2", all.beta2 >= 0 && all.beta2 < 1, "in [0, 1)", all.beta2);
+  in_range("weight_decay", weight_decay >= 0, "at least 0", weight_decay);
+  require(step >= 1, op, "step must be at least 1, got " + std::to_string(step));
+  const ScalarType copied = copy ? copy->scalar_type() : ScalarType::Half;
+  require(copied == ScalarType::Half || copied == ScalarType::BFloat16, op,
+          "copy must be float16 or bfloat16, got " + describe(copied));
+  AdamwArrays<T> x{param.numel(),
+                   param.dim() ? param.size(param.dim() - 1) : 1,
+                   sparse,
+                   written<T>(op, "param", param, param, kind),
+                   in<T>(grad),
+                   written<T>(op, "exp_avg", exp_avg, param, kind),
+                   written<T>(op, "exp_avg_sq", exp_avg_sq, param, kind),
+                   nullptr,
+                   nullptr};
+  if (copy && copied == ScalarType::Half) x.half = written<Half>(op, "copy", *copy, param, kind.with(copied));
+  if (copy && copied == ScalarType::BFloat16)
+    x.bfloat16 = written<Bfloat16>(op, "copy", *copy, param, kind.with(copied));
+  return {AdamwRule<T>(lr, all.beta1, all.beta2, all.eps, weight_decay, step), x};
+}
+Tensor dense_gradient(const char* op, const Tensor& grad, const Tensor& param, const Kind& kind) {
+  require_like(op, "grad", grad, param, kind);
+  return torch::stable::contiguous(grad);
+}
+
 void adamw_step(Tensor param, Tensor grad, Tensor exp_avg, Tensor exp_avg_sq, double lr, double beta1, double beta2,
                 double eps, double weight_decay, int64_t step, bool sparse, std::optional<Tensor> copy) {
   const char* op = "adamw_step_";
   const Kind kind = real_kind(op, "param", param);
-  const auto in_range = [&](const char* name, bool fits, const char* range, double got) {
-    require(fits, op, std::string(name) + " must be " + range + ", got " + std::to_string(got));
-  };
-  in_range("lr", lr >= 0, "at least 0", lr), in_range("eps", eps >= 0, "at least 0", eps);
-  in_range("beta1", beta1 >= 0 && beta1 < 1, "in [0, 1)", beta1);
-  in_range("beta2", beta2 >= 0 && beta2 < 1, "in [0, 1)", beta2);
-  in_range("weight_decay", weight_decay >= 0, "at least 0", weight_decay);
-  require(step >= 1, op, "step must be at least 1, got " + std::to_string(step));
-  require_like(op, "grad", grad, param, kind);
-  const Tensor g = torch::stable::contiguous(grad);
-  const ScalarType copied = copy ? copy->scalar_type() : ScalarType::Half;
-  require(copied == ScalarType::Half || copied == ScalarType::BFloat16, op,
-          "copy must be float16 or bfloat16, got " + describe(copied));
+  const Tensor g = dense_gradient(op, grad, param, kind);
   on_device(kind, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    AdamwArrays<T> x{param.numel(),
-                     param.dim() ? param.size(param.dim() - 1) : 1,
-                     sparse,
-                     written<T>(op, "param", param, param, kind),
-                     in<T>(g),
-                     written<T>(op, "exp_avg", exp_avg, param, kind),
-                     written<T>(op, "exp_avg_sq", exp_avg_sq, param, kind),
-                     nullptr,
-                     nullptr};
-    if (copy && copied == ScalarType::Half) x.half = written<Half>(op, "copy", *copy, param, kind.with(copied));
-    if (copy && copied == ScalarType::BFloat16)
-      x.bfloat16 = written<Bfloat16>(op, "copy", *copy, param, kind.with(copied));
-    device.run(op, x.n, AdamwBody<T>{AdamwRule<T>(lr, beta1, beta2, eps, weight_decay, step), x});
+    device.run(op, param.numel(),
+               step_of<T>(op, param, g, exp_avg, exp_avg_sq, lr, {beta1, beta2, eps}, weight_decay, step, sparse,
+                          copy ? &*copy : nullptr, kind));
+  });
+}
+
+void adamw_steps(std::vector<Tensor> params, std::vector<Tensor> grads, std::vector<Tensor> exp_avgs,
+                 std::vector<Tensor> exp_avg_sqs, std::vector<double> lrs, double beta1, double beta2, double eps,
+                 std::vector<double> weight_decays, std::vector<int64_t> steps, std::vector<bool> sparse,
+                 std::vector<Tensor> copies, std::vector<int64_t> copied) {
+  const char* op = "adamw_steps_";
+  const size_t n = params.size();
+  require(n > 0, op, "params must hold a tensor");
+  const auto as_many = [&](const char* name, size_t size, size_t wanted) {
+    require(size == wanted, op, std::string(name) + " must hold " + std::to_string(wanted) + ", got " + std::to_string(size));
+  };
+  as_many("grads", grads.size(), n), as_many("exp_avgs", exp_avgs.size(), n), as_many("exp_avg_sqs", exp_avg_sqs.size(), n);
+  as_many("lrs", lrs.size(), n), as_many("weight_decays", weight_decays.size(), n), as_many("steps", steps.size(), n);
+  as_many("sparse", sparse.size(), n), as_many("copied", copied.size(), copies.size());
+  std::vector<Tensor*> copy_of(n, nullptr);
+  for (size_t k = 0; k < copies.size(); ++k) {
+    require(copied[k] >= 0 && copied[k] < int64_t(n), op, "copied must hold positions in params");
+    copy_of[size_t(copied[k])] = &copies[k];
+  }
+  const Kind kind = real_kind(op, "params", params[0]);
+  for (size_t k = 0; k < n; ++k) {
+    require_like(op, "params", params[k], params[k], kind);  // one dtype, one device
+    grads[k] = dense_gradient(op, grads[k], params[k], kind);
+  }
+  on_device(kind, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    std::vector<AdamwListBody<T>> lists(1);
+    for (size_t k = 0; k < n; ++k) {
+      if (lists.back().n_arrays == kMostAdamwArrays) lists.emplace_back();
+      lists.back().add(step_of<T>(op, params[k], grads[k], exp_avgs[k], exp_avg_sqs[k], lrs[k], {beta1, beta2, eps},
+                                  weight_decays[k], steps[k], sparse[k], copy_of[k], kind));
+    }
+    for (const AdamwListBody<T>& list : lists) device.run(op, list.count(), list);
   });
 }
 
@@ -70,8 +124,15 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "adamw_step_(Tensor(a!) param, Tensor grad, Tensor(b!) exp_avg, Tensor(c!) exp_avg_sq, float lr, float beta1, "
       "float beta2, float eps, float weight_decay, int step, bool sparse, Tensor(d!)? copy=None) -> ()");
+  m.def(
+      "adamw_steps_(Tensor(a!)[] params, Tensor[] grads, Tensor(b!)[] exp_avgs, Tensor(c!)[] exp_avg_sqs, float[] lrs, "
+      "float beta1, float beta2, float eps, float[] weight_decays, int[] steps, bool[] sparse, Tensor(d!)[] copies, "
+      "int[] copied) -> ()");
 }
 
-SPLITNERF_IMPLEMENT(m) { m.impl("adamw_step_", TORCH_BOX(&adamw_step)); }
+SPLITNERF_IMPLEMENT(m) {
+  m.impl("adamw_step_", TORCH_BOX(&adamw_step));
+  m.impl("adamw_steps_", TORCH_BOX(&adamw_steps));
+}
 
 }  // namespace splitnerf::glue

@@ -1,4 +1,6 @@
 // Kernels of the distance field and its hash grid, against the CPU.
+#include <array>
+
 #include "check.h"
 #include "gpu.h"
 #include "splitnerf/march.h"
@@ -229,6 +231,31 @@ TEST(FieldKernels, Adamw) {
         check_adamw<double>(1e-14, rows, columns, sparse);
         check_adamw<float>(1e-6, rows, columns, sparse);
       }
+}
+
+// As many arrays as one kernel takes, empty ones among them; the blocks' ends lie within arrays.
+TEST(FieldKernels, AdamwOfManyArrays) {
+  Random random(77);
+  const int64_t sizes[] = {0, 1, 300, 0, 7, 513, 2};
+  AdamwListBody<double> together, alone;
+  std::vector<std::vector<double>> kept;
+  for (int k = 0; k < kMostAdamwArrays; ++k) {
+    const int64_t n = sizes[k % 7];
+    const AdamwRule<double> rule(0.01 * k, 0.9, 0.99, 1e-8, 0.1, 1 + k);
+    const auto grad = random.uniforms(n, -1), param = random.uniforms(n, -1), m = random.uniforms(n, -1), v = random.uniforms(n);
+    kept.push_back(grad);
+    const double* const gradient = kept.back().data();
+    for (AdamwListBody<double>* list : {&together, &alone}) {
+      std::array<double*, 3> written;
+      for (size_t i = 0; i < 3; ++i) kept.push_back(i == 0 ? param : i == 1 ? m : v), written[i] = kept.back().data();
+      list->add({rule, {n, 1, k % 2 == 0, written[0], gradient, written[1], written[2], nullptr, nullptr}});
+    }
+  }
+  on_gpu(together.count(), together);
+  cpu::run(alone.count(), alone);
+  for (int k = 0; k < kMostAdamwArrays; ++k)
+    for (int i = 0; i < 3; ++i) expect_near(kept[7 * k + 1 + i], kept[7 * k + 4 + i], 1e-14);
+  on_gpu(0, AdamwListBody<double>{});
 }
 
 }  // namespace

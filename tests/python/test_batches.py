@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import torch
 from tiny_runs import tiny
 
@@ -47,10 +48,12 @@ def test_what_is_drawn_fills_its_range():
 
 def test_whole_pixels_are_seen_before_what_lies_behind_them():
     """And all others before random colours, which do not change by that."""
-    numbers, behind = torch.tensor([0, 7, 8, 1999]), torch.arange(12.0).view(4, 3)
-    batch, plain = drawn(edges=EdgePixels(numbers, behind)), drawn()
+    near, behind = np.zeros((40, 50), bool), np.arange(12, dtype=np.uint8).reshape(4, 3)
+    numbers = torch.tensor([0, 7, 8, 1999])
+    near.ravel()[numbers] = True
+    batch, plain = drawn(edges=EdgePixels([(near, behind)], 2000, torch.device("cpu"))), drawn()
     assert torch.equal(batch.whole.nonzero()[:, 0], numbers) and not plain.whole.any()
-    assert torch.equal(batch.background[numbers], behind)
+    torch.testing.assert_close(batch.background[numbers], torch.from_numpy(behind) / 255)
     assert torch.equal(batch.background[~batch.whole], plain.background[~batch.whole])
 
 

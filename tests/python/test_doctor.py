@@ -49,7 +49,8 @@ def spoil(monkeypatch, name: str, change, output: int = 0) -> None:
         result = operator(*arguments)
         within.clear()
         if result is None:
-            arguments[output].copy_(change(arguments[output]))
+            written = arguments[output] if isinstance(arguments[output], list) else [arguments[output]]
+            written[-1].copy_(change(written[-1]))
             return None
         if isinstance(result, torch.Tensor):
             return change(result)

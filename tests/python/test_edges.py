@@ -10,10 +10,8 @@ from layout_scenes import write_transforms
 from op_checks import generator
 
 from splitnerf.data.dataset import Dataset, load_dataset
-from splitnerf.render.edges import EdgePixels, band, filled_in
+from splitnerf.render.edges import band, edge_of, filled_in
 from splitnerf.render.rays import PixelSource
-
-CPU = torch.device("cpu")
 
 
 def square(height: int = 40, width: int = 60) -> np.ndarray:
@@ -62,28 +60,29 @@ def test_what_lies_behind_is_filled_in_from_outside(width):
     np.testing.assert_allclose(colour[:, 0], ramp.ravel()[place], atol=0.005 * 4 * (width + 2))
 
 
-def test_pixels_of_which_nothing_is_known_outside_are_no_edges(tmp_path):
+def test_pixels_of_which_nothing_is_known_outside_are_no_edges():
     image = photo(square(), 0.9, np.full((40, 60), 0.25))
-    known = np.ones((1, 40, 60), bool)
-    known[0, :, 40:] = False  # right of the object, where its mask ends at column 40
-    edges = EdgePixels.of(scene(tmp_path, image[None], known=known), 2, CPU)
-    columns = edges.numbers.numpy() % 60
-    assert columns.max() == 39 and (edges.numbers.numpy() // 60 == 20).sum() == 4
-    np.testing.assert_allclose(edges.behind, 0.25, atol=1e-6)
+    known = np.ones((40, 60), bool)
+    known[:, 40:] = False  # right of the object, where its mask ends at column 40
+    near, behind = edge_of(image[..., :3], image[..., 3], known, 2)
+    assert not near[:, 40:].any() and near[:, 39].any() and near[20].sum() == 4
+    assert behind.shape == (near.sum(), 3) and (behind == 64).all()
 
 
-def test_pixels_are_found_by_their_numbers(tmp_path):
-    """In photos of bytes, each with a background of its own."""
-    grey = (51, 102, 204)
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_pixels_are_found_by_their_numbers(tmp_path, dtype):
+    """In photos of each kind of number, each with a background of its own, one without an object."""
+    grey = (51, 102, 153, 204)
     images = np.stack([photo(square(), 0.9, np.full((40, 60), g / 255)) for g in grey])
-    edges = EdgePixels.of(scene(tmp_path, (255 * images + 0.5).astype(np.uint8)), 2, CPU)
-    index = torch.arange(3 * 40 * 60)
-    whole, behind = edges.at(index)
+    images[1, ..., 3] = 0
+    codes = images if dtype == np.float32 else np.rint(images * np.iinfo(dtype).max).astype(dtype)
+    edges = PixelSource(scene(tmp_path, codes), 0.5, generator(), 2).edges
     expected = np.stack([band(image[..., 3], 2)[0] for image in images])
-    assert np.array_equal(whole.numpy(), expected.ravel()) and len(edges) == expected.sum()
-    for i, g in enumerate(grey):
-        of_view = behind.view(3, -1, 3)[i][whole.view(3, -1)[i]]
-        torch.testing.assert_close(of_view, torch.full_like(of_view, g / 255))
+    index = torch.randperm(4 * 40 * 60, generator=generator())
+    whole, behind = edges.at(index)
+    assert np.array_equal(whole.numpy(), expected.ravel()[index.numpy()]) and len(edges) == expected.sum() > 0
+    view = index // (40 * 60)
+    torch.testing.assert_close(behind[whole], (torch.tensor(grey)[view] / 255)[whole, None].expand(-1, 3))
 
 
 def test_a_source_has_edges_where_photos_are_whole_and_masks_have_edges(tmp_path):

@@ -138,10 +138,10 @@ class TestLoss:
 
     def test_srgb_samples_are_compared_at_an_exposure_of_one(self):
         """And so is what lies behind the object at the masks' edges."""
-        edges = EdgePixels(torch.zeros(1, dtype=torch.int64), torch.tensor([[0.2, 0.3, 0.4]]))
+        edges = EdgePixels([(np.ones((1, 1), bool), np.uint8([[51, 76, 102]]))], 1, CPU)
         batch = self.batch(0.5, edges, compositing="srgb", shading="split")
         assert torch.equal(batch.exposure, torch.ones(1, 3)) and batch.whole.item()
-        behind = srgb_to_linear(np.float32([0.2, 0.3, 0.4]))
+        behind = srgb_to_linear(np.float32([51, 76, 102]) / 255)
         np.testing.assert_allclose(srgb_to_linear(batch.background[0].numpy()), 2 * behind, rtol=1e-4)
         linear = srgb_to_linear(np.float32([0.5, 0.6]))
         np.testing.assert_allclose(srgb_to_linear(batch.target[0, :2].numpy()), 2 * linear, rtol=1e-4)

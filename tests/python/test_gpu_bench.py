@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -61,6 +62,18 @@ def test_a_profile_names_what_takes_the_time(data, tmp_path):
         "--profile", page, *settings)  # fmt: skip
     text = page.read_text()
     assert text.startswith("20 steps after 39: ") and "sdf_layer_backward" in text
+
+
+def test_a_step_has_no_more_launches_than_it_had(tmp_path):
+    """Those of our operators are as many as their launchers make, each once a step."""
+    said = run("launches.py", "--steps", 8, "--out", tmp_path / "launches.md")
+    launches = float(re.match(r"(\d+) launches a step", said)[1])
+    assert 200 < launches <= 279
+    for line in ("| sample_rays | 4.0 |", "| spread_samples | 7.0 |", "| sdf_layer_backward | 4.0 |"):
+        assert line in said
+    counted = [float(x) for x in re.findall(r"^\| [a-z_]+ \| ([\d.]+) \|$", said, re.MULTILINE)]
+    assert sum(counted) == pytest.approx(launches, rel=0.01)
+    assert said.strip() in (tmp_path / "launches.md").read_text()
 
 
 @pytest.mark.parametrize("script", ["gpu.sh", "gpu_bundle.sh"])

@@ -213,6 +213,70 @@ def test_a_group_may_be_sparse_and_a_closure_is_called():
     assert [group["sparse"] for group in optimiser.param_groups] == [True, False]
 
 
+# ---- many parameters at once ----
+
+
+@each_device
+@pytest.mark.parametrize("count", [1, 24, 30])
+def test_many_parameters_move_as_each_alone(device, count):
+    """More than one launch takes, of all shapes, each by its own rate, decay, count and sparsity; a copy of two of them."""
+    g = generator()
+    shapes = [SHAPES[k % len(SHAPES)] for k in range(count)]
+    tensors = [[torch.rand(shape, generator=g).to(device) for shape in shapes] for _ in range(4)]
+    for grad in tensors[1][::2]:
+        grad *= (torch.rand(grad.shape, generator=g) < 0.3).to(device)
+    rates, decays, steps = ([f(k) for k in range(count)] for f in (lambda k: 0.01 * k, lambda k: 0.1 * (k % 3), lambda k: 1 + k % 5))
+    sparse, copied = [k % 2 == 0 for k in range(count)], sorted({0, count - 1})
+    alone = [[x.clone() for x in kind] for kind in tensors]
+    copies = [torch.zeros(shapes[k], dtype=torch.float16, device=device) for k in copied]
+    lib.adamw_steps_(*tensors, rates, 0.9, 0.99, 1e-8, decays, steps, sparse, copies, copied)
+    for k in range(count):
+        copy = torch.zeros(shapes[k], dtype=torch.float16, device=device) if k in copied else None
+        lib.adamw_step_(*(kind[k] for kind in alone), rates[k], 0.9, 0.99, 1e-8, decays[k], steps[k], sparse[k], copy)
+        for together, one in zip(tensors, alone):
+            assert torch.equal(together[k], one[k]), (k, shapes[k])
+        assert copy is None or torch.equal(copies[copied.index(k)], copy)
+
+
+def test_an_optimiser_takes_one_call_for_each_dtype(monkeypatch):
+    calls, real = [], lib.adamw_steps_
+    monkeypatch.setattr(lib, "adamw_steps_", lambda *given: (calls.append(len(given[0])), real(*given)))
+    params = [torch.nn.Parameter(torch.ones(3, dtype=dtype)) for dtype in (torch.float32, torch.float64) * 3]
+    idle = torch.nn.Parameter(torch.ones(2))
+    optimiser = AdamW([{"params": params[:2], "lr": 0.2}, {"params": [*params[2:], idle]}], lr=0.1, weight_decay=0.0)
+    optimiser.step()
+    assert calls == [] and not optimiser.state
+    for param in params:
+        param.grad = torch.ones_like(param)
+    optimiser.step()
+    assert sorted(calls) == [3, 3] and (idle == 1).all() and idle not in optimiser.state
+    for param in params:
+        assert param[0].item() == pytest.approx(0.8 if param is params[0] or param is params[1] else 0.9)
+        assert optimiser.state[param]["step"] == 1
+
+
+def test_errors_of_many_name_what_is_wrong():
+    def given() -> list:
+        tensors = [[torch.ones(3, 2), torch.ones(4)] for _ in range(4)]
+        return [*tensors, [0.1, 0.1], 0.9, 0.99, 1e-8, [0.0, 0.0], [1, 1], [True, False], [torch.ones(4).half()], [1]]
+
+    def wrong(position, value, *parts):
+        changed = given()
+        changed[position] = value
+        check_error(lambda: lib.adamw_steps_(*changed), "adamw_steps_", *parts)
+
+    lib.adamw_steps_(*given())
+    wrong(1, [torch.ones(3, 2)], "grads must hold 2, got 1")
+    wrong(4, [0.1] * 3, "lrs must hold 2, got 3")
+    wrong(9, [1, 0], "step must be at least 1, got 0")
+    wrong(10, [True], "sparse must hold 2, got 1")
+    wrong(12, [2], "copied must hold positions in params")
+    wrong(12, [0, 1], "copied must hold 1, got 2")
+    wrong(11, [torch.ones(3).half()], "copy must be [4] float16")
+    wrong(0, [torch.ones(3, 2), torch.ones(4).double()], "params must be [4] float32", "float64")
+    wrong(2, [torch.ones(3, 2), torch.ones(5)], "exp_avg must be [4]", "[5]")
+
+
 # ---- the operator ----
 
 

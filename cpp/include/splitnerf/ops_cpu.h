@@ -120,6 +120,7 @@ SPLITNERF_API void build_vertex_grids(int64_t n_vertices, const T* vertices, T r
 // ---- bodies that run faster here than by their plain loop; the ratio stands in the file of each ----
 
 template <class T> SPLITNERF_API void run(int64_t n, const AdamwBody<T>& body);
+template <class T> SPLITNERF_API void run(int64_t n, const AdamwListBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const CachedOcclusionBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const CachedVisibilityBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const LightLookupBody<T>& body);

@@ -1,4 +1,4 @@
-"""AdamW with one operator call per tensor, on the CPU and the GPU. It can skip rows without a gradient.
+"""AdamW with one operator call for all tensors, on the CPU and the GPU. It can skip rows without a gradient.
 
 Source: Loshchilov and Hutter 2019, Algorithm 2; rows without gradient: Mueller et al. 2022, section 4.
 """
@@ -51,7 +51,8 @@ def adamw_step_(
 
 
 class AdamW(torch.optim.Optimizer):
-    """torch.optim.AdamW with :func:`adamw_step_`; each class loads the other's state_dict.
+    """torch.optim.AdamW by the rule of :func:`adamw_step_`, all parameters of one dtype in one call; each class loads the
+    other's state_dict.
 
     Args:
         params: Contiguous tensors, or groups of them with their own settings.
@@ -116,28 +117,41 @@ class AdamW(torch.optim.Optimizer):
         if closure is not None:
             with torch.enable_grad():
                 loss = closure()
+        together: dict[tuple, list[tuple[Tensor, dict]]] = {}  # what one call takes
         for group in self.param_groups:
             for param in group["params"]:
                 if param.grad is not None:
-                    self._step(param, group)
+                    shared = param.dtype, param.device, group["betas"], group["eps"]
+                    together.setdefault(shared, []).append((param, group))
+        for (_, _, betas, eps), members in together.items():
+            self._step(members, *betas, eps)
         return loss
 
-    def _step(self, param: Tensor, group: dict) -> None:
+    def _step(self, members: list[tuple[Tensor, dict]], beta1: float, beta2: float, eps: float) -> None:
+        params, groups = [param for param, _ in members], [group for _, group in members]
+        states = [self._state(param) for param in params]
+        counts, means, squares = ([state[name] for state in states] for name in ("step", "exp_avg", "exp_avg_sq"))
+        copied = [i for i, param in enumerate(params) if param in self._copies]
+        copies = [self._copies[params[i]].of(params[i]) for i in copied]
+        lib.adamw_steps_(
+            params, [param.grad for param in params], means, squares, [float(group["lr"]) for group in groups], beta1, beta2, eps,
+            [group["weight_decay"] for group in groups], [int(count) + 1 for count in counts],
+            [group["sparse"] for group in groups], copies, copied,
+        )  # fmt: skip
+        torch.autograd.graph.increment_version([*params, *means, *squares, *copies])
+        torch._foreach_add_(counts, 1)
+        for i in copied:
+            self._copies[params[i]].was_written(params[i])
+
+    def _state(self, param: Tensor) -> dict[str, Tensor]:
+        """A parameter's moments and its count of steps, which is on the CPU."""
         state = self.state[param]
         if not state:
             state["step"] = torch.zeros((), dtype=torch.float32)
             state["exp_avg"] = torch.zeros_like(param)
             state["exp_avg_sq"] = torch.zeros_like(param)
-        copy = self._copies.get(param)
-        beta1, beta2 = group["betas"]
-        adamw_step_(
-            param, param.grad, state["exp_avg"], state["exp_avg_sq"], lr=float(group["lr"]), beta1=beta1, beta2=beta2,
-            eps=group["eps"], weight_decay=group["weight_decay"], step=int(state["step"]) + 1, sparse=group["sparse"],
-            copy=None if copy is None else copy.of(param),
-        )  # fmt: skip
-        state["step"] += 1
-        if copy is not None:
-            copy.was_written(param)
+        return state
 
 
-torch.library.register_fake("splitnerf::adamw_step_", lambda *arguments: None)
+for _op in ("adamw_step_", "adamw_steps_"):
+    torch.library.register_fake(f"splitnerf::{_op}", lambda *arguments: None)

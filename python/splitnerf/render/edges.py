@@ -2,74 +2,82 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import torch
-from scipy.ndimage import binary_dilation
 from torch import Tensor
 
-from splitnerf.data.dataset import Dataset
+from splitnerf.render.masks import runs_of, widened
 
 PARTLY = 0.02, 0.98  # coverage between which a pixel lies on an edge
-NEIGHBOURS = 1 << 20  # pixels that are averaged at once
 
 
 class EdgePixels:
     """The pixels within a band along the edges of the masks, where a mask is not trusted to a pixel.
 
     There a pixel's colour is compared whole: with the object's over the colour of what lies behind it, which is filled in from
-    outside the band.
+    outside the band. 16 bytes a run of neighbours and 3 a pixel.
 
     Args:
-        numbers: [k] int64, ascending, the pixels, counted through all photos.
-        behind: [k, 3] the sRGB colours behind the object, at the photos' own exposures.
+        photos: What :func:`edge_of` finds in each photo.
+        n_pixels: The number of pixels of a photo.
+        device: Where the pixels are looked up.
     """
 
-    def __init__(self, numbers: Tensor, behind: Tensor):
-        self.numbers, self.behind = numbers, behind
-
-    @classmethod
-    def of(cls, dataset: Dataset, width: int, device: torch.device) -> EdgePixels | None:
-        """The pixels of a split whose photos keep their colours outside the masks; None where no mask has an edge.
-
-        Args:
-            dataset: The split.
-            width: The pixels on each side of an edge.
-            device: Where the pixels are looked up.
-        """
-        numbers, behind, n_pixels = [], [], dataset.height * dataset.width
-        for i in range(len(dataset)):
-            near, outside = band(dataset.images[i, ..., 3], width)
-            if dataset.known is not None:
-                near, outside = near & dataset.known[i], outside & dataset.known[i]
-            place, colour = filled_in(dataset.images.codes[i, ..., :3], near, outside, width)
-            numbers.append(place + i * n_pixels)
-            behind.append(colour)
-        if not any(map(len, numbers)):
-            return None
-        scale = 1.0 if dataset.images.codes.dtype.kind == "f" else 1 / np.iinfo(dataset.images.codes.dtype).max
-        colours = np.concatenate(behind) * np.float32(scale)
-        return cls(torch.from_numpy(np.concatenate(numbers)).to(device), torch.from_numpy(colours).to(device))
+    def __init__(self, photos: list[tuple[np.ndarray, np.ndarray]], n_pixels: int, device: torch.device):
+        runs = [runs_of(torch.from_numpy(near)) for near, _ in photos]
+        starts, ends = (np.concatenate([run[k] + i * n_pixels for i, run in enumerate(runs)]) for k in (0, 1))
+        before = np.cumsum(ends - starts) - (ends - starts)
+        self.starts, self.shift = (torch.from_numpy(x).to(device) for x in (starts, before - starts))
+        self.ends = torch.from_numpy(ends).to(device)
+        self.behind = torch.from_numpy(np.concatenate([behind for _, behind in photos])).to(device)
 
     def __len__(self) -> int:
-        return len(self.numbers)
+        return len(self.behind)
 
     def at(self, index: Tensor) -> tuple[Tensor, Tensor]:
-        """Which of the pixels [n] are among these, [n] bool, and the colours [n, 3] behind the object there."""
-        place = torch.searchsorted(self.numbers, index).clamp(max=len(self) - 1)
-        return self.numbers[place] == index, self.behind[place]
+        """Which of the pixels [n], counted through all photos, are among these, [n] bool, and the sRGB colours [n, 3] behind the
+        object there, at the photos' own exposures."""
+        run = (torch.searchsorted(self.starts, index, right=True) - 1).clamp(min=0)
+        found = (index >= self.starts[run]) & (index < self.ends[run])
+        behind = self.behind[torch.where(found, index + self.shift[run], 0)]
+        return found, behind.float() / 255
+
+
+def edge_of(
+    colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The pixels [H, W] bool of a photo within a band along its mask's edges, and the sRGB colours [k, 3] uint8 behind the object
+    there, row by row.
+
+    Args:
+        colours: [H, W, 3] sRGB, whole numbers or floats in [0, 1].
+        alpha: [H, W] the mask, in [0, 1].
+        known: [H, W] bool, the pixels that say something; None for all.
+        width: The pixels on each side of an edge.
+    """
+    near, outside = band(alpha, width)
+    if known is not None:
+        near, outside = near & known, outside & known
+    place, behind = filled_in(colours, near, outside, width)
+    near = np.zeros_like(near)
+    near.reshape(-1)[place] = True
+    scale = 255 if colours.dtype.kind == "f" else 255 / np.iinfo(colours.dtype).max
+    return near, (behind * np.float32(scale) + np.float32(0.5)).astype(np.uint8)
 
 
 def band(alpha: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
     """[H, W] bool each: the pixels within `width` of the edge of a mask [H, W], and those more than twice as far outside it, which
     the object does not touch where the mask is wrong by no more than the band is wide."""
-    inside, partly = alpha > 0.5, (alpha > PARTLY[0]) & (alpha < PARTLY[1])
-    square = np.ones((3, 3), bool)
-    near = (binary_dilation(inside, square, width) & binary_dilation(~inside, square, width)) | partly
-    return near, ~binary_dilation(inside, square, 2 * width) & ~near
+    inside, partly = torch.from_numpy(alpha > 0.5), torch.from_numpy((alpha > PARTLY[0]) & (alpha < PARTLY[1]))
+    near = (widened(inside, width) & widened(~inside, width)) | partly
+    return near.numpy(), (~widened(inside, 2 * width) & ~near).numpy()
 
 
 def filled_in(colours: np.ndarray, near: np.ndarray, outside: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """The pixels [k] of a band that have some outside within reach, and their mean colour [k, 3], weighted by a Gaussian.
+    """The pixels [k] of a band that have some outside within reach, and their mean colour [k, 3], weighted by a Gaussian, over every
+    third pixel in both directions.
 
     Args:
         colours: [H, W, 3].
@@ -77,17 +85,16 @@ def filled_in(colours: np.ndarray, near: np.ndarray, outside: np.ndarray, size: 
         size: Half the width of the band in pixels, which is the Gaussian's deviation.
     """
     height, width = near.shape
-    step = np.arange(-3 * size - 2, 3 * size + 3)
-    weight = np.exp(-0.5 * (step[:, None] ** 2 + step**2) / size**2).astype(np.float32).ravel()
+    reach = 3 * (size + 1)
+    step = np.arange(-reach, reach + 1, 3)
+    weights = np.exp(-0.5 * (step[:, None] ** 2 + step**2) / size**2).astype(np.float32).ravel()
     place = np.flatnonzero(near)
-    kept, found = [], []
-    for chosen in np.array_split(place, max(1, len(place) * len(weight) // NEIGHBOURS)):
-        row = (chosen[:, None] // width + step).clip(0, height - 1)[:, :, None]
-        column = (chosen[:, None] % width + step).clip(0, width - 1)[:, None, :]
-        weights = outside[row, column].reshape(-1, len(weight)) * weight
-        total = weights.sum(1)
-        seen = total > 0
-        sums = np.einsum("kn,knc->kc", weights[seen], colours[row[seen], column[seen]].reshape(-1, len(weight), 3))
-        kept.append(chosen[seen])
-        found.append(sums / total[seen, None])
-    return np.concatenate(kept), np.concatenate(found).astype(np.float32)
+    total, sums = np.zeros(len(place), np.float32), np.zeros((len(place), 3), np.float32)
+    row, column = place // width, place % width
+    for (dy, dx), weight in zip(itertools.product(step, step), weights):
+        y, x = (row + dy).clip(0, height - 1), (column + dx).clip(0, width - 1)
+        at = outside[y, x].nonzero()[0]
+        total[at] += weight
+        sums[at] += weight * colours[y[at], x[at]]
+    seen = total > 0
+    return place[seen], sums[seen] / total[seen, None]

@@ -12,7 +12,7 @@ from torch.nn import functional as F
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import PixelReader
 from splitnerf.devices import tensor_cores
-from splitnerf.render.edges import EdgePixels
+from splitnerf.render.edges import EdgePixels, edge_of
 from splitnerf.render.masks import PixelRuns, reduced, runs_of, widened
 
 HULL_EDGE = 400  # pixels, about, along the shorter edge of the masks that make the hull
@@ -103,22 +103,27 @@ class PixelSource:
         self.matrices, self.origins = pixel_matrix(self.poses, self.intrinsics), self.poses[:, :3, 3].contiguous()
         self.height, self.width = dataset.height, dataset.width
         self.share, self.generator = foreground_share, generator
-        self.edges = EdgePixels.of(dataset, edge_pixels, self.device) if edge_pixels and dataset.whole else None
-        near, known, possible = [], [], []
+        near, known, possible, edges = [], [], [], []
         self.hull_factor = max(1, min(self.height, self.width) // HULL_EDGE)
         for i in range(len(dataset)):
-            mask = torch.from_numpy(dataset.images[i, ..., 3] > 0)
+            alpha, known_here = dataset.images[i, ..., 3], None
+            mask = torch.from_numpy(alpha > 0)
             wide, seen = widened(mask, max(2, self.width // 50)), mask
             if dataset.known is not None:
                 known_here = torch.from_numpy(np.array(dataset.known[i]))
                 wide, seen = wide & known_here, mask | ~known_here
                 known.append(runs_of(known_here))
+            if edge_pixels and dataset.whole:
+                known_here = None if known_here is None else known_here.numpy()
+                edges.append(edge_of(dataset.images.codes[i, ..., :3], alpha, known_here, edge_pixels))
             near.append(runs_of(wide))
             possible.append(reduced(seen, self.hull_factor))
         self.possible = torch.stack(possible).to(self.device)
         n_pixels = self.height * self.width
         self.foreground = PixelRuns.of(near, n_pixels, self.device)
         self.known = PixelRuns.of(known, n_pixels, self.device) if known else None
+        has_edges = any(len(behind) for _, behind in edges)
+        self.edges = EdgePixels(edges, n_pixels, self.device) if has_edges else None
 
     def draw(self, n: int) -> DrawnRays:
         """Draws n rays."""

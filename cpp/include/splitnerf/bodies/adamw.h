@@ -16,6 +16,7 @@ template <class T> struct AdamwRule {
   T correction;            // 1 / sqrt(1 - beta2^step)
   T eps;
 
+  AdamwRule() = default;
   AdamwRule(double lr, double beta1, double beta2, double eps, double weight_decay, int64_t step)
       : decay(T(1 - lr * weight_decay)), rate(T(lr / (1 - std::pow(beta1, double(step))))), to_mean(T(1 - beta1)),
         of_square(T(beta2)), to_square(T(1 - beta2)), correction(T(1 / std::sqrt(1 - std::pow(beta2, double(step))))),
@@ -59,5 +60,25 @@ template <class T> struct AdamwBody {
   }
 };
 SPLITNERF_ON_GPU(AdamwBody);
+
+// Some arrays, each with its rule, as one list of numbers: array k has those from ends[k - 1] to ends[k].
+inline constexpr int kMostAdamwArrays = 24;  // so that a GPU's kernel takes them as arguments, 4 KB
+template <class T> struct AdamwListBody {
+  int n_arrays = 0;
+  int64_t ends[kMostAdamwArrays];
+  AdamwBody<T> arrays[kMostAdamwArrays];
+
+  int64_t count() const { return n_arrays ? ends[n_arrays - 1] : 0; }
+  void add(const AdamwBody<T>& array) {
+    const int64_t before = count();
+    arrays[n_arrays] = array, ends[n_arrays++] = before + array.x.n;
+  }
+  SPLITNERF_HD void operator()(int64_t i) const {
+    int k = 0;
+    while (i >= ends[k]) ++k;
+    arrays[k](i - (k ? ends[k - 1] : 0));
+  }
+};
+SPLITNERF_ON_GPU(AdamwListBody);
 
 }  // namespace splitnerf

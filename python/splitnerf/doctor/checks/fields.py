@@ -96,3 +96,20 @@ def adamw_step_():
     yield average, 0.1 * gradient
     yield square, 0.01 * gradient**2
     yield copy, moved
+
+
+@check
+def adamw_steps_():
+    """The same for two parameters, the second at twice the rate and without decay; of the second a copy in 16 bits."""
+    gradients = [pattern(N) - 1, pattern(5) + 1]
+    params, averages, squares = [[torch.full_like(g, x) for g in gradients] for x in (2.0, 0.0, 0.0)]
+    copy = torch.zeros(5).half()
+    lib.adamw_steps_(
+        params, gradients, averages, squares, [0.1, 0.2], 0.9, 0.99, 1e-15, [0.5, 0.0], [1, 1], [False, True], [copy], [1]
+    )
+    yield params[0], 2 * (1 - 0.1 * 0.5) - 0.1 * gradients[0].sign()
+    yield params[1], 2 - 0.2 * gradients[1].sign()
+    yield copy, params[1]
+    for average, square, gradient in zip(averages, squares, gradients):
+        yield average, 0.1 * gradient
+        yield square, 0.01 * gradient**2
