@@ -18,7 +18,7 @@
 
 namespace splitnerf::cuda {
 
-inline constexpr int kBlock = 256;       // threads
+inline constexpr int kBlock = 256;      // threads
 inline constexpr int kSumBlocks = 512;  // blocks that add up
 
 inline void check(cudaError_t error, const char* what) {

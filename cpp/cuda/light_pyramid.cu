@@ -71,7 +71,8 @@ void light_lookup_backward(const Queue& queue, const LightPyramid<T>& pyramid, i
   if (n == 0) return;
   constexpr unsigned kMostBlocks = 1024;  // each adds once to every coefficient
   launch(queue, op, lookup_backward_kernel<T>, min_of(blocks_for(n, kPoints), kMostBlocks), kThreads, 0, n, pyramid,
-         *pyramid.recurrence, directions, roughness, grad_radiance, grad_directions, grad_roughness, grad_levels, grad_sh);
+         *pyramid.recurrence, directions, roughness, grad_radiance, grad_directions, grad_roughness, grad_levels,
+         grad_sh);
 }
 
 template void light_lookup_backward<float>(const Queue&, const LightPyramid<float>&, int64_t, const float*,

@@ -242,8 +242,8 @@ void sdf_layer(const Queue& queue, const SdfWeights<T>& weights, int64_t n, cons
   const SdfLayer<T> layer = prepare(queue, op, weights);
   const auto kernel = layer_kernel<T>;
   const TileSize tile = tile_size<T>(op, SdfTile<T>::forward_rows(weights.n_inputs, weights.n_outputs), kernel);
-  launch(queue, op, kernel, blocks_for(n, tile.points), tile.points, tile.bytes, n, layer, positions, features, jacobian,
-         outputs, gradient);
+  launch(queue, op, kernel, blocks_for(n, tile.points), tile.points, tile.bytes, n, layer, positions, features,
+         jacobian, outputs, gradient);
 }
 
 template <class T>

@@ -91,9 +91,11 @@ void adamw_steps(std::vector<Tensor> params, std::vector<Tensor> grads, std::vec
   const size_t n = params.size();
   require(n > 0, op, "params must hold a tensor");
   const auto as_many = [&](const char* name, size_t size, size_t wanted) {
-    require(size == wanted, op, std::string(name) + " must hold " + std::to_string(wanted) + ", got " + std::to_string(size));
+    require(size == wanted, op,
+            std::string(name) + " must hold " + std::to_string(wanted) + ", got " + std::to_string(size));
   };
-  as_many("grads", grads.size(), n), as_many("exp_avgs", exp_avgs.size(), n), as_many("exp_avg_sqs", exp_avg_sqs.size(), n);
+  as_many("grads", grads.size(), n), as_many("exp_avgs", exp_avgs.size(), n),
+      as_many("exp_avg_sqs", exp_avg_sqs.size(), n);
   as_many("lrs", lrs.size(), n), as_many("weight_decays", weight_decays.size(), n), as_many("steps", steps.size(), n);
   as_many("sparse", sparse.size(), n), as_many("copied", copied.size(), copies.size());
   std::vector<Tensor*> copy_of(n, nullptr);

@@ -46,9 +46,9 @@ std::tuple<Tensor, Tensor, Tensor> gradient_losses(Tensor gradients, Tensor weig
     auto* scale = device.template scratch<double>(1);
     const T per_point = T(1) / T(max_of<int64_t>(n, 1));
     device.run(op, n, EikonalBody<T>{in<T>(g), per_point, out<T>(losses), out<T>(eikonal_by), smoothness});
-    device.run(op, m,
-               NormalPairsBody<T>{n, n_weights, m, in<T>(g), in<T>(w), in<int64_t>(b), out<T>(losses) + 1, smoothness,
-                                  scale});
+    device.run(
+        op, m,
+        NormalPairsBody<T>{n, n_weights, m, in<T>(g), in<T>(w), in<int64_t>(b), out<T>(losses) + 1, smoothness, scale});
     device.run(op, 3 * n, ScaleBody<T>{scale, smoothness});
   });
   return {losses, eikonal_by, smoothness_by};
@@ -65,9 +65,9 @@ std::tuple<Tensor, Tensor> material_losses(Tensor albedo, Tensor metallic, Tenso
     using T = decltype(zero);
     const int64_t n = m.size(0);
     auto* scale = device.template scratch<double>(1);
-    device.run(op, n,
-               MaterialLossesBody<T>{n, in<T>(a), in<T>(m), in<T>(s), smooth_l1, out<T>(losses), out<T>(by_metallic),
-                                     scale});
+    device.run(
+        op, n,
+        MaterialLossesBody<T>{n, in<T>(a), in<T>(m), in<T>(s), smooth_l1, out<T>(losses), out<T>(by_metallic), scale});
     device.run(op, 3 * n, ScaleBody<T>{scale, out<T>(by_metallic)});
   });
   return {losses, by_metallic};
@@ -95,7 +95,8 @@ std::tuple<Tensor, Tensor> quadratic_entropy(Tensor x) {
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
-      "pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background, Tensor whole, bool linear) -> (Tensor, Tensor, "
+      "pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background, Tensor whole, bool linear) -> "
+      "(Tensor, Tensor, "
       "Tensor, Tensor)");
   m.def("gradient_losses(Tensor gradients, Tensor weights, Tensor beside) -> (Tensor, Tensor, Tensor)");
   m.def("material_losses(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1) -> (Tensor, Tensor)");

@@ -37,7 +37,8 @@ template <class Body> void on_gpu(int64_t n, const Body& body) {
 
 // Outputs, which nobody has written yet.
 template <class T> std::vector<T> unwritten(int64_t n) {
-  return std::vector<T>(size_t(n), std::numeric_limits<T>::has_quiet_NaN ? std::numeric_limits<T>::quiet_NaN() : T(-77));
+  return std::vector<T>(size_t(n),
+                        std::numeric_limits<T>::has_quiet_NaN ? std::numeric_limits<T>::quiet_NaN() : T(-77));
 }
 
 }  // namespace splitnerf

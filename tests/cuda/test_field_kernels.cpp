@@ -39,7 +39,8 @@ template <class T, int F, class S = T> void check_hash_grid(double tolerance) {
     auto features = unwritten<T>(n * columns), jacobian = unwritten<T>(3 * n * columns), features1 = features,
          jacobian1 = jacobian;
     cpu::hash_encode(shape, n_active, n, positions.data(), table.data(), features.data(), jacobian.data());
-    cuda::hash_encode(gpu.queue(), shape, n_active, n, positions.data(), table.data(), features1.data(), jacobian1.data());
+    cuda::hash_encode(gpu.queue(), shape, n_active, n, positions.data(), table.data(), features1.data(),
+                      jacobian1.data());
     expect_near(features1, features, tolerance), expect_near(jacobian1, jacobian, tolerance);
     auto alone = unwritten<T>(n * columns);
     cuda::hash_encode<T>(gpu.queue(), shape, n_active, n, positions.data(), table.data(), alone.data(), nullptr);
@@ -48,7 +49,8 @@ template <class T, int F, class S = T> void check_hash_grid(double tolerance) {
     for (const T* to_jacobian : {static_cast<const T*>(nullptr), gj.data()}) {
       auto to_table = unwritten<T>(n_entries * F), to_table1 = to_table;
       cpu::hash_encode_backward(shape, n_active, n, positions.data(), g.data(), to_jacobian, to_table.data());
-      cuda::hash_encode_backward(gpu.queue(), shape, n_active, n, positions.data(), g.data(), to_jacobian, to_table1.data());
+      cuda::hash_encode_backward(gpu.queue(), shape, n_active, n, positions.data(), g.data(), to_jacobian,
+                                 to_table1.data());
       expect_near(to_table1, to_table, tolerance);
     }
     auto to_positions = unwritten<T>(3 * n), to_positions1 = to_positions;
@@ -105,8 +107,8 @@ void check_layer(int width, int n_outputs, std::initializer_list<int64_t> sizes)
     struct Grads {
       std::vector<double> features, jacobian, hidden, hidden_bias, out, out_bias;
     };
-    Grads a{unwritten<double>(n * c),       unwritten<double>(3 * n * c), unwritten<double>(net.hidden.size()),
-            unwritten<double>(width),       unwritten<double>(net.out.size()), unwritten<double>(n_outputs)};
+    Grads a{unwritten<double>(n * c), unwritten<double>(3 * n * c),      unwritten<double>(net.hidden.size()),
+            unwritten<double>(width), unwritten<double>(net.out.size()), unwritten<double>(n_outputs)};
     Grads b = a;
     cpu::sdf_layer_backward(net.weights, n, x.data(), f.data(), j.data(), go.data(), gg.data(), a.features.data(),
                             a.jacobian.data(), a.hidden.data(), a.hidden_bias.data(), a.out.data(), a.out_bias.data());
@@ -128,9 +130,9 @@ TEST(FieldKernels, SdfLayerOfManyOutputs) {
   const Network net(random, 8, 1000);
   Gpu gpu;
   std::vector<double> out(1000), three(3);
-  EXPECT_THROW(cuda::sdf_layer(gpu.queue(), net.weights, 1, three.data(), three.data(), three.data(), out.data(),
-                               three.data()),
-               std::invalid_argument);
+  EXPECT_THROW(
+      cuda::sdf_layer(gpu.queue(), net.weights, 1, three.data(), three.data(), three.data(), out.data(), three.data()),
+      std::invalid_argument);
 }
 
 struct Field {
@@ -213,8 +215,9 @@ template <class T> void check_adamw(double tolerance, int64_t rows, int64_t colu
   const AdamwArrays<T> x{n,         columns,   sparse,       param1.data(), grad.data(),
                          m1.data(), v1.data(), half1.data(), bfloat1.data()};
   cpu::run(n, AdamwBody<T>{rule, x});
-  on_gpu(n, AdamwBody<T>{rule, {n, columns, sparse, param2.data(), grad.data(), m2.data(), v2.data(), half2.data(),
-                                bfloat2.data()}});
+  on_gpu(n, AdamwBody<T>{
+                rule,
+                {n, columns, sparse, param2.data(), grad.data(), m2.data(), v2.data(), half2.data(), bfloat2.data()}});
   expect_near(param2, param1, tolerance), expect_near(m2, m1, tolerance), expect_near(v2, v1, tolerance);
   for (int64_t i = 0; i < n; ++i) {
     for (const Half x : {half1[i], half2[i]}) EXPECT_NEAR(widen(x), param1[i], 1e-3 * (1 + std::abs(param1[i]))) << i;
@@ -242,7 +245,8 @@ TEST(FieldKernels, AdamwOfManyArrays) {
   for (int k = 0; k < kMostAdamwArrays; ++k) {
     const int64_t n = sizes[k % 7];
     const AdamwRule<double> rule(0.01 * k, 0.9, 0.99, 1e-8, 0.1, 1 + k);
-    const auto grad = random.uniforms(n, -1), param = random.uniforms(n, -1), m = random.uniforms(n, -1), v = random.uniforms(n);
+    const auto grad = random.uniforms(n, -1), param = random.uniforms(n, -1), m = random.uniforms(n, -1),
+               v = random.uniforms(n);
     kept.push_back(grad);
     const double* const gradient = kept.back().data();
     for (AdamwListBody<double>* list : {&together, &alone}) {

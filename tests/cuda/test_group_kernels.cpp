@@ -54,16 +54,16 @@ TEST(GroupKernels, NeusWeightsAndTheirGradients) {
   for (const double least : {0., 0.3}) {
     std::vector<double> w(n, 9), o(n_rays), prev(n, 9), next(n, 9), s(n_rays), w8(n, 7), o8(n_rays), prev8(n, 7),
         next8(n, 7), s8(n_rays);
-    cpu::run(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least,
-                                                        w.data(), o.data()});
+    cpu::run(r.packed().n_rays,
+             NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(), o.data()});
     cpu::run(r.packed().n_rays,
              NeusWeightsBackwardBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(),
                                              gw.data(), go.data(), prev.data(), next.data(), s.data()});
-    on_gpu(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
-                                                                    least, w8.data(), o8.data()});
-    on_gpu(r.packed().n_rays, NeusWeightsBackwardBody<double>{
-                                                r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(),
-                                                gw.data(), go.data(), prev8.data(), next8.data(), s8.data()});
+    on_gpu(r.packed().n_rays,
+           NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w8.data(), o8.data()});
+    on_gpu(r.packed().n_rays,
+           NeusWeightsBackwardBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(),
+                                           gw.data(), go.data(), prev8.data(), next8.data(), s8.data()});
     expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
     expect_near(prev8, prev, 1e-13), expect_near(next8, next, 1e-13), expect_near(s8, s, 1e-13);
   }
@@ -77,8 +77,8 @@ TEST(GroupKernels, NeusWeightsPassANanOn) {
   std::vector<double> w(n, 9), o(n_rays), w32(n, 7), o32(n_rays);
   cpu::run(r.packed().n_rays,
            NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, 0., w.data(), o.data()});
-  on_gpu(r.packed().n_rays, NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s,
-                                                                   0., w32.data(), o32.data()});
+  on_gpu(r.packed().n_rays,
+         NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, 0., w32.data(), o32.data()});
   for (size_t i = 0; i < n; ++i) {
     EXPECT_EQ(std::isnan(w32[i]), std::isnan(w[i])) << i;
     if (!std::isnan(w[i])) { EXPECT_NEAR(w32[i], w[i], 1e-14) << i; }
@@ -98,9 +98,8 @@ TEST(GroupKernels, SurfaceWeightsAndTheirGradients) {
                                                               to_sdf.data(), to_gradient.data(), to_s.data()});
   std::vector<double> normals8(3 * n, 7), w8(n, 7), o8(n_rays), to_sdf8(n, 7), to_gradient8(3 * n, 7), to_s8(n_rays);
   on_gpu(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals8.data(), w8.data(), o8.data()});
-  on_gpu(in.rays.n_rays,
-                       SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(), to_sdf8.data(),
-                                                          to_gradient8.data(), to_s8.data()});
+  on_gpu(in.rays.n_rays, SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(),
+                                                            to_sdf8.data(), to_gradient8.data(), to_s8.data()});
   expect_near(normals8, normals, 0), expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
   for (const double last : {w8.back(), to_gradient8.back(), normals8.back()}) EXPECT_EQ(last, 0);
   expect_near(to_sdf8, to_sdf, 1e-13), expect_near(to_gradient8, to_gradient, 1e-13), expect_near(to_s8, to_s, 1e-13);
@@ -116,10 +115,9 @@ TEST(GroupKernels, CompositeAndItsGradients) {
   cpu::run(r.packed().n_rays, CompositeBody<double>{r.packed(), channels, w.data(), v.data(), sums.data()});
   cpu::run(r.packed().n_rays,
            CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(), g.data(), to_w.data(), to_v.data()});
+  on_gpu(r.packed().n_rays, CompositeBody<double>{r.packed(), channels, w.data(), v.data(), sums8.data()});
   on_gpu(r.packed().n_rays,
-                       CompositeBody<double>{r.packed(), channels, w.data(), v.data(), sums8.data()});
-  on_gpu(r.packed().n_rays, CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(),
-                                                                        g.data(), to_w8.data(), to_v8.data()});
+         CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(), g.data(), to_w8.data(), to_v8.data()});
   expect_near(sums8, sums, 1e-14), expect_near(to_w8, to_w, 0), expect_near(to_v8, to_v, 0);
 }
 
@@ -164,6 +162,21 @@ TEST(GroupKernels, SpreadSamples) {
     EXPECT_EQ(two.share, one.share);
     EXPECT_EQ(two.first.back(), 0);
   }
+}
+
+// A ray of which more samples are drawn than were counted: what the next ray has stays its own.
+TEST(GroupKernels, SpreadSamplesKeepsToWhatWasCounted) {
+  const std::vector<int64_t> offsets{0, 8, 16}, stretches{0, 1, 2}, filled{0, 1, 2}, drawn{0, 7, 15};
+  const std::vector<double> weights(16, 0.1), phase(2, 0.5);
+  std::vector<double> t(16), share(16);
+  for (size_t i = 0; i < 16; ++i) t[i] = 0.1 * double(i);
+  std::vector<int64_t> shaded(15, -1), heaviest(2), leaders(2), stretch(15), first(16), second(16);
+  const Spread to{shaded.data(), heaviest.data(), leaders.data(), stretch.data(), {15, 2, 2}};
+  const SpreadFillBody<double> fill{
+      {2, 16, offsets.data()}, weights.data(), t.data(), phase.data(), INFINITY,      0,           drawn.data(),
+      stretches.data(),        filled.data(),  to,       first.data(), second.data(), share.data()};
+  fill(1), fill(0);
+  for (int64_t k = 0; k < 15; ++k) EXPECT_EQ(shaded[size_t(k)], k < 7 ? k : k + 1);
 }
 
 // Offsets that nobody has checked: nothing outside the arrays is touched.
@@ -217,18 +230,18 @@ TEST(GroupKernels, MarchingTakesTheSamplesOfTheCpuInItsOrder) {
       cpu::run(m.n(), MarchCountBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
                                             one.offsets.data() + 1});
       on_gpu(m.n(), MarchCountBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
-                                                        lanes.offsets.data() + 1});
+                                          lanes.offsets.data() + 1});
       for (Marched* marched : {&one, &lanes})
         for (int64_t r = 0; r < m.n(); ++r) marched->offsets[r + 1] += marched->offsets[r];
       ASSERT_EQ(lanes.offsets, one.offsets);
       EXPECT_EQ(one.offsets.back() > 0, filled > 0);
       one.allocate(), lanes.allocate();
-      cpu::run(m.n(), MarchFillBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
-                                           one.offsets.data(), one.ray_indices.data(), one.t_starts.data(),
-                                           one.t_ends.data()});
-      on_gpu(m.n(), MarchFillBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(),
-                                                       lanes.offsets.data(), lanes.ray_indices.data(),
-                                                       lanes.t_starts.data(), lanes.t_ends.data()});
+      cpu::run(m.n(),
+               MarchFillBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(), one.offsets.data(),
+                                    one.ray_indices.data(), one.t_starts.data(), one.t_ends.data()});
+      on_gpu(m.n(),
+             MarchFillBody<float>{m.options, grid.view(), m.o.data(), m.d.data(), m.jitter.data(), lanes.offsets.data(),
+                                  lanes.ray_indices.data(), lanes.t_starts.data(), lanes.t_ends.data()});
       EXPECT_EQ(lanes.ray_indices, one.ray_indices);
       EXPECT_EQ(lanes.t_starts, one.t_starts);
       EXPECT_EQ(lanes.t_ends, one.t_ends);
@@ -255,32 +268,33 @@ TEST(GroupKernels, MonteCarloSumsAndTheirGradients) {
   const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n, 0.05, 1);
   const auto share = random.uniforms(n, 0, 1);
   std::vector<double> dirs(3 * n * k), pdf(n * k), dirs8(dirs.size()), pdf8(pdf.size());
-  cpu::run(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs.data(), pdf.data()});
-  on_gpu(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs8.data(), pdf8.data()});
+  cpu::run(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs.data(),
+                                     pdf.data()});
+  on_gpu(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs8.data(),
+                                   pdf8.data()});
   expect_near(dirs8, dirs, 0), expect_near(pdf8, pdf, 0);
   cpu::run(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs.data()});
   on_gpu(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs8.data()});
   expect_near(dirs8, dirs, 0);
 
   const auto radiance = random.uniforms(3 * n * k), g = random.uniforms(3 * kLightSums * n, -1);
-  std::vector<double> sums(3 * kLightSums * n), to_n(3 * n), to_rho(n), to_light(3 * n * k), sums8(3 * kLightSums * n), to_n8(3 * n), to_rho8(n),
-      to_light8(3 * n * k);
+  std::vector<double> sums(3 * kLightSums * n), to_n(3 * n), to_rho(n), to_light(3 * n * k), sums8(3 * kLightSums * n),
+      to_n8(3 * n), to_rho8(n), to_light8(3 * n * k);
   const DrawnLight<double> light{k, dirs.data(), pdf.data(), radiance.data()};
   const ToDrawnLight<double> receive{k, to_light.data()};
   cpu::run(n, DrawnLightBody<double>{k, normals.data(), views.data(), rho.data(), light, sums.data()});
   cpu::run(n, DrawnLightBackwardBody<double>{k, normals.data(), views.data(), rho.data(), light, g.data(), to_n.data(),
                                              to_rho.data(), receive});
   on_gpu(n, SumLightBody<double, DrawnLight<double>>{k, normals.data(), views.data(), rho.data(), light, sums8.data()});
-  on_gpu(n,
-                       SumLightBackwardBody<double, DrawnLight<double>, ToDrawnLight<double>>{k,
-                                                                                              normals.data(),
-                                                                                              views.data(),
-                                                                                              rho.data(),
-                                                                                              light,
-                                                                                              g.data(),
-                                                                                              to_n8.data(),
-                                                                                              to_rho8.data(),
-                                                                                              {k, to_light8.data()}});
+  on_gpu(n, SumLightBackwardBody<double, DrawnLight<double>, ToDrawnLight<double>>{k,
+                                                                                   normals.data(),
+                                                                                   views.data(),
+                                                                                   rho.data(),
+                                                                                   light,
+                                                                                   g.data(),
+                                                                                   to_n8.data(),
+                                                                                   to_rho8.data(),
+                                                                                   {k, to_light8.data()}});
   expect_near(sums8, sums, 1e-13), expect_near(to_n8, to_n, 1e-13), expect_near(to_rho8, to_rho, 1e-13);
   expect_near(to_light8, to_light, 0);
 }
@@ -291,28 +305,30 @@ TEST(GroupKernels, SummedLightAndItsGradients) {
   Random random(11);
   const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n, 0.05, 1);
   const auto dirs = random.directions(k), angles = random.uniforms(k), radiance = random.uniforms(3 * k);
-  const auto visible = random.uniforms(n * k), sent = random.uniforms(3 * n * k), g = random.uniforms(3 * kLightSums * n, -1);
+  const auto visible = random.uniforms(n * k), sent = random.uniforms(3 * n * k),
+             g = random.uniforms(3 * kLightSums * n, -1);
   for (const bool with_sent : {false, true}) {
     const SharedLight<double> light{
         k, dirs.data(), angles.data(), radiance.data(), visible.data(), with_sent ? sent.data() : nullptr};
-    std::vector<double> sums(3 * kLightSums * n), to_n(3 * n), to_rho(n), to_light(3 * k), sums8(3 * kLightSums * n), to_n8(3 * n), to_rho8(n),
-        to_light8(3 * k);
+    std::vector<double> sums(3 * kLightSums * n), to_n(3 * n), to_rho(n), to_light(3 * k), sums8(3 * kLightSums * n),
+        to_n8(3 * n), to_rho8(n), to_light8(3 * k);
     const ToSharedLight<double> receive{k, visible.data(), to_light.data()};
     cpu::run(n, SharedLightBody<double>{k, normals.data(), views.data(), rho.data(), {light}, sums.data()});
-    cpu::run(n, SharedLightBackwardBody<double>{k, normals.data(), views.data(), rho.data(), {light}, g.data(),
-                                                to_n.data(), to_rho.data(), receive});
+    cpu::run(n,
+             SharedLightBackwardBody<double>{
+                 k, normals.data(), views.data(), rho.data(), {light}, g.data(), to_n.data(), to_rho.data(), receive});
     on_gpu(n, SumLightBody<double, ArrivingLight<double>>{
-                                k, normals.data(), views.data(), rho.data(), {light}, sums8.data()});
+                  k, normals.data(), views.data(), rho.data(), {light}, sums8.data()});
     on_gpu(n, SumLightBackwardBody<double, ArrivingLight<double>, ToSharedLight<double>>{
-                                k,
-                                normals.data(),
-                                views.data(),
-                                rho.data(),
-                                {light},
-                                g.data(),
-                                to_n8.data(),
-                                to_rho8.data(),
-                                {k, visible.data(), to_light8.data()}});
+                  k,
+                  normals.data(),
+                  views.data(),
+                  rho.data(),
+                  {light},
+                  g.data(),
+                  to_n8.data(),
+                  to_rho8.data(),
+                  {k, visible.data(), to_light8.data()}});
     expect_near(sums8, sums, 1e-13), expect_near(to_n8, to_n, 1e-13), expect_near(to_rho8, to_rho, 1e-13);
     expect_near(to_light8, to_light, 1e-13);
   }

@@ -59,7 +59,8 @@ template <class T> struct Pyramid {
   LightPyramid<T> view{};
 
   explicit Pyramid(Random& random) {
-    levels = random.uniforms<T>(3 * (16 * 16 + 8 * 8), 0.1, 1.1), sh = random.uniforms<T>(3 * kShCoefficients, -0.05, 0.05);
+    levels = random.uniforms<T>(3 * (16 * 16 + 8 * 8), 0.1, 1.1),
+    sh = random.uniforms<T>(3 * kShCoefficients, -0.05, 0.05);
     sh[0] = sh[1] = sh[2] = 3;
     for (const double factor : zonal_factors(0.5, 9)) zonal.push_back(T(factor));
     // So little of the constant that the sums lie about the floor, those of the second channel close to it.

@@ -20,8 +20,9 @@ TEST(PointKernels, SplitSumShading) {
           const auto rho = random.uniforms(n), metallic = random.uniforms(n), specular = random.uniforms(3 * n);
           const auto diffuse = random.uniforms(3 * n), o_s = random.uniforms(n * channels),
                      o_d = random.uniforms(n * channels), g = random.uniforms(3 * n, -1);
-          const ShadeArrays<const double> in{normals.data(),  views.data(),   albedo.data(), rho.data(), metallic.data(),
-                                             specular.data(), diffuse.data(), o_s.data(),    o_d.data()};
+          const ShadeArrays<const double> in{normals.data(), views.data(),    albedo.data(),
+                                             rho.data(),     metallic.data(), specular.data(),
+                                             diffuse.data(), o_s.data(),      o_d.data()};
           auto radiance = unwritten<double>(3 * n), grad = unwritten<double>(17 * n + 2 * n * channels);
           auto radiance1 = radiance, grad1 = grad;
           const auto parts = [&](double* p) {
@@ -73,12 +74,12 @@ TEST(PointKernels, QueryDirectionsAndShares) {
         return QueryDirectionBody<double>{brdf_lut(), mean, normals.data(), views.data(), rho.data(), to};
       };
       const auto backward = [&](double* to) {
-        return QueryDirectionBackwardBody<double>{brdf_lut(), mean,     normals.data(), views.data(), rho.data(),
-                                                  g.data(),   to,       to + 3 * n,     to + 6 * n};
+        return QueryDirectionBackwardBody<double>{brdf_lut(), mean, normals.data(), views.data(), rho.data(),
+                                                  g.data(),   to,   to + 3 * n,     to + 6 * n};
       };
       const auto shares = [&](double* to) {
-        return SpecularShareBody<double>{brdf_lut(),    normals.data(),  views.data(), albedo.data(),
-                                         rho.data(),    metallic.data(), to};
+        return SpecularShareBody<double>{
+            brdf_lut(), normals.data(), views.data(), albedo.data(), rho.data(), metallic.data(), to};
       };
       cpu::run(n, forward(out.data())), cpu::run(n, backward(grad.data())), cpu::run(n, shares(share.data()));
       on_gpu(n, forward(out1.data())), on_gpu(n, backward(grad1.data())), on_gpu(n, shares(share1.data()));
@@ -107,13 +108,18 @@ TEST(PointKernels, Interpolation) {
     const int64_t m = 40, channels = 3;
     std::vector<int64_t> first(n), second(n);
     for (int64_t i = 0; i < n; ++i) first[i] = random.below(m + 4) - 2, second[i] = random.below(m);
-    const auto share = random.uniforms(n), values = random.uniforms(m * channels), g = random.uniforms(n * channels, -1);
+    const auto share = random.uniforms(n), values = random.uniforms(m * channels),
+               g = random.uniforms(n * channels, -1);
     auto out = unwritten<double>(n * channels), out1 = out;
     std::vector<double> grad(m * channels), grad1(grad);
-    cpu::run(n * channels, InterpolateBody<double>{m, channels, first.data(), second.data(), share.data(), values.data(), out.data()});
-    on_gpu(n * channels, InterpolateBody<double>{m, channels, first.data(), second.data(), share.data(), values.data(), out1.data()});
-    cpu::run(n * channels, InterpolateBackwardBody<double>{m, channels, first.data(), second.data(), share.data(), g.data(), grad.data()});
-    on_gpu(n * channels, InterpolateBackwardBody<double>{m, channels, first.data(), second.data(), share.data(), g.data(), grad1.data()});
+    cpu::run(n * channels, InterpolateBody<double>{m, channels, first.data(), second.data(), share.data(),
+                                                   values.data(), out.data()});
+    on_gpu(n * channels,
+           InterpolateBody<double>{m, channels, first.data(), second.data(), share.data(), values.data(), out1.data()});
+    cpu::run(n * channels, InterpolateBackwardBody<double>{m, channels, first.data(), second.data(), share.data(),
+                                                           g.data(), grad.data()});
+    on_gpu(n * channels, InterpolateBackwardBody<double>{m, channels, first.data(), second.data(), share.data(),
+                                                         g.data(), grad1.data()});
     expect_near(out1, out, 1e-15), expect_near(grad1, grad, 1e-13);
   }
 }
@@ -131,11 +137,12 @@ TEST(PointKernels, PixelLosses) {
       const auto run = [&](const auto& launch) {
         std::vector<std::vector<double>> out{unwritten<double>(2), unwritten<double>(3 * n), unwritten<double>(n),
                                              unwritten<double>(n)};
-        launch(make_pixel_losses(n, mean.data(), opacity.data(), target.data(), background.data(),
-                                 whole.get(), linear, out[0].data(), out[1].data(), out[2].data(), out[3].data()));
+        launch(make_pixel_losses(n, mean.data(), opacity.data(), target.data(), background.data(), whole.get(), linear,
+                                 out[0].data(), out[1].data(), out[2].data(), out[3].data()));
         return out;
       };
-      const auto a = run([&](const auto& body) { cpu::run(n, body); }), b = run([&](const auto& body) { on_gpu(n, body); });
+      const auto a = run([&](const auto&body) { cpu::run(n, body); }),
+                 b = run([&](const auto&body) { on_gpu(n, body); });
       for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
     }
 }
@@ -174,7 +181,8 @@ TEST(PointKernels, MaterialLosses) {
                                           out[1].data(), out[2].data()});
         return out;
       };
-      const auto a = run([&](const auto& body) { cpu::run(n, body); }), b = run([&](const auto& body) { on_gpu(n, body); });
+      const auto a = run([&](const auto&body) { cpu::run(n, body); }),
+                 b = run([&](const auto&body) { on_gpu(n, body); });
       for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
     }
 }

@@ -13,13 +13,12 @@ namespace {
 
 // What a launch throws; empty where it throws nothing.
 template <class... Parameters, class... Arguments>
-std::string failure(void (*kernel)(Parameters...), dim3 grid, unsigned block, size_t bytes, const Arguments&... arguments) {
+std::string failure(void (*kernel)(Parameters...), dim3 grid, unsigned block, size_t bytes,
+                    const Arguments&... arguments) {
   Gpu gpu;
   try {
     launch(gpu.queue(), "test", kernel, grid, block, bytes, arguments...);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
+  } catch (const std::runtime_error& error) { return error.what(); }
   return "";
 }
 

@@ -67,8 +67,8 @@ TEST(GroupKernels, CachedOcclusionAndVisibility) {
     std::vector<double> o_d(3 * n), o_s(3 * n), i_d(few), i_s(few), o_d8(3 * n), o_s8(3 * n), i_d8(few), i_s8(few);
     cpu::run(n, CachedOcclusionBody<double>{cache, x.data(), normals.data(), lobes.data(), rho.data(), o_d.data(),
                                             o_s.data(), i_d.data(), i_s.data()});
-    on_gpu(n, CachedOcclusionBody<double>{cache, x.data(), normals.data(), lobes.data(), rho.data(),
-                                                        o_d8.data(), o_s8.data(), i_d8.data(), i_s8.data()});
+    on_gpu(n, CachedOcclusionBody<double>{cache, x.data(), normals.data(), lobes.data(), rho.data(), o_d8.data(),
+                                          o_s8.data(), i_d8.data(), i_s8.data()});
     expect_same_nan_and_near(o_d8, o_d), expect_same_nan_and_near(o_s8, o_s);
     expect_same_nan_and_near(i_d8, i_d), expect_same_nan_and_near(i_s8, i_s);
     EXPECT_TRUE(o_d[0] > 0 && o_d[0] < 1 && o_d[3] == 1 && std::isnan(o_d[6]));

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import torch
 from blender_data import look_at
 from tiny_runs import train
 
+from splitnerf.capture import masks as capture_masks
 from splitnerf.cli import main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.ground import find_table
@@ -243,6 +245,15 @@ def test_from_photos_without_masks_to_an_asset(tmp_path, capsys, monkeypatch):
     assert train(tmp_path / "data", run, *again) == 0 and overlap(run, masks) > 0.9  # found anew
     (run / SEPARATED / "separation.json").unlink()
     assert main(["evaluate", str(run), "--data", str(tmp_path / "data"), "--spp", "1"]) == 2
+
+
+def test_prepare_looks_for_the_table_in_the_field_where_sparse_points_show_none(tmp_path, monkeypatch):
+    """Or for a wall: before what all points lie on, the object is cut from it."""
+    masks = write_ball_on_floor(tmp_path)
+    monkeypatch.setattr(capture_masks, "train_field", lambda dataset, **_: TrueField(dataset.world_from_box))
+    found = capture_masks.find_masks(tmp_path, SimpleNamespace(table=False), 0, lambda share: None)
+    shares = [((a > 0.5) & b).sum() / ((a > 0.5) | b).sum() for a, b in zip(found, masks)]
+    assert np.mean(shares) > 0.9
 
 
 def test_photos_in_other_units_of_radiance(tmp_path, monkeypatch):

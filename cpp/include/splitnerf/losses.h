@@ -12,7 +12,7 @@ namespace splitnerf {
 inline constexpr double kSaturated = 254.0 / 255.0;  // of a photo's channel: the truth is at least as bright
 inline constexpr double kLeastOpacity = 1e-3;        // in the mask's logarithms
 
-inline constexpr double kMaskOfWhole = 0.1;          // what the mask of a whole pixel counts
+inline constexpr double kMaskOfWhole = 0.1;  // what the mask of a whole pixel counts
 
 // Squared error of a pixel against the photo, both over one background, summed over the channels, and the cross entropy of
 // its opacity against the mask, with their gradients. Where the photo is saturated the colour is clipped like it.
@@ -31,7 +31,8 @@ SPLITNERF_HD PixelLosses<T> pixel_losses(Vec3<T> mean, T opacity, const T* targe
   PixelLosses<T> out{};
   for (int k = 0; k < 3; ++k) {
     const bool mixed = whole && linear;  // object and background before the curve, else behind it
-    const T b = mixed ? linear_from_srgb(background[k]) : background[k], x = mixed ? lerp(b, mean[k], opacity) : mean[k];
+    const T b = mixed ? linear_from_srgb(background[k]) : background[k],
+            x = mixed ? lerp(b, mean[k], opacity) : mean[k];
     ValueAndSlope<T> c = linear ? srgb_from_linear(x) : ValueAndSlope<T>{x, T(1)};
     if (target[k] >= T(kSaturated) && c.value > T(1)) c = {T(1), T(0)};
     const T error = (mixed ? c.value : lerp(b, c.value, opacity)) - (whole ? target[k] : lerp(b, target[k], target[3]));

@@ -20,8 +20,8 @@ from splitnerf.data.normalisation import transform_points
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.notes import note
-from splitnerf.separation.job import find_object
-from splitnerf.separation.masks import find_mask
+from splitnerf.separation.job import find_object, table_under
+from splitnerf.separation.masks import find_mask, surface_points
 from splitnerf.separation.table import Table
 from splitnerf.separation.training import train_field
 
@@ -43,8 +43,9 @@ def find_masks(out: Path, world: World, seed: int, report: Callable[[float], Non
     photos = load_dataset(out, "train", 1, Reading("all"), masked=False)
     to_box = photos.box_from_world
     field = train_field(photos, steps=STEPS, minutes=0.0, seed=seed, report=lambda share, _: report(0.8 * share))
-    table = Table(np.array([0.0, 0, 1]), float(to_box[2, 3])) if world.table else None
-    region, _ = find_object(field, photos, table)
+    points = surface_points(field, photos)
+    table = Table(np.array([0.0, 0, 1]), float(to_box[2, 3])) if world.table else table_under(points, photos, seed)
+    region, _ = find_object(field, photos, table, points)
     masks = []
     for i in range(len(photos)):
         masks.append(find_mask(field, region, photos, i))

@@ -27,8 +27,9 @@ namespace cuda_on_cpu {
 namespace {
 
 constexpr int kWarp = 32, kMostThreads = 1024, kMostBlocksInY = 65535;
-constexpr size_t kMostSharedBytes = 227 * 1024, kSharedBytesUnasked = 48 * 1024;  // of a block, on compute capability 9.0
-constexpr size_t kGap = 64;  // bytes between variables in shared memory, at least
+constexpr size_t kMostSharedBytes = 227 * 1024,
+                 kSharedBytesUnasked = 48 * 1024;  // of a block, on compute capability 9.0
+constexpr size_t kGap = 64;                        // bytes between variables in shared memory, at least
 constexpr size_t kArena = kMostSharedBytes + 16 * kGap;
 constexpr size_t kStackBytes = 64 * 1024;
 
@@ -193,8 +194,9 @@ class Block {
   size_t dynamic_bytes_, taken_ = 0, used_ = 0;
   char* stacks_;
   ucontext_t scheduler_;
-  std::vector<char> meeting_;  // addresses that stand for the warps and for the block; in memory of its own, so that no other
-                               // block has them
+  std::vector<char>
+      meeting_;  // addresses that stand for the warps and for the block; in memory of its own, so that no other
+                 // block has them
   char end_;
 #if defined(__SANITIZE_ADDRESS__)
   void* fake_stack_ = nullptr;
@@ -270,10 +272,14 @@ std::string place_of(CallSite site) {
 }
 const char* name_of(Operation operation) {
   switch (operation) {
-    case Operation::kBarrier: return "__syncthreads";
-    case Operation::kWarpBarrier: return "__syncwarp";
-    case Operation::kShuffle: return "a shuffle";
-    case Operation::kBallot: return "a ballot";
+    case Operation::kBarrier:
+      return "__syncthreads";
+    case Operation::kWarpBarrier:
+      return "__syncwarp";
+    case Operation::kShuffle:
+      return "a shuffle";
+    case Operation::kBallot:
+      return "a ballot";
   }
   return "";
 }
@@ -393,7 +399,8 @@ void run(const void* kernel, dim3 grid, dim3 block, size_t bytes, const std::fun
         for (unsigned x = 0; x < grid.x; ++x) {
           Block one(thread, {x, y, z}, grid, block, bytes, order);
           one.run();
-          if (one.static_bytes() > kSharedBytesUnasked) throw Failure{"more shared memory of variables than a block can have"};
+          if (one.static_bytes() > kSharedBytesUnasked)
+            throw Failure{"more shared memory of variables than a block can have"};
         }
   } catch (const Failure& failure) {
     last_error = failure.message;

@@ -105,13 +105,15 @@ template <class T> T add_atomically(T* to, T value) {
 #define CUDA_ON_CPU_HERE (cuda_on_cpu::CallSite{__FILE__, __LINE__})
 #define __syncthreads() cuda_on_cpu::barrier(CUDA_ON_CPU_HERE)
 #define __syncwarp() \
-  static_cast<void>(cuda_on_cpu::exchange(cuda_on_cpu::Operation::kWarpBarrier, ~0u, 0, cuda_on_cpu::lane(), CUDA_ON_CPU_HERE))
-#define __shfl_sync(mask, value, from) cuda_on_cpu::shuffle(mask, value, (from) & 31, CUDA_ON_CPU_HERE)
+  static_cast<void>( \
+      cuda_on_cpu::exchange(cuda_on_cpu::Operation::kWarpBarrier, ~0u, 0, cuda_on_cpu::lane(), CUDA_ON_CPU_HERE))
+#define __shfl_sync(mask, value, from) cuda_on_cpu::shuffle(mask, value, (from)&31, CUDA_ON_CPU_HERE)
 #define __shfl_xor_sync(mask, value, bits) \
   cuda_on_cpu::shuffle(mask, value, cuda_on_cpu::lane() ^ (bits), CUDA_ON_CPU_HERE)
-#define __shfl_up_sync(mask, value, step)                                                                    \
-  cuda_on_cpu::shuffle(mask, value, cuda_on_cpu::lane() < int(step) ? cuda_on_cpu::lane()                    \
-                                                                    : cuda_on_cpu::lane() - int(step), CUDA_ON_CPU_HERE)
+#define __shfl_up_sync(mask, value, step)                                                                       \
+  cuda_on_cpu::shuffle(mask, value,                                                                             \
+                       cuda_on_cpu::lane() < int(step) ? cuda_on_cpu::lane() : cuda_on_cpu::lane() - int(step), \
+                       CUDA_ON_CPU_HERE)
 #define __ballot_sync(mask, yes) cuda_on_cpu::ballot(mask, yes, CUDA_ON_CPU_HERE)
 
 inline int __popc(unsigned word) { return __builtin_popcount(word); }
@@ -134,9 +136,9 @@ inline float4 atomicAdd(float4* to, float4 v) {
 }
 
 // Shared memory, and a launch, as launch.cuh writes them.
-#define SPLITNERF_SHARED(type, name, dims)        \
-  static const char name##_variable = 0;          \
-  using name##_shape = type dims;                 \
+#define SPLITNERF_SHARED(type, name, dims) \
+  static const char name##_variable = 0;   \
+  using name##_shape = type dims;          \
   name##_shape& name = *static_cast<name##_shape*>(cuda_on_cpu::shared_memory(&name##_variable, sizeof(name##_shape)))
 #define SPLITNERF_DYNAMIC_SHARED(name) \
   unsigned char* const name = static_cast<unsigned char*>(cuda_on_cpu::dynamic_shared_memory())

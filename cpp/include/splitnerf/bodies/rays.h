@@ -274,9 +274,10 @@ template <class T> struct SpreadFillBody {
     const SampleRange samples = rays.samples_of(r);
     const int64_t begin = samples.first, at = drawn[r], n_drawn = drawn[r + 1] - at;
     if (n_drawn == 0 || !to.has_room(drawn[r + 1], stretches[r + 1])) return;
-    int64_t k = at;
-    spread_by_weight(weights + begin, t + begin, samples.n, gap, per_ray, double(phase[r]),
-                     [&](int64_t i) { to.shaded[k++] = begin + i; });
+    int64_t k = at;  // bounded: a compiler may round here in another way than where the samples were counted
+    spread_by_weight(weights + begin, t + begin, samples.n, gap, per_ray, double(phase[r]), [&](int64_t i) {
+      if (k < at + n_drawn) to.shaded[k++] = begin + i;
+    });
     const SpreadRay<T> ray{weights, t, begin, begin + samples.n, to.shaded, at, n_drawn};
     to.heaviest[filled[r]] = heaviest_drawn(ray);
     arrange_spread(ray, gap, stretches[r], first, second, share, to.leaders + stretches[r], to.stretch);
