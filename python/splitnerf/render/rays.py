@@ -94,9 +94,7 @@ class PixelSource:
             of large photos are smaller by `hull_factor`, a pixel being true where one within it is.
     """
 
-    def __init__(
-        self, dataset: Dataset, foreground_share: float, generator: torch.Generator, edge_pixels: int = 0
-    ):
+    def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator, edge_pixels: int = 0):
         self.device = generator.device
         self.poses, self.intrinsics = (torch.from_numpy(x).to(self.device) for x in (dataset.poses, dataset.intrinsics))
         self.pixels = PixelReader(dataset.images, self.device)
