@@ -280,3 +280,5 @@ class TestChoice:
         assert "note: trains on the GPU: the Big GPU passes" in capsys.readouterr().err
         assert device_for("auto", True) == "cpu"
         assert "note: trains on the CPU: no GPU repeats bits" in capsys.readouterr().err
+        gpu(there=False)
+        assert device_for("auto", False) == "cpu" and not capsys.readouterr().err

@@ -12,7 +12,7 @@ from splitnerf import _core
 ON_THE_CPU_ALONE = {  # Embree; once a mesh
     "trace_visibility", "occlusion_factors", "incoming_light", "visibility_bits", "vertex_grids"
 }  # fmt: skip
-WRITES_TO_ARGUMENTS = {"adamw_step_"}  # has no outputs: see test_ops_adamw.py
+WRITES_TO_ARGUMENTS = {"adamw_step_", "adamw_steps_"}  # have no outputs: see test_ops_adamw.py
 
 
 # Largest error, relative to the largest number of an output.

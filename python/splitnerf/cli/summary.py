@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 
-def print_summary(run: Path, evaluation: dict, step: int | None = None, seconds: float | None = None) -> None:
-    """Prints the errors against the truth in the data, and the path of the results."""
+def print_summary(
+    run: Path, evaluation: dict, step: int | None = None, seconds: float | None = None, device: str = "cpu"
+) -> None:
+    """Prints the steps and where they were made, the errors against the truth in the data, and the path of the results."""
     if step is not None and seconds is not None:
-        print(f"{step} steps in {seconds:.0f} s")
+        print(f"{step} steps in {seconds:.0f} s on the {'CPU' if device == 'cpu' else 'GPU'}")
     print_last_stage(evaluation.get("last_stage"))
     print_scores(evaluation)
     print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")

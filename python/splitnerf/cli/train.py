@@ -115,19 +115,22 @@ def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object]) -
         where = "in the last stage" if trained.finished else f"at step {trained.step}"
         print(f"stopped {where}; the state is in {run}. To go on, repeat the command with --resume.")
         return INTERRUPTED
-    print_summary(run, evaluation, trained.step, trained.seconds)
+    print_summary(run, evaluation, trained.step, trained.seconds, device.type)
     return DONE
 
 
 def device_for(wanted: str, deterministic: bool) -> str:
-    """The name of the device that is asked for; for ``auto`` of one that is fit, and a note says which and why."""
+    """The name of the device that is asked for; for ``auto`` of one that is fit, and a note says why where torch finds a GPU."""
+    import torch
+
     from splitnerf.doctor.choice import fit_device
     from splitnerf.notes import note
 
     if wanted != "auto":
         return wanted
     device, why = ("cpu", "no GPU repeats bits") if deterministic else fit_device()
-    note(f"trains on the {'GPU' if device == 'cuda' else 'CPU'}: {why}")
+    if torch.cuda.is_available():
+        note(f"trains on the {'GPU' if device == 'cuda' else 'CPU'}: {why}")
     return device
 
 
