@@ -1,10 +1,12 @@
 #include "splitnerf/path_tracer.h"
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "path_integrator.h"
@@ -17,6 +19,7 @@ using Vec = Vec3<float>;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr int64_t kPixelsPerTask = 64;
+constexpr std::chrono::milliseconds kPause{100};  // between two calls of `between`
 
 constexpr int kCameraRays = 64;  // of a pixel, traced together
 
@@ -227,7 +230,7 @@ void check_surface(const char* caller, const Scene& scene, const Surface& surfac
 }
 
 int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
-               const PathTracerParams& params, const RenderTargets& targets) {
+               const PathTracerParams& params, const RenderTargets& targets, const std::function<void()>& between) {
   const char* caller = "render";
   const Checks check{caller};
   check.require(camera.width > 0 && camera.height > 0, "camera width and height must be positive");
@@ -243,10 +246,16 @@ int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap&
 
   const PathTracer tracer(scene, surface, environment, camera, params);
   std::atomic<int64_t> n_rays{0};
-  parallel_for(int64_t(camera.width) * camera.height, kPixelsPerTask, [&](int64_t begin, int64_t end) {
+  const auto calling_thread = std::this_thread::get_id();
+  auto next_call = std::chrono::steady_clock::now() + kPause;
+  parallel_for_uneven(int64_t(camera.width) * camera.height, kPixelsPerTask, [&](int64_t begin, int64_t end) {
     Worker worker;
     for (int64_t pixel = begin; pixel < end; ++pixel) tracer.render_pixel(pixel, worker, targets);
     n_rays += worker.path.n_rays;
+    if (between && std::this_thread::get_id() == calling_thread && std::chrono::steady_clock::now() > next_call) {
+      between();
+      next_call = std::chrono::steady_clock::now() + kPause;
+    }
   });
   return n_rays;
 }

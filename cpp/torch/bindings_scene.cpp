@@ -147,6 +147,12 @@ py::array_t<float> pixel_filter_offsets(const py::object& u, const std::string& 
   return offsets;
 }
 
+// Runs Python's handlers of signals that came meanwhile, so that Ctrl-C ends a long call.
+void raise_what_signals_ask() {
+  py::gil_scoped_acquire acquire;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+}
+
 py::dict render(const PyScene& self, const py::object& albedo, const py::object& roughness, const py::object& metallic,
                 const py::object& environment, const py::object& camera_to_world, float fx, float fy, float cx,
                 float cy, int width, int height, const py::object& normals, const std::string& materials_per,
@@ -215,7 +221,7 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
   int64_t n_rays;
   {
     py::gil_scoped_release release;
-    n_rays = splitnerf::render(*self.scene, surface, light, camera, params, targets);
+    n_rays = splitnerf::render(*self.scene, surface, light, camera, params, targets, raise_what_signals_ask);
   }
   images["rays"] = n_rays;
   return images;
@@ -301,9 +307,10 @@ void bind_scene(py::module_& m) {
         "(alpha + shadow <= 1); and rays, the number of rays traced.\n"
         "Equal seeds give equal images.");
 
-  m.def("pixel_filter_offsets", &pixel_filter_offsets, py::arg("u"), py::arg("pixel_filter") = "blackman-harris",
-        "Offsets from a pixel's centre, in pixels, at which shares u [n] float32 in [0, 1) of the filter lie below; see "
-        "render.");
+  m.def(
+      "pixel_filter_offsets", &pixel_filter_offsets, py::arg("u"), py::arg("pixel_filter") = "blackman-harris",
+      "Offsets from a pixel's centre, in pixels, at which shares u [n] float32 in [0, 1) of the filter lie below; see "
+      "render.");
 
   m.def(
       "embree_version", [] { return std::string(splitnerf::embree_version()); },

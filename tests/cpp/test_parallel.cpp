@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 namespace splitnerf {
@@ -32,6 +34,38 @@ TEST(Parallel, ExceptionsReachTheCaller) {
   EXPECT_THROW(fail_at(0), std::runtime_error);
   EXPECT_THROW(fail_at(9999), std::runtime_error);
   EXPECT_NO_THROW(fail_at(10000));
+}
+
+TEST(Parallel, UnevenWorkIsDoneOnce) {
+  for (const int64_t n : {0, 1, 7, 1000, 100003}) {
+    std::vector<std::atomic<int>> visits(n);
+    parallel_for_uneven(n, 64, [&](int64_t begin, int64_t end) {
+      ASSERT_TRUE(0 <= begin && begin < end && end <= n && end - begin <= 64);
+      for (int64_t i = begin; i < end; ++i) ++visits[i];
+    });
+    for (int64_t i = 0; i < n; ++i) ASSERT_EQ(visits[i], 1) << i << " of " << n;
+  }
+}
+
+TEST(Parallel, NoMoreUnevenWorkIsTakenAfterAnExceptionWhichKeepsItsType) {
+  static const auto without_exceptions = [](int64_t n, int64_t, RangeBody body, void* context) {
+    try {
+      body(0, n, context);
+    } catch (...) { throw "a pool that passes on no types"; }
+  };
+  std::atomic<int64_t> done{0};
+  const auto fail_at_100 = [&] {
+    parallel_for_uneven(2000, 1, [&](int64_t begin, int64_t) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));  // so that all threads are at work
+      if (begin == 100) throw std::runtime_error("bad item");
+      ++done;
+    });
+  };
+  EXPECT_THROW(fail_at_100(), std::runtime_error);
+  EXPECT_LT(done, 1000);
+  set_parallel_backend(without_exceptions);
+  EXPECT_THROW(fail_at_100(), std::runtime_error);
+  set_parallel_backend(nullptr);
 }
 
 TEST(Parallel, BackendCanBeReplacedAndRestored) {

@@ -30,8 +30,10 @@ class Gpu {
   std::vector<std::unique_ptr<void, Free>> pieces_;
 };
 
+// Runs a body for no item, then for n.
 template <class Body> void on_gpu(int64_t n, const Body& body) {
   Gpu gpu;
+  cuda::run(gpu.queue(), "on_gpu", 0, body);
   cuda::run(gpu.queue(), "on_gpu", n, body);
 }
 

@@ -48,10 +48,9 @@ def test_what_is_drawn_fills_its_range():
 
 def test_whole_pixels_are_seen_before_what_lies_behind_them():
     """And all others before random colours, which do not change by that."""
-    near, behind = np.zeros((40, 50), bool), np.arange(12, dtype=np.uint8).reshape(4, 3)
-    numbers = torch.tensor([0, 7, 8, 1999])
-    near.ravel()[numbers] = True
-    batch, plain = drawn(edges=EdgePixels([(near, behind)], 2000, torch.device("cpu"))), drawn()
+    numbers, behind = torch.tensor([0, 7, 8, 1999]), np.arange(12, dtype=np.uint8).reshape(4, 3)
+    runs = np.array([0, 7, 1999]), np.array([1, 9, 2000])
+    batch, plain = drawn(edges=EdgePixels([(runs, behind)], 2000, torch.device("cpu"))), drawn()
     assert torch.equal(batch.whole.nonzero()[:, 0], numbers) and not plain.whole.any()
     torch.testing.assert_close(batch.background[numbers], torch.from_numpy(behind) / 255)
     assert torch.equal(batch.background[~batch.whole], plain.background[~batch.whole])

@@ -64,7 +64,10 @@ def test_pixels_of_which_nothing_is_known_outside_are_no_edges():
     image = photo(square(), 0.9, np.full((40, 60), 0.25))
     known = np.ones((40, 60), bool)
     known[:, 40:] = False  # right of the object, where its mask ends at column 40
-    near, behind = edge_of(image[..., :3], image[..., 3], known, 2)
+    (starts, ends), behind = edge_of(image[..., :3], image[..., 3], known, 2)
+    near = np.zeros((40, 60), bool)
+    for start, end in zip(starts, ends):
+        near.reshape(-1)[start:end] = True
     assert not near[:, 40:].any() and near[:, 39].any() and near[20].sum() == 4
     assert behind.shape == (near.sum(), 3) and (behind == 64).all()
 

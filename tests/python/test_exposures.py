@@ -138,7 +138,7 @@ class TestLoss:
 
     def test_srgb_samples_are_compared_at_an_exposure_of_one(self):
         """And so is what lies behind the object at the masks' edges."""
-        edges = EdgePixels([(np.ones((1, 1), bool), np.uint8([[51, 76, 102]]))], 1, CPU)
+        edges = EdgePixels([((np.array([0]), np.array([1])), np.uint8([[51, 76, 102]]))], 1, CPU)
         batch = self.batch(0.5, edges, compositing="srgb", shading="split")
         assert torch.equal(batch.exposure, torch.ones(1, 3)) and batch.whole.item()
         behind = srgb_to_linear(np.float32([51, 76, 102]) / 255)

@@ -135,3 +135,19 @@ def test_reduced_masks_lose_no_pixel():
     mask = torch.zeros(10, 11, dtype=torch.bool)
     mask[3, 7] = mask[9, 0] = True
     assert reduced(mask, 2).nonzero().tolist() == [[1, 3], [4, 0]]
+
+
+class Requests(list):
+    """Stands in for a file: the bytes that the system was asked to read."""
+
+    def madvise(self, advice, start, size):
+        self.append((start, size))
+
+
+def test_a_photo_is_asked_for_in_parts_that_the_system_takes_whole():
+    requests = Requests()
+    pixels._ask_for(requests, start=5000, size=500_000)
+    ends = [start + size for start, size in requests]
+    assert all(size <= 128 * 1024 and start % 4096 == 0 for start, size in requests)
+    assert [start for start, _ in requests] == [4096, *ends[:-1]]
+    assert ends[-1] == 505_000

@@ -2,6 +2,8 @@
 
 import json
 import os
+import signal
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -181,3 +183,32 @@ def test_looks_as_in_blender(scene, least):
     straight = maps["radiance"] / np.maximum(maps["alpha"], 1e-8)[..., None]
     image = over_background(np.clip(linear_to_srgb(straight), 0, 1), maps["alpha"])
     assert psnr(image, over_background(truth[..., :3], truth[..., 3])) > least
+
+
+class Asked(Exception):
+    """What the test's signal raises."""
+
+
+def test_a_signal_ends_a_rendering():
+    """The handler runs while views are rendered: it would run but once if it waited for their end."""
+    calls, done = [], threading.Event()
+
+    def handler(number, frame) -> None:
+        calls.append(number)
+        if len(calls) == 3:
+            raise Asked
+
+    def ask() -> None:
+        while not done.wait(0.02):
+            os.kill(os.getpid(), signal.SIGUSR1)
+
+    previous = signal.signal(signal.SIGUSR1, handler)
+    asking = threading.Thread(target=ask)
+    try:
+        asking.start()
+        with pytest.raises(Asked):
+            render(square(Material()), spp=1 << 15)
+    finally:
+        done.set()
+        asking.join()
+        signal.signal(signal.SIGUSR1, previous)

@@ -11,8 +11,7 @@ namespace splitnerf {
 
 inline constexpr double kSaturated = 254.0 / 255.0;  // of a photo's channel: the truth is at least as bright
 inline constexpr double kLeastOpacity = 1e-3;        // in the mask's logarithms
-
-inline constexpr double kMaskOfWhole = 0.1;  // what the mask of a whole pixel counts
+inline constexpr double kMaskOfWhole = 0.1;          // what the mask of a whole pixel counts
 
 // Squared error of a pixel against the photo, both over one background, summed over the channels, and the cross entropy of
 // its opacity against the mask, with their gradients. Where the photo is saturated the colour is clipped like it.

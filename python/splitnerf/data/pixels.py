@@ -19,6 +19,7 @@ from splitnerf.errors import InputError
 from splitnerf.memory import SHARE_OF_PHOTOS, memory_bytes
 
 GB = 10**9
+READ_AHEAD = 1 << 17  # bytes that Linux reads at one request, by default; it takes no more of a longer one
 _in_memory: WeakValueDictionary[int, np.ndarray] = WeakValueDictionary()  # the arrays of all photos that are there
 
 
@@ -192,5 +193,6 @@ def forget_pages(array: np.ndarray) -> None:
 
 def _ask_for(file: mmap.mmap, start: int, size: int) -> None:
     """Has the system begin to read bytes of a file, so that its pages are not waited for one by one."""
-    begin = start - start % mmap.PAGESIZE
-    file.madvise(mmap.MADV_WILLNEED, begin, start + size - begin)
+    begin, end = start - start % mmap.PAGESIZE, start + size
+    for part in range(begin, end, READ_AHEAD):
+        file.madvise(mmap.MADV_WILLNEED, part, min(READ_AHEAD, end - part))

@@ -121,7 +121,7 @@ class AdamW(torch.optim.Optimizer):
         for group in self.param_groups:
             for param in group["params"]:
                 if param.grad is not None:
-                    shared = param.dtype, param.device, group["betas"], group["eps"]
+                    shared = param.dtype, param.device, tuple(group["betas"]), group["eps"]
                     together.setdefault(shared, []).append((param, group))
         for (_, _, betas, eps), members in together.items():
             self._step(members, *betas, eps)
@@ -153,5 +153,5 @@ class AdamW(torch.optim.Optimizer):
         return state
 
 
-for _op in ("adamw_step_", "adamw_steps_"):
-    torch.library.register_fake(f"splitnerf::{_op}", lambda *arguments: None)
+torch.library.register_fake("splitnerf::adamw_step_", lambda *arguments: None)
+torch.library.register_fake("splitnerf::adamw_steps_", lambda *arguments: None)

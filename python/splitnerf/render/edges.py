@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from splitnerf.render.masks import runs_of, widened
+from splitnerf.render.masks import joined, runs_of, widened
 
 PARTLY = 0.02, 0.98  # coverage between which a pixel lies on an edge
 
@@ -25,9 +25,10 @@ class EdgePixels:
         device: Where the pixels are looked up.
     """
 
-    def __init__(self, photos: list[tuple[np.ndarray, np.ndarray]], n_pixels: int, device: torch.device):
-        runs = [runs_of(torch.from_numpy(near)) for near, _ in photos]
-        starts, ends = (np.concatenate([run[k] + i * n_pixels for i, run in enumerate(runs)]) for k in (0, 1))
+    def __init__(
+        self, photos: list[tuple[tuple[np.ndarray, np.ndarray], np.ndarray]], n_pixels: int, device: torch.device
+    ):
+        starts, ends = joined([runs for runs, _ in photos], n_pixels)
         before = np.cumsum(ends - starts) - (ends - starts)
         self.starts, self.shift = (torch.from_numpy(x).to(device) for x in (starts, before - starts))
         self.ends = torch.from_numpy(ends).to(device)
@@ -47,9 +48,9 @@ class EdgePixels:
 
 def edge_of(
     colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """The pixels [H, W] bool of a photo within a band along its mask's edges, and the sRGB colours [k, 3] uint8 behind the object
-    there, row by row.
+) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """The pixels of a photo within a band along its mask's edges as runs (see :func:`splitnerf.render.masks.runs_of`), and the
+    sRGB colours [k, 3] uint8 behind the object there.
 
     Args:
         colours: [H, W, 3] sRGB, whole numbers or floats in [0, 1].
@@ -64,7 +65,7 @@ def edge_of(
     near = np.zeros_like(near)
     near.reshape(-1)[place] = True
     scale = 255 if colours.dtype.kind == "f" else 255 / np.iinfo(colours.dtype).max
-    return near, (behind * np.float32(scale) + np.float32(0.5)).astype(np.uint8)
+    return runs_of(torch.from_numpy(near)), (behind * np.float32(scale) + np.float32(0.5)).astype(np.uint8)
 
 
 def band(alpha: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:

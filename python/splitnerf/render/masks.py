@@ -49,14 +49,19 @@ class PixelRuns:
     @classmethod
     def of(cls, runs: list[tuple[np.ndarray, np.ndarray]], n_pixels: int, device: torch.device) -> PixelRuns:
         """The runs (see :func:`runs_of`) of photos with as many pixels."""
-        starts, ends = (np.concatenate([run[k] + i * n_pixels for i, run in enumerate(runs)]) for k in (0, 1))
-        return cls(starts, ends, device)
+        return cls(*joined(runs, n_pixels), device)
 
     def __len__(self) -> int:
         return self.count
 
     def __getitem__(self, ranks: Tensor) -> Tensor:
         return ranks + self.shift[torch.searchsorted(self.last, ranks, right=True)]
+
+
+def joined(runs: list[tuple[np.ndarray, np.ndarray]], n_pixels: int) -> tuple[np.ndarray, np.ndarray]:
+    """The runs of photos with as many pixels, their pixels counted through all photos."""
+    starts, ends = (np.concatenate([run[k] + i * n_pixels for i, run in enumerate(runs)]) for k in (0, 1))
+    return starts, ends
 
 
 def runs_of(mask: Tensor) -> tuple[np.ndarray, np.ndarray]:

@@ -194,9 +194,8 @@ class Block {
   size_t dynamic_bytes_, taken_ = 0, used_ = 0;
   char* stacks_;
   ucontext_t scheduler_;
-  std::vector<char>
-      meeting_;  // addresses that stand for the warps and for the block; in memory of its own, so that no other
-                 // block has them
+  // Addresses that stand for the warps and for the block, in memory of its own, so that no other block has them; and for its end.
+  std::vector<char> meeting_;
   char end_;
 #if defined(__SANITIZE_ADDRESS__)
   void* fake_stack_ = nullptr;
