@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import signal
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -28,7 +29,7 @@ from splitnerf.evaluate.jobs import Protocol, score_asset
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.refinement import job
-from splitnerf.refinement.fit import RefinementSettings, Stage
+from splitnerf.refinement.fit import Refinement, RefinementSettings, Stage
 from splitnerf.refinement.job import OtherState, refine_folder
 from splitnerf.report.last_stage import KNOWN_COLOURS, UNKNOWN_COLOURS, coloured, last_stage_section
 
@@ -222,6 +223,39 @@ def test_a_stage_goes_on_from_each_of_its_states(painted, folder, monkeypatch):
     assert parts.sweeps[-1].seconds > seconds > parts.sweeps[0].seconds and parts.outline == whole.outline
     assert [s.error for s in parts.sweeps] == [s.error for s in whole.sweeps]
     assert bytes_of(folder / "parts", *DELIVERED[:4]) == bytes_of(folder / "whole", *DELIVERED[:4])
+
+
+def within(sweep: int) -> Callable:
+    """Refinement.gather, which sends SIGINT to this process before the second batch of a sweep, counted from 0."""
+    gather = Refinement.gather
+
+    def interrupted(fit, surface):
+        error = gather(fit, surface)
+        if fit.n_sweeps == sweep:
+            os.kill(os.getpid(), signal.SIGINT)
+            raise AssertionError("the sweep goes on")
+        return error
+
+    return interrupted
+
+
+def test_a_signal_ends_a_sweep(painted, folder, monkeypatch):
+    """It may take longer than the second that there is; the stage goes on from the sweep's beginning, with the bits of the whole."""
+    whole = refine_folder(folder, painted[1], folder / "whole", QUICK)
+    for n in (0, 2):
+        with monkeypatch.context() as patch:
+            patch.setattr(Refinement, "gather", within(n))
+            assert refine_folder(folder, painted[1], folder / "parts", QUICK, resume=n > 0) is None
+        assert len(read_tensors(folder / "parts" / "refinement.pt")["sweeps"]) == n
+    parts = refine_folder(folder, painted[1], folder / "parts", QUICK, resume=True)
+    assert [s.error for s in parts.sweeps] == [s.error for s in whole.sweeps]
+    assert bytes_of(folder / "parts", *DELIVERED[:4]) == bytes_of(folder / "whole", *DELIVERED[:4])
+
+
+def test_a_signal_ends_the_preparations(painted, folder, monkeypatch):
+    monkeypatch.setattr(job, "Stage", lambda *_: os.kill(os.getpid(), signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        refine_folder(folder, painted[1], folder, QUICK)
 
 
 def test_the_state_is_kept_from_time_to_time(painted, folder, monkeypatch):

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import platform
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import torch
@@ -14,6 +18,7 @@ from splitnerf.data.images import read_image
 from splitnerf.data.pixels import Photos, PixelReader, decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
+from splitnerf.memory import give_back
 from splitnerf.render.masks import PixelRuns, reduced, runs_of, widened
 from splitnerf.training import loop
 from tiny_runs import tiny
@@ -151,3 +156,28 @@ def test_a_photo_is_asked_for_in_parts_that_the_system_takes_whole():
     assert all(size <= 128 * 1024 and start % 4096 == 0 for start, size in requests)
     assert [start for start, _ in requests] == [4096, *ends[:-1]]
     assert ends[-1] == 505_000
+
+
+GAPS = """
+import re
+from pathlib import Path
+import numpy as np
+from splitnerf.memory import give_back
+
+def resident():
+    return 1024 * int(re.search(r"RssAnon:\\s+(\\d+)", Path("/proc/self/status").read_text())[1])
+
+np.ones(10**6)  # once it is freed, glibc takes arrays of this size from its heap
+arrays = [(np.ones(5 * 10**5), np.ones(10**4)) for _ in range(50)]
+small, before = [few for _, few in arrays], resident()
+del arrays
+give_back()
+print(before - resident(), sum(few.sum() for few in small))
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc is asked")
+def test_freed_memory_between_arrays_that_stay_is_given_back():
+    """In a process of its own, whose memory has no gaps yet."""
+    said = subprocess.run([sys.executable, "-c", GAPS], capture_output=True, text=True, check=True).stdout.split()
+    assert int(said[0]) > 0.9 * 50 * 4e6 and float(said[1]) == 50 * 1e4

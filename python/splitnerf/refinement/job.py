@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import hashlib
 import math
@@ -101,15 +102,19 @@ class StateFile:
             raise OtherState(f"{self.path}: is of another asset, other photos or settings; delete it to begin anew")
         return content
 
-    def save(self, stage: Stage) -> None:
-        """Writes the state. Raises OSError where the disk is full; the old file is kept."""
-        write_tensors(self.path, {"format": STATE_FORMAT, "origin": self.origin, **stage.state()})
+    def take(self, stage: Stage) -> None:
+        """Remembers the state of a stage that has made its sweeps to their ends."""
+        self.content = copy.deepcopy(stage.state())
+
+    def save(self) -> None:
+        """Writes the state that was taken last. Raises OSError where the disk is full; the old file is kept."""
+        write_tensors(self.path, {"format": STATE_FORMAT, "origin": self.origin, **self.content})
         self.saved_at = time.monotonic()
 
-    def save_if_due(self, stage: Stage) -> None:
+    def save_if_due(self) -> None:
         """Writes the state where the last one is old enough."""
         if time.monotonic() - self.saved_at > 60.0 * self.minutes:
-            self.save(stage)
+            self.save()
 
 
 def origin_of(source: Path, dataset: Dataset, settings: RefinementSettings) -> str:
@@ -124,7 +129,7 @@ def origin_of(source: Path, dataset: Dataset, settings: RefinementSettings) -> s
 def refine_folder(
     source: Path, dataset: Dataset, out: Path, settings: RefinementSettings, *, resume: bool = False, save_minutes: float = 2.0
 ) -> Refined | None:
-    """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it after the sweep and keeps its state.
+    """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it and keeps the state before the sweep.
 
     Args:
         source: The folder of mesh.glb and environment.exr.
@@ -146,15 +151,21 @@ def refine_folder(
     asset, light = read_source(source)
     out.mkdir(parents=True, exist_ok=True)
     kept = StateFile(out, origin_of(source, dataset, settings), save_minutes)
+    stage = begin(dataset, asset, light, settings, kept.load() if resume else None, kept.path)
     with Interrupt() as interrupt:
-        stage = begin(dataset, asset, light, settings, kept.load() if resume else None, kept.path)
+        complete = True
+        kept.take(stage)
         with Progress(stage.progress) as bar:
             while stage.progress < 1.0 and not interrupt.asked:
-                stage.advance()
-                kept.save_if_due(stage)
-                bar.show(stage.progress, told(stage))
-        if stage.progress < 1.0:
-            kept.save(stage)
+                n_sweeps = len(stage.sweeps)
+                interrupt.attempt(stage.advance)
+                complete = len(stage.sweeps) > n_sweeps
+                if complete:
+                    kept.take(stage)
+                    kept.save_if_due()
+                    bar.show(stage.progress, told(stage))
+        if not complete or stage.progress < 1.0:
+            kept.save()
             return None
     refined = stage.result()
     write_glb(out / "mesh.glb", refined.asset, occlusion_texture(refined.asset))

@@ -12,6 +12,7 @@ from torch.nn import functional as F
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import PixelReader
 from splitnerf.devices import tensor_cores
+from splitnerf.memory import give_back
 from splitnerf.render.edges import EdgePixels, edge_of
 from splitnerf.render.masks import PixelRuns, reduced, runs_of, widened
 
@@ -116,6 +117,8 @@ class PixelSource:
                 edges.append(edge_of(dataset.images.codes[i, ..., :3], alpha, known_here, edge_pixels))
             near.append(runs_of(wide))
             possible.append(reduced(seen, self.hull_factor))
+            del alpha, mask, wide, seen, known_here
+            give_back()  # else a photo's arrays, large ones, leave gaps between the runs that stay: 13 MB at 12 megapixels
         self.possible = torch.stack(possible).to(self.device)
         n_pixels = self.height * self.width
         self.foreground = PixelRuns.of(near, n_pixels, self.device)
