@@ -255,6 +255,40 @@ def test_an_optimiser_takes_one_call_for_each_dtype(monkeypatch):
         assert optimiser.state[param]["step"] == 1
 
 
+def test_groups_with_settings_of_their_own_move_as_those_of_torch():
+    """And a parameter whose gradient comes later counts its own steps."""
+    sides = []
+    for kind in (AdamW, torch.optim.AdamW):
+        params = [torch.nn.Parameter(torch.linspace(-1, 2, 5, dtype=torch.float64) + k) for k in range(4)]
+        groups = [
+            {"params": params[:1], "lr": 0.1, "weight_decay": 0.2},
+            {"params": params[1:2], "weight_decay": 0.0},
+            {"params": params[2:3], "betas": (0.5, 0.7)},
+            {"params": params[3:], "eps": 0.3},
+        ]
+        optimiser = kind(groups, lr=0.03)
+        for step in range(8):
+            for k, param in enumerate(params):
+                param.grad = torch.cos(5 * param.detach() + k) if step >= k else None
+            optimiser.step()
+        sides.append(params)
+    for ours, theirs in zip(*sides):
+        torch.testing.assert_close(ours, theirs, rtol=1e-13, atol=1e-13)
+
+
+def test_a_step_writes_each_of_several_copies(monkeypatch):
+    """And none is rounded anew."""
+    grids = [HashGrid(HASH_SPEC, 1.0, torch.float16) for _ in range(2)]
+    optimiser = AdamW([grid.table for grid in grids], lr=0.1, copies={grid.table: grid.copy for grid in grids})
+    first = [grid.stored() for grid in grids]
+    for grid in grids:
+        grid.table.grad = torch.ones_like(grid.table)
+    optimiser.step()
+    monkeypatch.setattr("splitnerf.ops.hash_grid.rounded", None)
+    for grid, copied in zip(grids, first):
+        assert grid.stored() is copied and torch.equal(copied, grid.table.detach().half())
+
+
 def test_errors_of_many_name_what_is_wrong():
     def given() -> list:
         tensors = [[torch.ones(3, 2), torch.ones(4)] for _ in range(4)]
