@@ -101,6 +101,7 @@ void adamw_steps(std::vector<Tensor> params, std::vector<Tensor> grads, std::vec
   std::vector<Tensor*> copy_of(n, nullptr);
   for (size_t k = 0; k < copies.size(); ++k) {
     require(copied[k] >= 0 && copied[k] < int64_t(n), op, "copied must hold positions in params");
+    require(!copy_of[size_t(copied[k])], op, "copied must hold no position twice");
     copy_of[size_t(copied[k])] = &copies[k];
   }
   const Kind kind = real_kind(op, "params", params[0]);

@@ -128,6 +128,7 @@ TEST(Runtime, LaunchesThatNoGpuTakesAreFound) {
   EXPECT_HAS(failure(lane_gone_kernel, 1, 1025, 0, out.data()), "more threads than a block");
   EXPECT_HAS(failure(lane_gone_kernel, dim3(1, 65536), 32, 0, out.data()), "more blocks than a grid");
   EXPECT_HAS(failure(shared_kernel, 1, 64, 49153, out.data()), "more shared memory than was allowed");
+  EXPECT_HAS(failure(shared_kernel, 1, 64, 49000, out.data()), "with that of variables");  // which are 256 bytes
   cudaFuncSetAttribute(shared_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, 49153);
   EXPECT_EQ(failure(shared_kernel, 1, 64, 49153, out.data()), "");
   cudaFuncSetAttribute(shared_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, 0);

@@ -173,7 +173,7 @@ LIMITS = {
     "sampling.grid_resolution": "in [1, 512]", "losses.entropy_points": "in [1, 65536]",
     "losses.albedo_width": "in (0, 1e+30]", "losses.gloss_width": "in (0, 1e+30]",
     "losses.neutral_queries": "in [1, 1048576]", "losses.smoothness_points": "in [1, 1048576]",
-    "losses.eikonal_points": "in [0, 1048576]", "losses.edge_pixels": "in [0, 64]",
+    "losses.eikonal_points": "in [0, 1048576]", "losses.edge_pixels": "in [0, 8]",
     "optimiser.light_step_every": "in [1, 64]", "refinement.share": "in [0, 1)",
     "separation.share": "in (0, 1)", "separation.steps": "in [1, 16777216]",
     "refinement.sweeps": "in [1, 16777216]", "export.resolution": "in [8, 4096]",

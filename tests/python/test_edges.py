@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import numpy as np
 import pytest
 import torch
@@ -10,6 +12,7 @@ from layout_scenes import write_transforms
 from op_checks import generator
 
 from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.data.images import read_image, write_image
 from splitnerf.render.edges import band, edge_of, filled_in
 from splitnerf.render.rays import PixelSource
 
@@ -41,10 +44,26 @@ def test_a_band_reaches_its_width_to_both_sides_of_an_edge():
     alpha[20, 30] = 0.9  # an edge of a mask that is finer than a pixel
     near, outside = band(alpha, 2)
     assert near[20, 19:23].all() and near[20, 38:42].all()  # the edge is between columns 20 and 21, and 39 and 40
-    assert not near[20, [18, 23, 37, 42]].any() and not outside[20, 17:44].any() and outside[20, [16, 44]].all()
+    assert not near[20, [18, 23, 37, 42]].any() and not outside[20, 16:44].any() and outside[20, [15, 44]].all()
     assert near[20, 30] and near[20, 24:37].sum() == 1
     assert not (near & outside).any()
     assert np.array_equal(near[20, 15:25], near[15, 15:25]) and near[8:12, 30].all() and not near[[7, 12], 30].any()
+
+
+def test_what_lies_behind_is_beside_the_finest_parts_too():
+    """A wire that covers pixels by less than half."""
+    alpha = np.zeros((20, 30), np.float32)
+    alpha[:, 15] = 0.4
+    near, outside = band(alpha, 2)
+    assert np.array_equal(near.any(0).nonzero()[0], [15]) and np.array_equal((~outside).any(0).nonzero()[0], range(11, 20))
+
+
+def test_before_what_is_too_bright_for_the_photo_the_mask_decides():
+    """In one channel is enough. The upper half of the photo shows such a place."""
+    behind = np.full((40, 60, 3), 0.9, np.float32)
+    behind[:20, :, 1] = 1.0
+    (starts, _), colours = edge_of(behind, square(), None, 2)
+    assert starts.min() // 60 >= 20 and len(starts) > 0 and (colours < 250).all()
 
 
 @pytest.mark.parametrize("width", [2, 3])
@@ -100,13 +119,19 @@ def test_a_source_has_edges_where_photos_are_whole_and_masks_have_edges(tmp_path
 
 
 def test_photos_with_masks_of_their_own_are_whole(tmp_path):
-    """Those with alpha are not, nor those that were averaged down, whose colours are the object's alone."""
-    masked, cut_out = tmp_path / "masked", tmp_path / "cut_out"
+    """Those with alpha are not, with masks beside it or without, nor those that were averaged down: their colours are the object's
+    alone."""
+    masked, cut_out, both = (tmp_path / name for name in ("masked", "cut_out", "both"))
     for folder in (masked, cut_out):
         folder.mkdir()
     write_transforms(masked, masks=True)
     write_transforms(cut_out)
+    shutil.copytree(masked, both)
+    for path in both.glob("images/*.png"):
+        write_image(path, np.dstack([read_image(path)[..., :3], np.ones((SIZE, SIZE))]).astype(np.float32))
     data = load_dataset(masked)
-    assert data.whole and not load_dataset(cut_out).whole and not load_dataset(masked, downscale=2).whole
+    assert data.whole
+    for other in (load_dataset(cut_out), load_dataset(both), load_dataset(masked, downscale=2)):
+        assert not other.whole
     assert data.images[0, 0, 0, :3] == pytest.approx(0.5, abs=0.01) and data.images[0, 0, 0, 3] == 0
     assert data.select([0, 1]).whole and SIZE == data.width

@@ -119,12 +119,12 @@ class TestLearning:
 
 
 class TestLoss:
-    def batch(self, exposure: float, edges=None, **changes):
+    def batch(self, exposure: float, edges=None, balance=(1.0, 1.0, 1.0), **changes):
         target = torch.tensor([[0.5, 0.6, 1.0, 1.0]])
         first = torch.zeros(1, dtype=torch.int64)
         drawn = DrawnRays(target[:, :3], target[:, :3], target, first, first)
         source = SimpleNamespace(generator=torch.Generator().manual_seed(0), draw=lambda n: drawn, edges=edges)
-        return draw_batch(source, 1, tiny(**changes), torch.full((1, 3), exposure))
+        return draw_batch(source, 1, tiny(**changes), torch.full((1, 3), exposure) * torch.tensor(balance))
 
     def test_a_photo_is_compared_at_its_own_exposure(self):
         """A rendering at an exposure of 1 that is right has no error, and what is clipped asks only for as much light."""
@@ -139,12 +139,13 @@ class TestLoss:
     def test_srgb_samples_are_compared_at_an_exposure_of_one(self):
         """And so is what lies behind the object at the masks' edges."""
         edges = EdgePixels([((np.array([0]), np.array([1])), np.uint8([[51, 76, 102]]))], 1, CPU)
-        batch = self.batch(0.5, edges, compositing="srgb", shading="split")
+        balance = np.float32([0.8, 1.2, 1.1])
+        batch = self.batch(0.5, edges, balance.tolist(), compositing="srgb", shading="split")
         assert torch.equal(batch.exposure, torch.ones(1, 3)) and batch.whole.item()
         behind = srgb_to_linear(np.float32([51, 76, 102]) / 255)
-        np.testing.assert_allclose(srgb_to_linear(batch.background[0].numpy()), 2 * behind, rtol=1e-4)
+        np.testing.assert_allclose(srgb_to_linear(batch.background[0].numpy()), 2 * behind / balance, rtol=1e-4)
         linear = srgb_to_linear(np.float32([0.5, 0.6]))
-        np.testing.assert_allclose(srgb_to_linear(batch.target[0, :2].numpy()), 2 * linear, rtol=1e-4)
+        np.testing.assert_allclose(srgb_to_linear(batch.target[0, :2].numpy()), 2 * linear / balance[:2], rtol=1e-4)
 
 
 def test_views_get_the_exposure_at_which_they_are_nearest(tmp_path):

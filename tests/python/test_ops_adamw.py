@@ -306,6 +306,10 @@ def test_errors_of_many_name_what_is_wrong():
     wrong(10, [True], "sparse must hold 2, got 1")
     wrong(12, [2], "copied must hold positions in params")
     wrong(12, [0, 1], "copied must hold 1, got 2")
+    with pytest.raises(ValueError, match="copied must hold no position twice"):
+        twice = given()
+        twice[11], twice[12] = twice[11] * 2, twice[12] * 2
+        lib.adamw_steps_(*twice)
     wrong(11, [torch.ones(3).half()], "copy must be [4] float16")
     wrong(0, [torch.ones(3, 2), torch.ones(4).double()], "params must be [4] float32", "float64")
     wrong(2, [torch.ones(3, 2), torch.ones(5)], "exp_avg must be [4]", "[5]")

@@ -285,6 +285,14 @@ def test_an_existing_run_is_not_written_over(data, tmp_path, capsys):
     assert load_checkpoint(run / "checkpoint.pt")["step"] == 3
 
 
+def test_a_deterministic_run_goes_on_where_it_began(data, tmp_path, monkeypatch):
+    """On the CPU, though there is a GPU by now and the command does not repeat what it asked for."""
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "4", "--deterministic") == DONE
+    monkeypatch.setattr("splitnerf.doctor.choice.fit_device", lambda: ("cuda", "it is fit"))
+    assert main(["train", str(data), "--out", str(run), "--resume", "--steps", "6"]) == DONE
+
+
 def test_resume_from_another_scene_is_refused(data, other_data, tmp_path, capsys):
     run = tmp_path / "run"
     assert train(data, run, "--steps", "2") == DONE

@@ -96,11 +96,12 @@ def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object]) -
     from splitnerf.training.checkpoint import config_of, load_checkpoint
     from splitnerf.workflow import begin_or_go_on, is_finished, reconstruct
 
-    device = choose_device(device_for(args.device, settings.get("run.deterministic", False)))
     resume, overwrite = begin_or_go_on(run) if args.resume == "auto" else (bool(args.resume), args.overwrite)
-    base = preset(args.preset or ("cpu" if device.type == "cpu" else "fast"))
-    if resume:
-        base = config_of(load_checkpoint(run / "checkpoint.pt"))
+    begun = config_of(load_checkpoint(run / "checkpoint.pt")) if resume else None
+    repeatable = (begun or preset("cpu")).replace(settings).run.deterministic
+    device = choose_device(device_for(args.device, repeatable))
+    base = begun or preset(args.preset or ("cpu" if device.type == "cpu" else "fast"))
+    if begun:
         if args.preset and not (args.resume == "auto" and args.preset == base.run.preset):
             raise InputError("--preset cannot change in a run that is resumed")
     config = base.replace(settings)

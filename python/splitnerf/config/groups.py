@@ -257,7 +257,7 @@ class Losses:
     mask_weight: float = setting(1.0, "weight of the masks")
     edge_pixels: int = setting(
         2, "pixels on each side of a mask's edge that are compared whole, with what lies behind the object; 0: the mask is "
-        "exact. Of photos whose masks are files of their own", unit="pixels", at_least=0, at_most=64,
+        "exact. Of photos whose masks are files of their own", unit="pixels", at_least=0, at_most=8,
     )  # fmt: skip
     neutral_weight: float = setting(0.03, "weight of the diffuse light's log chroma")
     light_prior_weight: float = setting(0.001, "weight of the distance to a smooth and grey light (of the pyramid)")

@@ -86,7 +86,7 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
     alpha = alpha if masked else np.full((height, width, 1), 255, np.uint8)
     kind = np.uint8 if colour.dtype == alpha.dtype == np.uint8 else np.uint16
     rgba = np.concatenate([encoded(colour, kind), encoded(alpha, kind)], axis=-1)
-    whole = is_object and frame.mask_path is not None
+    whole = is_object and frame.mask_path is not None and channels in (1, 3)  # where a photo has alpha, nothing lies behind
     says_nothing = bool((rgba[..., 3] == np.iinfo(kind).max).all())
     if frame.distortion is not None:
         straight, known = _undistort(decoded(rgba), known, frame, straight=whole)

@@ -85,6 +85,7 @@ class StateFile:
     def __init__(self, folder: Path, origin: str, minutes: float):
         self.path, self.origin, self.minutes = folder / STATE, origin, minutes
         self.saved_at = time.monotonic()
+        self.content: dict[str, object] = {}
 
     def load(self) -> dict | None:
         """The state; None where there is no file.
@@ -104,6 +105,7 @@ class StateFile:
 
     def take(self, stage: Stage) -> None:
         """Remembers the state of a stage that has made its sweeps to their ends."""
+        self.content = {}  # so that there are never three states in memory
         self.content = copy.deepcopy(stage.state())
 
     def save(self) -> None:
@@ -130,6 +132,7 @@ def refine_folder(
     source: Path, dataset: Dataset, out: Path, settings: RefinementSettings, *, resume: bool = False, save_minutes: float = 2.0
 ) -> Refined | None:
     """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it and keeps the state before the sweep.
+    Before the first sweep Ctrl-C raises KeyboardInterrupt: there is nothing to keep.
 
     Args:
         source: The folder of mesh.glb and environment.exr.
@@ -164,8 +167,8 @@ def refine_folder(
                     kept.take(stage)
                     kept.save_if_due()
                     bar.show(stage.progress, told(stage))
+        kept.save()  # also where all is done: what follows may be interrupted, too
         if not complete or stage.progress < 1.0:
-            kept.save()
             return None
     refined = stage.result()
     write_glb(out / "mesh.glb", refined.asset, occlusion_texture(refined.asset))

@@ -11,13 +11,14 @@ from torch import Tensor
 from splitnerf.render.masks import joined, runs_of, widened
 
 PARTLY = 0.02, 0.98  # coverage between which a pixel lies on an edge
+BRIGHTEST = 250  # of 255: what is behind may be brighter than the photo shows, so that the mask has to say where the edge is
 
 
 class EdgePixels:
     """The pixels within a band along the edges of the masks, where a mask is not trusted to a pixel.
 
     There a pixel's colour is compared whole: with the object's over the colour of what lies behind it, which is filled in from
-    outside the band. 16 bytes a run of neighbours and 3 a pixel.
+    outside the band. 24 bytes a run of neighbours and 3 a pixel.
 
     Args:
         photos: What :func:`edge_of` finds in each photo.
@@ -49,7 +50,7 @@ class EdgePixels:
 def edge_of(
     colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """The pixels of a photo within a band along its mask's edges as runs (see :func:`splitnerf.render.masks.runs_of`), and the
+    """The pixels of a photo within a band along its mask's edges, but for those before what is too bright for the photo, as runs (see :func:`splitnerf.render.masks.runs_of`), and the
     sRGB colours [k, 3] uint8 behind the object there.
 
     Args:
@@ -62,10 +63,12 @@ def edge_of(
     if known is not None:
         near, outside = near & known, outside & known
     place, behind = filled_in(colours, near, outside, width)
-    near = np.zeros_like(near)
-    near.reshape(-1)[place] = True
     scale = 255 if colours.dtype.kind == "f" else 255 / np.iinfo(colours.dtype).max
-    return runs_of(torch.from_numpy(near)), (behind * np.float32(scale) + np.float32(0.5)).astype(np.uint8)
+    behind = (behind * np.float32(scale) + np.float32(0.5)).astype(np.uint8)
+    certain = behind.max(axis=1) < BRIGHTEST
+    near = np.zeros_like(near)
+    near.reshape(-1)[place[certain]] = True
+    return runs_of(torch.from_numpy(near)), behind[certain]
 
 
 def band(alpha: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
@@ -73,7 +76,7 @@ def band(alpha: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
     the object does not touch where the mask is wrong by no more than the band is wide."""
     inside, partly = torch.from_numpy(alpha > 0.5), torch.from_numpy((alpha > PARTLY[0]) & (alpha < PARTLY[1]))
     near = (widened(inside, width) & widened(~inside, width)) | partly
-    return near.numpy(), (~widened(inside, 2 * width) & ~near).numpy()
+    return near.numpy(), (~widened(inside | partly, 2 * width) & ~near).numpy()
 
 
 def filled_in(colours: np.ndarray, near: np.ndarray, outside: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:

@@ -381,13 +381,13 @@ void set_order(Order wanted) { order = wanted; }
 void allow_shared_memory(const void* kernel, int bytes) { allowed[kernel] = size_t(bytes); }
 
 void run(const void* kernel, dim3 grid, dim3 block, size_t bytes, const std::function<void()>& thread) {
-  const auto known = allowed.find(kernel);
+  const size_t asked = allowed.count(kernel) ? allowed.at(kernel) : 0;
   const size_t n_threads = size_t(block.x) * block.y * block.z;
   if (grid.x == 0 || grid.y == 0 || grid.z == 0 || n_threads == 0) {
     last_error = "a launch of no threads";
   } else if (n_threads > kMostThreads || grid.y > kMostBlocksInY || grid.z > kMostBlocksInY || grid.x > 0x7fffffffu) {
     last_error = "a launch of more threads than a block, or of more blocks than a grid can have";
-  } else if (bytes > std::max(kSharedBytesUnasked, known == allowed.end() ? 0 : known->second)) {
+  } else if (bytes > std::max(kSharedBytesUnasked, asked)) {
     last_error = "more shared memory than was allowed for the kernel";
   }
   if (!last_error.empty()) return;
@@ -398,8 +398,9 @@ void run(const void* kernel, dim3 grid, dim3 block, size_t bytes, const std::fun
         for (unsigned x = 0; x < grid.x; ++x) {
           Block one(thread, {x, y, z}, grid, block, bytes, order);
           one.run();
-          if (one.static_bytes() > kSharedBytesUnasked)
-            throw Failure{"more shared memory of variables than a block can have"};
+          if (one.static_bytes() + bytes > std::max(kSharedBytesUnasked, one.static_bytes() + asked) ||
+              one.static_bytes() > kSharedBytesUnasked)
+            throw Failure{"more shared memory, with that of variables, than was allowed"};
         }
   } catch (const Failure& failure) {
     last_error = failure.message;

@@ -7,7 +7,7 @@
 //   a launch asks for what no GPU has, or for more shared memory than was allowed before.
 //
 // Shared memory is new for each block and holds NaN. Atomics are the processor's. AddressSanitizer and ThreadSanitizer know the
-// fibers: to the latter, threads of a block are ordered by barriers, those of a warp by its operations, and blocks not at all.
+// fibers: to the latter, threads of a block are ordered by barriers, those of a warp by __syncwarp, and blocks not at all.
 // Nothing here tells of a GPU's speed or of its order of memory.
 #pragma once
 
@@ -48,7 +48,7 @@ struct CallSite {
 enum class Operation { kBarrier, kWarpBarrier, kShuffle, kBallot };
 
 void barrier(CallSite site);
-// Waits for the lanes of the mask, each with 8 bytes of its own; `from(lane)` is the lane whose bytes this one gets.
+// Waits for the lanes of the mask, each with 8 bytes of its own; `from` is the lane whose bytes this one gets.
 uint64_t exchange(Operation operation, unsigned mask, uint64_t value, int from, CallSite site);
 uint32_t ballot(unsigned mask, bool yes, CallSite site);
 int lane();
