@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import re
 import shutil
 import signal
@@ -148,7 +147,7 @@ def stop_after(monkeypatch, sweeps: int) -> None:
     def counted(stage):
         sweep = advance(stage)
         if sweep.number == sweeps:
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
         return sweep
 
     monkeypatch.setattr(Stage, "advance", counted)
@@ -232,7 +231,7 @@ def within(sweep: int) -> Callable:
     def interrupted(fit, surface):
         error = gather(fit, surface)
         if fit.n_sweeps == sweep:
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
             raise AssertionError("the sweep goes on")
         return error
 
@@ -253,7 +252,7 @@ def test_a_signal_ends_a_sweep(painted, folder, monkeypatch):
 
 
 def test_a_signal_ends_the_preparations(painted, folder, monkeypatch):
-    monkeypatch.setattr(job, "Stage", lambda *_: os.kill(os.getpid(), signal.SIGINT))
+    monkeypatch.setattr(job, "Stage", lambda *_: signal.raise_signal(signal.SIGINT))
     with pytest.raises(KeyboardInterrupt):
         refine_folder(folder, painted[1], folder, QUICK)
 
