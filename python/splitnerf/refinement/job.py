@@ -132,7 +132,7 @@ def refine_folder(
     source: Path, dataset: Dataset, out: Path, settings: RefinementSettings, *, resume: bool = False, save_minutes: float = 2.0
 ) -> Refined | None:
     """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it and keeps the state before the sweep.
-    Before the first sweep Ctrl-C raises KeyboardInterrupt: there is nothing to keep.
+    While the first sweep is prepared there is nothing to keep: Ctrl-C raises KeyboardInterrupt.
 
     Args:
         source: The folder of mesh.glb and environment.exr.

@@ -50,8 +50,8 @@ class EdgePixels:
 def edge_of(
     colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """The pixels of a photo within a band along its mask's edges, but for those before what is too bright for the photo, as runs (see :func:`splitnerf.render.masks.runs_of`), and the
-    sRGB colours [k, 3] uint8 behind the object there.
+    """The pixels of a photo within a band along its mask's edges as runs (see :func:`splitnerf.render.masks.runs_of`), and the sRGB
+    colours [k, 3] uint8 behind the object there. Pixels before what is too bright for the photo are left out.
 
     Args:
         colours: [H, W, 3] sRGB, whole numbers or floats in [0, 1].
