@@ -175,6 +175,19 @@ class World:
         state = torch.where(outside.abs() < SHELL / 2 + BOX / n, CELL_OCCUPIED, CELL_EMPTY)
         return torch.where(outside < -SHELL, CELL_OPAQUE, state).to(torch.uint8)
 
+    def drawing(self) -> tuple:
+        """Most rays near masks that cover every second half row of 100 photos of 400 x 400 pixels."""
+        runs, r = torch.arange(100 * 400, dtype=torch.int64), self.sizes.rays
+        near, none = (200 * (runs + 1), 200 * runs, 200 * len(runs)), torch.empty(0, dtype=torch.int64)
+        cameras = self.randn(100, 3, 3, seed=62), self.randn(100, 3, seed=63)
+        return self.rand(r, seed=64), r * 3 // 4, *near, none, none, 100 * 400 * 400, *cameras, 400, 400
+
+    def placing(self) -> tuple:
+        r, m = self.rays, self.sizes.entropy
+        indices = torch.arange(self.sizes.rays).repeat_interleave(self.sizes.per_ray)
+        probes = self.rand(m, 3, seed=65), self.rand(m, seed=66), self.rand(m, 3, seed=67)
+        return r.origins, r.directions, indices, r.t, r.t + SHELL / self.sizes.per_ray, *probes, self.sizes.samples
+
     def marching(self) -> tuple:
         return *self.rays[:3], self.cells, BOX, self.rays.step, 1024
 
@@ -413,6 +426,8 @@ CASES = [
     Case("sample_rays", World.sampling,
          lambda s, out: float(out[-1].sum()) * (s.encode(2) + s.layer + 6 * s.width + 20), None, 4),
     Case("march_rays", World.marching, lambda s, out: 12 * len(out[0])),
+    Case("draw_rays", World.drawing, lambda s, out: 40 * s.rays),
+    Case("place_samples", World.placing, a_sample(10)),
     NEUS, backward(NEUS, a_sample(20), 0), SURFACE, backward(SURFACE, a_sample(60), 1),
     COMPOSITE, backward(COMPOSITE, a_sample(32)),
     Case("spread_samples", World.spreading, a_sample(6)),

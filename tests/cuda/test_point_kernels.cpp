@@ -2,6 +2,7 @@
 #include "check.h"
 #include "gpu.h"
 #include "splitnerf/bodies/elementwise.h"
+#include "splitnerf/bodies/pixels.h"
 #include "splitnerf/light_tables.h"
 #include "splitnerf/ops_cpu.h"
 
@@ -122,6 +123,64 @@ TEST(PointKernels, Interpolation) {
                                                          g.data(), grad1.data()});
     expect_near(out1, out, 1e-15), expect_near(grad1, grad, 1e-13);
   }
+}
+
+// ---- where a step looks ----
+
+TEST(PointKernels, DrawnRays) {
+  const int64_t last[] = {4, 5, 40}, shift[] = {10, 30, 200};
+  for (const int64_t n : {0, 1, 256, 700}) {
+    Random random(85);
+    const auto u = random.uniforms(n), matrices = random.uniforms(3 * 9, -1), origins = random.uniforms(3 * 3);
+    const auto run = [&](const auto& launch) {
+      std::pair out{unwritten<double>(6 * n), unwritten<int64_t>(2 * n)};
+      double* rays = out.first.data();
+      int64_t* numbers = out.second.data();
+      launch(DrawRaysBody<double>{n,
+                                  n / 3,
+                                  {last, shift, 3, 40},
+                                  {nullptr, nullptr, 0, 264},
+                                  3,
+                                  8,
+                                  11,
+                                  u.data(),
+                                  matrices.data(),
+                                  origins.data(),
+                                  rays,
+                                  rays + 3 * n,
+                                  numbers,
+                                  numbers + n});
+      return out;
+    };
+    const auto a = run([&](const auto&body) { cpu::run(n, body); }), b = run([&](const auto&body) { on_gpu(n, body); });
+    expect_near(b.first, a.first, 1e-14);
+    EXPECT_EQ(b.second, a.second);
+  }
+}
+
+TEST(PointKernels, PlacedSamples) {
+  for (const int64_t n : {0, 1, 300})
+    for (const int64_t room : {n, 2 * n + 5}) {
+      Random random(95);
+      const int64_t rays = 20, k = 30, m = n > 0 ? 50 : 0;
+      const auto o = random.uniforms(3 * rays), d = random.directions(rays), begin = random.uniforms(n),
+                 end = random.uniforms(n, 1, 2), anywhere = random.uniforms(3 * k), chosen = random.uniforms(m),
+                 shifts = random.uniforms(3 * m);
+      std::vector<int64_t> indices(n);
+      for (int64_t& ray : indices) ray = random.below(int(rays));
+      const auto run = [&](const auto& launch) {
+        std::pair out{unwritten<double>(3 * (2 * room + k + m)), unwritten<int64_t>(m)};
+        double* points = out.first.data();
+        launch(PlaceSamplesBody<double>{n, room, k, o.data(), d.data(), indices.data(), begin.data(), end.data(),
+                                        anywhere.data(), chosen.data(), shifts.data(), points,
+                                        points + 3 * (room + k + m), out.second.data()});
+        return out;
+      };
+      const auto a = run([&](const auto&body) { cpu::run(room + k + m, body); }),
+                 b = run([&](const auto&body) { on_gpu(room + k + m, body); });
+      expect_near(b.first, a.first, 1e-15);
+      EXPECT_EQ(b.second, a.second);
+    }
 }
 
 // ---- sums ----

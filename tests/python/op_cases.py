@@ -185,6 +185,23 @@ def march_inputs(device, dtype, n: int = 40) -> tuple:
     return *(x.to(device, dtype) for x in (origins, directions, jitter)), cells.to(device), 1.5, 0.03, 64
 
 
+def draw_inputs(dtype, n: int = 300) -> tuple:
+    """Arguments of ``draw_rays``: a third of the rays near the runs of two of three photos of 8 x 11 pixels."""
+    last, shift = torch.tensor([4, 5, 40]), torch.tensor([10, 30, 200])
+    none, matrices = torch.empty(0, dtype=torch.int64), torch.randn(3, 3, 3, generator=generator(1), dtype=torch.float64)
+    cameras = matrices.to(dtype), torch.arange(9.0, dtype=dtype).view(3, 3)
+    return rand(n, dtype=dtype), n // 3, last, shift, 40, none, none, 3 * 8 * 11, *cameras, 8, 11
+
+
+def place_inputs(dtype) -> tuple:
+    """Arguments of ``place_samples``: samples of 20 rays, room for more, and points beside some."""
+    rays_o, rays_d = (torch.randn(20, 3, generator=generator(i), dtype=torch.float64) for i in range(2))
+    ray_indices, starts = torch.randint(20, (200,), generator=generator(2)), rand(200, seed=3)
+    numbers = rays_o, unit(rays_d), starts, starts + 0.1, rand(30, 3, seed=4), rand(50, seed=5), rand(50, 3, seed=6)
+    rays_o, rays_d, *rest = (x.to(dtype) for x in numbers)
+    return rays_o, rays_d, ray_indices, *rest, 260
+
+
 def surface_inputs(dtype=torch.float64) -> tuple:
     """Samples of 50 rays around a surface, some seen from behind, one with next to no gradient."""
     _, samples, _ = packed_samples()
@@ -409,6 +426,8 @@ CASES = {
         rand(600, 3, dtype=t), rand(600, 1, seed=1, dtype=t), rand(600, seed=2, dtype=t), False
     ),
     "quadratic_entropy": lambda t: (rand(70, 11, dtype=t),),
+    "draw_rays": draw_inputs,
+    "place_samples": place_inputs,
     "march_rays": lambda t: march_inputs("cpu", t, 300),
     "neus_weights": lambda t: neus_inputs("cpu", t, 0.01),
     "neus_weights_backward": lambda t: with_gradients("neus_weights", neus_inputs("cpu", t, 0.01), 0),

@@ -12,7 +12,6 @@ from tiny_runs import tiny
 
 from splitnerf.fields.light import LightSamples
 from splitnerf.training import losses
-from splitnerf.training.losses import Term
 
 LOOSE = {"light_noise": 0.0, "light_lobe_below": 0.0, "losses.light_form": "square"}
 
@@ -140,8 +139,13 @@ def test_neutral_light_is_asked_about_diffuse_light():
 def test_the_gradient_is_that_of_the_weighted_sum():
     """Of 2 x^2 + 5 x - 3 c at x = 3: 17; a term without a gradient is left out."""
     x = torch.tensor(3.0, requires_grad=True)
-    losses.backward({"a": Term(2.0, x * x), "b": Term(5.0, x), "c": Term(-3.0, torch.tensor(1.0))})
+    terms = losses.Terms()
+    terms.add({"a": 2.0, "left out": None, "b": 5.0}, torch.stack([x * x, x, x]))
+    terms.add({"c": -3.0}, torch.tensor(1.0))
+    terms.backward()
     assert x.grad.item() == pytest.approx(17.0)
+    assert {name: (weight, value.item()) for name, (weight, value) in terms.items()} == {"a": (2, 9), "b": (5, 3), "c": (-3, 1)}
+    assert terms.values_with(torch.tensor([7, 8])).tolist() == [9, 3, 1, 7, 8]
 
 
 def test_materials_differ_in_being_metal_as_well(monkeypatch):

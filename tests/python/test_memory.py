@@ -19,7 +19,8 @@ from splitnerf.data.pixels import Photos, PixelReader, decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.memory import give_back
-from splitnerf.render.masks import PixelRuns, reduced, runs_of, widened
+from splitnerf.ops import draw_rays
+from splitnerf.render.masks import pixel_list, reduced, runs_of, widened
 from splitnerf.training import loop
 from tiny_runs import tiny
 
@@ -124,9 +125,12 @@ def test_a_negative_budget_is_refused(tmp_path, capsys):
 def test_runs_list_the_pixels_of_a_mask():
     masks = torch.rand(4, 9, 13, generator=torch.Generator().manual_seed(0)) > 0.6
     masks[1], masks[2] = False, True
-    runs = PixelRuns.of([runs_of(mask) for mask in masks], 9 * 13, CPU)
+    listed = pixel_list([runs_of(mask) for mask in masks], 9 * 13, CPU)
     numbers = masks.reshape(-1).nonzero().squeeze(1)
-    assert len(runs) == len(numbers) and torch.equal(runs[torch.arange(len(runs))], numbers)
+    n = listed.count
+    cameras = torch.eye(3).expand(4, 3, 3), torch.zeros(4, 3)
+    drawn = draw_rays(torch.full((n,), 0.5), n, listed, listed, *cameras, 9, 13)
+    assert n == len(numbers) and torch.equal(drawn[3], numbers)
 
 
 @pytest.mark.parametrize("radius", [0, 1, 2, 3, 7, 40])

@@ -24,6 +24,7 @@ from splitnerf.ops.monte_carlo import (
     summed_light,
 )
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
+from splitnerf.ops.pixels import PixelList, draw_rays, place_samples
 from splitnerf.ops.rays import (
     CELL_EMPTY,
     CELL_OCCUPIED,
@@ -43,11 +44,11 @@ from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_v
 
 __all__ = [
     "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "IncomingLight",
-    "LightSums", "MeshScene", "PackedSamples", "QUERIES", "SdfNetwork", "ShadingSubset", "SparseMap", "TexturedSurface",
-    "VisibilityCache", "adamw_step_", "brdf_lut", "cached_occlusion", "cached_visibility", "composite",
+    "LightSums", "MeshScene", "PackedSamples", "PixelList", "QUERIES", "SdfNetwork", "ShadingSubset", "SparseMap", "TexturedSurface",
+    "VisibilityCache", "adamw_step_", "brdf_lut", "cached_occlusion", "cached_visibility", "composite", "draw_rays",
     "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian", "incoming_light",
     "light_averages", "light_filters", "light_lookup", "light_sum_of_levels", "linear_to_srgb", "march_rays",
-    "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors", "pixel_losses", "prefilter_light",
+    "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors", "pixel_losses", "place_samples", "prefilter_light",
     "quadratic_entropy", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer", "sdf_values",
     "sh_projection", "shade_sums", "sparse_product", "specular_share", "split_sum_shade", "spread_samples",
     "srgb_to_linear", "summed_light", "surface_weights", "trace_visibility", "visibility_bits", "zonal_factors",

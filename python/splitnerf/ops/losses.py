@@ -13,7 +13,7 @@ from splitnerf.ops._library import lib, refuse_gradients, register
 
 def pixel_losses(
     mean: Tensor, opacity: Tensor, target: Tensor, background: Tensor, whole: Tensor | None = None, *, linear: bool = True
-) -> tuple[Tensor, Tensor]:
+) -> Tensor:
     """Mean squared sRGB error of pixels against photos over the same background, and the cross entropy with their
     masks.
 
@@ -31,7 +31,7 @@ def pixel_losses(
         linear: Whether ``mean`` is linear; otherwise it is sRGB.
 
     Returns:
-        colour [], the mean over channels and pixels, and mask [], the mean over pixels; 0 without pixels.
+        [2]: colour, the mean over channels and pixels, and mask, the mean over pixels; 0 without pixels.
         Differentiable in mean and opacity.
 
     Raises:
@@ -40,11 +40,10 @@ def pixel_losses(
     Source: SplitNeRF Eq. (3); NeuS Eq. (17).
     """
     whole = torch.zeros_like(opacity, dtype=torch.bool) if whole is None else whole
-    colour, mask = lib.pixel_losses(mean, opacity, target, background, whole, linear)[0].unbind()
-    return colour, mask
+    return lib.pixel_losses(mean, opacity, target, background, whole, linear)[0]
 
 
-def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple[Tensor, Tensor]:
+def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> Tensor:
     """The eikonal loss and the smoothness loss of a distance field's gradients.
 
     The eikonal loss asks for gradients of length 1. The smoothness loss asks for equal directions at neighbouring
@@ -59,7 +58,7 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple
         beside: [m] int64, the sample beside each neighbour.
 
     Returns:
-        eikonal [], the mean of (|g| - 1)^2, and smoothness [], the weighted mean distance of unit normals; 0 without
+        [2]: eikonal, the mean of (|g| - 1)^2, and smoothness, the weighted mean distance of unit normals; 0 without
         points. Differentiable in the gradients.
 
     Raises:
@@ -67,13 +66,12 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple
 
     Source: Gropp et al. 2020 (eikonal).
     """
-    eikonal, smoothness = lib.gradient_losses(gradients, weights, beside)[0].unbind()
-    return eikonal, smoothness
+    return lib.gradient_losses(gradients, weights, beside)[0]
 
 
 def material_losses(
     albedo: Tensor, metallic: Tensor, shares: Tensor, *, smooth_l1: bool = False
-) -> tuple[Tensor, Tensor, Tensor]:
+) -> Tensor:
     """Three penalties on metallic m: for metals, for values between 0 and 1, and for dark metals.
 
     Args:
@@ -83,7 +81,7 @@ def material_losses(
         smooth_l1: Whether the first penalty is m^2 / 2, the smooth L1 loss, instead of m^2.
 
     Returns:
-        metal, binary_metal and dark_metal, each []: weighted means of m^2, of m (1 - m) and of m (1 - F0 / .4)+, where
+        [3]: metal, binary_metal and dark_metal, weighted means of m^2, of m (1 - m) and of m (1 - F0 / .4)+, where
         F0 is the brightest channel of the albedo; 0 without points. Differentiable in metallic.
 
     Raises:
@@ -92,8 +90,7 @@ def material_losses(
     Source: SplitNeRF Eq. (18), over all samples instead of a tenth. A dark metal and a black dielectric with F0 = .04
     look nearly alike, but no dark metals exist (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
     """
-    metal, binary, dark = lib.material_losses(albedo, metallic, shares, smooth_l1)[0].unbind()
-    return metal, binary, dark
+    return lib.material_losses(albedo, metallic, shares, smooth_l1)[0]
 
 
 def quadratic_entropy(x: Tensor) -> Tensor:

@@ -6,6 +6,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from splitnerf.ops import PixelList
+
 
 def widened(mask: Tensor, radius: int) -> Tensor:
     """[H, W] bool, the pixels within `radius` of one of `mask` [H, W] along rows and columns.
@@ -31,31 +33,12 @@ def reduced(mask: Tensor, factor: int) -> Tensor:
     return blocks.any(dim=3).any(dim=1)
 
 
-class PixelRuns:
-    """Pixels of a stack of photos in their order, as runs of neighbours: 16 bytes a run in place of 8 a pixel.
-
-    Indexed by ranks [k] it gives the pixels' numbers [k], as the list of them would.
-
-    Args:
-        starts, ends: [m] int64, the first pixel of each run, and the one after its last, counted through all photos.
-        device: Where the ranks are.
-    """
-
-    def __init__(self, starts: np.ndarray, ends: np.ndarray, device: torch.device):
-        last = np.cumsum(ends - starts)
-        self.count = int(last[-1]) if len(last) else 0
-        self.last, self.shift = (torch.from_numpy(x).to(device) for x in (last, ends - last))
-
-    @classmethod
-    def of(cls, runs: list[tuple[np.ndarray, np.ndarray]], n_pixels: int, device: torch.device) -> PixelRuns:
-        """The runs (see :func:`runs_of`) of photos with as many pixels."""
-        return cls(*joined(runs, n_pixels), device)
-
-    def __len__(self) -> int:
-        return self.count
-
-    def __getitem__(self, ranks: Tensor) -> Tensor:
-        return ranks + self.shift[torch.searchsorted(self.last, ranks, right=True)]
+def pixel_list(runs: list[tuple[np.ndarray, np.ndarray]], n_pixels: int, device: torch.device) -> PixelList:
+    """The pixels in runs (see :func:`runs_of`) of photos with as many pixels: 16 bytes a run in place of 8 a pixel."""
+    starts, ends = joined(runs, n_pixels)
+    last = np.cumsum(ends - starts)
+    of_runs = (torch.from_numpy(x).to(device) for x in (last, ends - last))
+    return PixelList(*of_runs, int(last[-1]) if len(last) else 0)
 
 
 def joined(runs: list[tuple[np.ndarray, np.ndarray]], n_pixels: int) -> tuple[np.ndarray, np.ndarray]:

@@ -13,8 +13,9 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import PixelReader
 from splitnerf.devices import tensor_cores
 from splitnerf.memory import give_back
+from splitnerf.ops import PixelList, draw_rays
 from splitnerf.render.edges import EdgePixels, edge_of
-from splitnerf.render.masks import PixelRuns, reduced, runs_of, widened
+from splitnerf.render.masks import pixel_list, reduced, runs_of, widened
 
 HULL_EDGE = 400  # pixels, about, along the shorter edge of the masks that make the hull
 
@@ -89,8 +90,7 @@ class PixelSource:
 
     Attributes:
         edges: The pixels along the masks' edges; None where there are none, or the photos' colours outside are not known.
-        foreground: The known pixels near a mask.
-        known: The known pixels; None for all.
+        foreground, known: The known pixels near a mask, and all known pixels.
         possible: [n, h, w] bool, where the photos may show the object: within the masks, and where nothing is known. Those
             of large photos are smaller by `hull_factor`, a pixel being true where one within it is.
     """
@@ -121,21 +121,17 @@ class PixelSource:
             give_back()  # else a photo's arrays, large ones, leave gaps between the runs that stay: 13 MB at 12 megapixels
         self.possible = torch.stack(possible).to(self.device)
         n_pixels = self.height * self.width
-        self.foreground = PixelRuns.of(near, n_pixels, self.device)
-        self.known = PixelRuns.of(known, n_pixels, self.device) if known else None
+        self.foreground = pixel_list(near, n_pixels, self.device)
+        n_all = n_pixels * len(dataset)
+        self.known = pixel_list(known, n_pixels, self.device) if known else PixelList.all(n_all, self.device)
         has_edges = any(len(behind) for _, behind in edges)
         self.edges = EdgePixels(edges, n_pixels, self.device) if has_edges else None
 
     def draw(self, n: int) -> DrawnRays:
-        """Draws n rays."""
-        n_near = int(n * self.share) if len(self.foreground) else 0
-        draw = {"generator": self.generator, "device": self.device}
-        near = self.foreground[torch.randint(max(1, len(self.foreground)), (n_near,), **draw)]
-        anywhere = torch.randint(len(self.pixels if self.known is None else self.known), (n - n_near,), **draw)
-        anywhere = anywhere if self.known is None else self.known[anywhere]
-        index = torch.cat([near, anywhere])
-        row = index // self.width
-        view, column = row // self.height, index - row * self.width
-        y = row - view * self.height
-        rays_d = through_pixels(self.matrices[view], column + 0.5, y + 0.5)
-        return DrawnRays(self.origins[view], rays_d, self.pixels.read(index), view, index)
+        """Draws n rays; see :func:`splitnerf.ops.draw_rays`."""
+        n_near = int(n * self.share) if self.foreground.count else 0
+        random = torch.rand(n, generator=self.generator, device=self.device)
+        rays_o, rays_d, view, index = draw_rays(
+            random, n_near, self.foreground, self.known, self.matrices, self.origins, self.height, self.width
+        )
+        return DrawnRays(rays_o, rays_d, self.pixels.read(index), view, index)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
-from torch.nn import functional as F
 
 from splitnerf.config import Config
 from splitnerf.fields import EvaluatedLight, RaySegments
@@ -16,6 +15,7 @@ from splitnerf.ops import (
     composite,
     linear_to_srgb,
     march_rays,
+    place_samples,
     sample_rays,
     spread_samples,
     surface_weights,
@@ -148,7 +148,7 @@ def find_samples(
         jitter: [n_rays] in [0, 1), offsets of the samples as shares of a sample's length.
         anneal: The annealing of the cosine: 0 at the start of a training, 1 when done.
         probes: Additional points at which the field will be evaluated, or None.
-        capacity: The minimum number of samples in the result; padding fills it up. Without probes it has no effect.
+        capacity: The minimum number of samples in the result; padding fills it up.
     """
     c, s = model.config, model.s_value
     step = sample_step(c, s)
@@ -162,18 +162,9 @@ def find_samples(
             reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
             max_samples=c.sampling.max_samples_per_ray,
         )  # fmt: skip
-    directions = rays_d[packed.ray_indices]
-    positions = rays_o[packed.ray_indices] + directions * packed.middles[:, None]
-    beside = torch.empty(0, dtype=torch.int64, device=positions.device)
-    if probes is not None:
-        beside = (probes.chosen * len(positions)).long() if len(positions) else beside
-        neighbours = positions[beside] + probes.shifts[: len(beside)]
-        again, n, n_more = [], len(positions), capacity - len(positions)
-        if n_more > 0:
-            packed, directions = packed.extended(n_more), F.pad(directions, (0, 0, 0, n_more))
-            which = torch.arange(n_more, device=positions.device) % max(n, 1)
-            again = [positions[which] if n else positions.new_zeros(n_more, 3)]
-        positions = torch.cat([positions, *again, probes.anywhere, neighbours])
+    probes = ProbePoints(rays_o[:0], jitter[:0], rays_o[:0]) if probes is None else probes
+    positions, directions, beside = place_samples(rays_o, rays_d, packed, *probes, capacity)
+    packed = packed.extended(len(directions) - len(packed.ray_indices))
     phase = (PHASES * jitter) % 1.0  # the choice of shaded samples must not depend on their positions
     numbers = (positions.new_full((), x) for x in (step, anneal))
     return FoundSamples(packed, rays_d, phase, positions, directions, beside, *numbers, evaluated)

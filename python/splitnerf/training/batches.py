@@ -52,7 +52,8 @@ def draw_batch(source: PixelSource, n_rays: int, config: Config, exposures: Tens
     g = source.generator
     drawn = source.draw(n_rays)
     target, exposure = drawn.pixels, exposures[drawn.view]
-    background, jitter = (torch.rand(*shape, generator=g, device=g.device) for shape in ((n_rays, 3), (n_rays,)))
+    random = torch.rand(4, n_rays, generator=g, device=g.device)
+    jitter, background = random[0], random[1:].reshape(n_rays, 3)
     if source.edges is None:
         whole = torch.zeros(n_rays, dtype=torch.bool, device=g.device)
     else:
@@ -69,11 +70,11 @@ def draw_batch(source: PixelSource, n_rays: int, config: Config, exposures: Tens
 
 def draw_probes(config: Config, generator: torch.Generator) -> ProbePoints:
     """Random points for the eikonal loss and for the smoothness loss, in addition to the samples of the rays."""
-    c = config
+    c, device = config, generator.device
     n_beside = c.losses.smoothness_points if c.losses.smoothness_weight else 0
-    draw = {"generator": generator, "device": generator.device}
+    anywhere, shifts = (torch.empty(n, 3, device=device) for n in (c.losses.eikonal_points, n_beside))
     return ProbePoints(
-        (torch.rand(c.losses.eikonal_points, 3, **draw) * 2 - 1) * c.surface.box,
-        torch.rand(n_beside, **draw),
-        c.losses.smoothness_radius * torch.randn(n_beside, 3, **draw),
+        anywhere.uniform_(-c.surface.box, c.surface.box, generator=generator),
+        torch.rand(n_beside, generator=generator, device=device),
+        shifts.normal_(0.0, c.losses.smoothness_radius, generator=generator),
     )

@@ -15,7 +15,7 @@ from splitnerf.fields import EvaluatedLight
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import FoundSamples, RenderedRays
 from splitnerf.training.batches import Batch
-from splitnerf.training.losses import Term
+from splitnerf.training.losses import Terms
 from splitnerf.training.schedule import light_moves, light_period
 from splitnerf.training.step import Step
 
@@ -47,7 +47,7 @@ class Recorded(NamedTuple):
     batch: Batch
     found: FoundSamples
     light: EvaluatedLight
-    outputs: tuple[RenderedRays, dict[str, Term]]
+    outputs: tuple[RenderedRays, Terms]
     grads: list[Tensor | None]
     capacity: tuple[int, int]
 
@@ -86,7 +86,7 @@ class GraphedStep(Step):
 
     def __call__(
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
-    ) -> tuple[RenderedRays, dict[str, Term]]:
+    ) -> tuple[RenderedRays, Terms]:
         found = self.find(batch, progress, self.capacity)
 
         def differentiate(batch: Batch, found: FoundSamples, light: EvaluatedLight, capacity: tuple[int, int] | None):
@@ -128,7 +128,7 @@ class GraphedStep(Step):
         leaves = [leaf.detach().clone().requires_grad_() for leaf in light.leaves]
         light = light.with_tensors(leaves, [x.clone() for x in light.constants])
 
-        def work() -> tuple[RenderedRays, dict[str, Term]]:
+        def work() -> tuple[RenderedRays, Terms]:
             light.zero_grad()  # a replay adds the gradients of one step only
             return function(batch, found, light, capacity)
 
@@ -138,7 +138,7 @@ class GraphedStep(Step):
 
     def _replayed(
         self, recorded: Recorded, batch: Batch, found: FoundSamples, light: EvaluatedLight
-    ) -> tuple[RenderedRays, dict[str, Term]]:
+    ) -> tuple[RenderedRays, Terms]:
         self._used = recorded.capacity
         old = [*tree_leaves((recorded.batch, recorded.found)), *recorded.light.leaves, *recorded.light.constants]
         new = [*tree_leaves((batch, found)), *light.leaves, *light.constants]

@@ -36,7 +36,7 @@ from splitnerf.training.checkpoint import (
 from splitnerf.training.exposure import BEGIN, PhotoExposures
 from splitnerf.training.finite import GradientWatch, check_state, explain_loss
 from splitnerf.training.graphs import GraphedStep
-from splitnerf.training.losses import SeenLight, Term
+from splitnerf.training.losses import SeenLight, Terms
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS, add_metrics, keep_metrics
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
@@ -281,11 +281,11 @@ class Training:
             write_preview(self.run, self.model, self.grid, self.dataset, self.step)
             self.previewed_at = self.progress
 
-    def read(self, ray: RenderedRays, terms: dict[str, Term]) -> StepNumbers:
+    def read(self, ray: RenderedRays, terms: Terms) -> StepNumbers:
         """Waits for the step once and reads its numbers."""
-        numbers = torch.stack([*(term.value.detach() for term in terms.values()), self.watch.largest()])
-        counts = torch.cat([ray.samples.offsets[-1:], ray.evaluated.sum()[None], ray.sizes])
-        *values, largest, n_samples, n_evaluated, n_shaded, _, n_segments = torch.cat([numbers, counts]).tolist()
+        counts = ray.samples.offsets[-1:], ray.evaluated.sum()[None], ray.sizes
+        read = terms.values_with(self.watch.largest()[None], *counts).tolist()
+        *values, largest, n_samples, n_evaluated, n_shaded, _, n_segments = read
         loss = sum(term.weight * value for term, value in zip(terms.values(), values))
         is_complete = self.take_step.is_complete(n_shaded, n_segments)
         return StepNumbers(dict(zip(terms, values)), loss, largest, n_samples, n_evaluated, n_shaded, is_complete)
@@ -295,7 +295,7 @@ class Training:
         psnr = "" if self.psnr_mean is None else f"PSNR {self.psnr_mean:.2f} dB, "
         return f"step {self.step} {psnr}{samples_per_ray:.1f} samples/ray"
 
-    def line(self, batch: Batch, terms: dict[str, Term], numbers: StepNumbers) -> dict[str, object]:
+    def line(self, batch: Batch, terms: Terms, numbers: StepNumbers) -> dict[str, object]:
         """The values of one line of metrics.jsonl, by name."""
         evaluated = max(1, numbers.n_evaluated)
         return {

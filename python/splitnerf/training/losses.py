@@ -38,25 +38,46 @@ class Term(NamedTuple):
 
     Attributes:
         weight: The factor of the term in the loss.
-        value: [] the term without its weight.
+        value: [] the term without its weight; no gradient.
     """
 
     weight: float
     value: Tensor
 
 
+class Terms(dict[str, Term]):
+    """The terms of a loss by name."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._roots: list[tuple[Tensor, tuple[float, ...]]] = []
+
+    def add(self, weights: dict[str, float | None], values: Tensor) -> None:
+        """Adds the terms `values` [k], or [] for one, with their names and weights in that order. A term whose weight is None
+        is left out."""
+        self._roots.append((values, tuple(weight or 0.0 for weight in weights.values())))
+        flat = values.detach().reshape(-1)
+        self.update((name, Term(weight, flat[i])) for i, (name, weight) in enumerate(weights.items()) if weight is not None)
+
+    def values_with(self, *others: Tensor) -> Tensor:
+        """The terms' values in their order, then other numbers [m]: one vector, for one copy to the host."""
+        return torch.cat([*(term.value[None] for term in self.values()), *others])
+
+    def backward(self) -> None:
+        """Takes the gradients of the weighted sum. The weights seed the backward pass, so that the sum itself is never
+        computed."""
+        roots = [(values, _seed(weights, values)) for values, weights in self._roots if values.requires_grad]
+        torch.autograd.backward(*map(list, zip(*roots)))
+
+
 @functools.lru_cache(maxsize=1024)
-def _seed(weight: float, device: torch.device) -> Tensor:
+def _stored_seed(weights: tuple[float, ...], shape: torch.Size, device: torch.device) -> Tensor:
     with torch.inference_mode(False):
-        return torch.tensor(weight, device=device)
+        return torch.tensor(weights, device=device).reshape(shape)
 
 
-def backward(terms: dict[str, Term]) -> None:
-    """Takes the gradients of the weighted sum of the terms. The weights seed the backward pass, so that the weighted
-    sum itself is never computed."""
-    seeds = [_seed(term.weight, term.value.device) for term in terms.values()]  # cached at first use
-    values = [(term.value, seed) for term, seed in zip(terms.values(), seeds) if term.value.requires_grad]
-    torch.autograd.backward(*map(list, zip(*values)))
+def _seed(weights: tuple[float, ...], values: Tensor) -> Tensor:
+    return _stored_seed(weights, values.shape, values.device)
 
 
 def penalty(error: Tensor, form: str) -> Tensor:
@@ -132,15 +153,22 @@ def light_prior_loss(light: LightPyramid) -> Tensor:
     coarser levels, and its channels near their mean. A deviation d costs log(1 + d^2 / (TAILS s^2)), that of Student's t
     distribution with TAILS degrees of freedom, as windows and lamps have edges.
     """
-    cost = light.texels.new_zeros(())
-    for number, level in enumerate(light.texels.split(light.level_sizes)):
-        if number == 0:
-            level = level - level.mean(0)
-        brightness = level.mean(1, keepdim=True)
-        colour = (level - brightness).square().mean(1) / COLOUR_DEVIATION**2
-        brightness = brightness.square().squeeze(1) / BRIGHTNESS_DEVIATION**2
-        cost = cost + torch.log1p(brightness / TAILS).mean() + torch.log1p(colour / TAILS).mean()
-    return cost
+    coarsest, share = _texel_shares(tuple(light.level_sizes), light.texels.device)
+    mean = light.texels[: light.level_sizes[0]].mean(0)  # the brightness of the whole light costs nothing
+    apart = torch.addcmul(light.texels, coarsest, mean, value=-1.0)
+    brightness = apart.mean(1, keepdim=True)
+    colour = (apart - brightness).square().mean(1)
+    cost = torch.log1p(brightness.square().squeeze(1) / (TAILS * BRIGHTNESS_DEVIATION**2))
+    return share @ (cost + torch.log1p(colour / (TAILS * COLOUR_DEVIATION**2)))
+
+
+@functools.lru_cache(maxsize=4)
+def _texel_shares(level_sizes: tuple[int, ...], device: torch.device) -> tuple[Tensor, Tensor]:
+    """1 for the texels of the coarsest level, else 0, [texels, 1]; and 1 / n for the n texels of each level, [texels]."""
+    with torch.inference_mode(False):
+        share = torch.cat([torch.full((n,), 1.0 / n) for n in level_sizes])
+        coarsest = (torch.arange(len(share)) < level_sizes[0]).float()[:, None]
+        return coarsest.to(device), share.to(device)
 
 
 class SeenLight:

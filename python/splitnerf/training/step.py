@@ -14,7 +14,7 @@ from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
 from splitnerf.training import losses
 from splitnerf.training.batches import Batch
-from splitnerf.training.losses import Term
+from splitnerf.training.losses import Terms
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
 
@@ -40,7 +40,7 @@ class Step:
 
     def __call__(
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
-    ) -> tuple[RenderedRays, dict[str, Term]]:
+    ) -> tuple[RenderedRays, Terms]:
         """Finds the rays' samples, renders them and takes the gradients of the losses.
 
         Args:
@@ -62,7 +62,7 @@ class Step:
     def differentiate(
         self, batch: Batch, found: FoundSamples, light: EvaluatedLight, environment: Tensor | None, step: int,
         progress: float, capacity: tuple[int, int] | None = None,
-    ) -> tuple[RenderedRays, dict[str, Term]]:  # fmt: skip
+    ) -> tuple[RenderedRays, Terms]:  # fmt: skip
         """Renders found samples and takes the gradients; for ``capacity`` see
         :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
@@ -71,7 +71,7 @@ class Step:
             self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen
         )
         self.model.zero_grad(set_to_none=True)
-        losses.backward(terms)
+        terms.backward()
         return ray, terms
 
     def is_complete(self, n_shaded: float, n_segments: float) -> bool:
@@ -87,7 +87,7 @@ def loss_terms(
     model: SceneModel, light: EvaluatedLight, batch: Batch, ray: RenderedRays, scene: MeshScene | None,
     environment: Tensor | None, generator: torch.Generator, step: int, progress: float,
     seen: losses.SeenLight | None = None,
-) -> dict[str, Term]:  # fmt: skip
+) -> Terms:  # fmt: skip
     """The terms of the loss by name; the colour's term comes first.
 
     Args:
@@ -101,40 +101,40 @@ def loss_terms(
 
     Source: SplitNeRF Eq. (3), (11), (18) and the losses named in :mod:`splitnerf.training.losses`.
     """
-    c = model.config
-    colour, mask = pixel_losses(
-        ray.mean * batch.exposure, ray.opacity, batch.target, batch.background, batch.whole, linear=ray.linear
-    )
-    eikonal, smoothness = gradient_losses(ray.gradients, ray.weights.detach(), ray.beside)
-    metal, binary_metal, dark_metal = material_losses(
-        ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=c.losses.metal_form == "smooth_l1"
-    )
+    c, w, terms = model.config, model.config.losses, Terms()
+    late = progress >= w.priors_from
     # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
-    terms = {"colour": Term(CHANNELS * c.losses.colour_weight, colour), "eikonal": Term(c.losses.eikonal_weight, eikonal)}
-    if c.losses.mask_weight:
-        terms["mask"] = Term(c.losses.mask_weight, mask)
-    if model.light.needs_consistency_loss and c.losses.light_weight and step % c.losses.light_every == 0:
-        terms["light"] = Term(c.losses.light_weight, losses.light_loss(model.light, c, generator, step))
+    terms.add(
+        {"colour": CHANNELS * w.colour_weight, "mask": w.mask_weight or None},
+        pixel_losses(ray.mean * batch.exposure, ray.opacity, batch.target, batch.background, batch.whole, linear=ray.linear),
+    )
+    terms.add(
+        {"eikonal": w.eikonal_weight, "smoothness": w.smoothness_weight or None},
+        gradient_losses(ray.gradients, ray.weights.detach(), ray.beside),
+    )
+    terms.add(
+        {
+            "metal": w.metal_weight if w.metal_regulariser else None,
+            "binary_metal": (late and w.binary_metal_weight) or None,
+            "dark_metal": w.dark_metal_weight or None,
+        },
+        material_losses(
+            ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=w.metal_form == "smooth_l1"
+        ),
+    )
+    if late and w.entropy_weight:
+        terms.add({"entropy": w.entropy_weight}, losses.material_entropy_loss(ray, c, generator))
+    if model.light.needs_consistency_loss and w.light_weight and step % w.light_every == 0:
+        terms.add({"light": w.light_weight}, losses.light_loss(model.light, c, generator, step))
     if light_moves(c, step):  # once for all steps since the light last moved
         since = step % light_period(c) + 1
-        if c.losses.neutral_weight:
-            terms["neutral"] = Term(c.losses.neutral_weight * since, losses.neutral_light_loss(light, c, generator))
-        if c.losses.light_prior_weight and c.light.kind == "pyramid":
-            terms["light_prior"] = Term(c.losses.light_prior_weight * since, losses.light_prior_loss(model.light))
-        if seen is not None and c.losses.seen_weight:
-            terms["seen_light"] = Term(c.losses.seen_weight * since, seen.loss(light))
-    if c.losses.smoothness_weight:
-        terms["smoothness"] = Term(c.losses.smoothness_weight, smoothness)
-    if c.losses.entropy_weight and progress >= c.losses.priors_from:
-        terms["entropy"] = Term(c.losses.entropy_weight, losses.material_entropy_loss(ray, c, generator))
-    if c.losses.metal_regulariser:
-        terms["metal"] = Term(c.losses.metal_weight, metal)
-    if c.losses.binary_metal_weight and progress >= c.losses.priors_from:
-        terms["binary_metal"] = Term(c.losses.binary_metal_weight, binary_metal)
-    if c.losses.dark_metal_weight:
-        terms["dark_metal"] = Term(c.losses.dark_metal_weight, dark_metal)
+        if w.neutral_weight:
+            terms.add({"neutral": w.neutral_weight * since}, losses.neutral_light_loss(light, c, generator))
+        if w.light_prior_weight and c.light.kind == "pyramid":
+            terms.add({"light_prior": w.light_prior_weight * since}, losses.light_prior_loss(model.light))
+        if seen is not None and w.seen_weight:
+            terms.add({"seen_light": w.seen_weight * since}, seen.loss(light))
     if environment is not None:
-        terms["occlusion"] = Term(
-            c.losses.occlusion_weight, losses.occlusion_loss(ray, scene, environment, c, generator, step)
-        )
+        found = losses.occlusion_loss(ray, scene, environment, c, generator, step)
+        terms.add({"occlusion": w.occlusion_weight}, found)
     return terms

@@ -61,6 +61,32 @@ def composite():
 
 
 @check
+def draw_rays():
+    """A ray to each pixel of one row of a photo, by a camera whose directions are the image points; half of them listed."""
+    listed = torch.tensor([N // 2]), torch.tensor([0]), N // 2
+    rest = torch.tensor([N - N // 2]), torch.tensor([N // 2]), N - N // 2
+    camera = torch.eye(3)[None], torch.tensor([[1.0, 2.0, 3.0]])
+    rays_o, rays_d, view, index = lib.draw_rays(torch.full((N,), 0.5), N // 2, *listed, *rest, *camera, 1, N)
+    points = torch.stack([torch.arange(N) + 0.5, torch.full((N,), 0.5), torch.ones(N)], 1)
+    yield rays_o, camera[1].expand(N, 3)
+    yield rays_d, points / points.norm(dim=1, keepdim=True)
+    yield view, torch.zeros(N, dtype=torch.int64)
+    yield index, torch.arange(N)
+
+
+@check
+def place_samples():
+    """Samples from 0 to 2 along the axes x and y, the first of them again, and points above the second."""
+    rays_d = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).repeat(N // 2, 1)
+    ends = torch.zeros(N), torch.full((N,), 2.0)
+    above, beside = torch.tensor([[0.0, 0.0, 1.0]]).repeat(4, 1), torch.full((4,), 1.5 / N)
+    placed = lib.place_samples(torch.zeros(N, 3), rays_d, torch.arange(N), *ends, above, beside, above, N + 1)
+    yield placed[0], torch.cat([rays_d, rays_d[:1], above, above + rays_d[1]])
+    yield placed[1], torch.cat([rays_d, torch.zeros(1, 3)])
+    yield placed[2], torch.ones(4, dtype=torch.int64)
+
+
+@check
 def march_rays():
     """Rays through a box whose first third is empty, the second occupied and the last opaque: ten samples each."""
     rays_o = torch.cat([torch.full((N, 1), -3.0), pattern(N, 2) - 1], 1)

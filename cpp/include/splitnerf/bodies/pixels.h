@@ -1,0 +1,89 @@
+// Where a training step looks: rays through drawn pixels, and points of the rays' samples.
+#pragma once
+
+#include "splitnerf/vec.h"
+
+namespace splitnerf {
+
+// Pixels of a stack of photos in their order, as runs of neighbours: pixel number `rank` of the list is rank + shift of the first run
+// whose `last`, the number of pixels up to its end, is larger. Without runs the list holds all pixels.
+struct PixelList {
+  const int64_t *last, *shift;
+  int64_t n_runs, count;
+
+  SPLITNERF_HD int64_t operator[](int64_t rank) const {
+    if (n_runs == 0) return rank;
+    int64_t low = 0, high = n_runs - 1;
+    while (low < high) {
+      const int64_t middle = (low + high) / 2;
+      if (last[middle] > rank) {
+        high = middle;
+      } else {
+        low = middle + 1;
+      }
+    }
+    return rank + shift[low];
+  }
+};
+
+// A ray through one pixel of each of n_near equal parts of one list, then of the other parts of another list.
+// matrices [views, 3, 3]: from (x, y, 1) to directions; the middle of a pixel is (column + 1/2, row + 1/2).
+template <class T> struct DrawRaysBody {
+  int64_t n, n_near;
+  PixelList near, anywhere;
+  int64_t n_views, height, width;
+  const T *random, *matrices, *origins;
+  T *rays_o, *rays_d;
+  int64_t *view, *index;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const bool is_near = i < n_near;
+    const PixelList& list = is_near ? near : anywhere;
+    const auto part = double(is_near ? i : i - n_near), parts = double(is_near ? n_near : n - n_near);
+    const auto rank = static_cast<int64_t>((part + double(random[i])) / parts * double(list.count));
+    const int64_t pixel =
+        clamp<int64_t>(list[clamp<int64_t>(rank, 0, list.count - 1)], 0, n_views * height * width - 1);
+    const int64_t row = pixel / width, photo = row / height;
+    const Vec3<T> at{T(pixel - row * width) + T(0.5), T(row - photo * height) + T(0.5), T(1)};
+    const T* m = matrices + 9 * photo;
+    store3(rays_d + 3 * i, normalize(Vec3<T>{dot(load3(m), at), dot(load3(m + 3), at), dot(load3(m + 6), at)}));
+    store3(rays_o + 3 * i, load3(origins + 3 * photo));
+    view[i] = photo;
+    index[i] = pixel;
+  }
+};
+SPLITNERF_ON_GPU(DrawRaysBody);
+
+// positions [n_room + n_anywhere + n_beside]: the midpoints of n samples and, up to n_room, the first of them again; then
+// given points; then points beside samples, chosen by a number in [0, 1). Without samples the room is filled with zeros.
+template <class T> struct PlaceSamplesBody {
+  int64_t n, n_room, n_anywhere;
+  const T *rays_o, *rays_d;
+  const int64_t* ray_indices;
+  const T *t_starts, *t_ends, *anywhere, *chosen, *shifts;
+  T *positions, *directions;
+  int64_t* beside;
+
+  SPLITNERF_HD Vec3<T> middle(int64_t sample) const {
+    const int64_t ray = ray_indices[sample];
+    return load3(rays_o + 3 * ray) + load3(rays_d + 3 * ray) * (T(0.5) * (t_starts[sample] + t_ends[sample]));
+  }
+  SPLITNERF_HD void operator()(int64_t i) const {
+    Vec3<T> position{T(0), T(0), T(0)}, direction = position;
+    if (i < n_room) {
+      if (n > 0) position = middle(i % n);
+      if (i < n) direction = load3(rays_d + 3 * ray_indices[i]);
+      store3(directions + 3 * i, direction);
+    } else if (const int64_t j = i - n_room; j < n_anywhere) {
+      position = load3(anywhere + 3 * j);
+    } else {
+      const int64_t k = j - n_anywhere;
+      beside[k] = clamp<int64_t>(static_cast<int64_t>(chosen[k] * T(n)), 0, n - 1);
+      position = middle(beside[k]) + load3(shifts + 3 * k);
+    }
+    store3(positions + 3 * i, position);
+  }
+};
+SPLITNERF_ON_GPU(PlaceSamplesBody);
+
+}  // namespace splitnerf

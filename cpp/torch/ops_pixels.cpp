@@ -1,0 +1,95 @@
+// draw_rays and place_samples as torch operators.
+#include <tuple>
+
+#include "device.h"
+#include "splitnerf/bodies/pixels.h"
+
+namespace splitnerf::glue {
+namespace {
+
+// The list as tensors of its runs; `count` pixels.
+PixelList pixel_list(const char* op, const char* name, const Tensor& last, const Tensor& shift, int64_t count) {
+  require(count >= 0 && (last.size(0) == 0 || count > 0), op, std::string(name) + " has runs without pixels");
+  return {in<int64_t>(last), in<int64_t>(shift), last.size(0), count};
+}
+
+std::tuple<Tensor, Tensor, Tensor, Tensor> draw_rays(Tensor random, int64_t n_near, Tensor near_last, Tensor near_shift,
+                                                     int64_t near_count, Tensor known_last, Tensor known_shift,
+                                                     int64_t known_count, Tensor matrices, Tensor origins,
+                                                     int64_t height, int64_t width) {
+  const char* op = "draw_rays";
+  const Kind type = real_kind(op, "random", random), whole = type.with(ScalarType::Long);
+  const Tensor u = checked(op, "random", random, {kAny}, type),
+               m = checked(op, "matrices", matrices, {kAny, 3, 3}, type);
+  const Tensor o = checked(op, "origins", origins, {m.size(0), 3}, type);
+  const Tensor near_ends = checked(op, "near_last", near_last, {kAny}, whole),
+               near_shifts = checked(op, "near_shift", near_shift, {near_ends.size(0)}, whole);
+  const Tensor known_ends = checked(op, "known_last", known_last, {kAny}, whole),
+               known_shifts = checked(op, "known_shift", known_shift, {known_ends.size(0)}, whole);
+  const int64_t n = u.size(0), n_views = m.size(0);
+  const PixelList near = pixel_list(op, "near", near_ends, near_shifts, near_count),
+                  known = pixel_list(op, "known", known_ends, known_shifts, known_count);
+  require(height > 0 && width > 0, op, "height and width must be positive");
+  require(n_near >= 0 && n_near <= n, op, "n_near must be from 0 to the number of rays");
+  require(n_near == 0 || near_count > 0, op, "near has no pixels");
+  require(n_near == n || known_count > 0, op, "known has no pixels");
+  require(n == 0 || n_views > 0, op, "there are no views");
+  Tensor rays_o = empty_like_type(u, {n, 3}, type), rays_d = empty_like_type(u, {n, 3}, type),
+         view = empty_like_type(u, {n}, whole), index = empty_like_type(u, {n}, whole);
+  on_device(type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    device.run(op, n,
+               DrawRaysBody<T>{n, n_near, near, known, n_views, height, width, in<T>(u), in<T>(m), in<T>(o),
+                               out<T>(rays_o), out<T>(rays_d), out<int64_t>(view), out<int64_t>(index)});
+  });
+  return {rays_o, rays_d, view, index};
+}
+
+std::tuple<Tensor, Tensor, Tensor> place_samples(Tensor rays_o, Tensor rays_d, Tensor ray_indices, Tensor t_starts,
+                                                 Tensor t_ends, Tensor anywhere, Tensor chosen, Tensor shifts,
+                                                 int64_t room) {
+  const char* op = "place_samples";
+  const Kind type = real_kind(op, "rays_o", rays_o), whole = type.with(ScalarType::Long);
+  const Tensor o = checked(op, "rays_o", rays_o, {kAny, 3}, type),
+               d = checked(op, "rays_d", rays_d, {o.size(0), 3}, type);
+  const Tensor r = checked(op, "ray_indices", ray_indices, {kAny}, whole);
+  const int64_t n = r.size(0), n_room = std::max(n, room);
+  const Tensor begin = checked(op, "t_starts", t_starts, {n}, type), end = checked(op, "t_ends", t_ends, {n}, type);
+  const Tensor points = checked(op, "anywhere", anywhere, {kAny, 3}, type),
+               which = checked(op, "chosen", chosen, {kAny}, type);
+  const Tensor apart = checked(op, "shifts", shifts, {which.size(0), 3}, type);
+  const int64_t n_anywhere = points.size(0), n_beside = n > 0 ? which.size(0) : 0;
+  for (int64_t i = 0; type.on_cpu() && i < n; ++i)
+    require(in<int64_t>(r)[i] >= 0 && in<int64_t>(r)[i] < o.size(0), op, "ray_indices must hold numbers of rays");
+  Tensor positions = empty_like_type(o, {n_room + n_anywhere + n_beside, 3}, type),
+         directions = empty_like_type(o, {n_room, 3}, type), beside = empty_like_type(o, {n_beside}, whole);
+  on_device(type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    device.run(op, positions.size(0),
+               PlaceSamplesBody<T>{n, n_room, n_anywhere, in<T>(o), in<T>(d), in<int64_t>(r), in<T>(begin), in<T>(end),
+                                   in<T>(points), in<T>(which), in<T>(apart), out<T>(positions), out<T>(directions),
+                                   out<int64_t>(beside)});
+  });
+  return {positions, directions, beside};
+}
+
+}  // namespace
+
+STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
+  m.def(
+      "draw_rays(Tensor random, int n_near, Tensor near_last, Tensor near_shift, int near_count, Tensor known_last, "
+      "Tensor known_shift, int known_count, Tensor matrices, Tensor origins, int height, int width) -> (Tensor, "
+      "Tensor, "
+      "Tensor, Tensor)");
+  m.def(
+      "place_samples(Tensor rays_o, Tensor rays_d, Tensor ray_indices, Tensor t_starts, Tensor t_ends, Tensor "
+      "anywhere, "
+      "Tensor chosen, Tensor shifts, int room) -> (Tensor, Tensor, Tensor)");
+}
+
+SPLITNERF_IMPLEMENT(m) {
+  m.impl("draw_rays", TORCH_BOX(&draw_rays));
+  m.impl("place_samples", TORCH_BOX(&place_samples));
+}
+
+}  // namespace splitnerf::glue

@@ -1,0 +1,99 @@
+"""Where a training step looks: rays through drawn pixels, and points of the rays' samples. Neither has a gradient."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from splitnerf.ops._library import lib, register
+from splitnerf.ops.rays import PackedSamples
+
+
+class PixelList(NamedTuple):
+    """Pixels of a stack of photos in their order, as runs of neighbours.
+
+    Attributes:
+        last: [m] int64, the number of listed pixels up to the end of each run; empty: all pixels of the photos.
+        shift: [m] int64, what is added to the rank of a listed pixel to get its number, counted through all photos.
+        count: The number of listed pixels.
+    """
+
+    last: Tensor
+    shift: Tensor
+    count: int
+
+    @classmethod
+    def all(cls, count: int, device: torch.device) -> PixelList:
+        """All pixels of photos with as many."""
+        none = torch.empty(0, dtype=torch.int64, device=device)
+        return cls(none, none, count)
+
+
+def draw_rays(
+    random: Tensor, n_near: int, near: PixelList, known: PixelList, matrices: Tensor, origins: Tensor, height: int, width: int
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Rays through the middles of random pixels: `n_near` of one list, the others of another.
+
+    The rays of a list share it out: ray i of k goes through pixel (i + u) / k of the list, u its random number. So each pixel
+    is drawn as often as another, and no part of the photos is left out by chance.
+
+    Args:
+        random: [n] in [0, 1), float32 or float64.
+        n_near: The number of rays through pixels of `near`, at most n.
+        near, known: The lists. Numbers beyond the last pixel of the photos count as that.
+        matrices: [v, 3, 3], from an image point (x, y, 1) of a view to its direction in the world, not normalised.
+        origins: [v, 3] the views' centres.
+        height, width: Of the photos, in pixels.
+
+    Returns:
+        rays_o, rays_d: [n, 3] origins and unit directions.
+        view, index: [n] int64, the rays' views, and their pixels counted through all views.
+
+    Raises:
+        ValueError: A shape, dtype or size does not fit, or a list from which rays are drawn has no pixel.
+
+    Source: stratified sampling (Pharr, Jakob and Humphreys, Physically Based Rendering, 4th ed., section 8.2.1).
+    """
+    return lib.draw_rays(random, n_near, *near, *known, matrices, origins, height, width)
+
+
+def place_samples(
+    rays_o: Tensor, rays_d: Tensor, samples: PackedSamples, anywhere: Tensor, chosen: Tensor, shifts: Tensor, room: int = 0
+) -> tuple[Tensor, Tensor, Tensor]:
+    """The points at which a step evaluates the field: the midpoints of samples, given points, and points beside samples.
+
+    Args:
+        rays_o, rays_d: [n_rays, 3] origins and unit directions.
+        samples: n samples of the rays.
+        anywhere: [k, 3] points.
+        chosen: [m] in [0, 1): number floor(n chosen) of n is the sample that a point stands beside.
+        shifts: [m, 3] from that sample to the point.
+        room: If n is less, the first samples are repeated until they are so many; without samples zeros take their place.
+
+    Returns:
+        positions: [max(n, room) + k + m, 3] in that order; without samples m is 0.
+        directions: [max(n, room), 3] unit, the directions of the samples' rays; 0 behind the samples.
+        beside: [m] int64, the chosen samples.
+
+    Raises:
+        ValueError: A shape or dtype does not fit, or (on the CPU) a sample's ray is not there.
+    """
+    return lib.place_samples(rays_o, rays_d, *samples[:3], anywhere, chosen, shifts, room)
+
+
+def _fake_draw(random, n_near, *rest):
+    n = random.shape[0]
+    return (*(random.new_empty(n, 3) for _ in range(2)), *(random.new_empty(n, dtype=torch.int64) for _ in range(2)))
+
+
+def _fake_place(rays_o, rays_d, ray_indices, t_starts, t_ends, anywhere, chosen, shifts, room):
+    n, beside = ray_indices.shape[0], chosen.shape[0] if ray_indices.shape[0] else 0
+    n_room = max(n, room)
+    positions = rays_o.new_empty(n_room + anywhere.shape[0] + beside, 3)
+    return positions, rays_o.new_empty(n_room, 3), rays_o.new_empty(beside, dtype=torch.int64)
+
+
+register("draw_rays", fake=_fake_draw)
+register("place_samples", fake=_fake_place)

@@ -1,0 +1,102 @@
+"""draw_rays and place_samples."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from op_cases import CASES
+from op_checks import check_error, check_op, generator, lib
+
+from splitnerf.ops import PackedSamples, PixelList, draw_rays, place_samples
+
+CPU = torch.device("cpu")
+CAMERAS = torch.eye(3).repeat(2, 1, 1), torch.tensor([[0.0, 0.0, 0.0], [7.0, 8.0, 9.0]])
+EVERY = PixelList.all(2 * 4 * 5, CPU)  # two photos of 4 rows and 5 columns
+RUNS = PixelList(torch.tensor([2, 3, 7]), torch.tensor([1, 5, 30]), 7)  # pixels 1 2, 7, 33 34 35 36
+
+
+def drawn(random: list[float], n_near: int, near: PixelList = RUNS, known: PixelList = EVERY):
+    return draw_rays(torch.tensor(random), n_near, near, known, *CAMERAS, 4, 5)
+
+
+def test_a_list_is_shared_out_among_its_rays():
+    """Seven rays to seven listed pixels, each its own; two rays to forty pixels: one in each half, at .5 and .99 of it."""
+    _, _, view, index = drawn([0.0, 0.3, 0.6, 0.9, 0.1, 0.0, 0.999, 0.5, 0.99], 7)
+    assert index.tolist() == [1, 2, 7, 33, 34, 35, 36, 10, 39]
+    assert view.tolist() == [0, 0, 0, 1, 1, 1, 1, 0, 1]
+
+
+def test_every_pixel_is_drawn_as_often():
+    random = torch.rand(50, 35, generator=generator())
+    index = torch.cat([drawn(row.tolist(), 0, known=EVERY)[3] for row in random])
+    counts = index.bincount(minlength=40)
+    assert counts.min() > 25 and counts.max() < 65 and counts.sum() == 50 * 35
+
+
+def test_rays_begin_at_their_views_centre_and_go_through_the_middles_of_pixels():
+    rays_o, rays_d, view, index = drawn([0.5] * 40, 0)
+    assert torch.equal(rays_o, CAMERAS[1][view])
+    row, column = index % 20 // 5, index % 5
+    expected = torch.stack([column + 0.5, row + 0.5, torch.ones(40)], 1)
+    torch.testing.assert_close(rays_d, expected / expected.norm(dim=1, keepdim=True))
+
+
+def test_a_direction_is_the_matrix_times_the_point():
+    matrices = torch.randn(2, 3, 3, generator=generator(), dtype=torch.float64)
+    _, rays_d, _, index = draw_rays(torch.tensor([0.1, 0.7], dtype=torch.float64), 0, EVERY, EVERY, matrices, CAMERAS[1].double(), 4, 5)
+    for i, view in enumerate((0, 1)):
+        point = torch.tensor([index[i] % 5 + 0.5, index[i] % 20 // 5 + 0.5, 1.0], dtype=torch.float64)
+        torch.testing.assert_close(rays_d[i], torch.nn.functional.normalize(matrices[view] @ point, dim=0))
+
+
+def test_numbers_that_are_out_of_range_stay_within_the_photos():
+    """Of a list that names pixels which are not there, and of random numbers that are none."""
+    beyond = PixelList(torch.tensor([3]), torch.tensor([1000]), 3)
+    assert drawn([0.5, 0.5], 2, near=beyond)[3].tolist() == [39, 39]
+    assert drawn([-3.0, 2.0], 0)[3].tolist() == [0, 39] and drawn([-3.0, 2.0], 2)[3].tolist() == [1, 36]
+
+
+RAYS = torch.tensor([[0.0, 0, 0], [10, 0, 0]]), torch.tensor([[1.0, 0, 0], [0, 1, 0]])
+SAMPLES = PackedSamples(torch.tensor([0, 0, 1]), torch.tensor([1.0, 2, 3]), torch.tensor([2.0, 3, 4]), torch.tensor([0, 2, 3]))
+MIDDLES = [[1.5, 0, 0], [2.5, 0, 0], [10, 3.5, 0]]
+ANYWHERE = torch.tensor([[5.0, 5, 5]])
+SHIFTS = torch.tensor([[0.0, 0, 1], [0, 0, 2]])
+
+
+def test_points_are_the_middles_of_samples_then_those_given_then_those_beside():
+    positions, directions, beside = place_samples(*RAYS, SAMPLES, ANYWHERE, torch.tensor([0.0, 0.99]), SHIFTS)
+    assert positions.tolist() == [*MIDDLES, [5, 5, 5], [1.5, 0, 1], [10, 3.5, 2]]
+    assert directions.tolist() == [[1, 0, 0], [1, 0, 0], [0, 1, 0]] and beside.tolist() == [0, 2]
+
+
+def test_room_is_filled_with_the_first_samples():
+    positions, directions, beside = place_samples(*RAYS, SAMPLES, ANYWHERE, torch.tensor([0.5, 0.5]), SHIFTS, 7)
+    assert positions.tolist() == [*MIDDLES, *MIDDLES, MIDDLES[0], [5, 5, 5], [2.5, 0, 1], [2.5, 0, 2]]
+    assert (directions[3:] == 0).all() and len(directions) == 7 and beside.tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("room", [0, 4])
+def test_without_samples_only_given_points_are_left(room):
+    none = PackedSamples(*(x[:0] for x in SAMPLES[:3]), torch.zeros(3, dtype=torch.int64))
+    positions, directions, beside = place_samples(*RAYS, none, ANYWHERE, torch.tensor([0.5, 0.5]), SHIFTS, room)
+    assert positions.tolist() == [*[[0, 0, 0]] * room, [5, 5, 5]] and len(directions) == room and len(beside) == 0
+
+
+def test_operators():
+    for name in ("draw_rays", "place_samples"):
+        for dtype in (torch.float32, torch.float64):
+            check_op(getattr(lib, name), CASES[name](dtype))
+
+
+def test_what_does_not_fit_is_named():
+    check_error(lambda: drawn([0.5], 2), "draw_rays", "n_near must be from 0 to the number of rays")
+    check_error(lambda: drawn([0.5], 1, near=PixelList.all(0, CPU)), "draw_rays", "near has no pixels")
+    check_error(lambda: drawn([0.5], 0, known=PixelList.all(0, CPU)), "draw_rays", "known has no pixels")
+    check_error(lambda: drawn([0.5], 0, known=RUNS._replace(count=0)), "draw_rays", "known has runs without pixels")
+    no_views = torch.zeros(0, 3, 3), torch.zeros(0, 3)
+    check_error(lambda: draw_rays(torch.ones(1), 0, EVERY, EVERY, *no_views, 4, 5), "draw_rays", "there are no views")
+    check_error(lambda: draw_rays(torch.ones(1), 0, EVERY, EVERY, *CAMERAS, 0, 5), "draw_rays", "height and width")
+    wrong = SAMPLES._replace(ray_indices=torch.tensor([0, 0, 2]))
+    probes = ANYWHERE, torch.tensor([0.5, 0.5]), SHIFTS
+    check_error(lambda: place_samples(*RAYS, wrong, *probes), "place_samples", "ray_indices must hold numbers of rays")
+    check_error(lambda: place_samples(*RAYS, SAMPLES, *probes[:2], SHIFTS[:1]), "place_samples", "shifts must be [2, 3]")
