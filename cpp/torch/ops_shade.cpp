@@ -1,4 +1,4 @@
-// query_direction and split_sum_shade as torch operators.
+// query_direction, light_queries and split_sum_shade as torch operators.
 #include <tuple>
 
 #include "check_lut.h"
@@ -41,6 +41,45 @@ std::tuple<Tensor, Tensor, Tensor> query_direction_backward(Tensor normals, Tens
                                              out<T>(grad_n), out<T>(grad_v), out<T>(grad_rho)});
   });
   return {grad_n, grad_v, grad_rho};
+}
+
+std::tuple<Tensor, Tensor> light_queries(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) {
+  const char* op = "light_queries";
+  const Kind type = real_kind(op, "normals", normals);
+  const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
+  const int64_t points = n.size(0);
+  const Tensor v = checked(op, "view_dirs", view_dirs, {points, 3}, type);
+  const Tensor rho = checked(op, "roughness", roughness, {points, 1}, type);
+  const Tensor table = checked_lut(op, lut, type);
+  Tensor directions = empty_like_type(n, {2 * points, 3}, type), asked = empty_like_type(n, {2 * points, 1}, type);
+  on_device(type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    device.run(op, points,
+               LightQueriesBody<T>{in<float>(table), mean, points, in<T>(n), in<T>(v), in<T>(rho), out<T>(directions),
+                                   out<T>(asked)});
+  });
+  return {directions, asked};
+}
+
+std::tuple<Tensor, Tensor> light_queries_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut,
+                                                  bool mean, Tensor grad_directions, Tensor grad_asked_roughness) {
+  const char* op = "light_queries_backward";
+  const Kind type = real_kind(op, "normals", normals);
+  const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
+  const int64_t points = n.size(0);
+  const Tensor v = checked(op, "view_dirs", view_dirs, {points, 3}, type);
+  const Tensor rho = checked(op, "roughness", roughness, {points, 1}, type);
+  const Tensor table = checked_lut(op, lut, type);
+  const Tensor g = checked(op, "grad_directions", grad_directions, {2 * points, 3}, type);
+  const Tensor g_rho = checked(op, "grad_asked_roughness", grad_asked_roughness, {2 * points, 1}, type);
+  Tensor grad_n = empty_like_type(n, {points, 3}, type), grad_rho = empty_like_type(n, {points, 1}, type);
+  on_device(type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    device.run(op, points,
+               LightQueriesBackwardBody<T>{in<float>(table), mean, points, in<T>(n), in<T>(v), in<T>(rho), in<T>(g),
+                                           in<T>(g_rho), out<T>(grad_n), out<T>(grad_rho)});
+  });
+  return {grad_n, grad_rho};
 }
 
 ShadeOptions checked_options(const char* op, int64_t fresnel_mode, bool compensate) {
@@ -110,8 +149,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tenso
     using T = decltype(zero);
     const ShadeArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
                             out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])};
-    device.run(op, p.n,
-               ShadeBackwardBody<T>{in<float>(p.lut), options, p.n_channels, p.arrays<T>(), in<T>(g), to});
+    device.run(op, p.n, ShadeBackwardBody<T>{in<float>(p.lut), options, p.n_channels, p.arrays<T>(), in<T>(g), to});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};
 }
@@ -126,6 +164,10 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "query_direction_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean, "
       "Tensor grad_directions) -> (Tensor, Tensor, Tensor)");
+  m.def("light_queries(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) -> (Tensor, Tensor)");
+  m.def(
+      "light_queries_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean, "
+      "Tensor grad_directions, Tensor grad_asked_roughness) -> (Tensor, Tensor)");
   m.def("split_sum_shade(" SPLITNERF_POINT ") -> Tensor");
   m.def("split_sum_shade_backward(" SPLITNERF_POINT
         ", Tensor grad_radiance) -> "
@@ -135,6 +177,8 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
 SPLITNERF_IMPLEMENT(m) {
   m.impl("query_direction", TORCH_BOX(&query_direction));
   m.impl("query_direction_backward", TORCH_BOX(&query_direction_backward));
+  m.impl("light_queries", TORCH_BOX(&light_queries));
+  m.impl("light_queries_backward", TORCH_BOX(&light_queries_backward));
   m.impl("split_sum_shade", TORCH_BOX(&split_sum_shade));
   m.impl("split_sum_shade_backward", TORCH_BOX(&split_sum_shade_backward));
 }

@@ -17,6 +17,7 @@ import trimesh
 from op_cases import CASES as TEST_INPUTS
 from op_cases import with_gradients
 from torch import Tensor
+from torch.utils._pytree import tree_leaves
 from torch.nn import functional as F
 
 from splitnerf.bench import reference
@@ -174,6 +175,15 @@ class World:
         outside = (x * x + y * y + z * z).sqrt() - RADIUS
         state = torch.where(outside.abs() < SHELL / 2 + BOX / n, CELL_OCCUPIED, CELL_EMPTY)
         return torch.where(outside < -SHELL, CELL_OPAQUE, state).to(torch.uint8)
+
+    @property
+    def shaded(self) -> Tensor:
+        """Every few samples, as many as points."""
+        return torch.arange(self.sizes.points) * (self.sizes.samples // self.sizes.points)
+
+    def row_arrays(self, n: int) -> list[Tensor]:
+        """Normals, outputs and features of so many samples."""
+        return [self.randn(n, columns, seed=68) for columns in (3, 13, self.sizes.features)]
 
     def drawing(self) -> tuple:
         """Most rays near masks that cover every second half row of 100 photos of 400 x 400 pixels."""
@@ -354,7 +364,7 @@ def backward(case: Case, operations: Callable[[Sizes, tuple], float], *between: 
 def bytes_moved(case: Case, sizes: Sizes, inputs: tuple, outputs: tuple) -> float:
     """Each input read once and each result written once; of a table no more entries than there are corners."""
     read = [x for i, x in enumerate(inputs) if i not in UNREAD.get(case.op, ())]
-    tensors = [x for x in (*read, *outputs) if isinstance(x, Tensor)]
+    tensors = [x for x in tree_leaves((read, outputs)) if isinstance(x, Tensor)]
     total = sum(x.numel() * x.element_size() for x in tensors)
     entries = sizes.spec.n_entries
     if case.op in ("hash_encode", "hash_encode_jacobian", "hash_encode_jacobian_backward_positions", "sdf_values"):
@@ -426,6 +436,9 @@ CASES = [
     Case("sample_rays", World.sampling,
          lambda s, out: float(out[-1].sum()) * (s.encode(2) + s.layer + 6 * s.width + 20), None, 4),
     Case("march_rays", World.marching, lambda s, out: 12 * len(out[0])),
+    Case("take_rows", lambda w: (w.row_arrays(w.sizes.samples), w.shaded), a_point(30)),
+    Case("put_rows", lambda w: (w.row_arrays(len(w.shaded)), w.shaded, [w.sizes.samples] * 3), a_point(30)),
+    Case("light_queries", World.query, a_point(50)),
     Case("draw_rays", World.drawing, lambda s, out: 40 * s.rays),
     Case("place_samples", World.placing, a_sample(10)),
     NEUS, backward(NEUS, a_sample(20), 0), SURFACE, backward(SURFACE, a_sample(60), 1),

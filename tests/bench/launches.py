@@ -95,6 +95,7 @@ def measured(config, folder: Path, steps: int) -> tuple[Launches, float]:
             training.advance(Silent())
 
     advance(60)
+    training.mesh.request(0.0)  # so that light is hidden by the object and sent by it
     training.mesh.poll(wait=True)
     advance(steps)
     begin = time.perf_counter()

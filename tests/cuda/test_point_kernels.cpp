@@ -3,6 +3,7 @@
 #include "gpu.h"
 #include "splitnerf/bodies/elementwise.h"
 #include "splitnerf/bodies/pixels.h"
+#include "splitnerf/bodies/rows.h"
 #include "splitnerf/light_tables.h"
 #include "splitnerf/ops_cpu.h"
 
@@ -180,6 +181,54 @@ TEST(PointKernels, PlacedSamples) {
                  b = run([&](const auto&body) { on_gpu(room + k + m, body); });
       expect_near(b.first, a.first, 1e-15);
       EXPECT_EQ(b.second, a.second);
+    }
+}
+
+TEST(PointKernels, TakenAndAddedRows) {
+  for (const int64_t m : {0, 1, 300}) {
+    Random random(105);
+    const int64_t rows[] = {40, 50}, columns[] = {3, 1};
+    std::vector<int64_t> index(m);
+    for (int64_t& row : index) row = random.below(40);
+    const std::vector<double> all[] = {random.uniforms(120), random.uniforms(50)},
+                              given[] = {random.uniforms(3 * m), random.uniforms(m)};
+    const auto run = [&](const auto& launch) {
+      std::vector<std::vector<double>> out{unwritten<double>(3 * m), unwritten<double>(m), unwritten<double>(120),
+                                           unwritten<double>(50)};
+      RowArrays<double> taken, cleared, added;
+      for (int k = 0; k < 2; ++k) {
+        taken.add(m, rows[k], columns[k], all[k].data(), out[k].data());
+        cleared.add(rows[k], rows[k], columns[k], nullptr, out[2 + k].data());
+        added.add(m, rows[k], columns[k], given[k].data(), out[2 + k].data());
+      }
+      launch(taken.count(), TakeRowsBody<double>{index.data(), taken});
+      launch(cleared.count(), ClearArraysBody<double>{cleared});
+      launch(added.count(), AddRowsBody<double>{index.data(), added});
+      return out;
+    };
+    const auto a = run([](int64_t n, const auto& body) { cpu::run(n, body); });
+    const auto b = run([](int64_t n, const auto& body) { on_gpu(n, body); });
+    for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
+  }
+}
+
+TEST(PointKernels, LightQueries) {
+  for (const int64_t n : {0, 1, 300})
+    for (const bool mean : {false, true}) {
+      Random random(115);
+      const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n),
+                 g = random.uniforms(6 * n, -1), g_rho = random.uniforms(2 * n, -1);
+      const auto run = [&](const auto& launch) {
+        auto out = unwritten<double>(12 * n);
+        double* p = out.data();
+        launch(LightQueriesBody<double>{brdf_lut(), mean, n, normals.data(), views.data(), rho.data(), p, p + 6 * n});
+        launch(LightQueriesBackwardBody<double>{brdf_lut(), mean, n, normals.data(), views.data(), rho.data(), g.data(),
+                                                g_rho.data(), p + 8 * n, p + 11 * n});
+        return out;
+      };
+      const auto a = run([&](const auto&body) { cpu::run(n, body); }),
+                 b = run([&](const auto&body) { on_gpu(n, body); });
+      expect_near(b, a, 1e-13);
     }
 }
 

@@ -10,6 +10,7 @@ import torch
 import trimesh
 from mesh_shapes import between, cache_of, grid_mesh
 from op_checks import as_tuple, generator, lib, unit
+from torch.utils._pytree import tree_map
 
 from splitnerf.fields.sdf import SdfField
 from splitnerf.ops import (
@@ -200,6 +201,11 @@ def place_inputs(dtype) -> tuple:
     numbers = rays_o, unit(rays_d), starts, starts + 0.1, rand(30, 3, seed=4), rand(50, seed=5), rand(50, 3, seed=6)
     rays_o, rays_d, *rest = (x.to(dtype) for x in numbers)
     return rays_o, rays_d, ray_indices, *rest, 260
+
+
+def row_numbers() -> torch.Tensor:
+    """300 of 40 rows, so that some are taken several times and by two blocks of a GPU."""
+    return torch.randint(40, (300,), generator=generator(7))
 
 
 def surface_inputs(dtype=torch.float64) -> tuple:
@@ -399,6 +405,10 @@ CASES = {
     "hash_encode_jacobian_backward_positions": lambda t: hash_backward("hash_encode_jacobian", t, 2),
     "query_direction": lambda t: query_inputs("cpu", t, True, 300),
     "query_direction_backward": lambda t: with_gradients("query_direction", query_inputs("cpu", t, True, 300)),
+    "light_queries": lambda t: query_inputs("cpu", t, True, 300),
+    "light_queries_backward": lambda t: with_gradients("light_queries", query_inputs("cpu", t, True, 300)),
+    "take_rows": lambda t: ([rand(40, 3, dtype=t), rand(50, 1, seed=1, dtype=t)], row_numbers()),
+    "put_rows": lambda t: ([rand(300, 3, dtype=t), rand(300, 1, seed=1, dtype=t)], row_numbers(), [40, 50]),
     "split_sum_shade": lambda t: split_sum_inputs("cpu", t, 0, True, 3, 300),
     "split_sum_shade_backward": lambda t: with_gradients(
         "split_sum_shade", split_sum_inputs("cpu", t, 2, True, 1, 300)
@@ -459,12 +469,12 @@ STAY_ON_THE_CPU = {"light_lookup": (4, 5), "light_lookup_backward": (4, 5)}  # r
 def moved(op: str, inputs: tuple, device: str) -> tuple:
     """The inputs on a device, but for those that an operator reads on the CPU."""
     stay = STAY_ON_THE_CPU.get(op, ())
-    return tuple(x.to(device) if isinstance(x, torch.Tensor) and i not in stay else x for i, x in enumerate(inputs))
+    there = tree_map(lambda x: x.to(device) if isinstance(x, torch.Tensor) else x, inputs)
+    return tuple(x if i in stay else y for i, (x, y) in enumerate(zip(inputs, there)))
 
 
 def truth(inputs: tuple) -> tuple:
     """The same numbers in float64, but the table of the split sum, which is float32."""
     is_table = lambda x: x.shape == (32, 32, 4)  # noqa: E731
-    return tuple(
-        x.double() if isinstance(x, torch.Tensor) and x.is_floating_point() and not is_table(x) else x for x in inputs
-    )
+    doubled = lambda x: x.double() if x.is_floating_point() and not is_table(x) else x  # noqa: E731
+    return tree_map(lambda x: doubled(x) if isinstance(x, torch.Tensor) else x, inputs)

@@ -28,7 +28,7 @@ OPERATORS = sorted(
 
 def outputs(name: str) -> list[int]:
     """The numbers of what an operator returns, or of the arguments that it writes to."""
-    schema = getattr(lib, name).default._schema
+    schema = getattr(torch.ops.splitnerf, name).default._schema
     written = [i for i, given in enumerate(schema.arguments) if given.alias_info and given.alias_info.is_write]
     return written or list(range(len(schema.returns)))
 

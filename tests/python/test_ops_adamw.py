@@ -11,7 +11,7 @@ from op_cases import HASH_SPEC
 from op_checks import check_error, devices, generator, lib
 
 from splitnerf.training.checkpoint import restore_optimiser
-from splitnerf.ops import AdamW, HashGrid, adamw_step_
+from splitnerf.ops import AdamW, HashGrid, _library, adamw_step_
 from splitnerf.ops.hash_grid import rounded
 
 SHAPES = [(), (7,), (1000, 2), (37, 1), (5, 300), (3, 2, 4), (0, 2)]
@@ -240,7 +240,7 @@ def test_many_parameters_move_as_each_alone(device, count):
 
 def test_an_optimiser_takes_one_call_for_each_dtype(monkeypatch):
     calls, real = [], lib.adamw_steps_
-    monkeypatch.setattr(lib, "adamw_steps_", lambda *given: (calls.append(len(given[0])), real(*given)))
+    monkeypatch.setattr(_library.lib, "adamw_steps_", lambda *given: (calls.append(len(given[0])), real(*given)))
     params = [torch.nn.Parameter(torch.ones(3, dtype=dtype)) for dtype in (torch.float32, torch.float64) * 3]
     idle = torch.nn.Parameter(torch.ones(2))
     optimiser = AdamW([{"params": params[:2], "lr": 0.2}, {"params": [*params[2:], idle]}], lr=0.1, weight_decay=0.0)

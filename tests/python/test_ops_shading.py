@@ -1,4 +1,4 @@
-"""query_direction and split_sum_shade."""
+"""query_direction, light_queries and split_sum_shade."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from op_cases import query_inputs, split_sum_inputs
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 
 from splitnerf.bench import reference
-from splitnerf.ops import brdf_lut, query_direction, split_sum_shade
+from splitnerf.ops import brdf_lut, light_queries, query_direction, split_sum_shade
 
 MODES = [(mode, compensate, channels) for mode in range(3) for compensate in (False, True) for channels in (1, 3)]
 
@@ -65,6 +65,23 @@ def test_query_gradcheck(device, mean):
 def test_shade_gradcheck(device, mode, compensate, channels):
     inputs = split_sum_inputs(device, torch.float64, mode, compensate, channels, 4)
     torch.autograd.gradcheck(lib.split_sum_shade, grad_leaves(inputs, range(9)))
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize("mean", [True, False])
+def test_light_queries_are_the_lobes_directions_and_the_normals_on_the_viewers_side(device, mean):
+    inputs = query_inputs(device, torch.float64, mean)
+    normals, views, roughness = inputs[:3]
+    directions, asked = lib.light_queries(*inputs)
+    side = (normals * views).sum(1, keepdim=True).sign()
+    assert (side < 0).any() and torch.equal(directions, torch.cat([lib.query_direction(*inputs), side * normals]))
+    assert torch.equal(asked, torch.cat([roughness, torch.ones_like(roughness)]))
+    check_op(lib.light_queries, inputs, (0, 2))
+    check_op(lib.light_queries_backward, (*inputs, directions, asked))
+    torch.autograd.gradcheck(lib.light_queries, grad_leaves(inputs, (0, 2)))
+    check_no_gradient(lib.light_queries, inputs, 1)
+    check_no_gradient(lib.light_queries, inputs, 3)
+    check_error(lambda: light_queries(normals, views, roughness, "median"), "light_queries", "query", "mean", "median")
 
 
 @pytest.mark.parametrize("device", DEVICES)

@@ -23,7 +23,7 @@ from splitnerf.fields.occlusion import (
     Senders,
     TracedBits,
 )
-from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility, query_direction
+from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility, query_direction, take_rows
 
 TEXELS_PER_CELL = 8  # fewest texels per direction of a light without texels of its own
 LOBE_DIRECTIONS = 15  # fewest directions within a lobe that a sum over the directions resolves
@@ -212,8 +212,9 @@ class VisibilityBits(OcclusionModel):
     def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:
         """The factors at points; with segments, those of each segment's leader for all of its points."""
         if segments is not None:
-            leaders = self.answer(OcclusionQuery(*(part[segments.leaders] for part in query)), None)
-            return Occlusion(*(None if part is None else part[segments.segment] for part in leaders))
+            leaders = self.answer(OcclusionQuery(*take_rows(list(query), segments.leaders)), None)
+            known = [part for part in leaders if part is not None]
+            return Occlusion(*take_rows(known, segments.segment))
         o_d, o_s, i_d, i_s = cached_occlusion(
             self.cache, query.positions, query.normals, query.lobe_dirs, query.roughness, self.light, self.radiance
         )

@@ -256,7 +256,7 @@ def _encode_backward(ctx, grad):
     _refuse_rounded_gradients(ctx, "hash_encode", table, stored)
     grad_positions = grad_table = None
     if ctx.needs_input_grad[0]:
-        _, jacobian = lib.hash_encode_jacobian(positions, table, *ctx.grid, *stored)
+        _, jacobian = lib.hash_encode_jacobian(positions, table, *ctx.grid, *(stored or [None]))
         grad_positions = torch.einsum("nac,nc->na", jacobian, grad)
     if ctx.needs_input_grad[1]:
         grad_table = lib.hash_encode_backward(positions, grad, *ctx.grid)
@@ -269,10 +269,10 @@ def _scatter_backward(ctx, grad_grad_table):
     positions, grad_features = ctx.saved_tensors
     grad_positions = grad_grad_features = None
     if ctx.needs_input_grad[0]:
-        _, jacobian = lib.hash_encode_jacobian(positions, grad_grad_table, *ctx.grid)
+        _, jacobian = lib.hash_encode_jacobian(positions, grad_grad_table, *ctx.grid, None)
         grad_positions = torch.einsum("nac,nc->na", jacobian, grad_features)
     if ctx.needs_input_grad[1]:
-        grad_grad_features = lib.hash_encode(positions, grad_grad_table, *ctx.grid)
+        grad_grad_features = lib.hash_encode(positions, grad_grad_table, *ctx.grid, None)
     return grad_positions, grad_grad_features, *_NO_GRID
 
 

@@ -1,6 +1,6 @@
-"""Split-sum shading: the query direction of the pre-integrated light, and the outgoing radiance.
+"""Split-sum shading: what it asks the pre-integrated light, and the outgoing radiance.
 
-Both operators are differentiable once in every floating input (``view_dirs`` included, the table
+The operators are differentiable once in every floating input (``view_dirs`` included, the table
 excluded); a second derivative raises.
 
 Source: SplitNeRF Eq. (6)-(10), (17); Karis 2013.
@@ -59,6 +59,27 @@ def query_direction(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query
     return lib.query_direction(normals, view_dirs, roughness, brdf_lut(normals.device), query == "mean")
 
 
+def light_queries(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean") -> tuple[Tensor, Tensor]:
+    """What shading asks the pre-integrated light, for the specular and for the diffuse light at once.
+
+    Args:
+        normals, view_dirs, roughness, query: See :func:`query_direction`.
+
+    Returns:
+        directions [2 n, 3]: those of :func:`query_direction`, then the normals on the viewer's side.
+        roughness [2 n, 1]: the points' own, then 1.
+        Differentiable once in normals and roughness.
+
+    Raises:
+        ValueError: A shape, dtype or the name of the query does not fit.
+
+    Source: SplitNeRF Eq. (6)-(10).
+    """
+    if query not in QUERIES:
+        raise ValueError(f"light_queries: query must be one of {QUERIES}, got {query!r}")
+    return lib.light_queries(normals, view_dirs, roughness, brdf_lut(normals.device), query == "mean")
+
+
 def split_sum_shade(
     normals: Tensor,
     view_dirs: Tensor,
@@ -115,6 +136,12 @@ def _query_backward(ctx, grad):
     return *grads, None, None
 
 
+def _queries_backward(ctx, *grads):
+    refuse_gradients(ctx, "light_queries", view_dirs=1, lut=3)
+    grad_normals, grad_roughness = lib.light_queries_backward(*ctx.saved_tensors, ctx.mean, *grads)
+    return grad_normals, None, grad_roughness, None, None
+
+
 def _keep_shade(ctx, inputs, output):
     ctx.save_for_backward(*inputs[:10])
     ctx.options = inputs[10:]
@@ -137,6 +164,18 @@ register(
     fake=lambda normals, view_dirs, roughness, lut, mean, grad: tuple(
         t.new_empty(t.shape) for t in (normals, view_dirs, roughness)
     ),
+)
+register(
+    "light_queries",
+    fake=lambda normals, *rest: (
+        normals.new_empty(2 * normals.shape[0], 3), normals.new_empty(2 * normals.shape[0], 1)
+    ),
+    setup_context=_keep_query,
+    backward=_queries_backward,
+)  # fmt: skip
+register(
+    "light_queries_backward",
+    fake=lambda normals, view_dirs, roughness, *rest: tuple(t.new_empty(t.shape) for t in (normals, roughness)),
 )
 register(
     "split_sum_shade",

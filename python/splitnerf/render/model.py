@@ -25,7 +25,7 @@ from splitnerf.fields import (
 )
 from splitnerf.fields.occlusion import TracedBits
 from splitnerf.fields.sdf import SdfSample, sharpness
-from splitnerf.ops import HashGridSpec, query_direction, shade_sums, split_sum_shade, summed_light
+from splitnerf.ops import HashGridSpec, light_queries, shade_sums, split_sum_shade, summed_light, take_rows
 
 START_BOUNCES = 3  # bounces of indirect light on a new mesh
 SUMMED_BAND = 0.15  # width in roughness of the transition from the split sum to the sum over directions
@@ -79,12 +79,6 @@ def make_occlusion(config: Config, n_inputs: int) -> OcclusionModel:
             c.occlusion.open_below,
         )
     return NoOcclusion(c.occlusion.channels)
-
-
-def face_forward(normals: Tensor, view_dirs: Tensor) -> Tensor:
-    """Normals [n, 3], negated where they point away from the viewer at ``view_dirs`` [n, 3]."""
-    side = (normals.detach() * view_dirs).sum(-1, keepdim=True)
-    return normals * torch.copysign(torch.ones_like(side), side)
 
 
 class SceneModel(nn.Module):
@@ -184,12 +178,11 @@ class SceneModel(nn.Module):
         c = self.config
         inputs = self.head_inputs(positions, outputs, features)
         albedo, roughness, metallic = self.material(inputs)
-        lobe_dirs = query_direction(normals, view_dirs, roughness, c.shading.query)
-        n, facing = len(normals), face_forward(normals, view_dirs)
-        radiance = light(torch.cat([lobe_dirs, facing]), torch.cat([roughness, torch.ones_like(roughness)]))
+        asked = light_queries(normals, view_dirs, roughness, c.shading.query)
+        light_s, light_d = light(*asked).chunk(2)
+        lobe_dirs, facing = asked[0].chunk(2)
         query = OcclusionQuery(inputs, positions - normals * outputs[:, :1], facing, lobe_dirs, roughness)
         occlusion = self.occlusion(query, segments)
-        light_s, light_d = radiance[:n], radiance[n:]
         factor_s, factor_d = occlusion.specular, occlusion.diffuse
         if occlusion.indirect_specular is not None:
             light_s = factor_s * light_s + occlusion.indirect_specular
@@ -237,10 +230,11 @@ class SceneModel(nn.Module):
         else:
             counts = torch.arange(len(candidates), device=candidates.device) < n_candidates
             at, t = candidates, (over * counts)[:, None].clamp(0.0, 1.0)
-        taken = normals, points.albedo, points.roughness, points.metallic, points.radiance
-        normals, albedo, roughness, metallic, split = (x.index_select(0, at) for x in taken)
-        view_dirs = view_dirs[at]
-        visible, sent = self.occlusion.visibility(on_surface[at], points.facing.detach()[at])
+        of_points = [
+            normals, points.albedo, points.roughness, points.metallic, points.radiance, view_dirs, on_surface, points.facing.detach(),
+        ]  # fmt: skip
+        normals, albedo, roughness, metallic, split, view_dirs, on_surface, facing = take_rows(of_points, at)
+        visible, sent = self.occlusion.visibility(on_surface, facing)
         cells = light.cells
         sums = summed_light(
             normals, view_dirs, roughness, cells.directions, cells.solid_angles, cells.radiance, visible, sent

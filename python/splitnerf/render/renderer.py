@@ -19,6 +19,7 @@ from splitnerf.ops import (
     sample_rays,
     spread_samples,
     surface_weights,
+    take_rows,
 )
 from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
@@ -205,9 +206,9 @@ def render_rays(
 
     spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step, capacity)
     shaded = spread.shaded
-    positions, view_dirs = found.positions[shaded], -found.directions[shaded]
-    # The gradient of index_select adds directly; the gradient of indexing sorts first on a GPU.
-    normals, outputs, features = (x.index_select(0, shaded) for x in (normals, field.outputs, field.features))
+    of_samples = [found.positions, found.directions, normals, field.outputs, field.features]
+    positions, directions, normals, outputs, features = take_rows(of_samples, shaded)
+    view_dirs = -directions
     sdf = outputs[:, 0]
     segments = RaySegments(spread.leaders, spread.stretch)
     points = model.shade(light, positions, outputs, features, normals, view_dirs, segments)

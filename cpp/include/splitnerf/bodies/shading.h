@@ -36,6 +36,42 @@ template <class T> struct QueryDirectionBackwardBody {
 };
 SPLITNERF_ON_GPU(QueryDirectionBackwardBody);
 
+// What shading asks the light at n points: the directions of the specular lobes with their roughness, then those of the
+// diffuse light, the normals on the viewer's side, with a roughness of 1.
+template <class T> struct LightQueriesBody {
+  const float* lut;
+  bool mean;
+  int64_t n;
+  const T *normals, *view_dirs, *roughness;
+  T *directions, *asked_roughness;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const Vec3<T> normal = load3(normals + 3 * i), view = load3(view_dirs + 3 * i);
+    store3(directions + 3 * i, query_direction(lut, mean, normal, view, roughness[i]));
+    store3(directions + 3 * (n + i), normal * facing(normal, view));
+    asked_roughness[i] = roughness[i];
+    asked_roughness[n + i] = T(1);
+  }
+};
+SPLITNERF_ON_GPU(LightQueriesBody);
+
+template <class T> struct LightQueriesBackwardBody {
+  const float* lut;
+  bool mean;
+  int64_t n;
+  const T *normals, *view_dirs, *roughness, *grad_directions, *grad_asked_roughness;
+  T *grad_normals, *grad_roughness;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const Vec3<T> normal = load3(normals + 3 * i), view = load3(view_dirs + 3 * i);
+    const QueryDirectionGrad<T> g =
+        query_direction_backward(lut, mean, normal, view, roughness[i], load3(grad_directions + 3 * i));
+    store3(grad_normals + 3 * i, g.normal + load3(grad_directions + 3 * (n + i)) * facing(normal, view));
+    grad_roughness[i] = g.roughness + grad_asked_roughness[i];
+  }
+};
+SPLITNERF_ON_GPU(LightQueriesBackwardBody);
+
 // Occlusion factors come as one value for all channels or as three; the gradient of the one is the sum of theirs.
 template <class T> SPLITNERF_HD Vec3<T> load_factors(const T* factors, int64_t i, int n_channels) {
   return n_channels == 3 ? load3(factors + 3 * i) : Vec3<T>{factors[i], factors[i], factors[i]};

@@ -51,6 +51,7 @@ BACKWARD: dict[str, tuple[Callable[[], tuple], tuple[int, ...]]] = {
     "hash_encode_jacobian_backward": (grid, (1,)),
     "hash_encode_jacobian_backward_positions": (grid, (0,)),
     "interpolate_backward": (lambda: (pattern(5, 3), *between()), (0,)),
+    "light_queries_backward": (lambda: (up(), views(), column(0.5), lut(), True), (0, 2)),
     "light_lookup_backward": (lambda: pyramid(pattern(64, 3)), (0, 1, 2, 3)),
     "linear_to_srgb_backward": (lambda: (pattern(N) * LINEAR[1],), (0,)),
     "monte_carlo_light_backward": (drawn_light, (0, 2, 5)),

@@ -87,6 +87,25 @@ def place_samples():
 
 
 @check
+def take_rows():
+    """Rows of two arrays from the last to the first, the first row of each three times."""
+    index = torch.cat([torch.arange(N - 1, -1, -1), torch.zeros(2, dtype=torch.int64)])
+    numbers = torch.arange(float(N))[:, None]
+    taken = lib.take_rows([numbers * torch.tensor([1.0, 10.0]), numbers + 0.5], index)
+    yield torch.cat(list(taken), dim=1), index[:, None] * torch.tensor([1.0, 10.0, 1.0]) + torch.tensor([0.0, 0.0, 0.5])
+
+
+@check
+def put_rows():
+    """Every second number once and the first three times more, in arrays of different lengths."""
+    index = torch.cat([torch.arange(0, N, 2), torch.zeros(3, dtype=torch.int64)])
+    sums = lib.put_rows([torch.ones(len(index), 2), torch.full((len(index), 1), 3.0)], index, [N, N + 5])
+    counts = torch.zeros(N + 5, 1)
+    counts[0:N:2], counts[0] = 1.0, 4.0
+    yield torch.cat([sums[0].flatten(), sums[1].flatten()]), torch.cat([counts[:N].expand(N, 2).flatten(), 3 * counts[:, 0]])
+
+
+@check
 def march_rays():
     """Rays through a box whose first third is empty, the second occupied and the last opaque: ten samples each."""
     rays_o = torch.cat([torch.full((N, 1), -3.0), pattern(N, 2) - 1], 1)

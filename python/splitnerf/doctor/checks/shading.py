@@ -40,6 +40,15 @@ def query_direction():
 
 
 @check
+def light_queries():
+    """The mirror directions, then the normals turned to the viewer, who stands below every second one."""
+    side = 1.0 - 2.0 * (torch.arange(N)[:, None] % 2)
+    directions, asked = lib.light_queries(side * up(), views(), column(0.2), lut(), True)
+    yield directions, torch.cat([views() * torch.tensor([-1.0, -1.0, 1.0]), up()])
+    yield asked, torch.cat([column(0.2), column(1.0)])
+
+
+@check
 def split_sum_shade():
     """A white furnace: white of any roughness and metallic under white light is white."""
     white, even = torch.ones(N, 3), torch.linspace(0, 1, N)[:, None]
