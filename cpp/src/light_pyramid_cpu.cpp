@@ -1,4 +1,7 @@
 #include <algorithm>
+#include <atomic>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "splitnerf/kernels.h"
@@ -19,6 +22,21 @@ template <class T> void run(int64_t n, const LightLookupBody<T>& b) {
 }
 template void run<float>(int64_t, const LightLookupBody<float>&);
 template void run<double>(int64_t, const LightLookupBody<double>&);
+
+template <class T> void run(int64_t n, const SparseProductBody<T>& b) {
+  constexpr int64_t kRowGrain = 256;
+  std::vector<T> padded(4 * b.matrix.n_columns);
+  for (int64_t i = 0; i < b.matrix.n_columns; ++i) std::copy_n(b.values + 3 * i, 3, &padded[4 * i]);
+  std::atomic<bool> in_range{true};
+  parallel_for(n, kRowGrain, [&](int64_t begin, int64_t end) {
+    if (!kernels<T>().sparse_product(b.matrix, padded.data(), begin, end, b.products)) in_range = false;
+  });
+  if (!in_range)
+    throw std::invalid_argument("sparse_product: columns must hold numbers in [0, " +
+                                std::to_string(b.matrix.n_columns) + ")");
+}
+template void run<float>(int64_t, const SparseProductBody<float>&);
+template void run<double>(int64_t, const SparseProductBody<double>&);
 
 template <class T>
 void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t n, const T* directions, const T* roughness,

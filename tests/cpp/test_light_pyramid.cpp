@@ -99,6 +99,45 @@ TEST(LightLookup, InstructionSetsAgree) {
   expect_equal_sets<float>(3e-5f);
 }
 
+// Rows of no entry to 25, whose columns may repeat, against sums one entry after the other.
+template <class T> void expect_products(T tolerance) {
+  constexpr int64_t kColumns = 30;
+  Random random(5);
+  std::vector<int64_t> offsets{0};
+  std::vector<int32_t> columns;
+  for (int length = 0; length <= 25; ++length) {
+    for (int i = 0; i < length; ++i) columns.push_back(random.below(kColumns));
+    offsets.push_back(int64_t(columns.size()));
+  }
+  std::vector<T> weights(columns.size()), padded(4 * kColumns);
+  for (T& w : weights) w = T(random.uniform(-1, 1));
+  for (T& x : padded) x = T(random.uniform());
+  const SparseRows<T> matrix{offsets.data(), columns.data(), weights.data(), kColumns};
+  for (const Kernels<T>& set : usable_kernels<T>()) {
+    std::vector<T> products(3 * 26, T(7));
+    ASSERT_TRUE(set.sparse_product(matrix, padded.data(), 1, 26, products.data())) << set.name;
+    ASSERT_EQ(products[2], T(7)) << "row 0 was not asked for";
+    for (int64_t row = 1; row < 26; ++row)
+      for (int c = 0; c < 3; ++c) {
+        T sum = 0;
+        for (int64_t k = offsets[row]; k < offsets[row + 1]; ++k) sum += weights[k] * padded[4 * columns[k] + c];
+        ASSERT_NEAR(products[3 * row + c], sum, tolerance) << set.name << ", row " << row;
+      }
+    for (const int32_t wrong : {int32_t(kColumns), -1}) {
+      std::vector<int32_t> changed = columns;
+      changed.back() = wrong;
+      const SparseRows<T> bad{offsets.data(), changed.data(), weights.data(), kColumns};
+      EXPECT_FALSE(set.sparse_product(bad, padded.data(), 0, 26, products.data())) << set.name;
+      EXPECT_TRUE(set.sparse_product(bad, padded.data(), 0, 25, products.data())) << set.name;
+    }
+  }
+}
+
+TEST(SparseProduct, InstructionSetsAgree) {
+  expect_products<double>(1e-14);
+  expect_products<float>(1e-5f);
+}
+
 TEST(LightTables, FiltersAndAveragesSumToOne) {
   for (const SparseMatrix& matrix : {light_averages(16), light_filter(16, 8, 0.3), light_filter(32, 32, 0.1)})
     for (size_t r = 0; r + 1 < matrix.offsets.size(); ++r) {

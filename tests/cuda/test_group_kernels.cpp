@@ -366,7 +366,7 @@ TEST(GroupKernels, SparseProduct) {
     offsets.push_back(int64_t(columns.size()));
   }
   const auto weights = random.uniforms(columns.size(), -1), values = random.uniforms(3 * n_columns);
-  const SparseRows<double> matrix{offsets.data(), columns.data(), weights.data()};
+  const SparseRows<double> matrix{offsets.data(), columns.data(), weights.data(), n_columns};
   std::vector<double> one(3 * n_rows), lanes(3 * n_rows);
   cpu::run(n_rows, SparseProductBody<double>{matrix, values.data(), one.data()});
   on_gpu(n_rows, SparseProductBody<double>{matrix, values.data(), lanes.data()});

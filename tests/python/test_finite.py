@@ -111,7 +111,7 @@ def test_a_learning_rate_of_a_thousand_loses_no_checkpoint(data, begun, capsys):
 
 
 def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path, monkeypatch, capsys):
-    original, allows, seen = trainer.GradientWatch.largest, trainer.GradientWatch.allows, []
+    original, allows, seen = trainer.GradientWatch.norm, trainer.GradientWatch.allows, []
 
     def planting(watch):
         step = len(seen)
@@ -119,13 +119,13 @@ def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path,
             watch.parameters[0].grad.view(-1)[0] = torch.nan if step == 3 else 1e30
         return original(watch)
 
-    def recording(watch, step, largest):
+    def recording(watch, step, norm):
         before = [p.detach().clone() for p in watch.parameters]
-        allowed = allows(watch, step, largest)
+        allowed = allows(watch, step, norm)
         seen.append((allowed, before))
         return allowed
 
-    monkeypatch.setattr(trainer.GradientWatch, "largest", planting)
+    monkeypatch.setattr(trainer.GradientWatch, "norm", planting)
     monkeypatch.setattr(trainer.GradientWatch, "allows", recording)
     trained = trainer.train(load_dataset(data), tiny(steps=8), tmp_path)
     assert [i for i, (allowed, _) in enumerate(seen) if not allowed] == [3, 5, 6]
@@ -142,15 +142,15 @@ def test_large_gradients_that_cancel_are_seen():
     watch = trainer.GradientWatch(parameters)
     for parameter, value in zip(parameters, (1e30, -1e30)):
         parameter.grad = torch.full((3,), value)
-    assert not watch.allows(0, watch.largest().item()) and watch.skipped == 1
+    assert not watch.allows(0, watch.norm().item()) and watch.skipped == 1
     for parameter in parameters:
         parameter.grad = torch.full((3,), -1e17)
-    assert watch.allows(1, watch.largest().item())
+    assert watch.allows(1, watch.norm().item())
 
 
 def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch):
     run, before = begun
-    original, steps = trainer.GradientWatch.largest, itertools.count(8)  # the run stands at step 8
+    original, steps = trainer.GradientWatch.norm, itertools.count(8)  # the run stands at step 8
 
     def planting(watch):
         if next(steps) > 12:
@@ -158,7 +158,7 @@ def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch):
         return original(watch)
 
     with monkeypatch.context() as patch:
-        patch.setattr(trainer.GradientWatch, "largest", planting)
+        patch.setattr(trainer.GradientWatch, "norm", planting)
         with pytest.raises(Diverged, match=f"step {12 + MOST_SKIPPED}: .*{MOST_SKIPPED} steps in a row"):
             trainer.train(load_dataset(data), tiny(steps=60), run, resume=True)
     goes_on(data, run, before)
@@ -170,13 +170,13 @@ def test_the_first_that_is_not_finite_is_found():
     assert first_not_finite([("fine", fine), ("bad", bad), ("worse", bad)]) == "bad (2 of 3 values)"
 
 
-def test_the_largest_magnitude_is_that_of_one_value():
-    """Of either sign and of any parameter; one without a gradient counts as none."""
+def test_the_norm_is_that_of_all_gradients():
+    """Of either sign and of any parameter, 3^2 + 4^2 + 7^2 + 6^2 = 110; one without a gradient counts as none."""
     parameters = [torch.zeros(2, requires_grad=True) for _ in range(3)]
     watch = GradientWatch(parameters)
     for parameter, gradient in ((parameters[0], [3.0, 4.0]), (parameters[2], [-7.0, 6.0])):
         parameter.grad = torch.tensor(gradient)
-    assert watch.largest().item() == 7.0
+    assert watch.norm().item() == pytest.approx(110**0.5)
 
 
 def test_a_gradient_may_be_taken_if_its_square_is_a_number(capsys):

@@ -102,6 +102,9 @@ template <class T> struct Kernels {
   void (*light_lookup_backward)(const LightPyramid<T>&, int64_t begin, int64_t end, const T* directions,
                                 const T* roughness, const T* grad_radiance, T* grad_directions, T* grad_roughness,
                                 T* grad_levels, T* grad_sh);
+  // products [n_rows, 3] = matrix . values, of values [n_columns, 4] whose last column is padding. Rows [begin, end). False where a
+  // column of the matrix is out of range.
+  bool (*sparse_product)(const SparseRows<T>&, const T* padded, int64_t begin, int64_t end, T* products);
   // Rows [begin, end) of columns > 0.
   void (*adamw_step)(const AdamwRule<T>&, const AdamwArrays<T>&, int64_t begin, int64_t end);
 };

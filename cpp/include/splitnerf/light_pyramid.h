@@ -139,6 +139,7 @@ template <class T> struct SparseRows {
   const int64_t* offsets;
   const int32_t* columns;
   const T* weights;
+  int64_t n_columns;
 };
 
 }  // namespace splitnerf

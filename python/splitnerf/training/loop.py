@@ -69,14 +69,14 @@ class StepNumbers(NamedTuple):
     Attributes:
         values: The terms of the loss without their weights, by name; the colour's term comes first.
         loss: The weighted sum.
-        largest_gradient: The largest magnitude among all gradients.
+        gradient_norm: The Euclidean norm of all gradients.
         n_samples, n_evaluated, n_shaded: Samples composited, points evaluated to find them, samples shaded.
         is_complete: Whether the step's results may be used.
     """
 
     values: dict[str, float]
     loss: float
-    largest_gradient: float
+    gradient_norm: float
     n_samples: int
     n_evaluated: int
     n_shaded: int
@@ -262,7 +262,7 @@ class Training:
         else:
             if not math.isfinite(numbers.loss):
                 raise explain_loss(self.step, numbers.values, self.dataset, batch, self.model, ray)
-            if self.watch.allows(self.step, numbers.largest_gradient):
+            if self.watch.allows(self.step, numbers.gradient_norm):
                 self.optimiser.step()
             if self.exposures.learned and self.progress > BEGIN:
                 self.exposures.learn(batch.view, batch.target, ray.mean, ray.opacity)
@@ -284,11 +284,11 @@ class Training:
     def read(self, ray: RenderedRays, terms: Terms) -> StepNumbers:
         """Waits for the step once and reads its numbers."""
         counts = ray.samples.offsets[-1:], ray.evaluated.sum()[None], ray.sizes
-        read = terms.values_with(self.watch.largest()[None], *counts).tolist()
-        *values, largest, n_samples, n_evaluated, n_shaded, _, n_segments = read
+        read = terms.values_with(self.watch.norm()[None], *counts).tolist()
+        *values, norm, n_samples, n_evaluated, n_shaded, _, n_segments = read
         loss = sum(term.weight * value for term, value in zip(terms.values(), values))
         is_complete = self.take_step.is_complete(n_shaded, n_segments)
-        return StepNumbers(dict(zip(terms, values)), loss, largest, n_samples, n_evaluated, n_shaded, is_complete)
+        return StepNumbers(dict(zip(terms, values)), loss, norm, n_samples, n_evaluated, n_shaded, is_complete)
 
     def told(self, samples_per_ray: float) -> str:
         """What the bar tells of a step: its number, the batches' mean PSNR in dB and the samples per ray."""
