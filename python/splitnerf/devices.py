@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import torch
+from torch import Tensor
 
 from splitnerf import _core
 from splitnerf.errors import InputError
@@ -41,6 +42,25 @@ def tensor_cores(on: bool) -> Iterator[None]:
         yield
     finally:
         products.fp32_precision = before
+
+
+def start_fetching(x: Tensor) -> tuple[Tensor, Callable[[], None]]:
+    """Starts to copy a tensor to the CPU, in the order of its device's work.
+
+    Returns:
+        The copy, and a function that waits until it is complete; another thread may call it.
+    """
+    copy = x.to("cpu", non_blocking=True)  # into pinned memory, where it comes from a GPU
+    if x.device.type != "cuda":
+        return copy, lambda: None
+    copied = torch.cuda.Event(blocking=True)  # the waiting thread sleeps
+    copied.record(torch.cuda.current_stream(x.device))
+    return copy, copied.synchronize
+
+
+def pinned(x: Tensor, device: torch.device) -> Tensor:
+    """A tensor of the CPU in memory from which this device copies without keeping the host waiting."""
+    return x.pin_memory() if device.type == "cuda" else x
 
 
 def wait_for(device: torch.device) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import NamedTuple
@@ -15,6 +14,7 @@ from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.fields.visibility import TracedBits
 from splitnerf.ops import MeshScene, SdfNetwork, sdf_values
 from splitnerf.render.model import SceneModel
+from splitnerf.training.background import in_background
 
 
 class TracedMesh(NamedTuple):
@@ -73,8 +73,7 @@ class SurfaceMesh:
             return
         network = network.snapshot()
         wait_for(self.model.device)  # the thread works in another CUDA stream
-        self._made = Future()
-        threading.Thread(target=fulfil, args=(self._made, make_mesh, self.model, network), daemon=True).start()
+        self._made = in_background(make_mesh, self.model, network)
 
     def poll(self, wait: bool = False) -> None:
         """Uses the mesh of the thread if it is ready; with ``wait``, waits for it.
@@ -103,14 +102,6 @@ class SurfaceMesh:
         if mesh is not None:
             self.current = mesh
             self.model.use_mesh(mesh.bits)
-
-
-def fulfil(future: Future, function: Callable, *args: object) -> None:
-    """Calls a function and stores its result or its exception in a future."""
-    try:
-        future.set_result(function(*args))
-    except BaseException as error:  # the thread that waits for the future raises it
-        future.set_exception(error)
 
 
 def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:

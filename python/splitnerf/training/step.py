@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
 
 import torch
 from torch import Tensor
@@ -14,6 +14,7 @@ from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
 from splitnerf.training import losses
 from splitnerf.training.batches import Batch
+from splitnerf.training.late_occlusion import LateOcclusion
 from splitnerf.training.losses import Term
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
@@ -37,6 +38,8 @@ class Step:
         seen: losses.SeenLight | None = None,
     ):  # fmt: skip
         self.model, self.grid, self.mesh, self.generator, self.seen = model, grid, mesh, generator, seen
+        on_cpu = model.device.type == "cpu"  # whose threads would only share the time
+        self.late = None if on_cpu or model.config.occlusion.kind != "mlp" else LateOcclusion(model, generator)
 
     def __call__(
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
@@ -68,7 +71,7 @@ class Step:
         c = self.model.config
         ray = render_rays(self.model, light, found, shades_per_ray=c.sampling.shades_per_ray, capacity=capacity)
         terms = loss_terms(
-            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen
+            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen, self.late
         )
         self.model.zero_grad(set_to_none=True)
         losses.backward(terms)
@@ -80,13 +83,13 @@ class Step:
 
     def stream(self) -> AbstractContextManager[None]:
         """The context in which steps run."""
-        return nullcontext()
+        return nullcontext() if self.late is None else closing(self.late)
 
 
 def loss_terms(
     model: SceneModel, light: EvaluatedLight, batch: Batch, ray: RenderedRays, scene: MeshScene | None,
     environment: Tensor | None, generator: torch.Generator, step: int, progress: float,
-    seen: losses.SeenLight | None = None,
+    seen: losses.SeenLight | None = None, late: LateOcclusion | None = None,
 ) -> dict[str, Term]:  # fmt: skip
     """The terms of the loss by name; the colour's term comes first.
 
@@ -98,6 +101,7 @@ def loss_terms(
         generator: Random numbers for the losses' subsets.
         step, progress: The number of the step, and the training's progress in [0, 1].
         seen: The light that photos show around the object; None where they show none.
+        late: Traces occlusion beside the training; None: the step traces its own points.
 
     Source: SplitNeRF Eq. (3), (11), (18) and the losses named in :mod:`splitnerf.training.losses`.
     """
@@ -133,8 +137,10 @@ def loss_terms(
         terms["binary_metal"] = Term(c.losses.binary_metal_weight, binary_metal)
     if c.losses.dark_metal_weight:
         terms["dark_metal"] = Term(c.losses.dark_metal_weight, dark_metal)
-    if environment is not None:
+    if environment is not None and late is None:
         terms["occlusion"] = Term(
             c.losses.occlusion_weight, losses.occlusion_loss(ray, scene, environment, c, generator, step)
         )
+    elif environment is not None and (value := late.loss(ray, scene, environment, step)) is not None:
+        terms["occlusion"] = Term(c.losses.occlusion_weight, value)
     return terms
