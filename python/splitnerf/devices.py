@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 import torch
 from torch import Tensor
@@ -63,7 +63,31 @@ def pinned(x: Tensor, device: torch.device) -> Tensor:
     return x.pin_memory() if device.type == "cuda" else x
 
 
-def wait_for(device: torch.device) -> None:
-    """Returns when all work given to a device is done."""
-    if device.type == "cuda":
-        torch.cuda.synchronize(device)
+class SideStream:
+    """The order of another thread's work on a device: on a GPU a CUDA stream, on the CPU nothing.
+
+    Neither thread waits for work of the other but where a method says so, and then the GPU waits, not the host.
+
+    Args:
+        device: The device of the work.
+    """
+
+    def __init__(self, device: torch.device):
+        self._device, self._stream = device, torch.cuda.Stream(device) if device.type == "cuda" else None
+
+    def within(self) -> AbstractContextManager[object]:
+        """The context in which the other thread works."""
+        return nullcontext() if self._stream is None else torch.cuda.stream(self._stream)
+
+    def follow(self) -> None:
+        """Lets later work here begin when all that the caller has given to the device is done.
+
+        Memory that was made here, and that the caller has freed, is not taken again before that.
+        """
+        if self._stream is not None:
+            self._stream.wait_stream(torch.cuda.current_stream(self._device))
+
+    def join(self) -> None:
+        """Lets later work of the caller begin when all work that was given here is done."""
+        if self._stream is not None:
+            torch.cuda.current_stream(self._device).wait_stream(self._stream)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 import torch
 from torch import Tensor
@@ -52,6 +52,16 @@ class Event:
         pass
 
     def synchronize(self) -> None:
+        pass
+
+
+class Stream:
+    """Work of the CPU has one order."""
+
+    def __init__(self, device: torch.device | None = None):
+        pass
+
+    def wait_stream(self, other: Stream) -> None:
         pass
 
 
@@ -157,7 +167,9 @@ def pretend_gpu(monkeypatch) -> Iterator[PretendGpu]:
     monkeypatch.setattr(torch, "Generator", Generator)
     monkeypatch.setattr(torch.cuda, "synchronize", lambda device=None: None)
     monkeypatch.setattr(torch.cuda, "Event", Event)
-    monkeypatch.setattr(torch.cuda, "current_stream", lambda device=None: None)
+    monkeypatch.setattr(torch.cuda, "Stream", Stream)
+    monkeypatch.setattr(torch.cuda, "current_stream", lambda device=None: Stream())
+    monkeypatch.setattr(torch.cuda, "stream", lambda stream: nullcontext())
     monkeypatch.setattr(Tensor, "pin_memory", lambda x: x)
     before = torch.__future__.get_overwrite_module_params_on_conversion()
     torch.__future__.set_overwrite_module_params_on_conversion(True)
