@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 import torch
+from torch import Tensor
 
 from splitnerf import _core
 from splitnerf.errors import InputError
@@ -43,7 +44,50 @@ def tensor_cores(on: bool) -> Iterator[None]:
         products.fp32_precision = before
 
 
-def wait_for(device: torch.device) -> None:
-    """Returns when all work given to a device is done."""
-    if device.type == "cuda":
-        torch.cuda.synchronize(device)
+def start_fetching(x: Tensor) -> tuple[Tensor, Callable[[], None]]:
+    """Starts to copy a tensor to the CPU, in the order of its device's work.
+
+    Returns:
+        The copy, and a function that waits until it is complete; another thread may call it.
+    """
+    copy = x.to("cpu", non_blocking=True)  # into pinned memory, where it comes from a GPU
+    if x.device.type != "cuda":
+        return copy, lambda: None
+    copied = torch.cuda.Event(blocking=True)  # the waiting thread sleeps
+    copied.record(torch.cuda.current_stream(x.device))
+    return copy, copied.synchronize
+
+
+def pinned(x: Tensor, device: torch.device) -> Tensor:
+    """A tensor of the CPU in memory from which this device copies without keeping the host waiting."""
+    return x.pin_memory() if device.type == "cuda" else x
+
+
+class SideStream:
+    """The order of another thread's work on a device: on a GPU a CUDA stream, on the CPU nothing.
+
+    Neither thread waits for work of the other but where a method says so, and then the GPU waits, not the host.
+
+    Args:
+        device: The device of the work.
+    """
+
+    def __init__(self, device: torch.device):
+        self._device, self._stream = device, torch.cuda.Stream(device) if device.type == "cuda" else None
+
+    def within(self) -> AbstractContextManager[object]:
+        """The context in which the other thread works."""
+        return nullcontext() if self._stream is None else torch.cuda.stream(self._stream)
+
+    def follow(self) -> None:
+        """Lets later work here begin when all that the caller has given to the device is done.
+
+        Memory that was made here, and that the caller has freed, is not taken again before that.
+        """
+        if self._stream is not None:
+            self._stream.wait_stream(torch.cuda.current_stream(self._device))
+
+    def join(self) -> None:
+        """Lets later work of the caller begin when all work that was given here is done."""
+        if self._stream is not None:
+            torch.cuda.current_stream(self._device).wait_stream(self._stream)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 import torch
 from torch import Tensor
@@ -40,6 +40,29 @@ class Generator(torch.Generator):
     @property
     def device(self) -> torch.device:
         return self.named
+
+
+class Event:
+    """Is over when it begins, as is all work of the CPU."""
+
+    def __init__(self, blocking: bool = False):
+        pass
+
+    def record(self, stream: object) -> None:
+        pass
+
+    def synchronize(self) -> None:
+        pass
+
+
+class Stream:
+    """Work of the CPU has one order."""
+
+    def __init__(self, device: torch.device | None = None):
+        pass
+
+    def wait_stream(self, other: Stream) -> None:
+        pass
 
 
 def marked(value: object) -> object:
@@ -114,6 +137,8 @@ class PretendGpu(TorchFunctionMode):
         if target is None:
             target = GPU if isinstance(args[0], GpuTensor) else CPU
         crossed = isinstance(args[0], GpuTensor) != (target.type == "cuda")
+        if how == "to" and crossed and not kwargs.get("non_blocking"):
+            self.waits[how] += 1
         result = args[0]
         if how == "to":  # a dtype may change as well
             result = func(*map(on_cpu, args), **{name: on_cpu(value) for name, value in kwargs.items()})
@@ -141,6 +166,11 @@ def pretend_gpu(monkeypatch) -> Iterator[PretendGpu]:
     """A GPU for the block, with ``torch.Generator("cuda")`` and modules that can be moved to it."""
     monkeypatch.setattr(torch, "Generator", Generator)
     monkeypatch.setattr(torch.cuda, "synchronize", lambda device=None: None)
+    monkeypatch.setattr(torch.cuda, "Event", Event)
+    monkeypatch.setattr(torch.cuda, "Stream", Stream)
+    monkeypatch.setattr(torch.cuda, "current_stream", lambda device=None: Stream())
+    monkeypatch.setattr(torch.cuda, "stream", lambda stream: nullcontext())
+    monkeypatch.setattr(Tensor, "pin_memory", lambda x: x)
     before = torch.__future__.get_overwrite_module_params_on_conversion()
     torch.__future__.set_overwrite_module_params_on_conversion(True)
     try:

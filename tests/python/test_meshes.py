@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import threading
 
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 import torch
 import trimesh
+from pretend_gpu import GPU, pretend_gpu
 
+from splitnerf.fields.occlusion import TracedBits
+from splitnerf.ops import SdfNetwork
 from splitnerf.training import meshes
 from splitnerf.config import preset
 from splitnerf.training.meshes import SurfaceMesh
@@ -122,3 +127,38 @@ def test_what_goes_wrong_beside_is_told(model):
     with pytest.raises(RuntimeError, match="not finite"):
         mesh.poll(wait=True)
     assert mesh.current is None
+
+
+def test_beside_it_works_in_a_stream_of_its_own_and_brings_the_bits_to_the_device(model, monkeypatch):
+    """The copy of the field is made before the stream goes on; the caller's stream waits before the bits are used."""
+    with pretend_gpu(monkeypatch):
+        told, main = [], threading.current_thread()
+
+        class Noted:
+            def __init__(self, name):
+                self.name = name
+
+            def wait_stream(self, other):
+                told.append(f"{self.name} waits for {other.name}")
+
+        @contextmanager
+        def within(stream):
+            assert threading.current_thread() is not main
+            told.append(f"in {stream.name}")
+            yield
+            told.append(f"out of {stream.name}")
+
+        monkeypatch.setattr(torch.cuda, "Stream", lambda device: Noted("ours"))
+        monkeypatch.setattr(torch.cuda, "current_stream", lambda device: Noted("theirs"))
+        monkeypatch.setattr(torch.cuda, "stream", within)
+        monkeypatch.setattr(torch.cuda, "synchronize", None)  # the host waits for nothing
+        snapshot, moved, use = SdfNetwork.snapshot, TracedBits.to, type(model.occlusion).use
+        monkeypatch.setattr(SdfNetwork, "snapshot", lambda self: told.append("copied") or snapshot(self))
+        monkeypatch.setattr(TracedBits, "to", lambda self, device: told.append("moved") or moved(self, device))
+        monkeypatch.setattr(type(model.occlusion), "use", lambda self, bits: told.append("used") or use(self, bits))
+        mesh = SurfaceMesh(model.to("cuda"), background=True)
+        mesh.request(0.1)
+        mesh.poll(wait=True)
+        assert mesh.current is not None and model.occlusion.cache.bits.device == GPU
+    made = ["copied", "ours waits for theirs", "in ours", "moved", "out of ours", "theirs waits for ours", "used", "moved"]
+    assert told == made

@@ -86,7 +86,7 @@ class TracedBits(NamedTuple):
     """The traced visibility of a mesh's vertices.
 
     Attributes:
-        cache: The visibility bits, on the CPU. ``hits`` are numbers of senders.
+        cache: The visibility bits. ``hits`` are numbers of senders.
         is_unoccluded: Whether the mesh blocks so little that it counts as convex.
         senders: The vertices that rays hit, each with the direction that it is hit from; None without indirect light.
     """
@@ -94,6 +94,11 @@ class TracedBits(NamedTuple):
     cache: VisibilityCache
     is_unoccluded: bool
     senders: Senders | None
+
+    def to(self, device: torch.device | str) -> TracedBits:
+        """A copy on a device; tensors that already are there are not copied."""
+        senders = None if self.senders is None else self.senders.to(device)
+        return TracedBits(self.cache.to(device), self.is_unoccluded, senders)
 
 
 class Senders(NamedTuple):

@@ -91,9 +91,10 @@ class SdfField(nn.Module):
         h = F.softplus(F.linear(inputs, hidden, self.hidden_bias), SOFTPLUS_BETA)
         return F.linear(h, out[:n_outputs], self.out_bias[:n_outputs])
 
-    def forward(self, positions: Tensor) -> Tensor:
-        """The outputs [n, n_outputs] at positions [n, 3], scene units."""
-        return self._outputs(self._inputs(positions, self.grid(self._to_unit(positions))))
+    def forward(self, positions: Tensor) -> tuple[Tensor, Tensor]:
+        """The outputs [n, n_outputs] and the hash features [n, C] at positions [n, 3], scene units."""
+        features = self.grid(self._to_unit(positions))
+        return self._outputs(self._inputs(positions, features)), features
 
     def sdf(self, positions: Tensor) -> Tensor:
         """Signed distance [n] at positions [n, 3], scene units."""
@@ -134,12 +135,11 @@ class SdfField(nn.Module):
         """
         resolution = self.grid.spec.levels()[max(0, self.grid.n_active - 1)][0]
         eps = cells * 2.0 * self.box / resolution
-        steps = eps * torch.cat([torch.eye(3), -torch.eye(3)]).to(positions)
+        axes = torch.eye(3, dtype=positions.dtype, device=positions.device)
+        steps = eps * torch.cat([axes, -axes])
         with tensor_cores(False):  # rounding to TF32 would exceed the differences
             taps = self.sdf((positions[:, None, :] + steps).reshape(-1, 3)).view(-1, 2, 3)
-        features = self.grid(self._to_unit(positions))
-        outputs = self._outputs(self._inputs(positions, features))
-        return SdfSample(outputs, features, (taps[:, 0] - taps[:, 1]) / (2.0 * eps))
+        return SdfSample(*self(positions), (taps[:, 0] - taps[:, 1]) / (2.0 * eps))
 
 
 def sharpness(variance: Tensor) -> Tensor:

@@ -112,8 +112,7 @@ class VisibilityBits(OcclusionModel):
     def use(self, traced: TracedBits) -> None:
         """Switches to these bits. The radiance of the senders is unknown until :meth:`refresh`."""
         super().use(traced)
-        self.cache, self.is_unoccluded = traced.cache.to(self.directions.device), traced.is_unoccluded
-        self.senders = None if traced.senders is None else traced.senders.to(self.directions.device)
+        self.cache, self.is_unoccluded, self.senders = traced.to(self.directions.device)
         self.directions.copy_(self.cache.directions)
         self.radiance = None
 

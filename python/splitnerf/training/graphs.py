@@ -67,7 +67,7 @@ class GraphedStep(Step):
         self._counts: tuple[float, float] | None = None  # shaded samples and segments of the last step
         self._used: tuple[int, int] | None = None  # capacity of the last step
         self._seen: set[Hashable] = set()
-        self._has_loaded = False  # whether all kernels of a step with a capacity are loaded
+        self._loaded: set[bool] = set()  # of steps with a capacity, by whether light is summed: their kernels are loaded
         self._graphs: dict[Hashable, Recorded] = {}
         self._stream = torch.cuda.Stream(model.device)
         self._pool = torch.cuda.graph_pool_handle()
@@ -101,8 +101,8 @@ class GraphedStep(Step):
             del self._graphs[key]
         if key not in self._graphs:
             self._used = tuple(round_up(SHADING_SLACK * n) for n in self._counts)
-            if not self._has_loaded:
-                self._has_loaded = True
+            if self.model.sums_light not in self._loaded:
+                self._loaded.add(self.model.sums_light)
                 return differentiate(batch, found, light, self._used)
             while len(self._graphs) >= MOST_GRAPHS:
                 del self._graphs[next(iter(self._graphs))]
@@ -177,9 +177,9 @@ def record(function: Callable[[], Any], pool: Any, generator: torch.Generator) -
     graph = torch.cuda.CUDAGraph()
     graph.register_generator_state(generator)
     collects = gc.isenabled()
-    gc.disable()  # memory freed during the recording would become part of the graph
-    graph.capture_begin(pool=pool, capture_error_mode="thread_local")  # another thread makes meshes meanwhile
     try:
+        gc.disable()  # memory freed during the recording would become part of the graph
+        graph.capture_begin(pool=pool, capture_error_mode="thread_local")  # another thread makes meshes meanwhile
         outputs = function()
     except BaseException:
         with suppress(RuntimeError):  # the first error is the one to report

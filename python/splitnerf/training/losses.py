@@ -220,31 +220,66 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
     return quadratic_entropy(x)
 
 
+class OcclusionPoints(NamedTuple):
+    """Points whose occlusion factors are traced, without gradients.
+
+    Attributes:
+        on_surface: [m, 3] positions on the surface, scene units.
+        normals: [m, 3] unit normals of the field.
+        lobe_dirs: [m, 3] unit axes of the specular lobe: the query direction of the specular light or, without
+            ``occlusion.directional``, the normal, as published.
+        roughness: [m, 1] perceptual roughness in [0, 1].
+    """
+
+    on_surface: Tensor
+    normals: Tensor
+    lobe_dirs: Tensor
+    roughness: Tensor
+
+
 def occlusion_loss(
     ray: RenderedRays, scene: MeshScene, environment: Tensor, config: Config, generator: torch.Generator, seed: int
 ) -> Tensor:
     """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples.
 
-    The specular lobe's axis is the query direction of the specular light or, without ``occlusion.directional``, the
-    normal, as published.
-
     Source: SplitNeRF Eq. (12)-(16).
     """
-    c = config
     random = torch.rand(len(ray.shaded), generator=generator, device=generator.device)
-    chosen = (random < c.occlusion.share).nonzero().squeeze(1)
+    chosen = (random < config.occlusion.share).nonzero().squeeze(1)
     if len(chosen) == 0:
         return ray.shares.new_zeros(())
-    with torch.no_grad():
-        normals = ray.normals[chosen]
-        on_surface = ray.positions[chosen] - normals * ray.sdf[chosen, None]
-        o_d, o_s = occlusion_factors(
-            scene, on_surface, normals, ray.points.lobe_dirs[chosen] if c.occlusion.directional else normals,
-            ray.points.roughness[chosen], environment, n_diffuse_rays=c.occlusion.rays,
-            n_specular_rays=c.occlusion.rays, offset=c.occlusion.offset, along_ray=c.occlusion.ray_start == "ray",
-            seed=seed, n_channels=c.occlusion.channels,
-        )  # fmt: skip
-    error_d, error_s = ray.points.occlusion_d[chosen] - o_d, ray.points.occlusion_s[chosen] - o_s
-    error = penalty(error_d, c.losses.occlusion_form) + penalty(error_s, c.losses.occlusion_form)
-    shares = ray.shares[chosen]
-    return shares @ error.sum(1) / (shares.sum().clamp(min=1e-8) * c.occlusion.channels)
+    truth = traced_factors(scene, occlusion_points(ray, chosen, config), environment, config, seed)
+    predicted = ray.points.occlusion_d[chosen], ray.points.occlusion_s[chosen]
+    return occlusion_error(predicted, truth, ray.shares[chosen], config)
+
+
+@torch.no_grad()
+def occlusion_points(ray: RenderedRays, chosen: Tensor, config: Config) -> OcclusionPoints:
+    """The points of chosen [m] int64 shaded samples, moved onto the surface."""
+    normals = ray.normals[chosen]
+    on_surface = ray.positions[chosen] - normals * ray.sdf[chosen, None]
+    lobe_dirs = ray.points.lobe_dirs[chosen] if config.occlusion.directional else normals
+    return OcclusionPoints(on_surface, normals, lobe_dirs, ray.points.roughness[chosen])
+
+
+@torch.no_grad()
+def traced_factors(
+    scene: MeshScene, points: OcclusionPoints, environment: Tensor, config: Config, seed: int
+) -> tuple[Tensor, Tensor]:
+    """The factors o_d and o_s of points, see :func:`splitnerf.ops.occlusion_factors`."""
+    c = config.occlusion
+    return occlusion_factors(
+        scene, *points, environment, n_diffuse_rays=c.rays, n_specular_rays=c.rays, offset=c.offset,
+        along_ray=c.ray_start == "ray", seed=seed, n_channels=c.channels,
+    )  # fmt: skip
+
+
+def occlusion_error(
+    predicted: tuple[Tensor, Tensor], truth: tuple[Tensor, Tensor], shares: Tensor, config: Config
+) -> Tensor:
+    """The mean error of predicted factors o_d and o_s, [m, channels] each, weighted by the samples' shares [m].
+
+    Source: SplitNeRF Eq. (16).
+    """
+    error_d, error_s = (penalty(ours - traced, config.losses.occlusion_form) for ours, traced in zip(predicted, truth))
+    return shares @ (error_d + error_s).sum(1) / (shares.sum().clamp(min=1e-8) * config.occlusion.channels)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import NamedTuple
@@ -10,11 +9,12 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from splitnerf.devices import wait_for
+from splitnerf.devices import SideStream
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.fields.visibility import TracedBits
 from splitnerf.ops import MeshScene, SdfNetwork, sdf_values
 from splitnerf.render.model import SceneModel
+from splitnerf.training.background import in_background
 
 
 class TracedMesh(NamedTuple):
@@ -37,8 +37,9 @@ class SurfaceMesh:
 
     Args:
         model: The scene; it uses each mesh as soon as the mesh is ready.
-        background: Whether a thread makes the meshes while the caller continues. The thread reads a copy of the field
-            and traces on the CPU; :meth:`poll` takes over the mesh. The thread ends with the program.
+        background: Whether a thread makes the meshes while the caller continues. The thread reads a copy of the field,
+            in a CUDA stream of its own, traces on the CPU, and brings the bits to the model's device; :meth:`poll`
+            takes over the mesh. The thread ends with the program.
 
     Attributes:
         current: The mesh in use; None before the first.
@@ -50,6 +51,7 @@ class SurfaceMesh:
         self.model, self.background, self.current = model, background, None
         self.made_at = self.asked_at = 0.0
         self._made: Future[TracedMesh | None] | None = None
+        self._side = SideStream(model.device)
 
     @property
     def scene(self) -> MeshScene | None:
@@ -72,9 +74,8 @@ class SurfaceMesh:
             self._use(make_mesh(self.model, network))
             return
         network = network.snapshot()
-        wait_for(self.model.device)  # the thread works in another CUDA stream
-        self._made = Future()
-        threading.Thread(target=fulfil, args=(self._made, make_mesh, self.model, network), daemon=True).start()
+        self._side.follow()
+        self._made = in_background(make_beside, self._side, self.model, network)
 
     def poll(self, wait: bool = False) -> None:
         """Uses the mesh of the thread if it is ready; with ``wait``, waits for it.
@@ -84,7 +85,9 @@ class SurfaceMesh:
         """
         if self._made is not None and (wait or self._made.done()):
             made, self._made = self._made, None
-            self._use(made.result())
+            mesh = made.result()
+            self._side.join()
+            self._use(mesh)
 
     def restore(self, content: dict) -> None:
         """Uses the mesh of a checkpoint, if it has one."""
@@ -105,14 +108,6 @@ class SurfaceMesh:
             self.model.use_mesh(mesh.bits)
 
 
-def fulfil(future: Future, function: Callable, *args: object) -> None:
-    """Calls a function and stores its result or its exception in a future."""
-    try:
-        future.set_result(function(*args))
-    except BaseException as error:  # the thread that waits for the future raises it
-        future.set_exception(error)
-
-
 def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
     """The zero level set of a field, traced; None where it is empty. Only constants of the model are read.
 
@@ -124,6 +119,13 @@ def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
     except EmptyMesh:
         return None
     return traced(model, torch.from_numpy(vertices), torch.from_numpy(faces))
+
+
+def make_beside(side: SideStream, model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
+    """The result of :func:`make_mesh` in the order of another stream, its bits on the model's device."""
+    with side.within():
+        mesh = make_mesh(model, network)
+        return mesh if mesh is None or mesh.bits is None else mesh._replace(bits=mesh.bits.to(model.device))
 
 
 def traced(model: SceneModel, vertices: Tensor, faces: Tensor) -> TracedMesh:

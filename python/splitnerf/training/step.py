@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
 
 import torch
 from torch import Tensor
@@ -14,6 +14,7 @@ from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
 from splitnerf.training import losses
 from splitnerf.training.batches import Batch
+from splitnerf.training.late_occlusion import LateOcclusion
 from splitnerf.training.losses import Terms
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
@@ -37,6 +38,8 @@ class Step:
         seen: losses.SeenLight | None = None,
     ):  # fmt: skip
         self.model, self.grid, self.mesh, self.generator, self.seen = model, grid, mesh, generator, seen
+        on_cpu = model.device.type == "cpu"  # whose threads would only share the time
+        self.late = None if on_cpu or model.config.occlusion.kind != "mlp" else LateOcclusion(model, generator)
 
     def __call__(
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
@@ -68,7 +71,7 @@ class Step:
         c = self.model.config
         ray = render_rays(self.model, light, found, shades_per_ray=c.sampling.shades_per_ray, capacity=capacity)
         terms = loss_terms(
-            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen
+            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen, self.late
         )
         self.model.zero_grad(set_to_none=True)
         terms.backward()
@@ -80,13 +83,13 @@ class Step:
 
     def stream(self) -> AbstractContextManager[None]:
         """The context in which steps run."""
-        return nullcontext()
+        return nullcontext() if self.late is None else closing(self.late)
 
 
 def loss_terms(
     model: SceneModel, light: EvaluatedLight, batch: Batch, ray: RenderedRays, scene: MeshScene | None,
     environment: Tensor | None, generator: torch.Generator, step: int, progress: float,
-    seen: losses.SeenLight | None = None,
+    seen: losses.SeenLight | None = None, late: LateOcclusion | None = None,
 ) -> Terms:  # fmt: skip
     """The terms of the loss by name; the colour's term comes first.
 
@@ -98,11 +101,12 @@ def loss_terms(
         generator: Random numbers for the losses' subsets.
         step, progress: The number of the step, and the training's progress in [0, 1].
         seen: The light that photos show around the object; None where they show none.
+        late: Traces occlusion beside the training; None: the step traces its own points.
 
     Source: SplitNeRF Eq. (3), (11), (18) and the losses named in :mod:`splitnerf.training.losses`.
     """
     c, w, terms = model.config, model.config.losses, Terms()
-    late = progress >= w.priors_from
+    has_priors = progress >= w.priors_from
     # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
     terms.add(
         {"colour": CHANNELS * w.colour_weight, "mask": w.mask_weight or None},
@@ -115,14 +119,14 @@ def loss_terms(
     terms.add(
         {
             "metal": w.metal_weight if w.metal_regulariser else None,
-            "binary_metal": (late and w.binary_metal_weight) or None,
+            "binary_metal": (has_priors and w.binary_metal_weight) or None,
             "dark_metal": w.dark_metal_weight or None,
         },
         material_losses(
             ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=w.metal_form == "smooth_l1"
         ),
     )
-    if late and w.entropy_weight:
+    if has_priors and w.entropy_weight:
         terms.add({"entropy": w.entropy_weight}, losses.material_entropy_loss(ray, c, generator))
     if model.light.needs_consistency_loss and w.light_weight and step % w.light_every == 0:
         terms.add({"light": w.light_weight}, losses.light_loss(model.light, c, generator, step))
@@ -134,7 +138,9 @@ def loss_terms(
             terms.add({"light_prior": w.light_prior_weight * since}, losses.light_prior_loss(model.light))
         if seen is not None and w.seen_weight:
             terms.add({"seen_light": w.seen_weight * since}, seen.loss(light))
-    if environment is not None:
+    if environment is not None and late is None:
         found = losses.occlusion_loss(ray, scene, environment, c, generator, step)
+        terms.add({"occlusion": w.occlusion_weight}, found)
+    elif environment is not None and (found := late.loss(ray, scene, environment, step)) is not None:
         terms.add({"occlusion": w.occlusion_weight}, found)
     return terms
