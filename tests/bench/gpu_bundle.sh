@@ -48,13 +48,15 @@ rm -rf "$packages/unpacked/usr/share" "$packages/unpacked/usr/bin"
 build_wheel() {
   "$wheel_python" -m venv "$packages/venv"
   "$packages/venv/bin/python" -m pip --disable-pip-version-check install --quiet scikit-build-core pybind11
-  mkdir "$packages/torch"
+  mkdir "$packages/torch" "$packages/source" # without libraries that an editable install left among the sources
+  (cd "$root" && tar cf - --exclude='*.so*' --exclude=__pycache__ cpp python third_party CMakeLists.txt pyproject.toml README.md LICENSE) |
+    tar xf - -C "$packages/source"
   python3 -c 'import pathlib, sys, torch
 here, there = pathlib.Path(torch.__file__).parent, pathlib.Path(sys.argv[1])
 for name in ("include", "lib"): (there / name).symlink_to(here / name)
 (there / "__init__.py").write_text(f"__version__ = {str(torch.__version__)!r}\n")' "$packages/torch"
   PYTHONPATH="$packages" "$packages/venv/bin/python" -m pip --disable-pip-version-check wheel --quiet --no-deps --no-build-isolation \
-    --no-cache-dir --wheel-dir "$out/built" "$root" -C build-dir="$packages/build" -C cmake.define.SPLITNERF_CUDA=ON \
+    --no-cache-dir --wheel-dir "$out/built" "$packages/source" -C build-dir="$packages/build" -C cmake.define.SPLITNERF_CUDA=ON \
     -C cmake.define.CMAKE_CUDA_ARCHITECTURES="${CUDA_ARCHITECTURES:-90-real}"
   "$root/tests/bench/gpu_sources.sh" >"$out/built/sources"
 }
