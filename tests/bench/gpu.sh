@@ -151,7 +151,8 @@ write_demo_dataset(Path('$work/writing'), $picture)" && mv "$work/writing" "$wor
 
 gpu_tests() { # each file in a process of its own: a kernel that takes the device down fails one file alone
   mkdir -p "$work/tests"
-  grep -lE 'DEVICES|devices\(|"cuda"' tests/python/test_*.py | if [ -n "$all_tests" ]; then cat; else head -n 2; fi | xargs -P 5 -I{} bash -c 'CUDA_LAUNCH_BLOCKING=1 "$run_python" -m pytest {} -q -k cuda -p no:cacheprovider -o faulthandler_timeout=60 -r fE >"$work/tests/$(basename {}).log" 2>&1 || [ $? = 5 ]'
+  grep -lE 'DEVICES|devices\(|"cuda"' tests/python/test_*.py | if [ -n "$all_tests" ]; then cat; else head -n 2; fi |
+    xargs -P 5 -I{} bash -c 'CUDA_LAUNCH_BLOCKING=1 "$run_python" -m pytest {} -q -k cuda -p no:cacheprovider -o faulthandler_timeout=60 -r fE >"$work/tests/$(basename {}).log" 2>&1 || [ $? = 5 ]'
   code=$?
   grep -hE '^(FAILED|ERROR|E  )' "$work"/tests/*.log
   for log in "$work"/tests/*.log; do echo "$(basename "$log" .py.log): $(tail -n 1 "$log")"; done | tee "$work/tests/summary"
@@ -173,7 +174,7 @@ train() { # name, seconds, preset, options of the training
 }
 
 sanitize() { # memcheck or racecheck, on the families that have kernels with shared memory
-  TOOL=compute-sanitizer tool_part "$1" 80 "$run_python" tests/bench/gpu_smoke.py --device $device --seconds 75 \
+  TOOL=compute-sanitizer tool_part "$1" 80 "$run_python" tests/bench/gpu_smoke.py --device $device --seconds $((75 * slower)) \
     --only fields --only gradients --only light --only losses --only rays --under compute-sanitizer --tool "$1" --error-exitcode 9
 }
 
@@ -186,7 +187,7 @@ tests_once() { # in the command that has the time
 }
 
 first() {
-  part smoke 90 "$run_python" tests/bench/gpu_smoke.py --device $device
+  part smoke 90 "$run_python" tests/bench/gpu_smoke.py --device $device --seconds $((60 * slower))
   part data 60 bash -c data || return
   scene=$(tail -n 1 "$work/data.log")
   part step 80 "$run_python" tests/bench/gpu_step.py "$scene" --device $device --steps $steps_before --out "$out" "${small[@]}"
@@ -222,7 +223,8 @@ facts
 install
 if [ -e "$work/installed" ]; then
   $command
-  [ ! -d "$work/runs" ] || (cd "$work" && find runs \( -name '*.json*' -o -name config.toml -o -name report.html \) -print0 | tar czf "$out/runs.tar.gz" --null -T -)
+  [ ! -d "$work/runs" ] || (cd "$work" && find runs \( -name '*.json*' -o -name config.toml -o -name report.html \) -print0 |
+    tar czf "$out/runs.tar.gz" --null -T -)
 fi
 awk -F '\t' '$1 == "part" && $3 != "done" && $3 != "left out" { print $2 }' "$rows" | while read -r name; do
   echo "---- $name" # the end of what failed, also where the reader sees no file
