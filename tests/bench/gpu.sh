@@ -200,6 +200,7 @@ first() {
   sanitize memcheck
   sanitize racecheck
   tests_once
+  wanted short_fast || return
   if [ "$(left)" -ge 80 ]; then # loading, export and scores take about 40 s
     train short_fast "$(left)" fast --steps $long_steps --max-minutes "$(awk "BEGIN { print ($(left) - 45) / 60 / $slower }")" "${small[@]}"
   else row short_fast "left out" 0 "the second command trains longer"; fi
