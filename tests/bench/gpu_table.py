@@ -9,6 +9,7 @@ between its two marker lines, in place of what stands there; a rehearsal on the 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from pathlib import Path
 from typing import NamedTuple
@@ -49,7 +50,8 @@ def markdown(run: Run) -> str:
     rehearsal = f" A rehearsal {run.facts['rehearsal']}: no number of it counts." if run.facts.get("rehearsal") else ""
     lines = [f"`tests/bench/gpu.sh {run.command}`: {facts}.{rehearsal}", "", "| part | | seconds | |", "|---|---|---|---|"]
     for cells in run.parts:
-        lines.append("| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |")
+        shown = [re.sub(r"(?<!\S)/\S*/", "", cell).replace("|", "/") for cell in cells]  # without folders of that machine
+        lines.append("| " + " | ".join(shown) + " |")
     return "\n".join(lines)
 
 

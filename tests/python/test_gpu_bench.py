@@ -130,7 +130,7 @@ def test_a_wrong_operator_is_named(monkeypatch, capsys):
     assert said.startswith("wrong: composite, torch.float64: ") and f"of {len(gpu_smoke.families('cpu')['rays'])} operators" in said
 
 
-LINES = "fact\tcard\tA card\nfact\tcommit\tabc1234\nfact\tdate\t2026-01-02\npart\tstep\tdone\t12\tall | agree\n"
+LINES = "fact\tcard\tA card\nfact\tcommit\tabc1234\nfact\tdate\t2026-01-02\npart\tstep\tdone\t12\tall | agree in /a/b/step.md\n"
 
 
 def test_the_table_goes_into_a_page(tmp_path, monkeypatch, capsys):
@@ -144,7 +144,7 @@ def test_the_table_goes_into_a_page(tmp_path, monkeypatch, capsys):
     text = page.read_text()
     assert text.startswith("before\n") and text.endswith("\nafter\n") and "old" not in text and text.count("| step |") == 2
     assert text.index("gpu.sh first`: card A card; driver unknown;") < text.index("gpu.sh second`")
-    assert "commit abc1234; date 2026-01-02." in text and "| step | done | 12 | all / agree |" in text
+    assert "commit abc1234; date 2026-01-02." in text and "| step | done | 12 | all / agree in step.md |" in text
     page.write_text("no markers")
     assert gpu_table.main() == 1 and page.read_text() == "no markers"
     page.write_text(text)
