@@ -3,9 +3,11 @@
 #   PYTHON_VERSION=3.12 tests/bench/gpu_bundle.sh DIR [HAVE ...]
 # HAVE names wheels that the other machine has already (the large ones: numpy scipy pillow cmake ninja); torch is never
 # among them. PYTHON_VERSION is that of the other machine (default: this one's). Embree comes as Debian packages, for a
-# C library at least as new as this machine's.
+# C library at least as new as this machine's. Where this machine has nvcc, torch and a Python of that version (pythonX.Y, or
+# WHEEL_PYTHON), a built wheel of the checkout goes along, with kernels for CUDA_ARCHITECTURES (default: 90).
 set -eu
-[ $# -ge 1 ] || { sed -n '2,6p' "$0"; exit 2; }
+[ $# -ge 1 ] || { sed -n '2,7p' "$0"; exit 2; }
+root=$(cd "$(dirname "$0")/../.." && pwd)
 mkdir -p "$1"
 out=$(cd "$1" && pwd) && shift
 python_version=${PYTHON_VERSION:-$(python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])')}
@@ -20,7 +22,7 @@ for minor in 17 24 27 28 31 34; do platforms="$platforms manylinux_2_${minor}_x8
 options=""
 for platform in $platforms; do options="$options --platform $platform"; done
 
-rm -rf "$out/wheels" "$out/embree.tar.xz"
+rm -rf "$out/wheels" "$out/built" "$out/embree.tar.xz"
 mkdir -p "$out/wheels"
 wanted=""
 for wheel in $wheels; do
@@ -42,5 +44,26 @@ for package in "$packages"/*.deb; do dpkg -x "$package" "$packages/unpacked"; do
 rm -rf "$packages/unpacked/usr/share" "$packages/unpacked/usr/bin"
 (cd "$packages/unpacked" && XZ_OPT=-9 tar cJf "$out/embree.tar.xz" usr)
 
-ls -s --block-size=K "$out"/wheels/* "$out/embree.tar.xz" | sort -n | sed "s|$out/||"
+# Needs only torch's headers, which are those of this machine's torch for any Python: a package of that name leads to them.
+build_wheel() {
+  "$wheel_python" -m venv "$packages/venv"
+  "$packages/venv/bin/python" -m pip --disable-pip-version-check install --quiet scikit-build-core pybind11
+  mkdir "$packages/torch" "$packages/source" # without libraries that an editable install left among the sources
+  (cd "$root" && tar cf - --exclude='*.so*' --exclude=__pycache__ cpp python third_party CMakeLists.txt pyproject.toml README.md LICENSE) |
+    tar xf - -C "$packages/source"
+  python3 -c 'import pathlib, sys, torch
+here, there = pathlib.Path(torch.__file__).parent, pathlib.Path(sys.argv[1])
+for name in ("include", "lib"): (there / name).symlink_to(here / name)
+(there / "__init__.py").write_text(f"__version__ = {str(torch.__version__)!r}\n")' "$packages/torch"
+  PYTHONPATH="$packages" "$packages/venv/bin/python" -m pip --disable-pip-version-check wheel --quiet --no-deps --no-build-isolation \
+    --no-cache-dir --wheel-dir "$out/built" "$packages/source" -C build-dir="$packages/build" -C cmake.define.SPLITNERF_CUDA=ON \
+    -C cmake.define.CMAKE_CUDA_ARCHITECTURES="${CUDA_ARCHITECTURES:-90-real}"
+  "$root/tests/bench/gpu_sources.sh" >"$out/built/sources"
+}
+wheel_python=$(command -v "${WHEEL_PYTHON:-python$python_version}") || wheel_python=
+if [ -n "$wheel_python" ] && python3 -c 'import torch' 2>/dev/null; then build_wheel; else
+  echo "no wheel of splitnerf: it takes python$python_version and torch on this machine; the other machine will build it" >&2
+fi
+
+ls -s --block-size=K "$out"/wheels/* "$out"/built/*.whl "$out/embree.tar.xz" 2>/dev/null | sort -n | sed "s|$out/||"
 du -sm "$out" | sed 's|\t.*| MB in all, without torch|'

@@ -39,15 +39,18 @@ BOX, RADIUS, SHELL = 1.5, 0.7, 0.3  # the surface is a ball, and its samples lie
 CORNERS = 8
 UNREAD = {"sparse_product": (3, 4, 5)}  # inputs that are for the backward pass
 S, ANNEAL, MIN_TRANSMITTANCE = 60.0, 1.0, 1e-3
+SEARCH = 0.65  # of a sample's length: the search asks for about 50,000 distances, as a training's does
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """How much there is of everything; the defaults are a step of the preset for a GPU."""
+    """How much there is of everything; the defaults are a step of preset `fast` in the middle of a training."""
 
-    rays: int = 8192
-    per_ray: int = 32  # samples
-    points: int = 25_600  # shaded
+    rays: int = 2900
+    per_ray: int = 11  # samples
+    beside: int = 6144  # points of the field that are no samples
+    points: int = 9000  # shaded
+    segments: int = 3200  # of rays, for which the caches are read
     levels: int = 16
     log2_table: int = 19
     width: int = 64
@@ -59,12 +62,17 @@ class Sizes:
     directions: int = 256  # of the bits
     light_resolution: int = 128
     subdivisions: int = 5  # of the mesh, 2 x 10242 vertices
-    entropy: int = 384
-    cells: int = 96
+    entropy: int = 1024
+    smooth: int = 4096  # points beside samples
+    cells: int = 128
 
     @property
     def samples(self) -> int:
         return self.rays * self.per_ray
+
+    @property
+    def field_points(self) -> int:
+        return self.samples + self.beside
 
     @property
     def spec(self) -> HashGridSpec:
@@ -85,8 +93,8 @@ class Sizes:
 
 
 TINY = Sizes(
-    rays=24, per_ray=8, points=40, levels=3, log2_table=8, width=16, outputs=5, queries=20, lights=64, traced=10, own=4,
-    directions=64, light_resolution=16, subdivisions=1, entropy=12, cells=12,
+    rays=24, per_ray=8, beside=9, points=40, segments=30, levels=3, log2_table=8, width=16, outputs=5, queries=20, lights=64,
+    traced=10, own=4, directions=64, light_resolution=16, subdivisions=1, entropy=12, smooth=14, cells=12,
 )  # fmt: skip
 
 
@@ -147,21 +155,26 @@ class World:
         hidden = torch.cat([network.hidden[:, :3], self.randn(self.sizes.width, self.sizes.features, seed=5)], 1)
         return network._replace(table=table, hidden=hidden).arguments()
 
+    @functools.cached_property
+    def positions(self) -> Tensor:
+        """Where the field is asked for: at the rays' samples, and anywhere."""
+        return torch.cat([self.rays.positions, (2 * self.rand(self.sizes.beside, 3, seed=62) - 1) * BOX])
+
     def grid(self, scattered: bool = False) -> tuple:
-        """Arguments of the hash grid, at the rays' samples or anywhere."""
-        at = self.rand(self.sizes.samples, 3, seed=6) if scattered else self.rays.positions / (2 * BOX) + 0.5
+        """Arguments of the hash grid, where the field is asked for or anywhere."""
+        at = self.rand(self.sizes.field_points, 3, seed=6) if scattered else self.positions / (2 * BOX) + 0.5
         table = self.randn(self.sizes.spec.n_entries, 2, seed=7)
         return at, table, *self.sizes.spec.arguments(self.sizes.levels)
 
     def grid_gradients(self, first: int, jacobian: bool, scattered: bool = False) -> tuple:
         at, table, *numbers = self.grid(scattered)
-        n, c = self.sizes.samples, self.sizes.features
+        n, c = self.sizes.field_points, self.sizes.features
         grads = (self.randn(n, c, seed=8), self.randn(n, 3, c, seed=9))[: 1 + jacobian]
         return *(at, table)[:first], *grads, *numbers
 
     def layer(self) -> tuple:
         _, hidden, hidden_bias, out, out_bias, beta, *_ = self.network
-        at = self.rays.positions
+        at = self.positions
         table = 1e-3 * self.randn(self.sizes.spec.n_entries, 2, seed=7)
         numbers = self.sizes.spec.arguments(self.sizes.levels)
         encoded = lib.hash_encode_jacobian(at / (2 * BOX) + 0.5, table, *numbers)
@@ -202,7 +215,7 @@ class World:
         return *self.rays[:3], self.cells, BOX, self.rays.step, 1024
 
     def sampling(self) -> tuple:
-        rules = (self.rays.step, 1024, S, ANNEAL, 1e-3, MIN_TRANSMITTANCE, 0.1, 1.25)
+        rules = (SEARCH * self.rays.step, 1024, S, ANNEAL, 1e-3, MIN_TRANSMITTANCE, 0.1, 1.25)
         return *self.rays[:3], self.cells, *self.network, *rules
 
     @functools.cached_property
@@ -264,8 +277,10 @@ class World:
         return queries, roughness, total, self.randn(self.sizes.queries, 3, seed=34), lights
 
     def pyramid(self) -> tuple:
+        """Lobes of the shaded points, then their normals for all of the light."""
         maps = pyramid_filters(self.sizes.light_resolution)
-        normals, _, _, roughness, _ = self.shading()
+        normals, views, _, roughness, _ = self.shading()
+        normals, roughness = torch.cat([views, normals]), torch.cat([roughness, torch.ones_like(roughness)])
         n_texels = int((maps.resolutions**2).sum())
         harmonics = 0.1 * self.randn(len(maps.projection), 3, seed=36)
         return normals, roughness, self.rand(n_texels, 3, seed=35), harmonics, maps.resolutions, maps.nodes, maps.zonal
@@ -288,8 +303,8 @@ class World:
         return normals, views, roughness, *drawn, self.rand(t, j, 3, seed=41)
 
     def shared_directions(self) -> tuple:
-        p, k = self.sizes.points, self.sizes.directions
-        normals, views, _, roughness, _ = self.shading()
+        p, k = self.sizes.segments, self.sizes.directions
+        normals, views, _, roughness, _ = (x[:p] for x in self.shading())
         seen = self.rand(p, k, seed=44), 0.2 * self.rand(p, k, 3, seed=45)
         around = fibonacci_directions(k, self.generator(42)), torch.full((k,), 4 * math.pi / k)
         return normals, views, roughness, *around, self.rand(k, 3, seed=43), *seen
@@ -305,7 +320,7 @@ class World:
         return VisibilityCache.trace(scene, vertices, normals, mesh.area, directions, with_hits=True)
 
     def near_the_mesh(self) -> tuple:
-        normals = unit(self.randn(self.sizes.points, 3, seed=47))
+        normals = unit(self.randn(self.sizes.segments, 3, seed=47))
         c = self.cache
         kept = (c.vertices, c.normals, c.starts, c.order, c.radius, c.bits, c.hits)
         return RADIUS * normals, normals, *kept, self.rand(len(c.vertices), 3, seed=48), c.directions
@@ -323,7 +338,7 @@ class World:
 
     def normals_beside(self) -> tuple:
         """Gradients of all samples, then of points beside some of them."""
-        n, m = self.sizes.samples, self.sizes.entropy
+        n, m = self.sizes.samples, self.sizes.smooth
         gradients = unit(self.randn(n + m, 3, seed=56)) * (0.9 + 0.2 * self.rand(n + m, 1, seed=57))
         return gradients, self.weights, torch.randint(n, (m,), generator=self.generator(58))
 
@@ -375,8 +390,8 @@ def bytes_moved(case: Case, sizes: Sizes, inputs: tuple, outputs: tuple) -> floa
     return float(total)
 
 
-def gather(operations_of_a_sample: Callable[[Sizes], float]) -> Callable[[Sizes, tuple], float]:
-    return lambda s, out: s.samples * operations_of_a_sample(s)
+def gather(operations_of_a_point: Callable[[Sizes], float]) -> Callable[[Sizes, tuple], float]:
+    return lambda s, out: s.field_points * operations_of_a_point(s)
 
 
 def a_point(n: float) -> Callable[[Sizes, tuple], float]:
@@ -409,10 +424,10 @@ PREFILTER = Case(  # of a pair: a cosine 5, the lobe 10, three sums and their to
     "prefilter_light", World.prefiltering, lambda s, out: 22 * s.queries * s.lights,
     reference.prefilter_light,
 )  # fmt: skip
-# Half of the points are rough: 169 basis functions of 4 each, and their sums with three colours, 6 each.
-LOOKUP = Case("light_lookup", World.pyramid, a_point(60 + 0.5 * 169 * 10))
+# Two lookups a point, three of four of them rough: 169 basis functions of 4 each, and their sums with three colours, 6 each.
+LOOKUP = Case("light_lookup", World.pyramid, a_point(2 * (60 + 0.75 * 169 * 10)))
 OWN = Case("monte_carlo_light", World.own_directions, lambda s, out: 55 * s.traced * s.own)
-SHARED = Case("summed_light", World.shared_directions, lambda s, out: 45 * s.points * s.directions)
+SHARED = Case("summed_light", World.shared_directions, lambda s, out: 45 * s.segments * s.directions)
 NEUS = Case("neus_weights", World.neus, a_sample(12))
 SURFACE = Case("surface_weights", World.surface, a_sample(35))
 COMPOSITE = Case("composite", lambda w: (w.weights, w.randn(w.sizes.samples, 8), w.rays.offsets), a_sample(16))
@@ -430,7 +445,7 @@ CASES = [
          gather(lambda s: s.encode(8) + s.levels * CORNERS * 12)),
     # The units twice (value and slope), the gradients to features and slopes, and two outer products for the weights.
     LAYER, backward(LAYER, gather(lambda s: 6 * s.layer + 4 * s.outputs * s.width + 12 * s.features)),
-    Case("sdf_values", lambda w: (w.rays.positions, *w.network),
+    Case("sdf_values", lambda w: (w.positions, *w.network),
          gather(lambda s: s.encode(2) + s.layer + 6 * s.width), None, 1),
     # Per distance asked for, as many as the last result says.
     Case("sample_rays", World.sampling,
@@ -450,14 +465,14 @@ CASES = [
     PREFILTER, Case("prefilter_light_backward", World.prefiltering_backward, lambda s, out: 22 * s.queries * s.lights),
     Case("sample_ggx_lobe", lambda w: (*w.prefiltering()[:2], w.sizes.own, 3), lambda s, out: 25 * s.queries * s.own),
     Case("sparse_product", World.averaging, lambda s, out: 12 * s.light_resolution**2), LOOKUP,
-    backward(LOOKUP, a_point(120 + 169 * 10)),
+    backward(LOOKUP, a_point(2 * (120 + 0.75 * 169 * 20))),
     Case("specular_share", lambda w: (*w.shading(), brdf_lut()), a_point(60)),
     Case("sample_bsdf", lambda w: (*w.own_directions()[:3], w.shares(), w.sizes.own, 3), lambda s, out: 60 * s.traced * s.own),
     OWN, backward(OWN, lambda s, out: 120 * s.traced * s.own), SHARED,
-    backward(SHARED, lambda s, out: 100 * s.points * s.directions),
+    backward(SHARED, lambda s, out: 100 * s.segments * s.directions),
     # About eight vertices around a point, an addition and a product for each of the directions.
-    Case("cached_visibility", World.near_the_mesh, lambda s, out: 16 * s.points * s.directions),
-    Case("cached_occlusion", World.occlusion, lambda s, out: (16 + 30) * s.points * s.directions),
+    Case("cached_visibility", World.near_the_mesh, lambda s, out: 16 * s.segments * s.directions),
+    Case("cached_occlusion", World.occlusion, lambda s, out: (16 + 30) * s.segments * s.directions),
     SRGB, backward(SRGB, a_sample(12)), Case("srgb_to_linear", lambda w: (w.rand(w.sizes.samples, 3),), a_sample(12)),
     Case("pixel_losses", World.pixels, lambda s, out: 60 * s.rays),
     Case("gradient_losses", World.normals_beside, a_sample(10)),
@@ -467,11 +482,17 @@ CASES = [
 ]  # fmt: skip
 
 
+# Those that took most of a step on a GPU (docs/cuda.md), first: they are timed should the time not last for all.
+COSTLY = ("sample_rays", "sdf_layer_backward", "cached_occlusion", "cached_visibility", "hash_encode_jacobian_backward",
+          "summed_light_backward", "sdf_layer", "hash_encode_jacobian", "light_lookup_backward", "sparse_product")  # fmt: skip
+
+
 def all_cases() -> list[Case]:
-    """Those above, and operators that are new since, with the inputs of their test."""
+    """Those above, the costly ones first, and operators that are new since, with the inputs of their test."""
     known = {case.op for case in CASES}
     missing = [op for op in TEST_INPUTS if op not in known]
-    return CASES + [
+    first = {op: i for i, op in enumerate(COSTLY)}
+    return sorted(CASES, key=lambda case: first.get(case.op, len(first))) + [
         Case(op, lambda w, op=op: TEST_INPUTS[op](torch.float32), lambda s, out: math.nan, variant="small inputs")
         for op in missing
     ]

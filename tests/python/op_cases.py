@@ -478,3 +478,17 @@ def truth(inputs: tuple) -> tuple:
     is_table = lambda x: x.shape == (32, 32, 4)  # noqa: E731
     doubled = lambda x: x.double() if x.is_floating_point() and not is_table(x) else x  # noqa: E731
     return tree_map(lambda x: doubled(x) if isinstance(x, torch.Tensor) else x, inputs)
+
+
+# Largest error of an operator's results, relative to the largest number of each.
+TOLERANCE = {torch.float64: 1e-11, torch.float32: 2e-5}
+
+
+def check_against_the_cpu(op: str, dtype: torch.dtype, device: str) -> None:
+    """Raises AssertionError where the operator on a device is farther from the CPU in float64 than :data:`TOLERANCE`."""
+    inputs = CASES[op](dtype)
+    expected = as_tuple(getattr(lib, op)(*(inputs if op in ROUNDED_ALIKE else truth(inputs))))
+    for got, x in zip(as_tuple(getattr(lib, op)(*moved(op, inputs, device))), expected):
+        assert got.device.type == device and got.shape == x.shape, f"{op}: {list(got.shape)} on {got.device}"
+        scale = float(x.double().abs().max()) if x.numel() else 1.0
+        torch.testing.assert_close(got.cpu().double(), x.double(), rtol=0, atol=TOLERANCE[dtype] * max(scale, 1e-30))

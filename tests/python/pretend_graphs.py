@@ -7,12 +7,15 @@ what is written to is always the same memory.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 import torch
 from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_iter
+
+from splitnerf.training import graphs, loop
 
 REFUSED = (
     "_local_scalar_dense",
@@ -92,3 +95,36 @@ def record(function: Callable[[], Any], pool: object, generator: torch.Generator
     with graph:
         outputs = function()
     return graph, outputs
+
+
+class NoStream:
+    """A stream that orders nothing, as the CPU is in order."""
+
+    def __init__(self, *_) -> None:
+        pass
+
+    def wait_stream(self, other) -> None:
+        pass
+
+
+def graphs_on_the_cpu(monkeypatch) -> dict[str, int]:
+    """Trainings on the CPU take graphed steps from now on; returns how often they recorded and replayed, as it goes on."""
+    used = {"recorded": 0, "replayed": 0}
+    replay_calls = PretendGraph.replay
+
+    def counted_record(*arguments):
+        used["recorded"] += 1
+        return record(*arguments)
+
+    def counted_replay(self):
+        used["replayed"] += 1
+        replay_calls(self)
+
+    monkeypatch.setattr(PretendGraph, "replay", counted_replay)
+    monkeypatch.setattr(graphs, "record", counted_record)
+    monkeypatch.setattr(loop, "Step", graphs.GraphedStep)
+    monkeypatch.setattr(torch.cuda, "Stream", NoStream)
+    monkeypatch.setattr(torch.cuda, "graph_pool_handle", lambda: None)
+    monkeypatch.setattr(torch.cuda, "current_stream", lambda device: NoStream())
+    monkeypatch.setattr(torch.cuda, "stream", lambda stream: nullcontext())
+    return used

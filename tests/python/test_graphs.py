@@ -22,36 +22,10 @@ from splitnerf.render.rays import PixelSource
 from splitnerf.training.step import Step
 
 
-class NoStream:
-    def __init__(self, *_) -> None:
-        pass
-
-    def wait_stream(self, other) -> None:
-        pass
-
-
 @pytest.fixture
 def recording(monkeypatch):
     """Graphs on the CPU; counts how they were used."""
-    used = {"recorded": 0, "replayed": 0}
-
-    def record(*arguments):
-        used["recorded"] += 1
-        return pretend_graphs.record(*arguments)
-
-    def replay(self):
-        used["replayed"] += 1
-        replay_calls(self)
-
-    replay_calls = pretend_graphs.PretendGraph.replay
-    monkeypatch.setattr(pretend_graphs.PretendGraph, "replay", replay)
-    monkeypatch.setattr(graphs, "record", record)
-    monkeypatch.setattr(trainer, "Step", GraphedStep)  # on the CPU too
-    monkeypatch.setattr(torch.cuda, "Stream", NoStream)
-    monkeypatch.setattr(torch.cuda, "graph_pool_handle", lambda: None)
-    monkeypatch.setattr(torch.cuda, "current_stream", lambda device: NoStream())
-    monkeypatch.setattr(torch.cuda, "stream", lambda stream: pytest.MonkeyPatch.context())
-    return used
+    return pretend_graphs.graphs_on_the_cpu(monkeypatch)
 
 
 @pytest.mark.parametrize("settings", [

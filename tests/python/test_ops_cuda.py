@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 import torch
-from op_cases import CASES, ROUNDED_ALIKE, moved, truth
-from op_checks import as_tuple, devices, has_cuda_kernel, lib
+from op_cases import CASES, check_against_the_cpu
+from op_checks import devices, has_cuda_kernel
 
 from splitnerf import _core
 
@@ -13,19 +13,6 @@ ON_THE_CPU_ALONE = {  # Embree; once a mesh
     "trace_visibility", "occlusion_factors", "incoming_light", "visibility_bits", "vertex_grids"
 }  # fmt: skip
 WRITES_TO_ARGUMENTS = {"adamw_step_", "adamw_steps_"}  # have no outputs: see test_ops_adamw.py
-
-
-# Largest error, relative to the largest number of an output.
-TOLERANCE = {torch.float64: 1e-11, torch.float32: 2e-5}
-
-
-def check_against_the_cpu(op: str, dtype, device: str) -> None:
-    inputs = CASES[op](dtype)
-    expected = as_tuple(getattr(lib, op)(*(inputs if op in ROUNDED_ALIKE else truth(inputs))))
-    for got, x in zip(as_tuple(getattr(lib, op)(*moved(op, inputs, device))), expected):
-        assert got.device.type == device and got.shape == x.shape
-        scale = float(x.double().abs().max()) if x.numel() else 1.0
-        torch.testing.assert_close(got.cpu().double(), x.double(), rtol=0, atol=TOLERANCE[dtype] * max(scale, 1e-30))
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64], ids=["float32", "float64"])
