@@ -181,13 +181,14 @@ def test_a_field_far_steeper_than_promised_costs_few_distances():
     plane = SdfNetwork(SDF_SPEC, 3, zeros, hidden, bias(0.0, 0.0), out, bias(0.5), 1e5, BOX)
     o, d = torch.zeros(7, 3, dtype=torch.float64), torch.zeros(7, 3, dtype=torch.float64)
     o[:, 0], o[:, 2], d[:, 2] = torch.linspace(-1, 1, 7), 0.6, -1.0
+    jitter = torch.linspace(0, 0.9, 7, dtype=torch.float64)
     kept, evaluated = sample_rays(
-        o, d, torch.linspace(0, 0.9, 7, dtype=torch.float64), full_cells(), plane,
+        o, d, jitter, full_cells(), plane,
         **sampling_settings(step=0.005, s=1000.0, min_weight=1e-3, min_transmittance=1e-3, reach=0.007),
     )  # fmt: skip
     z = 0.6 - 0.5 * (kept.t_starts + kept.t_ends)
     assert torch.equal(kept.ray_indices.unique(), torch.arange(7))
-    assert (z + 0.2).abs().max() < 0.005
+    assert (z + 0.2).abs().max() < 0.01
     assert evaluated.min() >= 65 and evaluated.max() <= 65 + 8 + 4
 
 
