@@ -39,6 +39,17 @@ void launch(const Queue& queue, const char* op, void (*kernel)(Parameters...), d
   check(cudaGetLastError(), op);
 }
 
+// The most bytes of dynamic shared memory that a block may take; and a kernel is allowed so many.
+inline int most_shared_memory(const char* op) {
+  int device = 0, most = 0;
+  check(cudaGetDevice(&device), op);
+  check(cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, device), op);
+  return most;
+}
+template <class Kernel> void allow_shared_memory(const char* op, Kernel kernel, int64_t bytes) {
+  check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)), op);
+}
+
 // One thread for each index.
 template <class Body> __global__ void __launch_bounds__(kBlock) for_each_kernel(int64_t n, const Body body) {
   const int64_t i = int64_t(blockIdx.x) * kBlock + threadIdx.x;
@@ -65,8 +76,9 @@ struct Warp {
   static constexpr unsigned all = 0xffffffffu;
 
   __device__ int lane() const { return threadIdx.x % size; }
-  template <class T> __device__ T sum(T value) const {
-    for (int step = size / 2; step > 0; step /= 2) value += __shfl_xor_sync(all, value, step);
+  template <class T> __device__ T sum(T value) const { return sum_of_run<size>(value); }
+  template <int N, class T> __device__ T sum_of_run(T value) const {
+    for (int step = N / 2; step > 0; step /= 2) value += __shfl_xor_sync(all, value, step);
     return value;
   }
   template <class T> __device__ T sum_before(T value) const {
@@ -78,7 +90,12 @@ struct Warp {
     }
     return running;
   }
-  template <class T> __device__ T last(T value) const { return __shfl_sync(all, value, size - 1); }
+  template <class T> __device__ T from(int lane, T value) const { return __shfl_sync(all, value, lane); }
+  template <class T> __device__ T last(T value) const { return from(size - 1, value); }
+  template <class T> __device__ T least(T value) const {
+    for (int step = size / 2; step > 0; step /= 2) value = min_of(value, __shfl_xor_sync(all, value, step));
+    return value;
+  }
   __device__ uint32_t ballot(bool yes) const { return __ballot_sync(all, yes); }
   __device__ void sync() const { __syncwarp(); }
 };

@@ -94,10 +94,10 @@ std::tuple<Tensor, Tensor, Tensor> monte_carlo_light_backward(Tensor normals, Te
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     const ToDrawnLight<T> to_light{i.n_samples(), out<T>(grad_radiance)};
-    device.run(op, i.n_points(),
-               DrawnLightBackwardBody<T>{i.n_samples(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness),
-                                         i.light<T>(), in<T>(g), out<T>(grad_normals), out<T>(grad_roughness),
-                                         to_light});
+    device.run(
+        op, i.n_points(),
+        DrawnLightBackwardBody<T>{i.n_samples(), in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), i.light<T>(),
+                                  in<T>(g), out<T>(grad_normals), out<T>(grad_roughness), to_light});
   });
   return {grad_normals, grad_roughness, grad_radiance};
 }
@@ -135,9 +135,9 @@ Tensor summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor d
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     const SharedLight<T> light = i.light<T>();
-    device.run(op, i.n_points(),
-               SharedLightBody<T>{light.n, in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), {light},
-                                  out<T>(sums)});
+    device.run(
+        op, i.n_points(),
+        SharedLightBody<T>{light.n, in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), {light}, out<T>(sums)});
   });
   return sums;
 }
@@ -154,10 +154,15 @@ std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor 
     using T = decltype(zero);
     const SharedLight<T> light = i.light<T>();
     const ToSharedLight<T> to_light{light.n, light.visible, out<T>(grad_light)};
-    device.clear(op, to_light.grad_light, 3 * int64_t{light.n});
-    device.run(op, i.n_points(),
-               SharedLightBackwardBody<T>{light.n, in<T>(i.normals), in<T>(i.view_dirs), in<T>(i.roughness), {light},
-                                          in<T>(g), out<T>(grad_normals), out<T>(grad_roughness), to_light});
+    device.shared_light_backward(i.n_points(), SharedLightBackwardBody<T>{light.n,
+                                                                          in<T>(i.normals),
+                                                                          in<T>(i.view_dirs),
+                                                                          in<T>(i.roughness),
+                                                                          {light},
+                                                                          in<T>(g),
+                                                                          out<T>(grad_normals),
+                                                                          out<T>(grad_roughness),
+                                                                          to_light});
   });
   return {grad_normals, grad_roughness, grad_light};
 }
@@ -211,8 +216,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tenso
     using T = decltype(zero);
     const SummedArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
                              out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])};
-    device.run(op, i.n_points(),
-               ShadeSumsBackwardBody<T>{in<float>(i.lut), compensate, i.arrays<T>(), in<T>(g), to});
+    device.run(op, i.n_points(), ShadeSumsBackwardBody<T>{in<float>(i.lut), compensate, i.arrays<T>(), in<T>(g), to});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};
 }

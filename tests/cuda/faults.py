@@ -55,6 +55,12 @@ FAULTS = (
           "for (int k = threadIdx.x; k < int(blockDim.x) * tile.n_outputs; k += blockDim.x)"),
     Fault("a gradient that blocks share is added to without an atomic", "thread", BODIES + "accumulate.h",
           "  atomicAdd(to, value);", "  *to += value;", "LightKernels.Lookup"),
+    Fault("walk: no barrier between a round's inputs and the network", "", BODIES + "bodies/sdf_layer.h",
+          "    group.sync();\n    const T of_part", "    const T of_part"),
+    Fault("cached visibility: only the first 32 vertices are looked at", "", BODIES + "bodies/visibility_cache.h",
+          "first < total; first += Group::size", "first < total && first == 0; first += Group::size"),
+    Fault("summed light's gradient: no barrier before the copies are added", "", CUDA + "summed_light.cu",
+          "to_copy(Warp{}, p);\n  __syncthreads();", "to_copy(Warp{}, p);"),
     Fault("sparse product: only one lane takes part in the sum", "", BODIES + "bodies/light_pyramid.h",
           "    sum = sum3(group, sum);", "    if (group.lane() == 0) sum = sum3(group, sum);"),
 )  # fmt: skip

@@ -9,16 +9,17 @@ namespace {
 
 // ---- the visibility cache ----
 
-// Vertices of a ball that see some directions open, some blocked, and know nothing of the others.
+// n vertices of a ball that see some directions open, some blocked, and know nothing of the others.
 struct Ball {
-  static constexpr int64_t n = 60, k = 64, levels = 2, buckets = 64;
+  static constexpr int64_t k = 64, levels = 2, buckets = 64;
+  int64_t n;
   double radius = 0.6;
   std::vector<double> vertices, directions, light, radiance;
   std::vector<uint32_t> bits = std::vector<uint32_t>(2 * n * k / kBitsPerWord);
   std::vector<int32_t> hits = std::vector<int32_t>(n * k, -1), starts = std::vector<int32_t>(levels * (buckets + 1)),
                        order = std::vector<int32_t>(levels * n);
 
-  explicit Ball(Random& random) {
+  Ball(Random& random, int64_t n) : n(n) {
     vertices = random.directions(n), light = random.uniforms(3 * k), radiance = random.uniforms(3 * n);
     for (uint32_t i = 0; i < k; ++i) {
       const Vec3<double> w = fibonacci_sphere<double>(i, k);
@@ -30,7 +31,7 @@ struct Ball {
         if (what > 1) continue;
         const bool blocked = what == 1;
         bits[(2 * v + blocked) * (k / kBitsPerWord) + i / kBitsPerWord] |= 1u << i % kBitsPerWord;
-        if (blocked) hits[v * k + i] = random.below(n + 3) - 1;  // some name no vertex
+        if (blocked) hits[v * k + i] = random.below(int(n) + 3) - 1;  // some name no vertex
       }
     cpu::build_vertex_grids(n, vertices.data(), radius, int(levels), buckets, starts.data(), order.data());
   }
@@ -54,13 +55,14 @@ template <class T> void expect_same_nan_and_near(const std::vector<T>& got, cons
   }
 }
 
-TEST(GroupKernels, CachedOcclusionAndVisibility) {
+void check_caches(int64_t n_vertices) {
   Random random(3);
-  const Ball ball(random);
-  const int64_t n = 12, k = Ball::k;
+  const Ball ball(random, n_vertices);
+  const int64_t n = 28, k = Ball::k;
   auto x = random.directions(n);
   const auto normals = x, lobes = random.directions(n), rho = random.uniforms(n, 0.1, 1);
-  std::fill_n(&x[3], 3, 50.), x[6] = NAN;  // far from every vertex; nowhere
+  std::fill_n(&x[3], 3, 50.), x[6] = NAN;         // far from every vertex; nowhere
+  for (int64_t i = 15; i < 30; ++i) x[i] *= 1.7;  // beyond the first level's radius
   for (const bool with_hits : {false, true}) {
     const VisibilityCache<double> cache = ball.cache(with_hits);
     const size_t few = with_hits ? 3 * n : 0, many = with_hits ? 3 * n * k : 0;
@@ -80,6 +82,10 @@ TEST(GroupKernels, CachedOcclusionAndVisibility) {
     expect_same_nan_and_near(v8, v), expect_same_nan_and_near(a8, a);
   }
 }
+
+// The larger ball has more vertices around a point than a group has threads, and more neighbours than are kept.
+TEST(GroupKernels, CachedOcclusionAndVisibility) { check_caches(60); }
+TEST(GroupKernels, CachedOcclusionAndVisibilityAmongManyVertices) { check_caches(500); }
 
 }  // namespace
 }  // namespace splitnerf

@@ -171,6 +171,27 @@ def test_where_the_field_is_steeper_than_promised_the_walk_goes_back():
     assert steepest > 1.5 and faint.max() < 4e-3
 
 
+def test_a_field_far_steeper_than_promised_costs_few_distances():
+    """2.5 (z + .2), which leaps of f / 1.25 cross: 160 samples lie before it, and each would cost two distances."""
+    zeros = torch.zeros(SDF_SPEC.n_entries, SDF_SPEC.n_features, dtype=torch.float64)
+    hidden = torch.zeros(2, 3 + SDF_SPEC.n_outputs, dtype=torch.float64)
+    hidden[0, 2], hidden[1, 2] = 1.0, -1.0
+    out = torch.tensor([[2.5, -2.5]], dtype=torch.float64)
+    bias = lambda *x: torch.tensor(x, dtype=torch.float64)  # noqa: E731
+    plane = SdfNetwork(SDF_SPEC, 3, zeros, hidden, bias(0.0, 0.0), out, bias(0.5), 1e5, BOX)
+    o, d = torch.zeros(7, 3, dtype=torch.float64), torch.zeros(7, 3, dtype=torch.float64)
+    o[:, 0], o[:, 2], d[:, 2] = torch.linspace(-1, 1, 7), 0.6, -1.0
+    jitter = torch.linspace(0, 0.9, 7, dtype=torch.float64)
+    kept, evaluated = sample_rays(
+        o, d, jitter, full_cells(), plane,
+        **sampling_settings(step=0.005, s=1000.0, min_weight=1e-3, min_transmittance=1e-3, reach=0.007),
+    )  # fmt: skip
+    z = 0.6 - 0.5 * (kept.t_starts + kept.t_ends)
+    assert torch.equal(kept.ray_indices.unique(), torch.arange(7))
+    assert (z + 0.2).abs().max() < 0.01
+    assert evaluated.min() >= 65 and evaluated.max() <= 65 + 8 + 4
+
+
 @pytest.mark.parametrize("n", [0, 1, 63, 64, 1000])
 def test_values_are_the_field(n):
     field = bumpy_field()

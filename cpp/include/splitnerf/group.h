@@ -17,8 +17,15 @@ struct OneThread {
   template <class T> SPLITNERF_HD T sum(T value) const { return value; }
   // Sum of the values of the threads before this one.
   template <class T> SPLITNERF_HD T sum_before(T) const { return T(0); }
-  // The value of the last thread.
+  // Sum over each run of N neighbouring threads, for all of them; N is a power of two.
+  template <int N, class T> SPLITNERF_HD T sum_of_run(T value) const {
+    static_assert(N == 1);
+    return value;
+  }
+  // The value of the thread that each names; of the last one; the least of all.
+  template <class T> SPLITNERF_HD T from(int, T value) const { return value; }
   template <class T> SPLITNERF_HD T last(T value) const { return value; }
+  template <class T> SPLITNERF_HD T least(T value) const { return value; }
   // Bit i: whether thread i says so.
   SPLITNERF_HD uint32_t ballot(bool yes) const { return yes ? 1u : 0u; }
   // What one thread wrote before, another may read afterwards.
@@ -39,6 +46,19 @@ SPLITNERF_HD int count_bits(uint32_t word) {
   int n = 0;
   for (; word; word &= word - 1) ++n;
   return n;
+#endif
+}
+
+// Index of the lowest bit of a word that is not 0.
+SPLITNERF_HD int lowest_bit(uint32_t word) {
+#if defined(__CUDA_ARCH__)
+  return __ffs(int(word)) - 1;
+#elif defined(__GNUC__)
+  return __builtin_ctz(word);
+#else
+  int i = 0;
+  while (!(word >> i & 1u)) ++i;
+  return i;
 #endif
 }
 

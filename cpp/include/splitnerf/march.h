@@ -150,6 +150,18 @@ SPLITNERF_HD int64_t next_occupied(const RayLattice<T>& ray, const OccupancyView
   }
 }
 
+// Bit i: whether thread i's sample stands in an occupied cell, and none before it ends the ray. The threads hold the cells of
+// neighbouring samples, in order.
+struct OccupiedSamples {
+  uint32_t bits;
+  bool ended;
+};
+template <class Group> SPLITNERF_HD OccupiedSamples occupied_samples(const Group& group, Cell cell) {
+  const uint32_t ended = group.ballot(cell == Cell::kOpaque);
+  const uint32_t in_front = ended ? (ended & -ended) - 1 : ~0u;  // bits below the lowest
+  return {group.ballot(cell == Cell::kOccupied) & in_front, ended != 0};
+}
+
 // Calls emit(i, t_start, t_end) for each sample in an occupied cell, front to back; i counts them. Returns their
 // number.
 // Each thread of the group tests one of as many neighbouring samples; the occupied ones are packed in order.
@@ -161,14 +173,12 @@ SPLITNERF_HD int64_t march_ray(const Group& group, Vec3<T> o, Vec3<T> d, T jitte
   for (int64_t first = 0; first < ray.n_steps && n < options.max_samples;) {
     const int64_t k = first + group.lane();
     const MarchStep step = march_step(ray, grid, options, k);
-    const uint32_t ended = group.ballot(step.cell == Cell::kOpaque);
-    const uint32_t in_front = ended ? (ended & -ended) - 1 : ~0u;  // bits below the lowest
-    const uint32_t occupied = group.ballot(step.cell == Cell::kOccupied) & in_front;
+    const OccupiedSamples occupied = occupied_samples(group, step.cell);
     const uint32_t mine = 1u << group.lane();
-    const int64_t i = n + count_bits(occupied & (mine - 1));
-    if (occupied & mine && i < options.max_samples) emit(i, ray.start(k), ray.start(k) + ray.step);
-    n = min_of(n + count_bits(occupied), options.max_samples);
-    if (ended) break;
+    const int64_t i = n + count_bits(occupied.bits & (mine - 1));
+    if (occupied.bits & mine && i < options.max_samples) emit(i, ray.start(k), ray.start(k) + ray.step);
+    n = min_of(n + count_bits(occupied.bits), options.max_samples);
+    if (occupied.ended) break;
     first = group.last(step.next);
   }
   return n;

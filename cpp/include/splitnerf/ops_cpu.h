@@ -117,6 +117,10 @@ template <class T>
 SPLITNERF_API void build_vertex_grids(int64_t n_vertices, const T* vertices, T radius, int n_levels, int64_t n_buckets,
                                       int32_t* starts, int32_t* order);
 
+// The body for n points; overwrites receive.grad_light with the sum over all of them. Points are summed in chunks that depend on
+// n alone: the same bits on any number of threads.
+template <class T> SPLITNERF_API void shared_light_backward(int64_t n, const SharedLightBackwardBody<T>& body);
+
 // ---- bodies that run faster here than by their plain loop; the ratio stands in the file of each ----
 
 template <class T> SPLITNERF_API void run(int64_t n, const AdamwBody<T>& body);
@@ -129,8 +133,6 @@ template <class T> SPLITNERF_API void run(int64_t n, const PairLikenessBody<T>& 
 template <class T> SPLITNERF_API void run(int64_t n, const SparseProductBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const ShadeBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const ShadeBackwardBody<T>& body);
-// Points are summed in chunks that depend on n alone: the same bits on any number of threads.
-template <class T> SPLITNERF_API void run(int64_t n, const SharedLightBackwardBody<T>& body);
 // The cells in the order of memory: 22 x the body block by block (64^3 cells; one thread of an AMD EPYC of family 25).
 inline void run(int64_t, const OccupiedBlocksBody& body) {
   find_occupied_blocks(body.cells, body.resolution, body.blocks);

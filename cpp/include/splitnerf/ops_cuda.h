@@ -3,6 +3,7 @@
 // last bits may differ from call to call.
 #pragma once
 
+#include "splitnerf/bodies/monte_carlo.h"
 #include "splitnerf/light_pyramid.h"
 #include "splitnerf/neus.h"
 #include "splitnerf/ray_walk.h"
@@ -37,6 +38,12 @@ template <class T>
 void light_lookup_backward(const Queue& queue, const LightPyramid<T>& pyramid, int64_t n, const T* directions,
                            const T* roughness, const T* grad_radiance, T* grad_directions, T* grad_roughness,
                            T* grad_levels, T* grad_sh);
+
+// ---- light that all points share ----
+
+// The body for n points; overwrites receive.grad_light with the sum over all of them, in an order that depends on n alone.
+// Throws std::invalid_argument where a copy of it does not fit into a block's shared memory.
+template <class T> void shared_light_backward(const Queue& queue, int64_t n, const SharedLightBackwardBody<T>& body);
 
 // ---- rays. Offsets are not looked at: numbers out of range count as the nearest in it ----
 

@@ -18,6 +18,10 @@ template <class T> struct SampleRules {
   T lipschitz;          // bound of |grad f|
 };
 
+// A field that is steeper than rules.lipschitz makes a walk go back and look at what it leapt over, two distances for each sample.
+// It does that so many times on a ray; from then on it takes the bound to be so many times as large, and goes back no more.
+inline constexpr int kMostReturns = 32, kSteeperThen = 4;
+
 inline constexpr int kNoDepth = 20;  // where s f is above, an interval that ends there has a depth below 2e-9
 
 // Depth of the density behind a distance f: that of an interval is the depth at its end less that at its start, see
@@ -33,6 +37,7 @@ template <class T> struct Walk {
   int64_t next;       // the sample at which the distance is asked for next; -1 where the ray has ended
   int64_t last = -1;  // the one before, -1 for none
   int64_t n_evaluated = 0;
+  int n_returns = 0;       // how often it went back
   T f_last = T(0);         // the distance at `last`
   T depth_last = T(0);     // depth_at there
   T transmittance = T(1);  // between the middles of the first and the last sample
@@ -40,6 +45,7 @@ template <class T> struct Walk {
 
   SPLITNERF_HD Walk(const RayLattice<T>& lattice, int64_t ray, const MarchOptions& march, const OccupancyView& grid)
       : lattice(lattice), ray(ray), next(next_occupied(lattice, grid, march, 0)) {}
+  SPLITNERF_HD bool goes_back() const { return n_returns < kMostReturns; }
 };
 
 // The neighbour of a walk's last sample.
@@ -69,17 +75,19 @@ SPLITNERF_HD bool may_weigh(const SampleRules<T>& rules, const Walk<T>& walk, co
 
 // Takes the distance f at walk.next and moves on; keep(t_start) is called for the samples to be kept, front to back. Within
 // (|f| - reach) / lipschitz no density begins, and samples there are left out; where the field turns out steeper than that,
-// the walk goes back and looks. A distance that is not finite is kept: whoever renders the samples shall see it.
+// the walk goes back and looks, but see kMostReturns. A distance that is not finite is kept: whoever renders the samples shall see it.
 template <class T, class Keep>
 SPLITNERF_HD void advance(Walk<T>& walk, T f, const OccupancyView& grid, const MarchOptions& march,
                           const SampleRules<T>& rules, Keep keep) {
   const T step = walk.lattice.step;
   ++walk.n_evaluated;
-  const bool jumped = walk.last >= 0 && walk.next > walk.last + 1 && walk.n_evaluated < march.max_samples;
+  const bool jumped =
+      walk.last >= 0 && walk.next > walk.last + 1 && walk.goes_back() && walk.n_evaluated < march.max_samples;
   if (jumped && (std::abs(f) < rules.reach || (f < T(0)) != (walk.f_last < T(0)))) {
     const int64_t between = next_occupied(walk.lattice, grid, march, walk.last + 1);
     if (between < walk.next) {
       walk.next = between;
+      ++walk.n_returns;
       return;
     }
   }
@@ -100,7 +108,8 @@ SPLITNERF_HD void advance(Walk<T>& walk, T f, const OccupancyView& grid, const M
     walk.next = -1;
     return;
   }
-  const T free = (std::abs(f) - rules.reach) / (rules.lipschitz * step);
+  const T steepest = walk.goes_back() ? rules.lipschitz : T(kSteeperThen) * rules.lipschitz;
+  const T free = (std::abs(f) - rules.reach) / (steepest * step);
   const int64_t stride = free > T(1) ? static_cast<int64_t>(min_of(free, T(walk.lattice.n_steps))) : 1;
   walk.next = next_occupied(walk.lattice, grid, march, here + stride);
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "splitnerf/ggx.h"
+#include "splitnerf/group.h"
 #include "splitnerf/sampling.h"
 #include "splitnerf/vec.h"
 
@@ -17,19 +18,6 @@ inline constexpr double kLobeDirections = 2;
 // smooth as the lobe turns.
 template <class T> SPLITNERF_HD T cached_lobe_alpha(T roughness, int n_directions) {
   return max_of(ggx_alpha_from_roughness(roughness), std::sqrt(T(kLobeDirections / 3) / T(n_directions)));
-}
-
-// Index of the lowest bit of a word that is not 0.
-SPLITNERF_HD int lowest_bit(uint32_t word) {
-#if defined(__CUDA_ARCH__)
-  return __ffs(int(word)) - 1;
-#elif defined(__GNUC__)
-  return __builtin_ctz(word);
-#else
-  int i = 0;
-  while (!(word >> i & 1u)) ++i;
-  return i;
-#endif
 }
 
 // ---- which vertices answer for a point -------------------------------------------------------
@@ -91,26 +79,44 @@ template <class T> SPLITNERF_HD T neighbour_weight(T relative_distance, T cosine
   return square((T(1) - relative_distance) / (relative_distance + T(0.05))) * square(square(cosine));
 }
 
+// One level of the grids around a point: the eight cells that the ball around it touches.
+template <class T> struct GridLevel {
+  const VertexGrids<T>& grids;
+  const int32_t *starts, *order;
+  Vec3<T> position, normal;
+  T reach, inverse_size;
+  GridCell first;
+
+  SPLITNERF_HD GridLevel(const VertexGrids<T>& grids, int level, T reach, Vec3<T> position, Vec3<T> normal)
+      : grids(grids), starts(grids.starts + level * (grids.n_buckets + 1)),
+        order(grids.order + level * grids.n_vertices), position(position), normal(normal), reach(reach),
+        inverse_size(T(0.5) / reach), first(grid_cell(position, inverse_size, T(-0.5))) {}
+  SPLITNERF_HD GridCell cell(int corner) const {
+    return {first.x + (corner & 1), first.y + (corner >> 1 & 1), first.z + (corner >> 2)};
+  }
+  // The weight of a vertex as a neighbour; 0 where it is none, or stands in another cell.
+  SPLITNERF_HD T weight(int32_t v, GridCell cell) const {
+    const Vec3<T> vertex = load3(grids.vertices + 3 * int64_t(v));
+    const T squared = dot(vertex - position, vertex - position);
+    if (!(squared < reach * reach) || !(grid_cell(vertex, inverse_size) == cell)) return T(0);
+    const T w = neighbour_weight(std::sqrt(squared) / reach, dot(normal, load3(grids.normals + 3 * int64_t(v))));
+    return w > T(1e-6) ? w : T(0);
+  }
+};
+
 // Vertices within the radius; where none answers, within twice, four times ... the radius.
 template <class T>
 SPLITNERF_HD Neighbours<T> find_neighbours(const VertexGrids<T>& grids, Vec3<T> position, Vec3<T> normal) {
   T reach = grids.radius;
   for (int level = 0; level < grids.n_levels; ++level, reach = reach * T(2)) {
     Neighbours<T> found;
-    const int32_t* starts = grids.starts + level * (grids.n_buckets + 1);
-    const int32_t* order = grids.order + level * grids.n_vertices;
-    const T inverse_size = T(0.5) / reach;
-    const GridCell first = grid_cell(position, inverse_size, T(-0.5));
+    const GridLevel<T> around(grids, level, reach, position, normal);
     for (int corner = 0; corner < 8; ++corner) {
-      const GridCell cell{first.x + (corner & 1), first.y + (corner >> 1 & 1), first.z + (corner >> 2)};
+      const GridCell cell = around.cell(corner);
       const int64_t bucket = cell.bucket(grids.n_buckets);
-      for (int32_t j = starts[bucket]; j < starts[bucket + 1]; ++j) {
-        const Vec3<T> vertex = load3(grids.vertices + 3 * int64_t(order[j]));
-        const T squared = dot(vertex - position, vertex - position);
-        if (!(squared < reach * reach) || !(grid_cell(vertex, inverse_size) == cell)) continue;
-        const T weight =
-            neighbour_weight(std::sqrt(squared) / reach, dot(normal, load3(grids.normals + 3 * int64_t(order[j]))));
-        if (weight > T(1e-6)) found.add(order[j], weight);
+      for (int32_t j = around.starts[bucket]; j < around.starts[bucket + 1]; ++j) {
+        const T weight = around.weight(around.order[j], cell);
+        if (weight > T(0)) found.add(around.order[j], weight);
       }
     }
     if (found.n == 0) continue;

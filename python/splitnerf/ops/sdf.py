@@ -117,7 +117,10 @@ def sample_rays(
     Two neighbouring samples are kept where one of them may have a rendering weight above `min_weight`. The weight is
     that of :func:`surface_weights` with the slope between their midpoints, or a bound for a surface between the
     midpoints. The ray ends where the transmittance is below `min_transmittance`. After a sample at distance f the
-    search skips the samples within ``(|f| - reach) / lipschitz``.
+    search skips the samples within ``(|f| - reach) / lipschitz``. Where it then meets density or the other sign, the
+    field is steeper than `lipschitz`: the search goes back and looks at what it skipped. It does that 32 times on a ray
+    at most. After that it skips a quarter as much and does not go back. So a steep field costs few evaluations, and one
+    of up to 4 `lipschitz` is still followed.
 
     Args:
         rays_o, rays_d: [n_rays, 3] origins (scene units) and unit directions.
@@ -134,7 +137,8 @@ def sample_rays(
         max_samples: The largest number of evaluated distances of one ray.
 
     Returns:
-        The kept samples, and [n_rays] int64, the number of evaluated points per ray.
+        The kept samples, and [n_rays] int64, the number of distances per ray that the search asked for. (On a GPU more
+        are evaluated: a group of neighbours at once.)
 
     Raises:
         ValueError: A shape, dtype or number does not fit.

@@ -1,7 +1,6 @@
 // Directions drawn for a point, and the sums over the light that comes from them.
 #pragma once
 
-#include "splitnerf/accumulate.h"
 #include "splitnerf/monte_carlo.h"
 #include "splitnerf/sampling.h"
 
@@ -112,10 +111,10 @@ template <class T, class Light, class Receive> struct SumLightBackwardBody {
 
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t p) const {
     const T* g = grad_sums + 3 * kLightSums * p;
-    const LightSumsGrad<T> out = sum_light_backward(
-        group, load3(normals + 3 * p), load3(view_dirs + 3 * p), roughness[p], n, light.of_point(p),
-        LightSums<T>{load3(g), load3(g + 3), load3(g + 6), load3(g + 9)},
-        [&](int i, Vec3<T> grad) { receive(p, i, grad); });
+    const LightSumsGrad<T> out =
+        sum_light_backward(group, load3(normals + 3 * p), load3(view_dirs + 3 * p), roughness[p], n, light.of_point(p),
+                           LightSums<T>{load3(g), load3(g + 3), load3(g + 6), load3(g + 9)},
+                           [&](int i, Vec3<T> grad) { receive(p, i, grad); });
     if (group.lane() > 0) return;
     store3(grad_normals + 3 * p, out.normal);
     grad_roughness[p] = out.roughness;
@@ -129,14 +128,14 @@ template <class T> struct ToDrawnLight {
 
   SPLITNERF_HD void operator()(int64_t p, int i, Vec3<T> grad) const { store3(grad_radiance + 3 * (p * n + i), grad); }
 };
-// All points add to one [n directions, 3].
+// Points that follow one another add to one [n directions, 3].
 template <class T> struct ToSharedLight {
   int n;
   const T* visible;
   T* grad_light;
 
   SPLITNERF_HD void operator()(int64_t p, int i, Vec3<T> grad) const {
-    add3_to(grad_light + 3 * i, grad * visible[p * n + i]);
+    store3(grad_light + 3 * i, load3(grad_light + 3 * i) + grad * visible[p * n + i]);
   }
 };
 
@@ -147,7 +146,7 @@ template <class T> using DrawnLightBackwardBody = SumLightBackwardBody<T, DrawnL
 SPLITNERF_ON_GPU(DrawnLightBackwardBody);
 template <class T> using SharedLightBody = SumLightBody<T, ArrivingLight<T>>;
 SPLITNERF_ON_GPU(SharedLightBody);
+// Of points that follow one another; shared_light_backward takes all points.
 template <class T> using SharedLightBackwardBody = SumLightBackwardBody<T, ArrivingLight<T>, ToSharedLight<T>>;
-SPLITNERF_ON_GPU(SharedLightBackwardBody);
 
 }  // namespace splitnerf
