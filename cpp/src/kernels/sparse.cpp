@@ -1,5 +1,5 @@
 // Rows of a sparse matrix times three columns of values, beside SparseProductBody with a check of the columns before it: 2.1 to
-// 2.7 x (6.7 million entries in 37,888 rows; float32, one thread of an AMD EPYC of family 25, AVX-512).
+// 2.7 x (6.7 million entries in 37,888 rows; float32, one thread of an AMD EPYC of family 25, AVX2).
 #include "kernel_set.h"
 
 namespace splitnerf::SPLITNERF_ISA {

@@ -10,7 +10,7 @@ inline constexpr int kMostRowArrays = 16;
 // Pairs of arrays, [rows, columns] and [m, columns], all numbers of one of each in one list.
 template <class T> struct RowArrays {
   int n_arrays = 0;
-  int64_t ends[kMostRowArrays], rows[kMostRowArrays], columns[kMostRowArrays];
+  int64_t ends[kMostRowArrays] = {}, rows[kMostRowArrays], columns[kMostRowArrays];
   const T* from[kMostRowArrays];
   T* to[kMostRowArrays];
 
