@@ -30,7 +30,7 @@ from splitnerf.training.loop import Training
 KERNELS = {
     "pixel_losses": 2, "gradient_losses": 5, "material_losses": 3, "quadratic_entropy": 4, "sdf_values": 2, "sdf_layer": 2,
     "sdf_layer_backward": 4, "hash_encode_backward": 2, "hash_encode_jacobian_backward": 2, "light_lookup_backward": 3,
-    "summed_light_backward": 2, "prefilter_light": 2, "prefilter_light_backward": 2, "interpolate_backward": 2, "march_rays": 3,
+    "summed_light_backward": 2, "put_rows": 2, "prefilter_light": 2, "prefilter_light_backward": 2, "interpolate_backward": 2, "march_rays": 3,
     "sample_rays": 4, "spread_samples": 7, "adamw_steps_": 1,
 }  # fmt: skip
 NO_LAUNCH = {
@@ -40,7 +40,7 @@ NO_LAUNCH = {
 PACKAGE = "/python/splitnerf/"
 SMALL = dict(
     n_levels=4, log2_table_size=10, target_samples=512, initial_rays=64, max_rays=256, grid_resolution=16, light_resolution=16,
-    light_samples=64, light_queries=16, eikonal_points=32, smoothness_points=32, mesh_resolution=24, cuda_graphs=False,
+    light_samples=64, light_queries=16, eikonal_points=32, smoothness_points=32, mesh_resolution=24, open_below=0.0, cuda_graphs=False,
 )  # fmt: skip
 SOURCES = ("tests/bench/launches.py", "python/splitnerf/training", "python/splitnerf/render", "python/splitnerf/fields")
 
