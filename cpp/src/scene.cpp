@@ -128,7 +128,7 @@ void Scene::trace_visibility(const float* origins, const float* directions, int6
       for (int k = 0; active && k < count; ++k)
         if (!active[first + k]) mask_out(rays, valid, k);
       embree::occluded16(valid, scene, &rays);
-      // Embree marks an occluded ray by tfar = -infinity and leaves masked lanes alone.
+      // Embree marks an occluded ray by tfar = -infinity.
       for (int k = 0; k < count; ++k) visible[first + k] = valid[k] == 0 || !(rays.tfar[k] < 0.f);
     }
   });

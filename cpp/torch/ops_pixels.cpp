@@ -66,9 +66,9 @@ std::tuple<Tensor, Tensor, Tensor> place_samples(Tensor rays_o, Tensor rays_d, T
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, positions.size(0),
-               PlaceSamplesBody<T>{n, n_room, n_anywhere, in<T>(o), in<T>(d), in<int64_t>(r), in<T>(begin), in<T>(end),
-                                   in<T>(points), in<T>(which), in<T>(apart), out<T>(positions), out<T>(directions),
-                                   out<int64_t>(beside)});
+               PlaceSamplesBody<T>{o.size(0), n, n_room, n_anywhere, in<T>(o), in<T>(d), in<int64_t>(r), in<T>(begin),
+                                   in<T>(end), in<T>(points), in<T>(which), in<T>(apart), out<T>(positions),
+                                   out<T>(directions), out<int64_t>(beside)});
   });
   return {positions, directions, beside};
 }

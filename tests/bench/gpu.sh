@@ -175,7 +175,7 @@ train() { # name, seconds, preset, options of the training
 
 sanitize() { # memcheck or racecheck, on the families that have kernels with shared memory
   TOOL=compute-sanitizer tool_part "$1" 80 "$run_python" tests/bench/gpu_smoke.py --device $device --seconds $((75 * slower)) \
-    --only fields --only gradients --only light --only losses --only rays --under compute-sanitizer --tool "$1" --error-exitcode 9
+    --only fields --only gradients --only light --only losses --only rays --only shading --under compute-sanitizer --tool "$1" --error-exitcode 9
 }
 
 profile_eager() { # also says which kernels the second command looks at

@@ -157,6 +157,7 @@ def restored(dataset: Dataset, config: Config, run: Path, device: str) -> Traini
     """The same training from its checkpoint on a device, all levels open."""
     training = Training(dataset, config, run, torch.device(device))
     training.restore()
+    training.take_step.late = None  # each device traces the points of this step
     training.model.open_levels(PROGRESS)
     return training
 

@@ -172,7 +172,7 @@ TEST(PointKernels, PlacedSamples) {
       const auto run = [&](const auto& launch) {
         std::pair out{unwritten<double>(3 * (2 * room + k + m)), unwritten<int64_t>(m)};
         double* points = out.first.data();
-        launch(PlaceSamplesBody<double>{n, room, k, o.data(), d.data(), indices.data(), begin.data(), end.data(),
+        launch(PlaceSamplesBody<double>{rays, n, room, k, o.data(), d.data(), indices.data(), begin.data(), end.data(),
                                         anywhere.data(), chosen.data(), shifts.data(), points,
                                         points + 3 * (room + k + m), out.second.data()});
         return out;

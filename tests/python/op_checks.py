@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 import torch
+from torch.utils._pytree import tree_map
 
 from splitnerf import ops  # noqa: F401  (loads torch.ops.splitnerf)
 
@@ -46,9 +47,8 @@ def check_op(op, inputs: tuple, differentiable: tuple = ()) -> None:
     torch.library.opcheck(op, inputs)
     if differentiable:
         torch.library.opcheck(op, grad_leaves(inputs, differentiable))
-    strided = tuple(
-        x.t().contiguous().t() if isinstance(x, torch.Tensor) and x.dim() == 2 and x.numel() else x for x in inputs
-    )
+    turned = lambda x: x.t().contiguous().t() if isinstance(x, torch.Tensor) and x.dim() == 2 and x.numel() else x  # noqa: E731
+    strided = tree_map(turned, inputs)
     torch.library.opcheck(op, strided, test_utils=("test_schema", "test_faketensor"))
     for got, expected in zip(as_tuple(op(*strided)), as_tuple(op(*inputs))):
         torch.testing.assert_close(got, expected, rtol=0, atol=0)

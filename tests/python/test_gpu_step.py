@@ -43,7 +43,7 @@ def test_a_step_agrees_with_float64(prepared, there):
     true, on_cpu, found = prepared[6]
     rows = compared(there, true, on_cpu, found)
     names = {row.name for row in rows}
-    assert all(row.holds for row in rows) and all(row.limit < 2e-3 for row in rows)
+    assert all(row.holds for row in rows) and all(row.limit < 5e-3 for row in rows)
     assert {"loss, colour", "loss, neutral", "loss, light_prior", "loss, entropy", "gradient, variance"} <= names
     assert {"gradient, light.texels, level 2", "gradient, sdf_field.grid.table, level 3"} <= names
     assert 0 < sum(row.on_cpu for row in rows) and true.terms["colour"] != on_cpu.terms["colour"]  # it was in float64
@@ -96,7 +96,8 @@ def test_a_term_too_many_and_one_too_few_are_found(prepared, there, monkeypatch)
 
     def others(*arguments):
         terms = terms_of(*arguments)
-        return {name: term for name, term in terms.items() if name != "mask"} | {"more": terms["mask"]}
+        terms["more"] = terms.pop("mask")
+        return terms
 
     monkeypatch.setattr(steps, "loss_terms", others)
     assert wrong(prepared, there) == {"loss, mask", "loss, more"}

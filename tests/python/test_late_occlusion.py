@@ -176,10 +176,3 @@ def test_chosen_numbers_are_one_of_each_run_and_all_have_one_chance():
     assert (counts - 3000 * 10 / 103).abs().max() < 5 * (3000 * 10 / 103) ** 0.5
     assert torch.equal(one_of_each_run(7, 2.0, g), torch.arange(7))
     assert len(one_of_each_run(0, 0.1, g)) == len(one_of_each_run(4, 0.1, g)) == 0
-
-
-def test_what_is_on_the_cpu_is_there(monkeypatch):
-    x = torch.rand(5)
-    copy, wait = start_fetching(x)
-    wait()
-    assert torch.equal(copy, x)

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 import torch
 from op_cases import CASES
-from op_checks import check_error, check_op, devices, generator, lib
+from op_checks import check_error, check_op, devices, floats, generator, lib
+from torch.utils._pytree import tree_map
+from torch.utils.checkpoint import checkpoint
 
 from splitnerf.ops import linear_to_srgb, take_rows
 from splitnerf.ops import _library
@@ -83,21 +88,79 @@ def test_what_does_not_fit_is_named():
 # ---- the short way ----
 
 
-def ways(x: torch.Tensor) -> list[torch.Tensor]:
-    """A result and its gradient by the short way and by torch's."""
-    found = []
-    for operator in (_library.lib.linear_to_srgb, lib.linear_to_srgb):
-        leaf = x.clone().requires_grad_()
-        y = operator(leaf)
-        y.sum().backward()
-        found += [(y.detach(), leaf.grad)]
-    return found
+def by(way, name: str, inputs: tuple, i: int) -> list[torch.Tensor] | None:
+    """The results of an operator and the gradient of their sum to input i, by a way; None where there is no such gradient."""
+    leaves = tree_map(lambda x: x.detach().clone() if isinstance(x, torch.Tensor) else x, inputs)
+    wanted = leaves[i] if isinstance(leaves[i], list) else [leaves[i]]
+    for leaf in wanted:
+        leaf.requires_grad_()
+    try:
+        found = floats(getattr(way, name)(*leaves))
+        gradients = torch.autograd.grad(sum(x.sum() for x in found), wanted, allow_unused=True)
+    except RuntimeError as error:
+        assert "gradient" in str(error)
+        return None
+    return [x.detach() for x in found] + [x for x in gradients if x is not None]
 
 
-def test_the_short_way_leads_to_the_same_numbers():
-    x = torch.rand(50, dtype=torch.float64, generator=generator())
-    (ours, gradient), (theirs, expected) = ways(x)
-    assert torch.equal(ours, theirs) and torch.equal(gradient, expected) and (gradient > 0).all()
+@pytest.mark.parametrize("name", sorted(name for name in _library._NODES if name in CASES))
+def test_the_short_way_leads_to_the_same_numbers(name):
+    """And to the same gradients, and refuses the same."""
+    inputs = CASES[name](torch.float64)
+    n_compared = 0
+    for i, x in enumerate(inputs):
+        first = x[0] if isinstance(x, list) else x
+        if not isinstance(first, torch.Tensor) or not first.is_floating_point():
+            continue
+        ours, theirs = by(_library.lib, name, inputs, i), by(lib, name, inputs, i)
+        assert (ours is None) == (theirs is None)
+        n_compared += ours is not None
+        for a, b in zip(ours or [], theirs or [], strict=True):
+            torch.testing.assert_close(a, b, rtol=1e-12, atol=1e-12, equal_nan=True)
+    assert n_compared > 0
+
+
+def test_a_tuple_of_tensors_is_as_good_as_a_list():
+    a = torch.rand(5, 3, requires_grad=True)
+    x, y = _library.lib.take_rows((a, 2 * a), INDEX)
+    (x.sum() + y.sum()).backward()
+    assert a.grad.sum() == 4 * 3 * 3
+
+
+def test_activations_may_be_computed_again():
+    """What torch's checkpointing does in the backward pass."""
+    x = torch.rand(5, requires_grad=True)
+    again = checkpoint(lambda y: linear_to_srgb(torch.sin(y) * 0.5 + 0.2), x, use_reentrant=False)
+    (gradient,) = torch.autograd.grad(again.sum(), x)
+    (expected,) = torch.autograd.grad(linear_to_srgb(torch.sin(x) * 0.5 + 0.2).sum(), x)
+    assert torch.equal(gradient, expected)
+
+
+def test_modes_that_change_arguments_change_what_is_saved():
+    """As one that computes in float64."""
+
+    class Doubles(torch.overrides.TorchFunctionMode):
+        def __torch_function__(self, function, types, args=(), kwargs=None):
+            return function(*(x.double() if isinstance(x, torch.Tensor) else x for x in args), **(kwargs or {}))
+
+    x = torch.rand(5, requires_grad=True)
+    with Doubles():
+        y = linear_to_srgb(x)
+    assert y.dtype == torch.float64
+    assert torch.autograd.grad(y.sum(), x)[0].dtype == torch.float32
+
+
+def test_compilation_in_a_new_process():
+    """Of an operator that nobody called before."""
+    code = """
+import torch
+from splitnerf.ops import linear_to_srgb
+f = torch.compile(lambda x: linear_to_srgb(x) + 1, fullgraph=True, backend="aot_eager")
+x = torch.rand(5, requires_grad=True)
+f(x).sum().backward()
+assert x.grad is not None
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=100)
 
 
 def test_the_short_way_is_taken(monkeypatch):

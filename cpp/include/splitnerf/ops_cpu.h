@@ -10,6 +10,7 @@
 #include "splitnerf/bodies/losses.h"
 #include "splitnerf/bodies/monte_carlo.h"
 #include "splitnerf/bodies/rays.h"
+#include "splitnerf/bodies/rows.h"
 #include "splitnerf/bodies/shading.h"
 #include "splitnerf/bodies/visibility_cache.h"
 #include "splitnerf/hash_grid.h"
@@ -129,6 +130,9 @@ template <class T> SPLITNERF_API void run(int64_t n, const CachedOcclusionBody<T
 template <class T> SPLITNERF_API void run(int64_t n, const CachedVisibilityBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const LightLookupBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const PairLikenessBody<T>& body);
+template <class T> SPLITNERF_API void run(int64_t n, const TakeRowsBody<T>& body);
+template <class T> SPLITNERF_API void run(int64_t n, const ClearArraysBody<T>& body);
+template <class T> SPLITNERF_API void run(int64_t n, const AddRowsBody<T>& body);
 // Throws std::invalid_argument where a column is out of range.
 template <class T> SPLITNERF_API void run(int64_t n, const SparseProductBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const ShadeBody<T>& body);

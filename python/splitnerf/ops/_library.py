@@ -25,24 +25,33 @@ def _load() -> None:
 _load()
 
 
+def holds_tensors(kind: torch.JitType) -> bool:
+    """Whether an argument or a result of this type is a list of tensors."""
+    return isinstance(kind, torch.ListType) and isinstance(kind.getElementType(), torch.TensorType)
+
+
 class Operator:
     """One of ``torch.ops.splitnerf``, called by a shorter way.
 
     torch's way leads from Python through the dispatcher back to Python, where the gradient is registered, and through the
-    dispatcher again, once forward and once for the operator of the backward pass. Here Python makes the gradient's node itself:
-    both take half of the time or less. What traces, transforms or asks for forward derivatives takes torch's way, and so do
-    gradients of a call that leaves arguments out, and of an operator that has none.
+    dispatcher again, once forward and once for the operator of the backward pass. Here Python makes the gradient's node itself.
+    What traces, transforms or asks for forward derivatives takes torch's way, and so do gradients of a call that leaves
+    arguments out, and of an operator that has none.
 
     Args:
         packet: The operator.
     """
 
     def __init__(self, packet: torch._ops.OpOverloadPacket):
-        self._packet, self._operator, self._count = packet, packet.default, len(packet.default._schema.arguments)
+        self._packet, self._operator = packet, packet.default
+        kinds = [argument.type for argument in packet.default._schema.arguments]
+        self._count, self._has_lists = len(kinds), any(map(holds_tensors, kinds))
 
     def __call__(self, *arguments: object) -> object:
         if is_transformed():
             return self._packet(*arguments)
+        if self._has_lists:  # torch sees whether a list requires a gradient, but not a tuple
+            arguments = tuple(list(x) if isinstance(x, tuple) else x for x in arguments)
         if torch.is_grad_enabled() and torch._C._any_requires_grad(*arguments):
             node = _NODES.get(self._packet.__name__)
             return self._packet(*arguments) if node is None or len(arguments) < self._count else node(*arguments)
@@ -51,9 +60,17 @@ class Operator:
 
 
 class Operators:
-    """All of ``torch.ops.splitnerf``, each an :class:`Operator`."""
+    """All of ``torch.ops.splitnerf``, each an :class:`Operator`, made here: within ``torch.compile`` none can be made."""
+
+    def __init__(self) -> None:
+        for name in torch._C._dispatch_get_all_op_names():
+            if name.startswith("splitnerf::"):
+                self._make(name.split("::")[1])
 
     def __getattr__(self, name: str) -> Operator:
+        return self._make(name)
+
+    def _make(self, name: str) -> Operator:
         operator = Operator(getattr(torch.ops.splitnerf, name))
         setattr(self, name, operator)
         return operator
@@ -65,41 +82,38 @@ _NODES: dict[str, Callable] = {}
 
 
 def is_transformed() -> bool:
-    """Whether ``torch.compile`` traces, a transform of ``torch.func`` is active, or tensors may carry tangents."""
+    """Whether ``torch.compile`` traces, a transform of ``torch.func`` or a mode that changes calls is active, or tensors may
+    carry tangents."""
     return (
         torch.compiler.is_compiling()
         or forward_ad._current_level >= 0
         or torch._C._functorch.peek_interpreter_stack() is not None
+        or torch._C._len_torch_function_stack() > 0
     )
 
 
 def node_of(name: str, backward: Callable, setup_context: Callable) -> Callable:
     """The gradient of an operator as a node of the graph, a function of the operator's arguments, from what :func:`register`
-    takes."""
+    takes. Where an argument is a list of tensors, ``ctx.needs_input_grad`` is of no use."""
     operator = getattr(torch.ops.splitnerf, name).default
-
-    returns_list = isinstance(operator._schema.returns[0].type, torch.ListType)
+    has_lists = any(holds_tensors(argument.type) for argument in operator._schema.arguments)
+    returns_list = holds_tensors(operator._schema.returns[0].type)
 
     def forward(ctx, *given):
-        *flat, sizes = given
-        arguments = nested(flat, sizes)
+        arguments = nested(*given) if has_lists else given
         with below_autograd():
             output = operator(*arguments)
         setup_context(ctx, arguments, output)
         return tuple(output) if returns_list else output
 
     def of_output(ctx, *grads):
-        grads = (list(grads),) if returns_list else grads
-        if torch.is_grad_enabled():  # for a second derivative
-            found = backward(ctx, *grads)
-        else:
-            with below_autograd():
-                found = backward(ctx, *grads)
-        return *flattened(found if isinstance(found, tuple) else (found,)), None
+        found = backward(ctx, list(grads)) if returns_list else backward(ctx, *grads)
+        found = found if isinstance(found, tuple) else (found,)
+        return (None, *flattened(found)) if has_lists else found
 
     methods = {"forward": staticmethod(forward), "backward": staticmethod(of_output)}
     node = type(f"{name}_gradient", (torch.autograd.Function,), methods)
-    return lambda *arguments: node.apply(*flattened(arguments), sizes_of(arguments))
+    return (lambda *arguments: node.apply(sizes_of(arguments), *flattened(arguments))) if has_lists else node.apply
 
 
 def is_list(argument: object) -> bool:
@@ -107,23 +121,18 @@ def is_list(argument: object) -> bool:
     return isinstance(argument, list) and not (argument and isinstance(argument[0], int | float))
 
 
-def sizes_of(arguments: Sequence) -> list[int] | None:
-    """The lengths of the arguments that are lists of tensors, -1 for others; None where there is no such list."""
-    sizes = [len(x) if is_list(x) else -1 for x in arguments]
-    return sizes if max(sizes) >= 0 else None
+def sizes_of(arguments: Sequence) -> list[int]:
+    """The lengths of the arguments that are lists of tensors, -1 for others."""
+    return [len(x) if is_list(x) else -1 for x in arguments]
 
 
-def flattened(arguments: Sequence) -> Sequence:
+def flattened(arguments: Sequence) -> list:
     """The arguments, and in place of a list of tensors what is in it: a node of the graph takes tensors alone."""
-    if not any(map(is_list, arguments)):
-        return arguments
     return [y for x in arguments for y in (x if is_list(x) else [x])]
 
 
-def nested(flat: Sequence, sizes: list[int] | None) -> Sequence:
+def nested(sizes: list[int], *flat: object) -> tuple:
     """The reverse of :func:`flattened`."""
-    if sizes is None:
-        return flat
     rest = iter(flat)
     return tuple(next(rest) if n < 0 else [next(rest) for _ in range(n)] for n in sizes)
 

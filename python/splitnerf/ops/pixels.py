@@ -36,8 +36,9 @@ def draw_rays(
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Rays through the middles of random pixels: `n_near` of one list, the others of another.
 
-    The rays of a list share it out: ray i of k goes through pixel (i + u) / k of the list, u its random number. So each pixel
-    is drawn as often as another, and no part of the photos is left out by chance.
+    The rays of a list share it out: ray i of k goes through pixel (i + u) / k of the list, u its random number. So no part of the
+    photos is left out by chance, and each pixel is drawn as often as another, if u takes many more values (2^24 in float32)
+    than a ray's part of the list has pixels.
 
     Args:
         random: [n] in [0, 1), float32 or float64.

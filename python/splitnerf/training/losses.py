@@ -55,7 +55,8 @@ class Terms(dict[str, Term]):
     def add(self, weights: dict[str, float | None], values: Tensor) -> None:
         """Adds the terms `values` [k], or [] for one, with their names and weights in that order. A term whose weight is None
         is left out."""
-        self._roots.append((values, tuple(weight or 0.0 for weight in weights.values())))
+        if any(weights.values()):
+            self._roots.append((values, tuple(weight or 0.0 for weight in weights.values())))
         flat = values.detach().reshape(-1)
         self.update((name, Term(weight, flat[i])) for i, (name, weight) in enumerate(weights.items()) if weight is not None)
 
@@ -153,7 +154,7 @@ def light_prior_loss(light: LightPyramid) -> Tensor:
     coarser levels, and its channels near their mean. A deviation d costs log(1 + d^2 / (TAILS s^2)), that of Student's t
     distribution with TAILS degrees of freedom, as windows and lamps have edges.
     """
-    coarsest, share = _texel_shares(tuple(light.level_sizes), light.texels.device)
+    coarsest, share = (x.to(light.texels) for x in _texel_shares(tuple(light.level_sizes), light.texels.device))
     mean = light.texels[: light.level_sizes[0]].mean(0)  # the brightness of the whole light costs nothing
     apart = torch.addcmul(light.texels, coarsest, mean, value=-1.0)
     brightness = apart.mean(1, keepdim=True)

@@ -38,8 +38,11 @@ class Step:
         seen: losses.SeenLight | None = None,
     ):  # fmt: skip
         self.model, self.grid, self.mesh, self.generator, self.seen = model, grid, mesh, generator, seen
-        on_cpu = model.device.type == "cpu"  # whose threads would only share the time
-        self.late = None if on_cpu or model.config.occlusion.kind != "mlp" else LateOcclusion(model, generator)
+        on_cpu, self.late = model.device.type == "cpu", None  # whose threads would only share the time
+        if not on_cpu and model.config.occlusion.kind == "mlp":
+            # How often it draws depends on the CPU's speed: the training's own numbers must not.
+            own = torch.Generator(generator.device).manual_seed(model.config.run.seed)
+            self.late = LateOcclusion(model, own)
 
     def __call__(
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float

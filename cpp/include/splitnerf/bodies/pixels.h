@@ -57,22 +57,24 @@ SPLITNERF_ON_GPU(DrawRaysBody);
 // positions [n_room + n_anywhere + n_beside]: the midpoints of n samples and, up to n_room, the first of them again; then
 // given points; then points beside samples, chosen by a number in [0, 1). Without samples the room is filled with zeros.
 template <class T> struct PlaceSamplesBody {
-  int64_t n, n_room, n_anywhere;
+  int64_t n_rays, n, n_room, n_anywhere;
   const T *rays_o, *rays_d;
   const int64_t* ray_indices;
   const T *t_starts, *t_ends, *anywhere, *chosen, *shifts;
   T *positions, *directions;
   int64_t* beside;
 
+  // On the CPU `ray_indices` has been checked. On the GPU it has not; any value keeps all accesses inside the arrays.
+  SPLITNERF_HD int64_t ray_of(int64_t sample) const { return clamp<int64_t>(ray_indices[sample], 0, n_rays - 1); }
   SPLITNERF_HD Vec3<T> middle(int64_t sample) const {
-    const int64_t ray = ray_indices[sample];
+    const int64_t ray = ray_of(sample);
     return load3(rays_o + 3 * ray) + load3(rays_d + 3 * ray) * (T(0.5) * (t_starts[sample] + t_ends[sample]));
   }
   SPLITNERF_HD void operator()(int64_t i) const {
     Vec3<T> position{T(0), T(0), T(0)}, direction = position;
     if (i < n_room) {
       if (n > 0) position = middle(i % n);
-      if (i < n) direction = load3(rays_d + 3 * ray_indices[i]);
+      if (i < n) direction = load3(rays_d + 3 * ray_of(i));
       store3(directions + 3 * i, direction);
     } else if (const int64_t j = i - n_room; j < n_anywhere) {
       position = load3(anywhere + 3 * j);
