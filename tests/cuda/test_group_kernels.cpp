@@ -322,12 +322,14 @@ void check_summed_light(int64_t n, int k, bool with_sent) {
   expect_near(sums8, sums, 1e-13), expect_near(to_n8, to_n, 1e-13), expect_near(to_rho8, to_rho, 1e-13);
   expect_near(to_light8, to_light, 1e-13 * double(1 + n));
 }
-// More points than warps; so many directions that only four warps have room for their copies, or none has.
 TEST(GroupKernels, SummedLightAndItsGradients) {
   for (const int64_t n : {0, 1, 40})
-    for (const bool with_sent : {false, true}) check_summed_light(n, 19, with_sent);
-  check_summed_light(2133, 33, false);
-  check_summed_light(9, 2000, true);
+    for (const bool with_sent : {false, true}) check_summed_light(n, 35, with_sent);
+}
+TEST(GroupKernels, SummedLightOfMorePointsThanWarps) { check_summed_light(2133, 3, false); }
+// Only four warps have room for their copies; then none has.
+TEST(GroupKernels, SummedLightOfManyDirections) {
+  check_summed_light(9, 1300, true);
   std::vector<double> to_light(3 * 10000);
   SharedLightBackwardBody<double> body{};
   body.n = body.receive.n = 10000, body.receive.grad_light = to_light.data();
