@@ -102,15 +102,19 @@ inline void require(bool condition, const char* op, const std::string& what) {
 template <class T> const T* in(const Tensor& t) { return static_cast<const T*>(t.const_data_ptr()); }
 template <class T> T* out(Tensor& t) { return static_cast<T*>(t.mutable_data_ptr()); }
 
-// Raises where a tensor of int32 on the CPU holds other numbers than those in [0, high): kernels read without a check.
-inline void check_indices(const char* op, const char* name, const Tensor& t, int64_t high) {
-  const int32_t* values = in<int32_t>(t);
-  int32_t least = 0, most = -1;
+// Whether all numbers of a tensor on the CPU lie in [0, high): kernels read without a check.
+template <class T> bool all_below(const Tensor& t, int64_t high) {
+  const T* values = in<T>(t);
+  T least = 0, most = -1;
   for (int64_t i = 0, n = t.numel(); i < n; ++i) {
     least = values[i] < least ? values[i] : least;
     most = values[i] > most ? values[i] : most;
   }
-  require(least >= 0 && most < high, op, std::string(name) + " must hold numbers in [0, " + std::to_string(high) + ")");
+  return least >= 0 && int64_t(most) < high;
+}
+inline void check_indices(const char* op, const char* name, const Tensor& t, int64_t high) {
+  require(all_below<int32_t>(t, high), op,
+          std::string(name) + " must hold numbers in [0, " + std::to_string(high) + ")");
 }
 
 inline Tensor empty_like_type(const Tensor& like, std::initializer_list<int64_t> shape, ScalarType type) {

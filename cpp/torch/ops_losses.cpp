@@ -36,8 +36,7 @@ std::tuple<Tensor, Tensor, Tensor> gradient_losses(Tensor gradients, Tensor weig
   const int64_t n = g.size(0), m = b.size(0), n_weights = w.size(0);
   require(n_weights + m <= n, op, "gradients must hold the samples and their neighbours");
   require(m == 0 || n_weights > 0, op, "beside must hold indices of weights");
-  for (int64_t j = 0; type.on_cpu() && j < m; ++j)
-    require(in<int64_t>(b)[j] >= 0 && in<int64_t>(b)[j] < n_weights, op, "beside must hold indices of weights");
+  if (type.on_cpu()) require(all_below<int64_t>(b, n_weights), op, "beside must hold indices of weights");
   Tensor losses = empty_like_type(g, {2}, type), eikonal_by = torch::stable::empty_like(g),
          smoothness_by = torch::stable::empty_like(g);
   on_device(type, [&](auto zero, const auto& device) {

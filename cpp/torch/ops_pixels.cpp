@@ -59,8 +59,7 @@ std::tuple<Tensor, Tensor, Tensor> place_samples(Tensor rays_o, Tensor rays_d, T
                which = checked(op, "chosen", chosen, {kAny}, type);
   const Tensor apart = checked(op, "shifts", shifts, {which.size(0), 3}, type);
   const int64_t n_anywhere = points.size(0), n_beside = n > 0 ? which.size(0) : 0;
-  for (int64_t i = 0; type.on_cpu() && i < n; ++i)
-    require(in<int64_t>(r)[i] >= 0 && in<int64_t>(r)[i] < o.size(0), op, "ray_indices must hold numbers of rays");
+  if (type.on_cpu()) require(all_below<int64_t>(r, o.size(0)), op, "ray_indices must hold numbers of rays");
   Tensor positions = empty_like_type(o, {n_room + n_anywhere + n_beside, 3}, type),
          directions = empty_like_type(o, {n_room, 3}, type), beside = empty_like_type(o, {n_beside}, whole);
   on_device(type, [&](auto zero, const auto& device) {

@@ -73,8 +73,8 @@ std::tuple<Tensor, Tensor> neus_weights(Tensor f_prev, Tensor f_next, Tensor s, 
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, o.size(0) - 1,
-               NeusWeightsBody<T>{packed_rays(o, p.size(0)), in<T>(p), in<T>(q), in<T>(sharpness),
-                                  T(min_transmittance), out<T>(weights), out<T>(opacity)});
+               NeusWeightsBody<T>{packed_rays(o, p.size(0)), in<T>(p), in<T>(q), in<T>(sharpness), T(min_transmittance),
+                                  out<T>(weights), out<T>(opacity)});
   });
   return {weights, opacity};
 }
@@ -173,8 +173,7 @@ std::tuple<Tensor, Tensor, Tensor> surface_weights(Tensor sdf, Tensor gradient, 
   Tensor opacity = empty_like_type(x.sdf, {x.n_rays()}, x.type);
   on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.run(op, x.n_rays(),
-               SurfaceWeightsBody<T>{x.view<T>(), out<T>(normals), out<T>(weights), out<T>(opacity)});
+    device.run(op, x.n_rays(), SurfaceWeightsBody<T>{x.view<T>(), out<T>(normals), out<T>(weights), out<T>(opacity)});
   });
   return {normals, weights, opacity};
 }
@@ -218,13 +217,13 @@ Tensors8 spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, 
   const auto indices = [&](int64_t n) { return empty_like_type(w, {n}, ScalarType::Long); };
   Tensor first = indices(w.size(0)), second = indices(w.size(0)), share = empty_like_type(w, {w.size(0)}, type);
   Tensor shaded, heaviest, leaders, stretch, sizes = indices(3);
-  const SpreadAllocator allocator{[&](const SpreadSizes& n) {
-                                    shaded = indices(n.shaded), heaviest = indices(n.heaviest);
-                                    leaders = indices(n.leaders), stretch = indices(n.shaded);
-                                    return Spread{out<int64_t>(shaded), out<int64_t>(heaviest), out<int64_t>(leaders),
-                                                  out<int64_t>(stretch), n};
-                                  },
-                                  fixed ? &room : nullptr};
+  const SpreadAllocator allocator{
+      [&](const SpreadSizes& n) {
+        shaded = indices(n.shaded), heaviest = indices(n.heaviest);
+        leaders = indices(n.leaders), stretch = indices(n.shaded);
+        return Spread{out<int64_t>(shaded), out<int64_t>(heaviest), out<int64_t>(leaders), out<int64_t>(stretch), n};
+      },
+      fixed ? &room : nullptr};
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     const auto inside = [](T p) { return p >= T(0) && p < T(1); };

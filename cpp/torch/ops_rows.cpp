@@ -10,8 +10,7 @@ namespace {
 
 Tensor checked_index(const char* op, const Tensor& index, const Kind& type, int64_t n) {
   const Tensor numbers = checked(op, "index", index, {kAny}, type.with(ScalarType::Long));
-  for (int64_t i = 0; type.on_cpu() && i < numbers.size(0); ++i)
-    require(in<int64_t>(numbers)[i] >= 0 && in<int64_t>(numbers)[i] < n, op, "index must hold numbers of rows");
+  if (type.on_cpu()) require(all_below<int64_t>(numbers, n), op, "index must hold numbers of rows");
   require(numbers.size(0) == 0 || n > 0, op, "there are no rows to take");
   return numbers;
 }
