@@ -264,14 +264,14 @@ def test_a_checkpoint_of_before_rays_were_aimed_goes_on(data, tmp_path):
     assert not torch.equal(bits.directions, bits.centres)
     content = torch.load(path, weights_only=True)
     light, n = content["occlusion_light"], len(content["mesh_vertices"])
-    assert len(light.pop("senders")) > 100 and not torch.equal(light.pop("aims"), bits.centres)
+    assert len(light.pop("senders")) > 30 and not torch.equal(light.pop("aims"), bits.centres)
     light.update(sent=torch.full((n, 3), 9e9), sky=torch.full((256, 3), 0.7))
     torch.save(content, path)
     resumed = trainer.Training(dataset, config.replace({"steps": 24}), tmp_path, torch.device("cpu"))
     resumed.restore()
     bits = resumed.model.occlusion
     assert torch.equal(bits.directions, bits.centres) and (bits.light == 0.7).all()
-    assert len(bits.radiance) == len(bits.senders.vertices) > 100 and bits.radiance.max() < 1e3
+    assert len(bits.radiance) == len(bits.senders.vertices) > 30 and bits.radiance.max() < 1e3
     scene = trainer.train(dataset, config.replace({"steps": 24}), tmp_path, resume=True)
     bits = scene.model.occlusion
     assert scene.finished and scene.step == 24 and not torch.equal(bits.directions, bits.centres)

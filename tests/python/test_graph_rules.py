@@ -9,7 +9,7 @@ from typing import NamedTuple
 import pretend_graphs
 import pytest
 import torch
-from test_graphs import NoStream
+from pretend_graphs import NoStream
 from tiny_runs import tiny
 from torch import Tensor
 

@@ -253,8 +253,12 @@ def test_a_signal_ends_a_sweep(painted, folder, monkeypatch):
 
 def test_a_signal_ends_the_preparations(painted, folder, monkeypatch):
     monkeypatch.setattr(job, "Stage", lambda *_: signal.raise_signal(signal.SIGINT))
-    with pytest.raises(KeyboardInterrupt):
-        refine_folder(folder, painted[1], folder, QUICK)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a process in the background may ignore it
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            refine_folder(folder, painted[1], folder, QUICK)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_the_state_is_kept_from_time_to_time(painted, folder, monkeypatch):

@@ -229,6 +229,54 @@ def marched(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     return torch.where(counts > limit, 1.0, worst), rows
 
 
+def drawn_rays(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """Through a listed pixel of the part of the list that is the ray's own, along a unit vector, from the view's centre."""
+    views, height, width = 3, 2000, 3000
+    whole = {"generator": draw.generator, "size": (2000,)}
+    apart = torch.randint(1, 3000, **whole)  # from the end of a run to the end of the next
+    ends = apart.cumsum(0)
+    starts = ends - torch.minimum(apart, torch.randint(1, 1000, **whole))
+    last = torch.cumsum(ends - starts, 0)
+    listed = ops.PixelList(last, ends - last, int(last[-1]))
+    matrices = (draw.normal(views, 3, 3) * draw.logarithmic(1e-6, 1e6, views, 1, 1)).float()
+    origins, random = draw.normal(views, 3).float(), draw.shares(n).clamp(max=1 - 6e-8).float()
+    rays_o, rays_d, view, index = ops.draw_rays(random, n, listed, listed, matrices, origins, height, width)
+    run = torch.searchsorted(ends, index, right=True).clamp(max=len(ends) - 1)
+    rank = index - listed.shift[run]
+    part = rank.double() * n / listed.count - torch.arange(n)
+    wrong = (index < starts[run]) | (view != index // (height * width)) | (rays_o != origins[view]).any(1)
+    length = (rays_d.double().norm(dim=1) - 1).abs() - 1e-6
+    outside = torch.maximum(-part - n / listed.count - 1e-6, part - 1 - 1e-6)
+    return torch.where(wrong, 1.0, torch.maximum(length, outside)), {"random": random}
+
+
+def placed(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """As far along its ray as the middle of its sample, to a rounding of the numbers added."""
+    rows = {
+        "rays_o": draw.vectors(n).clamp(-1e18, 1e18).float(), "rays_d": draw.directions(n).float(),
+        "t_starts": draw.logarithmic(1e-20, 1e18, n).float(),
+    }  # fmt: skip
+    ends = rows["t_starts"] * (1 + draw.shares(n)).float()
+    samples = ops.PackedSamples(torch.arange(n), rows["t_starts"], ends, torch.arange(n + 1))
+    none = rows["rays_o"][:0]
+    positions, directions, _ = ops.place_samples(rows["rays_o"], rows["rays_d"], samples, none, none[:, 0], none)
+    o, d = rows["rays_o"].double(), rows["rays_d"].double()
+    along = d * (0.5 * (rows["t_starts"].double() + ends.double()))[:, None]
+    error = ((positions.double() - (o + along)).abs() - 3e-7 * (o.abs() + along.abs())).amax(1)
+    return torch.where((directions == rows["rays_d"]).all(1), error, 1.0), rows
+
+
+def queries_of_light(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """The directions of query_direction with their roughness; the normals, not behind the surface, with 1."""
+    given = draw.directions(n).float(), draw.directions(n).float(), draw.roughness(n).float()
+    directions, asked = ops.light_queries(*given)
+    lobes, facing = directions.chunk(2)
+    turned = (facing == given[0]).all(1) | (facing == -given[0]).all(1)
+    same = (lobes == ops.query_direction(*given)).all(1) & (asked[:n] == given[2]).all(1) & (asked[n:] == 1).all(1)
+    behind = -(facing.double() * given[1].double()).sum(1) - 4e-7
+    return torch.where(same & turned, behind, 1.0), dict(zip(("normals", "view_dirs", "roughness"), given))
+
+
 def spread(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     """Shares in [0, 1], neighbours in order, and interpolated constants that stay themselves."""
     samples = 8
@@ -306,6 +354,9 @@ PROPERTIES = (
         chunk=1024,
     ),
     Property("cached_occlusion", cached, "in [0, 1], the mesh's own light too, under black and single lights"),
+    Property("draw_rays", drawn_rays, "a listed pixel of the ray's own part of the list, a unit vector, the view's centre"),
+    Property("place_samples", placed, "on the ray in the middle of the sample, to a rounding"),
+    Property("light_queries", queries_of_light, "those of query_direction, then normals that do not face away"),
     Property("march_rays", marched, "in the box, ascending by the step, at most as many as asked for"),
     Property("spread_samples", spread, "shares in [0, 1]; every ray has a sample; constants stay themselves", size=8),
     Property("sample_ggx_lobe", lobe_samples, "unit, above the horizon, evenly spaced in the CDF of D cos", size=8),

@@ -99,7 +99,7 @@ def fitted(steps: int) -> SdfField:
     near = on_surface(1 << 16)
     for _ in range(steps):
         points = near[torch.randint(len(near), (4096,))] + 0.03 * torch.randn(4096, 3)
-        error = field(points)[:, 0] - surface(points)
+        error = field.sdf(points) - surface(points)
         optimiser.zero_grad()
         error.abs().mean().backward()
         optimiser.step()
