@@ -248,11 +248,13 @@ void sdf_values(const Queue& queue, const SdfField<T>& field, int64_t n, const T
 template <class T>
 void sample_rays(const Queue& queue, const SdfField<T>& field, const MarchOptions& march, const OccupancyView& cells,
                  const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter,
-                 int64_t* offsets, int64_t* n_evaluated, const SampleAllocator<T>& allocate) {
+                 int64_t room, int64_t* offsets, int64_t* n_evaluated, int64_t* n_found,
+                 const SampleAllocator<T>& allocate) {
   const char* op = "sample_rays";
   const SdfLayer<T> layer = prepare(queue, op, field.weights);
   const int64_t most = most_samples<T>(march);
   T* starts = queue.scratch<T>(n_rays * most);
+  int64_t* all = queue.scratch<int64_t>(n_rays + 1);
   const bool copies = distance_weights(layer) * sizeof(T) <= kMostCopied;
   const size_t bytes = sizeof(T) * (kWalkWarps * walk_tile_size(layer) + (copies ? distance_weights(layer) : 0));
   if (n_rays > 0) {
@@ -261,13 +263,16 @@ void sample_rays(const Queue& queue, const SdfField<T>& field, const MarchOption
         const auto kernel = walk_kernel<T, decltype(count)::n, Pointee<decltype(table)>>;
         allow_shared_memory(op, kernel, bytes);
         launch(queue, op, kernel, blocks_for(n_rays, kWalkWarps), kWalkThreads, bytes, n_rays, field_grid(field, table),
-               layer, copies, march, cells, rules, rays_o, rays_d, jitter, most, starts, offsets + 1, n_evaluated);
+               layer, copies, march, cells, rules, rays_o, rays_d, jitter, most, starts, all + 1, n_evaluated);
       });
     });
   }
-  sum_counts(queue, op, n_rays, offsets);
-  const PackedSamples<T> to = allocate(read_number(queue, offsets + n_rays));
+  sum_counts(queue, op, n_rays, all);
+  const int64_t rows = room > 0 ? room : read_number(queue, all + n_rays);
+  for_each(queue, op, n_rays + 1, FitOffsetsBody{n_rays, rows, all, offsets, n_found});
+  const PackedSamples<T> to = allocate(rows);
   for_each_group(queue, op, n_rays, PackSamplesBody<T>{most, T(march.step), starts, offsets, to});
+  if (room > 0) for_each(queue, op, room, PadSamplesBody<T>{offsets + n_rays, to});
 }
 
 template <class T>
@@ -304,8 +309,8 @@ void sdf_layer_backward(const Queue& queue, const SdfWeights<T>& weights, int64_
 #define SPLITNERF_INSTANTIATE(T)                                                                                 \
   template void sdf_values<T>(const Queue&, const SdfField<T>&, int64_t, const T*, T*);                          \
   template void sample_rays<T>(const Queue&, const SdfField<T>&, const MarchOptions&, const OccupancyView&,      \
-                               const SampleRules<T>&, int64_t, const T*, const T*, const T*, int64_t*, int64_t*, \
-                               const SampleAllocator<T>&);                                                       \
+                               const SampleRules<T>&, int64_t, const T*, const T*, const T*, int64_t, int64_t*,  \
+                               int64_t*, int64_t*, const SampleAllocator<T>&);                                   \
   template void sdf_layer<T>(const Queue&, const SdfWeights<T>&, int64_t, const T*, const T*, const T*, T*, T*); \
   template void sdf_layer_backward<T>(const Queue&, const SdfWeights<T>&, int64_t, const T*, const T*, const T*, \
                                       const T*, const T*, T*, T*, T*, T*, T*, T*);

@@ -12,6 +12,7 @@ template <class T> void run(int64_t, const AdamwBody<T>& body) {
                [&](int64_t begin, int64_t end) { kernels<T>().adamw_step(body.rule, x, begin, end); });
 }
 template <class T> void run(int64_t, const AdamwListBody<T>& body) {
+  if (body.allowed && !*body.allowed) return;
   for (int k = 0; k < body.n_arrays; ++k) run(body.arrays[k].x.n, body.arrays[k]);
 }
 

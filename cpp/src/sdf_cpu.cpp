@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "splitnerf/bodies/rays.h"
 #include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/parallel.h"
@@ -107,7 +108,8 @@ void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, const T* positi
 template <class T>
 void sample_rays(const SdfField<T>& field, const MarchOptions& march, const OccupancyView& grid,
                  const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter,
-                 int64_t* offsets, int64_t* n_evaluated, const SampleAllocator<T>& allocate) {
+                 int64_t room, int64_t* offsets, int64_t* n_evaluated, int64_t* n_found,
+                 const SampleAllocator<T>& allocate) {
   const Kernels<T>& k = kernels<T>();
   const PreparedField<T> prepared(field);
   std::vector<std::vector<T>> kept(n_rays);  // where the samples of each ray start, front to back
@@ -131,18 +133,21 @@ void sample_rays(const SdfField<T>& field, const MarchOptions& march, const Occu
       walks.erase(std::remove_if(walks.begin(), walks.end(), [](const Walk<T>& w) { return w.next < 0; }), walks.end());
     }
   });
-  offsets[0] = 0;
-  for (int64_t r = 0; r < n_rays; ++r) offsets[r + 1] = offsets[r] + static_cast<int64_t>(kept[r].size());
-  const PackedSamples<T> to = allocate(offsets[n_rays]);
+  std::vector<int64_t> all(n_rays + 1);
+  for (int64_t r = 0; r < n_rays; ++r) all[r + 1] = all[r] + static_cast<int64_t>(kept[r].size());
+  const int64_t rows = room > 0 ? room : all[n_rays];
+  const FitOffsetsBody fit{n_rays, rows, all.data(), offsets, n_found};
+  for (int64_t r = 0; r <= n_rays; ++r) fit(r);
+  const PackedSamples<T> to = allocate(rows);
   for (int64_t r = 0; r < n_rays; ++r) {
-    int64_t i = offsets[r];
-    for (const T start : kept[r]) {
+    for (int64_t i = offsets[r]; i < offsets[r + 1]; ++i) {
       to.ray_indices[i] = r;
-      to.t_starts[i] = start;
-      to.t_ends[i] = start + T(march.step);
-      ++i;
+      to.t_starts[i] = kept[r][i - offsets[r]];
+      to.t_ends[i] = to.t_starts[i] + T(march.step);
     }
   }
+  const PadSamplesBody<T> pad{offsets + n_rays, to};
+  for (int64_t i = offsets[n_rays]; i < rows; ++i) pad(i);
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                                                       \
@@ -151,7 +156,8 @@ void sample_rays(const SdfField<T>& field, const MarchOptions& march, const Occu
   template void sdf_layer_backward<T>(const SdfWeights<T>&, int64_t, const T*, const T*, const T*, const T*, const T*, \
                                       T*, T*, T*, T*, T*, T*);                                                         \
   template void sample_rays<T>(const SdfField<T>&, const MarchOptions&, const OccupancyView&, const SampleRules<T>&,   \
-                               int64_t, const T*, const T*, const T*, int64_t*, int64_t*, const SampleAllocator<T>&);
+                               int64_t, const T*, const T*, const T*, int64_t, int64_t*, int64_t*, int64_t*,           \
+                               const SampleAllocator<T>&);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

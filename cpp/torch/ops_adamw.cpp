@@ -86,7 +86,7 @@ void adamw_step(Tensor param, Tensor grad, Tensor exp_avg, Tensor exp_avg_sq, do
 void adamw_steps(std::vector<Tensor> params, std::vector<Tensor> grads, std::vector<Tensor> exp_avgs,
                  std::vector<Tensor> exp_avg_sqs, std::vector<double> lrs, double beta1, double beta2, double eps,
                  std::vector<double> weight_decays, std::vector<int64_t> steps, std::vector<bool> sparse,
-                 std::vector<Tensor> copies, std::vector<int64_t> copied) {
+                 std::vector<Tensor> copies, std::vector<int64_t> copied, std::optional<Tensor> allowed) {
   const char* op = "adamw_steps_";
   const size_t n = params.size();
   require(n > 0, op, "params must hold a tensor");
@@ -109,6 +109,8 @@ void adamw_steps(std::vector<Tensor> params, std::vector<Tensor> grads, std::vec
     require_like(op, "params", params[k], params[k], kind);  // one dtype, one device
     grads[k] = dense_gradient(op, grads[k], params[k], kind);
   }
+  std::optional<Tensor> flag;
+  if (allowed) flag = checked(op, "allowed", *allowed, {}, kind.with(ScalarType::Bool));
   on_device(kind, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     std::vector<AdamwListBody<T>> lists(1);
@@ -117,7 +119,10 @@ void adamw_steps(std::vector<Tensor> params, std::vector<Tensor> grads, std::vec
       lists.back().add(step_of<T>(op, params[k], grads[k], exp_avgs[k], exp_avg_sqs[k], lrs[k], {beta1, beta2, eps},
                                   weight_decays[k], steps[k], sparse[k], copy_of[k], kind));
     }
-    for (const AdamwListBody<T>& list : lists) device.run(op, list.count(), list);
+    for (AdamwListBody<T>& list : lists) {
+      list.allowed = flag ? in<bool>(*flag) : nullptr;
+      device.run(op, list.count(), list);
+    }
   });
 }
 
@@ -130,7 +135,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "adamw_steps_(Tensor(a!)[] params, Tensor[] grads, Tensor(b!)[] exp_avgs, Tensor(c!)[] exp_avg_sqs, float[] lrs, "
       "float beta1, float beta2, float eps, float[] weight_decays, int[] steps, bool[] sparse, Tensor(d!)[] copies, "
-      "int[] copied) -> ()");
+      "int[] copied, Tensor? allowed=None) -> ()");
 }
 
 SPLITNERF_IMPLEMENT(m) {

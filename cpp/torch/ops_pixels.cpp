@@ -46,8 +46,8 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> draw_rays(Tensor random, int64_t n_ne
 }
 
 std::tuple<Tensor, Tensor, Tensor> place_samples(Tensor rays_o, Tensor rays_d, Tensor ray_indices, Tensor t_starts,
-                                                 Tensor t_ends, Tensor anywhere, Tensor chosen, Tensor shifts,
-                                                 int64_t room) {
+                                                 Tensor t_ends, Tensor offsets, Tensor anywhere, Tensor chosen,
+                                                 Tensor shifts, int64_t room) {
   const char* op = "place_samples";
   const Kind type = real_kind(op, "rays_o", rays_o), whole = type.with(ScalarType::Long);
   const Tensor o = checked(op, "rays_o", rays_o, {kAny, 3}, type),
@@ -55,6 +55,7 @@ std::tuple<Tensor, Tensor, Tensor> place_samples(Tensor rays_o, Tensor rays_d, T
   const Tensor r = checked(op, "ray_indices", ray_indices, {kAny}, whole);
   const int64_t n = r.size(0), n_room = std::max(n, room);
   const Tensor begin = checked(op, "t_starts", t_starts, {n}, type), end = checked(op, "t_ends", t_ends, {n}, type);
+  const Tensor ends_of_rays = checked(op, "offsets", offsets, {o.size(0) + 1}, whole);
   const Tensor points = checked(op, "anywhere", anywhere, {kAny, 3}, type),
                which = checked(op, "chosen", chosen, {kAny}, type);
   const Tensor apart = checked(op, "shifts", shifts, {which.size(0), 3}, type);
@@ -64,10 +65,11 @@ std::tuple<Tensor, Tensor, Tensor> place_samples(Tensor rays_o, Tensor rays_d, T
          directions = empty_like_type(o, {n_room, 3}, type), beside = empty_like_type(o, {n_beside}, whole);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.run(op, positions.size(0),
-               PlaceSamplesBody<T>{o.size(0), n, n_room, n_anywhere, in<T>(o), in<T>(d), in<int64_t>(r), in<T>(begin),
-                                   in<T>(end), in<T>(points), in<T>(which), in<T>(apart), out<T>(positions),
-                                   out<T>(directions), out<int64_t>(beside)});
+    device.run(
+        op, positions.size(0),
+        PlaceSamplesBody<T>{o.size(0), n, n_room, n_anywhere, in<T>(o), in<T>(d), in<int64_t>(r),
+                            in<int64_t>(ends_of_rays) + o.size(0), in<T>(begin), in<T>(end), in<T>(points),
+                            in<T>(which), in<T>(apart), out<T>(positions), out<T>(directions), out<int64_t>(beside)});
   });
   return {positions, directions, beside};
 }
@@ -82,8 +84,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "Tensor, Tensor)");
   m.def(
       "place_samples(Tensor rays_o, Tensor rays_d, Tensor ray_indices, Tensor t_starts, Tensor t_ends, Tensor "
-      "anywhere, "
-      "Tensor chosen, Tensor shifts, int room) -> (Tensor, Tensor, Tensor)");
+      "offsets, Tensor anywhere, Tensor chosen, Tensor shifts, int room) -> (Tensor, Tensor, Tensor)");
 }
 
 SPLITNERF_IMPLEMENT(m) {

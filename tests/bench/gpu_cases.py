@@ -209,13 +209,13 @@ class World:
         r, m = self.rays, self.sizes.entropy
         indices = torch.arange(self.sizes.rays).repeat_interleave(self.sizes.per_ray)
         probes = self.rand(m, 3, seed=65), self.rand(m, seed=66), self.rand(m, 3, seed=67)
-        return r.origins, r.directions, indices, r.t, r.t + SHELL / self.sizes.per_ray, *probes, self.sizes.samples
+        return r.origins, r.directions, indices, r.t, r.t + SHELL / self.sizes.per_ray, r.offsets, *probes, self.sizes.samples
 
     def marching(self) -> tuple:
         return *self.rays[:3], self.cells, BOX, self.rays.step, 1024
 
     def sampling(self) -> tuple:
-        rules = (SEARCH * self.rays.step, 1024, S, ANNEAL, 1e-3, MIN_TRANSMITTANCE, 0.1, 1.25)
+        rules = (SEARCH * self.rays.step, 1024, S, ANNEAL, 1e-3, MIN_TRANSMITTANCE, 0.1, 1.25, 0)
         return *self.rays[:3], self.cells, *self.network, *rules
 
     @functools.cached_property
@@ -449,7 +449,7 @@ CASES = [
          gather(lambda s: s.encode(2) + s.layer + 6 * s.width), None, 1),
     # Per distance asked for, as many as the last result says.
     Case("sample_rays", World.sampling,
-         lambda s, out: float(out[-1].sum()) * (s.encode(2) + s.layer + 6 * s.width + 20), None, 4),
+         lambda s, out: float(out[4].sum()) * (s.encode(2) + s.layer + 6 * s.width + 20), None, 4),
     Case("march_rays", World.marching, lambda s, out: 12 * len(out[0])),
     Case("take_rows", lambda w: (w.row_arrays(w.sizes.samples), w.shaded), a_point(30)),
     Case("put_rows", lambda w: (w.row_arrays(len(w.shaded)), w.shaded, [w.sizes.samples] * 3), a_point(30)),

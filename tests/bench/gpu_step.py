@@ -35,9 +35,10 @@ from splitnerf.devices import tensor_cores
 from splitnerf.fields import LightPyramid
 from splitnerf.render.renderer import FoundSamples
 from splitnerf.training.batches import Batch, draw_batch
-from splitnerf.training.graphs import SAMPLE_SLACK, round_up
 from splitnerf.training.loop import Training
+from splitnerf.training.room import SAMPLE_SLACK, round_up
 from splitnerf.training.schedule import light_moves
+from splitnerf.training.step import Room
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("cpp", "python/splitnerf")
@@ -262,13 +263,13 @@ def same_choice(ours: Training, truth: Training, there: Training) -> tuple[Work,
 
 
 def graphed(training: Training, work: Work) -> tuple[Answer, Answer]:
-    """The step without a graph but with its capacity, and the replay of its graph, both with the same seed.
+    """The step without a graph but with its room, and the replay of its graph, both with the same seed.
 
     Raises:
         RuntimeError: No graph was made, or it has too little room.
     """
     batch = on(training.model.device, work.batch)
-    training.take_step.capacity = round_up(SAMPLE_SLACK * len(work.found.directions))
+    training.take_step.sample_room = round_up(SAMPLE_SLACK * len(work.found.directions))
     answers = []
     with training.take_step.stream():
         for _ in range(5):  # two without a graph, one that records and replays, two that replay
@@ -278,8 +279,9 @@ def graphed(training: Training, work: Work) -> tuple[Answer, Answer]:
             ray, terms = training.take_step(batch, light, None, work.step, PROGRESS)
             light.backward()
             n_shaded, _, n_segments = ray.sizes.tolist()
-            if not training.take_step.is_complete(n_shaded, n_segments):
-                raise RuntimeError("the graph's capacity is too small for the batch that it was made for")
+            counts, room = Room(int(ray.n_found), n_shaded, n_segments), training.take_step.room
+            if not training.take_step.settle(counts, room, training.model.s_value):
+                raise RuntimeError("the graph's room is too small for the batch that it was made for")
             answers.append(collected(training, ray, terms))
     if not training.take_step._graphs:
         raise RuntimeError("no graph was recorded")

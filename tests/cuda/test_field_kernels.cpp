@@ -180,6 +180,8 @@ template <class T> struct Found {
   std::vector<int64_t> offsets, evaluated, indices;
   std::vector<T> starts, ends;
 
+  int64_t all = -7;
+
   explicit Found(int64_t n) : offsets(unwritten<int64_t>(n + 1)), evaluated(unwritten<int64_t>(n)) {}
   SampleAllocator<T> allocate() {
     return [this](int64_t kept) {
@@ -189,14 +191,14 @@ template <class T> struct Found {
   }
 };
 // What the CPU finds, and the GPU.
-template <class T> std::pair<Found<T>, Found<T>> find(const SdfField<T>& field, const Rays<T>& r) {
+template <class T> std::pair<Found<T>, Found<T>> find(const SdfField<T>& field, const Rays<T>& r, int64_t room = 0) {
   const OccupancyCells cells(r.cells.data(), 6);
   Found<T> a(r.n), b(r.n);
   Gpu gpu;
-  cpu::sample_rays<T>(field, r.march, cells.view(), r.rules, r.n, r.o.data(), r.d.data(), r.jitter.data(),
-                      a.offsets.data(), a.evaluated.data(), a.allocate());
+  cpu::sample_rays<T>(field, r.march, cells.view(), r.rules, r.n, r.o.data(), r.d.data(), r.jitter.data(), room,
+                      a.offsets.data(), a.evaluated.data(), &a.all, a.allocate());
   cuda::sample_rays<T>(gpu.queue(), field, r.march, cells.view(), r.rules, r.n, r.o.data(), r.d.data(), r.jitter.data(),
-                       b.offsets.data(), b.evaluated.data(), b.allocate());
+                       room, b.offsets.data(), b.evaluated.data(), &b.all, b.allocate());
   return {a, b};
 }
 void expect_same_samples(const std::pair<Found<double>, Found<double>>& found) {
@@ -204,6 +206,7 @@ void expect_same_samples(const std::pair<Found<double>, Found<double>>& found) {
   EXPECT_EQ(b.offsets, a.offsets);
   EXPECT_EQ(b.evaluated, a.evaluated);
   EXPECT_EQ(b.indices, a.indices);
+  EXPECT_EQ(b.all, a.all);
   expect_near(b.starts, a.starts, 1e-14), expect_near(b.ends, a.ends, 1e-14);
 }
 
@@ -218,6 +221,24 @@ TEST(FieldKernels, SampledRays) {
     expect_same_samples(found);
     if (n > 1) { EXPECT_GT(found.second.starts.size(), size_t(n)); }
   }
+}
+
+// With room for fewer and for more samples than there are, and for none of an empty box.
+TEST(FieldKernels, SampledRaysWithRoom) {
+  Random random(4);
+  const Field field(random);
+  Rays<double> rays(random, 30);
+  const int64_t n = find(field.view(), rays).first.all;
+  for (const int64_t room : {int64_t(1), n - 3, n + 300}) {
+    const auto found = find(field.view(), rays, room);
+    expect_same_samples(found);
+    EXPECT_EQ(found.second.all, n);
+    EXPECT_EQ(int64_t(found.second.starts.size()), room);
+  }
+  std::fill(rays.cells.begin(), rays.cells.end(), uint8_t(Cell::kEmpty));
+  const auto found = find(field.view(), rays, 5);
+  expect_same_samples(found);
+  EXPECT_EQ(found.second.starts, std::vector<double>(5));
 }
 
 // Steeper than the rules say: some walks go back as often as they may, and look no more at each sample after that.
@@ -323,6 +344,16 @@ TEST(FieldKernels, AdamwOfManyArrays) {
   for (int k = 0; k < kMostAdamwArrays; ++k)
     for (int i = 0; i < 3; ++i) expect_near(kept[7 * k + 1 + i], kept[7 * k + 4 + i], 1e-14);
   on_gpu(0, AdamwListBody<double>{});
+  // A flag on the device decides.
+  const auto moved = kept;
+  for (const bool allowed : {false, true}) {
+    together.allowed = alone.allowed = &allowed;
+    on_gpu(together.count(), together);
+    cpu::run(alone.count(), alone);
+    EXPECT_EQ(kept != moved, allowed);
+    for (int k = 0; k < kMostAdamwArrays; ++k)
+      for (int i = 0; i < 3; ++i) expect_near(kept[7 * k + 1 + i], kept[7 * k + 4 + i], 1e-14);
+  }
 }
 
 }  // namespace

@@ -163,7 +163,7 @@ TEST(PointKernels, PlacedSamples) {
   for (const int64_t n : {0, 1, 300})
     for (const int64_t room : {n, 2 * n + 5}) {
       Random random(95);
-      const int64_t rays = 20, k = 30, m = n > 0 ? 50 : 0;
+      const int64_t rays = 20, k = 30, m = n > 0 ? 50 : 0, filled = n / 2;
       const auto o = random.uniforms(3 * rays), d = random.directions(rays), begin = random.uniforms(n),
                  end = random.uniforms(n, 1, 2), anywhere = random.uniforms(3 * k), chosen = random.uniforms(m),
                  shifts = random.uniforms(3 * m);
@@ -172,8 +172,8 @@ TEST(PointKernels, PlacedSamples) {
       const auto run = [&](const auto& launch) {
         std::pair out{unwritten<double>(3 * (2 * room + k + m)), unwritten<int64_t>(m)};
         double* points = out.first.data();
-        launch(PlaceSamplesBody<double>{rays, n, room, k, o.data(), d.data(), indices.data(), begin.data(), end.data(),
-                                        anywhere.data(), chosen.data(), shifts.data(), points,
+        launch(PlaceSamplesBody<double>{rays, n, room, k, o.data(), d.data(), indices.data(), &filled, begin.data(),
+                                        end.data(), anywhere.data(), chosen.data(), shifts.data(), points,
                                         points + 3 * (room + k + m), out.second.data()});
         return out;
       };

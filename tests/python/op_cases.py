@@ -195,12 +195,12 @@ def draw_inputs(dtype, n: int = 300) -> tuple:
 
 
 def place_inputs(dtype) -> tuple:
-    """Arguments of ``place_samples``: samples of 20 rays, room for more, and points beside some."""
+    """Arguments of ``place_samples``: samples of 20 rays in rows for a few more, room for others, and points beside some."""
     rays_o, rays_d = (torch.randn(20, 3, generator=generator(i), dtype=torch.float64) for i in range(2))
     ray_indices, starts = torch.randint(20, (200,), generator=generator(2)), rand(200, seed=3)
     numbers = rays_o, unit(rays_d), starts, starts + 0.1, rand(30, 3, seed=4), rand(50, seed=5), rand(50, 3, seed=6)
     rays_o, rays_d, *rest = (x.to(dtype) for x in numbers)
-    return rays_o, rays_d, ray_indices, *rest, 260
+    return rays_o, rays_d, ray_indices, *rest[:2], torch.arange(0, 200, 9)[:21], *rest[2:], 260
 
 
 def row_numbers() -> torch.Tensor:
@@ -308,7 +308,7 @@ def sample_rays_inputs(dtype=torch.float64) -> tuple:
     n = bumpy_field().to(dtype).network()
     o, d, jitter = field_rays(12, dtype)
     return (
-        o, d, jitter, full_cells(), *n._replace(n_active=2).arguments(), STEP, 64, 60.0, 1.0, 0.01, 1e-3, 0.1, 1.25,
+        o, d, jitter, full_cells(), *n._replace(n_active=2).arguments(), STEP, 64, 60.0, 1.0, 0.01, 1e-3, 0.1, 1.25, 0,
     )  # fmt: skip
 
 

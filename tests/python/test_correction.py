@@ -17,7 +17,7 @@ from splitnerf.render.occupancy import make_grid
 from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training.batches import Batch, draw_probes
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.step import Step
+from splitnerf.training.step import Room, Step
 
 
 def bowl() -> trimesh.Trimesh:
@@ -183,7 +183,7 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     n = len(ray.weights)
     assert len(ray.beside) == 40 and len(ray.gradients) == n + 30 + 40
     assert len(ray.shaded) < 0.5 * n
-    assert step.is_complete(1e9, 1e9)  # it has no capacity
+    assert step.settle(Room(1e9, 1e9, 1e9), step.room, 20.0)  # it has no limit
     entropies = []
     for seed in range(2):
         torch.manual_seed(seed)

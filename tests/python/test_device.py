@@ -51,7 +51,7 @@ def test_modules_and_gradients_stay_there(monkeypatch):
 
 @pytest.mark.parametrize("name", ["cpu", "fast", "paper"])
 def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeypatch, name):
-    """Beside the operators that must know how many samples there are: for s, for the sums' samples, for the loss."""
+    """Beside the operators that must know how many samples there are, which count their waits in C++."""
     waits = []
 
     def counted(*args, **kwargs):
@@ -60,12 +60,12 @@ def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeyp
 
     monkeypatch.setattr(step, "find_samples", counted)
     with pretend_gpu(monkeypatch) as gpu:
-        settings = {"min_step": 0.03} if name == "paper" else {}  # fewer samples a ray
+        settings = {"min_step": 0.03} if name == "paper" else {"target_samples": 4608}  # so that samples have room
         trained = trainer.train(load_dataset(data), tiny(name, steps=50, **settings), tmp_path, device="cuda")
         assert trained.finished and trained.model.device == GPU and trained.grid.cells.device == GPU
     assert all(isinstance(p, GpuTensor) for p in trained.model.parameters())
     each = statistics.median(b - a for a, b in itertools.pairwise(waits[-20:]))
-    assert each <= {"cpu": 3, "fast": 3, "paper": 2}[name]
+    assert each <= {"cpu": 0, "fast": 0, "paper": 1}[name]
 
 
 @pytest.mark.parametrize("settings", [{}, {"sparse_steps": True, "table_dtype": "float16"}])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +12,13 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 import torch
-from tiny_runs import tiny, train
+from tiny_runs import lines_of, tiny, train
 
 from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, FAILED
 from splitnerf.data.dataset import load_dataset
+from splitnerf.ops import AdamW
 from splitnerf.training.finite import MOST_SKIPPED, Diverged, GradientWatch, check_state, explain_loss, first_not_finite
 
 
@@ -49,7 +49,20 @@ def test_an_image_with_a_bad_pixel_is_refused_and_named(data, tmp_path, capsys, 
     assert not (tmp_path / "run").exists()
 
 
-def test_a_nan_pixel_stops_the_run_and_is_named(data, begun):
+@pytest.fixture(params=[0, 1])
+def late(request, monkeypatch) -> int:
+    """Runs read the numbers of a step so many steps later, as those on a GPU do."""
+    begin = trainer.Training.__init__
+
+    def reads_late(self, *arguments):
+        begin(self, *arguments)
+        self.reads_late = request.param
+
+    monkeypatch.setattr(trainer.Training, "__init__", reads_late)
+    return request.param
+
+
+def test_a_nan_pixel_stops_the_run_and_is_named(data, begun, late):
     """The image came another way than through the reader."""
     run, before = begun
     dataset = load_dataset(data)
@@ -110,31 +123,48 @@ def test_a_learning_rate_of_a_thousand_loses_no_checkpoint(data, begun, capsys):
     goes_on(data, run, before)
 
 
-def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path, monkeypatch, capsys):
-    original, allows, seen = trainer.GradientWatch.norm, trainer.GradientWatch.allows, []
+def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path, monkeypatch, capsys, late):
+    norm, step, steps, moved = trainer.GradientWatch.norm, AdamW.step, itertools.count(), []
 
     def planting(watch):
-        step = len(seen)
-        if step in (3, 5, 6):
-            watch.parameters[0].grad.view(-1)[0] = torch.nan if step == 3 else 1e30
-        return original(watch)
+        now = next(steps)
+        if now in (3, 5, 6):
+            watch.parameters[0].grad.view(-1)[0] = torch.nan if now == 3 else 1e30
+        return norm(watch)
 
-    def recording(watch, step, norm):
-        before = [p.detach().clone() for p in watch.parameters]
-        allowed = allows(watch, step, norm)
-        seen.append((allowed, before))
-        return allowed
+    def watched(optimiser, allowed):
+        params = [p for group in optimiser.param_groups for p in group["params"]]
+        before = [p.detach().clone() for p in params]
+        step(optimiser, allowed=allowed)
+        moved.append(not all(torch.equal(a, b) for a, b in zip(params, before)))
 
     monkeypatch.setattr(trainer.GradientWatch, "norm", planting)
-    monkeypatch.setattr(trainer.GradientWatch, "allows", recording)
+    monkeypatch.setattr(AdamW, "step", watched)
     trained = trainer.train(load_dataset(data), tiny(steps=8), tmp_path)
-    assert [i for i, (allowed, _) in enumerate(seen) if not allowed] == [3, 5, 6]
-    for i in (3, 5, 6):
-        assert all(torch.equal(a, b) for a, b in zip(seen[i][1], seen[i + 1][1]))
+    assert [i for i, any_moved in enumerate(moved) if not any_moved] == [3, 5, 6]
     assert all(p.isfinite().all() for p in trained.model.parameters())
-    lines = [json.loads(line) for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
-    assert [line["skipped"] for line in lines] == [0, 0, 0, 1, 1, 2, 3, 3]
+    assert [line["skipped"] for line in lines_of(tmp_path)] == [0, 0, 0, 1, 1, 2, 3, 3]
     assert capsys.readouterr().err.count("step is skipped") == 3
+    counts = {int(moments["step"]) for moments in load_checkpoint(tmp_path / "checkpoint.pt")["optimiser"]["state"].values()}
+    assert max(counts) == 5
+
+
+def test_numbers_that_are_read_late_are_those_of_their_step(data, tmp_path, monkeypatch):
+    """Only the number of rays follows later, and what a line tells of its time and of the mesh is of when it is written."""
+    monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 64)
+    written, begin = [], trainer.Training.__init__
+    for late in (0, 1, 3):
+
+        def reads_late(self, *arguments, late=late):
+            begin(self, *arguments)
+            self.reads_late = late
+
+        monkeypatch.setattr(trainer.Training, "__init__", reads_late)
+        (tmp_path / str(late)).mkdir()
+        trainer.train(load_dataset(data), tiny(steps=41), tmp_path / str(late))
+        written.append([line | dict.fromkeys(("seconds", "progress", "is_unoccluded")) for line in lines_of(tmp_path / str(late))])
+    assert [line["step"] for line in written[0]] == [*range(1, 21), 40, 41]
+    assert written[1] == written[0] and written[2] == written[0]
 
 
 def test_large_gradients_that_cancel_are_seen():
@@ -148,7 +178,7 @@ def test_large_gradients_that_cancel_are_seen():
     assert watch.allows(1, watch.norm().item())
 
 
-def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch):
+def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch, late):
     run, before = begun
     original, steps = trainer.GradientWatch.norm, itertools.count(8)  # the run stands at step 8
 

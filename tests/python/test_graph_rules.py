@@ -15,7 +15,9 @@ from torch import Tensor
 
 from splitnerf.render.model import SceneModel
 from splitnerf.training import graphs
-from splitnerf.training.graphs import GraphedStep, has_room, round_up
+from splitnerf.training.graphs import GraphedStep
+from splitnerf.training.room import round_up
+from splitnerf.training.step import Room
 
 LIGHT_PERIOD = 4
 PRIORS_FROM = 0.5
@@ -45,8 +47,8 @@ class Fake(GraphedStep):
         self.given: tuple[Rays, Found] | None = None  # the inputs of the last step
 
     def find(self, batch: Rays, progress: float, capacity: int) -> Found:
-        assert capacity == PADDED
-        self.given = batch, Found(torch.full((self.n_found, 3), self.scale), torch.tensor([int(7 * self.scale)]))
+        assert capacity in (0, PADDED)
+        self.given = batch, Found(torch.full((capacity or self.n_found, 3), self.scale), torch.tensor([int(7 * self.scale)]))
         return self.given[1]
 
     def differentiate(self, batch, found, light, environment, step, progress, capacity):
@@ -75,7 +77,7 @@ class Fake(GraphedStep):
         result = self(Rays(torch.full((n_rays, 3), target)), light, None, step, progress)
         is_new = any(all(graph is not other for other in known) for graph in self._graphs.values())
         how = "recorded" if is_new else "called" if len(self.calls) > before else "repeated"
-        complete = self.is_complete(*counts) if counts else None
+        complete = self.settle(Room(self.n_found, *counts), self.room, 20.0) if counts else None
         return SimpleNamespace(value=result[0].item(), how=how, room=self.calls[-1], complete=complete)
 
 
@@ -101,13 +103,13 @@ def ways(taker: Fake, n: int, **settings) -> list[str]:
 
 
 def test_a_step_is_called_and_then_recorded_and_then_repeated(step, monkeypatch):
-    """The first has room for all there is; the very first with a capacity is called too, so that kernels are loaded."""
-    assert step.capacity == PADDED
+    """The first has room for all there is; the first with a room is called too, so that its kernels are loaded."""
+    assert step.sample_room == PADDED
     replays, replay = [], pretend_graphs.PretendGraph.replay
     monkeypatch.setattr(pretend_graphs.PretendGraph, "replay", lambda self: replays.append(self) or replay(self))
     assert ways(step, 5) == ["called", "called", "recorded", "repeated", "repeated"]
     assert step.calls == [None, ROOM, ROOM] and len(replays) == 3 and replays[0] is replays[1] is replays[2]
-    assert ways(step, 3, n_rays=6) == ["called", "recorded", "repeated"] and step.calls[3:] == [None, ROOM]
+    assert ways(step, 3, n_rays=6) == ["called", "recorded", "repeated"] and step.calls[3:] == [ROOM, ROOM]
     assert ways(step, 1) == ["repeated"]
 
 
@@ -115,12 +117,15 @@ def test_without_counts_of_a_step_before_none_is_recorded(step):
     assert ways(step, 4, counts=None) == ["called"] * 4 and step.calls == [None] * 4
 
 
-def test_a_step_that_finds_more_than_there_is_room_for_is_called(step):
-    ways(step, 4)
+def test_samples_without_room_are_not_complete_and_the_next_step_has_no_limit(step):
+    """Until the samples of a step fit again."""
+    ways(step, 3)
     step.n_found = PADDED + 1
-    assert ways(step, 4) == ["called"] * 4 and step.calls[-4:] == [None] * 4
+    cut = step.taken()
+    assert cut.how == "repeated" and cut.complete is False and step.n_discarded == 1 and not step._graphs
+    assert ways(step, 3) == ["called"] * 3 and step.calls[-3:] == [None] * 3 and step.n_discarded == 1
     step.n_found = PADDED
-    assert ways(step, 1) == ["repeated"]
+    assert ways(step, 3) == ["called", "recorded", "repeated"] and step.calls[-2:] == [None, ROOM]
 
 
 def decide(step: Fake, what: str) -> dict:
@@ -140,8 +145,7 @@ def decide(step: Fake, what: str) -> dict:
 def test_another_decision_is_another_graph(step, what):
     ways(step, 4)
     settings = decide(step, what)
-    first = ["called"] * (2 if what == "occlusion" else 1)  # the sum over directions has other kernels with a capacity
-    assert ways(step, 4, **settings)[: len(first) + 2] == [*first, "recorded", "repeated"]
+    assert ways(step, 3, **settings) == ["called", "recorded", "repeated"]
 
 
 def test_steps_that_decide_alike_share_a_graph(step):
@@ -170,18 +174,19 @@ def test_a_graph_with_too_little_room_is_recorded_anew_before_it_fails(step):
 
 
 def test_what_exceeds_its_room_is_not_complete_and_all_graphs_are_dropped(step):
-    for counts, n_rays in (((1281.0, 512.0), 5), ((1280.0, 513.0), 6)):
-        assert step.taken(n_rays=n_rays, counts=(1e9, 1e9)).complete  # without a graph there is no limit
-        ways(step, 3, n_rays=n_rays)
-        step.taken(n_rays=n_rays, counts=COUNTS)
+    assert step.taken(counts=(1e9, 1e9)).complete  # the first step has no limit
+    step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
+    for counts in ((1281.0, 512.0), (1280.0, 513.0)):
+        step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
+        ways(step, 2)
         n = step.n_discarded
-        assert step.taken(n_rays=n_rays, counts=(1280.0, 512.0)).complete is True and step.n_discarded == n
-        ways(step, 1, n_rays=n_rays)
+        assert step.taken(counts=(1280.0, 512.0)).complete is True and step.n_discarded == n
         step._graphs.clear()
-        assert ways(step, 1, n_rays=n_rays) == ["recorded"] and step.calls[-1] == ROOM
-        assert step.taken(n_rays=n_rays, counts=counts).complete is False and step.n_discarded == n + 1
+        step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
+        assert ways(step, 1) == ["recorded"] and step.calls[-1] == ROOM
+        assert step.taken(counts=counts).complete is False and step.n_discarded == n + 1
         assert not step._graphs
-        assert step.taken(n_rays=n_rays).how == "recorded"
+        assert step.taken().how == "recorded"
 
 
 def test_four_graphs_are_kept_and_the_oldest_makes_room(step):
@@ -260,10 +265,12 @@ def test_capacities_come_in_units(n, rounded):
     assert round_up(n) == rounded
 
 
-def test_room_is_room_for_both():
-    assert has_room((10, 20), (10, 20)) and has_room((10, 20), (0, 0))
-    assert not has_room((10, 20), (11, 20)) and not has_room((10, 20), (10, 21))
-    assert has_room((11, 22), (10, 20), slack=1.1) and not has_room((11, 22), (10, 20.1), slack=1.1)
+def test_room_is_room_for_all():
+    room = Room(5, 10, 20)
+    assert room.holds(Room(5, 10, 20)) and room.holds(Room(0, 0, 0)) and Room().holds(Room(1e9, 1e9, 1e9))
+    assert not any(room.holds(more) for more in (Room(6, 10, 20), Room(5, 11, 20), Room(5, 10, 21)))
+    assert Room(5.5, 11, 22).holds(room, slack=1.1) and not Room(5.5, 11, 22).holds(Room(5, 10, 20.1), slack=1.1)
+    assert Room().of_shading is None and room.of_shading == (10, 20)
 
 
 # ---- the recording itself ----

@@ -9,9 +9,11 @@ import pytest
 import torch
 from tiny_runs import lines_of, tiny
 
-from splitnerf.training import graphs
+from splitnerf.ops import AdamW
+from splitnerf.training import graphs, room
 from splitnerf.training import loop as trainer
 from splitnerf.training.batches import draw_batch
+from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
@@ -98,19 +100,26 @@ def test_a_capacity_changes_roundings_alone(data):
         assert (a - b).norm() <= 1e-4 * b.norm(), name
 
 
-def test_a_step_that_exceeds_its_capacity_is_not_taken(data, tmp_path, monkeypatch, recording):
-    monkeypatch.setattr(graphs, "SHADING_SLACK", 0.2)
-    monkeypatch.setattr(graphs, "CAPACITY_UNIT", 1)
-    complete, asked = [], GraphedStep.is_complete
-    monkeypatch.setattr(
-        GraphedStep, "is_complete", lambda self, *counts: complete.append(asked(self, *counts)) or complete[-1]
-    )
-    taken, step = [], torch.optim.AdamW.step
-    monkeypatch.setattr(torch.optim.AdamW, "step", lambda self: taken.append(1) or step(self))
+def test_a_step_that_exceeds_its_room_moves_nothing(data, tmp_path, monkeypatch, recording):
+    """Nor does it count."""
+    monkeypatch.setattr(room, "SHADING_SLACK", 0.2)
+    monkeypatch.setattr(room, "UNIT", 1)
+    complete, settle, moved, step = [], GraphedStep.settle, [], AdamW.step
+    monkeypatch.setattr(GraphedStep, "settle", lambda self, *told: complete.append(settle(self, *told)) or complete[-1])
+
+    def watched(self, allowed):
+        params = [p for group in self.param_groups for p in group["params"]]
+        before = [p.detach().clone() for p in params]
+        step(self, allowed=allowed)
+        moved.append(any(not torch.equal(p, b) for p, b in zip(params, before)))
+
+    monkeypatch.setattr(AdamW, "step", watched)
     monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
     config = tiny("cpu", steps=40, cuda_graphs=True, target_samples=4608)
     trained = trainer.train(load_dataset(data), config, tmp_path)
-    assert complete.count(False) > 0 and len(taken) == complete.count(True) and trained.finished
+    assert complete.count(False) > 0 and moved == complete and trained.finished
+    stored = load_checkpoint(tmp_path / "checkpoint.pt")["optimiser"]["state"]
+    assert max(int(moments["step"]) for moments in stored.values()) == complete.count(True)
 
 
 def test_what_cannot_be_recorded_is_refused():

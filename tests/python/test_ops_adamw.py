@@ -238,6 +238,44 @@ def test_many_parameters_move_as_each_alone(device, count):
         assert copy is None or torch.equal(copies[copied.index(k)], copy)
 
 
+@each_device
+@pytest.mark.parametrize("sparse", [False, True])
+def test_a_step_that_is_not_allowed_moves_nothing(device, sparse):
+    """Neither parameters nor moments nor copies, of more arrays than one launch takes; one that is allowed moves all."""
+    g, count = generator(), 30
+    for allowed in (False, True):
+        tensors = [[torch.rand(6, 2, generator=g).to(device) for _ in range(count)] for _ in range(4)]
+        tensors[1][3][0, 0] = math.nan
+        copies = [torch.zeros(6, 2, dtype=torch.float16, device=device) for _ in range(2)]
+        before = [[x.clone() for x in kind] for kind in tensors]
+        numbers = [0.1] * count, 0.9, 0.99, 1e-8, [0.1] * count, [1] * count, [sparse] * count
+        lib.adamw_steps_(*tensors, *numbers, copies, [0, 29], torch.tensor(allowed, device=device))
+        for kind in (0, 2, 3):
+            assert all(torch.equal(a, b) != allowed for a, b in zip(tensors[kind], before[kind]))
+        assert all(bool(copy.any()) == allowed for copy in copies)
+    with pytest.raises(ValueError, match=r"allowed must be \[\] bool"):
+        lib.adamw_steps_(*tensors, *numbers, copies, [0, 29], torch.tensor([True], device=device))
+
+
+def test_a_step_that_was_not_allowed_can_be_taken_back():
+    """Then the optimiser goes on as if there had been none; a parameter without a gradient in that step keeps its count."""
+    params = [torch.nn.Parameter(torch.linspace(-1, 1, 4) + i) for i in range(2)]
+    alone = [torch.nn.Parameter(p.detach().clone()) for p in params]
+    optimiser, other = AdamW(params, lr=0.1), AdamW(alone, lr=0.1)
+    for step, allowed in enumerate((True, False, True)):
+        for sides in (params, alone):
+            for i, param in enumerate(sides):
+                param.grad = torch.full_like(param, 1.0 + step) if i == 0 or step != 1 else None
+        optimiser.step(allowed=torch.tensor(allowed))
+        assert len(optimiser.counted) == (1 if step == 1 else 2)
+        if allowed:
+            other.step()
+        else:
+            optimiser.take_back(optimiser.counted)
+    assert all(torch.equal(a, b) for a, b in zip(params, alone))
+    assert [int(optimiser.state[p]["step"]) for p in params] == [2, 2]
+
+
 def test_an_optimiser_takes_one_call_for_each_dtype(monkeypatch):
     calls, real = [], lib.adamw_steps_
     monkeypatch.setattr(_library.lib, "adamw_steps_", lambda *given: (calls.append(len(given[0])), real(*given)))

@@ -75,6 +75,21 @@ def test_room_is_filled_with_the_first_samples():
     assert (directions[3:] == 0).all() and len(directions) == 7 and beside.tolist() == [1, 1]
 
 
+def test_rows_behind_the_samples_count_for_nothing():
+    """As of a search with more room than it found samples: the rows are filled with the first ones, and none is beside them."""
+    behind = PackedSamples(*(torch.cat([x, x[1:]]) for x in SAMPLES[:3]), SAMPLES.offsets)
+    for room in (0, 6):
+        positions, directions, beside = place_samples(*RAYS, behind, ANYWHERE, torch.tensor([0.5, 0.99]), SHIFTS, room)
+        padding = (MIDDLES * 2)[3 : max(5, room)]
+        assert positions.tolist() == [*MIDDLES, *padding, [5, 5, 5], [2.5, 0, 1], [10, 3.5, 2]]
+        assert directions[:3].tolist() == [[1, 0, 0], [1, 0, 0], [0, 1, 0]] and not directions[3:].any()
+        assert beside.tolist() == [1, 2]
+    none = behind._replace(offsets=torch.zeros(3, dtype=torch.int64))
+    positions, directions, beside = place_samples(*RAYS, none, ANYWHERE, torch.tensor([0.5, 0.99]), SHIFTS)
+    assert positions.tolist() == [*[[0, 0, 0]] * 5, [5, 5, 5], [0, 0, 1], [0, 0, 2]] and not directions.any()
+    assert beside.tolist() == [0, 0]
+
+
 @pytest.mark.parametrize("room", [0, 4])
 def test_without_samples_only_given_points_are_left(room):
     none = PackedSamples(*(x[:0] for x in SAMPLES[:3]), torch.zeros(3, dtype=torch.int64))

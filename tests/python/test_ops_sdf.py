@@ -65,7 +65,7 @@ def test_keeps_the_neighbours_that_may_weigh(anneal):
     weights = stretches(field, samples, o, d, 60.0, anneal)
     heavy = weights > 0.01
     wanted = heavy | torch.cat([torch.tensor([False]), heavy[:-1]])
-    kept, evaluated = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings(anneal=anneal))
+    kept, evaluated, _ = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings(anneal=anneal))
     assert int(evaluated.sum()) == len(weights)
     assert torch.equal(kept.ray_indices, samples.ray_indices[wanted])
     torch.testing.assert_close(kept.t_starts, samples.t_starts[wanted])
@@ -80,8 +80,8 @@ def test_far_from_the_surface_it_asks_less_and_keeps_the_same():
     with torch.no_grad():  # a field whose gradient is bounded by 1
         x = 3 * torch.rand(4000, 3, generator=generator(), dtype=torch.float64) - 1.5
         bound = field.sample(x).gradient.norm(dim=1).max().item() * 1.1
-    everything, all_points = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings())
-    some, points = sample_rays(
+    everything, all_points, _ = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings())
+    some, points, _ = sample_rays(
         o, d, jitter, full_cells(), field.network(), **sampling_settings(reach=8 / 60.0, lipschitz=bound)
     )
     assert torch.equal(some.ray_indices, everything.ray_indices)
@@ -99,7 +99,7 @@ def test_a_thin_sheet_is_never_jumped_over(thickness, s):
     bias = torch.tensor([-thickness / 2])
     sheet = SdfNetwork(SDF_SPEC, 3, zeros, hidden, torch.zeros(2), torch.ones(1, 2), bias, 1e5, BOX)
     o, d, jitter = (x.float() for x in field_rays())
-    kept, evaluated = sample_rays(
+    kept, evaluated, _ = sample_rays(
         o,
         d,
         jitter,
@@ -118,8 +118,8 @@ def test_a_thin_sheet_is_never_jumped_over(thickness, s):
 
 def test_a_ray_ends_where_nothing_gets_through():
     field, (o, d, jitter) = bumpy_field(), field_rays()
-    whole, all_points = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings(min_weight=0.0))
-    ended, points = sample_rays(
+    whole, all_points, _ = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings(min_weight=0.0))
+    ended, points, _ = sample_rays(
         o, d, jitter, full_cells(), field.network(), **sampling_settings(min_weight=0.0, min_transmittance=1e-3)
     )
     assert points.sum() < 0.8 * all_points.sum()
@@ -148,7 +148,7 @@ def left_out(field, s: float, anneal: float = 1.0, lipschitz: float = 1.25) -> t
         there.sdf.detach(), there.gradient.detach(), d, sharp, samples.offsets, step=STEP, anneal=anneal
     )
     rules = sampling_settings(s=s, anneal=anneal, min_weight=1e-3, reach=7.0 / s, lipschitz=lipschitz)
-    kept, _ = sample_rays(o, d, jitter, full_cells(), field.network(), **rules)
+    kept, _, _ = sample_rays(o, d, jitter, full_cells(), field.network(), **rules)
     lattice = lambda some: some.ray_indices * 100000 + (some.t_starts / STEP * 8).round().long()  # noqa: E731
     faint = torch.where(torch.isin(lattice(samples), lattice(kept)), 0.0, weights)
     return faint, torch.zeros(len(o), dtype=torch.float64).index_add(0, samples.ray_indices, faint)
@@ -182,7 +182,7 @@ def test_a_field_far_steeper_than_promised_costs_few_distances():
     o, d = torch.zeros(7, 3, dtype=torch.float64), torch.zeros(7, 3, dtype=torch.float64)
     o[:, 0], o[:, 2], d[:, 2] = torch.linspace(-1, 1, 7), 0.6, -1.0
     jitter = torch.linspace(0, 0.9, 7, dtype=torch.float64)
-    kept, evaluated = sample_rays(
+    kept, evaluated, _ = sample_rays(
         o, d, jitter, full_cells(), plane,
         **sampling_settings(step=0.005, s=1000.0, min_weight=1e-3, min_transmittance=1e-3, reach=0.007),
     )  # fmt: skip
@@ -204,16 +204,37 @@ def test_values_are_the_field(n):
 
 def test_empty_cells_are_not_asked():
     field, (o, d, jitter) = bumpy_field(), field_rays()
-    samples, evaluated = sample_rays(
+    samples, evaluated, _ = sample_rays(
         o, d, jitter, torch.full_like(full_cells(), CELL_EMPTY), field.network(), **sampling_settings()
     )
     assert len(samples.t_starts) == 0 and int(evaluated.sum()) == 0
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_a_room_cuts_the_samples_or_is_filled_up(dtype):
+    """Cut samples are those of the last rays, and no offset points behind the room."""
+    field, rays = bumpy_field().to(dtype), field_rays(30, dtype)
+    free, asked, found = sample_rays(*rays, full_cells(), field.network(), **sampling_settings())
+    n = len(free.t_starts)
+    assert int(found) == n > 60
+    for room in (1, n - 5, n, n + 7, 3 * n + 1):
+        samples, evaluated, found = sample_rays(*rays, full_cells(), field.network(), **sampling_settings(room=room))
+        assert int(found) == n and torch.equal(evaluated, asked)
+        assert torch.equal(samples.offsets, free.offsets.clamp(max=room))
+        for ours, all_ in zip(samples[:3], free[:3]):
+            assert torch.equal(ours, torch.nn.functional.pad(all_, (0, 2 * n + 1))[:room])
+    empty = torch.full_like(full_cells(), CELL_EMPTY)
+    samples, _, found = sample_rays(*rays, empty, field.network(), **sampling_settings(room=9))
+    assert int(found) == 0 and not samples.offsets.any() and not any(x.any() for x in samples[:3])
+    assert all(len(x) == 9 for x in samples[:3])
+    with pytest.raises(ValueError, match="room must not be negative"):
+        sample_rays(*rays, empty, field.network(), **sampling_settings(room=-1))
+
+
 def test_a_nan_is_kept_for_the_loss_to_see():
     field, (o, d, jitter) = bumpy_field(), field_rays(8)
     network = field.network()._replace(out_bias=torch.full((13,), math.nan, dtype=torch.float64))
-    samples, evaluated = sample_rays(o, d, jitter, full_cells(), network, **sampling_settings())
+    samples, evaluated, _ = sample_rays(o, d, jitter, full_cells(), network, **sampling_settings())
     assert len(samples.t_starts) == int(evaluated.sum()) > 0
 
 
@@ -228,8 +249,8 @@ def test_opcheck_and_empty_batch(dtype):
 
 def test_float32_keeps_what_float64_does():
     field, (o, d, jitter) = bumpy_field(), field_rays()
-    exact, _ = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings())
-    single, _ = sample_rays(
+    exact, _, _ = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings())
+    single, _, _ = sample_rays(
         o.float(), d.float(), jitter.float(), full_cells(), field.float().network(), **sampling_settings()
     )
     assert abs(len(single.t_starts) - len(exact.t_starts)) < 0.01 * len(exact.t_starts)

@@ -23,6 +23,7 @@ from splitnerf.training import loop, meshes
 from splitnerf.training.finite import Diverged
 from splitnerf.training.losses import Term
 from splitnerf.training.schedule import next_ray_count
+from splitnerf.training.step import Room
 
 PLAIN = {"occlusion": "off", "shading": "split", "preview_every": 2.0}  # nothing is traced, nothing shown
 
@@ -166,9 +167,10 @@ def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(data, tmp_path):
     """Of 50 rays: 600 points looked at, 300 composited, 120 shaded; steps that were skipped, by either reason."""
     training = loop.Training(load_dataset(data), tiny(), tmp_path, torch.device("cpu"))
     training.watch.skipped, training.take_step.n_discarded = 2, 3
-    numbers = loop.StepNumbers({"colour": 0.25}, 0.5, 1.0, 300, 600, 120, True)
-    line = training.line(SimpleNamespace(target=torch.zeros(50, 4)), {"colour": Term(2.0, torch.tensor(0.0))}, numbers)
-    counts = {"rays": 50, "samples_per_ray": 12.0, "kept": 0.5, "shaded": 0.2, "skipped": 5}
+    numbers = loop.StepNumbers({"colour": 0.25}, 0.5, 1.0, Room(300, 120, 40), 600, 20.0)
+    batch = SimpleNamespace(target=torch.zeros(50, 4))
+    line = training.line(SimpleNamespace(step=7, batch=batch, terms={"colour": Term(2.0, torch.tensor(0.0))}), numbers)
+    counts = {"rays": 50, "samples_per_ray": 12.0, "kept": 0.5, "shaded": 0.2, "skipped": 5, "step": 7, "s": 20.0}
     expected = counts | {"loss": 0.5, "loss_colour": 0.5}
     assert {name: line[name] for name in expected} == expected
 
@@ -176,13 +178,16 @@ def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(data, tmp_path):
 @pytest.mark.parametrize("complete", [False, True])
 def test_a_step_without_all_its_samples_leaves_nothing_behind(data, tmp_path, monkeypatch, complete):
     training = loop.Training(load_dataset(data), tiny(**PLAIN), tmp_path, torch.device("cpu"))
-    monkeypatch.setattr(training.take_step, "is_complete", lambda *_: complete)
+    training.reads_late, training.take_step.room = 1, Room() if complete else Room(samples=0)
     before = {name: value.clone() for name, value in training.model.state_dict().items()}
     training.refresh()
     training.advance(SimpleNamespace(show=lambda *_: None))
+    assert training.psnr_mean is None and len(training.unread) == 1
+    training.settle()
     moved = [name for name, value in training.model.state_dict().items() if not torch.equal(value, before[name])]
     assert training.step == 1 and bool(moved) == complete and (training.psnr_mean is not None) == complete
-    assert any(leaf.grad is not None for leaf in training.light.leaves) == complete
+    assert any(leaf.grad.any() for leaf in training.light.leaves if leaf.grad is not None) == complete
+    assert {int(moments["step"]) for moments in training.optimiser.state.values()} == {int(complete)}
 
 
 def test_the_first_steps_the_last_and_every_twentieth_are_logged(data, tmp_path):
@@ -229,9 +234,9 @@ def test_training_leaves_the_last_stage_its_share_of_the_minutes(data, tmp_path,
 
 def test_the_bar_tells_the_step_the_error_and_the_samples(data, tmp_path):
     training = loop.Training(load_dataset(data), tiny(steps=100), tmp_path, torch.device("cpu"))
-    assert training.told(3.04) == "step 0 3.0 samples/ray"
-    training.step, training.psnr_mean = 4, 21.456
-    assert training.told(3.24) == "step 4 PSNR 21.46 dB, 3.2 samples/ray"
+    assert training.told(0, 3.04) == "step 0 3.0 samples/ray"
+    training.psnr_mean = 21.456
+    assert training.told(4, 3.24) == "step 4 PSNR 21.46 dB, 3.2 samples/ray"
 
 
 def test_a_finished_run_that_is_resumed_stays_as_it_is(data, tmp_path):

@@ -138,10 +138,11 @@ def test_padding_repeats_the_first_samples_and_changes_nothing():
         ray, expected = rendered(model, padded, shades_per_ray=2), rendered(model, bare, shades_per_ray=2)
         torch.testing.assert_close((ray.mean, ray.opacity), (expected.mean, expected.opacity))
         assert torch.equal(ray.gradients[n + more :], expected.gradients[n:]) and (ray.weights[n:] == 0).all()
-    assert len(find_samples(model, cells, *rays, probes=probes, capacity=n - 1).directions) == n
+    cut = find_samples(model, cells, *rays, probes=probes, capacity=n - 1)
+    assert torch.equal(cut.positions[: n - 1], bare.positions[: n - 1]) and len(cut.directions) == n - 1 and int(cut.n_found) == n
     empty = torch.full_like(cells, CELL_EMPTY)
     nothing = find_samples(model, empty, *rays, probes=probes, capacity=4)
-    assert (nothing.positions[:4] == 0).all() and torch.equal(nothing.positions[4:], probes.anywhere) and len(nothing.beside) == 0
+    assert (nothing.positions[:4] == 0).all() and torch.equal(nothing.positions[4:9], probes.anywhere) and not nothing.beside.any()
 
 
 # ---- shading ----

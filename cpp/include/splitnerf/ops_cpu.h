@@ -80,7 +80,7 @@ SPLITNERF_API void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, c
 template <class T>
 SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& march, const OccupancyView& grid,
                                const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d,
-                               const T* jitter, int64_t* offsets, int64_t* n_evaluated,
+                               const T* jitter, int64_t room, int64_t* offsets, int64_t* n_evaluated, int64_t* n_found,
                                const SampleAllocator<T>& allocate);
 
 // Which samples are shaded, `per_ray` of each ray spread by weight (0: all), and where the others lie between them. What is

@@ -158,6 +158,12 @@ class EvaluatedLight:
         for leaf in self.leaves:
             leaf.grad = None
 
+    def keep_grad(self, kept: Tensor) -> None:
+        """Makes the accumulated gradients 0 where ``kept``, a [] bool on their device, is false."""
+        for leaf in self.leaves:
+            if leaf.grad is not None:
+                leaf.grad = torch.where(kept, leaf.grad, 0.0)
+
 
 def leaf_of(value: Tensor) -> Tensor:
     """A leaf tensor with the same values; gradients accumulate there and stop."""

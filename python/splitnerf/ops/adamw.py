@@ -60,6 +60,9 @@ class AdamW(torch.optim.Optimizer):
         copies: Rounded copies that a step also writes, by parameter: ``{grid.table: grid.copy}`` of a
             :class:`splitnerf.ops.HashGrid` with a table_dtype. Without it the grid renews its copy itself.
 
+    Attributes:
+        counted: The counts of steps that the last step has raised, those of the parameters with a gradient.
+
     Raises:
         ValueError: A setting, a parameter or a gradient does not fit; raised in a step.
 
@@ -87,6 +90,7 @@ class AdamW(torch.optim.Optimizer):
     ):
         super().__init__(params, {"lr": lr, "betas": betas, "eps": eps, "weight_decay": weight_decay, "sparse": sparse})
         self._copies = dict(copies or {})
+        self.counted: list[Tensor] = []
 
     def load_state_dict(self, state_dict: dict) -> None:
         """Loads moments and settings of this class or of torch.optim.AdamW; with the latter, groups keep their
@@ -105,15 +109,20 @@ class AdamW(torch.optim.Optimizer):
     def __setstate__(self, state: dict) -> None:
         super().__setstate__(state)
         self.__dict__.setdefault("_copies", {})
+        self.counted = []
         for group in self.param_groups:
             group.setdefault("sparse", self.defaults["sparse"])
         for moments in self.state.values():
             moments["step"] = moments["step"].cpu()
 
     @torch.no_grad()
-    def step(self, closure: Callable[[], Tensor] | None = None) -> Tensor | None:
-        """Moves every parameter that has a gradient; first calls the closure, if any, and returns its loss."""
-        loss = None
+    def step(self, closure: Callable[[], Tensor] | None = None, allowed: Tensor | None = None) -> Tensor | None:
+        """Moves every parameter that has a gradient; first calls the closure, if any, and returns its loss.
+
+        ``allowed`` is a [] bool on the parameters' device: where it is false nothing moves, although the step counts. Nobody
+        waits for it. Once it is known, :meth:`take_back` mends the count.
+        """
+        loss, self.counted = None, []
         if closure is not None:
             with torch.enable_grad():
                 loss = closure()
@@ -124,10 +133,17 @@ class AdamW(torch.optim.Optimizer):
                     shared = param.dtype, param.device, tuple(group["betas"]), group["eps"]
                     together.setdefault(shared, []).append((param, group))
         for (_, _, betas, eps), members in together.items():
-            self._step(members, *betas, eps)
+            self._step(members, *betas, eps, allowed)
         return loss
 
-    def _step(self, members: list[tuple[Tensor, dict]], beta1: float, beta2: float, eps: float) -> None:
+    @staticmethod
+    def take_back(counted: list[Tensor]) -> None:
+        """Counts a step no more whose ``allowed`` was false; ``counted`` is what :attr:`counted` was after it."""
+        torch._foreach_sub_(counted, 1)
+
+    def _step(
+        self, members: list[tuple[Tensor, dict]], beta1: float, beta2: float, eps: float, allowed: Tensor | None
+    ) -> None:
         params, groups = [param for param, _ in members], [group for _, group in members]
         states = [self._state(param) for param in params]
         counts, means, squares = ([state[name] for state in states] for name in ("step", "exp_avg", "exp_avg_sq"))
@@ -136,10 +152,11 @@ class AdamW(torch.optim.Optimizer):
         lib.adamw_steps_(
             params, [param.grad for param in params], means, squares, [float(group["lr"]) for group in groups], beta1, beta2, eps,
             [group["weight_decay"] for group in groups], [int(count) + 1 for count in counts],
-            [group["sparse"] for group in groups], copies, copied,
+            [group["sparse"] for group in groups], copies, copied, allowed,
         )  # fmt: skip
         torch.autograd.graph.increment_version([*params, *means, *squares, *copies])
-        torch._foreach_add_(counts, 1)
+        torch._foreach_add_(counts, 1)  # on the CPU
+        self.counted += counts
         for i in copied:
             self._copies[params[i]].was_written(params[i])
 

@@ -67,21 +67,22 @@ def place_samples(
 
     Args:
         rays_o, rays_d: [n_rays, 3] origins and unit directions.
-        samples: n samples of the rays.
+        samples: n samples of the rays, which fill their first rows; what is behind them counts for nothing.
         anywhere: [k, 3] points.
         chosen: [m] in [0, 1): number floor(n chosen) of n is the sample that a point stands beside.
         shifts: [m, 3] from that sample to the point.
-        room: If n is less, the first samples are repeated until they are so many; without samples zeros take their place.
+        room: The least number of rows for samples. The first samples are repeated until the rows are full; without samples
+            they are zeros.
 
     Returns:
-        positions: [max(n, room) + k + m, 3] in that order; without samples m is 0.
-        directions: [max(n, room), 3] unit, the directions of the samples' rays; 0 behind the samples.
+        positions: [max(rows, room) + k + m, 3] in that order; without a row for samples m is 0.
+        directions: [max(rows, room), 3] unit, the directions of the samples' rays; 0 behind the samples.
         beside: [m] int64, the chosen samples.
 
     Raises:
         ValueError: A shape or dtype does not fit, or (on the CPU) a sample's ray is not there.
     """
-    return lib.place_samples(rays_o, rays_d, *samples[:3], anywhere, chosen, shifts, room)
+    return lib.place_samples(rays_o, rays_d, *samples, anywhere, chosen, shifts, room)
 
 
 def _fake_draw(random, n_near, *rest):
@@ -89,7 +90,7 @@ def _fake_draw(random, n_near, *rest):
     return (*(random.new_empty(n, 3) for _ in range(2)), *(random.new_empty(n, dtype=torch.int64) for _ in range(2)))
 
 
-def _fake_place(rays_o, rays_d, ray_indices, t_starts, t_ends, anywhere, chosen, shifts, room):
+def _fake_place(rays_o, rays_d, ray_indices, t_starts, t_ends, offsets, anywhere, chosen, shifts, room):
     n, beside = ray_indices.shape[0], chosen.shape[0] if ray_indices.shape[0] else 0
     n_room = max(n, room)
     positions = rays_o.new_empty(n_room + anywhere.shape[0] + beside, 3)

@@ -111,7 +111,8 @@ def sample_rays(
     reach: float,
     lipschitz: float,
     max_samples: int = 1024,
-) -> tuple[PackedSamples, Tensor]:
+    room: int = 0,
+) -> tuple[PackedSamples, Tensor, Tensor]:
     """The samples of :func:`march_rays` that contribute to a pixel; the search evaluates the distance along the rays.
 
     Two neighbouring samples are kept where one of them may have a rendering weight above `min_weight`. The weight is
@@ -135,27 +136,29 @@ def sample_rays(
         reach: The distance outside the surface beyond which the density vanishes, scene units.
         lipschitz: The bound on the length of the field's gradient.
         max_samples: The largest number of evaluated distances of one ray.
+        room: If positive, the number of samples in the result, so that the host need not wait for a GPU's count. The last
+            rays lose what has no room. Zeros that belong to no ray fill it up.
 
     Returns:
-        The kept samples, and [n_rays] int64, the number of distances per ray that the search asked for. (On a GPU more
-        are evaluated: a group of neighbours at once.)
+        The kept samples; [n_rays] int64, the number of distances per ray that the search asked for (on a GPU more are
+        evaluated: a group of neighbours at once); and [] int64, the number of samples that were found.
 
     Raises:
         ValueError: A shape, dtype or number does not fit.
     """
-    *samples, evaluated = lib.sample_rays(
+    *samples, evaluated, found = lib.sample_rays(
         rays_o, rays_d, jitter, cells, *network.arguments(), step, max_samples, s, anneal, min_weight, min_transmittance,
-        reach, lipschitz,
+        reach, lipschitz, room,
     )  # fmt: skip
-    return PackedSamples(*samples), evaluated
+    return PackedSamples(*samples), evaluated, found
 
 
 def _fake_sample(rays_o, rays_d, jitter, cells, table, *rest):
-    n = torch.library.get_ctx().new_dynamic_size()
+    n = rest[-1] or torch.library.get_ctx().new_dynamic_size()
     long, n_rays = torch.int64, rays_o.shape[0]
     return (
         rays_o.new_empty(n, dtype=long), rays_o.new_empty(n), rays_o.new_empty(n), rays_o.new_empty(n_rays + 1, dtype=long),
-        rays_o.new_empty(n_rays, dtype=long),
+        rays_o.new_empty(n_rays, dtype=long), rays_o.new_empty((), dtype=long),
     )  # fmt: skip
 
 

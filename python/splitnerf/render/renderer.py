@@ -47,19 +47,20 @@ class ProbePoints(NamedTuple):
 class FoundSamples(NamedTuple):
     """The samples of a batch of rays, with all values that depend on their positions alone.
 
-    n, the number of samples, is at least the requested capacity. The samples behind those of the last ray are padding:
-    they belong to no ray, and their `positions` repeat those of the first samples, so that the field is finite there.
+    The samples behind those of the last ray are padding: they belong to no ray, and their `positions` repeat those of the
+    first samples, so that the field is finite there.
 
     Attributes:
         packed: The distances of the samples along their rays.
         rays_d: [n_rays, 3] unit directions.
         phase: [n_rays] in [0, 1), random offset of the marks that :func:`splitnerf.ops.spread_samples` draws with.
-        positions: [n + k + m, 3] the midpoints of the n samples, then the k + m probes, scene units.
+        positions: [n + k + m, 3] the midpoints of the n samples with the padding, then the k + m probes, scene units.
         directions: [n, 3] unit directions of the samples' rays.
         beside: [m] int64, the samples whose neighbours the last m positions are.
         step: [] length of a sample, scene units.
         anneal: [] annealing of the cosine, in [0, 1], at which the samples were chosen.
         evaluated: [n_rays] int64, the number of points per ray at which the search evaluated the distance.
+        n_found: [] int64, the number of samples that the search found; those above n are left out.
     """
 
     packed: PackedSamples
@@ -71,6 +72,7 @@ class FoundSamples(NamedTuple):
     step: Tensor
     anneal: Tensor
     evaluated: Tensor
+    n_found: Tensor
 
 
 @dataclass
@@ -82,7 +84,7 @@ class RenderedRays:
         linear: Whether `mean` is linear; otherwise it is sRGB.
         opacity: [n_rays] in [0, 1].
         samples: The packed samples.
-        evaluated: [n_rays] int64, the number of points per ray at which the search evaluated the distance.
+        evaluated, n_found: See :class:`FoundSamples`.
         weights: [n] rendering weights.
         values: [n, 3] composited values: radiance of the split sum, linear or sRGB by the setting `compositing`. With
             `shading.method = summed`, `mean` also contains the quadrature correction at each ray's heaviest sample, by the
@@ -103,6 +105,7 @@ class RenderedRays:
     opacity: Tensor
     samples: PackedSamples
     evaluated: Tensor
+    n_found: Tensor
     weights: Tensor
     values: Tensor
     gradients: Tensor
@@ -139,6 +142,7 @@ def find_samples(
     anneal: float = 1.0,
     probes: ProbePoints | None = None,
     capacity: int = 0,
+    s: float | None = None,
 ) -> FoundSamples:
     """Finds the samples of rays that contribute to their pixels, with the current field.
 
@@ -149,26 +153,28 @@ def find_samples(
         jitter: [n_rays] in [0, 1), offsets of the samples as shares of a sample's length.
         anneal: The annealing of the cosine: 0 at the start of a training, 1 when done.
         probes: Additional points at which the field will be evaluated, or None.
-        capacity: The minimum number of samples in the result; padding fills it up.
+        capacity: The number of samples in the result, if positive: padding fills it up, and what exceeds it is left out. Where
+            ``sampling.min_weight`` is 0, nothing is left out.
+        s: The sharpness of the density; None: the model's own, for which the host waits.
     """
-    c, s = model.config, model.s_value
+    c, s = model.config, model.s_value if s is None else s
     step = sample_step(c, s)
     if c.sampling.min_weight == 0:
         packed = march_rays(rays_o, rays_d, jitter, cells, c.surface.box, step, c.sampling.max_samples_per_ray)
-        evaluated = packed.offsets.diff()
+        evaluated, n_found = packed.offsets.diff(), packed.offsets[-1]
     else:
-        packed, evaluated = sample_rays(
+        packed, evaluated, n_found = sample_rays(
             rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=s, anneal=anneal,
             min_weight=c.sampling.min_weight, min_transmittance=c.sampling.min_transmittance,
             reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
-            max_samples=c.sampling.max_samples_per_ray,
+            max_samples=c.sampling.max_samples_per_ray, room=capacity,
         )  # fmt: skip
     probes = ProbePoints(rays_o[:0], jitter[:0], rays_o[:0]) if probes is None else probes
     positions, directions, beside = place_samples(rays_o, rays_d, packed, *probes, capacity)
     packed = packed.extended(len(directions) - len(packed.ray_indices))
     phase = (PHASES * jitter) % 1.0  # the choice of shaded samples must not depend on their positions
     numbers = (positions.new_full((), x) for x in (step, anneal))
-    return FoundSamples(packed, rays_d, phase, positions, directions, beside, *numbers, evaluated)
+    return FoundSamples(packed, rays_d, phase, positions, directions, beside, *numbers, evaluated, n_found)
 
 
 def render_rays(
@@ -231,7 +237,7 @@ def render_rays(
         part = carried[spread.stretch[at]] / opacity.detach().clamp(min=MIN_OPACITY)[ray]
         mean = mean.index_add(0, ray, correction * part[:, None])
     return RenderedRays(
-        mean, c.shading.compositing == "linear", opacity, samples, found.evaluated, weights, values, field.gradient,
+        mean, c.shading.compositing == "linear", opacity, samples, found.evaluated, found.n_found, weights, values, field.gradient,
         found.beside,
         shaded, spread.sizes, shares, positions, normals, sdf, points,
     )  # fmt: skip

@@ -50,7 +50,9 @@ class PhotoExposures:
         self.factors = self.start.exp()
         self.sums = torch.zeros(len(dataset), 4, device=device)
 
-    def learn(self, view: Tensor, target: Tensor, mean: Tensor, opacity: Tensor) -> None:
+    def learn(
+        self, view: Tensor, target: Tensor, mean: Tensor, opacity: Tensor, allowed: Tensor | None = None
+    ) -> None:
         """Takes in the pixels of a step.
 
         Args:
@@ -58,10 +60,12 @@ class PhotoExposures:
             target: [k, 4] sRGB values of the photos as they are, straight alpha.
             mean: [k, 3] linear values of the rendering at an exposure of 1.
             opacity: [k] of the rendering.
+            allowed: [] bool; where it is false none of the pixels counts. None: all count.
         """
         photo = srgb_to_linear(target[:, :3])
         counts = (target[:, 3] > COVERED) & (opacity.detach() > COVERED)
         counts &= ((photo > DARKEST) & (photo < BRIGHTEST)).all(1)
+        counts = counts if allowed is None else counts & allowed
         apart = photo.clamp(min=DARKEST).log() - mean.detach().clamp(min=1e-4).log() - self.start[view]
         values = torch.cat([apart.clamp(-FARTHEST, FARTHEST), torch.ones_like(apart[:, :1])], dim=1)
         self.sums.mul_(KEEP).index_add_(0, view, torch.where(counts[:, None], values, 0.0))

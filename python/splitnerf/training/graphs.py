@@ -16,13 +16,12 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import FoundSamples, RenderedRays
 from splitnerf.training.batches import Batch
 from splitnerf.training.losses import Terms
+from splitnerf.training.room import RoomyStep
 from splitnerf.training.schedule import light_moves, light_period
-from splitnerf.training.step import Step
+from splitnerf.training.step import Room
 
 MOST_GRAPHS = 4  # graphs kept; they share work memory, but each has its own gradients
-SAMPLE_SLACK = 1.15  # capacity for samples, over the target of a step
-SHADING_SLACK = 1.25  # capacity for shaded samples and segments, over the last count
-CAPACITY_UNIT = 256
+ROOM_LEFT = 1.1  # share of the last counts for which a graph must have room
 
 
 class Graph(Protocol):
@@ -40,7 +39,7 @@ class Recorded(NamedTuple):
         batch, found, light: The graph's inputs, in memory of their own.
         outputs: The rendered rays and the terms of the loss.
         grads: The gradients of the model's parameters, in memory that each replay overwrites.
-        capacity: The largest numbers of shaded samples and of segments that the graph can hold.
+        room: The largest numbers of samples, shaded samples and segments that the graph can hold.
     """
 
     graph: Graph
@@ -49,25 +48,21 @@ class Recorded(NamedTuple):
     light: EvaluatedLight
     outputs: tuple[RenderedRays, Terms]
     grads: list[Tensor | None]
-    capacity: tuple[int, int]
+    room: Room
 
 
-class GraphedStep(Step):
+class GraphedStep(RoomyStep):
     """A step whose rendering, losses and backward pass are one launch where shapes repeat; see :class:`Step`.
 
     A graph repeats the host's decisions at the time of recording: sizes, numbers, addresses of memory. So samples are
-    padded to a fixed capacity, and all other decisions of the host form the key of the graph. The first step with a key
-    runs without a graph, the next one is recorded. Each step overwrites the results of the step before. Parameters and
+    padded to a fixed number, and all other decisions of the host form the key of the graph. The first step with a key runs
+    without a graph, the next one is recorded. Each step overwrites the results of the step before. Parameters and
     caches of the model must stay at the same addresses while the key stays the same.
     """
 
     def __init__(self, model: SceneModel, *parts: Any):
         super().__init__(model, *parts)
-        self.capacity = round_up(SAMPLE_SLACK * model.config.sampling.target_samples)
-        self._counts: tuple[float, float] | None = None  # shaded samples and segments of the last step
-        self._used: tuple[int, int] | None = None  # capacity of the last step
         self._seen: set[Hashable] = set()
-        self._loaded: set[bool] = set()  # of steps with a capacity, by whether light is summed: their kernels are loaded
         self._graphs: dict[Hashable, Recorded] = {}
         self._stream = torch.cuda.Stream(model.device)
         self._pool = torch.cuda.graph_pool_handle()
@@ -84,29 +79,24 @@ class GraphedStep(Step):
         finally:
             outside.wait_stream(self._stream)
 
-    def __call__(
-        self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
+    def _rendered(
+        self, batch: Batch, found: FoundSamples, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
     ) -> tuple[RenderedRays, Terms]:
-        found = self.find(batch, progress, self.capacity)
+        def differentiate(batch: Batch, found: FoundSamples, light: EvaluatedLight) -> tuple[RenderedRays, Terms]:
+            return self.differentiate(batch, found, light, environment, step, progress, self.room.of_shading)
 
-        def differentiate(batch: Batch, found: FoundSamples, light: EvaluatedLight, capacity: tuple[int, int] | None):
-            return self.differentiate(batch, found, light, environment, step, progress, capacity)
-
-        self._used, key = None, (*self._decided(step, progress), len(batch.target), len(found.directions))
-        if len(found.directions) != self.capacity or key not in self._seen or self._counts is None:
-            self._seen.add(key)
-            return differentiate(batch, found, light, None)
+        key = (*self._decided(step, progress), len(batch.target))
+        if self.room.samples != self.sample_room or key not in self._seen:
+            if self.room.samples == self.sample_room:
+                self._seen.add(key)  # and its kernels will be loaded: none may be while recording
+            return differentiate(batch, found, light)
         self.model.sdf_field.grid.stored()  # makes the 16-bit copy before the graph, not in it
-        if key in self._graphs and not has_room(self._graphs[key].capacity, self._counts, slack=1.1):
+        if key in self._graphs and not self._graphs[key].room.holds(self._counts._replace(samples=0), ROOM_LEFT):
             del self._graphs[key]
         if key not in self._graphs:
-            self._used = tuple(round_up(SHADING_SLACK * n) for n in self._counts)
-            if self.model.sums_light not in self._loaded:
-                self._loaded.add(self.model.sums_light)
-                return differentiate(batch, found, light, self._used)
             while len(self._graphs) >= MOST_GRAPHS:
                 del self._graphs[next(iter(self._graphs))]
-            self._graphs[key] = self._recorded(differentiate, batch, found, light, self._used)
+            self._graphs[key] = self._recorded(differentiate, batch, found, light)
         return self._replayed(self._graphs[key], batch, found, light)
 
     def _decided(self, step: int, progress: float) -> tuple:
@@ -122,7 +112,7 @@ class GraphedStep(Step):
         )
 
     def _recorded(
-        self, function: Callable, batch: Batch, found: FoundSamples, light: EvaluatedLight, capacity: tuple[int, int]
+        self, function: Callable, batch: Batch, found: FoundSamples, light: EvaluatedLight
     ) -> Recorded:
         batch, found = tree_map(torch.clone, (batch, found))
         leaves = [leaf.detach().clone().requires_grad_() for leaf in light.leaves]
@@ -130,16 +120,16 @@ class GraphedStep(Step):
 
         def work() -> tuple[RenderedRays, Terms]:
             light.zero_grad()  # a replay adds the gradients of one step only
-            return function(batch, found, light, capacity)
+            return function(batch, found, light)
 
         graph, outputs = record(work, self._pool, self.generator)
         grads = [p.grad for p in self.model.parameters()]
-        return Recorded(graph, batch, found, light, outputs, grads, capacity)
+        return Recorded(graph, batch, found, light, outputs, grads, self.room)
 
     def _replayed(
         self, recorded: Recorded, batch: Batch, found: FoundSamples, light: EvaluatedLight
     ) -> tuple[RenderedRays, Terms]:
-        self._used = recorded.capacity
+        self.room = recorded.room
         old = [*tree_leaves((recorded.batch, recorded.found)), *recorded.light.leaves, *recorded.light.constants]
         new = [*tree_leaves((batch, found)), *light.leaves, *light.constants]
         with torch.no_grad():
@@ -155,13 +145,10 @@ class GraphedStep(Step):
                 ours.grad = theirs.grad.clone() if ours.grad is None else ours.grad.add_(theirs.grad)
         return recorded.outputs
 
-    def is_complete(self, n_shaded: float, n_segments: float) -> bool:
-        """Whether the last step's capacity was enough for its counts. If not, its results have no meaning, and all
-        graphs are dropped."""
-        self._counts = n_shaded, n_segments
-        complete = self._used is None or has_room(self._used, self._counts)
+    def settle(self, counts: Room, room: Room, s: float) -> bool:
+        """As :meth:`RoomyStep.settle`; graphs are dropped where a step had too little room."""
+        complete = super().settle(counts, room, s)
         if not complete:
-            self.n_discarded += 1
             self._graphs.clear()
         return complete
 
@@ -191,13 +178,3 @@ def record(function: Callable[[], Any], pool: Any, generator: torch.Generator) -
         if collects:
             gc.enable()
     return graph, outputs
-
-
-def has_room(capacity: tuple[int, int], counts: tuple[float, float], slack: float = 1.0) -> bool:
-    """Whether the capacity is at least ``slack`` times the counts."""
-    return all(slack * n <= room for n, room in zip(counts, capacity))
-
-
-def round_up(n: float) -> int:
-    """The smallest multiple of the capacities' unit that is at least n."""
-    return -(-int(n) // CAPACITY_UNIT) * CAPACITY_UNIT

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -23,8 +23,7 @@ from splitnerf.progress import Interrupt, Progress
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
-from splitnerf.render.renderer import RenderedRays
-from splitnerf.training.batches import Batch, draw_batch
+from splitnerf.training.batches import draw_batch
 from splitnerf.training.checkpoint import (
     load_checkpoint,
     restore_generator,
@@ -36,11 +35,13 @@ from splitnerf.training.checkpoint import (
 from splitnerf.training.exposure import BEGIN, PhotoExposures
 from splitnerf.training.finite import GradientWatch, check_state, explain_loss
 from splitnerf.training.graphs import GraphedStep
-from splitnerf.training.losses import SeenLight, Terms
+from splitnerf.training.losses import SeenLight
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS, add_metrics, keep_metrics
+from splitnerf.training.numbers import PastStep, StepNumbers
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
 from splitnerf.training.repeatable import same_bits
+from splitnerf.training.room import RoomyStep
 from splitnerf.training.schedule import light_moves, light_period, next_ray_count
 from splitnerf.training.step import Step
 
@@ -61,26 +62,6 @@ class TrainedScene:
     finished: bool
     n_new: int
     exposures: np.ndarray | None
-
-
-class StepNumbers(NamedTuple):
-    """The numbers that the host reads from one step, in one transfer.
-
-    Attributes:
-        values: The terms of the loss without their weights, by name; the colour's term comes first.
-        loss: The weighted sum.
-        gradient_norm: The Euclidean norm of all gradients.
-        n_samples, n_evaluated, n_shaded: Samples composited, points evaluated to find them, samples shaded.
-        is_complete: Whether the step's results may be used.
-    """
-
-    values: dict[str, float]
-    loss: float
-    gradient_norm: float
-    n_samples: int
-    n_evaluated: int
-    n_shaded: int
-    is_complete: bool
 
 
 def train(
@@ -138,7 +119,7 @@ class Training:
             hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.possible, source.poses, lenses)
         self.grid = make_grid(c, hull, device)
         self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
-        step = GraphedStep if c.run.cuda_graphs and device.type == "cuda" else Step
+        step = Step if device.type == "cpu" else GraphedStep if c.run.cuda_graphs else RoomyStep
         seen = None if dataset.surroundings is None else SeenLight(dataset.surroundings, self.generator.device)
         self.take_step = step(self.model, self.grid, self.mesh, self.generator, seen)
         self.watch = GradientWatch(self.model.parameters())
@@ -146,6 +127,8 @@ class Training:
         self.environment: Tensor | None = None  # the light that weighs traced occlusion
         self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.sampling.initial_rays, 0.0
         self.psnr_mean: float | None = None
+        self.unread: deque[PastStep] = deque()
+        self.reads_late = 0 if device.type == "cpu" else 1  # steps; a GPU goes on while the host reads
         self.started = self.saved_at = time.monotonic()
         self.first = True  # step of the run
         self.resumed_at = 0
@@ -195,6 +178,7 @@ class Training:
 
     def save(self) -> None:
         """Writes the checkpoint."""
+        self.settle()
         check_state(self.step, self.model, self.optimiser)
         save_checkpoint(
             self.run / "checkpoint.pt", config=self.config, fingerprint=self.fingerprint,
@@ -249,31 +233,24 @@ class Training:
             model.refresh_indirect(self.light)
 
     def advance(self, bar: Progress) -> None:
-        """Makes one step: draws rays, takes gradients, moves parameters; writes a line of the log when due."""
+        """Makes one step: draws rays, takes gradients, moves parameters; and reads the numbers of a step, on a GPU of the one
+        before."""
         c, light = self.config, self.light
         batch = draw_batch(self.source, self.n_rays, c, self.exposures.factors)
         ray, terms = self.take_step(batch, light, self.environment, self.step, self.progress)
         if light_moves(c, self.step):
             light.backward()
             self.light = None
-        numbers = self.read(ray, terms)
-        if not numbers.is_complete:
-            light.zero_grad()
-        else:
-            if not math.isfinite(numbers.loss):
-                raise explain_loss(self.step, numbers.values, self.dataset, batch, self.model, ray)
-            if self.watch.allows(self.step, numbers.gradient_norm):
-                self.optimiser.step()
-            if self.exposures.learned and self.progress > BEGIN:
-                self.exposures.learn(batch.view, batch.target, ray.mean, ray.opacity)
-            psnr = -10.0 * math.log10(max(numbers.values["colour"], 1e-10))
-            self.psnr_mean = psnr if self.psnr_mean is None else 0.95 * self.psnr_mean + 0.05 * psnr
-        self.n_rays = next_ray_count(self.n_rays, numbers.n_samples, c)
-        self.step, self.first, self.seconds = self.step + 1, False, time.monotonic() - self.started
-        bar.show(self.progress, self.told(numbers.n_evaluated / len(batch.target)))
-        if self.step % LOG_EVERY == 0 or self.step <= LOG_EVERY or self.progress >= 1.0:
-            check_state(self.step, self.model, self.optimiser)
-            add_metrics(self.run / METRICS, self.line(batch, terms, numbers))
+        past = PastStep.of(self.step + 1, batch, ray, terms, self.take_step.room, self.watch.norm(), self.model.s)
+        if self.reads_late:  # else gradients of results without room would stay in the light
+            light.keep_grad(past.allowed)
+        self.optimiser.step(allowed=past.allowed)
+        past.counted = self.optimiser.counted
+        if self.exposures.learned and self.progress > BEGIN:
+            self.exposures.learn(batch.view, batch.target, ray.mean, ray.opacity, past.allowed)
+        self.unread.append(past)
+        self.step, self.first = self.step + 1, False
+        self.settle(bar, self.reads_late)
 
     def preview_if_due(self) -> None:
         """Writes a preview where the last one is old enough."""
@@ -281,36 +258,54 @@ class Training:
             write_preview(self.run, self.model, self.grid, self.dataset, self.step)
             self.previewed_at = self.progress
 
-    def read(self, ray: RenderedRays, terms: Terms) -> StepNumbers:
-        """Waits for the step once and reads its numbers."""
-        counts = ray.samples.offsets[-1:], ray.evaluated.sum()[None], ray.sizes
-        read = terms.values_with(self.watch.norm()[None], *counts).tolist()
-        *values, norm, n_samples, n_evaluated, n_shaded, _, n_segments = read
-        loss = sum(term.weight * value for term, value in zip(terms.values(), values))
-        is_complete = self.take_step.is_complete(n_shaded, n_segments)
-        return StepNumbers(dict(zip(terms, values)), loss, norm, n_samples, n_evaluated, n_shaded, is_complete)
+    def settle(self, bar: Progress | None = None, left: int = 0) -> None:
+        """Reads the numbers of all steps but the last ones, and does what follows from them.
 
-    def told(self, samples_per_ray: float) -> str:
+        Raises:
+            Diverged: A loss is not finite, or too many gradients were not.
+        """
+        while len(self.unread) > left:
+            past = self.unread.popleft()
+            numbers = past.read()
+            complete = self.take_step.settle(numbers.counts, past.room, numbers.s)
+            if complete and not math.isfinite(numbers.loss):
+                raise explain_loss(past.step - 1, numbers.values, self.dataset, past.batch, self.model, past.ray)
+            if not complete or not self.watch.allows(past.step - 1, numbers.gradient_norm):
+                self.optimiser.take_back(past.counted)
+            if complete:
+                psnr = -10.0 * math.log10(max(numbers.values["colour"], 1e-10))
+                self.psnr_mean = psnr if self.psnr_mean is None else 0.95 * self.psnr_mean + 0.05 * psnr
+            self.n_rays = next_ray_count(len(past.batch.target), numbers.counts.samples, self.config)
+            self.seconds = time.monotonic() - self.started
+            if bar is not None:
+                bar.show(self.progress, self.told(past.step, numbers.n_evaluated / len(past.batch.target)))
+            is_last = self.progress >= 1.0 and not self.unread
+            if past.step % LOG_EVERY == 0 or past.step <= LOG_EVERY or is_last:
+                check_state(self.step, self.model, self.optimiser)
+                add_metrics(self.run / METRICS, self.line(past, numbers))
+
+    def told(self, step: int, samples_per_ray: float) -> str:
         """What the bar tells of a step: its number, the batches' mean PSNR in dB and the samples per ray."""
         psnr = "" if self.psnr_mean is None else f"PSNR {self.psnr_mean:.2f} dB, "
-        return f"step {self.step} {psnr}{samples_per_ray:.1f} samples/ray"
+        return f"step {step} {psnr}{samples_per_ray:.1f} samples/ray"
 
-    def line(self, batch: Batch, terms: Terms, numbers: StepNumbers) -> dict[str, object]:
+    def line(self, past: PastStep, numbers: StepNumbers) -> dict[str, object]:
         """The values of one line of metrics.jsonl, by name."""
-        evaluated = max(1, numbers.n_evaluated)
+        evaluated, counts, n_rays = max(1, numbers.n_evaluated), numbers.counts, len(past.batch.target)
         return {
-            "step": self.step, "seconds": round(self.seconds, 3), "progress": self.progress, "loss": numbers.loss,
-            **{f"loss_{name}": term.weight * numbers.values[name] for name, term in terms.items()},
+            "step": past.step, "seconds": round(self.seconds, 3), "progress": self.progress, "loss": numbers.loss,
+            **{f"loss_{name}": term.weight * numbers.values[name] for name, term in past.terms.items()},
             "psnr": self.psnr_mean,
-            "rays": len(batch.target), "samples_per_ray": numbers.n_evaluated / len(batch.target),
-            "kept": numbers.n_samples / evaluated, "shaded": numbers.n_shaded / evaluated,
-            "s": self.model.s_value, "is_unoccluded": self.model.occlusion.is_unoccluded,
+            "rays": n_rays, "samples_per_ray": numbers.n_evaluated / n_rays,
+            "kept": counts.samples / evaluated, "shaded": counts.shaded / evaluated,
+            "s": numbers.s, "is_unoccluded": self.model.occlusion.is_unoccluded,
             "skipped": self.watch.skipped + self.take_step.n_discarded,
         }  # fmt: skip
 
     def finish(self) -> None:
         """Updates grid and mesh to the final surface, unless the run was interrupted, and writes the last
         checkpoint."""
+        self.settle()
         self.optimiser.zero_grad(set_to_none=True)
         check_state(self.step, self.model, self.optimiser)
         finished = self.progress >= 1.0

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import torch
-
 from splitnerf.config import Config
 from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
 
 
-def make_optimiser(model: SceneModel, config: Config) -> torch.optim.Optimizer:
+def make_optimiser(model: SceneModel, config: Config) -> AdamW:
     """AdamW with the released code's settings; sharpness and light texels have their own rates and no decay."""
     c, grid = config, model.sdf_field.grid
     texels = [model.light.texels] if c.light.kind == "pyramid" else []
@@ -25,13 +23,11 @@ def make_optimiser(model: SceneModel, config: Config) -> torch.optim.Optimizer:
         for params, rate, decay in groups
         if params
     ]
-    settings = {"betas": (0.9, 0.99), "eps": 1e-15}
-    if c.optimiser.sparse_steps:
-        return AdamW(groups, **settings, copies={grid.table: grid.copy} if grid.copy else None)
-    return torch.optim.AdamW(groups, **settings, fused=True)
+    copies = {grid.table: grid.copy} if grid.copy else None
+    return AdamW(groups, betas=(0.9, 0.99), eps=1e-15, copies=copies)
 
 
-def set_learning_rate(optimiser: torch.optim.Optimizer, config: Config, step: int, progress: float) -> None:
+def set_learning_rate(optimiser: AdamW, config: Config, step: int, progress: float) -> None:
     """Linear warm-up over ``warmup_steps``, then exponential decay to ``final_learning_rate`` at the end."""
     warmup = min(config.optimiser.warmup_steps / config.run.steps, 0.5)
     decayed = max(0.0, (progress - warmup) / (1.0 - warmup))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import AbstractContextManager, closing, nullcontext
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -22,6 +24,23 @@ from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
 CHANNELS = 3
 
 
+class Room(NamedTuple):
+    """How many samples, shaded samples and ray segments there are, or how many there may be."""
+
+    samples: float = math.inf
+    shaded: float = math.inf
+    segments: float = math.inf
+
+    @property
+    def of_shading(self) -> tuple[int, int] | None:
+        """The capacity that :func:`splitnerf.render.renderer.render_rays` takes."""
+        return None if math.isinf(self.shaded) else (int(self.shaded), int(self.segments))
+
+    def holds(self, counts: Room, slack: float = 1.0) -> bool:
+        """Whether it is at least ``slack`` times as large as the counts."""
+        return all(slack * n <= room for n, room in zip(counts, self))
+
+
 class Step:
     """One training step up to the gradients, which it stores at the model's parameters and the light's leaves.
 
@@ -29,9 +48,14 @@ class Step:
         model, grid, mesh: The scene, its occupancy grid and its newest mesh.
         generator: Random numbers for the losses' subsets.
         seen: The light that photos show around the object; None where they show none.
+
+    Attributes:
+        room: The room of the last step.
+        n_discarded: The number of steps whose results had too little room.
     """
 
-    n_discarded = 0  # steps whose results were not complete
+    room, n_discarded = Room(), 0
+    s: float | None = None  # the sharpness as far as it is known without waiting
 
     def __init__(
         self, model: SceneModel, grid: OccupancyGrid, mesh: SurfaceMesh, generator: torch.Generator,
@@ -63,7 +87,7 @@ class Step:
     def find(self, batch: Batch, progress: float, capacity: int = 0) -> FoundSamples:
         """The samples of a batch, see :func:`splitnerf.render.renderer.find_samples`."""
         anneal = cosine_anneal(self.model.config, progress)
-        return find_samples(self.model, self.grid.cells, *batch.rays, anneal, batch.probes, capacity)
+        return find_samples(self.model, self.grid.cells, *batch.rays, anneal, batch.probes, capacity, self.s)
 
     def differentiate(
         self, batch: Batch, found: FoundSamples, light: EvaluatedLight, environment: Tensor | None, step: int,
@@ -80,9 +104,9 @@ class Step:
         terms.backward()
         return ray, terms
 
-    def is_complete(self, n_shaded: float, n_segments: float) -> bool:
-        """Whether the last step's results hold all samples and segments that were counted; here they always do."""
-        return True
+    def settle(self, counts: Room, room: Room, s: float) -> bool:
+        """Takes in the counts of a step with this room and its sharpness; returns whether its results may be used."""
+        return room.holds(counts)
 
     def stream(self) -> AbstractContextManager[None]:
         """The context in which steps run."""

@@ -61,10 +61,12 @@ template <class T> struct AdamwBody {
 };
 SPLITNERF_ON_GPU(AdamwBody);
 
-// Some arrays, each with its rule, as one list of numbers: array k has those from ends[k - 1] to ends[k].
+// Some arrays, each with its rule, as one list of numbers: array k has those from ends[k - 1] to ends[k]. Nothing moves where
+// `allowed` is not null and false.
 inline constexpr int kMostAdamwArrays = 24;  // so that a GPU's kernel takes them as arguments, 4 KB
 template <class T> struct AdamwListBody {
   int n_arrays = 0;
+  const bool* allowed = nullptr;
   int64_t ends[kMostAdamwArrays];
   AdamwBody<T> arrays[kMostAdamwArrays];
 
@@ -74,6 +76,7 @@ template <class T> struct AdamwListBody {
     arrays[n_arrays] = array, ends[n_arrays++] = before + array.x.n;
   }
   SPLITNERF_HD void operator()(int64_t i) const {
+    if (allowed && !*allowed) return;
     int k = 0;
     while (i >= ends[k]) ++k;
     arrays[k](i - (k ? ends[k - 1] : 0));

@@ -54,12 +54,12 @@ template <class T> struct DrawRaysBody {
 };
 SPLITNERF_ON_GPU(DrawRaysBody);
 
-// positions [n_room + n_anywhere + n_beside]: the midpoints of n samples and, up to n_room, the first of them again; then
+// positions [n_room + n_anywhere + n_beside]: the midpoints of the samples in the first of n_rows and, up to n_room, the first of them again; then
 // given points; then points beside samples, chosen by a number in [0, 1). Without samples the room is filled with zeros.
 template <class T> struct PlaceSamplesBody {
-  int64_t n_rays, n, n_room, n_anywhere;
+  int64_t n_rays, n_rows, n_room, n_anywhere;
   const T *rays_o, *rays_d;
-  const int64_t* ray_indices;
+  const int64_t *ray_indices, *n_samples;
   const T *t_starts, *t_ends, *anywhere, *chosen, *shifts;
   T *positions, *directions;
   int64_t* beside;
@@ -71,6 +71,7 @@ template <class T> struct PlaceSamplesBody {
     return load3(rays_o + 3 * ray) + load3(rays_d + 3 * ray) * (T(0.5) * (t_starts[sample] + t_ends[sample]));
   }
   SPLITNERF_HD void operator()(int64_t i) const {
+    const int64_t n = clamp<int64_t>(*n_samples, 0, n_rows);
     Vec3<T> position{T(0), T(0), T(0)}, direction = position;
     if (i < n_room) {
       if (n > 0) position = middle(i % n);
@@ -80,8 +81,9 @@ template <class T> struct PlaceSamplesBody {
       position = load3(anywhere + 3 * j);
     } else {
       const int64_t k = j - n_anywhere;
-      beside[k] = clamp<int64_t>(static_cast<int64_t>(chosen[k] * T(n)), 0, n - 1);
-      position = middle(beside[k]) + load3(shifts + 3 * k);
+      beside[k] = clamp<int64_t>(static_cast<int64_t>(chosen[k] * T(n)), 0, max_of<int64_t>(n - 1, 0));
+      if (n > 0) position = middle(beside[k]);
+      position = position + load3(shifts + 3 * k);
     }
     store3(positions + 3 * i, position);
   }

@@ -284,6 +284,28 @@ template <class T> struct SpreadFillBody {
   }
 };
 
+// The offsets [n_rays + 1] of samples where there is room for `room` of them, from those of all samples, and how many these are.
+struct FitOffsetsBody {
+  int64_t n_rays, room;
+  const int64_t* all;
+  int64_t *offsets, *n_found;
+
+  SPLITNERF_HD void operator()(int64_t r) const {
+    offsets[r] = min_of(all[r], room);
+    if (r == n_rays) *n_found = all[r];
+  }
+};
+
+// Zeros behind the samples, of which there are `*n`; one call per row of their room.
+template <class T> struct PadSamplesBody {
+  const int64_t* n;
+  PackedSamples<T> to;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    if (i >= *n) to.ray_indices[i] = 0, to.t_starts[i] = to.t_ends[i] = T(0);
+  }
+};
+
 // The starts [n_rays, most] of the samples of each ray, one ray after the other; a group of threads a ray.
 template <class T> struct PackSamplesBody {
   int64_t most;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import torch
+from torch.nn import functional as F
 
 from splitnerf.doctor.table import N, check, pattern, sphere
 from splitnerf.ops import HashGridSpec
@@ -70,17 +71,18 @@ def sdf_values():
 
 @check
 def sample_rays():
-    """Rays that cross a flat surface, each of whose 30 samples has some weight."""
+    """Rays that cross a flat surface, each of whose 30 samples has some weight; with room for one sample more."""
     rays_o, rays_d = torch.zeros(N, 3), torch.zeros(N, 3)
     rays_o[:, 2], rays_d[:, 2] = 3.0, -1.0
     cells, table = torch.ones(2, 2, 2, dtype=torch.uint8), torch.zeros(SPEC.n_entries, 2)
-    rays, starts, ends, offsets, evaluated = lib.sample_rays(
+    rays, starts, ends, offsets, evaluated, found = lib.sample_rays(
         rays_o, rays_d, torch.zeros(N), cells, table, *difference_of_softplus(4), 100.0, *GRID, BOX, 0.1, 64, 10.0, 1.0,
-        0.0, 0.0, 10.0, 1.25,
+        0.0, 0.0, 10.0, 1.25, 30 * N + 1,
     )  # fmt: skip
-    yield rays, torch.arange(N).repeat_interleave(30)
-    yield starts, (1.5 + 0.1 * torch.arange(30)).repeat(N)
-    yield ends, (1.6 + 0.1 * torch.arange(30)).repeat(N)
+    yield rays, F.pad(torch.arange(N).repeat_interleave(30), (0, 1))
+    yield starts, F.pad((1.5 + 0.1 * torch.arange(30)).repeat(N), (0, 1))
+    yield ends, F.pad((1.6 + 0.1 * torch.arange(30)).repeat(N), (0, 1))
+    yield found, torch.tensor(30 * N)
     yield offsets, 30 * torch.arange(N + 1)
     yield evaluated, torch.full((N,), 30)
 

@@ -80,7 +80,7 @@ def place_samples():
     rays_d = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).repeat(N // 2, 1)
     ends = torch.zeros(N), torch.full((N,), 2.0)
     above, beside = torch.tensor([[0.0, 0.0, 1.0]]).repeat(4, 1), torch.full((4,), 1.5 / N)
-    placed = lib.place_samples(torch.zeros(N, 3), rays_d, torch.arange(N), *ends, above, beside, above, N + 1)
+    placed = lib.place_samples(torch.zeros(N, 3), rays_d, torch.arange(N), *ends, torch.arange(N + 1), above, beside, above, N + 1)
     yield placed[0], torch.cat([rays_d, rays_d[:1], above, above + rays_d[1]])
     yield placed[1], torch.cat([rays_d, torch.zeros(1, 3)])
     yield placed[2], torch.ones(4, dtype=torch.int64)

@@ -1,0 +1,89 @@
+"""The numbers of a step: what decides on the device whether parameters move, and what the host reads of it later."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from splitnerf.devices import start_fetching
+from splitnerf.render.renderer import RenderedRays
+from splitnerf.training.batches import Batch
+from splitnerf.training.finite import LARGEST
+from splitnerf.training.losses import Terms
+from splitnerf.training.step import Room
+
+
+class StepNumbers(NamedTuple):
+    """What the host reads of a step, in one copy.
+
+    Attributes:
+        values: The terms of the loss without their weights, by name; the colour's term comes first.
+        loss: The weighted sum.
+        gradient_norm: The Euclidean norm of all gradients.
+        counts: The samples found, and those shaded and their segments.
+        n_evaluated: The number of points evaluated to find the samples.
+        s: The sharpness of the density.
+    """
+
+    values: dict[str, float]
+    loss: float
+    gradient_norm: float
+    counts: Room
+    n_evaluated: float
+    s: float
+
+
+@dataclass
+class PastStep:
+    """A step that the device has been given and whose numbers the host has not read.
+
+    Attributes:
+        step: Its number, counted from 1.
+        batch, ray, terms: Its rays, their rendering and the terms of its loss.
+        room: The room of its results.
+        allowed: [] bool, whether its loss is a number, its gradient can be squared and its results had room.
+        fetched: Its numbers on the CPU, and what waits until they are there.
+        counted: The optimiser's counts of steps that this one has raised.
+    """
+
+    step: int
+    batch: Batch
+    ray: RenderedRays
+    terms: Terms
+    room: Room
+    allowed: Tensor
+    fetched: tuple[Tensor, Callable[[], None]]
+    counted: Sequence[Tensor] = ()
+
+    @classmethod
+    def of(
+        cls, step: int, batch: Batch, ray: RenderedRays, terms: Terms, room: Room, norm: Tensor, s: Tensor
+    ) -> PastStep:
+        """Starts to fetch the numbers of a step from its device; ``norm`` [] is that of all gradients, ``s`` [] the sharpness."""
+        found = ray.n_found[None]
+        numbers = terms.values_with(norm[None], found, ray.sizes, ray.evaluated.sum()[None], s.detach()[None])
+        allowed = (numbers.abs() < _limits(len(terms), room, numbers.device)).all()
+        return cls(step, batch, ray, terms, room, allowed, start_fetching(numbers))
+
+    def read(self) -> StepNumbers:
+        """The numbers; waits until they are there."""
+        numbers, wait = self.fetched
+        wait()
+        *values, norm, n_samples, n_shaded, _, n_segments, n_evaluated, s = numbers.tolist()
+        loss = sum(term.weight * value for term, value in zip(self.terms.values(), values))
+        counts = Room(n_samples, n_shaded, n_segments)
+        return StepNumbers(dict(zip(self.terms, values)), loss, norm, counts, n_evaluated, s)
+
+
+@functools.lru_cache(maxsize=256)
+def _limits(n_terms: int, room: Room, device: torch.device) -> Tensor:
+    """What each of a step's numbers must stay below."""
+    counts = room.samples + 0.5, room.shaded + 0.5, math.inf, room.segments + 0.5
+    with torch.inference_mode(False):
+        return torch.tensor([math.inf] * n_terms + [LARGEST, *counts, math.inf, math.inf], device=device)
