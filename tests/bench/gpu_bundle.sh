@@ -14,7 +14,7 @@ python_version=${PYTHON_VERSION:-$(python3 -c 'import sys; print("%d.%d" % sys.v
 
 # To build, to train, to test; with what these import. Embree stands for embreex, scikit-image is for `splitnerf relight`.
 wheels="pip scikit-build-core pybind11 pathspec packaging cmake ninja
-  numpy scipy pillow trimesh OpenImageIO xatlas fast-simplification tomli-w tqdm jinja2 markupsafe
+  numpy scipy pillow trimesh OpenImageIO xatlas fast-simplification tomli-w shtab tqdm jinja2 markupsafe
   pytest pluggy iniconfig pygments hypothesis sortedcontainers mpmath"
 [ "$python_version" != 3.10 ] || wheels="$wheels tomli exceptiongroup typing-extensions"
 platforms="manylinux1_x86_64 manylinux2014_x86_64"

@@ -11,7 +11,9 @@ import sys
 
 import splitnerf
 from splitnerf.cli import ablate, bench, demo, doctor, evaluate, export, info, inspect, prepare, refine, relight, synth, train
+from splitnerf.cli.completion import SHELLS, PrintCompletion
 from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
+from splitnerf.cli.help import Help
 from splitnerf.cli.streams import lasting_streams
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
@@ -27,9 +29,15 @@ def build_parser() -> argparse.ArgumentParser:
         description="From posed images of one object to a mesh, PBR materials and the HDR environment.",
     )
     parser.add_argument("--version", action="version", version=f"splitnerf {splitnerf.__version__}")
+    parser.add_argument(
+        "--print-completion", action=PrintCompletion, choices=SHELLS, metavar="SHELL",
+        help=f"print the script that completes commands in a shell ({', '.join(SHELLS)})",
+    )  # fmt: skip
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for command in COMMANDS:
         command.add_parser(commands)
+    for command in commands.choices.values():
+        command.formatter_class = Help
     return parser
 
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.cli.help import examples
 from splitnerf.cli.train import budget
 from splitnerf.errors import InputError
 
@@ -16,6 +17,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "ablate", help="measure what each part of the method is worth",
         description="Trains on each DATA with the full method and with one part at a time taken out or exchanged, each for "
         "the same time, and writes ablation.csv, ablation.md and the runs into OUT. Repeat the command to go on.",
+        epilog=examples("splitnerf ablate data --minutes 6", "splitnerf ablate --list"),
     )  # fmt: skip
     parser.add_argument("data", type=Path, nargs="*", metavar="DATA")
     parser.add_argument("--out", type=Path, default=Path("runs/ablation"), metavar="OUT", help="default: runs/ablation")

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.cli.help import examples
 from splitnerf.cli.summary import print_summary
 from splitnerf.cli.train import budget
 from splitnerf.errors import InputError
@@ -17,6 +18,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "demo", help="render a small scene, reconstruct it and print the errors against its truth",
         description="Makes a scene with known shape, materials and sky, renders it with the built-in path tracer, "
         "trains on it and prints the errors. Nothing is downloaded.",
+        epilog=examples("splitnerf demo", "splitnerf demo --max-minutes 1 --out /tmp/demo --overwrite"),
     )  # fmt: skip
     parser.add_argument(
         "--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)"

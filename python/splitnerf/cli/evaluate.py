@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.help import examples
 from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.cli.summary import print_scores
 from splitnerf.errors import InputError
@@ -20,6 +21,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "without a last stage is rendered from its checkpoint), relights the asset under the data's maps, and writes "
         "evaluation.json and report.html into RUN (for a file FILE_evaluation.json beside it). Without --data it reads the "
         "scores written before, for --table.",
+        epilog=examples("splitnerf evaluate runs/a --data data", "splitnerf evaluate runs/a runs/b --table table.md"),
     )  # fmt: skip
     parser.add_argument("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
     parser.add_argument(

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.help import examples
 from splitnerf.errors import InputError
 
 MAX_TEXTURE_SIZE = 8192
@@ -19,6 +20,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "UV-unwrapped, with albedo, occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex "
         "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces and "
         "the walls of cavities are dropped.",
+        epilog=examples(
+            "splitnerf export runs/data --formats glb,obj --out asset",
+            "splitnerf export runs/data --faces 20000 --texture-size 1024 --out small",
+        ),
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained after a last stage)")

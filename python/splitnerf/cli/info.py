@@ -6,10 +6,14 @@ import argparse
 
 from splitnerf.cli import doctor
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.help import examples
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("info", help="show the settings of a preset; without --settings the same as doctor")
+    parser = commands.add_parser(
+        "info", help="show the settings of a preset; without --settings the same as doctor",
+        epilog=examples("splitnerf info --settings fast"),
+    )  # fmt: skip
     parser.add_argument(
         "--settings",
         metavar="PRESET",

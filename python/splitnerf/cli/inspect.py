@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.help import examples
 from splitnerf.cli.findings import show
 from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.errors import InputError
@@ -19,6 +20,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Prints what DATA hold and what to do about what is suspected: cameras in the object or on one "
         "side of it, masks that disagree with the poses, a moved object, duplicate photos, differing brightness, cut, "
         "small or clipped objects. Draws it, with all masks over their photos, on a page. Exit code 2: DATA cannot be read.",
+        epilog=examples("splitnerf inspect data", "splitnerf inspect data --out looks.html"),
     )  # fmt: skip
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images")
     parser.add_argument(

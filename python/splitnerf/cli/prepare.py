@@ -7,6 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.help import examples
 from splitnerf.errors import InputError
 
 PACKAGES = {"pycolmap": "pycolmap", "cv2": "opencv-python-headless"}
@@ -23,6 +24,11 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Reads a folder of photographs, or a video, of one object that does not move, and writes DATA, which train "
         "reads: images without lens distortion, masks, transforms.json, and prepare.html to look at. The same command goes on "
         "where it was interrupted.",
+        epilog=examples(
+            "splitnerf prepare photos --out data",
+            "splitnerf prepare turn.mp4 --frames 150 --out data",
+            "splitnerf prepare photos --masks masks --max-size 1600 --out data",
+        ),
     )  # fmt: skip
     parser.add_argument("photos", type=Path, metavar="PHOTOS", help="folder of photos, or a video file")
     parser.add_argument("--out", type=Path, required=True, metavar="DATA", help="folder to write")

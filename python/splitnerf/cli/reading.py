@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from splitnerf.data.reading import Reading
 
 
-def add_reading_options(parser: argparse.ArgumentParser, default: str) -> None:
-    """Adds --eval-mode, --mask-kind and --max-memory; `default` says in their help what holds without them."""
+def add_reading_options(parser: argparse.ArgumentParser, default: str = "as the data say or look like") -> None:
+    """Adds --eval-mode, --mask-kind and --max-memory; `default` says in the help of the first two what holds without them."""
     parser.add_argument(
         "--eval-mode", choices=["all", "fraction", "filename"],
         help="what of the data is for testing: fraction, every 8th view; filename, the views with `test` or `eval` in "

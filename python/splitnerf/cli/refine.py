@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.cli.help import examples
 from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.errors import InputError
 
@@ -18,6 +19,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "normals) and the light of environment.exr to the photos through the path tracer's own model, interreflection "
         "included. Writes mesh.glb, environment.exr and .hdr, uncertainty.exr and refinement.json into RUN/refined. Ctrl-C "
         "keeps the state there; --resume goes on.",
+        epilog=examples("splitnerf refine runs/data --data data --minutes 10"),
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN", help="a finished run, or a folder with both files")
     parser.add_argument("--data", type=Path, required=True, metavar="DATA", help="the data that RUN was trained on")

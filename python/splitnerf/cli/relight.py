@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.help import examples
 from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.errors import InputError
 
@@ -15,6 +16,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "relight", help="render an asset under other lights",
         description="Path-traces RUN's mesh.glb, or any metallic-roughness glTF file, under environment maps and "
         "writes NNN.png (sRGB, straight alpha) and NNN.exr (linear, associated alpha) for each frame.",
+        epilog=examples(
+            "splitnerf relight runs/data --env studio.hdr --out lit",
+            "splitnerf relight chair.glb --env studio.hdr --turntable 48 --rotate light --gif --out turn",
+        ),
     )  # fmt: skip
     # fmt: off
     add = parser.add_argument

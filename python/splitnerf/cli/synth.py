@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.help import examples
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -13,6 +14,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "synth", help="render a dataset with full truth from a GLB file",
         description="Renders ASSET, brought to the unit sphere, from cameras around it under the light MAP, with true albedo, "
         "roughness, metallic, normals and relit views, in a layout that train and evaluate read.",
+        epilog=examples(
+            "splitnerf synth chair.glb --light studio.hdr --out data",
+            "splitnerf synth chair.glb --light studio.hdr --relight field.hdr city.hdr --size 400 --out data",
+        ),
     )  # fmt: skip
     parser.add_argument("asset", type=Path, metavar="ASSET.glb")
     parser.add_argument(

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.cli.help import examples
 from splitnerf.cli.reading import add_reading_options, reading_options
 from splitnerf.cli.summary import print_scores, print_summary
 from splitnerf.errors import InputError
@@ -17,21 +18,32 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Trains on DATA (transforms files, COLMAP's, NeuS's and other layouts, see docs/data.md), fits the exported asset and its light "
         "to the photos in a last stage, and writes mesh.glb, mesh.ply, environment.exr/.hdr, uncertainty.exr, evaluation.json and "
         "report.html into the run's folder.",
-        epilog="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient "
-        "alone skips its step. The message names where it came from, and the last checkpoint stands: --resume goes on "
-        "from it.",
+        epilog=examples(
+            "splitnerf train data --max-minutes 30", "splitnerf train data --preset fast --downscale 2 --out runs/fast",
+            "splitnerf train data --resume auto",
+            after="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient alone skips "
+            "its step. The message names where it came from, and the last checkpoint stands: --resume goes on from it.",
+        ),
     )  # fmt: skip
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images; masks help, else the object is looked for")
     parser.add_argument("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
+    add_alias(parser, "--output-dir", "--out")
     add_training_options(parser)
     parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
-    add_reading_options(parser, "what the data say or look like, else fraction")
+    add_alias(parser, "--downscale-factor", "--downscale")
+    add_reading_options(parser)
     parser.add_argument(
         "--resume", nargs="?", const=True, choices=["auto"], metavar="auto",
         help="continue the run in --out from its checkpoint; auto: begin where there is none, leave a finished run alone",
     )  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
     parser.set_defaults(execute=run)
+
+
+def add_alias(parser: argparse.ArgumentParser, alias: str, option: str) -> None:
+    """Lets users type an option as other programs name it; the help does not list it."""
+    of = next(action for action in parser._actions if option in action.option_strings)
+    parser.add_argument(alias, dest=of.dest, type=of.type, default=argparse.SUPPRESS, help=argparse.SUPPRESS)
 
 
 def add_training_options(parser: argparse.ArgumentParser) -> None:
@@ -41,6 +53,8 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
         help="cpu: small, for a few cores (default there); fast: for a GPU (default there); paper: the publication's settings",
     )
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
+    add_alias(parser, "--max-num-iterations", "--steps")
+    add_alias(parser, "--n_steps", "--steps")
     parser.add_argument("--max-minutes", type=float, metavar="M", help="time of training and last stage; the schedule fits itself to it")
     parser.add_argument(
         "--device", choices=["auto", "cpu", "cuda"], default="auto",
