@@ -15,7 +15,9 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 FUZZ_SECONDS ?= 600
 STABILITY_CASES ?= 10000000
 STABILITY_OPTIONS ?=
-CMAKE_TESTS = $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
+# With a compiler cache, what the package has compiled is not compiled again for the tests.
+CACHED = CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || true)
+CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 READERS := json colmap neus png exr hdr glb checkpoint
 
 .PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants clean
@@ -73,7 +75,7 @@ install: $(VENV)/.installed
 SOURCES := $(shell find cpp third_party -type f) CMakeLists.txt pyproject.toml
 $(VENV)/.installed: $(SOURCES) | system
 	sh third_party/install_python_packages.sh $(PYTHON) $(VENV)
-	$(BIN)/python -m pip install --quiet --no-build-isolation -e '.[test]'
+	$(CACHED) $(BIN)/python -m pip install --quiet --no-build-isolation -e '.[test]'
 	@touch $@
 
 clean:

@@ -12,6 +12,7 @@ need 'python3 -c "import sysconfig, os; assert os.path.exists(os.path.join(sysco
 need 'ls /usr/include/embree*/rtcore.h /usr/local/include/embree*/rtcore.h 2>/dev/null | grep -q .' libembree-dev
 need 'ls /usr/include/gtest/gtest.h /usr/local/include/gtest/gtest.h 2>/dev/null | grep -q .' libgtest-dev
 [ -n "$missing" ] || exit 0
+command -v ccache >/dev/null 2>&1 || missing="$missing ccache"  # not needed, but the tests then compile the core no second time
 
 run=""
 if [ "$(id -u)" != 0 ]; then
