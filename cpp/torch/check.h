@@ -33,6 +33,8 @@ inline std::string describe(ScalarType type) {
       return "int64";
     case ScalarType::Int:
       return "int32";
+    case ScalarType::Short:
+      return "int16";
     case ScalarType::Byte:
       return "uint8";
     case ScalarType::Bool:

@@ -1,5 +1,6 @@
-// pixel_losses, gradient_losses, material_losses and quadratic_entropy as torch operators: each returns its values and
-// their gradients, found in the same pass.
+// pixel_losses, gradient_losses, material_losses and quadratic_entropy as torch operators. The last one finds its gradient in
+// the same pass; those of the others find the gradients anew, and read the sums that they divide by.
+#include <optional>
 #include <tuple>
 
 #include "device.h"
@@ -7,69 +8,148 @@
 namespace splitnerf::glue {
 namespace {
 
-std::tuple<Tensor, Tensor, Tensor, Tensor> pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background,
-                                                        Tensor whole, bool linear) {
+using std::optional;
+
+// Pixels and photos, checked and contiguous.
+struct Pixels {
+  Kind type;
+  Tensor mean, opacity, target, background;
+  optional<Tensor> whole, exposure;
+  bool linear;
+
+  Pixels(const char* op, const Tensor& mean_in, const Tensor& opacity_in, const Tensor& target_in,
+         const Tensor& background_in, const optional<Tensor>& whole_in, const optional<Tensor>& exposure_in,
+         bool linear)
+      : type(real_kind(op, "mean", mean_in)), mean(checked(op, "mean", mean_in, {kAny, 3}, type)),
+        opacity(checked(op, "opacity", opacity_in, {n()}, type)),
+        target(checked(op, "target", target_in, {n(), 4}, type)),
+        background(checked(op, "background", background_in, {n(), 3}, type)), linear(linear) {
+    if (whole_in) whole = checked(op, "whole", *whole_in, {n()}, type.with(ScalarType::Bool));
+    if (exposure_in) exposure = checked(op, "exposure", *exposure_in, {n(), 3}, type);
+  }
+  int64_t n() const { return mean.size(0); }
+  template <class T> PixelArrays<T> view() const {
+    return {n(),
+            in<T>(mean),
+            in<T>(opacity),
+            in<T>(target),
+            in<T>(background),
+            exposure ? in<T>(*exposure) : nullptr,
+            whole ? in<bool>(*whole) : nullptr,
+            linear};
+  }
+};
+
+Tensor pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background, optional<Tensor> whole,
+                    optional<Tensor> exposure, bool linear) {
   const char* op = "pixel_losses";
-  const Kind type = real_kind(op, "mean", mean);
-  const Tensor m = checked(op, "mean", mean, {kAny, 3}, type);
-  const int64_t n = m.size(0);
-  const Tensor o = checked(op, "opacity", opacity, {n}, type), t = checked(op, "target", target, {n, 4}, type);
-  const Tensor b = checked(op, "background", background, {n, 3}, type),
-               w = checked(op, "whole", whole, {n}, type.with(ScalarType::Bool));
-  Tensor losses = empty_like_type(m, {2}, type), colour_by_mean = torch::stable::empty_like(m);
-  Tensor colour_by_opacity = empty_like_type(m, {n}, type), mask_by_opacity = empty_like_type(m, {n}, type);
-  on_device(type, [&](auto zero, const auto& device) {
+  const Pixels x(op, mean, opacity, target, background, whole, exposure, linear);
+  Tensor losses = empty_like_type(x.mean, {2}, x.type);
+  on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.run(op, n,
-               make_pixel_losses(n, in<T>(m), in<T>(o), in<T>(t), in<T>(b), in<bool>(w), linear, out<T>(losses),
-                                 out<T>(colour_by_mean), out<T>(colour_by_opacity), out<T>(mask_by_opacity)));
+    device.run(op, x.n(), PixelLossesBody<T>{x.view<T>(), out<T>(losses)});
   });
-  return {losses, colour_by_mean, colour_by_opacity, mask_by_opacity};
+  return losses;
 }
 
-std::tuple<Tensor, Tensor, Tensor> gradient_losses(Tensor gradients, Tensor weights, Tensor beside) {
-  const char* op = "gradient_losses";
-  const Kind type = real_kind(op, "gradients", gradients);
-  const Tensor g = checked(op, "gradients", gradients, {kAny, 3}, type),
-               w = checked(op, "weights", weights, {kAny}, type);
-  const Tensor b = checked(op, "beside", beside, {kAny}, type.with(ScalarType::Long));
-  const int64_t n = g.size(0), m = b.size(0), n_weights = w.size(0);
-  require(n_weights + m <= n, op, "gradients must hold the samples and their neighbours");
-  require(m == 0 || n_weights > 0, op, "beside must hold indices of weights");
-  if (type.on_cpu()) require(all_below<int64_t>(b, n_weights), op, "beside must hold indices of weights");
-  Tensor losses = empty_like_type(g, {2}, type), eikonal_by = torch::stable::empty_like(g),
-         smoothness_by = torch::stable::empty_like(g);
-  on_device(type, [&](auto zero, const auto& device) {
+std::tuple<Tensor, Tensor> pixel_losses_backward(Tensor mean, Tensor opacity, Tensor target, Tensor background,
+                                                 optional<Tensor> whole, optional<Tensor> exposure, bool linear,
+                                                 Tensor grad_losses) {
+  const char* op = "pixel_losses_backward";
+  const Pixels x(op, mean, opacity, target, background, whole, exposure, linear);
+  const Tensor g = checked(op, "grad_losses", grad_losses, {2}, x.type);
+  Tensor grad_mean = empty_like_type(x.mean, {x.n(), 3}, x.type), grad_opacity = empty_like_type(g, {x.n()}, x.type);
+  on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    T* smoothness = out<T>(smoothness_by);
-    auto* scale = device.template scratch<double>(1);
-    const T per_point = T(1) / T(max_of<int64_t>(n, 1));
-    device.run(op, n, EikonalBody<T>{in<T>(g), per_point, out<T>(losses), out<T>(eikonal_by), smoothness});
-    device.run(
-        op, m,
-        NormalPairsBody<T>{n, n_weights, m, in<T>(g), in<T>(w), in<int64_t>(b), out<T>(losses) + 1, smoothness, scale});
-    device.run(op, 3 * n, ScaleBody<T>{scale, smoothness});
+    device.run(op, x.n(), PixelLossesBackwardBody<T>{x.view<T>(), in<T>(g), out<T>(grad_mean), out<T>(grad_opacity)});
   });
-  return {losses, eikonal_by, smoothness_by};
+  return {grad_mean, grad_opacity};
 }
+
+// Gradients of a field and pairs of them, checked and contiguous.
+struct Gradients {
+  Kind type;
+  Tensor gradients, weights, beside;
+
+  Gradients(const char* op, const Tensor& gradients_in, const Tensor& weights_in, const Tensor& beside_in)
+      : type(real_kind(op, "gradients", gradients_in)),
+        gradients(checked(op, "gradients", gradients_in, {kAny, 3}, type)),
+        weights(checked(op, "weights", weights_in, {kAny}, type)),
+        beside(checked(op, "beside", beside_in, {kAny}, type.with(ScalarType::Long))) {
+    require(weights.size(0) + m() <= n(), op, "gradients must hold the samples and their neighbours");
+    require(m() == 0 || weights.size(0) > 0, op, "beside must hold indices of weights");
+    if (type.on_cpu()) require(all_below<int64_t>(beside, weights.size(0)), op, "beside must hold indices of weights");
+  }
+  int64_t n() const { return gradients.size(0); }
+  int64_t m() const { return beside.size(0); }
+  template <class T> GradientArrays<T> view() const {
+    return {n(), weights.size(0), m(), in<T>(gradients), in<T>(weights), in<int64_t>(beside)};
+  }
+};
+
+std::tuple<Tensor, Tensor> gradient_losses(Tensor gradients, Tensor weights, Tensor beside) {
+  const char* op = "gradient_losses";
+  const Gradients x(op, gradients, weights, beside);
+  Tensor losses = empty_like_type(x.gradients, {2}, x.type), total = empty_like_type(x.gradients, {}, x.type);
+  on_device(x.type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    device.run(op, x.n() + x.m(), GradientLossesBody<T>{x.view<T>(), out<T>(losses), out<T>(total)});
+  });
+  return {losses, total};
+}
+
+Tensor gradient_losses_backward(Tensor gradients, Tensor weights, Tensor beside, Tensor total, Tensor grad_losses) {
+  const char* op = "gradient_losses_backward";
+  const Gradients x(op, gradients, weights, beside);
+  const Tensor sum = checked(op, "total", total, {}, x.type), g = checked(op, "grad_losses", grad_losses, {2}, x.type);
+  Tensor grad_gradients = empty_like_type(g, {x.n(), 3}, x.type);
+  on_device(x.type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    const GradientLossesBackwardBody<T> body{x.view<T>(), in<T>(sum), in<T>(g), out<T>(grad_gradients)};
+    device.run(op, x.n(), body);
+    device.run(op, x.m(), SamplesOfPairsBackwardBody<T>{body});
+  });
+  return grad_gradients;
+}
+
+// Materials of points, checked and contiguous.
+struct Materials {
+  Kind type;
+  Tensor metallic, albedo, shares;
+  bool smooth_l1;
+
+  Materials(const char* op, const Tensor& albedo_in, const Tensor& metallic_in, const Tensor& shares_in, bool smooth_l1)
+      : type(real_kind(op, "metallic", metallic_in)), metallic(checked(op, "metallic", metallic_in, {kAny, 1}, type)),
+        albedo(checked(op, "albedo", albedo_in, {n(), 3}, type)), shares(checked(op, "shares", shares_in, {n()}, type)),
+        smooth_l1(smooth_l1) {}
+  int64_t n() const { return metallic.size(0); }
+  template <class T> MaterialArrays<T> view() const {
+    return {in<T>(albedo), in<T>(metallic), in<T>(shares), smooth_l1};
+  }
+};
 
 std::tuple<Tensor, Tensor> material_losses(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1) {
   const char* op = "material_losses";
-  const Kind type = real_kind(op, "metallic", metallic);
-  const Tensor m = checked(op, "metallic", metallic, {kAny, 1}, type);
-  const Tensor a = checked(op, "albedo", albedo, {m.size(0), 3}, type),
-               s = checked(op, "shares", shares, {m.size(0)}, type);
-  Tensor losses = empty_like_type(m, {3}, type), by_metallic = empty_like_type(m, {3, m.size(0)}, type);
-  on_device(type, [&](auto zero, const auto& device) {
+  const Materials x(op, albedo, metallic, shares, smooth_l1);
+  Tensor losses = empty_like_type(x.metallic, {3}, x.type), total = empty_like_type(x.metallic, {}, x.type);
+  on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    const int64_t n = m.size(0);
-    auto* scale = device.template scratch<double>(1);
-    device.run(
-        op, n,
-        MaterialLossesBody<T>{n, in<T>(a), in<T>(m), in<T>(s), smooth_l1, out<T>(losses), out<T>(by_metallic), scale});
-    device.run(op, 3 * n, ScaleBody<T>{scale, out<T>(by_metallic)});
+    device.run(op, x.n(), MaterialLossesBody<T>{x.view<T>(), out<T>(losses), out<T>(total)});
   });
-  return {losses, by_metallic};
+  return {losses, total};
+}
+
+Tensor material_losses_backward(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1, Tensor total,
+                                Tensor grad_losses) {
+  const char* op = "material_losses_backward";
+  const Materials x(op, albedo, metallic, shares, smooth_l1);
+  const Tensor sum = checked(op, "total", total, {}, x.type), g = checked(op, "grad_losses", grad_losses, {3}, x.type);
+  Tensor grad_metallic = empty_like_type(g, {x.n(), 1}, x.type);
+  on_device(x.type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    device.run(op, x.n(), MaterialLossesBackwardBody<T>{x.view<T>(), in<T>(sum), in<T>(g), out<T>(grad_metallic)});
+  });
+  return grad_metallic;
 }
 
 std::tuple<Tensor, Tensor> quadratic_entropy(Tensor x) {
@@ -92,20 +172,29 @@ std::tuple<Tensor, Tensor> quadratic_entropy(Tensor x) {
 
 }  // namespace
 
+#define SPLITNERF_PIXELS \
+  "Tensor mean, Tensor opacity, Tensor target, Tensor background, Tensor? whole, Tensor? exposure, bool linear"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
+  m.def("pixel_losses(" SPLITNERF_PIXELS ") -> Tensor");
+  m.def("pixel_losses_backward(" SPLITNERF_PIXELS ", Tensor grad_losses) -> (Tensor, Tensor)");
+  m.def("gradient_losses(Tensor gradients, Tensor weights, Tensor beside) -> (Tensor, Tensor)");
   m.def(
-      "pixel_losses(Tensor mean, Tensor opacity, Tensor target, Tensor background, Tensor whole, bool linear) -> "
-      "(Tensor, Tensor, "
-      "Tensor, Tensor)");
-  m.def("gradient_losses(Tensor gradients, Tensor weights, Tensor beside) -> (Tensor, Tensor, Tensor)");
+      "gradient_losses_backward(Tensor gradients, Tensor weights, Tensor beside, Tensor total, Tensor grad_losses) -> "
+      "Tensor");
   m.def("material_losses(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1) -> (Tensor, Tensor)");
+  m.def(
+      "material_losses_backward(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1, Tensor total, Tensor "
+      "grad_losses) -> Tensor");
   m.def("quadratic_entropy(Tensor x) -> (Tensor, Tensor)");
 }
 
 SPLITNERF_IMPLEMENT(m) {
   m.impl("pixel_losses", TORCH_BOX(&pixel_losses));
+  m.impl("pixel_losses_backward", TORCH_BOX(&pixel_losses_backward));
   m.impl("gradient_losses", TORCH_BOX(&gradient_losses));
+  m.impl("gradient_losses_backward", TORCH_BOX(&gradient_losses_backward));
   m.impl("material_losses", TORCH_BOX(&material_losses));
+  m.impl("material_losses_backward", TORCH_BOX(&material_losses_backward));
   m.impl("quadratic_entropy", TORCH_BOX(&quadratic_entropy));
 }
 

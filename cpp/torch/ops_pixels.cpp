@@ -1,4 +1,4 @@
-// draw_rays and place_samples as torch operators.
+// draw_rays, read_pixels, probe_points and place_samples as torch operators.
 #include <tuple>
 
 #include "device.h"
@@ -45,6 +45,66 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> draw_rays(Tensor random, int64_t n_ne
   return {rays_o, rays_d, view, index};
 }
 
+// Pixels of the photos' codes, as bytes, words or floats.
+std::tuple<Tensor, Tensor, Tensor, Tensor> read_pixels(Tensor codes, Tensor index, Tensor view, Tensor exposures,
+                                                       Tensor backgrounds, Tensor edge_starts, Tensor edge_ends,
+                                                       Tensor edge_shift, Tensor edge_behind) {
+  const char* op = "read_pixels";
+  const Kind type = real_kind(op, "exposures", exposures), number = type.with(ScalarType::Long);
+  const ScalarType code = codes.scalar_type();
+  require(code == ScalarType::Byte || code == ScalarType::Short || code == ScalarType::Float, op,
+          "codes must be uint8, int16 or float32, got " + describe(code));
+  const Tensor c = checked(op, "codes", codes, {kAny, 4}, type.with(code)),
+               i = checked(op, "index", index, {kAny}, number), v = checked(op, "view", view, {i.size(0)}, number),
+               factors = checked(op, "exposures", exposures, {kAny, 3}, type),
+               random = checked(op, "backgrounds", backgrounds, {i.size(0), 3}, type);
+  const Tensor starts = checked(op, "edge_starts", edge_starts, {kAny}, number),
+               ends = checked(op, "edge_ends", edge_ends, {starts.size(0)}, number),
+               shift = checked(op, "edge_shift", edge_shift, {starts.size(0)}, number),
+               behind = checked(op, "edge_behind", edge_behind, {kAny, 3}, type.with(ScalarType::Byte));
+  const int64_t n = i.size(0);
+  require(n == 0 || (c.size(0) > 0 && factors.size(0) > 0), op, "there are no photos");
+  require(starts.size(0) == 0 || behind.size(0) > 0, op, "edge_behind has no colours");
+  if (type.on_cpu()) {
+    require(all_below<int64_t>(i, c.size(0)), op, "index must hold numbers of pixels");
+    require(all_below<int64_t>(v, factors.size(0)), op, "view must hold numbers of photos");
+  }
+  const EdgeRuns edges{in<int64_t>(starts), in<int64_t>(ends), in<int64_t>(shift),
+                       in<uint8_t>(behind), starts.size(0),    behind.size(0)};
+  Tensor target = empty_like_type(i, {n, 4}, type), exposure = empty_like_type(i, {n, 3}, type),
+         background = empty_like_type(i, {n, 3}, type), whole = empty_like_type(i, {n}, ScalarType::Bool);
+  on_device(type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    const auto read = [&](auto sample) {
+      using Code = decltype(sample);
+      device.run(op, n,
+                 ReadPixelsBody<T, Code>{in<Code>(c), c.size(0), factors.size(0), edges, in<int64_t>(i), in<int64_t>(v),
+                                         in<T>(factors), in<T>(random), out<T>(target), out<T>(exposure),
+                                         out<T>(background), out<bool>(whole)});
+    };
+    if (code == ScalarType::Byte) return read(uint8_t{});
+    if (code == ScalarType::Short) return read(int16_t{});
+    read(float{});
+  });
+  return {target, exposure, background, whole};
+}
+
+std::tuple<Tensor, Tensor> probe_points(Tensor random, int64_t n_anywhere, double box, double deviation) {
+  const char* op = "probe_points";
+  const Kind type = real_kind(op, "random", random);
+  const Tensor u = checked(op, "random", random, {kAny}, type);
+  const int64_t n_shifts = (u.size(0) - 3 * n_anywhere) / 4;
+  require(n_anywhere >= 0 && n_shifts >= 0 && 3 * n_anywhere + 4 * n_shifts == u.size(0), op,
+          "random must hold three numbers for each point and four for each shift");
+  Tensor anywhere = empty_like_type(u, {n_anywhere, 3}, type), shifts = empty_like_type(u, {n_shifts, 3}, type);
+  on_device(type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    device.run(op, n_anywhere + n_shifts,
+               ProbesBody<T>{n_anywhere, n_shifts, T(box), T(deviation), in<T>(u), out<T>(anywhere), out<T>(shifts)});
+  });
+  return {anywhere, shifts};
+}
+
 std::tuple<Tensor, Tensor, Tensor> place_samples(Tensor rays_o, Tensor rays_d, Tensor ray_indices, Tensor t_starts,
                                                  Tensor t_ends, Tensor offsets, Tensor anywhere, Tensor chosen,
                                                  Tensor shifts, int64_t room) {
@@ -83,12 +143,18 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "Tensor, "
       "Tensor, Tensor)");
   m.def(
+      "read_pixels(Tensor codes, Tensor index, Tensor view, Tensor exposures, Tensor backgrounds, Tensor edge_starts, "
+      "Tensor edge_ends, Tensor edge_shift, Tensor edge_behind) -> (Tensor, Tensor, Tensor, Tensor)");
+  m.def("probe_points(Tensor random, int n_anywhere, float box, float deviation) -> (Tensor, Tensor)");
+  m.def(
       "place_samples(Tensor rays_o, Tensor rays_d, Tensor ray_indices, Tensor t_starts, Tensor t_ends, Tensor "
       "offsets, Tensor anywhere, Tensor chosen, Tensor shifts, int room) -> (Tensor, Tensor, Tensor)");
 }
 
 SPLITNERF_IMPLEMENT(m) {
   m.impl("draw_rays", TORCH_BOX(&draw_rays));
+  m.impl("read_pixels", TORCH_BOX(&read_pixels));
+  m.impl("probe_points", TORCH_BOX(&probe_points));
   m.impl("place_samples", TORCH_BOX(&place_samples));
 }
 

@@ -1,5 +1,6 @@
-// march_rays, neus_weights, surface_weights, spread_samples, interpolate and composite as torch operators.
+// march_rays, neus_weights, surface_weights, sharpness, spread_samples, interpolate and composite as torch operators.
 #include <algorithm>
+#include <optional>
 #include <tuple>
 
 #include "device.h"
@@ -102,75 +103,97 @@ std::tuple<Tensor, Tensor, Tensor> neus_weights_backward(Tensor f_prev, Tensor f
   return {grad_p, grad_q, grad_s};
 }
 
-Tensor composite(Tensor weights, Tensor values, Tensor offsets) {
+// Weights and values of samples, checked and contiguous.
+struct Weighed {
+  Kind type;
+  Tensor weights, values, offsets;
+  std::optional<Tensor> opacity;
+  double least;
+
+  Weighed(const char* op, const Tensor& weights_in, const Tensor& values_in, const Tensor& offsets_in,
+          const std::optional<Tensor>& opacity_in, double least)
+      : type(real_kind(op, "weights", weights_in)), weights(checked(op, "weights", weights_in, {kAny}, type)),
+        values(checked(op, "values", values_in, {weights.size(0), kAny}, type)),
+        offsets(checked_offsets(op, offsets_in, weights.size(0), type)), least(least) {
+    if (!opacity_in) return;
+    require(least > 0, op, "least_opacity must be positive");
+    opacity = checked(op, "opacity", *opacity_in, {n_rays()}, type);
+  }
+  int64_t n_rays() const { return offsets.size(0) - 1; }
+  template <class T> CompositeArrays<T> view() const {
+    return {packed_rays(offsets, weights.size(0)), values.size(1), in<T>(weights), in<T>(values),
+            opacity ? in<T>(*opacity) : nullptr,   T(least)};
+  }
+};
+
+Tensor composite(Tensor weights, Tensor values, Tensor offsets, std::optional<Tensor> opacity, double least_opacity) {
   const char* op = "composite";
-  const Kind type = real_kind(op, "weights", weights);
-  const Tensor w = checked(op, "weights", weights, {kAny}, type),
-               v = checked(op, "values", values, {w.size(0), kAny}, type);
-  const Tensor o = checked_offsets(op, offsets, w.size(0), type);
-  Tensor sums = empty_like_type(w, {o.size(0) - 1, v.size(1)}, type);
-  on_device(type, [&](auto zero, const auto& device) {
+  const Weighed x(op, weights, values, offsets, opacity, least_opacity);
+  Tensor sums = empty_like_type(x.weights, {x.n_rays(), x.values.size(1)}, x.type);
+  on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.run(op, o.size(0) - 1,
-               CompositeBody<T>{packed_rays(o, w.size(0)), v.size(1), in<T>(w), in<T>(v), out<T>(sums)});
+    device.run(op, x.n_rays(), CompositeBody<T>{x.view<T>(), out<T>(sums)});
   });
   return sums;
 }
 
-std::tuple<Tensor, Tensor> composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor grad_sums) {
+// The gradient to the opacity is empty where there is none.
+std::tuple<Tensor, Tensor, Tensor> composite_backward(Tensor weights, Tensor values, Tensor offsets,
+                                                      std::optional<Tensor> opacity, double least_opacity,
+                                                      Tensor grad_sums) {
   const char* op = "composite_backward";
-  const Kind type = real_kind(op, "weights", weights);
-  const Tensor w = checked(op, "weights", weights, {kAny}, type),
-               v = checked(op, "values", values, {w.size(0), kAny}, type);
-  const Tensor o = checked_offsets(op, offsets, w.size(0), type);
-  const Tensor g = checked(op, "grad_sums", grad_sums, {o.size(0) - 1, v.size(1)}, type);
-  Tensor grad_w = empty_like_type(w, {w.size(0)}, type), grad_v = empty_like_type(w, {w.size(0), v.size(1)}, type);
-  on_device(type, [&](auto zero, const auto& device) {
+  const Weighed x(op, weights, values, offsets, opacity, least_opacity);
+  const Tensor g = checked(op, "grad_sums", grad_sums, {x.n_rays(), x.values.size(1)}, x.type);
+  Tensor grad_w = empty_like_type(g, {x.weights.size(0)}, x.type),
+         grad_v = empty_like_type(g, {x.weights.size(0), x.values.size(1)}, x.type),
+         grad_o = empty_like_type(g, {x.opacity ? x.n_rays() : 0}, x.type);
+  on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.run(op, o.size(0) - 1,
-               CompositeBackwardBody<T>{packed_rays(o, w.size(0)), v.size(1), in<T>(w), in<T>(v), in<T>(g),
-                                        out<T>(grad_w), out<T>(grad_v)});
+    device.run(op, x.n_rays(),
+               CompositeBackwardBody<T>{x.view<T>(), in<T>(g), out<T>(grad_w), out<T>(grad_v), out<T>(grad_o)});
   });
-  return {grad_w, grad_v};
+  return {grad_w, grad_v, grad_o};
 }
 
-// Samples of a surface, checked and contiguous.
+// Samples of a surface, checked and contiguous: the first n of a field's points.
 struct Surface {
   Kind type;
-  Tensor sdf, gradient, rays_d, s, offsets, step, anneal;
+  Tensor sdf;
+  int64_t n;
+  Tensor gradient, rays_d, s, offsets, step, anneal;
   double min_transmittance;
 
   Surface(const char* op, const Tensor& sdf_in, const Tensor& gradient_in, const Tensor& rays_d_in, const Tensor& s_in,
-          const Tensor& offsets_in, const Tensor& step_in, const Tensor& anneal_in, double min_transmittance)
-      : type(real_kind(op, "sdf", sdf_in)), sdf(checked(op, "sdf", sdf_in, {kAny}, type)),
-        gradient(checked(op, "gradient", gradient_in, {sdf.size(0), 3}, type)),
+          const Tensor& offsets_in, const Tensor& step_in, const Tensor& anneal_in, double min_transmittance,
+          int64_t n_samples)
+      : type(real_kind(op, "sdf", sdf_in)), sdf(sdf_in.dim() == 2 ? checked(op, "sdf", sdf_in, {kAny, kAny}, type)
+                                                                  : checked(op, "sdf", sdf_in, {kAny}, type)),
+        n(n_samples < 0 ? n_rows() : n_samples), gradient(checked(op, "gradient", gradient_in, {n_rows(), 3}, type)),
         rays_d(checked(op, "rays_d", rays_d_in, {kAny, 3}, type)), s(checked(op, "s", s_in, {}, type)),
-        offsets(checked_offsets(op, offsets_in, sdf.size(0), type)), step(checked(op, "step", step_in, {}, type)),
+        offsets(checked_offsets(op, offsets_in, n, type)), step(checked(op, "step", step_in, {}, type)),
         anneal(checked(op, "anneal", anneal_in, {}, type)), min_transmittance(min_transmittance) {
+    require(n <= n_rows(), op, "n_samples must be at most the number of points");
+    require(n_rows() == 0 || (stride() > 0 && n_rays() > 0), op, "there are points but no distances or no rays");
     require(offsets.size(0) == n_rays() + 1, op, "offsets must be [n_rays + 1]");
     if (!type.on_cpu()) return;
     dispatch_real(type, [&](auto zero) { require(*in<decltype(zero)>(this->step) > 0, op, "step must be positive"); });
   }
   int64_t n_rays() const { return rays_d.size(0); }
+  int64_t n_rows() const { return sdf.size(0); }
+  int64_t stride() const { return sdf.dim() == 2 ? sdf.size(1) : 1; }
   template <class T> SurfaceSamples<T> view() const {
-    return {packed_rays(offsets, sdf.size(0)),
-            in<T>(sdf),
-            in<T>(gradient),
-            in<T>(rays_d),
-            in<T>(s),
-            in<T>(step),
-            in<T>(anneal),
-            T(min_transmittance)};
+    return {packed_rays(offsets, n), in<T>(sdf),           in<T>(gradient), in<T>(rays_d), in<T>(s), in<T>(step),
+            in<T>(anneal),           T(min_transmittance), stride(),        n_rows()};
   }
 };
 
 std::tuple<Tensor, Tensor, Tensor> surface_weights(Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets,
-                                                   Tensor step, Tensor anneal, double min_transmittance) {
+                                                   Tensor step, Tensor anneal, double min_transmittance,
+                                                   int64_t n_samples) {
   const char* op = "surface_weights";
-  const Surface x(op, sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance);
-  Tensor normals = empty_like_type(x.sdf, {x.sdf.size(0), 3}, x.type),
-         weights = empty_like_type(x.sdf, {x.sdf.size(0)}, x.type);
-  Tensor opacity = empty_like_type(x.sdf, {x.n_rays()}, x.type);
+  const Surface x(op, sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance, n_samples);
+  Tensor normals = empty_like_type(x.sdf, {x.n, 3}, x.type), weights = empty_like_type(x.sdf, {x.n}, x.type),
+         opacity = empty_like_type(x.sdf, {x.n_rays()}, x.type);
   on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, x.n_rays(), SurfaceWeightsBody<T>{x.view<T>(), out<T>(normals), out<T>(weights), out<T>(opacity)});
@@ -180,36 +203,64 @@ std::tuple<Tensor, Tensor, Tensor> surface_weights(Tensor sdf, Tensor gradient, 
 
 std::tuple<Tensor, Tensor, Tensor> surface_weights_backward(Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s,
                                                             Tensor offsets, Tensor step, Tensor anneal,
-                                                            double min_transmittance, Tensor weights,
+                                                            double min_transmittance, int64_t n_samples, Tensor weights,
                                                             Tensor grad_normals, Tensor grad_weights,
                                                             Tensor grad_opacity) {
   const char* op = "surface_weights_backward";
-  const Surface x(op, sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance);
-  const int64_t n = x.sdf.size(0), n_rays = x.n_rays();
-  const Tensor w = checked(op, "weights", weights, {n}, x.type);
-  const Tensor gn = checked(op, "grad_normals", grad_normals, {n, 3}, x.type);
-  const Tensor gw = checked(op, "grad_weights", grad_weights, {n}, x.type);
-  const Tensor ga = checked(op, "grad_opacity", grad_opacity, {n_rays}, x.type);
-  Tensor grad_sdf = empty_like_type(w, {n}, x.type), grad_gradient = empty_like_type(w, {n, 3}, x.type);
-  Tensor grad_s = empty_like_type(w, {n_rays}, x.type);
+  const Surface x(op, sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance, n_samples);
+  const Tensor w = checked(op, "weights", weights, {x.n}, x.type);
+  const Tensor gn = checked(op, "grad_normals", grad_normals, {x.n, 3}, x.type);
+  const Tensor gw = checked(op, "grad_weights", grad_weights, {x.n}, x.type);
+  const Tensor ga = checked(op, "grad_opacity", grad_opacity, {x.n_rays()}, x.type);
+  Tensor grad_sdf = torch::stable::empty_like(x.sdf), grad_gradient = empty_like_type(w, {x.n_rows(), 3}, x.type);
+  Tensor grad_s = empty_like_type(w, {x.n_rays()}, x.type);
   on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.run(op, n_rays,
+    device.run(op, x.n_rays(),
                SurfaceWeightsBackwardBody<T>{x.view<T>(), in<T>(w), in<T>(gn), in<T>(gw), in<T>(ga), out<T>(grad_sdf),
-                                             out<T>(grad_gradient), out<T>(grad_s)});
+                                             out<T>(grad_gradient), out<T>(grad_s), device.template scratch<T>(x.n)});
   });
   return {grad_sdf, grad_gradient, grad_s};
 }
 
+Tensor sharpness(Tensor variance) {
+  const char* op = "sharpness";
+  const Kind type = real_kind(op, "variance", variance);
+  const Tensor v = torch::stable::contiguous(variance);
+  Tensor s = torch::stable::empty_like(v);
+  on_device(type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    device.run(op, v.numel(), SharpnessBody<T>{in<T>(v), out<T>(s)});
+  });
+  return s;
+}
+
+Tensor sharpness_backward(Tensor variance, Tensor grad_s) {
+  const char* op = "sharpness_backward";
+  const Kind type = real_kind(op, "variance", variance);
+  require(grad_s.scalar_type() == variance.scalar_type() && grad_s.numel() == variance.numel() &&
+              grad_s.device() == variance.device(),
+          op, "grad_s must be like variance");
+  const Tensor v = torch::stable::contiguous(variance), g = torch::stable::contiguous(grad_s);
+  Tensor grad_variance = torch::stable::empty_like(v);
+  on_device(type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    device.run(op, v.numel(), SharpnessBackwardBody<T>{in<T>(v), in<T>(g), out<T>(grad_variance)});
+  });
+  return grad_variance;
+}
+
 using Tensors8 = std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor>;
 Tensors8 spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, double gap, int64_t per_ray,
-                        int64_t max_shaded, int64_t max_stretches) {
+                        int64_t max_shaded, int64_t max_stretches, std::optional<Tensor> unit) {
   const char* op = "spread_samples";
   const Kind type = real_kind(op, "weights", weights);
   const Tensor w = checked(op, "weights", weights, {kAny}, type), at = checked(op, "t", t, {w.size(0)}, type);
   const Tensor o = checked_offsets(op, offsets, w.size(0), type),
                u = checked(op, "phase", phase, {o.size(0) - 1}, type);
   require(gap > 0, op, "gap must be positive");
+  std::optional<Tensor> length;
+  if (unit) length = checked(op, "unit", *unit, {}, type);
   require(per_ray >= 0 && per_ray < 1 << 20, op, "per_ray must be in [0, 2^20)");
   const bool fixed = max_shaded >= 0;
   require(fixed == (max_stretches >= 0), op, "max_shaded and max_stretches must be given both or neither");
@@ -228,8 +279,11 @@ Tensors8 spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, 
     using T = decltype(zero);
     const auto inside = [](T p) { return p >= T(0) && p < T(1); };
     require(!type.on_cpu() || std::all_of(in<T>(u), in<T>(u) + u.size(0), inside), op, "phase must be in [0, 1)");
-    device.spread_samples(packed_rays(o, w.size(0)), in<T>(w), in<T>(at), in<T>(u), T(gap), static_cast<int>(per_ray),
-                          out<int64_t>(sizes), out<int64_t>(first), out<int64_t>(second), out<T>(share), allocator);
+    const SpreadArrays<T> arrays{
+        packed_rays(o, w.size(0)), in<T>(w), in<T>(at), in<T>(u), T(gap), length ? in<T>(*length) : nullptr,
+        static_cast<int>(per_ray)};
+    device.spread_samples(arrays, out<int64_t>(sizes), out<int64_t>(first), out<int64_t>(second), out<T>(share),
+                          allocator);
   });
   return {shaded, first, second, share, heaviest, leaders, stretch, sizes};
 }
@@ -286,7 +340,7 @@ Tensor interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor secon
 
 #define SPLITNERF_SURFACE                                                                                    \
   "Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets, Tensor step, Tensor anneal, float " \
-  "min_transmittance"
+  "min_transmittance, int n_samples"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "march_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, float box, float step, "
@@ -297,20 +351,26 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance, "
       "Tensor weights, Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
-  m.def("surface_weights(" SPLITNERF_SURFACE ") -> (Tensor, Tensor, Tensor)");
+  m.def("surface_weights(" SPLITNERF_SURFACE "=-1) -> (Tensor, Tensor, Tensor)");
   m.def("surface_weights_backward(" SPLITNERF_SURFACE
         ", Tensor weights, Tensor grad_normals, "
         "Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
   m.def(
       "spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray, int "
-      "max_shaded=-1, "
-      "int max_stretches=-1) -> (Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
+      "max_shaded=-1, int max_stretches=-1, Tensor? unit=None) -> (Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, "
+      "Tensor, Tensor)");
   m.def("interpolate(Tensor values, Tensor first, Tensor second, Tensor share) -> Tensor");
   m.def(
       "interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor second, Tensor share, Tensor shaded) -> "
       "Tensor");
-  m.def("composite(Tensor weights, Tensor values, Tensor offsets) -> Tensor");
-  m.def("composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor grad_sums) -> (Tensor, Tensor)");
+  m.def(
+      "composite(Tensor weights, Tensor values, Tensor offsets, Tensor? opacity=None, float least_opacity=1) -> "
+      "Tensor");
+  m.def(
+      "composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor? opacity, float least_opacity, Tensor "
+      "grad_sums) -> (Tensor, Tensor, Tensor)");
+  m.def("sharpness(Tensor variance) -> Tensor");
+  m.def("sharpness_backward(Tensor variance, Tensor grad_s) -> Tensor");
 }
 
 SPLITNERF_IMPLEMENT(m) {
@@ -324,6 +384,8 @@ SPLITNERF_IMPLEMENT(m) {
   m.impl("interpolate_backward", TORCH_BOX(&interpolate_backward));
   m.impl("composite", TORCH_BOX(&composite));
   m.impl("composite_backward", TORCH_BOX(&composite_backward));
+  m.impl("sharpness", TORCH_BOX(&sharpness));
+  m.impl("sharpness_backward", TORCH_BOX(&sharpness_backward));
 }
 
 }  // namespace splitnerf::glue

@@ -205,6 +205,20 @@ class World:
         cameras = self.randn(100, 3, 3, seed=62), self.randn(100, 3, seed=63)
         return self.rand(r, seed=64), r * 3 // 4, *near, none, none, 100 * 400 * 400, *cameras, 400, 400
 
+    def reading(self) -> tuple:
+        """Bytes of 100 photos of 400 x 400 pixels, a tenth of them at edges."""
+        r, photos = self.sizes.rays, torch.arange(400 * 400 * 400, dtype=torch.uint8).view(-1, 4).repeat(10, 1)
+        index, starts = torch.randint(len(photos), (r,), generator=self.generator(69)), 400 * torch.arange(100 * 400)
+        behind = photos[: 40 * len(starts), :3].contiguous()
+        edges = starts, starts + 40, -360 * torch.arange(100 * 400), behind
+        return photos, index, index // 400**2, self.rand(100, 3, seed=70), self.rand(r, 3, seed=71), *edges
+
+    def probes(self) -> tuple:
+        return self.rand(3 * self.sizes.smooth + 4 * self.sizes.smooth, seed=72), self.sizes.smooth, BOX, 0.01
+
+    def composing(self) -> tuple:
+        return self.weights, self.randn(self.sizes.samples, 3), self.rays.offsets, self.rand(self.sizes.rays, seed=73), 1e-4
+
     def placing(self) -> tuple:
         r, m = self.rays, self.sizes.entropy
         indices = torch.arange(self.sizes.rays).repeat_interleave(self.sizes.per_ray)
@@ -229,15 +243,16 @@ class World:
     def surface(self) -> tuple:
         gradient = unit(self.rays.positions) + 0.1 * self.randn(self.sizes.samples, 3, seed=10)
         sharp = torch.tensor(S)
-        numbers = (torch.tensor(self.rays.step), torch.tensor(ANNEAL), MIN_TRANSMITTANCE)
-        return self.distances, gradient, self.rays.directions, sharp, self.rays.offsets, *numbers
+        numbers = (torch.tensor(self.rays.step), torch.tensor(ANNEAL), MIN_TRANSMITTANCE, self.sizes.samples)
+        outputs = torch.cat([self.distances[:, None], self.randn(self.sizes.samples, 12, seed=68)], 1)
+        return outputs, gradient, self.rays.directions, sharp, self.rays.offsets, *numbers
 
     @functools.cached_property
     def weights(self) -> Tensor:
         return lib.neus_weights(*self.neus())[0]
 
     def spreading(self) -> tuple:
-        return self.weights, self.rays.t, self.rays.offsets, self.rays.jitter, 0.1, 4
+        return self.weights, self.rays.t, self.rays.offsets, self.rays.jitter, 2.5, 4, -1, -1, torch.tensor(0.04)
 
     def interpolation(self) -> tuple:
         """Values of the shaded samples, and between which two each sample lies."""
@@ -334,7 +349,7 @@ class World:
     def pixels(self) -> tuple:
         r = self.sizes.rays
         numbers = self.rand(r, 3, seed=52), self.rand(r, seed=53), self.rand(r, 4, seed=54), self.rand(r, 3, seed=55)
-        return *numbers, self.rand(r, seed=58) < 0.1, True
+        return *numbers, self.rand(r, seed=58) < 0.1, 0.8 + 0.4 * self.rand(r, 3, seed=59), True
 
     def normals_beside(self) -> tuple:
         """Gradients of all samples, then of points beside some of them."""
@@ -430,7 +445,9 @@ OWN = Case("monte_carlo_light", World.own_directions, lambda s, out: 55 * s.trac
 SHARED = Case("summed_light", World.shared_directions, lambda s, out: 45 * s.segments * s.directions)
 NEUS = Case("neus_weights", World.neus, a_sample(12))
 SURFACE = Case("surface_weights", World.surface, a_sample(35))
-COMPOSITE = Case("composite", lambda w: (w.weights, w.randn(w.sizes.samples, 8), w.rays.offsets), a_sample(16))
+COMPOSITE = Case("composite", World.composing, a_sample(6))
+SHARPNESS = Case("sharpness", lambda w: (torch.tensor(0.4),), lambda s, out: 10)
+PIXELS = Case("pixel_losses", World.pixels, lambda s, out: 60 * s.rays)
 SRGB = Case("linear_to_srgb", lambda w: (w.rand(w.sizes.samples, 3),), a_sample(12))
 
 CASES = [
@@ -455,9 +472,11 @@ CASES = [
     Case("put_rows", lambda w: (w.row_arrays(len(w.shaded)), w.shaded, [w.sizes.samples] * 3), a_point(30)),
     Case("light_queries", World.query, a_point(50)),
     Case("draw_rays", World.drawing, lambda s, out: 40 * s.rays),
+    Case("read_pixels", World.reading, lambda s, out: 40 * s.rays),
+    Case("probe_points", World.probes, lambda s, out: 60 * s.smooth),
     Case("place_samples", World.placing, a_sample(10)),
     NEUS, backward(NEUS, a_sample(20), 0), SURFACE, backward(SURFACE, a_sample(60), 1),
-    COMPOSITE, backward(COMPOSITE, a_sample(32)),
+    COMPOSITE, backward(COMPOSITE, a_sample(14)), SHARPNESS, backward(SHARPNESS, lambda s, out: 12),
     Case("spread_samples", World.spreading, a_sample(6)),
     Case("interpolate", World.interpolation, a_sample(24)),
     Case("interpolate_backward", World.interpolation_backward, a_sample(24)),
@@ -474,9 +493,11 @@ CASES = [
     Case("cached_visibility", World.near_the_mesh, lambda s, out: 16 * s.segments * s.directions),
     Case("cached_occlusion", World.occlusion, lambda s, out: (16 + 30) * s.segments * s.directions),
     SRGB, backward(SRGB, a_sample(12)), Case("srgb_to_linear", lambda w: (w.rand(w.sizes.samples, 3),), a_sample(12)),
-    Case("pixel_losses", World.pixels, lambda s, out: 60 * s.rays),
+    PIXELS, backward(PIXELS, lambda s, out: 90 * s.rays),
     Case("gradient_losses", World.normals_beside, a_sample(10)),
+    Case("gradient_losses_backward", lambda w: with_gradients("gradient_losses", w.normals_beside(), 1)[:-1], a_sample(20)),
     Case("material_losses", World.materials, a_point(20)),
+    Case("material_losses_backward", lambda w: with_gradients("material_losses", w.materials(), 1)[:-1], a_point(20)),
     # Of a pair of five numbers: their distance 15, its exponential and the sum.
     Case("quadratic_entropy", lambda w: (w.randn(w.sizes.entropy, 5),), lambda s, out: 17 * s.entropy**2),
 ]  # fmt: skip

@@ -60,7 +60,7 @@ def sample(field: SdfField, x: Tensor) -> SdfSample:
 # ---- samples ----
 
 
-def spread_samples(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_stretches=-1):
+def spread_samples(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_stretches=-1, unit=None):
     """All samples are shaded, each for itself."""
     every = torch.arange(len(weights))
     rays = reference.ray_indices(offsets)
@@ -95,12 +95,14 @@ def stacked(losses):
 REPLACED = {
     rays_module: dict(
         march_rays=reference.march_rays, surface_weights=reference.surface_weights, composite=reference.composite,
+        sharpness=reference.sharpness,
         spread_samples=spread_samples, interpolate=lambda values, first, second, share: values,
         interpolate_backward=lambda grad, first, second, share, shaded: grad,
     ),
     losses_module: dict(
         quadratic_entropy=lambda x: (reference.quadratic_entropy(x), None),
-        pixel_losses=stacked(reference.pixel_losses), gradient_losses=stacked(reference.gradient_losses),
+        pixel_losses=lambda *inputs: torch.stack(reference.pixel_losses(*inputs)),
+        gradient_losses=stacked(reference.gradient_losses),
         material_losses=stacked(reference.material_losses),
     ),
     shading_module: dict(query_direction=reference.query_direction, split_sum_shade=reference.split_sum_shade),

@@ -200,15 +200,24 @@ TEST(AnnealedCosine, GoesFromSoftToSharp) {
 
 TEST(Composite, SumsEachRayAndItsAdjointIsExact) {
   const std::vector<int64_t> offsets{0, 2, 2, 3};
-  std::vector<double> w{1, 2, 3}, v{1, 10, 2, 20, 3, 30}, sums(6, -7);
+  std::vector<double> w{1, 2, 3}, v{1, 10, 2, 20, 3, 30}, sums(6, -7), opacity{2, 0, 0.25};
   const PackedRays rays{3, offsets.back(), offsets.data()};
-  cpu::run(3, CompositeBody<double>{rays, 2, w.data(), v.data(), sums.data()});
+  const CompositeArrays<double> plain{rays, 2, w.data(), v.data(), nullptr, 1};
+  cpu::run(3, CompositeBody<double>{plain, sums.data()});
   EXPECT_EQ(sums, (std::vector<double>{5, 50, 0, 0, 9, 90}));
   const std::vector<double> g{1, 2, 3, 4, 5, 6};
-  std::vector<double> gw(3), gv(6);
-  cpu::run(3, CompositeBackwardBody<double>{rays, 2, w.data(), v.data(), g.data(), gw.data(), gv.data()});
+  std::vector<double> gw(3), gv(6), go(3, -7);
+  cpu::run(3, CompositeBackwardBody<double>{plain, g.data(), gw.data(), gv.data(), nullptr});
   EXPECT_EQ(gw, (std::vector<double>{21, 42, 195}));
   EXPECT_EQ(gv, (std::vector<double>{1, 2, 2, 4, 15, 18}));
+  // Divided by the opacity, at least .5: the second and the third ray count as that, and have no gradient.
+  const CompositeArrays<double> divided{rays, 2, w.data(), v.data(), opacity.data(), 0.5};
+  cpu::run(3, CompositeBody<double>{divided, sums.data()});
+  EXPECT_EQ(sums, (std::vector<double>{2.5, 25, 0, 0, 18, 180}));
+  cpu::run(3, CompositeBackwardBody<double>{divided, g.data(), gw.data(), gv.data(), go.data()});
+  EXPECT_EQ(gw, (std::vector<double>{10.5, 21, 390}));
+  EXPECT_EQ(gv, (std::vector<double>{0.5, 1, 1, 2, 30, 36}));
+  EXPECT_EQ(go, (std::vector<double>{-(2.5 + 2 * 25) / 2, 0, 0}));
 }
 
 }  // namespace

@@ -86,42 +86,60 @@ TEST(GroupKernels, NeusWeightsPassANanOn) {
   EXPECT_TRUE(std::isnan(o32[5]));
 }
 
+// The distance is the first of some columns, and behind the samples there are other points.
 TEST(GroupKernels, SurfaceWeightsAndTheirGradients) {
   const Rays r;
-  const SurfaceSamples<double> in = r.surface();
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
-  Random random(2);
-  const auto gn = random.uniforms(3 * n, -1), gw = random.uniforms(n, -1), go = random.uniforms(n_rays, -1);
-  std::vector<double> normals(3 * n, 9), w(n, 9), o(n_rays), to_sdf(n, 9), to_gradient(3 * n, 9), to_s(n_rays);
-  cpu::run(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals.data(), w.data(), o.data()});
-  cpu::run(in.rays.n_rays, SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(),
-                                                              to_sdf.data(), to_gradient.data(), to_s.data()});
-  std::vector<double> normals8(3 * n, 7), w8(n, 7), o8(n_rays), to_sdf8(n, 7), to_gradient8(3 * n, 7), to_s8(n_rays);
-  on_gpu(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals8.data(), w8.data(), o8.data()});
-  on_gpu(in.rays.n_rays, SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(),
-                                                            to_sdf8.data(), to_gradient8.data(), to_s8.data()});
-  expect_near(normals8, normals, 0), expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
-  for (const double last : {w8.back(), to_gradient8.back(), normals8.back()}) EXPECT_EQ(last, 0);
-  expect_near(to_sdf8, to_sdf, 1e-13), expect_near(to_gradient8, to_gradient, 1e-13), expect_near(to_s8, to_s, 1e-13);
+  for (const auto& [stride, more] : std::initializer_list<std::pair<size_t, size_t>>{{1, 0}, {3, 500}}) {
+    SurfaceSamples<double> in = r.surface();
+    const size_t rows = n + more;
+    std::vector<double> sdf(stride * rows, 7);
+    for (size_t i = 0; i < n; ++i) sdf[stride * i] = r.sdf[i];
+    in.sdf = sdf.data(), in.stride = int64_t(stride), in.n_rows = int64_t(rows);
+    Random random(2);
+    const auto gn = random.uniforms(3 * n, -1), gw = random.uniforms(n, -1), go = random.uniforms(n_rays, -1);
+    std::vector<double> normals(3 * n, 9), w(n, 9), o(n_rays), to_sdf(stride * rows, 9), to_gradient(3 * rows, 9),
+        to_s(n_rays), depths(n);
+    cpu::run(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals.data(), w.data(), o.data()});
+    cpu::run(in.rays.n_rays,
+             SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(), to_sdf.data(),
+                                                to_gradient.data(), to_s.data(), depths.data()});
+    std::vector<double> normals8(3 * n, 7), w8(n, 7), o8(n_rays), to_sdf8(stride * rows, 7), to_gradient8(3 * rows, 7),
+        to_s8(n_rays), depths8 = unwritten<double>(int64_t(n));
+    on_gpu(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals8.data(), w8.data(), o8.data()});
+    on_gpu(in.rays.n_rays,
+           SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(), to_sdf8.data(),
+                                              to_gradient8.data(), to_s8.data(), depths8.data()});
+    expect_near(normals8, normals, 0), expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
+    for (const double last : {w8.back(), to_gradient8.back(), to_sdf8.back(), normals8.back()}) EXPECT_EQ(last, 0);
+    expect_near(to_sdf8, to_sdf, 1e-13), expect_near(to_gradient8, to_gradient, 1e-13);
+    expect_near(to_s8, to_s, 1e-13);
+  }
 }
 
 TEST(GroupKernels, CompositeAndItsGradients) {
   const Rays r;
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays), channels = 5;
   Random random(4);
-  const auto w = random.uniforms(n), v = random.uniforms(n * channels, -1), g = random.uniforms(n_rays * channels, -1);
-  std::vector<double> sums(n_rays * channels), to_w(n, 9), to_v(n * channels, 9), sums8(n_rays * channels), to_w8(n, 7),
-      to_v8(n * channels, 7);
-  cpu::run(r.packed().n_rays, CompositeBody<double>{r.packed(), channels, w.data(), v.data(), sums.data()});
-  cpu::run(r.packed().n_rays,
-           CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(), g.data(), to_w.data(), to_v.data()});
-  on_gpu(r.packed().n_rays, CompositeBody<double>{r.packed(), channels, w.data(), v.data(), sums8.data()});
-  on_gpu(r.packed().n_rays,
-         CompositeBackwardBody<double>{r.packed(), channels, w.data(), v.data(), g.data(), to_w8.data(), to_v8.data()});
-  expect_near(sums8, sums, 1e-14), expect_near(to_w8, to_w, 0), expect_near(to_v8, to_v, 0);
+  const auto w = random.uniforms(n), v = random.uniforms(n * channels, -1), g = random.uniforms(n_rays * channels, -1),
+             opacity = random.uniforms(n_rays);
+  for (const double* divisor : {static_cast<const double*>(nullptr), opacity.data()}) {
+    const CompositeArrays<double> in{r.packed(), int64_t(channels), w.data(), v.data(), divisor, 0.3};
+    const auto run = [&](const auto& launch) {
+      std::vector<std::vector<double>> out{std::vector<double>(n_rays * channels, 9), std::vector<double>(n, 9),
+                                           std::vector<double>(n * channels, 9), std::vector<double>(n_rays, 9)};
+      launch(CompositeBody<double>{in, out[0].data()});
+      launch(CompositeBackwardBody<double>{in, g.data(), out[1].data(), out[2].data(), out[3].data()});
+      return out;
+    };
+    const auto a = run([&](const auto&body) { cpu::run(in.rays.n_rays, body); }),
+               b = run([&](const auto&body) { on_gpu(in.rays.n_rays, body); });
+    expect_near(b[0], a[0], 1e-14), expect_near(b[1], a[1], 0), expect_near(b[2], a[2], 0);
+    expect_near(b[3], a[3], 1e-14);
+  }
 }
 
-// With as much room as is needed, and with more.
+// With as much room as is needed, with more, and with too little.
 TEST(GroupKernels, SpreadSamples) {
   const Rays r;
   const int64_t n = r.n(), n_rays = r.packed().n_rays;
@@ -129,9 +147,15 @@ TEST(GroupKernels, SpreadSamples) {
   const auto w = random.uniforms(size_t(n)), phase = random.uniforms(size_t(n_rays));
   std::vector<double> t(n);
   for (int64_t i = 0; i < n; ++i) t[i] = (i ? t[i - 1] : 0) + random.uniform(0.01, 0.2);
-  const SpreadSizes room{500, n_rays, 400};
-  for (const auto& [per_ray, gap, fixed] : std::initializer_list<std::tuple<int, double, const SpreadSizes*>>{
-           {0, 0.15, nullptr}, {1, 0.15, nullptr}, {4, INFINITY, nullptr}, {4, 0.15, &room}, {1, INFINITY, &room}}) {
+  const SpreadSizes room{500, n_rays, 400}, narrow{20, n_rays, 10};
+  const double unit = 0.5;
+  for (const auto& [per_ray, gap, fixed] :
+       std::initializer_list<std::tuple<int, double, const SpreadSizes*>>{{0, 0.15, nullptr},
+                                                                          {1, 0.15, nullptr},
+                                                                          {4, INFINITY, nullptr},
+                                                                          {4, 0.15, &room},
+                                                                          {1, INFINITY, &room},
+                                                                          {4, 0.15, &narrow}}) {
     using Indices = std::vector<int64_t>;
     struct Result {
       Indices first, second, shaded, heaviest, leaders, stretch;
@@ -144,13 +168,12 @@ TEST(GroupKernels, SpreadSamples) {
     };
     Result one{Indices(n, -1), Indices(n, -1), {}, {}, {}, {}, std::vector<double>(n, -1)}, two = one;
     int64_t sizes[3];
-    cpu::spread_samples(r.packed(), w.data(), t.data(), phase.data(), gap, per_ray, sizes, one.first.data(),
-                        one.second.data(), one.share.data(),
+    const SpreadArrays<double> in{r.packed(), w.data(), t.data(), phase.data(), gap / unit, &unit, per_ray};
+    cpu::spread_samples(in, sizes, one.first.data(), one.second.data(), one.share.data(),
                         {[&](const SpreadSizes& s) { return one.allocate(s); }, fixed});
     int64_t counted[3];
     Gpu gpu;
-    cuda::spread_samples(gpu.queue(), r.packed(), w.data(), t.data(), phase.data(), gap, per_ray, counted,
-                         two.first.data(), two.second.data(), two.share.data(),
+    cuda::spread_samples(gpu.queue(), in, counted, two.first.data(), two.second.data(), two.share.data(),
                          {[&](const SpreadSizes& s) { return two.allocate(s); }, fixed});
     EXPECT_TRUE(std::equal(counted, counted + 3, sizes));
     EXPECT_EQ(two.shaded, one.shaded);
@@ -166,15 +189,19 @@ TEST(GroupKernels, SpreadSamples) {
 
 // A ray of which more samples are drawn than were counted: what the next ray has stays its own.
 TEST(GroupKernels, SpreadSamplesKeepsToWhatWasCounted) {
-  const std::vector<int64_t> offsets{0, 8, 16}, stretches{0, 1, 2}, filled{0, 1, 2}, drawn{0, 7, 15};
+  const std::vector<int64_t> offsets{0, 8, 16}, sums{0, 7, 15, 0, 1, 2, 0, 1, 2};
   const std::vector<double> weights(16, 0.1), phase(2, 0.5);
   std::vector<double> t(16), share(16);
   for (size_t i = 0; i < 16; ++i) t[i] = 0.1 * double(i);
   std::vector<int64_t> shaded(15, -1), heaviest(2), leaders(2), stretch(15), first(16), second(16);
   const Spread to{shaded.data(), heaviest.data(), leaders.data(), stretch.data(), {15, 2, 2}};
   const SpreadFillBody<double> fill{
-      {2, 16, offsets.data()}, weights.data(), t.data(), phase.data(), INFINITY,      0,           drawn.data(),
-      stretches.data(),        filled.data(),  to,       first.data(), second.data(), share.data()};
+      {{2, 16, offsets.data()}, weights.data(), t.data(), phase.data(), INFINITY, nullptr, 0},
+      sums.data(),
+      to,
+      first.data(),
+      second.data(),
+      share.data()};
   fill(1), fill(0);
   for (int64_t k = 0; k < 15; ++k) EXPECT_EQ(shaded[size_t(k)], k < 7 ? k : k + 1);
 }

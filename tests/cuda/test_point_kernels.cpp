@@ -159,6 +159,62 @@ TEST(PointKernels, DrawnRays) {
   }
 }
 
+template <class Code> void compare_read_pixels(int64_t n) {
+  Random random(125);
+  const int64_t n_pixels = 90, starts[] = {3, 40}, ends[] = {9, 80}, shift[] = {-3, -34};
+  std::vector<Code> codes(4 * n_pixels);
+  for (Code& code : codes) code = Code(random.below(60000));
+  std::vector<uint8_t> behind(3 * 46);
+  for (uint8_t& code : behind) code = uint8_t(random.below(256));
+  std::vector<int64_t> index(n), view(n);
+  for (int64_t i = 0; i < n; ++i) index[i] = random.below(n_pixels + 4) - 2, view[i] = random.below(5) - 1;
+  const auto exposures = random.uniforms(9), backgrounds = random.uniforms(3 * n);
+  const auto run = [&](const auto& launch) {
+    std::pair out{unwritten<double>(10 * n), std::vector<int64_t>(n)};
+    const std::unique_ptr<bool[]> whole(new bool[n]);
+    double* p = out.first.data();
+    launch(ReadPixelsBody<double, Code>{codes.data(),
+                                        n_pixels,
+                                        3,
+                                        {starts, ends, shift, behind.data(), 2, 46},
+                                        index.data(),
+                                        view.data(),
+                                        exposures.data(),
+                                        backgrounds.data(),
+                                        p,
+                                        p + 4 * n,
+                                        p + 7 * n,
+                                        whole.get()});
+    std::copy(whole.get(), whole.get() + n, out.second.begin());
+    return out;
+  };
+  const auto a = run([&](const auto&body) { cpu::run(n, body); }), b = run([&](const auto&body) { on_gpu(n, body); });
+  expect_near(b.first, a.first, 0);
+  EXPECT_EQ(b.second, a.second);
+}
+
+TEST(PointKernels, ReadPixels) {
+  for (const int64_t n : {0, 1, 700}) {
+    compare_read_pixels<uint8_t>(n);
+    compare_read_pixels<int16_t>(n);
+    compare_read_pixels<float>(n);
+  }
+}
+
+TEST(PointKernels, Probes) {
+  for (const int64_t k : {0, 1, 300})
+    for (const int64_t m : {0, 1, 300}) {
+      Random random(135);
+      const auto u = random.uniforms(3 * k + 4 * m);
+      auto a = unwritten<double>(3 * (k + m)), b = a;
+      const auto body = [&](auto& out) {
+        return ProbesBody<double>{k, m, 1.3, 0.05, u.data(), out.data(), out.data() + 3 * k};
+      };
+      cpu::run(k + m, body(a)), on_gpu(k + m, body(b));
+      expect_near(b, a, 1e-15);
+    }
+}
+
 TEST(PointKernels, PlacedSamples) {
   for (const int64_t n : {0, 1, 300})
     for (const int64_t room : {n, 2 * n + 5}) {
@@ -239,19 +295,29 @@ TEST(PointKernels, PixelLosses) {
     for (const bool linear : {false, true}) {
       Random random(55);
       const auto mean = random.uniforms(3 * n, 0, 1.5), opacity = random.uniforms(n), target = random.uniforms(4 * n),
-                 background = random.uniforms(3 * n);
+                 background = random.uniforms(3 * n), exposure = random.uniforms(3 * n, 0.5, 2);
       const std::unique_ptr<bool[]> whole(new bool[n]);
       for (int64_t i = 0; i < n; ++i) whole[i] = random.below(2) == 1;
-      const auto run = [&](const auto& launch) {
-        std::vector<std::vector<double>> out{unwritten<double>(2), unwritten<double>(3 * n), unwritten<double>(n),
-                                             unwritten<double>(n)};
-        launch(make_pixel_losses(n, mean.data(), opacity.data(), target.data(), background.data(), whole.get(), linear,
-                                 out[0].data(), out[1].data(), out[2].data(), out[3].data()));
-        return out;
-      };
-      const auto a = run([&](const auto&body) { cpu::run(n, body); }),
-                 b = run([&](const auto&body) { on_gpu(n, body); });
-      for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
+      const double grad[] = {1.5, -0.5};
+      for (const bool given : {false, true}) {
+        const PixelArrays<double> in{n,
+                                     mean.data(),
+                                     opacity.data(),
+                                     target.data(),
+                                     background.data(),
+                                     given ? exposure.data() : nullptr,
+                                     given ? whole.get() : nullptr,
+                                     linear};
+        const auto run = [&](const auto& launch) {
+          std::vector<std::vector<double>> out{unwritten<double>(2), unwritten<double>(3 * n), unwritten<double>(n)};
+          launch(PixelLossesBody<double>{in, out[0].data()});
+          launch(PixelLossesBackwardBody<double>{in, grad, out[1].data(), out[2].data()});
+          return out;
+        };
+        const auto a = run([&](const auto&body) { cpu::run(n, body); }),
+                   b = run([&](const auto&body) { on_gpu(n, body); });
+        for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
+      }
     }
 }
 
@@ -263,13 +329,14 @@ TEST(PointKernels, GradientLosses) {
     const auto gradients = random.uniforms(3 * n, -1), weights = random.uniforms(n_weights);
     std::vector<int64_t> beside(m);
     for (int64_t& i : beside) i = random.below(int(n_weights));
+    const GradientArrays<double> in{n, n_weights, m, gradients.data(), weights.data(), beside.data()};
+    const double grad[] = {1.5, -0.5};
     const auto run = [&](const auto& launch) {
-      std::vector<std::vector<double>> out{unwritten<double>(2), unwritten<double>(3 * n), unwritten<double>(3 * n),
-                                           unwritten<double>(1)};
-      launch(n, EikonalBody<double>{gradients.data(), 1.0 / double(n), out[0].data(), out[1].data(), out[2].data()});
-      launch(m, NormalPairsBody<double>{n, n_weights, m, gradients.data(), weights.data(), beside.data(),
-                                        out[0].data() + 1, out[2].data(), out[3].data()});
-      launch(3 * n, ScaleBody<double>{out[3].data(), out[2].data()});
+      std::vector<std::vector<double>> out{unwritten<double>(2), unwritten<double>(1), unwritten<double>(3 * n)};
+      launch(n + m, GradientLossesBody<double>{in, out[0].data(), out[1].data()});
+      const GradientLossesBackwardBody<double> backward{in, out[1].data(), grad, out[2].data()};
+      launch(n, backward);
+      launch(m, SamplesOfPairsBackwardBody<double>{backward});
       return out;
     };
     const auto a = run([](int64_t n, const auto& body) { cpu::run(n, body); });
@@ -283,10 +350,12 @@ TEST(PointKernels, MaterialLosses) {
     for (const bool smooth : {false, true}) {
       Random random(75);
       const auto albedo = random.uniforms(3 * n), metallic = random.uniforms(n), shares = random.uniforms(n);
+      const MaterialArrays<double> in{albedo.data(), metallic.data(), shares.data(), smooth};
+      const double grad[] = {1.5, -0.5, 0.25};
       const auto run = [&](const auto& launch) {
-        std::vector<std::vector<double>> out{unwritten<double>(3), unwritten<double>(3 * n), unwritten<double>(1)};
-        launch(MaterialLossesBody<double>{n, albedo.data(), metallic.data(), shares.data(), smooth, out[0].data(),
-                                          out[1].data(), out[2].data()});
+        std::vector<std::vector<double>> out{unwritten<double>(3), unwritten<double>(1), unwritten<double>(n)};
+        launch(MaterialLossesBody<double>{in, out[0].data(), out[1].data()});
+        launch(MaterialLossesBackwardBody<double>{in, out[1].data(), grad, out[2].data()});
         return out;
       };
       const auto a = run([&](const auto&body) { cpu::run(n, body); }),

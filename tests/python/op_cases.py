@@ -105,11 +105,13 @@ def rand(*shape: int, seed: int = 0, dtype=torch.float64) -> torch.Tensor:
 
 
 def pixel_inputs(n: int = 60, dtype=torch.float64) -> tuple:
-    """Colours up to 1.6, some below 0; opacities beyond both bounds of the mask's; some channels clipped by the photo."""
+    """Colours up to 1.6, some below 0; opacities beyond both bounds of the mask's; some channels clipped by the photo; exposures
+    from .8 to 1.2."""
     target = rand(n, 4, seed=3)
     target[::7, :2] = 1.0
     parts = 1.7 * rand(n, 3) - 0.1, 1.004 * rand(n, seed=1) - 0.002, target, rand(n, 3, seed=4)
-    return *(part.to(dtype) for part in parts), torch.arange(n) % 3 == 1
+    exposure = 0.8 + 0.4 * rand(n, 3, seed=5)
+    return *(part.to(dtype) for part in parts), torch.arange(n) % 3 == 1, exposure.to(dtype)
 
 
 def field_gradients(dtype=torch.float64) -> tuple:
@@ -194,6 +196,15 @@ def draw_inputs(dtype, n: int = 300) -> tuple:
     return rand(n, dtype=dtype), n // 3, last, shift, 40, none, none, 3 * 8 * 11, *cameras, 8, 11
 
 
+def read_inputs(dtype, n: int = 300) -> tuple:
+    """Arguments of ``read_pixels``: three photos of 40 pixels as words, and two runs of pixels at edges."""
+    draw = generator(8)
+    codes = torch.randint(-(2**15), 2**15, (120, 4), generator=draw).to(torch.int16)
+    index, behind = torch.randint(120, (n,), generator=draw), torch.randint(256, (46, 3), generator=draw).to(torch.uint8)
+    edges = torch.tensor([3, 60]), torch.tensor([9, 100]), torch.tensor([-3, -54]), behind
+    return codes, index, index // 40, rand(3, 3, seed=9, dtype=dtype), rand(n, 3, seed=10, dtype=dtype), *edges
+
+
 def place_inputs(dtype) -> tuple:
     """Arguments of ``place_samples``: samples of 20 rays in rows for a few more, room for others, and points beside some."""
     rays_o, rays_d = (torch.randn(20, 3, generator=generator(i), dtype=torch.float64) for i in range(2))
@@ -201,6 +212,15 @@ def place_inputs(dtype) -> tuple:
     numbers = rays_o, unit(rays_d), starts, starts + 0.1, rand(30, 3, seed=4), rand(50, seed=5), rand(50, 3, seed=6)
     rays_o, rays_d, *rest = (x.to(dtype) for x in numbers)
     return rays_o, rays_d, ray_indices, *rest[:2], torch.arange(0, 200, 9)[:21], *rest[2:], 260
+
+
+def composite_case(dtype) -> tuple:
+    """Arguments of ``composite`` with the rays' opacities, of which one is less than the least."""
+    return *composite_inputs("cpu", dtype), torch.tensor([0.9, 0.5, 0.01, 0.7], dtype=dtype), 0.1
+
+
+def material_inputs(dtype) -> tuple:
+    return rand(600, 3, dtype=dtype), rand(600, 1, seed=1, dtype=dtype), rand(600, seed=2, dtype=dtype), False
 
 
 def row_numbers() -> torch.Tensor:
@@ -218,6 +238,15 @@ def surface_inputs(dtype=torch.float64) -> tuple:
     rays_d = unit(torch.randn(50, 3, generator=g, dtype=torch.float64))
     s = torch.tensor(12.0, dtype=torch.float64)
     return *(x.to(dtype) for x in (sdf, gradient, rays_d, s)), samples.offsets
+
+
+def surface_case(dtype) -> tuple:
+    """Arguments of ``surface_weights``: the distances are the first of three columns, and behind the samples there are others."""
+    sdf, gradient, rays_d, s, offsets = surface_inputs(dtype)
+    n = len(sdf)
+    outputs = torch.cat([torch.stack([sdf, sdf + 1, sdf + 2], 1), rand(70, 3, seed=11, dtype=dtype)])
+    gradient = torch.cat([gradient, rand(70, 3, seed=12, dtype=dtype)])
+    return outputs, gradient, rays_d, s, offsets, *torch.tensor([0.1, 0.4], dtype=dtype).unbind(), 1e-3, n
 
 
 def packed_samples(dtype=torch.float64, seed: int = 4) -> tuple:
@@ -431,22 +460,25 @@ CASES = {
     "linear_to_srgb_backward": lambda t: (rand(40, 7, dtype=t), rand(40, 7, seed=1, dtype=t)),
     "srgb_to_linear": lambda t: (rand(40, 7, dtype=t),),
     "pixel_losses": lambda t: (*pixel_inputs(600, t), True),
+    "pixel_losses_backward": lambda t: with_gradients("pixel_losses", (*pixel_inputs(600, t), True)),
     "gradient_losses": field_gradients,
-    "material_losses": lambda t: (
-        rand(600, 3, dtype=t), rand(600, 1, seed=1, dtype=t), rand(600, seed=2, dtype=t), False
-    ),
+    "gradient_losses_backward": lambda t: with_gradients("gradient_losses", field_gradients(t), 1)[:-1],
+    "material_losses": material_inputs,
+    "material_losses_backward": lambda t: with_gradients("material_losses", material_inputs(t), 1)[:-1],
     "quadratic_entropy": lambda t: (rand(70, 11, dtype=t),),
     "draw_rays": draw_inputs,
+    "read_pixels": read_inputs,
+    "probe_points": lambda t: (rand(3 * 200 + 4 * 150, dtype=t), 200, 1.3, 0.05),
     "place_samples": place_inputs,
     "march_rays": lambda t: march_inputs("cpu", t, 300),
     "neus_weights": lambda t: neus_inputs("cpu", t, 0.01),
     "neus_weights_backward": lambda t: with_gradients("neus_weights", neus_inputs("cpu", t, 0.01), 0),
-    "surface_weights": lambda t: (*surface_inputs(t), torch.tensor(0.1, dtype=t), torch.tensor(0.4, dtype=t), 1e-3),
-    "surface_weights_backward": lambda t: with_gradients(
-        "surface_weights", (*surface_inputs(t), torch.tensor(0.1, dtype=t), torch.tensor(0.4, dtype=t), 1e-3), 1
-    ),
-    "composite": lambda t: composite_inputs("cpu", t),
-    "composite_backward": lambda t: with_gradients("composite", composite_inputs("cpu", t)),
+    "surface_weights": surface_case,
+    "surface_weights_backward": lambda t: with_gradients("surface_weights", surface_case(t), 1),
+    "sharpness": lambda t: (torch.linspace(-0.2, 1.1, 40, dtype=t),),
+    "sharpness_backward": lambda t: with_gradients("sharpness", CASES["sharpness"](t)),
+    "composite": composite_case,
+    "composite_backward": lambda t: with_gradients("composite", composite_case(t)),
     "spread_samples": spread_inputs,
     "sample_rays": sample_rays_inputs,
     "sdf_layer": lambda t: sdf_layer_inputs(150, t),

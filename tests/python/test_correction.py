@@ -15,7 +15,7 @@ from splitnerf.ops import split_sum_shade
 from splitnerf.render.model import SUMMED_BAND, SceneModel, ShadedPoints
 from splitnerf.render.occupancy import make_grid
 from splitnerf.render.renderer import find_samples, render_rays
-from splitnerf.training.batches import Batch, draw_probes
+from splitnerf.training.batches import Batch, draw_numbers, make_probes, probe_counts
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.step import Room, Step
 
@@ -174,7 +174,8 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     jitter = torch.rand(30, generator=g)
     pixels = torch.rand(30, 4, generator=g), torch.rand(30, 3, generator=g), torch.zeros(30, dtype=torch.bool)
     photo = torch.zeros(30, dtype=torch.int64), torch.ones(30, 3)
-    batch = Batch(*rays, *pixels, jitter, *photo, draw_probes(model.config, g))
+    probes = make_probes(model.config, *draw_numbers(g, probe_counts(model.config)))
+    batch = Batch(*rays, *pixels, jitter, jitter, *photo, probes)
     gradients = []
     for _ in range(2):
         ray, _ = step(batch, model.evaluate_light(), None, 1, 0.0)

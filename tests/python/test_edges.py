@@ -98,13 +98,14 @@ def test_pixels_are_found_by_their_numbers(tmp_path, dtype):
     images = np.stack([photo(square(), 0.9, np.full((40, 60), g / 255)) for g in grey])
     images[1, ..., 3] = 0
     codes = images if dtype == np.float32 else np.rint(images * np.iinfo(dtype).max).astype(dtype)
-    edges = PixelSource(scene(tmp_path, codes), 0.5, generator(), 2).edges
+    source = PixelSource(scene(tmp_path, codes), 0.5, generator(), 2)
     expected = np.stack([band(image[..., 3], 2)[0] for image in images])
     index = torch.randperm(4 * 40 * 60, generator=generator())
-    whole, behind = edges.at(index)
-    assert np.array_equal(whole.numpy(), expected.ravel()[index.numpy()]) and len(edges) == expected.sum() > 0
-    view = index // (40 * 60)
+    view, random = index // (40 * 60), torch.rand(len(index), 3)
+    _, _, behind, whole = source.pixels.read(index, view, torch.ones(4, 3), random, source.edges.runs)
+    assert np.array_equal(whole.numpy(), expected.ravel()[index.numpy()]) and len(source.edges) == expected.sum() > 0
     torch.testing.assert_close(behind[whole], (torch.tensor(grey)[view] / 255)[whole, None].expand(-1, 3))
+    assert torch.equal(behind[~whole], random[~whole])
 
 
 def test_a_source_has_edges_where_photos_are_whole_and_masks_have_edges(tmp_path):

@@ -19,7 +19,7 @@ from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf.data.pixels import per_channel
 from splitnerf.errors import InputError
 from splitnerf.evaluate.exposure import exposed_like
-from splitnerf.ops import pixel_losses
+from splitnerf.ops import EdgeRuns, pixel_losses, read_pixels
 from splitnerf.training import exposure
 from splitnerf.render.edges import EdgePixels
 from splitnerf.render.rays import DrawnRays
@@ -122,8 +122,13 @@ class TestLoss:
     def batch(self, exposure: float, edges=None, balance=(1.0, 1.0, 1.0), **changes):
         target = torch.tensor([[0.5, 0.6, 1.0, 1.0]])
         first = torch.zeros(1, dtype=torch.int64)
-        drawn = DrawnRays(target[:, :3], target[:, :3], target, first, first)
-        source = SimpleNamespace(generator=torch.Generator().manual_seed(0), draw=lambda n: drawn, edges=edges)
+        runs = EdgeRuns.none(CPU) if edges is None else edges.runs
+
+        def draw(n, random, backgrounds, exposures):
+            pixels, *beside = read_pixels(target, first, first, exposures, backgrounds, runs)
+            return DrawnRays(target[:, :3], target[:, :3], pixels, first, *beside)
+
+        source = SimpleNamespace(generator=torch.Generator().manual_seed(0), draw=draw)
         return draw_batch(source, 1, tiny(**changes), torch.full((1, 3), exposure) * torch.tensor(balance))
 
     def test_a_photo_is_compared_at_its_own_exposure(self):

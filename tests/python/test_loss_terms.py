@@ -12,7 +12,7 @@ from splitnerf.config import preset
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import make_grid
 from splitnerf.render.renderer import find_samples, render_rays
-from splitnerf.training.batches import Batch, draw_probes
+from splitnerf.training.batches import Batch, draw_numbers, make_probes, probe_counts
 from splitnerf.training.step import loss_terms
 
 SMALL = {
@@ -35,7 +35,8 @@ def rendered():
     target = 0.9 * torch.rand(n, 4, generator=g)  # nowhere saturated
     background, jitter = torch.rand(n, 3, generator=g), torch.rand(n, generator=g)
     photo = torch.zeros(n, dtype=torch.int64), torch.ones(n, 3)
-    batch = Batch(origins, directions, target, background, torch.zeros(n, dtype=torch.bool), jitter, *photo, draw_probes(config, g))
+    probes = make_probes(config, *draw_numbers(g, probe_counts(config)))
+    batch = Batch(origins, directions, target, background, torch.zeros(n, dtype=torch.bool), jitter, jitter, *photo, probes)
     light = model.evaluate_light()
     ray = render_rays(model, light, find_samples(model, grid.cells, *batch.rays, probes=batch.probes))
     return config, batch, ray, loss_terms(model, light, batch, ray, None, None, g, 0, 0.0)

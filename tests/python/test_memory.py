@@ -19,7 +19,7 @@ from splitnerf.data.pixels import Photos, PixelReader, decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.memory import give_back
-from splitnerf.ops import draw_rays
+from splitnerf.ops import EdgeRuns, draw_rays
 from splitnerf.render.masks import pixel_list, reduced, runs_of, widened
 from splitnerf.training import loop
 from tiny_runs import tiny
@@ -87,8 +87,10 @@ def test_single_pixels_are_those_of_the_photos(random_codes):
     for codes in (random_codes, encoded(random_codes, np.uint16), decoded(random_codes)):
         photos = Photos(codes, exposures)
         index = torch.randperm(3 * 5 * 7)
-        read = PixelReader(photos, CPU).read(index).numpy()
-        assert np.allclose(read, decoded(codes).reshape(-1, 4)[index.numpy()], atol=2e-6)
+        factors, behind = torch.from_numpy(exposures[:, None].repeat(3, 1)).float(), torch.rand(len(index), 3)
+        read = PixelReader(photos, CPU).read(index, index // 35, factors, behind, EdgeRuns.none(CPU))
+        assert np.array_equal(read[0].numpy(), decoded(codes).reshape(-1, 4)[index.numpy()])
+        assert torch.equal(read[1], factors[index // 35]) and torch.equal(read[2], behind) and not read[3].any()
 
 
 def test_exposure_divides_linear_light(random_codes):

@@ -6,7 +6,7 @@ import math
 
 import pytest
 import torch
-from op_cases import field_gradients, pixel_inputs, rand
+from op_cases import CASES, field_gradients, pixel_inputs, rand
 from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 
 from splitnerf.bench import reference
@@ -34,6 +34,20 @@ def same_as(ours: tuple, theirs: tuple, leaves: tuple, twins: tuple) -> None:
 def test_pixels_and_their_gradients_are_the_formula(n, linear):
     leaves, twins = grad_leaves(pixel_inputs(n), (0, 1)), grad_leaves(pixel_inputs(n), (0, 1))
     same_as(pixel_losses(*leaves, linear=linear), reference.pixel_losses(*twins, linear), leaves, twins)
+
+
+def test_an_exposure_is_a_factor_of_the_colours():
+    """Of each channel, and of the gradient; none is the same as 1, and no whole pixel as all that are none."""
+    mean, opacity, target, background, whole, exposure = pixel_inputs(60)
+    ours, theirs = mean.clone().requires_grad_(), mean.clone().requires_grad_()
+    a = pixel_losses(ours, opacity, target, background, whole, exposure)
+    b = pixel_losses(theirs * exposure, opacity, target, background, whole)
+    torch.testing.assert_close(a, b)
+    a.sum().backward()
+    b.sum().backward()
+    torch.testing.assert_close(ours.grad, theirs.grad)
+    none = pixel_losses(mean, opacity, target, background, torch.zeros_like(whole), torch.ones_like(exposure))
+    assert torch.equal(pixel_losses(mean, opacity, target, background), none)
 
 
 def test_a_clipped_photo_asks_only_for_enough():
@@ -191,7 +205,19 @@ def test_a_nan_shows():
 def test_opcheck_of_the_losses(dtype):
     check_op(lib.pixel_losses, (*pixel_inputs(9, dtype), True), (0, 1))
     check_op(lib.gradient_losses, field_gradients(dtype), (0,))
+    for op in ("pixel_losses_backward", "gradient_losses_backward", "material_losses_backward"):
+        check_op(getattr(lib, op), CASES[op](dtype))
     check_op(lib.material_losses, (rand(6, 3, dtype=dtype), rand(6, 1, dtype=dtype), rand(6, dtype=dtype), False), (1,))
+
+
+def test_gradients_of_the_losses_by_differences():
+    """In float64, away from the bounds of the mask and from what is clipped."""
+    mean, opacity, target, background, whole, exposure = pixel_inputs(9)
+    inputs = mean.abs() + 0.1, opacity.clamp(0.1, 0.9), 0.9 * target, background, whole, exposure
+    for linear in (True, False):
+        assert torch.autograd.gradcheck(lambda *x: lib.pixel_losses(*x, linear), grad_leaves(inputs, (0, 1)))  # noqa: B023
+    assert torch.autograd.gradcheck(gradient_losses, grad_leaves(field_gradients(), (0,)))
+    assert torch.autograd.gradcheck(material_losses, grad_leaves((rand(6, 3), rand(6, 1), rand(6)), (1,)))
 
 
 def test_float32_of_the_losses_is_close_to_float64():
@@ -203,13 +229,18 @@ def test_float32_of_the_losses_is_close_to_float64():
 
 
 def test_what_has_no_gradient_and_what_does_not_fit():
-    check_no_gradient(lib.pixel_losses, (*pixel_inputs(5), True), 2)
+    for index in (2, 3, 5):
+        check_no_gradient(lib.pixel_losses, (*pixel_inputs(5), True), index)
     check_no_gradient(lib.gradient_losses, field_gradients(), 1)
     check_no_gradient(lib.material_losses, (rand(6, 3), rand(6, 1), rand(6), False), 0)
     g, w, beside = field_gradients()
     check_error(lambda: gradient_losses(g, w, beside + 15), "gradient_losses", "beside must hold indices of weights")
     check_error(lambda: gradient_losses(g[:25], w, beside), "gradient_losses", "samples and their neighbours")
     check_error(lambda: pixel_losses(*pixel_inputs(4)[:3], rand(5, 3)), "pixel_losses", "background must be [4, 3]")
+    check_error(lambda: pixel_losses(*pixel_inputs(4)[:5], rand(4, 1)), "pixel_losses", "exposure must be [4, 3]")
+    for op in ("pixel_losses_backward", "gradient_losses_backward", "material_losses_backward"):
+        *inputs, grad = CASES[op](torch.float32)
+        check_error(lambda: getattr(lib, op)(*inputs, grad[:1]), op, "grad_losses must be")  # noqa: B023
     check_error(lambda: material_losses(rand(4, 3), rand(5, 1), rand(5)), "material_losses", "albedo must be [5, 3]")
 
 

@@ -1,4 +1,4 @@
-"""draw_rays and place_samples."""
+"""draw_rays, read_pixels, probe_points and place_samples."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import torch
 from op_cases import CASES
 from op_checks import check_error, check_op, generator, lib
 
-from splitnerf.ops import PackedSamples, PixelList, draw_rays, place_samples
+from splitnerf.ops import EdgeRuns, PackedSamples, PixelList, draw_rays, place_samples, probe_points, read_pixels
 
 CPU = torch.device("cpu")
 CAMERAS = torch.eye(3).repeat(2, 1, 1), torch.tensor([[0.0, 0.0, 0.0], [7.0, 8.0, 9.0]])
@@ -56,6 +56,60 @@ def test_numbers_that_are_out_of_range_stay_within_the_photos():
     assert drawn([-3.0, 2.0], 0)[3].tolist() == [0, 39] and drawn([-3.0, 2.0], 2)[3].tolist() == [1, 36]
 
 
+# ---- what photos show ----
+
+EXPOSURES = torch.tensor([[1.0, 2, 3], [4, 5, 6]])
+RANDOM = 0.1 * torch.arange(12.0).view(4, 3)
+EDGES = EdgeRuns(torch.tensor([2, 6]), torch.tensor([3, 8]), torch.tensor([-2, -5]), torch.arange(9, dtype=torch.uint8).view(3, 3))
+
+
+def read(codes: torch.Tensor, pixels: list[int], edges: EdgeRuns = EDGES):
+    """Of two photos of four pixels."""
+    index = torch.tensor(pixels, dtype=torch.int64)
+    return read_pixels(codes, index, index // 4, EXPOSURES, RANDOM[: len(pixels)], edges)
+
+
+@pytest.mark.parametrize("dtype", [torch.uint8, torch.int16, torch.float32])
+def test_codes_are_read_as_the_values_they_stand_for(dtype):
+    """Words are those without a sign, in tensors whose numbers have one."""
+    values = torch.linspace(0, 1, 32).view(8, 4)
+    most = {torch.uint8: 255, torch.int16: 65535}.get(dtype, 1)
+    codes = (values * most).round() if most > 1 else values
+    stored = torch.where(codes > 32767, codes - 65536, codes).to(dtype) if dtype == torch.int16 else codes.to(dtype)
+    pixels, exposure, _, _ = read(stored, [7, 0, 3, 4])
+    torch.testing.assert_close(pixels, codes[[7, 0, 3, 4]] / most)
+    assert torch.equal(exposure, EXPOSURES[[1, 0, 0, 1]])
+
+
+def test_pixels_of_runs_have_a_colour_of_their_own_behind_them():
+    """The first and the last of a run too, but not its neighbours, nor a pixel before all runs."""
+    for pixels, row in (([2, 6, 7], [0, 1, 2]), ([0, 1, 3, 5], [None] * 4)):
+        _, _, behind, whole = read(torch.zeros(8, 4), pixels)
+        assert whole.tolist() == [k is not None for k in row]
+        for i, k in enumerate(row):
+            expected = RANDOM[i] if k is None else EDGES.behind[k] / 255
+            torch.testing.assert_close(behind[i], expected)
+    assert not read(torch.zeros(8, 4), [2, 6], EdgeRuns.none(CPU))[3].any()
+
+
+# ---- points of a step ----
+
+
+def test_probes_fill_the_cube_and_shifts_are_normal():
+    """Each coordinate by its quantiles, no two related; of the least and the largest numbers they are finite."""
+    n = 40_000
+    anywhere, shifts = probe_points(torch.rand(7 * n, generator=generator(3), dtype=torch.float64), n, 1.3, 0.5)
+    shares = (torch.arange(n, dtype=torch.float64) + 0.5) / n
+    for column, expected in ((anywhere, 2.6 * shares - 1.3), (shifts, 0.5 * 2**0.5 * torch.erfinv(2 * shares - 1))):
+        inner = slice(n // 1000, -n // 1000)
+        for x in column.T:
+            torch.testing.assert_close(x.sort().values[inner], expected[inner], rtol=0, atol=0.05)
+    assert (torch.corrcoef(torch.cat([anywhere, shifts], 1).T) - torch.eye(6)).abs().max() < 0.03
+    largest = 1 - 2**-24
+    _, extreme = probe_points(torch.tensor([0.0, 0.3, largest, 0.0]), 0, 1.0, 1.0)
+    assert extreme[0, :2].tolist() == [0, 0] and 5.7 < extreme[0, 2] < 5.8
+
+
 RAYS = torch.tensor([[0.0, 0, 0], [10, 0, 0]]), torch.tensor([[1.0, 0, 0], [0, 1, 0]])
 SAMPLES = PackedSamples(torch.tensor([0, 0, 1]), torch.tensor([1.0, 2, 3]), torch.tensor([2.0, 3, 4]), torch.tensor([0, 2, 3]))
 MIDDLES = [[1.5, 0, 0], [2.5, 0, 0], [10, 3.5, 0]]
@@ -98,7 +152,7 @@ def test_without_samples_only_given_points_are_left(room):
 
 
 def test_operators():
-    for name in ("draw_rays", "place_samples"):
+    for name in ("draw_rays", "read_pixels", "probe_points", "place_samples"):
         for dtype in (torch.float32, torch.float64):
             check_op(getattr(lib, name), CASES[name](dtype))
 
@@ -115,3 +169,10 @@ def test_what_does_not_fit_is_named():
     probes = ANYWHERE, torch.tensor([0.5, 0.5]), SHIFTS
     check_error(lambda: place_samples(*RAYS, wrong, *probes), "place_samples", "ray_indices must hold numbers of rays")
     check_error(lambda: place_samples(*RAYS, SAMPLES, *probes[:2], SHIFTS[:1]), "place_samples", "shifts must be [2, 3]")
+    for codes, text in ((torch.zeros(8, 4, dtype=torch.int32), "codes must be uint8, int16 or float32"), (torch.zeros(8, 3), "codes")):
+        check_error(lambda: read(codes, [0]), "read_pixels", text)  # noqa: B023
+    check_error(lambda: read(torch.zeros(8, 4), [0, 8]), "read_pixels", "index must hold numbers of pixels")
+    check_error(lambda: read(torch.zeros(12, 4), [8]), "read_pixels", "view must hold numbers of photos")
+    check_error(lambda: read(torch.zeros(8, 4), [0], EDGES._replace(ends=EDGES.ends[:1])), "read_pixels", "edge_ends must be [2]")
+    check_error(lambda: read(torch.zeros(0, 4), [0]), "read_pixels", "there are no photos")
+    check_error(lambda: probe_points(torch.rand(8), 2, 1.0, 1.0), "probe_points", "three numbers for each point")

@@ -1,11 +1,11 @@
-"""march_rays, neus_weights, surface_weights, spread_samples, interpolate and composite."""
+"""march_rays, neus_weights, surface_weights, sharpness, spread_samples, interpolate and composite."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 import torch
-from op_cases import OFFSETS, composite_inputs, march_inputs, neus_inputs, packed_samples, surface_inputs
+from op_cases import OFFSETS, composite_inputs, march_inputs, neus_inputs, packed_samples, surface_case, surface_inputs
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 
 from splitnerf.bench import reference
@@ -14,6 +14,7 @@ from splitnerf.ops import (
     composite,
     march_rays,
     neus_weights,
+    sharpness,
     spread_samples,
     surface_weights,
 )
@@ -166,12 +167,40 @@ def test_surface_weights_opcheck_and_errors():
     x = *x, torch.tensor(0.1).to(x[0]), torch.tensor(0.4).to(x[0])
     check_op(lib.surface_weights, (*x, 1e-3), (0, 1, 3))
     outputs = lib.surface_weights(*x, 1e-3)
-    check_op(lib.surface_weights_backward, (*x, 1e-3, outputs[1], *(torch.ones_like(o) for o in outputs)))
+    check_op(lib.surface_weights_backward, (*x, 1e-3, -1, outputs[1], *(torch.ones_like(o) for o in outputs)))
     x = x[:5]
     with pytest.raises(RuntimeError, match="no gradient to rays_d"):
         surface_weights(*grad_leaves(x, (2,)), step=0.1)[1].sum().backward()
     check_error(lambda: surface_weights(x[0], x[1][:, :2], *x[2:], step=0.1), "surface_weights", "gradient")
     check_error(lambda: surface_weights(*x, step=0.0), "surface_weights", "step")
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_a_fields_outputs_serve_as_they_are(dtype):
+    """Distances in the first of some columns, and other points behind the samples: as without, and gradients 0 there."""
+    *case, n = surface_case(dtype)
+    outputs, gradient, *rest = case
+    leaves = [x.clone().requires_grad_() for x in (outputs, gradient, outputs[:n, 0], gradient[:n])]
+    found = lib.surface_weights(*leaves[:2], *rest, n)
+    expected = lib.surface_weights(*leaves[2:], *rest)
+    for results in (found, expected):
+        sum((x * torch.arange(1.0, x.numel() + 1).view(x.shape)).sum() for x in results).backward()
+    for a, b in zip(found, expected):
+        assert torch.equal(a, b)
+    assert torch.equal(leaves[0].grad[:n, 0], leaves[2].grad) and torch.equal(leaves[1].grad[:n], leaves[3].grad)
+    assert not leaves[0].grad[:, 1:].any() and not leaves[0].grad[n:].any() and not leaves[1].grad[n:].any()
+    check_error(lambda: lib.surface_weights(*case, n + 71), "surface_weights", "n_samples must be at most")
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_sharpness_opcheck_and_gradients(dtype):
+    v = torch.tensor([-0.1, 0.3, 0.8, 1.0], dtype=dtype)
+    check_op(lib.sharpness, (v,), (0,))
+    check_op(lib.sharpness_backward, (v, v))
+    check_no_gradient(lib.sharpness_backward, (v, v), 1)
+    torch.autograd.gradcheck(sharpness, (v.double().requires_grad_(),))
+    check_error(lambda: sharpness(torch.tensor(1)), "sharpness", "variance must be float32 or float64")
+    check_error(lambda: lib.sharpness_backward(v, v[1:]), "sharpness_backward", "grad_s must be like variance")
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
@@ -253,7 +282,8 @@ def test_room_that_is_given_holds_the_same_and_what_counts_for_nothing():
     assert (n_shaded, n_rays, n_stretches) == (len(free.shaded), len(free.heaviest), len(free.leaders)) and n_rays == 49
     longer = torch.cat([weights, weights.new_full((9,), 5.0)])
     padded = PackedSamples(*(torch.cat([x, x[:9]]) for x in samples[:3]), samples.offsets)
-    roomy = spread_samples(longer, padded, 2, phase, torch.tensor(0.3, dtype=weights.dtype), capacity=(300, 250))
+    unit = torch.tensor(0.1, dtype=weights.dtype)
+    roomy = spread_samples(longer, padded, 2, phase, 3.0, capacity=(300, 250), unit=unit)
     assert (len(roomy.shaded), len(roomy.stretch), len(roomy.leaders), len(roomy.heaviest)) == (300, 300, 250, 50)
     assert roomy.sizes.tolist() == free.sizes.tolist()
     for name, short in free._asdict().items():
@@ -346,12 +376,29 @@ def test_composite_matches_the_reference(device):
 def test_composite_opcheck_and_gradients(device):
     for dtype in (torch.float32, torch.float64):
         inputs = composite_inputs(device, dtype)
+        divided = *inputs, torch.tensor([0.9, 0.5, 0.01, 0.7], device=device, dtype=dtype), 0.1
         grad = torch.randn(4, 4, generator=generator(6)).to(device, dtype)
         check_op(lib.composite, inputs, (0, 1))
-        check_op(lib.composite_backward, (*inputs, grad))
+        check_op(lib.composite, divided, (0, 1, 3))
+        check_op(lib.composite_backward, (*inputs, None, 1.0, grad))
+        check_op(lib.composite_backward, (*divided, grad))
     torch.autograd.gradcheck(lib.composite, grad_leaves(inputs, (0, 1)))
-    for index in (0, 1, 3):
-        check_no_gradient(lib.composite_backward, (*inputs, grad), index)
+    torch.autograd.gradcheck(lib.composite, grad_leaves(divided, (0, 1, 3)))
+    for index in (0, 1, 3, 5):
+        check_no_gradient(lib.composite_backward, (*divided, grad), index)
+
+
+def test_a_mean_colour_is_the_sum_over_the_opacity():
+    """Of a ray that is nearly clear over the least opacity, which then has no gradient."""
+    weights, values, offsets = composite_inputs("cpu", torch.float64)
+    opacity = torch.tensor([0.5, 0.0, 0.2, 0.01], dtype=torch.float64, requires_grad=True)
+    mean = composite(weights, values, offsets, opacity, 0.1)
+    torch.testing.assert_close(mean, composite(weights, values, offsets) / torch.tensor([[0.5], [0.1], [0.2], [0.1]]))
+    mean.sum().backward()
+    expected = -mean.detach().sum(1) / opacity.detach()
+    torch.testing.assert_close(opacity.grad, torch.where(opacity.detach() < 0.1, 0.0, expected))
+    check_error(lambda: composite(weights, values, offsets, opacity[1:]), "composite", "opacity must be [4]")
+    check_error(lambda: composite(weights, values, offsets, opacity, 0.0), "composite", "least_opacity must be positive")
 
 
 @pytest.mark.parametrize("device", DEVICES)

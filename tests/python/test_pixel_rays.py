@@ -50,7 +50,7 @@ def dataset(tmp_path) -> Dataset:
 
 @pytest.mark.parametrize("share", [0.0, 0.7, 1.0])
 def test_training_rays_go_through_the_middles_of_their_pixels(dataset, share):
-    origins, directions, pixels, view, _ = PixelSource(dataset, share, generator()).draw(600)
+    origins, directions, pixels, view, *_ = PixelSource(dataset, share, generator()).draw(600)
     view = view.numpy()
     assert np.array_equal(view, (pixels[:, 2] * 3).round().long().numpy())
     ahead = far_along(origins, directions)
@@ -109,7 +109,7 @@ def test_as_many_rays_are_drawn_as_asked(dataset, share, n_near):
     images = np.array(dataset.images)
     images[1:, ..., 3] = 0.0
     source = PixelSource(with_images(dataset, images), share, generator())
-    origins, directions, pixels, view, _ = source.draw(10)
+    origins, directions, pixels, view, *_ = source.draw(10)
     assert len(origins) == len(directions) == len(pixels) == len(view) == 10
     assert (pixels[:n_near, 2] == 0).all()
 

@@ -12,8 +12,7 @@ from splitnerf.config import preset
 from splitnerf.fields import LightMlp, OcclusionHead, SdfField
 from splitnerf.fields.light import LightSamples
 from splitnerf.fields.occlusion import OcclusionQuery
-from splitnerf.fields.sdf import sharpness
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec
+from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec, sharpness
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import AveragedGrid, OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import image_rays

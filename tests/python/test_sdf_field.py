@@ -11,8 +11,7 @@ from precision import precisions
 from torch.nn import functional as F
 
 from splitnerf.fields import SdfField
-from splitnerf.fields.sdf import sharpness
-from splitnerf.ops import HashGridSpec
+from splitnerf.ops import HashGridSpec, sharpness
 
 BOX = 1.2
 SPEC = HashGridSpec(n_levels=4, base_resolution=4, growth=2.0, log2_table_size=8)

@@ -250,6 +250,44 @@ def drawn_rays(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     return torch.where(wrong, 1.0, torch.maximum(length, outside)), {"random": random}
 
 
+def read_photos(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """Words of 16 bits over 65535, the photo's own factors, and behind pixels of runs their own colours, to a rounding."""
+
+    def whole(low: int, high: int, *shape: int) -> Tensor:
+        return torch.randint(low, high + 1, shape, generator=draw.generator)
+
+    lengths, gaps = whole(1, 20, 2), whole(1, 20, 2)
+    starts = torch.cumsum(lengths + gaps, 0) - lengths
+    ends, pixels = starts + lengths, 100
+    before = lengths.cumsum(0) - lengths
+    behind = whole(0, 255, int(lengths.sum()), 3).to(torch.uint8)
+    edges = ops.EdgeRuns(starts, ends, before - starts, behind)
+    words = whole(0, 65535, 2 * pixels, 4)
+    index, exposures = whole(0, 2 * pixels - 1, n), draw.logarithmic(1e-6, 1e6, 2, 3).float()
+    random, view = draw.shares(n, 3).float(), index // pixels
+    codes = torch.where(words > 32767, words - 65536, words).to(torch.int16)
+    target, exposure, background, marked = ops.read_pixels(codes, index, view, exposures, random, edges)
+    inside = ((index[:, None] >= starts) & (index[:, None] < ends)).any(1)
+    run = torch.searchsorted(ends, index, right=True).clamp(max=len(ends) - 1)
+    own = behind[(index - starts[run] + before[run]).clamp(0, len(behind) - 1)].double() / 255
+    wrong = (exposure != exposures[view]).any(1) | (marked != inside)
+    expected = torch.where(inside[:, None], own, random.double())
+    error = torch.cat([target.double() - words[index].double() / 65535, background.double() - expected], 1).abs().amax(1)
+    return torch.where(wrong, 1.0, error - 1.2e-7), {"index": index, "random": random}
+
+
+def probes(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """In the cube, and as far away as the two numbers of a radius say, to a rounding."""
+    cube, shifts = draw.shares(n, 3).clamp(max=1 - 6e-8).float(), draw.shares(n, 4).clamp(max=1 - 6e-8).float()
+    anywhere, moved = ops.probe_points(torch.cat([cube.flatten(), shifts.flatten()]), n, 1.5, 0.25)
+    expected = 3 * cube.double() - 1.5
+    radius = 0.25 * torch.sqrt(-2 * torch.log1p(-shifts[:, ::2].double()))
+    length = moved[:, :2].double().norm(dim=1)
+    third = (radius[:, 1] * torch.cos(2 * torch.pi * shifts[:, 3].double()) - moved[:, 2]).abs() - 2e-6
+    error = torch.maximum((anywhere - expected).abs().amax(1) - 1e-6, (length - radius[:, 0]).abs() - 2e-6)
+    return torch.maximum(error, third), {"cube": cube, "shifts": shifts}
+
+
 def placed(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     """As far along its ray as the middle of its sample, to a rounding of the numbers added."""
     rows = {
@@ -355,6 +393,8 @@ PROPERTIES = (
     ),
     Property("cached_occlusion", cached, "in [0, 1], the mesh's own light too, under black and single lights"),
     Property("draw_rays", drawn_rays, "a listed pixel of the ray's own part of the list, a unit vector, the view's centre"),
+    Property("read_pixels", read_photos, "the value of its code, its photo's factors, its own colour behind it where it has one"),
+    Property("probe_points", probes, "in the cube; as long as Box and Muller's formula, to a rounding"),
     Property("place_samples", placed, "on the ray in the middle of the sample, to a rounding"),
     Property("light_queries", queries_of_light, "those of query_direction, then normals that do not face away"),
     Property("march_rays", marched, "in the box, ascending by the step, at most as many as asked for"),

@@ -12,6 +12,13 @@ template <class T> SPLITNERF_HD T sigmoid(T x) {
 }
 template <class T> SPLITNERF_HD T softplus(T x) { return max_of(x, T(0)) + std::log1p(std::exp(-std::abs(x))); }
 
+// s = exp(10 v) with 10 v in [0, 9], and its derivative, 0 outside.                    Source: NeuS, section 4.1.
+template <class T> struct Sharpness { T value, slope; };
+template <class T> SPLITNERF_HD Sharpness<T> sharpness(T variance) {
+  const T exponent = T(10) * variance, s = std::exp(clamp(exponent, T(0), T(9)));
+  return {s, exponent >= T(0) && exponent <= T(9) ? T(10) * s : T(0)};
+}
+
 // Optical depth of one interval, tau = -log(1 - alpha), alpha = (Phi(f_prev) - Phi(f_next))+ / Phi(f_prev),
 // Phi(f) = sigmoid(s f). In terms of d = s (f_prev - f_next)+ and x = s f_prev,
 //   1 - alpha = Phi(f_next) / Phi(f_prev) = 1 / (1 + X),   X = expm1(d) sigmoid(-x),
@@ -41,9 +48,7 @@ SPLITNERF_HD OpticalDepthGrad<T> neus_optical_depth_backward(T f_prev, T f_next,
 }
 
 // One sample of a ray: the distances at its two ends, and their difference.
-template <class T> struct NeusInterval {
-  T f_prev, f_next, apart;
-};
+template <class T> struct NeusInterval { T f_prev, f_next, apart; };
 template <class T> SPLITNERF_HD T neus_optical_depth(const NeusInterval<T>& interval, T s) {
   return neus_optical_depth(interval.f_prev, interval.f_next, interval.apart, s);
 }
@@ -141,9 +146,7 @@ template <class T> SPLITNERF_HD Vec3<T> unit_normal_backward(Vec3<T> gradient, V
 
 // Slope of the distance along the ray, never positive: relu(-c), or, while t < 1, in part relu(1/2 - c/2), so that
 // samples that face away keep a gradient early on.        Source: NeuS, the released code's cos_anneal_ratio.
-template <class T> struct AnnealedCosine {
-  T value, slope;
-};
+template <class T> struct AnnealedCosine { T value, slope; };
 template <class T> SPLITNERF_HD AnnealedCosine<T> annealed_cosine(T cosine, T t) {
   const T soft = T(0.5) - T(0.5) * cosine;  // a NaN goes on to the caller
   return {-((soft < T(0) ? T(0) : soft) * (T(1) - t) + (cosine > T(0) ? T(0) : -cosine) * t),
@@ -181,9 +184,10 @@ struct PackedRays {
 // sample's length `step`, with the annealed cosine as its slope.
 template <class T> struct SurfaceSamples {
   PackedRays rays;
-  const T *sdf, *gradient, *directions;  // [n], [n, 3], [n_rays, 3] unit
+  const T *sdf, *gradient, *directions;  // [n, stride], of which the first column counts; [n, 3]; [n_rays, 3] unit
   const T *s, *step, *anneal;            // one number each
   T min_transmittance;
+  int64_t stride = 1, n_rows = rays.n_samples;  // rows behind the samples are of other points
 };
 
 // The distances at both ends of a sample, and their difference; at grazing angles the difference is smaller than the

@@ -85,12 +85,11 @@ SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& mar
 
 // Which samples are shaded, `per_ray` of each ray spread by weight (0: all), and where the others lie between them. What is
 // more than `gap` apart along the ray is drawn for and interpolated on its own.
-// weights [n], t [n] along the ray, phase [n_rays] -> sizes [3] of SpreadSizes as counted, first, second, share [n] and what
+// in: weights [n], t [n] along the ray, phase [n_rays] -> sizes [3] of SpreadSizes as counted, first, second, share [n] and what
 // the allocator makes room for, see Spread; where there is more room, entries in range that count for nothing. With too little
 // of it sizes tells, and the rest means nothing, but is in range.
 template <class T>
-SPLITNERF_API void spread_samples(const PackedRays& rays, const T* weights, const T* t, const T* phase, T gap,
-                                  int per_ray, int64_t* sizes, int64_t* first, int64_t* second, T* share,
+SPLITNERF_API void spread_samples(const SpreadArrays<T>& in, int64_t* sizes, int64_t* first, int64_t* second, T* share,
                                   const SpreadAllocator& allocator);
 
 // ---- occlusion ----

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "splitnerf/bodies/monte_carlo.h"
+#include "splitnerf/bodies/rays.h"
 #include "splitnerf/light_pyramid.h"
 #include "splitnerf/neus.h"
 #include "splitnerf/ray_walk.h"
@@ -49,9 +50,8 @@ template <class T> void shared_light_backward(const Queue& queue, int64_t n, con
 
 // Waits for the sizes, but where they are fixed.
 template <class T>
-void spread_samples(const Queue& queue, const PackedRays& rays, const T* weights, const T* t, const T* phase, T gap,
-                    int per_ray, int64_t* sizes, int64_t* first, int64_t* second, T* share,
-                    const SpreadAllocator& allocator);
+void spread_samples(const Queue& queue, const SpreadArrays<T>& in, int64_t* sizes, int64_t* first, int64_t* second,
+                    T* share, const SpreadAllocator& allocator);
 
 // ---- the distance field ----
 

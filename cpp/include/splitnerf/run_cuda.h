@@ -20,7 +20,8 @@ struct Queue {
 // Makes a GPU the current one of this library's own copy of the CUDA runtime.
 void use_device(int device);
 
-// A number in the GPU's memory; waits for the stream.
+// Numbers in the GPU's memory; waits for the stream.
+void read_numbers(const Queue& queue, int64_t n, const int64_t* numbers, int64_t* to);
 int64_t read_number(const Queue& queue, const int64_t* number);
 
 // Sets bytes to 0.
@@ -29,8 +30,9 @@ template <class T> void clear(const Queue& queue, const char* op, T* values, int
   clear_bytes(queue, op, values, n * sizeof(T));
 }
 
-// offsets [n + 1]: 0, and the counts in what follows become their sums.
-void sum_counts(const Queue& queue, const char* op, int64_t n, int64_t* offsets);
+// offsets [columns, n + 1]: 0, and the counts in what follows become their sums; totals [columns]: the sums of all, if asked for.
+void sum_counts(const Queue& queue, const char* op, int64_t n, int64_t* offsets, unsigned columns = 1,
+                int64_t* totals = nullptr);
 
 // Runs a body for each index, as splitnerf/run.h says; sums of a body are added in an order that depends on n alone. Kernels
 // are there for the bodies that stand under SPLITNERF_ON_GPU.

@@ -104,10 +104,17 @@ def neus_weights(f_prev, f_next, s, offsets, min_transmittance) -> tuple[Tensor,
     return weights, torch.zeros(len(counts), dtype=weights.dtype).index_add(0, rays, weights)
 
 
+def sharpness(variance: Tensor) -> Tensor:
+    """exp(10 v), with 10 v in [0, 9]."""
+    return torch.exp(torch.clamp(10 * variance, 0, 9))
+
+
 def surface_weights(
-    sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance
+    sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance, n_samples=-1
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Unit normals, weights and their sum: the interval of a sample by its slope along the ray, annealed."""
+    n = len(sdf) if n_samples < 0 else n_samples
+    sdf, gradient = (sdf[:, 0] if sdf.dim() == 2 else sdf)[:n], gradient[:n]
     squared = (gradient * gradient).sum(1, keepdim=True)
     gradient = torch.where(squared < 1e-6, gradient.detach(), gradient)
     normals = gradient * torch.rsqrt((gradient * gradient).sum(1, keepdim=True) + 1e-12)
@@ -116,10 +123,11 @@ def surface_weights(
     return normals, *neus_weights(sdf - half, sdf + half, s, offsets, min_transmittance)
 
 
-def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:
-    """sum w v along each ray."""
+def composite(weights: Tensor, values: Tensor, offsets: Tensor, opacity: Tensor | None = None, least: float = 1.0) -> Tensor:
+    """sum w v along each ray, over its opacity if that is given."""
     sums = torch.zeros(len(offsets) - 1, values.shape[1], dtype=values.dtype)
-    return sums.index_add(0, ray_indices(offsets), weights[:, None] * values)
+    sums = sums.index_add(0, ray_indices(offsets), weights[:, None] * values)
+    return sums if opacity is None else sums / opacity.clamp(min=least)[:, None]
 
 
 # ---- shading ----
@@ -377,9 +385,9 @@ def cached_occlusion(
 # ---- losses ----
 
 
-def pixel_losses(mean, opacity, target, background, whole, linear: bool) -> tuple[Tensor, Tensor]:
+def pixel_losses(mean, opacity, target, background, whole, exposure, linear: bool) -> tuple[Tensor, Tensor]:
     """Squared error over a background, one-sided where the photo is clipped, and cross entropy of the mask."""
-    o, a, w = opacity[:, None], target[:, 3:], whole[:, None]
+    o, a, w, mean = opacity[:, None], target[:, 3:], whole[:, None], mean * exposure
 
     def clipped(linear_or_not: Tensor) -> Tensor:
         colour = linear_to_srgb(linear_or_not) if linear else linear_or_not

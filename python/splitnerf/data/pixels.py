@@ -97,23 +97,22 @@ class PixelReader:
 
     def __init__(self, photos: Photos, device: torch.device):
         codes = photos.codes
-        self.scale = 1.0 if codes.dtype.kind == "f" else 1 / np.iinfo(codes.dtype).max
         self.file = file_of(codes) if device.type == "cpu" else None
-        codes = codes.view(np.int16) if codes.dtype == np.uint16 else codes  # tensors of which all devices can index
+        codes = codes.view(np.int16) if codes.dtype == np.uint16 else codes  # of which torch has more operations
         self.codes = torch.from_numpy(codes).to(device).view(-1, 4)
 
     def __len__(self) -> int:
         return len(self.codes)
 
-    def read(self, index: Tensor) -> Tensor:
-        """[k, 4] float32, pixels [k] counted through all photos, sRGB at the photos' own exposures."""
+    def read(
+        self, index: Tensor, view: Tensor, exposures: Tensor, backgrounds: Tensor, edges: ops.EdgeRuns
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """What the photos show at pixels, as they are; see :func:`splitnerf.ops.read_pixels`."""
         if self.file is not None:
             size = 4 * self.codes.element_size()
             for page in np.unique(index.numpy() * size // mmap.PAGESIZE).tolist():
                 _ask_for(self.file, page * mmap.PAGESIZE, size)
-        values = self.codes[index]
-        values = (values.int() & 0xFFFF if values.dtype == torch.int16 else values).float()
-        return values * self.scale if self.scale != 1 else values
+        return ops.read_pixels(self.codes, index, view, exposures, backgrounds, edges)
 
 
 def per_channel(exposures: np.ndarray) -> np.ndarray:

@@ -140,8 +140,3 @@ class SdfField(nn.Module):
         with tensor_cores(False):  # rounding to TF32 would exceed the differences
             taps = self.sdf((positions[:, None, :] + steps).reshape(-1, 3)).view(-1, 2, 3)
         return SdfSample(*self(positions), (taps[:, 0] - taps[:, 1]) / (2.0 * eps))
-
-
-def sharpness(variance: Tensor) -> Tensor:
-    """The sharpness s = exp(10 v) of the NeuS density, where Phi(f) = sigmoid(s f); 10 v is clamped to [0, 9]."""
-    return torch.exp(torch.clamp(10.0 * variance, 0.0, 9.0))

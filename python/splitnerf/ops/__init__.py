@@ -24,7 +24,7 @@ from splitnerf.ops.monte_carlo import (
     summed_light,
 )
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
-from splitnerf.ops.pixels import PixelList, draw_rays, place_samples
+from splitnerf.ops.pixels import EdgeRuns, PixelList, draw_rays, place_samples, probe_points, read_pixels
 from splitnerf.ops.rays import (
     CELL_EMPTY,
     CELL_OCCUPIED,
@@ -34,6 +34,7 @@ from splitnerf.ops.rays import (
     composite,
     march_rays,
     neus_weights,
+    sharpness,
     spread_samples,
     surface_weights,
 )
@@ -44,13 +45,13 @@ from splitnerf.ops.srgb import linear_to_srgb, srgb_to_linear
 from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_visibility, visibility_bits
 
 __all__ = [
-    "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "IncomingLight",
+    "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "EdgeRuns", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "IncomingLight",
     "LightSums", "MeshScene", "PackedSamples", "PixelList", "QUERIES", "SdfNetwork", "ShadingSubset", "SparseMap", "TexturedSurface",
     "VisibilityCache", "adamw_step_", "brdf_lut", "cached_occlusion", "cached_visibility", "composite", "draw_rays",
     "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian", "incoming_light",
     "light_averages", "light_filters", "light_lookup", "light_queries", "light_sum_of_levels", "linear_to_srgb", "march_rays",
-    "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors", "pixel_losses", "place_samples", "prefilter_light",
-    "quadratic_entropy", "query_direction", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer", "sdf_values",
-    "sh_projection", "shade_sums", "sparse_product", "specular_share", "split_sum_shade", "spread_samples",
+    "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors", "pixel_losses", "place_samples",
+    "prefilter_light", "probe_points", "quadratic_entropy", "query_direction", "read_pixels", "sample_bsdf", "sample_ggx_lobe", "sample_rays",
+    "sdf_layer", "sdf_values", "sh_projection", "shade_sums", "sharpness", "sparse_product", "specular_share", "split_sum_shade", "spread_samples",
     "srgb_to_linear", "summed_light", "surface_weights", "take_rows", "trace_visibility", "visibility_bits", "zonal_factors",
 ]  # fmt: skip

@@ -1,19 +1,19 @@
-"""Terms of the training loss, each computed together with its gradient in one pass over the pixels, points or pairs.
+"""Terms of the training loss: one pass over the pixels, points or pairs finds their values, another one their gradients.
 
 All are differentiable once, in the arguments that the docstrings name; a gradient to any other argument raises.
 """
 
 from __future__ import annotations
 
-import torch
 from torch import Tensor
 
 from splitnerf.ops._library import lib, refuse_gradients, register
 
 
 def pixel_losses(
-    mean: Tensor, opacity: Tensor, target: Tensor, background: Tensor, whole: Tensor | None = None, *, linear: bool = True
-) -> Tensor:
+    mean: Tensor, opacity: Tensor, target: Tensor, background: Tensor, whole: Tensor | None = None,
+    exposure: Tensor | None = None, *, linear: bool = True,
+) -> Tensor:  # fmt: skip
     """Mean squared sRGB error of pixels against photos over the same background, and the cross entropy with their
     masks.
 
@@ -28,6 +28,7 @@ def pixel_losses(
         whole: [n] bool, the pixels whose photo is what the camera saw, the object and the background together (both added up
             as light, if ``linear``): there the background is what it would have seen without the object, the target's alpha
             says nothing of the colour, and the mask counts a tenth. None: no pixel.
+        exposure: [n, 3] factors of ``mean``, by which a photo shows more or less than an exposure of 1. None: all are 1.
         linear: Whether ``mean`` is linear; otherwise it is sRGB.
 
     Returns:
@@ -39,8 +40,7 @@ def pixel_losses(
 
     Source: SplitNeRF Eq. (3); NeuS Eq. (17).
     """
-    whole = torch.zeros_like(opacity, dtype=torch.bool) if whole is None else whole
-    return lib.pixel_losses(mean, opacity, target, background, whole, linear)[0]
+    return lib.pixel_losses(mean, opacity, target, background, whole, exposure, linear)
 
 
 def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> Tensor:
@@ -110,56 +110,74 @@ def quadratic_entropy(x: Tensor) -> Tensor:
     return lib.quadratic_entropy(x)[0]
 
 
-def _keep_gradients(ctx, inputs, output):
-    ctx.mark_non_differentiable(*output[1:])
-    ctx.save_for_backward(*output[1:])
+def _keep_pixels(ctx, inputs, output):
+    *tensors, ctx.linear = inputs
+    ctx.save_for_backward(*tensors)
 
 
-def _pixel_backward(ctx, grad, *_):
-    refuse_gradients(ctx, "pixel_losses", target=2, background=3)
-    colour_by_mean, colour_by_opacity, mask_by_opacity = ctx.saved_tensors
-    by_opacity = torch.addcmul(colour_by_opacity * grad[0], mask_by_opacity, grad[1])
-    return colour_by_mean * grad[0], by_opacity, None, None, None, None
+def _pixel_backward(ctx, grad):
+    refuse_gradients(ctx, "pixel_losses", target=2, background=3, exposure=5)
+    return *lib.pixel_losses_backward(*ctx.saved_tensors, ctx.linear, grad), None, None, None, None, None
 
 
-def _gradient_backward(ctx, grad, *_):
+def _keep_inputs_and_total(ctx, inputs, output):
+    """Saves the tensors among the inputs, and the sum of weights, to which there is no gradient."""
+    tensors = [x for x in inputs if isinstance(x, Tensor)]
+    ctx.numbers = inputs[len(tensors) :]
+    ctx.mark_non_differentiable(output[1])
+    ctx.set_materialize_grads(False)  # else zeros are made for it
+    ctx.save_for_backward(*tensors, output[1])
+
+
+def _gradient_backward(ctx, grad, _):
     refuse_gradients(ctx, "gradient_losses", weights=1)
-    eikonal_by, smoothness_by = ctx.saved_tensors
-    return torch.addcmul(eikonal_by * grad[0], smoothness_by, grad[1]), None, None
+    return None if grad is None else lib.gradient_losses_backward(*ctx.saved_tensors, grad), None, None
 
 
-def _material_backward(ctx, grad, *_):
+def _material_backward(ctx, grad, _):
     refuse_gradients(ctx, "material_losses", albedo=0, shares=2)
-    return None, (grad @ ctx.saved_tensors[0])[:, None], None, None
+    *tensors, total = ctx.saved_tensors
+    by_metallic = None if grad is None else lib.material_losses_backward(*tensors, *ctx.numbers, total, grad)
+    return None, by_metallic, None, None
 
 
-def _entropy_backward(ctx, grad, *_):
-    return ctx.saved_tensors[0] * grad
+def _keep_gradient(ctx, inputs, output):
+    ctx.mark_non_differentiable(output[1])
+    ctx.set_materialize_grads(False)  # else zeros are made for it
+    ctx.save_for_backward(output[1])
+
+
+def _entropy_backward(ctx, grad, _):
+    return None if grad is None else ctx.saved_tensors[0] * grad
 
 
 register(
     "pixel_losses",
-    fake=lambda mean, opacity, *rest: (
-        mean.new_empty(2), mean.new_empty(mean.shape), mean.new_empty(opacity.shape), mean.new_empty(opacity.shape)
-    ),
-    setup_context=_keep_gradients,
+    fake=lambda mean, *rest: mean.new_empty(2),
+    setup_context=_keep_pixels,
     backward=_pixel_backward,
-)  # fmt: skip
+)
+register(
+    "pixel_losses_backward",
+    fake=lambda mean, opacity, *rest: (mean.new_empty(mean.shape), opacity.new_empty(opacity.shape)),
+)
 register(
     "gradient_losses",
-    fake=lambda gradients, *rest: (gradients.new_empty(2), *(gradients.new_empty(gradients.shape) for _ in range(2))),
-    setup_context=_keep_gradients,
+    fake=lambda gradients, *rest: (gradients.new_empty(2), gradients.new_empty(())),
+    setup_context=_keep_inputs_and_total,
     backward=_gradient_backward,
 )
+register("gradient_losses_backward", fake=lambda gradients, *rest: gradients.new_empty(gradients.shape))
 register(
     "material_losses",
-    fake=lambda albedo, metallic, *rest: (metallic.new_empty(3), metallic.new_empty(3, metallic.shape[0])),
-    setup_context=_keep_gradients,
+    fake=lambda albedo, metallic, *rest: (metallic.new_empty(3), metallic.new_empty(())),
+    setup_context=_keep_inputs_and_total,
     backward=_material_backward,
 )
+register("material_losses_backward", fake=lambda albedo, metallic, *rest: metallic.new_empty(metallic.shape))
 register(
     "quadratic_entropy",
     fake=lambda x: (x.new_empty(()), x.new_empty(x.shape)),
-    setup_context=_keep_gradients,
+    setup_context=_keep_gradient,
     backward=_entropy_backward,
 )

@@ -1,4 +1,5 @@
-"""Where a training step looks: rays through drawn pixels, and points of the rays' samples. Neither has a gradient."""
+"""Where a training step looks: rays through drawn pixels, what photos show there, and points of the rays' samples. None has a
+gradient."""
 
 from __future__ import annotations
 
@@ -31,6 +32,27 @@ class PixelList(NamedTuple):
         return cls(none, none, count)
 
 
+class EdgeRuns(NamedTuple):
+    """Pixels whose colour is compared whole, as runs of neighbours in their order.
+
+    Attributes:
+        starts, ends: [r] int64, the first pixel of each run and the one after its last, counted through all photos.
+        shift: [r] int64, what is added to a pixel's number to get its row in `behind`.
+        behind: [b, 3] uint8, sRGB of what the photo would show at these pixels without the object.
+    """
+
+    starts: Tensor
+    ends: Tensor
+    shift: Tensor
+    behind: Tensor
+
+    @classmethod
+    def none(cls, device: torch.device) -> EdgeRuns:
+        """No pixels."""
+        empty = torch.empty(0, dtype=torch.int64, device=device)
+        return cls(empty, empty, empty, torch.empty(0, 3, dtype=torch.uint8, device=device))
+
+
 def draw_rays(
     random: Tensor, n_near: int, near: PixelList, known: PixelList, matrices: Tensor, origins: Tensor, height: int, width: int
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -58,6 +80,53 @@ def draw_rays(
     Source: stratified sampling (Pharr, Jakob and Humphreys, Physically Based Rendering, 4th ed., section 8.2.1).
     """
     return lib.draw_rays(random, n_near, *near, *known, matrices, origins, height, width)
+
+
+def read_pixels(
+    codes: Tensor, index: Tensor, view: Tensor, exposures: Tensor, backgrounds: Tensor, edges: EdgeRuns
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """What photos show at pixels, how they were exposed, and what lies behind.
+
+    Args:
+        codes: [pixels, 4] of all photos, one after the other: uint8 or int16, which holds the bits of uint16, the values times 255
+            or 65535; or float32, the values.
+        index, view: [n] int64, the pixels and their photos, see :func:`draw_rays`.
+        exposures: [v, 3] the photos' factors, float32 or float64.
+        backgrounds: [n, 3] sRGB colours.
+        edges: The pixels behind which another colour lies.
+
+    Returns:
+        pixels: [n, 4] sRGB and alpha, in [0, 1] but for float32 codes, which stay as they are.
+        exposure: [n, 3] the factors of each pixel's photo.
+        background: [n, 3] `backgrounds`, but at the pixels of `edges` their own.
+        whole: [n] bool, which pixels are among those of `edges`.
+
+    Raises:
+        ValueError: A shape or dtype does not fit, or (on the CPU) a pixel or a photo is not there.
+    """
+    return lib.read_pixels(codes, index, view, exposures, backgrounds, *edges)
+
+
+def probe_points(random: Tensor, n_anywhere: int, box: float, deviation: float) -> tuple[Tensor, Tensor]:
+    """Points of a cube and normal vectors, from uniform numbers.
+
+    Args:
+        random: [3 k + 4 m] in [0, 1), float32 or float64: three numbers for each point, then four for each vector.
+        n_anywhere: The number k of points.
+        box: Half the edge of the cube, scene units.
+        deviation: The standard deviation of each coordinate of a vector, scene units. In float32 no coordinate is more than 5.8
+            deviations from 0.
+
+    Returns:
+        anywhere: [k, 3] points, even over [-box, box)^3.
+        shifts: [m, 3] vectors.
+
+    Raises:
+        ValueError: The dtype does not fit, or the numbers are not that many.
+
+    Source: Box and Muller 1958.
+    """
+    return lib.probe_points(random, n_anywhere, box, deviation)
 
 
 def place_samples(
@@ -90,6 +159,16 @@ def _fake_draw(random, n_near, *rest):
     return (*(random.new_empty(n, 3) for _ in range(2)), *(random.new_empty(n, dtype=torch.int64) for _ in range(2)))
 
 
+def _fake_read(codes, index, view, exposures, backgrounds, *edges):
+    n = index.shape[0]
+    found = [backgrounds.new_empty(n, c) for c in (4, 3, 3)]
+    return *found, backgrounds.new_empty(n, dtype=torch.bool)
+
+
+def _fake_probes(random, n_anywhere, box, deviation):
+    return random.new_empty(n_anywhere, 3), random.new_empty((random.shape[0] - 3 * n_anywhere) // 4, 3)
+
+
 def _fake_place(rays_o, rays_d, ray_indices, t_starts, t_ends, offsets, anywhere, chosen, shifts, room):
     n, beside = ray_indices.shape[0], chosen.shape[0] if ray_indices.shape[0] else 0
     n_room = max(n, room)
@@ -98,4 +177,6 @@ def _fake_place(rays_o, rays_d, ray_indices, t_starts, t_ends, offsets, anywhere
 
 
 register("draw_rays", fake=_fake_draw)
+register("read_pixels", fake=_fake_read)
+register("probe_points", fake=_fake_probes)
 register("place_samples", fake=_fake_place)

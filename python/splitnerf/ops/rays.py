@@ -2,9 +2,9 @@
 
 The samples of all rays are in one array, ray after ray; ``offsets`` [n_rays + 1] holds the first sample of each ray.
 
-Differentiable once: ``neus_weights`` in f_prev, f_next and s, ``surface_weights`` in sdf, gradient and s, ``composite``
-in weights and values, ``ShadingSubset.interpolate`` in values. A second derivative raises. ``march_rays`` and
-``spread_samples`` have no gradient.
+Differentiable once: ``neus_weights`` in f_prev, f_next and s, ``surface_weights`` in sdf, gradient and s, ``sharpness`` in
+variance, ``composite`` in weights, values and opacity, ``ShadingSubset.interpolate`` in values. A second derivative raises.
+``march_rays`` and ``spread_samples`` have no gradient.
 """
 
 from __future__ import annotations
@@ -104,6 +104,7 @@ def surface_weights(
     step: float | Tensor,
     anneal: float | Tensor = 1.0,
     min_transmittance: float = 0.0,
+    n_samples: int | None = None,
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Normals and rendering weights of samples, from the distance and its gradient at the samples' midpoints.
 
@@ -112,16 +113,18 @@ def surface_weights(
     .001 gets no gradient in the backward pass.
 
     Args:
-        sdf, gradient: [n] signed distances (scene units) and their gradients [n, 3].
+        sdf, gradient: [n] signed distances (scene units), or [n, c] with the distances in the first column, and their gradients
+            [n, 3].
         rays_d: [n_rays, 3] unit directions.
         s: [] sharpness of the density, positive.
         offsets: [n_rays + 1] int64, see :class:`PackedSamples`.
         step: The length of a sample, scene units; a number or a tensor [].
         anneal: The annealing of the cosine: 0 at the start of a training, 1 when done; a number or a tensor [].
         min_transmittance: The transmittance below which samples get weight 0, see :func:`neus_weights`.
+        n_samples: Only so many of the first points are samples, as if the others were not there; None: all.
 
     Returns:
-        normals [n, 3], weights [n] and opacity [n_rays]. Differentiable once in sdf, gradient and s.
+        normals [n_samples, 3], weights [n_samples] and opacity [n_rays]. Differentiable once in sdf, gradient and s.
 
     Raises:
         ValueError: A shape, dtype or number does not fit.
@@ -129,8 +132,26 @@ def surface_weights(
     Source: NeuS Eq. (13) and its released code's estimate of both ends from one evaluation.
     """
     return lib.surface_weights(
-        sdf, gradient, rays_d, s, offsets, _as_tensor(step, sdf), _as_tensor(anneal, sdf), min_transmittance
-    )
+        sdf, gradient, rays_d, s, offsets, _as_tensor(step, sdf), _as_tensor(anneal, sdf), min_transmittance,
+        -1 if n_samples is None else n_samples,
+    )  # fmt: skip
+
+
+def sharpness(variance: Tensor) -> Tensor:
+    """The sharpness s = exp(10 v) of the NeuS density, where Phi(f) = sigmoid(s f); 10 v is clamped to [0, 9].
+
+    Args:
+        variance: v, any shape, float32 or float64.
+
+    Returns:
+        s in [1, e^9] of that shape, 1 / scene units. Differentiable once; the gradient is 0 where 10 v is clamped.
+
+    Raises:
+        ValueError: The dtype does not fit.
+
+    Source: NeuS (Wang et al. 2021), section 4.1, and its released code.
+    """
+    return lib.sharpness(variance)
 
 
 def _as_tensor(value: float | Tensor, like: Tensor) -> Tensor:
@@ -174,8 +195,8 @@ class ShadingSubset(NamedTuple):
 
 
 def spread_samples(
-    weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor, gap: float | Tensor = math.inf,
-    capacity: tuple[int, int] | None = None,
+    weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor, gap: float = math.inf,
+    capacity: tuple[int, int] | None = None, unit: Tensor | None = None,
 ) -> ShadingSubset:  # fmt: skip
     """Draws the samples of each ray that are shaded, in proportion to their weights.
 
@@ -186,41 +207,45 @@ def spread_samples(
 
     Args:
         weights: [n] rendering weights.
-        samples: The packed samples.
+        samples: The packed samples; how far they are apart is told by their starts.
         per_ray: The number of marks on a ray; 0 draws all samples.
         phase: [n_rays] position of each ray's first mark in [0, 1), as a share of the marks' spacing.
-        gap: The distance along the ray at which segments are split, scene units, positive; a number or a tensor [].
+        gap: The distance along the ray at which segments are split, positive, in units of `unit`.
         capacity: Fixed lengths of the results for shaded samples and for segments, so that the host need not wait for a
             GPU's counts; ``heaviest`` is then [n_rays]. Entries past the counts are valid indices with weight 0. If a
             count exceeds its capacity, as ``sizes`` shows, all other results are in range but have no meaning. None:
             exact lengths.
+        unit: [] a length in scene units; None: 1.
 
     Raises:
         ValueError: A shape, dtype or number does not fit.
 
     Source: Systematic resampling (Kitagawa 1996).
     """
-    t = samples.middles
-    if isinstance(gap, Tensor):
-        t, gap = t / gap, 1.0
-    return ShadingSubset(*lib.spread_samples(weights, t, samples.offsets, phase, gap, per_ray, *(capacity or ())))
+    room = (-1, -1) if capacity is None else capacity
+    found = lib.spread_samples(weights, samples.t_starts, samples.offsets, phase, gap, per_ray, *room, unit)
+    return ShadingSubset(*found)
 
 
-def composite(weights: Tensor, values: Tensor, offsets: Tensor) -> Tensor:
-    """Weighted sum of the samples' values along each ray.
+def composite(
+    weights: Tensor, values: Tensor, offsets: Tensor, opacity: Tensor | None = None, least_opacity: float = 1e-4
+) -> Tensor:
+    """Weighted sum of the samples' values along each ray or, with the rays' opacity o, their mean: sum / max(o, least).
 
     Args:
         weights: [n] rendering weights.
         values: [n, c] values of the samples.
         offsets: [n_rays + 1] int64, see :class:`PackedSamples`.
+        opacity: [n_rays] what the sums are divided by; None: they are not.
+        least_opacity: A smaller opacity counts as this one, and gets no gradient; positive.
 
     Returns:
-        [n_rays, c] sums; 0 for a ray without samples. Differentiable once in weights and values.
+        [n_rays, c] sums or means; 0 for a ray without samples. Differentiable once in weights, values and opacity.
 
     Raises:
         ValueError: A shape, dtype or the order of the offsets does not fit.
     """
-    return lib.composite(weights, values, offsets)
+    return lib.composite(weights, values, offsets, opacity, least_opacity)
 
 
 def _fake_march(rays_o, rays_d, jitter, cells, box, step, max_samples):
@@ -247,14 +272,25 @@ def _weights_backward(ctx, grad_weights, grad_opacity):
 
 
 def _keep_composite(ctx, inputs, output):
-    ctx.save_for_backward(*inputs)
+    *tensors, ctx.least_opacity = inputs
+    ctx.save_for_backward(*tensors)
 
 
 def _composite_backward(ctx, grad):
-    return *lib.composite_backward(*ctx.saved_tensors, grad), None
+    *_, opacity = tensors = ctx.saved_tensors
+    by_weights, by_values, by_opacity = lib.composite_backward(*tensors, ctx.least_opacity, grad)
+    return by_weights, by_values, None, None if opacity is None else by_opacity, None
 
 
-def _fake_spread(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_stretches=-1):
+def _keep_variance(ctx, inputs, output):
+    ctx.save_for_backward(*inputs)
+
+
+def _sharpness_backward(ctx, grad):
+    return lib.sharpness_backward(*ctx.saved_tensors, grad)
+
+
+def _fake_spread(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_stretches=-1, unit=None):
     sizes = (max_shaded, phase.shape[0], max_stretches)
     if max_shaded < 0:
         sizes = (torch.library.get_ctx().new_dynamic_size() for _ in range(3))
@@ -275,7 +311,7 @@ def _interpolation_backward(ctx, grad):
 
 
 def _keep_surface(ctx, inputs, output):
-    *tensors, ctx.min_transmittance = inputs
+    *tensors, ctx.min_transmittance, ctx.n_samples = inputs
     ctx.save_for_backward(*tensors, output[1])
 
 
@@ -285,22 +321,24 @@ def _surface_backward(ctx, grad_normals, grad_weights, grad_opacity):
     grad_sdf, grad_gradient, grad_s = lib.surface_weights_backward(
         *tensors,
         ctx.min_transmittance,
+        ctx.n_samples,
         weights,
         grad_normals,
         grad_weights,
         grad_opacity,
     )
-    return grad_sdf, grad_gradient, None, grad_s.sum(), None, None, None, None
+    return grad_sdf, grad_gradient, None, grad_s.sum(), None, None, None, None, None
+
+
+def _fake_surface(sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance, n_samples=-1):
+    n = sdf.shape[0] if n_samples < 0 else n_samples
+    return gradient.new_empty(n, 3), sdf.new_empty(n), sdf.new_empty(rays_d.shape[0])
 
 
 register("march_rays", fake=_fake_march)
 register(
     "surface_weights",
-    fake=lambda sdf, gradient, rays_d, *rest: (
-        gradient.new_empty(gradient.shape),
-        sdf.new_empty(sdf.shape),
-        sdf.new_empty(rays_d.shape[0]),
-    ),
+    fake=_fake_surface,
     setup_context=_keep_surface,
     backward=_surface_backward,
 )
@@ -342,11 +380,21 @@ register(
 )
 register(
     "composite",
-    fake=lambda weights, values, offsets: values.new_empty(offsets.shape[0] - 1, values.shape[1]),
+    fake=lambda weights, values, offsets, *rest: values.new_empty(offsets.shape[0] - 1, values.shape[1]),
     setup_context=_keep_composite,
     backward=_composite_backward,
 )
 register(
     "composite_backward",
-    fake=lambda weights, values, offsets, grad: (weights.new_empty(weights.shape), values.new_empty(values.shape)),
+    fake=lambda weights, values, offsets, opacity=None, least_opacity=1.0, grad=None: (
+        weights.new_empty(weights.shape), values.new_empty(values.shape),
+        weights.new_empty(0 if opacity is None else opacity.shape[0]),
+    ),
+)  # fmt: skip
+register(
+    "sharpness",
+    fake=lambda variance: variance.new_empty(variance.shape),
+    setup_context=_keep_variance,
+    backward=_sharpness_backward,
 )
+register("sharpness_backward", fake=lambda variance, grad_s: variance.new_empty(variance.shape))

@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 import torch
-from torch import Tensor
 
+from splitnerf.ops import EdgeRuns
 from splitnerf.render.masks import joined, runs_of, widened
 
 PARTLY = 0.02, 0.98  # coverage between which a pixel lies on an edge
@@ -24,6 +24,9 @@ class EdgePixels:
         photos: What :func:`edge_of` finds in each photo.
         n_pixels: The number of pixels of a photo.
         device: Where the pixels are looked up.
+
+    Attributes:
+        runs: The pixels and the colours behind the object there, at the photos' own exposures.
     """
 
     def __init__(
@@ -31,20 +34,11 @@ class EdgePixels:
     ):
         starts, ends = joined([runs for runs, _ in photos], n_pixels)
         before = np.cumsum(ends - starts) - (ends - starts)
-        self.starts, self.shift = (torch.from_numpy(x).to(device) for x in (starts, before - starts))
-        self.ends = torch.from_numpy(ends).to(device)
-        self.behind = torch.from_numpy(np.concatenate([behind for _, behind in photos])).to(device)
+        behind = np.concatenate([behind for _, behind in photos])
+        self.runs = EdgeRuns(*(torch.from_numpy(x).to(device) for x in (starts, ends, before - starts, behind)))
 
     def __len__(self) -> int:
-        return len(self.behind)
-
-    def at(self, index: Tensor) -> tuple[Tensor, Tensor]:
-        """Which of the pixels [n], counted through all photos, are among these, [n] bool, and the sRGB colours [n, 3] behind the
-        object there, at the photos' own exposures."""
-        run = (torch.searchsorted(self.starts, index, right=True) - 1).clamp(min=0)
-        found = (index >= self.starts[run]) & (index < self.ends[run])
-        behind = self.behind[torch.where(found, index + self.shift[run], 0)]
-        return found, behind.float() / 255
+        return len(self.runs.behind)
 
 
 def edge_of(

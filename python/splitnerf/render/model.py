@@ -24,8 +24,8 @@ from splitnerf.fields import (
     VisibilityBits,
 )
 from splitnerf.fields.occlusion import TracedBits
-from splitnerf.fields.sdf import SdfSample, sharpness
-from splitnerf.ops import HashGridSpec, light_queries, shade_sums, split_sum_shade, summed_light, take_rows
+from splitnerf.fields.sdf import SdfSample
+from splitnerf.ops import HashGridSpec, light_queries, shade_sums, sharpness, split_sum_shade, summed_light, take_rows
 
 START_BOUNCES = 3  # bounces of indirect light on a new mesh
 SUMMED_BAND = 0.15  # width in roughness of the transition from the split sum to the sum over directions
@@ -126,8 +126,8 @@ class SceneModel(nn.Module):
 
     @property
     def s_value(self) -> float:
-        """:attr:`s` as a number."""
-        return float(self.s.detach())
+        """:attr:`s` as a number, worked out on the CPU."""
+        return float(sharpness(self.variance.detach().cpu()))
 
     def open_levels(self, progress: float) -> None:
         """Opens the hash-grid levels of this progress: one after the other until ``levels_open_by`` of the run."""

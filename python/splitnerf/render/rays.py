@@ -13,7 +13,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import PixelReader
 from splitnerf.devices import tensor_cores
 from splitnerf.memory import give_back
-from splitnerf.ops import PixelList, draw_rays
+from splitnerf.ops import EdgeRuns, PixelList, draw_rays
 from splitnerf.render.edges import EdgePixels, edge_of
 from splitnerf.render.masks import pixel_list, reduced, runs_of, widened
 
@@ -69,14 +69,18 @@ class DrawnRays(NamedTuple):
         rays_o, rays_d: [n, 3] origins and unit directions.
         pixels: [n, 4] sRGB of the photos as they are, in [0, 1], straight alpha.
         view: [n] int64, the photos' numbers.
-        index: [n] int64, the pixels' numbers, counted through all photos.
+        exposure: [n, 3] the factors of the photos' linear values.
+        background: [n, 3] sRGB colours behind the pixels: at edges what the photo would show there without the object.
+        whole: [n] bool, the pixels along the masks' edges.
     """
 
     rays_o: Tensor
     rays_d: Tensor
     pixels: Tensor
     view: Tensor
-    index: Tensor
+    exposure: Tensor
+    background: Tensor
+    whole: Tensor
 
 
 class PixelSource:
@@ -126,12 +130,27 @@ class PixelSource:
         self.known = pixel_list(known, n_pixels, self.device) if known else PixelList.all(n_all, self.device)
         has_edges = any(len(behind) for _, behind in edges)
         self.edges = EdgePixels(edges, n_pixels, self.device) if has_edges else None
+        self._no_edges = EdgeRuns.none(self.device)
 
-    def draw(self, n: int) -> DrawnRays:
-        """Draws n rays; see :func:`splitnerf.ops.draw_rays`."""
+    def draw(
+        self, n: int, random: Tensor | None = None, backgrounds: Tensor | None = None, exposures: Tensor | None = None
+    ) -> DrawnRays:
+        """Draws n rays; see :func:`splitnerf.ops.draw_rays`.
+
+        Args:
+            n: The number of rays.
+            random: [n] in [0, 1); None: drawn by the generator.
+            backgrounds: [n, 3] sRGB colours behind the pixels that are not at edges; None: black.
+            exposures: [views, 3] the photos' factors; None: 1.
+        """
         n_near = int(n * self.share) if self.foreground.count else 0
-        random = torch.rand(n, generator=self.generator, device=self.device)
+        if random is None:
+            random = torch.rand(n, generator=self.generator, device=self.device)
+        backgrounds = random.new_zeros(n, 3) if backgrounds is None else backgrounds
+        exposures = torch.ones_like(self.origins) if exposures is None else exposures
         rays_o, rays_d, view, index = draw_rays(
             random, n_near, self.foreground, self.known, self.matrices, self.origins, self.height, self.width
         )
-        return DrawnRays(rays_o, rays_d, self.pixels.read(index), view, index)
+        edges = self._no_edges if self.edges is None else self.edges.runs
+        pixels, *beside = self.pixels.read(index, view, exposures, backgrounds, edges)
+        return DrawnRays(rays_o, rays_d, pixels, view, *beside)

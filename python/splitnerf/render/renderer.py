@@ -142,6 +142,7 @@ def find_samples(
     anneal: float = 1.0,
     probes: ProbePoints | None = None,
     capacity: int = 0,
+    phase: Tensor | None = None,
     s: float | None = None,
 ) -> FoundSamples:
     """Finds the samples of rays that contribute to their pixels, with the current field.
@@ -155,6 +156,7 @@ def find_samples(
         probes: Additional points at which the field will be evaluated, or None.
         capacity: The number of samples in the result, if positive: padding fills it up, and what exceeds it is left out. Where
             ``sampling.min_weight`` is 0, nothing is left out.
+        phase: [n_rays] in [0, 1), see :class:`FoundSamples`; None: the last digits of `jitter`.
         s: The sharpness of the density; None: the model's own, for which the host waits.
     """
     c, s = model.config, model.s_value if s is None else s
@@ -172,7 +174,8 @@ def find_samples(
     probes = ProbePoints(rays_o[:0], jitter[:0], rays_o[:0]) if probes is None else probes
     positions, directions, beside = place_samples(rays_o, rays_d, packed, *probes, capacity)
     packed = packed.extended(len(directions) - len(packed.ray_indices))
-    phase = (PHASES * jitter) % 1.0  # the choice of shaded samples must not depend on their positions
+    if phase is None:  # the choice of shaded samples must not depend on their positions
+        phase = (PHASES * jitter) % 1.0
     numbers = (positions.new_full((), x) for x in (step, anneal))
     return FoundSamples(packed, rays_d, phase, positions, directions, beside, *numbers, evaluated, n_found)
 
@@ -198,19 +201,19 @@ def render_rays(
     c = model.config
     samples, step, n = found.packed, found.step, len(found.directions)
     field = model.surface(found.positions)
-    sdf = field.sdf[:n]
     normals, weights, opacity = surface_weights(
-        sdf,
-        field.gradient[:n],
+        field.outputs,
+        field.gradient,
         found.rays_d,
         model.s,
         samples.offsets,
         step=step,
         anneal=found.anneal,
         min_transmittance=c.sampling.min_transmittance,
+        n_samples=n,
     )
 
-    spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP * step, capacity)
+    spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP, capacity, step)
     shaded = spread.shaded
     of_samples = [found.positions, found.directions, normals, field.outputs, field.features]
     positions, directions, normals, outputs, features = take_rows(of_samples, shaded)
@@ -220,7 +223,7 @@ def render_rays(
     points = model.shade(light, positions, outputs, features, normals, view_dirs, segments)
     radiance = points.radiance if c.shading.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
-    mean = composite(weights, values, samples.offsets) / opacity.clamp(min=MIN_OPACITY)[:, None]
+    mean = composite(weights, values, samples.offsets, opacity, MIN_OPACITY)
     if model.sums_light:
         on_surface = positions - normals.detach() * sdf.detach()[:, None]
         at, correction = model.quadrature_correction(

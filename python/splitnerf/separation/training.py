@@ -45,7 +45,7 @@ def train_field(
     while share < 1.0:
         for group in optimiser.param_groups:
             group["lr"] = RATE * min(1.0, (step + 1) / WARM_UP) * LAST_RATE**share
-        rays_o, rays_d, pixels, view, _ = source.draw(RAYS)
+        rays_o, rays_d, pixels, view, *_ = source.draw(RAYS)
         colour = at_unit_exposure(pixels[:, :3], exposures[view]).clamp(max=1)
         rendered = field.render(rays_o, rays_d, FIRST, SECOND, jitter=True)
         apart = rendered.colour - colour

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from splitnerf.config import Config
 from splitnerf.data.pixels import at_unit_exposure
+from splitnerf.ops import probe_points
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import ProbePoints
 
@@ -23,6 +24,7 @@ class Batch(NamedTuple):
             photo would show without the object.
         whole: [n] bool, the pixels along the masks' edges, whose colours are compared whole.
         jitter: [n] offsets of each ray's samples in [0, 1), as shares of a sample's length.
+        phase: [n] in [0, 1), where the choice of each ray's shaded samples begins.
         view: [n] int64, the photos' numbers.
         exposure: [n, 3] the factors of the photos' linear values.
         probes: Other points that the losses evaluate.
@@ -34,6 +36,7 @@ class Batch(NamedTuple):
     background: Tensor
     whole: Tensor
     jitter: Tensor
+    phase: Tensor
     view: Tensor
     exposure: Tensor
     probes: ProbePoints
@@ -49,32 +52,40 @@ def draw_batch(source: PixelSource, n_rays: int, config: Config, exposures: Tens
 
     Where samples are added as sRGB, colours at another exposure are not known: the photos are brought to an exposure of 1.
     """
-    g = source.generator
-    drawn = source.draw(n_rays)
-    target, exposure = drawn.pixels, exposures[drawn.view]
-    random = torch.rand(4, n_rays, generator=g, device=g.device)
-    jitter, background = random[0], random[1:].reshape(n_rays, 3)
-    if source.edges is None:
-        whole = torch.zeros(n_rays, dtype=torch.bool, device=g.device)
-    else:
-        whole, behind = source.edges.at(drawn.index)
-        background = torch.where(whole[:, None], behind, background)
+    pixels, jitter, phase, backgrounds, chosen, probes = draw_numbers(
+        source.generator, [n_rays, n_rays, n_rays, 3 * n_rays, *probe_counts(config)]
+    )
+    drawn = source.draw(n_rays, pixels, backgrounds.view(n_rays, 3), exposures)
+    target, background, exposure = drawn.pixels, drawn.background, drawn.exposure
     if config.shading.compositing == "srgb":
         target = torch.cat([at_unit_exposure(target[:, :3], exposure), target[:, 3:]], dim=1)
-        background = torch.where(whole[:, None], at_unit_exposure(background, exposure), background)
+        background = torch.where(drawn.whole[:, None], at_unit_exposure(background, exposure), background)
         exposure = torch.ones_like(exposure)
     return Batch(
-        drawn.rays_o, drawn.rays_d, target, background, whole, jitter, drawn.view, exposure, draw_probes(config, g)
-    )
+        drawn.rays_o, drawn.rays_d, target, background, drawn.whole, jitter, phase, drawn.view, exposure,
+        make_probes(config, chosen, probes),
+    )  # fmt: skip
 
 
-def draw_probes(config: Config, generator: torch.Generator) -> ProbePoints:
-    """Random points for the eikonal loss and for the smoothness loss, in addition to the samples of the rays."""
-    c, device = config, generator.device
-    n_beside = c.losses.smoothness_points if c.losses.smoothness_weight else 0
-    anywhere, shifts = (torch.empty(n, 3, device=device) for n in (c.losses.eikonal_points, n_beside))
-    return ProbePoints(
-        anywhere.uniform_(-c.surface.box, c.surface.box, generator=generator),
-        torch.rand(n_beside, generator=generator, device=device),
-        shifts.normal_(0.0, c.losses.smoothness_radius, generator=generator),
-    )
+def draw_numbers(generator: torch.Generator, counts: list[int]) -> list[Tensor]:
+    """Vectors of so many numbers in [0, 1), drawn together. Each begins at a multiple of 16 bytes, so that no operator copies it."""
+    rooms = [-(-n // 4) * 4 for n in counts]
+    parts = torch.rand(sum(rooms), generator=generator, device=generator.device).split(rooms)
+    return [part[:n] for part, n in zip(parts, counts)]
+
+
+def probe_counts(config: Config) -> tuple[int, int]:
+    """How many numbers :func:`make_probes` takes as `chosen` and as `random`."""
+    n_beside = config.losses.smoothness_points if config.losses.smoothness_weight else 0
+    return n_beside, 3 * config.losses.eikonal_points + 4 * n_beside
+
+
+def make_probes(config: Config, chosen: Tensor, random: Tensor) -> ProbePoints:
+    """Points for the eikonal loss and for the smoothness loss, in addition to the samples of the rays.
+
+    Args:
+        chosen, random: Numbers in [0, 1), as many as :func:`probe_counts` says.
+    """
+    c = config
+    anywhere, shifts = probe_points(random, c.losses.eikonal_points, c.surface.box, c.losses.smoothness_radius)
+    return ProbePoints(anywhere, chosen, shifts)

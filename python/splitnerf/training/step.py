@@ -87,7 +87,9 @@ class Step:
     def find(self, batch: Batch, progress: float, capacity: int = 0) -> FoundSamples:
         """The samples of a batch, see :func:`splitnerf.render.renderer.find_samples`."""
         anneal = cosine_anneal(self.model.config, progress)
-        return find_samples(self.model, self.grid.cells, *batch.rays, anneal, batch.probes, capacity, self.s)
+        return find_samples(
+            self.model, self.grid.cells, *batch.rays, anneal, batch.probes, capacity, batch.phase, self.s
+        )
 
     def differentiate(
         self, batch: Batch, found: FoundSamples, light: EvaluatedLight, environment: Tensor | None, step: int,
@@ -137,7 +139,9 @@ def loss_terms(
     # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
     terms.add(
         {"colour": CHANNELS * w.colour_weight, "mask": w.mask_weight or None},
-        pixel_losses(ray.mean * batch.exposure, ray.opacity, batch.target, batch.background, batch.whole, linear=ray.linear),
+        pixel_losses(
+            ray.mean, ray.opacity, batch.target, batch.background, batch.whole, batch.exposure, linear=ray.linear
+        ),
     )
     terms.add(
         {"eikonal": w.eikonal_weight, "smoothness": w.smoothness_weight or None},

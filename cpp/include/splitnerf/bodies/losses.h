@@ -1,4 +1,4 @@
-// Losses with their gradients, one item per call; the sums over items are added to `sums`, in double.
+// Losses and their gradients, one item per call; the sums over items are added to `sums`, in double.
 #pragma once
 
 #include "splitnerf/accumulate.h"
@@ -8,123 +8,164 @@
 
 namespace splitnerf {
 
+// What the losses of pixels read. Without `exposure` all factors are 1, without `whole` no pixel is whole.
+template <class T> struct PixelArrays {
+  int64_t n;
+  const T *mean, *opacity, *target, *background, *exposure;
+  const bool* whole;
+  bool linear;
+
+  SPLITNERF_HD T per_value() const { return T(1) / T(max_of<int64_t>(3 * n, 1)); }
+  SPLITNERF_HD T per_ray() const { return T(1) / T(max_of<int64_t>(n, 1)); }
+  SPLITNERF_HD Vec3<T> exposure_of(int64_t i) const {
+    return exposure ? load3(exposure + 3 * i) : Vec3<T>{T(1), T(1), T(1)};
+  }
+  SPLITNERF_HD PixelLosses<T> at(int64_t i) const {
+    return pixel_losses(load3(mean + 3 * i) * exposure_of(i), opacity[i], target + 4 * i, load3(background + 3 * i),
+                        whole && whole[i], linear);
+  }
+};
+
 // sums = {colour, mask}
 template <class T> struct PixelLossesBody {
   static constexpr int n_sums = 2;
-  const T *mean, *opacity, *target, *background;
-  const bool* whole;
-  bool linear;
-  T per_value, per_ray;  // 1 over the number of values and of rays, as the means are taken
-  T *losses, *colour_by_mean, *colour_by_opacity, *mask_by_opacity;
+  PixelArrays<T> in;
+  T* losses;  // [2]
 
   SPLITNERF_HD void operator()(int64_t i, double* sums) const {
-    const auto pixel =
-        pixel_losses(load3(mean + 3 * i), opacity[i], target + 4 * i, load3(background + 3 * i), whole[i], linear);
+    const auto pixel = in.at(i);
     sums[0] += double(pixel.colour), sums[1] += double(pixel.mask);
-    store3(colour_by_mean + 3 * i, pixel.colour_by_mean * per_value);
-    colour_by_opacity[i] = pixel.colour_by_opacity * per_value;
-    mask_by_opacity[i] = pixel.mask_by_opacity * per_ray;
   }
   SPLITNERF_HD void finish(const double* sums) const {
-    losses[0] = T(sums[0] * double(per_value)), losses[1] = T(sums[1] * double(per_ray));
+    losses[0] = T(sums[0] * double(in.per_value())), losses[1] = T(sums[1] * double(in.per_ray()));
   }
 };
 SPLITNERF_ON_GPU(PixelLossesBody);
-template <class T>
-PixelLossesBody<T> make_pixel_losses(int64_t n, const T* mean, const T* opacity, const T* target, const T* background,
-                                     const bool* whole, bool linear, T* losses, T* colour_by_mean, T* colour_by_opacity,
-                                     T* mask_by_opacity) {
-  return {mean,
-          opacity,
-          target,
-          background,
-          whole,
-          linear,
-          T(1) / T(max_of<int64_t>(3 * n, 1)),
-          T(1) / T(max_of<int64_t>(n, 1)),
-          losses,
-          colour_by_mean,
-          colour_by_opacity,
-          mask_by_opacity};
-}
 
-// sums = {eikonal}; clears smoothness_by for what NormalPairsBody adds.
-template <class T> struct EikonalBody {
-  static constexpr int n_sums = 1;
-  const T* gradients;
-  T per_point;
-  T *loss, *eikonal_by, *smoothness_by;
+template <class T> struct PixelLossesBackwardBody {
+  PixelArrays<T> in;
+  const T* grad_losses;  // [2]
+  T *grad_mean, *grad_opacity;
 
-  SPLITNERF_HD void operator()(int64_t i, double* sums) const {
-    const auto point = eikonal_loss(load3(gradients + 3 * i));
-    sums[0] += double(point.value);
-    store3(eikonal_by + 3 * i, point.by_gradient * per_point);
-    store3(smoothness_by + 3 * i, Vec3<T>{T(0), T(0), T(0)});
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const auto pixel = in.at(i);
+    const T by_colour = grad_losses[0] * in.per_value(), by_mask = grad_losses[1] * in.per_ray();
+    store3(grad_mean + 3 * i, pixel.colour_by_mean * in.exposure_of(i) * by_colour);
+    grad_opacity[i] = pixel.colour_by_opacity * by_colour + pixel.mask_by_opacity * by_mask;
   }
-  SPLITNERF_HD void finish(const double* sums) const { *loss = T(sums[0] * double(per_point)); }
 };
-SPLITNERF_ON_GPU(EikonalBody);
+SPLITNERF_ON_GPU(PixelLossesBackwardBody);
 
-// Pair j is of sample beside[j] and of gradient n - m + j. sums = {weight distance, weight}; adds to smoothness_by, which is
-// then to be scaled by *scale.
-template <class T> struct NormalPairsBody {
-  static constexpr int n_sums = 2;
+inline constexpr double kLeastWeight = 1e-8;  // a smaller sum of weights counts as this one
+
+// What the losses of gradients read: pair j is of sample beside[j] and of gradient n - m + j.
+template <class T> struct GradientArrays {
   int64_t n, n_weights, m;
   const T *gradients, *weights;
   const int64_t* beside;
-  T *loss, *smoothness_by;
-  double* scale;
 
-  SPLITNERF_HD void operator()(int64_t j, double* sums) const {
-    // On the CPU `beside` has been checked. On the GPU it has not; any value keeps all accesses inside the arrays.
-    const int64_t here = clamp<int64_t>(beside[j], 0, n_weights - 1), there = n - m + j;
-    const T weight = weights[here];
-    const auto pair = normal_distance(load3(gradients + 3 * here), load3(gradients + 3 * there));
-    if (!pair.counts) return;
-    sums[0] += double(weight * pair.value), sums[1] += double(weight);
-    add3_to(smoothness_by + 3 * here, pair.by_here * weight);
-    add3_to(smoothness_by + 3 * there, pair.by_there * weight);
-  }
-  SPLITNERF_HD void finish(const double* sums) const {
-    *scale = 1.0 / max_of(sums[1], 1e-8);
-    *loss = T(sums[0] * *scale);
+  SPLITNERF_HD T per_point() const { return T(1) / T(max_of<int64_t>(n, 1)); }
+  // On the CPU `beside` has been checked. On the GPU it has not; any value keeps all accesses inside the arrays.
+  SPLITNERF_HD int64_t sample_of(int64_t j) const { return clamp<int64_t>(beside[j], 0, n_weights - 1); }
+  SPLITNERF_HD NormalDistance<T> pair(int64_t j) const {
+    return normal_distance(load3(gradients + 3 * sample_of(j)), load3(gradients + 3 * (n - m + j)));
   }
 };
-SPLITNERF_ON_GPU(NormalPairsBody);
 
-// sums = {metal, binary, dark, share}; by_metallic is then to be scaled by *scale.
-template <class T> struct MaterialLossesBody {
-  static constexpr int n_sums = 4;
-  int64_t n;
-  const T *albedo, *metallic, *shares;
-  bool smooth_l1;
-  T *losses, *by_metallic;
-  double* scale;
+// One call for each of the n points, then for each of the m pairs. sums = {eikonal, weight distance, weight}
+template <class T> struct GradientLossesBody {
+  static constexpr int n_sums = 3;
+  GradientArrays<T> in;
+  T *losses, *total;  // [2], and the weight of the pairs that count
 
   SPLITNERF_HD void operator()(int64_t i, double* sums) const {
-    const auto point = material_losses(load3(albedo + 3 * i), metallic[i], smooth_l1);
-    const T values[3] = {point.metal, point.binary, point.dark},
-            slopes[3] = {point.metal_slope, point.binary_slope, point.dark_slope};
-    for (int k = 0; k < 3; ++k) {
-      sums[k] += double(shares[i] * values[k]);
-      by_metallic[k * n + i] = shares[i] * slopes[k];
+    if (i < in.n) {
+      sums[0] += double(eikonal_loss(load3(in.gradients + 3 * i)).value);
+    } else if (const auto pair = in.pair(i - in.n); pair.counts) {
+      const T weight = in.weights[in.sample_of(i - in.n)];
+      sums[1] += double(weight * pair.value), sums[2] += double(weight);
     }
-    sums[3] += double(shares[i]);
   }
   SPLITNERF_HD void finish(const double* sums) const {
-    *scale = 1.0 / max_of(sums[3], 1e-8);
-    for (int k = 0; k < 3; ++k) losses[k] = T(sums[k] * *scale);
+    losses[0] = T(sums[0] * double(in.per_point())), losses[1] = T(sums[1] / max_of(sums[2], kLeastWeight));
+    *total = T(sums[2]);
+  }
+};
+SPLITNERF_ON_GPU(GradientLossesBody);
+
+// The gradient at each of the n points, but for what the pairs pull at their samples.
+template <class T> struct GradientLossesBackwardBody {
+  GradientArrays<T> in;
+  const T *total, *grad_losses;
+  T* grad_gradients;
+
+  SPLITNERF_HD T by_pair(int64_t j) const {
+    return grad_losses[1] * in.weights[in.sample_of(j)] / max_of(*total, T(kLeastWeight));
+  }
+  SPLITNERF_HD void operator()(int64_t i) const {
+    Vec3<T> grad = eikonal_loss(load3(in.gradients + 3 * i)).by_gradient * (grad_losses[0] * in.per_point());
+    const int64_t j = i - (in.n - in.m);
+    if (j >= 0)
+      if (const auto pair = in.pair(j); pair.counts) grad += pair.by_there * by_pair(j);
+    store3(grad_gradients + 3 * i, grad);
+  }
+};
+SPLITNERF_ON_GPU(GradientLossesBackwardBody);
+
+// What pair j pulls at its sample, added to the gradient that the body above has stored there.
+template <class T> struct SamplesOfPairsBackwardBody {
+  static constexpr bool adds_to_shared = true;
+  GradientLossesBackwardBody<T> of;
+
+  SPLITNERF_HD void operator()(int64_t j) const {
+    const auto pair = of.in.pair(j);
+    if (pair.counts) add3_to(of.grad_gradients + 3 * of.in.sample_of(j), pair.by_here * of.by_pair(j));
+  }
+};
+SPLITNERF_ON_GPU(SamplesOfPairsBackwardBody);
+
+// What the losses of materials read.
+template <class T> struct MaterialArrays {
+  const T *albedo, *metallic, *shares;
+  bool smooth_l1;
+
+  SPLITNERF_HD MaterialLosses<T> at(int64_t i) const {
+    return material_losses(load3(albedo + 3 * i), metallic[i], smooth_l1);
+  }
+};
+
+// sums = {metal, binary, dark, share}
+template <class T> struct MaterialLossesBody {
+  static constexpr int n_sums = 4;
+  MaterialArrays<T> in;
+  T *losses, *total;  // [3], and the sum of the shares
+
+  SPLITNERF_HD void operator()(int64_t i, double* sums) const {
+    const auto point = in.at(i);
+    const T share = in.shares[i];
+    sums[0] += double(share * point.metal), sums[1] += double(share * point.binary);
+    sums[2] += double(share * point.dark), sums[3] += double(share);
+  }
+  SPLITNERF_HD void finish(const double* sums) const {
+    for (int k = 0; k < 3; ++k) losses[k] = T(sums[k] / max_of(sums[3], kLeastWeight));
+    *total = T(sums[3]);
   }
 };
 SPLITNERF_ON_GPU(MaterialLossesBody);
 
-template <class T> struct ScaleBody {
-  const double* scale;
-  T* values;
+template <class T> struct MaterialLossesBackwardBody {
+  MaterialArrays<T> in;
+  const T *total, *grad_losses;
+  T* grad_metallic;
 
-  SPLITNERF_HD void operator()(int64_t i) const { values[i] *= T(*scale); }
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const auto point = in.at(i);
+    const T slope =
+        grad_losses[0] * point.metal_slope + grad_losses[1] * point.binary_slope + grad_losses[2] * point.dark_slope;
+    grad_metallic[i] = slope * (in.shares[i] / max_of(*total, T(kLeastWeight)));
+  }
 };
-SPLITNERF_ON_GPU(ScaleBody);
+SPLITNERF_ON_GPU(MaterialLossesBackwardBody);
 
 // ---- quadratic entropy: E = -ln(sum_ij k_ij / n^2),  dE / dx_i = sum_j k_ij (x_i - x_j) / sum k ----
 

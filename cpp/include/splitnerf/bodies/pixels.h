@@ -1,6 +1,7 @@
 // Where a training step looks: rays through drawn pixels, and points of the rays' samples.
 #pragma once
 
+#include "splitnerf/trigonometry.h"
 #include "splitnerf/vec.h"
 
 namespace splitnerf {
@@ -53,6 +54,87 @@ template <class T> struct DrawRaysBody {
   }
 };
 SPLITNERF_ON_GPU(DrawRaysBody);
+
+// Pixels of which a photo's colour is compared whole, as runs of neighbours: those numbered starts[r] to ends[r] - 1, whose colours
+// without the object are in `behind` [n, 3] from number starts[r] + shift[r] on.
+struct EdgeRuns {
+  const int64_t *starts, *ends, *shift;
+  const uint8_t* behind;
+  int64_t n_runs, n_behind;
+
+  // The number of a pixel in `behind`, or -1.
+  SPLITNERF_HD int64_t find(int64_t pixel) const {
+    int64_t low = 0, high = n_runs;  // the first run that starts later
+    while (low < high) {
+      const int64_t middle = (low + high) / 2;
+      if (starts[middle] > pixel) {
+        high = middle;
+      } else {
+        low = middle + 1;
+      }
+    }
+    if (low == 0 || pixel >= ends[low - 1]) return -1;
+    return clamp<int64_t>(pixel + shift[low - 1], 0, n_behind - 1);
+  }
+};
+
+// What photos show at pixels, from their codes [n_pixels, 4]: bytes, words of 16 bits (given as signed ones), or floats.
+template <class T, class Code> struct ReadPixelsBody {
+  const Code* codes;
+  int64_t n_pixels, n_views;
+  EdgeRuns edges;
+  const int64_t *index, *view;
+  const T *exposures, *backgrounds;
+  T *target, *exposure, *background;
+  bool* whole;
+
+  SPLITNERF_HD static T value(uint8_t code) { return T(code) * T(1. / 255); }
+  SPLITNERF_HD static T value(int16_t code) { return T(static_cast<uint16_t>(code)) * T(1. / 65535); }
+  SPLITNERF_HD static T value(float code) { return T(code); }
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const int64_t pixel = clamp<int64_t>(index[i], 0, n_pixels - 1), photo = clamp<int64_t>(view[i], 0, n_views - 1);
+    const int64_t edge = edges.find(pixel);
+    for (int k = 0; k < 4; ++k) target[4 * i + k] = value(codes[4 * pixel + k]);
+    store3(exposure + 3 * i, load3(exposures + 3 * photo));
+    for (int k = 0; k < 3; ++k)
+      background[3 * i + k] = edge < 0 ? backgrounds[3 * i + k] : value(edges.behind[3 * edge + k]);
+    whole[i] = edge >= 0;
+  }
+};
+template <class T> using ReadBytesBody = ReadPixelsBody<T, uint8_t>;
+template <class T> using ReadWordsBody = ReadPixelsBody<T, int16_t>;
+template <class T> using ReadFloatsBody = ReadPixelsBody<T, float>;
+SPLITNERF_ON_GPU(ReadBytesBody);
+SPLITNERF_ON_GPU(ReadWordsBody);
+SPLITNERF_ON_GPU(ReadFloatsBody);
+
+// n_anywhere points of a cube from three numbers in [0, 1) each, and n_shifts vectors whose coordinates are normal with a
+// deviation, from four.
+//   x, y = deviation sqrt(-2 ln(1 - u)) (cos 2 pi v, sin 2 pi v)             Source: Box and Muller 1958.
+template <class T> struct ProbesBody {
+  int64_t n_anywhere, n_shifts;
+  T box, deviation;
+  const T* random;
+  T *anywhere, *shifts;
+
+  SPLITNERF_HD Vec2<T> normal_pair(const T* u) const {
+    const T radius = deviation * std::sqrt(T(-2) * std::log(T(1) - u[0]));
+    const Vec2<T> at = cos_sin_of_turns(u[1]);
+    return {radius * at.x, radius * at.y};
+  }
+  SPLITNERF_HD void operator()(int64_t i) const {
+    if (i < n_anywhere) {
+      const Vec3<T> u = load3(random + 3 * i), one{T(1), T(1), T(1)};
+      store3(anywhere + 3 * i, (u * T(2) - one) * box);
+    } else {
+      const int64_t k = i - n_anywhere;
+      const T* u = random + 3 * n_anywhere + 4 * k;
+      const Vec2<T> first = normal_pair(u), second = normal_pair(u + 2);
+      store3(shifts + 3 * k, Vec3<T>{first.x, first.y, second.x});
+    }
+  }
+};
+SPLITNERF_ON_GPU(ProbesBody);
 
 // positions [n_room + n_anywhere + n_beside]: the midpoints of the samples in the first of n_rows and, up to n_room, the first of them again; then
 // given points; then points beside samples, chosen by a number in [0, 1). Without samples the room is filled with zeros.

@@ -113,7 +113,7 @@ template <class T> struct SurfaceIntervals {
 
   SPLITNERF_HD T cosine(int64_t i) const { return dot(direction, unit_normal(load3(in.gradient + 3 * (first + i)))); }
   SPLITNERF_HD NeusInterval<T> operator()(int64_t i) const {
-    return surface_interval(in.sdf[first + i], cosine(i), *in.step, *in.anneal);
+    return surface_interval(in.sdf[(first + i) * in.stride], cosine(i), *in.step, *in.anneal);
   }
 };
 
@@ -137,72 +137,107 @@ template <class T> struct SurfaceWeightsBody {
 };
 SPLITNERF_ON_GPU(SurfaceWeightsBody);
 
-// grad_sdf [n] stores the optical depths until its own values are written.
+// grad_sdf [n_rows, stride] and grad_gradient [n_rows, 3]; `depths` [n] is work memory.
 template <class T> struct SurfaceWeightsBackwardBody {
   SurfaceSamples<T> in;
   const T *weights, *grad_normals, *grad_weights, *grad_opacity;
-  T *grad_sdf, *grad_gradient, *grad_s_rays;
+  T *grad_sdf, *grad_gradient, *grad_s_rays, *depths;
 
+  SPLITNERF_HD void store(int64_t i, T by_sdf, Vec3<T> by_gradient) const {
+    T* row = grad_sdf + i * in.stride;
+    row[0] = by_sdf;
+    for (int64_t c = 1; c < in.stride; ++c) row[c] = T(0);
+    store3(grad_gradient + 3 * i, by_gradient);
+  }
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
     const SampleRange ray = in.rays.samples_of(r);
     const int64_t first = ray.first;
     const SurfaceIntervals<T> intervals{in, first, load3(in.directions + 3 * r)};
     const T grad_s = neus_ray_weights_backward(
         group, intervals, *in.s, ray.n, in.min_transmittance, weights + first, grad_weights + first, grad_opacity[r],
-        grad_sdf + first, [&](int64_t i, const OpticalDepthGrad<T>& g) {
+        depths + first, [&](int64_t i, const OpticalDepthGrad<T>& g) {
           const T grad_cosine = surface_interval_backward(g, intervals.cosine(i), *in.step, *in.anneal);
-          grad_sdf[first + i] = g.both;
-          store3(grad_gradient + 3 * (first + i),
-                 unit_normal_backward(load3(in.gradient + 3 * (first + i)),
-                                      load3(grad_normals + 3 * (first + i)) + intervals.direction * grad_cosine));
+          const Vec3<T> grad_normal = load3(grad_normals + 3 * (first + i)) + intervals.direction * grad_cosine;
+          store(first + i, g.both, unit_normal_backward(load3(in.gradient + 3 * (first + i)), grad_normal));
         });
     if (group.lane() == 0) grad_s_rays[r] = grad_s;
-    in.rays.for_each_unowned(group, r, [&](int64_t i) {
-      grad_sdf[i] = T(0);
-      store3(grad_gradient + 3 * i, Vec3<T>{T(0), T(0), T(0)});
-    });
+    const PackedRays rows{in.rays.n_rays, in.n_rows, in.rays.offsets};
+    rows.for_each_unowned(group, r, [&](int64_t i) { store(i, T(0), Vec3<T>{T(0), T(0), T(0)}); });
   }
 };
 SPLITNERF_ON_GPU(SurfaceWeightsBackwardBody);
 
-// sums [n_rays, n_channels] of weights [n] times values [n, n_channels], added in double.
-template <class T> struct CompositeBody {
+// s = exp(10 v), one number a call.
+template <class T> struct SharpnessBody {
+  const T* variance;
+  T* s;
+
+  SPLITNERF_HD void operator()(int64_t i) const { s[i] = sharpness(variance[i]).value; }
+};
+SPLITNERF_ON_GPU(SharpnessBody);
+
+template <class T> struct SharpnessBackwardBody {
+  const T *variance, *grad_s;
+  T* grad_variance;
+
+  SPLITNERF_HD void operator()(int64_t i) const { grad_variance[i] = grad_s[i] * sharpness(variance[i]).slope; }
+};
+SPLITNERF_ON_GPU(SharpnessBackwardBody);
+
+// What is added up along rays: weights [n] times values [n, n_channels]. The sums are divided by the rays' opacity, at least
+// `least`; without opacities by 1.
+template <class T> struct CompositeArrays {
   PackedRays rays;
   int64_t n_channels;
-  const T *weights, *values;
+  const T *weights, *values, *opacity;
+  T least;
+
+  SPLITNERF_HD T divisor(int64_t r) const { return opacity ? max_of(opacity[r], least) : T(1); }
+};
+
+// sums [n_rays, n_channels], added in double.
+template <class T> struct CompositeBody {
+  CompositeArrays<T> in;
   T* sums;
 
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
-    const SampleRange ray = rays.samples_of(r);
-    for (int64_t c = 0; c < n_channels; ++c) {
+    const SampleRange ray = in.rays.samples_of(r);
+    for (int64_t c = 0; c < in.n_channels; ++c) {
       double total = 0;
       for (int64_t i = ray.first + group.lane(); i < ray.first + ray.n; i += Group::size)
-        total += double(weights[i]) * double(values[i * n_channels + c]);
+        total += double(in.weights[i]) * double(in.values[i * in.n_channels + c]);
       total = group.sum(total);
-      if (group.lane() == 0) sums[r * n_channels + c] = T(total);
+      if (group.lane() == 0) sums[r * in.n_channels + c] = T(total / double(in.divisor(r)));
     }
   }
 };
 SPLITNERF_ON_GPU(CompositeBody);
 
+// x = sum w v / max(o, least), so that dx/do = -x / o above the least opacity.
 template <class T> struct CompositeBackwardBody {
-  PackedRays rays;
-  int64_t n_channels;
-  const T *weights, *values, *grad_sums;
-  T *grad_weights, *grad_values;
+  CompositeArrays<T> in;
+  const T* grad_sums;
+  T *grad_weights, *grad_values, *grad_opacity;
 
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
-    const SampleRange ray = rays.samples_of(r);
-    const T* g = grad_sums + r * n_channels;
+    const SampleRange ray = in.rays.samples_of(r);
+    const int64_t n_channels = in.n_channels;
+    const T *g = grad_sums + r * n_channels, divisor = in.divisor(r);
+    double pulled = 0;
     for (int64_t i = ray.first + group.lane(); i < ray.first + ray.n; i += Group::size) {
       T grad_weight = T(0);
       for (int64_t c = 0; c < n_channels; ++c) {
-        grad_weight += g[c] * values[i * n_channels + c];
-        grad_values[i * n_channels + c] = g[c] * weights[i];
+        grad_weight += g[c] * in.values[i * n_channels + c];
+        grad_values[i * n_channels + c] = g[c] * in.weights[i] / divisor;
       }
-      grad_weights[i] = grad_weight;
+      grad_weights[i] = grad_weight / divisor;
+      pulled += double(grad_weights[i]) * double(in.weights[i]);
     }
-    rays.for_each_unowned(group, r, [&](int64_t i) {
+    if (in.opacity) {
+      pulled = group.sum(pulled);
+      if (group.lane() == 0) grad_opacity[r] = in.opacity[r] >= in.least ? T(-pulled / double(divisor)) : T(0);
+    }
+    in.rays.for_each_unowned(group, r, [&](int64_t i) {
       grad_weights[i] = T(0);
       for (int64_t c = 0; c < n_channels; ++c) grad_values[i * n_channels + c] = T(0);
     });
@@ -210,77 +245,94 @@ template <class T> struct CompositeBackwardBody {
 };
 SPLITNERF_ON_GPU(CompositeBackwardBody);
 
-// Per ray: the number of its shaded samples, the number of its segments, and 1 if it has samples; one call per ray.
-template <class T> struct SpreadCountBody {
+// What the choice of shaded samples reads. `gap` is a length, in units of *unit where there is one.
+template <class T> struct SpreadArrays {
   PackedRays rays;
   const T *weights, *t, *phase;
   T gap;
+  const T* unit;
   int per_ray;
-  int64_t *drawn, *stretches, *filled;
 
-  SPLITNERF_HD void operator()(int64_t r) const {
+  SPLITNERF_HD T gap_length() const { return unit ? gap * *unit : gap; }
+  template <class Draw> SPLITNERF_HD void draw(int64_t r, const Draw& draw_sample) const {
     const SampleRange ray = rays.samples_of(r);
-    int64_t n_drawn = 0, n_stretches = 0;
-    spread_by_weight(weights + ray.first, t + ray.first, ray.n, gap, per_ray, double(phase[r]),
-                     [&](int64_t) { ++n_drawn; });
-    for (int64_t i = ray.first; i < ray.first + ray.n; ++i)
-      if (i == ray.first || t[i] - t[i - 1] > gap) ++n_stretches;
-    drawn[r] = n_drawn, stretches[r] = n_drawn > 0 ? n_stretches : 0, filled[r] = n_drawn > 0 ? 1 : 0;
+    spread_by_weight(weights + ray.first, t + ray.first, ray.n, gap_length(), per_ray, double(phase[r]), draw_sample);
   }
 };
 
-// The sums of these counts over all rays, in the order of SpreadSizes; one call.
-struct SpreadSizesBody {
-  const int64_t *drawn, *filled, *stretches;
-  int64_t* sizes;
+// Per ray: the number of its shaded samples, 1 if it has samples, and the number of its segments, the columns of `counts`, which
+// are n_rays + 1 numbers apart; one call per ray.
+template <class T> struct SpreadCountBody {
+  SpreadArrays<T> in;
+  int64_t* counts;
 
-  SPLITNERF_HD void operator()(int64_t) const { sizes[0] = *drawn, sizes[1] = *filled, sizes[2] = *stretches; }
+  SPLITNERF_HD void operator()(int64_t r) const {
+    const SampleRange ray = in.rays.samples_of(r);
+    const T gap = in.gap_length();
+    int64_t n_drawn = 0, n_stretches = 0, column = in.rays.n_rays + 1;
+    in.draw(r, [&](int64_t) { ++n_drawn; });
+    for (int64_t i = ray.first; i < ray.first + ray.n; ++i)
+      if (i == ray.first || in.t[i] - in.t[i - 1] > gap) ++n_stretches;
+    counts[r] = n_drawn, counts[column + r] = n_drawn > 0 ? 1 : 0,
+    counts[2 * column + r] = n_drawn > 0 ? n_stretches : 0;
+  }
 };
 
-// Fills the entries that no ray writes. Samples from `cleared` on get the first shaded sample. Unused entries have
-// weight 0; they get indices spread over the valid range, so that their zero gradients are not all added to one number.
+// Fills the entries that no ray writes: those behind the counts, and of samples from `owned` on, which get the first shaded
+// sample. Unused entries have weight 0; they get indices spread over the valid range, so that their zero gradients are not all
+// added to one number.
 template <class T> struct SpreadUnusedBody {
-  PackedRays rays;
-  int64_t cleared;
+  int64_t n_samples, n_owned, owned;
+  SpreadSizes counted;
   Spread to;
   int64_t *first, *second;
   T* share;
 
   SPLITNERF_HD int64_t count() const {
-    return max_of(max_of(rays.n_samples, to.room.shaded), max_of(to.room.heaviest, to.room.leaders));
+    return max_of(max_of(n_samples, to.room.shaded), max_of(to.room.heaviest, to.room.leaders));
   }
   SPLITNERF_HD void operator()(int64_t i) const {
-    if (i >= cleared && i < rays.n_samples) first[i] = second[i] = 0, share[i] = T(0);
-    if (i < to.room.shaded) to.shaded[i] = within(i, rays.n_owned()), to.stretch[i] = within(i, to.room.leaders);
-    if (i < to.room.heaviest) to.heaviest[i] = within(i, to.room.shaded);
-    if (i < to.room.leaders) to.leaders[i] = within(i, to.room.shaded);
+    if (i >= owned && i < n_samples) first[i] = second[i] = 0, share[i] = T(0);
+    if (i >= counted.shaded && i < to.room.shaded)
+      to.shaded[i] = within(i, n_owned), to.stretch[i] = within(i, to.room.leaders);
+    if (i >= counted.heaviest && i < to.room.heaviest) to.heaviest[i] = within(i, to.room.shaded);
+    if (i >= counted.leaders && i < to.room.leaders) to.leaders[i] = within(i, to.room.shaded);
   }
   SPLITNERF_HD static int64_t within(int64_t i, int64_t n) { return n > 0 ? i % n : 0; }
 };
 
-// From the running sums of these counts [n_rays + 1]: the entries of Spread, and first, second, share [n]. A ray that
-// exceeds the capacity writes nothing.
+// From the running sums of these counts, the columns [n_rays + 1] of `sums`: the entries of Spread, and first, second, share [n].
+// Where the capacity is exceeded only unused entries are written. One call for each of count().
 template <class T> struct SpreadFillBody {
-  PackedRays rays;
-  const T *weights, *t, *phase;
-  T gap;
-  int per_ray;
-  const int64_t *drawn, *stretches, *filled;
+  SpreadArrays<T> in;
+  const int64_t* sums;
   Spread to;
   int64_t *first, *second;
   T* share;
 
-  SPLITNERF_HD void operator()(int64_t r) const {
-    const SampleRange samples = rays.samples_of(r);
-    const int64_t begin = samples.first, at = drawn[r], n_drawn = drawn[r + 1] - at;
-    if (n_drawn == 0 || !to.has_room(drawn[r + 1], stretches[r + 1])) return;
+  SPLITNERF_HD const int64_t* column(int k) const { return sums + k * (in.rays.n_rays + 1); }
+  SPLITNERF_HD int64_t count() const { return max_of(unused(false).count(), in.rays.n_rays); }
+  SPLITNERF_HD SpreadUnusedBody<T> unused(bool fits) const {
+    const int64_t last = in.rays.n_rays, n_owned = in.rays.n_owned();
+    const SpreadSizes counted = fits ? SpreadSizes{column(0)[last], column(1)[last], column(2)[last]} : SpreadSizes{};
+    return {in.rays.n_samples, n_owned, fits ? n_owned : 0, counted, to, first, second, share};
+  }
+  SPLITNERF_HD void operator()(int64_t i) const {
+    const bool fits = to.has_room(column(0)[in.rays.n_rays], column(2)[in.rays.n_rays]);
+    unused(fits)(i);
+    if (fits && i < in.rays.n_rays) fill(i);
+  }
+  SPLITNERF_HD void fill(int64_t r) const {
+    const SampleRange samples = in.rays.samples_of(r);
+    const int64_t begin = samples.first, at = column(0)[r], n_drawn = column(0)[r + 1] - at, before = column(2)[r];
+    if (n_drawn == 0) return;
     int64_t k = at;  // bounded: a compiler may round here in another way than where the samples were counted
-    spread_by_weight(weights + begin, t + begin, samples.n, gap, per_ray, double(phase[r]), [&](int64_t i) {
-      if (k < at + n_drawn) to.shaded[k++] = begin + i;
+    in.draw(r, [&](int64_t sample) {
+      if (k < at + n_drawn) to.shaded[k++] = begin + sample;
     });
-    const SpreadRay<T> ray{weights, t, begin, begin + samples.n, to.shaded, at, n_drawn};
-    to.heaviest[filled[r]] = heaviest_drawn(ray);
-    arrange_spread(ray, gap, stretches[r], first, second, share, to.leaders + stretches[r], to.stretch);
+    const SpreadRay<T> ray{in.weights, in.t, begin, begin + samples.n, to.shaded, at, n_drawn};
+    to.heaviest[column(1)[r]] = heaviest_drawn(ray);
+    arrange_spread(ray, in.gap_length(), before, first, second, share, to.leaders + before, to.stretch);
   }
 };
 

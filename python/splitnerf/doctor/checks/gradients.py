@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 from splitnerf.doctor.checks.fields import BOX, GRID, SPEC, points
 from splitnerf.doctor.checks.light import pyramid
+from splitnerf.doctor.checks.losses import metals, neighbours, pixels
 from splitnerf.doctor.checks.rays import between, offsets, plane_inputs, surface_inputs
 from splitnerf.doctor.checks.shading import LINEAR, up, views
 from splitnerf.doctor.table import CHECKS, N, column, lut, pattern, slopes, sphere
@@ -46,7 +47,8 @@ def shared_light() -> tuple:
 
 # The inputs of the forward operator, and those to which the backward pass gives a gradient.
 BACKWARD: dict[str, tuple[Callable[[], tuple], tuple[int, ...]]] = {
-    "composite_backward": (lambda: (pattern(N), pattern(N, 3), offsets()), (0, 1)),
+    "composite_backward": (lambda: (pattern(N), pattern(N, 3), offsets(), pattern(3), 0.75), (0, 1, 3)),
+    "gradient_losses_backward": (neighbours, (0,)),
     "hash_encode_backward": (grid, (1,)),
     "hash_encode_jacobian_backward": (grid, (1,)),
     "hash_encode_jacobian_backward_positions": (grid, (0,)),
@@ -54,12 +56,15 @@ BACKWARD: dict[str, tuple[Callable[[], tuple], tuple[int, ...]]] = {
     "light_queries_backward": (lambda: (up(), views(), column(0.5), lut(), True), (0, 2)),
     "light_lookup_backward": (lambda: pyramid(pattern(64, 3)), (0, 1, 2, 3)),
     "linear_to_srgb_backward": (lambda: (pattern(N) * LINEAR[1],), (0,)),
+    "material_losses_backward": (metals, (1,)),
     "monte_carlo_light_backward": (drawn_light, (0, 2, 5)),
     "neus_weights_backward": (plane_inputs, (0, 1, 2)),
+    "pixel_losses_backward": (pixels, (0, 1)),
     "prefilter_light_backward": (lambda: (sphere(N), column(0.5), sphere(256), pattern(256, 3)), (3,)),
     "query_direction_backward": (lambda: (up(), views(), column(0.5), lut(), True), (0, 1, 2)),
     "sdf_layer_backward": (layer, (1, 2, 3, 4, 5, 6)),
     "shade_sums_backward": (sums, tuple(range(9))),
+    "sharpness_backward": (lambda: (0.5 * pattern(N),), (0,)),
     "split_sum_shade_backward": (split_sum, tuple(range(9))),
     "summed_light_backward": (shared_light, (0, 2, 5)),
     "surface_weights_backward": (lambda: surface_inputs(pattern(N, 3).flip(0)), (0, 1, 3)),

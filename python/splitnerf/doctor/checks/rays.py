@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 
 from splitnerf.doctor.table import N, axis, check, pattern
@@ -53,11 +55,22 @@ def surface_weights():
 
 
 @check
+def sharpness():
+    """exp(10 v) of v from 0.05 to 0.85, and the bounds 1 and e^9."""
+    v = torch.linspace(0.05, 0.85, N)
+    yield lib.sharpness(v), torch.exp(10 * v)
+    yield lib.sharpness(torch.tensor([-1.0, 2.0])), torch.tensor([1.0, math.exp(9.0)])
+
+
+@check
 def composite():
-    """Sums of half of 0 ... 15, of nothing, and of half of 16 ... 37."""
+    """Sums of half of 0 ... 15, of nothing, and of half of 16 ... 37; and divided by opacities, the last one too small."""
     values = torch.arange(float(N))[:, None] * torch.tensor([1.0, 2.0, 3.0])
     sums = torch.tensor([60.0, 0.0, 291.5])[:, None] * torch.tensor([1.0, 2.0, 3.0])
-    yield lib.composite(torch.full((N,), 0.5), values, offsets()), sums
+    inputs = torch.full((N,), 0.5), values, offsets()
+    yield lib.composite(*inputs), sums
+    means = sums / torch.tensor([0.8, 0.8, 0.5])[:, None]
+    yield lib.composite(*inputs, torch.tensor([0.8, 0.8, 0.1]), 0.5), means
 
 
 @check
@@ -72,6 +85,32 @@ def draw_rays():
     yield rays_d, points / points.norm(dim=1, keepdim=True)
     yield view, torch.zeros(N, dtype=torch.int64)
     yield index, torch.arange(N)
+
+
+@check
+def read_pixels():
+    """Bytes of one value a pixel, of two photos in turn; every pixel from the fifth on has a colour of its own behind it."""
+    codes, view = torch.arange(N, dtype=torch.uint8)[:, None].repeat(1, 4), torch.arange(N) % 2
+    edges = torch.tensor([4]), torch.tensor([N]), torch.tensor([-4]), (codes[4:, :3] + 100).contiguous()
+    exposures = torch.tensor([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    values = torch.arange(float(N))[:, None]
+    pixels, exposure, behind, whole = lib.read_pixels(codes, torch.arange(N), view, exposures, torch.ones(N, 3), *edges)
+    yield pixels, values.repeat(1, 4) / 255
+    yield exposure, exposures[view]
+    yield behind, torch.where(values < 4, 1.0, (values + 100) / 255).repeat(1, 3)
+    yield whole, values[:, 0] >= 4
+
+
+@check
+def probe_points():
+    """A point in the middle of each part of the cube's diagonal; vectors as long as ln 16 makes them, in four directions."""
+    shares = (torch.arange(float(N)) + 0.5) / N
+    turns = torch.arange(4) / 4
+    numbers = torch.stack([torch.full((4,), 0.75), turns, torch.full((4,), 0.75), turns], 1)
+    anywhere, shifts = lib.probe_points(torch.cat([shares.repeat_interleave(3), numbers.flatten()]), N, 2.0, 0.5)
+    yield anywhere, (4 * shares - 2)[:, None].repeat(1, 3)
+    unit = torch.tensor([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, -1.0], [0.0, -1.0, 0.0]])
+    yield shifts, 0.5 * math.log(16.0) ** 0.5 * unit
 
 
 @check
