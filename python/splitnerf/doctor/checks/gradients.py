@@ -57,7 +57,7 @@ BACKWARD: dict[str, tuple[Callable[[], tuple], tuple[int, ...]]] = {
     "light_lookup_backward": (lambda: pyramid(pattern(64, 3)), (0, 1, 2, 3)),
     "light_prior_backward": (lambda: (pattern(N, 3).flip(0), [4, N - 4]), (0,)),
     "linear_to_srgb_backward": (lambda: (pattern(N) * LINEAR[1],), (0,)),
-    "log_chroma_backward": (lambda: (pattern(N, 3),), (0,)),
+    "log_chroma_backward": (lambda: (pattern(N, 3).flip(0),), (0,)),
     "material_losses_backward": (metals, (1,)),
     "monte_carlo_light_backward": (drawn_light, (0, 2, 5)),
     "neus_weights_backward": (plane_inputs, (0, 1, 2)),
