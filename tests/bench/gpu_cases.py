@@ -357,6 +357,11 @@ class World:
         gradients = unit(self.randn(n + m, 3, seed=56)) * (0.9 + 0.2 * self.rand(n + m, 1, seed=57))
         return gradients, self.weights, torch.randint(n, (m,), generator=self.generator(58))
 
+    def texels(self) -> tuple:
+        """Of a light's levels from 4 x 4 texels on."""
+        sizes = [4**k for k in range(2, self.sizes.light_resolution.bit_length())]
+        return self.randn(sum(sizes), 3, seed=75), sizes
+
     def materials(self) -> tuple:
         p = self.sizes.points
         return self.rand(p, 3, seed=59), self.rand(p, 1, seed=60), self.rand(p, seed=61), False
@@ -447,6 +452,8 @@ NEUS = Case("neus_weights", World.neus, a_sample(12))
 SURFACE = Case("surface_weights", World.surface, a_sample(35))
 COMPOSITE = Case("composite", World.composing, a_sample(6))
 SHARPNESS = Case("sharpness", lambda w: (torch.tensor(0.4),), lambda s, out: 10)
+CHROMA = Case("log_chroma", lambda w: (w.rand(w.sizes.queries, 3, seed=74),), lambda s, out: 60 * s.queries)
+PRIOR = Case("light_prior", World.texels, lambda s, out: 80 * (4 * s.light_resolution**2 // 3))
 PIXELS = Case("pixel_losses", World.pixels, lambda s, out: 60 * s.rays)
 SRGB = Case("linear_to_srgb", lambda w: (w.rand(w.sizes.samples, 3),), a_sample(12))
 
@@ -493,6 +500,7 @@ CASES = [
     Case("cached_visibility", World.near_the_mesh, lambda s, out: 16 * s.segments * s.directions),
     Case("cached_occlusion", World.occlusion, lambda s, out: (16 + 30) * s.segments * s.directions),
     SRGB, backward(SRGB, a_sample(12)), Case("srgb_to_linear", lambda w: (w.rand(w.sizes.samples, 3),), a_sample(12)),
+    CHROMA, backward(CHROMA, lambda s, out: 80 * s.queries), PRIOR, backward(PRIOR, lambda s, out: 100 * len(out[0])),
     PIXELS, backward(PIXELS, lambda s, out: 90 * s.rays),
     Case("gradient_losses", World.normals_beside, a_sample(10)),
     Case("gradient_losses_backward", lambda w: with_gradients("gradient_losses", w.normals_beside(), 1)[:-1], a_sample(20)),

@@ -2,6 +2,7 @@
 #include "check.h"
 #include "gpu.h"
 #include "splitnerf/bodies/elementwise.h"
+#include "splitnerf/bodies/light_losses.h"
 #include "splitnerf/bodies/pixels.h"
 #include "splitnerf/bodies/rows.h"
 #include "splitnerf/light_tables.h"
@@ -362,6 +363,27 @@ TEST(PointKernels, MaterialLosses) {
                  b = run([&](const auto&body) { on_gpu(n, body); });
       for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
     }
+}
+
+TEST(PointKernels, LossesOfTheLight) {
+  for (const int64_t n : {0, 1, 336, 700}) {
+    Random random(145);
+    const auto radiance = random.uniforms(3 * n), texels = random.uniforms(3 * n, -1);
+    const double grad = 1.5;
+    const int64_t first = n / 4 + 1;
+    const TexelLevels<double> levels{2, {first, max_of<int64_t>(n - first, 1)}, texels.data()};
+    const auto run = [&](const auto& launch) {
+      std::vector<std::vector<double>> out{unwritten<double>(1), unwritten<double>(3 * n), unwritten<double>(1),
+                                           unwritten<double>(3 * n)};
+      launch(LogChromaBody<double>{n, radiance.data(), out[0].data()});
+      launch(LogChromaBackwardBody<double>{n, radiance.data(), &grad, out[1].data()});
+      launch(LightPriorBody<double>{levels, out[2].data()});
+      launch(LightPriorBackwardBody<double>{levels, &grad, out[3].data()});
+      return out;
+    };
+    const auto a = run([&](const auto&body) { cpu::run(n, body); }), b = run([&](const auto&body) { on_gpu(n, body); });
+    for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
+  }
 }
 
 TEST(PointKernels, EntropyOfRows) {

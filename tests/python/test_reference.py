@@ -30,7 +30,8 @@ DIFFERENTIABLE = {
     "composite": (0, 1, 3), "sharpness": (0,), "query_direction": (0, 1, 2), "split_sum_shade": range(9), "shade_sums": range(9),
     "monte_carlo_light": (0, 2, 5), "summed_light": (0, 2, 5), "linear_to_srgb": (0,), "srgb_to_linear": (), "prefilter_light": (3,),
     "sparse_product": (6,), "light_lookup": (0, 1, 2, 3), "cached_visibility": (), "cached_occlusion": (),
-    "pixel_losses": (0, 1), "gradient_losses": (0,), "material_losses": (1,), "quadratic_entropy": (0,),
+    "pixel_losses": (0, 1), "gradient_losses": (0,), "material_losses": (1,), "quadratic_entropy": (0,), "log_chroma": (0,),
+    "light_prior": (0,),
 }  # fmt: skip
 TOLERANCE = {"cached_occlusion": 2e-7}  # its directions have unit length in float32; of the others: 1e-9
 LOSSES = ("pixel_losses", "gradient_losses", "material_losses")  # whose operators return all terms in one tensor

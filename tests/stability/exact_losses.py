@@ -7,7 +7,7 @@ import numpy as np
 from stability.entry import Rows
 from stability.precise import mp, vector
 
-PAIRS = 6
+PAIRS, LEVELS = 6, [4, 20]
 
 
 def linear_of(x):
@@ -76,3 +76,25 @@ def quadratic_entropy(row: dict[str, np.ndarray], shared: Rows) -> dict[str, lis
     points = [vector(x) for x in row["x"]]
     likeness = [mp.exp(-mp.fsum((a - b) ** 2 for a, b in zip(p, q)) / 4) for p in points for q in points]
     return {"entropy": [-mp.log(mp.fsum(likeness) / len(points) ** 2)]}
+
+
+def log_chroma(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+    terms = []
+    for radiance in row["radiance"]:
+        logs = [mp.log(x + mp.mpf("1e-6")) for x in vector(radiance)]
+        mean = mp.fsum(logs) / 3
+        terms += [(x - mean) ** 2 for x in logs]
+    return {"chroma": [mp.fsum(terms) / len(terms)]}
+
+
+def light_prior(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+    texels, total, first = [vector(x) for x in row["texels"]], mp.mpf(0), 0
+    mean = [mp.fsum(x) / LEVELS[0] for x in zip(*texels[: LEVELS[0]])]
+    for number, size in enumerate(LEVELS):
+        for texel in texels[first : first + size]:
+            apart = [x - m for x, m in zip(texel, mean)] if number == 0 else texel
+            grey = mp.fsum(apart) / 3
+            colour = mp.fsum((x - grey) ** 2 for x in apart) / 3
+            total += (mp.log1p(grey**2 / mp.mpf("0.75")) + mp.log1p(colour / mp.mpf("0.12"))) / size
+        first += size
+    return {"prior": [total]}

@@ -13,6 +13,7 @@ from stability.cases import Draw
 from stability.entry import Entry, Rows
 
 BATCH, PAIRS, POINTS = 48, 6, 24
+LEVELS = exact_losses.LEVELS
 BY_CONDITION = "a few roundings of each term, times its condition; sums in float64"
 
 
@@ -82,6 +83,18 @@ def draw_points(draw: Draw, n: int) -> Rows:
     spread = draw.mixed((0.0, 1e-7, 1e-3, 1e6), draw.logarithmic(1e-3, 30, n, 1, 1))
     x: Tensor = draw.uniform(n, 1, 3, low=-1, high=1) + spread * draw.normal(n, POINTS, 3)
     return {"x": x}
+
+
+def draw_light(draw: Draw, n: int) -> Rows:
+    """Radiance from nothing to 1e4, of each channel or nearly grey."""
+    radiance = draw.radiance(n, BATCH, 3, top=1e4)
+    grey = radiance[..., :1] * (1 + draw.pick((0.0, 1e-6, 1e-2), n, BATCH, 1) * draw.uniform(n, BATCH, 3))
+    return {"radiance": torch.where(draw.chance(0.3, n, 1, 1), grey, radiance)}
+
+
+def draw_texels(draw: Draw, n: int) -> Rows:
+    """Log radiance beside the coarser levels: none, nearly none, ordinary, and more than any light has."""
+    return {"texels": draw.pick((0.0, 1e-6, 1e-2, 1.0, 30.0), n, 1, 1) * draw.normal(n, POINTS, 3)}
 
 
 def repaired_shares(rows: Rows) -> Rows:
@@ -156,5 +169,39 @@ ENTRIES = (
         gradient_floor=1e-3,
         repair=lambda rows: {"x": rows["x"].clamp(-1e6, 1e6)},
         reason="the likeness of a pair is off by 2^-22 of itself; an entropy below 1 is a logarithm close to 0",
+    ),
+    Entry(
+        "log_chroma",
+        draw=draw_light,
+        smooth=("radiance",),
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=2e-5,
+        call=lambda rows, shared: batches(rows, ("radiance",), lambda x: (ops.log_chroma(x),), ("chroma",)),
+        exact=exact_losses.log_chroma,
+        exact_bound=1e-13,
+        size=BATCH,
+        chunk=256,
+        floor=0.1,
+        gradient_floor=100.0,
+        repair=lambda rows: {"radiance": rows["radiance"].clamp(0, 1e4)},
+        reason="logarithms of ratios; a chroma below .1 counts as that, as do gradients below 100 where the dark's reach 1e4",
+    ),
+    Entry(
+        "light_prior",
+        draw=draw_texels,
+        smooth=("texels",),
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=8e-6,
+        call=lambda rows, shared: batches(rows, ("texels",), lambda x: (ops.light_prior(x, LEVELS),), ("prior",)),
+        exact=exact_losses.light_prior,
+        exact_bound=1e-13,
+        size=POINTS,
+        chunk=256,
+        floor=1e-12,
+        gradient_floor=1e-6,
+        repair=lambda rows: {"texels": rows["texels"].clamp(-1e3, 1e3)},
+        reason=BY_CONDITION,
     ),
 )

@@ -15,6 +15,7 @@ from stability.entry import Entry, Rows
 SAMPLES = 8  # of a ray
 LONG = 10_000  # samples of a long ray
 STEP = 1 / 128
+LEAST = 1e-4  # opacity
 BY_DEPTH = "a rounding of s f moves a weight by s f 2^-24, which the condition holds; else a few roundings"
 BY_NORMAL = "absolute: a rounding of the normal moves a depth by s step 2^-23; gradients of up to s are differences"
 
@@ -101,6 +102,19 @@ def sums(rows: Rows, shared: Rows) -> Rows:
     }
 
 
+def draw_means(draw: Draw, n: int) -> Rows:
+    """With an opacity of any size, the least one and its neighbours in float32 apart."""
+    opacity = draw.mixed((0.0, 1e-30, 1.0), draw.logarithmic(1e-3, 1, n, 1)).clamp(0, 1)
+    return draw_composite(draw, n, SAMPLES) | {"opacity": opacity}
+
+
+def means(rows: Rows, shared: Rows) -> Rows:
+    n, samples = rows["weights"].shape
+    values = rows["values"].reshape(n * samples, 3)
+    found = ops.composite(rows["weights"].flatten(), values, offsets(n, samples), rows["opacity"].flatten(), LEAST)
+    return {"means": found}
+
+
 def neus(name: str, s: float, draw, **changes) -> Entry:
     options = {
         "bound": 4e-6,
@@ -161,6 +175,32 @@ ENTRIES = (
         exact=exact_rays.composite,
         exact_bound=1e-14,
         reason="sums in float64, rounded once; gradients are sums over the channels",
+    ),
+    Entry(
+        "composite, divided by the opacity",
+        draw=draw_means,
+        call=means,
+        smooth=("weights", "values", "opacity"),
+        conditioned=True,
+        bound=1e-6,
+        gradient_bound=2e-6,
+        exact=partial(exact_rays.composite_means, least=LEAST),
+        exact_bound=1e-14,
+        repair=lambda rows: rows | {"opacity": torch.where(rows["opacity"] < 1e-3, 0.0, rows["opacity"].clamp(max=1))},
+        reason="a sum in float64 and one division",
+    ),
+    Entry(
+        "sharpness",
+        draw=lambda draw, n: {"variance": draw.mixed((-1.0, 0.0, 2.0), draw.uniform(n, 1, low=-0.1, high=0.89))},
+        call=lambda rows, shared: {"s": ops.sharpness(rows["variance"])},
+        smooth=("variance",),
+        conditioned=True,
+        bound=4e-7,
+        gradient_bound=2e-6,
+        exact=exact_rays.sharpness,
+        exact_bound=1e-14,
+        repair=lambda rows: {"variance": rows["variance"].clamp(-1, 0.89)},
+        reason="an exponential of a number up to 9, which is rounded once; at .9, where the slope ends, the side is a rounding's",
     ),
     Entry(
         "composite, 10^4 samples",

@@ -418,6 +418,23 @@ def material_losses(albedo, metallic, shares, smooth_l1: bool) -> tuple[Tensor, 
     return shares @ metal, shares @ (m * (1 - m)), shares @ (m * darkness)
 
 
+def log_chroma(radiance: Tensor) -> Tensor:
+    """Mean squared distance of the log channels from their mean."""
+    log_light = torch.log(radiance + 1e-6)
+    return (log_light - log_light.mean(1, keepdim=True)).square().mean()
+
+
+def light_prior(texels: Tensor, level_sizes: list[int]) -> Tensor:
+    """Student's t costs of the texels' brightness and colour, those of the coarsest level beside their mean."""
+    coarsest, *finer = texels.split(level_sizes)
+    total = texels.new_zeros(())
+    for level in (coarsest - coarsest.mean(0), *finer):
+        brightness = level.mean(1, keepdim=True)
+        colour = (level - brightness).square().mean(1)
+        total = total + (torch.log1p(brightness[:, 0].square() / 0.75) + torch.log1p(colour / 0.12)).mean()
+    return total
+
+
 def quadratic_entropy(x: Tensor) -> Tensor:
     """-log of the mean over all pairs of exp(-|x_i - x_j|^2 / 4)."""
     return -torch.log(torch.exp(-0.25 * (x[:, None] - x[None]).square().sum(-1)).mean())

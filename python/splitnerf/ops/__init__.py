@@ -4,6 +4,7 @@ from splitnerf.ops.adamw import AdamW, adamw_step_
 from splitnerf.ops.hash_grid import HashGrid, HashGridSpec, growth_for, hash_encode, hash_encode_jacobian
 from splitnerf.ops.incoming_light import IncomingLight, TexturedSurface, incoming_light
 from splitnerf.ops.light import fibonacci_directions, prefilter_light, sample_ggx_lobe
+from splitnerf.ops.light_losses import light_prior, log_chroma
 from splitnerf.ops.light_pyramid import (
     SparseMap,
     light_averages,
@@ -45,13 +46,15 @@ from splitnerf.ops.srgb import linear_to_srgb, srgb_to_linear
 from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_visibility, visibility_bits
 
 __all__ = [
-    "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "EdgeRuns", "FRESNEL_MODES", "HashGrid", "HashGridSpec", "IncomingLight",
-    "LightSums", "MeshScene", "PackedSamples", "PixelList", "QUERIES", "SdfNetwork", "ShadingSubset", "SparseMap", "TexturedSurface",
-    "VisibilityCache", "adamw_step_", "brdf_lut", "cached_occlusion", "cached_visibility", "composite", "draw_rays",
-    "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian", "incoming_light",
-    "light_averages", "light_filters", "light_lookup", "light_queries", "light_sum_of_levels", "linear_to_srgb", "march_rays",
-    "material_losses", "monte_carlo_light", "neus_weights", "occlusion_factors", "pixel_losses", "place_samples",
-    "prefilter_light", "probe_points", "quadratic_entropy", "query_direction", "read_pixels", "sample_bsdf", "sample_ggx_lobe", "sample_rays",
-    "sdf_layer", "sdf_values", "sh_projection", "shade_sums", "sharpness", "sparse_product", "specular_share", "split_sum_shade", "spread_samples",
-    "srgb_to_linear", "summed_light", "surface_weights", "take_rows", "trace_visibility", "visibility_bits", "zonal_factors",
+    "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "EdgeRuns", "FRESNEL_MODES", "HashGrid", "HashGridSpec",
+    "IncomingLight", "LightSums", "MeshScene", "PackedSamples", "PixelList", "QUERIES", "SdfNetwork", "ShadingSubset",
+    "SparseMap", "TexturedSurface", "VisibilityCache", "adamw_step_", "brdf_lut", "cached_occlusion", "cached_visibility",
+    "composite", "draw_rays", "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian",
+    "incoming_light", "light_averages", "light_filters", "light_lookup", "light_prior", "light_queries",
+    "light_sum_of_levels", "linear_to_srgb", "log_chroma", "march_rays", "material_losses", "monte_carlo_light",
+    "neus_weights", "occlusion_factors", "pixel_losses", "place_samples", "prefilter_light", "probe_points",
+    "quadratic_entropy", "query_direction", "read_pixels", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer",
+    "sdf_values", "sh_projection", "shade_sums", "sharpness", "sparse_product", "specular_share", "split_sum_shade",
+    "spread_samples", "srgb_to_linear", "summed_light", "surface_weights", "take_rows", "trace_visibility", "visibility_bits",
+    "zonal_factors",
 ]  # fmt: skip

@@ -17,6 +17,8 @@ from splitnerf.fields import EvaluatedLight, Light, LightPyramid
 from splitnerf.ops import (
     MeshScene,
     fibonacci_directions,
+    light_prior,
+    log_chroma,
     occlusion_factors,
     prefilter_light,
     quadratic_entropy,
@@ -24,8 +26,6 @@ from splitnerf.ops import (
 )
 from splitnerf.render.renderer import RenderedRays
 
-BRIGHTNESS_DEVIATION = 0.5  # of a texel's log radiance from the coarser levels
-COLOUR_DEVIATION = 0.2  # of its channels from their mean
 TAILS = 3.0  # degrees of freedom
 SEEN_TEXELS = 1024  # directions in which the light is compared with what photos show, at least
 SEEN_DEVIATION = 0.2  # of the log radiance
@@ -143,33 +143,16 @@ def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.G
     normals = F.normalize(
         torch.randn(config.losses.neutral_queries, 3, generator=generator, device=generator.device), dim=1
     )
-    log_light = torch.log(light(normals, torch.ones_like(normals[:, :1])) + 1e-6)
-    return (log_light - log_light.mean(1, keepdim=True)).square().mean()
+    return log_chroma(light(normals, torch.ones_like(normals[:, :1])))
 
 
 def light_prior_loss(light: LightPyramid) -> Tensor:
-    """How far a light is from a smooth and grey one: the sum over its levels of the mean cost of a texel.
+    """How far a light is from a smooth and grey one, see :func:`splitnerf.ops.light_prior`.
 
     Many lights explain the photos of an object that is not a mirror. The log radiance of a texel is expected near that of the
-    coarser levels, and its channels near their mean. A deviation d costs log(1 + d^2 / (TAILS s^2)), that of Student's t
-    distribution with TAILS degrees of freedom, as windows and lamps have edges.
+    coarser levels, and its channels near their mean; windows and lamps have edges, so a large deviation costs little more.
     """
-    coarsest, share = (x.to(light.texels) for x in _texel_shares(tuple(light.level_sizes), light.texels.device))
-    mean = light.texels[: light.level_sizes[0]].mean(0)  # the brightness of the whole light costs nothing
-    apart = torch.addcmul(light.texels, coarsest, mean, value=-1.0)
-    brightness = apart.mean(1, keepdim=True)
-    colour = (apart - brightness).square().mean(1)
-    cost = torch.log1p(brightness.square().squeeze(1) / (TAILS * BRIGHTNESS_DEVIATION**2))
-    return share @ (cost + torch.log1p(colour / (TAILS * COLOUR_DEVIATION**2)))
-
-
-@functools.lru_cache(maxsize=4)
-def _texel_shares(level_sizes: tuple[int, ...], device: torch.device) -> tuple[Tensor, Tensor]:
-    """1 for the texels of the coarsest level, else 0, [texels, 1]; and 1 / n for the n texels of each level, [texels]."""
-    with torch.inference_mode(False):
-        share = torch.cat([torch.full((n,), 1.0 / n) for n in level_sizes])
-        coarsest = (torch.arange(len(share)) < level_sizes[0]).float()[:, None]
-        return coarsest.to(device), share.to(device)
+    return light_prior(light.texels, light.level_sizes)
 
 
 class SeenLight:

@@ -118,7 +118,7 @@ template <class T> struct ProbesBody {
   T *anywhere, *shifts;
 
   SPLITNERF_HD Vec2<T> normal_pair(const T* u) const {
-    const T radius = deviation * std::sqrt(T(-2) * std::log(T(1) - u[0]));
+    const T radius = deviation * std::sqrt(T(-2) * std::log1p(-u[0]));
     const Vec2<T> at = cos_sin_of_turns(u[1]);
     return {radius * at.x, radius * at.y};
   }

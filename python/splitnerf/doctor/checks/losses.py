@@ -49,6 +49,22 @@ def material_losses():
 
 
 @check
+def log_chroma():
+    """Channels e^.3, 1 and e^-.3 times a brightness: 2 .3^2 / 3."""
+    tint = torch.exp(torch.tensor([[0.3, 0.0, -0.3]]))
+    yield lib.log_chroma(pattern(N, 1) * tint), torch.tensor(0.06)
+
+
+@check
+def light_prior():
+    """A grey texel of the finer level .9 from its neighbours, and one of the coarser 2 below the three others."""
+    texels = torch.zeros(N, 3)
+    texels[0], texels[4] = -2.0, 0.9
+    coarse = (math.log1p(1.5**2 / 0.75) + 3 * math.log1p(0.5**2 / 0.75)) / 4
+    yield lib.light_prior(texels, [4, N - 4]), torch.tensor(coarse + math.log1p(0.81 / 0.75) / (N - 4))
+
+
+@check
 def quadratic_entropy():
     """Two equal heaps of points at a distance of 2: -ln((1 + 1 / e) / 2)."""
     heaps = torch.cat([torch.zeros(N, 4), torch.ones(N, 4)])

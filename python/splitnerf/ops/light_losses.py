@@ -1,0 +1,81 @@
+"""Terms of the training loss that look at the light alone. Differentiable once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from torch import Tensor
+
+from splitnerf.ops._library import lib, register
+
+
+def log_chroma(radiance: Tensor) -> Tensor:
+    """How coloured radiance is: the mean squared distance of its log channels from their mean, ``l = ln(L + 1e-6)``.
+
+    Args:
+        radiance: [n, 3] linear, at least 0, float32 or float64.
+
+    Returns:
+        [] the mean over points and channels; 0 without points, and for grey of any brightness. Differentiable in radiance.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+
+    Source: our own.
+    """
+    return lib.log_chroma(radiance)
+
+
+def light_prior(texels: Tensor, level_sizes: Sequence[int]) -> Tensor:
+    """How far a light is from a smooth and grey one: the sum over its levels of the mean cost of a texel.
+
+    The mean over the coarsest level, the brightness of the whole light, costs nothing: it is taken from that level's texels. A
+    texel d then costs ``ln(1 + b^2 / (3 .5^2)) + ln(1 + c / (3 .2^2))``, b the mean of its channels and c that of (d - b)^2.
+
+    Args:
+        texels: [T, 3] log radiance beside the coarser levels, the coarsest level first, float32 or float64.
+        level_sizes: The numbers of texels of at most 16 levels; T in sum. The first should be small: each of its texels is
+            worked out from all of them.
+
+    Returns:
+        []. Differentiable in texels.
+
+    Raises:
+        ValueError: A shape, dtype or size does not fit.
+
+    Source: our own; Student's t distribution with 3 degrees of freedom.
+    """
+    return lib.light_prior(texels, list(level_sizes))
+
+
+def _keep_radiance(ctx, inputs, output):
+    ctx.save_for_backward(*inputs)
+
+
+def _chroma_backward(ctx, grad):
+    return lib.log_chroma_backward(*ctx.saved_tensors, grad)
+
+
+def _keep_texels(ctx, inputs, output):
+    texels, ctx.level_sizes = inputs
+    ctx.save_for_backward(texels)
+
+
+def _prior_backward(ctx, grad):
+    return lib.light_prior_backward(*ctx.saved_tensors, ctx.level_sizes, grad), None
+
+
+register(
+    "log_chroma",
+    fake=lambda radiance: radiance.new_empty(()),
+    setup_context=_keep_radiance,
+    backward=_chroma_backward,
+)
+register("log_chroma_backward", fake=lambda radiance, grad_loss: radiance.new_empty(radiance.shape))
+register(
+    "light_prior",
+    fake=lambda texels, level_sizes: texels.new_empty(()),
+    setup_context=_keep_texels,
+    backward=_prior_backward,
+)
+register("light_prior_backward", fake=lambda texels, level_sizes, grad_loss: texels.new_empty(texels.shape))
