@@ -1,45 +1,14 @@
 #include <algorithm>
-#include <array>
-#include <memory>
 #include <vector>
 
+#include "prepared_field.h"
 #include "splitnerf/bodies/rays.h"
-#include "splitnerf/kernels.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/parallel.h"
 #include "splitnerf/ray_walk.h"
 
 namespace splitnerf::cpu {
 namespace {
-
-// A field as the kernels read it.
-template <class T> struct PreparedField {
-  std::array<HashLevel, kMaxLevels> levels;
-  PreparedSdfLayer<T> layer;
-  SdfNetwork<T> network;
-
-  explicit PreparedField(const SdfField<T>& f) : layer(f.weights) {
-    hash_levels(f.shape, levels.data());
-    network = {{levels.data(), f.shape.n_features, f.shape.n_levels, f.n_active, 0, nullptr, f.table}, layer.layer()};
-  }
-};
-
-// Gradients of the weights, padded as in SdfLayer.
-template <class T> struct PaddedGrad {
-  std::vector<T> hidden, hidden_bias, out, out_bias;
-
-  explicit PaddedGrad(const SdfLayer<T>& l)
-      : hidden(l.width * l.input_columns), hidden_bias(l.width_columns), out(l.n_outputs * l.width_columns),
-        out_bias(l.n_outputs) {}
-  SdfLayerGrad<T> view() { return {hidden.data(), hidden_bias.data(), out.data(), out_bias.data()}; }
-};
-
-// matrix [rows, columns] += padded [rows, padded_columns]
-template <class T>
-void add_unpadded(int64_t rows, int64_t columns, int64_t padded_columns, const std::vector<T>& padded, T* matrix) {
-  for (int64_t r = 0; r < rows; ++r)
-    for (int64_t c = 0; c < columns; ++c) matrix[r * columns + c] += padded[r * padded_columns + c];
-}
 
 constexpr int64_t kLayerGrain = 512;  // points of a task
 
@@ -53,56 +22,6 @@ template <class T> void sdf_values(const SdfField<T>& field, int64_t n, const T*
     for (int64_t i = begin; i < end; i += kSdfBlock)
       k.sdf_values(prepared.network, min_of<int64_t>(kSdfBlock, end - i), positions + 3 * i, work.data(), values + i);
   });
-}
-
-template <class T>
-void sdf_layer(const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features, const T* jacobian,
-               T* outputs, T* gradient) {
-  const Kernels<T>& k = kernels<T>();
-  const PreparedSdfLayer<T> prepared(weights);
-  const int64_t n_features = weights.n_inputs - 3;
-  parallel_for(n, kLayerGrain, [&](int64_t begin, int64_t end) {
-    std::vector<T> work(sdf_work_size(prepared.layer()));
-    for (int64_t i = begin; i < end; i += kSdfBlock) {
-      const SdfPoints<T> block{min_of<int64_t>(kSdfBlock, end - i), positions + 3 * i, features + i * n_features,
-                               jacobian + 3 * i * n_features};
-      k.sdf_layer(prepared.layer(), block, work.data(), outputs + i * weights.n_outputs, gradient + 3 * i);
-    }
-  });
-}
-
-template <class T>
-void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features,
-                        const T* jacobian, const T* grad_outputs, const T* grad_gradient, T* grad_features,
-                        T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias, T* grad_out, T* grad_out_bias) {
-  const Kernels<T>& k = kernels<T>();
-  const PreparedSdfLayer<T> prepared(weights);
-  const SdfLayer<T>& layer = prepared.layer();
-  const int64_t n_features = weights.n_inputs - 3, n_tasks = (n + kLayerGrain - 1) / kLayerGrain;
-  std::vector<std::unique_ptr<PaddedGrad<T>>> sums(n_tasks);  // one a task, added in order: the same bits each time
-  parallel_for(n_tasks, 1, [&](int64_t first, int64_t last) {
-    std::vector<T> work(sdf_work_size(layer));
-    for (int64_t task = first; task < last; ++task) {
-      sums[task] = std::make_unique<PaddedGrad<T>>(layer);
-      const int64_t end = min_of(n, (task + 1) * kLayerGrain);
-      for (int64_t i = task * kLayerGrain; i < end; i += kSdfBlock) {
-        const SdfPoints<T> block{min_of<int64_t>(kSdfBlock, end - i), positions + 3 * i, features + i * n_features,
-                                 jacobian + 3 * i * n_features};
-        k.sdf_layer_backward(layer, block, grad_outputs + i * weights.n_outputs, grad_gradient + 3 * i, work.data(),
-                             grad_features + i * n_features, grad_jacobian + 3 * i * n_features, sums[task]->view());
-      }
-    }
-  });
-  std::fill(grad_hidden, grad_hidden + layer.width * layer.n_inputs, T(0));
-  std::fill(grad_hidden_bias, grad_hidden_bias + layer.width, T(0));
-  std::fill(grad_out, grad_out + layer.n_outputs * layer.width, T(0));
-  std::fill(grad_out_bias, grad_out_bias + layer.n_outputs, T(0));
-  for (const auto& sum : sums) {
-    add_unpadded(layer.width, layer.n_inputs, layer.input_columns, sum->hidden, grad_hidden);
-    add_unpadded(1, layer.width, layer.width_columns, sum->hidden_bias, grad_hidden_bias);
-    add_unpadded(layer.n_outputs, layer.width, layer.width_columns, sum->out, grad_out);
-    add_unpadded(1, layer.n_outputs, layer.n_outputs, sum->out_bias, grad_out_bias);
-  }
 }
 
 template <class T>
@@ -150,13 +69,10 @@ void sample_rays(const SdfField<T>& field, const MarchOptions& march, const Occu
   for (int64_t i = offsets[n_rays]; i < rows; ++i) pad(i);
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                       \
-  template void sdf_values<T>(const SdfField<T>&, int64_t, const T*, T*);                                              \
-  template void sdf_layer<T>(const SdfWeights<T>&, int64_t, const T*, const T*, const T*, T*, T*);                     \
-  template void sdf_layer_backward<T>(const SdfWeights<T>&, int64_t, const T*, const T*, const T*, const T*, const T*, \
-                                      T*, T*, T*, T*, T*, T*);                                                         \
-  template void sample_rays<T>(const SdfField<T>&, const MarchOptions&, const OccupancyView&, const SampleRules<T>&,   \
-                               int64_t, const T*, const T*, const T*, int64_t, int64_t*, int64_t*, int64_t*,           \
+#define SPLITNERF_INSTANTIATE(T)                                                                                     \
+  template void sdf_values<T>(const SdfField<T>&, int64_t, const T*, T*);                                            \
+  template void sample_rays<T>(const SdfField<T>&, const MarchOptions&, const OccupancyView&, const SampleRules<T>&, \
+                               int64_t, const T*, const T*, const T*, int64_t, int64_t*, int64_t*, int64_t*,         \
                                const SampleAllocator<T>&);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -1,5 +1,6 @@
-// sdf_layer, sdf_values and sample_rays as torch operators.
+// sdf_field, sdf_values and sample_rays as torch operators.
 #include <algorithm>
+#include <optional>
 #include <tuple>
 #include <vector>
 
@@ -9,11 +10,12 @@
 namespace splitnerf::glue {
 namespace {
 
-// The weights of the layer, checked and contiguous.
+// The weights of the layer, checked and contiguous; with lengths, directions of weights.
 struct Weights {
   Kind type;
   Tensor hidden, hidden_bias, out, out_bias;
   double beta, box;
+  std::optional<Tensor> hidden_length, out_length;
 
   Weights(const char* op, int64_t n_features, const Tensor& hidden_in, const Tensor& hidden_bias_in,
           const Tensor& out_in, const Tensor& out_bias_in, double beta, double box)
@@ -25,6 +27,10 @@ struct Weights {
     require(out.size(0) > 0, op, "out must have a row, the distance's");
     require(beta > 0 && box > 0, op, "beta and box must be positive");
   }
+  void set_lengths(const char* op, const Tensor& of_hidden, const Tensor& of_out) {
+    hidden_length = checked(op, "hidden_length", of_hidden, {hidden.size(0), 1}, type);
+    out_length = checked(op, "out_length", of_out, {out.size(0), 1}, type);
+  }
   template <class T> SdfWeights<T> view() const {
     return {static_cast<int>(hidden.size(1)),
             static_cast<int>(hidden.size(0)),
@@ -34,7 +40,9 @@ struct Weights {
             in<T>(out),
             in<T>(out_bias),
             T(beta),
-            T(box)};
+            T(box),
+            hidden_length ? in<T>(*hidden_length) : nullptr,
+            out_length ? in<T>(*out_length) : nullptr};
   }
 };
 
@@ -58,55 +66,55 @@ struct Field {
   template <class T> SdfField<T> view() const { return {table.shape, table.n_active, table.view(), weights.view<T>()}; }
 };
 
-// Points with their hash-grid features.
-struct Points {
-  Tensor positions, features, jacobian;
-
-  Points(const char* op, const Tensor& positions_in, const Tensor& features_in, const Tensor& jacobian_in)
-      : positions(checked(op, "positions", positions_in, {kAny, 3}, real_kind(op, "positions", positions_in))),
-        features(checked(op, "features", features_in, {n(), kAny}, kind())),
-        jacobian(checked(op, "jacobian", jacobian_in, {n(), 3, features.size(1)}, kind())) {}
-  int64_t n() const { return positions.size(0); }
-  Kind kind() const { return {positions.scalar_type(), positions.device()}; }
-};
-
-std::tuple<Tensor, Tensor> sdf_layer(Tensor positions, Tensor features, Tensor jacobian, Tensor hidden,
-                                     Tensor hidden_bias, Tensor out_weights, Tensor out_bias, double beta, double box) {
-  const char* op = "sdf_layer";
-  const Points x(op, positions, features, jacobian);
-  const Weights w(op, x.features.size(1), hidden, hidden_bias, out_weights, out_bias, beta, box);
-  require(w.type == x.kind().type && w.type.device == x.kind().device, op,
-          "positions and hidden must have one dtype and device");
-  Tensor outputs = empty_like_type(x.positions, {x.n(), w.out.size(0)}, w.type);
-  Tensor gradient = empty_like_type(x.positions, {x.n(), 3}, w.type);
-  on_device(w.type, [&](auto zero, const auto& device) {
+std::tuple<Tensor, Tensor, Tensor> sdf_field(Tensor positions, Tensor table, Tensor hidden, Tensor hidden_length,
+                                             Tensor hidden_bias, Tensor out_weights, Tensor out_length, Tensor out_bias,
+                                             double beta, int64_t n_levels, int64_t base_resolution, double growth,
+                                             int64_t log2_table_size, int64_t n_active, double box,
+                                             std::optional<Tensor> stored) {
+  const char* op = "sdf_field";
+  Field field(op, table, hidden, hidden_bias, out_weights, out_bias, beta, n_levels, base_resolution, growth,
+              log2_table_size, n_active, box);
+  field.weights.set_lengths(op, hidden_length, out_length);
+  if (stored) field.table.read(op, *stored);
+  const Tensor x = checked(op, "positions", positions, {kAny, 3}, field.type);
+  const int64_t n = x.size(0);
+  Tensor outputs = empty_like_type(x, {n, field.weights.out.size(0)}, field.type);
+  Tensor features = empty_like_type(x, {n, field.weights.hidden.size(1) - 3}, field.type);
+  Tensor gradient = empty_like_type(x, {n, 3}, field.type);
+  on_device(field.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.sdf_layer(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), out<T>(outputs),
-                     out<T>(gradient));
+    device.sdf_field(field.view<T>(), n, in<T>(x), SdfOutputs<T>{out<T>(outputs), out<T>(features), out<T>(gradient)});
   });
-  return {outputs, gradient};
+  return {outputs, features, gradient};
 }
 
-std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> sdf_layer_backward(
-    Tensor positions, Tensor features, Tensor jacobian, Tensor hidden, Tensor hidden_bias, Tensor out_weights,
-    Tensor out_bias, double beta, double box, Tensor grad_outputs, Tensor grad_gradient) {
-  const char* op = "sdf_layer_backward";
-  const Points x(op, positions, features, jacobian);
-  const Weights w(op, x.features.size(1), hidden, hidden_bias, out_weights, out_bias, beta, box);
-  require(w.type == x.kind().type && w.type.device == x.kind().device, op,
-          "positions and hidden must have one dtype and device");
-  const Tensor go = checked(op, "grad_outputs", grad_outputs, {x.n(), w.out.size(0)}, w.type);
-  const Tensor gg = checked(op, "grad_gradient", grad_gradient, {x.n(), 3}, w.type);
+std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> sdf_field_backward(
+    Tensor positions, Tensor table, Tensor hidden, Tensor hidden_length, Tensor hidden_bias, Tensor out_weights,
+    Tensor out_length, Tensor out_bias, double beta, int64_t n_levels, int64_t base_resolution, double growth,
+    int64_t log2_table_size, int64_t n_active, double box, Tensor grad_outputs, Tensor grad_features,
+    Tensor grad_gradient) {
+  const char* op = "sdf_field_backward";
+  Field field(op, table, hidden, hidden_bias, out_weights, out_bias, beta, n_levels, base_resolution, growth,
+              log2_table_size, n_active, box);
+  Weights& w = field.weights;
+  w.set_lengths(op, hidden_length, out_length);
+  const Tensor x = checked(op, "positions", positions, {kAny, 3}, field.type);
+  const int64_t n = x.size(0);
+  const Tensor go = checked(op, "grad_outputs", grad_outputs, {n, w.out.size(0)}, field.type);
+  const Tensor gf = checked(op, "grad_features", grad_features, {n, w.hidden.size(1) - 3}, field.type);
+  const Tensor gg = checked(op, "grad_gradient", grad_gradient, {n, 3}, field.type);
   const auto like = [&](const Tensor& t) { return torch::stable::empty_like(t); };
-  Tensor grad_features = like(x.features), grad_jacobian = like(x.jacobian), grad_hidden = like(w.hidden);
-  Tensor grad_hidden_bias = like(w.hidden_bias), grad_out = like(w.out), grad_out_bias = like(w.out_bias);
-  on_device(w.type, [&](auto zero, const auto& device) {
+  Tensor to_table = empty_like_type(x, {table.size(0), table.size(1)}, field.type);
+  Tensor to_hidden = like(w.hidden), to_hidden_length = like(*w.hidden_length), to_hidden_bias = like(w.hidden_bias);
+  Tensor to_out = like(w.out), to_out_length = like(*w.out_length), to_out_bias = like(w.out_bias);
+  on_device(field.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.sdf_layer_backward(w.view<T>(), x.n(), in<T>(x.positions), in<T>(x.features), in<T>(x.jacobian), in<T>(go),
-                              in<T>(gg), out<T>(grad_features), out<T>(grad_jacobian), out<T>(grad_hidden),
-                              out<T>(grad_hidden_bias), out<T>(grad_out), out<T>(grad_out_bias));
+    device.sdf_field_backward(
+        field.view<T>(), n, in<T>(x), SdfOutputs<const T>{in<T>(go), in<T>(gf), in<T>(gg)},
+        SdfFieldGrad<T>{out<T>(to_table), out<T>(to_hidden), out<T>(to_hidden_length), out<T>(to_hidden_bias),
+                        out<T>(to_out), out<T>(to_out_length), out<T>(to_out_bias)});
   });
-  return {grad_features, grad_jacobian, grad_hidden, grad_hidden_bias, grad_out, grad_out_bias};
+  return {to_table, to_hidden, to_hidden_length, to_hidden_bias, to_out, to_out_length, to_out_bias};
 }
 
 Tensor sdf_values(Tensor positions, Tensor table, Tensor hidden, Tensor hidden_bias, Tensor out_weights,
@@ -172,17 +180,18 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
 
 }  // namespace
 
-#define SPLITNERF_SDF_LAYER                                                                             \
-  "Tensor positions, Tensor features, Tensor jacobian, Tensor hidden, Tensor hidden_bias, Tensor out, " \
-  "Tensor out_bias, float beta, float box"
+#define SPLITNERF_SDF_FIELD                                                                               \
+  "Tensor positions, Tensor table, Tensor hidden, Tensor hidden_length, Tensor hidden_bias, Tensor out, " \
+  "Tensor out_length, Tensor out_bias, float beta, int n_levels, int base_resolution, float growth, "     \
+  "int log2_table_size, int n_active, float box"
 #define SPLITNERF_SDF_NETWORK                                                                                \
   "Tensor table, Tensor hidden, Tensor hidden_bias, Tensor out, Tensor out_bias, float beta, int n_levels, " \
   "int base_resolution, float growth, int log2_table_size, int n_active, float box"
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("sdf_layer(" SPLITNERF_SDF_LAYER ") -> (Tensor, Tensor)");
-  m.def("sdf_layer_backward(" SPLITNERF_SDF_LAYER
-        ", Tensor grad_outputs, Tensor grad_gradient) -> "
-        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
+  m.def("sdf_field(" SPLITNERF_SDF_FIELD ", Tensor? stored=None) -> (Tensor, Tensor, Tensor)");
+  m.def("sdf_field_backward(" SPLITNERF_SDF_FIELD
+        ", Tensor grad_outputs, Tensor grad_features, Tensor grad_gradient) -> "
+        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
   m.def("sdf_values(Tensor positions, " SPLITNERF_SDF_NETWORK ") -> Tensor");
   m.def("sample_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, " SPLITNERF_SDF_NETWORK
         ", float step, int max_samples, float s, float anneal, float min_weight, float min_transmittance, "
@@ -190,8 +199,8 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
 }
 
 SPLITNERF_IMPLEMENT(m) {
-  m.impl("sdf_layer", TORCH_BOX(&sdf_layer));
-  m.impl("sdf_layer_backward", TORCH_BOX(&sdf_layer_backward));
+  m.impl("sdf_field", TORCH_BOX(&sdf_field));
+  m.impl("sdf_field_backward", TORCH_BOX(&sdf_field_backward));
   m.impl("sdf_values", TORCH_BOX(&sdf_values));
   m.impl("sample_rays", TORCH_BOX(&sample_rays));
 }

@@ -172,13 +172,10 @@ class World:
         grads = (self.randn(n, c, seed=8), self.randn(n, 3, c, seed=9))[: 1 + jacobian]
         return *(at, table)[:first], *grads, *numbers
 
-    def layer(self) -> tuple:
-        _, hidden, hidden_bias, out, out_bias, beta, *_ = self.network
-        at = self.positions
-        table = 1e-3 * self.randn(self.sizes.spec.n_entries, 2, seed=7)
-        numbers = self.sizes.spec.arguments(self.sizes.levels)
-        encoded = lib.hash_encode_jacobian(at / (2 * BOX) + 0.5, table, *numbers)
-        return at, *encoded, hidden, hidden_bias, out, out_bias, beta, BOX
+    def field(self) -> tuple:
+        table, hidden, hidden_bias, out, out_bias, *numbers = self.network
+        lengths = [weights.norm(dim=1, keepdim=True) for weights in (hidden, out)]
+        return self.positions, table, hidden, lengths[0], hidden_bias, out, lengths[1], out_bias, *numbers
 
     @functools.cached_property
     def cells(self) -> Tensor:
@@ -402,7 +399,7 @@ def bytes_moved(case: Case, sizes: Sizes, inputs: tuple, outputs: tuple) -> floa
     tensors = [x for x in tree_leaves((read, outputs)) if isinstance(x, Tensor)]
     total = sum(x.numel() * x.element_size() for x in tensors)
     entries = sizes.spec.n_entries
-    if case.op in ("hash_encode", "hash_encode_jacobian", "hash_encode_jacobian_backward_positions", "sdf_values"):
+    if case.op in ("hash_encode", "hash_encode_jacobian", "hash_encode_jacobian_backward_positions", "sdf_values", "sdf_field"):
         corners = CORNERS * len(inputs[0])
         touched = sum(min(level[2], corners) for level in sizes.spec.levels()[: sizes.levels])
         table = next(x for x in tensors if len(x) == entries)
@@ -432,10 +429,10 @@ SCATTERED = Case(
     1,
     variant="scattered points",
 )
-# The layer's forward: the hidden units, the outputs, the distance's gradient by the units and the Jacobian.
-LAYER = Case(
-    "sdf_layer", World.layer,
-    gather(lambda s: 2 * s.layer + 2 * s.outputs * s.width + 6 * s.features + 4 * s.width),
+# The grid with its Jacobian, the hidden units, the outputs, the distance's gradient by the units and the Jacobian.
+FIELD = Case(
+    "sdf_field", World.field,
+    gather(lambda s: s.encode(8) + 2 * s.layer + 2 * s.outputs * s.width + 6 * s.features + 4 * s.width), None, 1,
 )  # fmt: skip
 QUERY = Case("query_direction", World.query, a_point(45), reference.query_direction)
 SPLIT = Case("split_sum_shade", World.split_sum, a_point(70), reference.split_sum_shade)
@@ -467,8 +464,9 @@ CASES = [
     # Of a corner: the products with four gradients and six second derivatives of the weight.
     Case("hash_encode_jacobian_backward_positions", lambda w: w.grid_gradients(2, True),
          gather(lambda s: s.encode(8) + s.levels * CORNERS * 12)),
-    # The units twice (value and slope), the gradients to features and slopes, and two outer products for the weights.
-    LAYER, backward(LAYER, gather(lambda s: 6 * s.layer + 4 * s.outputs * s.width + 12 * s.features)),
+    # The grid twice, to and from; the units twice (value and slope), the gradients to features and slopes, and two outer products
+    # for the weights.
+    FIELD, backward(FIELD, gather(lambda s: 2 * s.encode(8) + 6 * s.layer + 4 * s.outputs * s.width + 12 * s.features)),
     Case("sdf_values", lambda w: (w.positions, *w.network),
          gather(lambda s: s.encode(2) + s.layer + 6 * s.width), None, 1),
     # Per distance asked for, as many as the last result says.
@@ -512,8 +510,8 @@ CASES = [
 
 
 # Those that took most of a step on a GPU (docs/cuda.md), first: they are timed should the time not last for all.
-COSTLY = ("sample_rays", "sdf_layer_backward", "cached_occlusion", "cached_visibility", "hash_encode_jacobian_backward",
-          "summed_light_backward", "sdf_layer", "hash_encode_jacobian", "light_lookup_backward", "sparse_product")  # fmt: skip
+COSTLY = ("sample_rays", "sdf_field_backward", "cached_occlusion", "cached_visibility", "hash_encode_jacobian_backward",
+          "summed_light_backward", "sdf_field", "hash_encode_jacobian", "light_lookup_backward", "sparse_product")  # fmt: skip
 
 
 def all_cases() -> list[Case]:

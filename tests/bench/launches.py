@@ -30,8 +30,8 @@ from splitnerf.training.loop import Training
 # Kernels and memory sets of an operator with more than one, as its launcher in cpp/cuda/ and cpp/torch/ makes them.
 KERNELS = {
     "pixel_losses": 2, "gradient_losses": 2, "gradient_losses_backward": 2, "material_losses": 2, "log_chroma": 2, "light_prior": 2,
-    "quadratic_entropy": 4, "sdf_values": 2, "sdf_layer": 2,
-    "sdf_layer_backward": 4, "hash_encode_backward": 2, "hash_encode_jacobian_backward": 2, "light_lookup_backward": 3,
+    "quadratic_entropy": 4, "sdf_values": 2, "sdf_field": 2,
+    "sdf_field_backward": 5, "hash_encode_backward": 2, "hash_encode_jacobian_backward": 2, "light_lookup_backward": 3,
     "summed_light_backward": 2, "put_rows": 2, "prefilter_light": 2, "prefilter_light_backward": 2, "interpolate_backward": 2, "march_rays": 3,
     "sample_rays": 6, "spread_samples": 3, "adamw_steps_": 1,
 }  # fmt: skip

@@ -288,6 +288,37 @@ template <class T> void every_set_agrees_with_base() {
   }
 }
 
+// Planes of levels, and rows of points whose gradient to the Jacobian is what the planes stand for.
+template <class T> void along_is_a_product() {
+  Random random(8);
+  for (const int F : {1, 2, 4, 8}) {
+    const HashGridShape shape{3, F, 4, 1.7, 8};
+    const std::vector<HashLevel> levels = levels_of(shape);
+    const int64_t n = 130, columns = 3 * F, open = 2;
+    const auto x = random.uniforms<T>(size_t(3 * n), -0.05, 1.05), along = random.uniforms<T>(size_t(3 * n), -1);
+    const auto features = random.uniforms<T>(size_t(open * n * F), -1),
+               slopes = random.uniforms<T>(size_t(open * n * F), -1);
+    std::vector<T> g(size_t(n * columns)), gj(size_t(3 * n * columns));
+    for (int64_t p = 0; p < n; ++p)
+      for (int64_t l = 0; l < open; ++l)
+        for (int64_t f = 0; f < F; ++f) {
+          g[p * columns + l * F + f] = features[(l * n + p) * F + f];
+          for (int64_t axis = 0; axis < 3; ++axis)
+            gj[(3 * p + axis) * columns + l * F + f] = along[3 * p + axis] * slopes[(l * n + p) * F + f];
+        }
+    const HashEncodeArgs<T> args{levels.data(), F, 3, int(open), n, x.data(), nullptr};
+    for (const Kernels<T>& k : usable_kernels<T>()) {
+      std::vector<T> got(size_t(n_entries(shape) * F)), expected = got;
+      for (int l = 0; l < open; ++l) {
+        k.hash_scatter_along(args, l, {features.data(), slopes.data(), n * F, int(open), F}, along.data(), got.data());
+        k.hash_scatter(args, l, g.data(), gj.data(), expected.data());
+      }
+      expect_close(got, expected, k.name);
+    }
+  }
+}
+TEST(HashKernels, ScatterAlongIsThatOfTheProduct) { along_is_a_product<float>(), along_is_a_product<double>(); }
+
 TEST(HashKernels, EveryInstructionSetAgreesWithBase) {
   every_set_agrees_with_base<float>();
   every_set_agrees_with_base<double>();

@@ -89,52 +89,6 @@ struct Network {
   }
 };
 
-// The last size gives each of the 256 blocks of 64 points a second tile, the last of them not full.
-void check_layer(int width, int n_outputs, std::initializer_list<int64_t> sizes) {
-  for (const int64_t n : sizes) {
-    Random random(1);
-    const Network net(random, width, n_outputs);
-    const int c = net.n_features;
-    const auto x = random.uniforms(3 * n, -1), f = random.uniforms(n * c, -1), j = random.uniforms(3 * n * c, -1);
-    const auto go = random.uniforms(n * n_outputs, -1), gg = random.uniforms(3 * n, -1);
-    Gpu gpu;
-    auto outputs = unwritten<double>(n * n_outputs), gradient = unwritten<double>(3 * n), outputs1 = outputs,
-         gradient1 = gradient;
-    cpu::sdf_layer(net.weights, n, x.data(), f.data(), j.data(), outputs.data(), gradient.data());
-    cuda::sdf_layer(gpu.queue(), net.weights, n, x.data(), f.data(), j.data(), outputs1.data(), gradient1.data());
-    expect_near(outputs1, outputs, 1e-13), expect_near(gradient1, gradient, 1e-13);
-
-    struct Grads {
-      std::vector<double> features, jacobian, hidden, hidden_bias, out, out_bias;
-    };
-    Grads a{unwritten<double>(n * c), unwritten<double>(3 * n * c),      unwritten<double>(net.hidden.size()),
-            unwritten<double>(width), unwritten<double>(net.out.size()), unwritten<double>(n_outputs)};
-    Grads b = a;
-    cpu::sdf_layer_backward(net.weights, n, x.data(), f.data(), j.data(), go.data(), gg.data(), a.features.data(),
-                            a.jacobian.data(), a.hidden.data(), a.hidden_bias.data(), a.out.data(), a.out_bias.data());
-    cuda::sdf_layer_backward(gpu.queue(), net.weights, n, x.data(), f.data(), j.data(), go.data(), gg.data(),
-                             b.features.data(), b.jacobian.data(), b.hidden.data(), b.hidden_bias.data(), b.out.data(),
-                             b.out_bias.data());
-    expect_near(b.features, a.features, 1e-12), expect_near(b.jacobian, a.jacobian, 1e-13);
-    expect_near(b.hidden, a.hidden, 1e-12), expect_near(b.hidden_bias, a.hidden_bias, 1e-12);
-    expect_near(b.out, a.out, 1e-12), expect_near(b.out_bias, a.out_bias, 1e-12);
-  }
-}
-TEST(FieldKernels, SdfLayerAndItsGradients) { check_layer(21, 5, {0, 1, 64, 131}); }
-TEST(FieldKernels, SdfLayerOfMoreTilesThanBlocks) { check_layer(8, 2, {2 * 64 * 256 + 17}); }
-
-// A tile of doubles of so many numbers only fits with 32 points, one of more does not fit at all.
-TEST(FieldKernels, SdfLayerOfManyOutputs) {
-  check_layer(16, 420, {0, 1, 70});
-  Random random(1);
-  const Network net(random, 8, 1000);
-  Gpu gpu;
-  std::vector<double> out(1000), three(3);
-  EXPECT_THROW(
-      cuda::sdf_layer(gpu.queue(), net.weights, 1, three.data(), three.data(), three.data(), out.data(), three.data()),
-      std::invalid_argument);
-}
-
 struct Field {
   Network net;
   std::vector<double> table;
@@ -145,6 +99,108 @@ struct Field {
   }
   SdfField<double> view() const { return {kShape, 5, table.data(), net.weights}; }
 };
+
+// A field of any sizes whose rows of weights have lengths, in T, its table in S.
+template <class T, class S> struct Lengthy {
+  HashGridShape shape;
+  int n_inputs, width, n_outputs;
+  int64_t n_entries;
+  std::vector<S> table;
+  std::vector<T> hidden, hidden_length, hidden_bias, out, out_length, out_bias;
+
+  Lengthy(Random& random, const HashGridShape& shape, int width, int n_outputs)
+      : shape(shape), n_inputs(3 + shape.n_levels * shape.n_features), width(width), n_outputs(n_outputs) {
+    HashLevel levels[kMaxLevels];
+    n_entries = hash_levels(shape, levels);
+    table = drawn_entries<S>(random, n_entries * shape.n_features);
+    hidden = random.uniforms<T>(width * n_inputs, -2, 2), hidden_length = random.uniforms<T>(width, 0.1, 1);
+    hidden_bias = random.uniforms<T>(width, -0.1, 0.1);
+    out = random.uniforms<T>(n_outputs * width, -3, 3), out_length = random.uniforms<T>(n_outputs, 0.5, 2);
+    out_bias = random.uniforms<T>(n_outputs, -1);
+  }
+  SdfField<T> view() const {
+    return {shape,
+            shape.n_levels - 1,
+            table.data(),
+            {n_inputs, width, n_outputs, hidden.data(), hidden_bias.data(), out.data(), out_bias.data(), T(20), T(1.5),
+             hidden_length.data(), out_length.data()}};
+  }
+};
+
+template <class T> struct FieldResults {
+  std::vector<T> outputs, features, gradient;
+
+  template <class F>
+  FieldResults(const F& field, int64_t n)
+      : outputs(unwritten<T>(n * field.n_outputs)), features(unwritten<T>(n * (field.n_inputs - 3))),
+        gradient(unwritten<T>(3 * n)) {}
+  SdfOutputs<T> view() { return {outputs.data(), features.data(), gradient.data()}; }
+};
+template <class T> struct FieldGradients {
+  std::vector<T> table, hidden, hidden_length, hidden_bias, out, out_length, out_bias;
+
+  template <class F>
+  explicit FieldGradients(const F& field)
+      : table(unwritten<T>(field.table.size())), hidden(unwritten<T>(field.hidden.size())),
+        hidden_length(unwritten<T>(field.width)), hidden_bias(unwritten<T>(field.width)),
+        out(unwritten<T>(field.out.size())), out_length(unwritten<T>(field.n_outputs)),
+        out_bias(unwritten<T>(field.n_outputs)) {}
+  SdfFieldGrad<T> view() {
+    return {table.data(), hidden.data(),     hidden_length.data(), hidden_bias.data(),
+            out.data(),   out_length.data(), out_bias.data()};
+  }
+};
+
+template <class T, class S = T>
+void check_field(const HashGridShape& shape, int width, int n_outputs, std::initializer_list<int64_t> sizes,
+                 double tolerance) {
+  for (const int64_t n : sizes) {
+    Random random(3);
+    const Lengthy<T, S> field(random, shape, width, n_outputs);
+    const auto x = random.uniforms<T>(3 * n, -1.7, 1.7);
+    FieldResults<T> a(field, n), b(field, n);
+    Gpu gpu;
+    cpu::sdf_field(field.view(), n, x.data(), a.view());
+    cuda::sdf_field(gpu.queue(), field.view(), n, x.data(), b.view());
+    expect_near(b.outputs, a.outputs, tolerance), expect_near(b.features, a.features, tolerance);
+    expect_near(b.gradient, a.gradient, tolerance);
+
+    const auto go = random.uniforms<T>(n * n_outputs, -1), gf = random.uniforms<T>(a.features.size(), -1),
+               gg = random.uniforms<T>(3 * n, -1);
+    FieldGradients<T> c(field), d(field);
+    const SdfOutputs<const T> given{go.data(), gf.data(), gg.data()};
+    cpu::sdf_field_backward(field.view(), n, x.data(), given, c.view());
+    cuda::sdf_field_backward(gpu.queue(), field.view(), n, x.data(), given, d.view());
+    const double of_sums = tolerance * (10 + n / 100);
+    expect_near(d.table, c.table, of_sums), expect_near(d.hidden, c.hidden, of_sums);
+    expect_near(d.hidden_length, c.hidden_length, of_sums), expect_near(d.hidden_bias, c.hidden_bias, of_sums);
+    expect_near(d.out, c.out, of_sums), expect_near(d.out_length, c.out_length, of_sums);
+    expect_near(d.out_bias, c.out_bias, of_sums);
+  }
+}
+TEST(FieldKernels, SdfField) { check_field<double>(kShape, 21, 5, {0, 1, 64, 131}, 1e-12); }
+// Each of the 264 blocks of 64 points has a second tile, the last of them not full.
+TEST(FieldKernels, SdfFieldOfMoreTilesThanBlocks) {
+  check_field<double>({3, 1, 4, 1.5, 8}, 8, 2, {2 * 64 * 264 - 47}, 1e-12);
+}
+// Units come in three turns, so that their weights are loaded for each tile; the blocks' sums are in memory.
+TEST(FieldKernels, SdfFieldOfManyUnits) { check_field<double>(kShape, 150, 3, {1, 200}, 1e-12); }
+// More squares of sums than threads, of one turn of units.
+TEST(FieldKernels, SdfFieldOfManyFeatures) { check_field<float>({8, 8, 4, 1.5, 6}, 64, 13, {70}, 2e-4); }
+TEST(FieldKernels, SdfFieldInFloatFromTablesOf16Bits) {
+  check_field<float, Half>(kShape, 64, 13, {0, 1, 130}, 1e-4);
+  check_field<float, Bfloat16>({3, 4, 4, 1.5, 8}, 16, 1, {65}, 1e-4);
+}
+// Tiles of 64 points of so many numbers do not fit, those of the last ones not even of 16.
+TEST(FieldKernels, SdfFieldOfManyOutputs) {
+  check_field<double>(kShape, 16, 180, {1, 70}, 1e-12);
+  Random random(1);
+  const Lengthy<double, double> field(random, kShape, 8, 1000);
+  FieldResults<double> results(field, 1);
+  Gpu gpu;
+  const std::vector<double> three(3);
+  EXPECT_THROW(cuda::sdf_field(gpu.queue(), field.view(), 1, three.data(), results.view()), std::invalid_argument);
+}
 
 TEST(FieldKernels, SdfValues) {
   for (const int64_t n : {0, 1, 64, 200}) {

@@ -341,16 +341,18 @@ def sample_rays_inputs(dtype=torch.float64) -> tuple:
     )  # fmt: skip
 
 
-def sdf_layer_inputs(n: int = 7, dtype=torch.float64) -> tuple:
+def sdf_field_inputs(n: int = 7, dtype=torch.float64) -> tuple:
+    """Arguments of ``sdf_field``: points off the cells' faces, some outside, and one closed level."""
     g = generator(5)
 
     def randn(*shape: int) -> torch.Tensor:
         return torch.randn(*shape, generator=g, dtype=torch.float64).to(dtype)
 
     beta_scale = 0.02  # around the bend of softplus_100
+    levels = SDF_SPEC.arguments(2)
     return (
-        randn(n, 3), randn(n, 6), randn(n, 3, 6), beta_scale * randn(10, 9), beta_scale * randn(10), randn(4, 10), randn(4),
-        100.0, BOX,
+        0.7 * randn(n, 3), randn(SDF_SPEC.n_entries, 2), randn(10, 9), beta_scale * (2 + randn(10, 1)), beta_scale * randn(10),
+        randn(4, 10), 2 + randn(4, 1), randn(4), 100.0, *levels, BOX,
     )  # fmt: skip
 
 
@@ -485,8 +487,8 @@ CASES = {
     "composite_backward": lambda t: with_gradients("composite", composite_case(t)),
     "spread_samples": spread_inputs,
     "sample_rays": sample_rays_inputs,
-    "sdf_layer": lambda t: sdf_layer_inputs(150, t),
-    "sdf_layer_backward": lambda t: with_gradients("sdf_layer", sdf_layer_inputs(150, t)),
+    "sdf_field": lambda t: sdf_field_inputs(150, t),
+    "sdf_field_backward": lambda t: with_gradients("sdf_field", sdf_field_inputs(150, t)),
     "sdf_values": lambda t: (sample_rays_inputs(t)[0], *sample_rays_inputs(t)[4:16]),
     "cached_occlusion": cached_occlusion_inputs,
     "cached_visibility": cached_visibility_inputs,

@@ -63,7 +63,7 @@ def test_a_profile_names_what_takes_the_time(data, tmp_path):
     run("gpu_train.py", data, "--out", tmp_path / "run", "--device", "cpu", "--preset", "cpu", "--steps", 60,
         "--profile", page, *settings)  # fmt: skip
     text = page.read_text()
-    assert text.startswith("20 steps after 39: ") and "sdf_layer_backward" in text
+    assert text.startswith("20 steps after 39: ") and "sdf_field_backward" in text
 
 
 def test_a_step_has_no_more_launches_than_it_had(tmp_path):
@@ -71,7 +71,7 @@ def test_a_step_has_no_more_launches_than_it_had(tmp_path):
     said = run("launches.py", "--steps", 8, "--out", tmp_path / "launches.md")
     launches = float(re.match(r"(\d+) launches a step", said)[1])
     assert 100 < launches <= 190
-    for line in ("| sample_rays | 6.0 |", "| spread_samples | 3.0 |", "| sdf_layer_backward | 4.0 |"):
+    for line in ("| sample_rays | 6.0 |", "| spread_samples | 3.0 |", "| sdf_field_backward | 5.0 |"):
         assert line in said
     counted = [float(x) for x in re.findall(r"^\| [a-z_]+ \| ([\d.]+) \|$", said, re.MULTILINE)]
     assert sum(counted) == pytest.approx(launches, rel=0.01)
@@ -101,7 +101,7 @@ def test_a_line_with_a_large_error_fails(monkeypatch, share, fails):
 
 def test_the_costly_operators_come_first():
     ops = [case.op for case in gpu_ops.all_cases()]
-    assert ops[:4] == ["sample_rays", "sdf_layer_backward", "cached_occlusion", "cached_visibility"]
+    assert ops[:4] == ["sample_rays", "sdf_field_backward", "cached_occlusion", "cached_visibility"]
     assert set(ops) == set(CASES)
 
 

@@ -1,4 +1,4 @@
-"""sdf_layer, sdf_values, and sample_rays: what it keeps against all samples, thin parts, errors."""
+"""sdf_field, sdf_values, and sample_rays: what it keeps against all samples, thin parts, errors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from op_cases import (
     full_cells,
     sample_rays_inputs,
     sampling_settings,
-    sdf_layer_inputs,
+    sdf_field_inputs,
 )
 from op_checks import check_op, generator, grad_leaves, lib
 
@@ -271,30 +271,36 @@ def test_errors_name_what_is_wrong():
         lib.sample_rays(*x)[1].sum().backward()
 
 
-# ---- sdf_layer ----
+# ---- sdf_field ----
+
+LEARNED = range(1, 8)  # the arguments to which there is a gradient
 
 
+def gradients(function, inputs: tuple) -> tuple[tuple, list[torch.Tensor]]:
+    """The outputs, and the gradients of a sum with drawn weights."""
+    leaves = grad_leaves(inputs, LEARNED)
+    outputs = function(*leaves)
+    total = sum((torch.randn(x.shape, generator=generator(i), dtype=torch.float64) * x).sum() for i, x in enumerate(outputs))
+    return outputs, list(torch.autograd.grad(total, leaves[1:8]))
 
 
 @pytest.mark.parametrize("n", [0, 1, 63, 64, 65, 1500])
-def test_layer_and_its_gradients_are_the_formula(n):
-    x = sdf_layer_inputs(n)
-    leaves, twins = grad_leaves(x, range(1, 7)), grad_leaves(x, range(1, 7))
-    ours, theirs = lib.sdf_layer(*leaves), reference.sdf_layer(*twins)
-    weights = [torch.randn(t.shape, generator=generator(6), dtype=t.dtype) for t in theirs]
-    for outputs in (ours, theirs):
-        (outputs[0] * weights[0]).sum().add((outputs[1] * weights[1]).sum()).backward()
-    for a, b in zip(ours, theirs):
+@pytest.mark.parametrize("n_active", [0, 2, 3])
+def test_field_and_its_gradients_are_the_formula(n, n_active):
+    inputs = list(sdf_field_inputs(n))
+    inputs[13] = n_active
+    (outputs, grads), (exact, exact_grads) = (gradients(f, tuple(inputs)) for f in (lib.sdf_field, reference.sdf_field))
+    for a, b in zip([*outputs, *grads], [*exact, *exact_grads], strict=True):
         torch.testing.assert_close(a, b)
-    for a, b in zip(leaves[1:7], twins[1:7]):
-        torch.testing.assert_close(a.grad, b.grad)
+    assert (outputs[1][:, 2 * n_active :] == 0).all()
 
 
-def test_layer_float32_is_close_to_float64():
-    exact = lib.sdf_layer(*sdf_layer_inputs(500))
-    single = lib.sdf_layer(*sdf_layer_inputs(500, torch.float32))
-    for a, b in zip(single, exact):
+def test_field_float32_is_close_to_float64():
+    (outputs, grads), (exact, exact_grads) = (gradients(lib.sdf_field, sdf_field_inputs(500, t)) for t in (torch.float32, torch.float64))
+    for a, b in zip(outputs, exact):
         torch.testing.assert_close(a.double(), b, rtol=1e-5, atol=1e-5)
+    for a, b in zip(grads, exact_grads):
+        assert (a.double() - b).abs().max() < 2e-5 * b.abs().max()
 
 
 def test_the_fields_gradient_is_that_of_its_values():
@@ -305,12 +311,76 @@ def test_the_fields_gradient_is_that_of_its_values():
     torch.testing.assert_close(field.sample(x).gradient, numeric, rtol=1e-5, atol=1e-7)
 
 
-def test_layer_opcheck_gradcheck_and_errors():
-    x = sdf_layer_inputs()
-    check_op(lib.sdf_layer, x, tuple(range(1, 7)))
-    check_op(lib.sdf_layer_backward, (*x, torch.ones(7, 4).double(), torch.ones(7, 3).double()))
-    assert torch.autograd.gradcheck(lambda *y: lib.sdf_layer(*y), grad_leaves(x, range(1, 7)), atol=1e-6, rtol=1e-5)
+def test_only_the_length_of_a_row_has_a_length():
+    """A direction may be three times as long, and its gradient is at right angles to it."""
+    inputs = sdf_field_inputs(40)
+    longer = tuple(3 * x if i in (2, 5) else x for i, x in enumerate(inputs))
+    (outputs, grads), (same, of_longer) = gradients(lib.sdf_field, inputs), gradients(lib.sdf_field, longer)
+    for i, (a, b) in enumerate(zip([*outputs, *grads], [*same, *of_longer])):
+        torch.testing.assert_close(a, 3 * b if i in (4, 7) else b)
+    for i in (2, 5):
+        along = (grads[i - 1] * inputs[i]).sum(1)
+        torch.testing.assert_close(along, torch.zeros_like(along), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
+def test_field_reads_the_copy_of_the_table(dtype):
+    inputs = sdf_field_inputs(70, torch.float32)
+    stored = inputs[1].to(dtype)
+    got = gradients(lambda *x: lib.sdf_field(*x, stored), inputs)
+    expected = gradients(lib.sdf_field, (inputs[0], stored.float(), *inputs[2:]))
+    for a, b in zip([*got[0], *got[1]], [*expected[0], *expected[1]]):
+        assert torch.equal(a, b)
+    for a, b in zip(lib.sdf_field(inputs[0], stored, *inputs[2:]), expected[0]):
+        assert torch.equal(a, b)
+    leaf = stored.clone().requires_grad_()
+    with pytest.raises(RuntimeError, match="no gradient to stored"):
+        lib.sdf_field(*inputs, leaf)[0].sum().backward()
+    with pytest.raises(RuntimeError, match="no gradient to a table of"):
+        lib.sdf_field(inputs[0], leaf, *inputs[2:])[0].sum().backward()
+    with pytest.raises(Exception, match="sdf_field: stored must be float16 or bfloat16"):
+        lib.sdf_field(*sdf_field_inputs(3), stored)
+
+
+def test_field_has_the_same_bits_on_any_number_of_threads():
+    inputs, kept = sdf_field_inputs(3000, torch.float32), torch.get_num_threads()
+    try:
+        found = []
+        for threads in (1, 2, 2):
+            torch.set_num_threads(threads)
+            outputs, grads = gradients(lib.sdf_field, inputs)
+            found.append([*outputs, *grads])
+    finally:
+        torch.set_num_threads(kept)
+    for others in found[1:]:
+        assert all(torch.equal(a, b) for a, b in zip(found[0], others))
+
+
+def test_field_opcheck_gradcheck_and_errors():
+    x = sdf_field_inputs()
+    check_op(lib.sdf_field, x, tuple(LEARNED))
+    check_op(lib.sdf_field, sdf_field_inputs(0), tuple(LEARNED))
+    check_op(lib.sdf_field_backward, (*x, *(torch.ones(7, k).double() for k in (4, 6, 3))))
+    assert torch.autograd.gradcheck(lambda *y: lib.sdf_field(*y), grad_leaves(x, LEARNED), atol=1e-6, rtol=1e-5)
     with pytest.raises(RuntimeError, match="no gradient to positions"):
-        lib.sdf_layer(*grad_leaves(x, (0,)))[0].sum().backward()
-    with pytest.raises(Exception, match=r"sdf_layer: jacobian must be \[7, 3, 6\] float64"):
-        lib.sdf_layer(x[0], x[1], x[2][:, :2], *x[3:])
+        lib.sdf_field(*grad_leaves(x, (0,)))[0].sum().backward()
+    with pytest.raises(RuntimeError, match="sdf_field_backward: no gradient is defined"):
+        (grad,) = torch.autograd.grad(lib.sdf_field(*(leaves := grad_leaves(x, LEARNED)))[0].sum(), leaves[2], create_graph=True)
+        grad.sum().backward()
+    wrong = [(3, x[3][:, 0], r"hidden_length must be \[10, 1\] float64"), (6, x[6][:2], r"out_length must be \[4, 1\] float64"),
+             (2, x[2][:, :8], r"hidden must be \[n, 9\]"), (0, x[0].float(), r"positions must be \[n, 3\] float64"),
+             (13, 4, r"n_active must be in \[0, n_levels\]"), (14, 0.0, "beta and box must be positive")]  # fmt: skip
+    for place, value, message in wrong:
+        with pytest.raises(Exception, match=f"sdf_field: {message}"):
+            lib.sdf_field(*(value if i == place else y for i, y in enumerate(x)))
+
+
+def test_a_nan_spoils_its_own_point_alone():
+    inputs = sdf_field_inputs(70, torch.float32)
+    inputs[0][5, 1] = math.nan
+    whole = lib.sdf_field(*inputs)
+    others = torch.arange(70) != 5
+    rest = lib.sdf_field(inputs[0][others], *inputs[1:])
+    for a, b in zip(whole, rest):
+        torch.testing.assert_close(a[others], b, rtol=1e-5, atol=1e-6)
+        assert not a[5].isfinite().all()

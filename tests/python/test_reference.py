@@ -26,7 +26,7 @@ from splitnerf.bench.hash_grid import SPEC
 
 # The inputs of each operator to which there is a gradient.
 DIFFERENTIABLE = {
-    "hash_encode": (0, 1), "sdf_layer": range(1, 7), "march_rays": (), "neus_weights": (0, 1, 2), "surface_weights": (0, 1, 3),
+    "hash_encode": (0, 1), "sdf_field": range(1, 8), "march_rays": (), "neus_weights": (0, 1, 2), "surface_weights": (0, 1, 3),
     "composite": (0, 1, 3), "sharpness": (0,), "query_direction": (0, 1, 2), "split_sum_shade": range(9), "shade_sums": range(9),
     "monte_carlo_light": (0, 2, 5), "summed_light": (0, 2, 5), "linear_to_srgb": (0,), "srgb_to_linear": (), "prefilter_light": (3,),
     "sparse_product": (6,), "light_lookup": (0, 1, 2, 3), "cached_visibility": (), "cached_occlusion": (),

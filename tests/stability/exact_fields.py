@@ -65,27 +65,43 @@ def cells(position: list, table: np.ndarray):
 
 def sdf_values(row: dict[str, np.ndarray], shared: Rows, box: int = 1) -> dict[str, list]:
     """The layer over the grid's features, of the table scaled by 1e-3 in float64."""
+    weights = [[vector(weights) for weights in shared[name].numpy()] for name in ("hidden", "out")]
+    return {"values": layer(row["positions"], encoded(row, shared, box), *weights, shared, box=box)["outputs"][:1]}
+
+
+def sdf_field(row: dict[str, np.ndarray], shared: Rows, box: int = 1) -> dict[str, list]:
+    """The same with all outputs and the gradient; rows of weights are length times unit direction."""
+    weights = [normalised(shared[name].numpy(), shared[f"{name}_length"].numpy()) for name in ("hidden", "out")]
+    features = encoded(row, shared, box)
+    return {"features": features["features"]} | layer(row["positions"], features, *weights, shared, box=box)
+
+
+def encoded(row: dict[str, np.ndarray], shared: Rows, box: int) -> dict[str, list]:
     unit = {"positions": np.asarray(row["positions"], np.float64) / (2 * box) + 0.5}
-    features = hash_encode(unit, shared | {"table": 1e-3 * shared["table"]})["features"]
-    inputs = {"positions": row["positions"], "features": features, "jacobian": np.zeros((3, len(features)))}
-    return {"values": sdf_layer(inputs, shared)["outputs"][:1]}
+    return hash_encode_jacobian(unit, shared | {"table": 1e-3 * shared["table"]})
 
 
-def sdf_layer(row: dict[str, np.ndarray], shared: Rows, beta: int = 100, box: int = 1) -> dict[str, list]:
+def normalised(directions: np.ndarray, lengths: np.ndarray) -> list[list]:
+    scales = [mp.mpf(float(n)) / mp.sqrt(mp.fsum(x**2 for x in vector(d))) for d, n in zip(directions, lengths[:, 0])]
+    return [[scale * x for x in vector(d)] for d, scale in zip(directions, scales)]
+
+
+def layer(
+    positions: np.ndarray, grid: dict[str, list], hidden: list[list], out: list[list], biases: Rows, beta: int = 100, box: int = 1
+) -> dict[str, list]:  # fmt: skip
     """outputs = out softplus(a) + out_bias and d outputs[0] / d position by the chain rule."""
-    inputs = vector(row["positions"]) + [mp.mpf(x) for x in row["features"]]
-    hidden, bias, out = (shared[name].numpy() for name in ("hidden", "hidden_bias", "out"))
-    outputs = vector(shared["out_bias"].numpy())
+    inputs = vector(positions) + grid["features"]
+    n = len(grid["features"])
+    outputs = vector(biases["out_bias"].numpy())
     by_input = [mp.mpf(0)] * len(inputs)
     for h, weights in enumerate(hidden):
-        weights = vector(weights)
-        y = beta * (mp.fsum(w * x for w, x in zip(weights, inputs)) + mp.mpf(float(bias[h])))
+        y = beta * (mp.fsum(w * x for w, x in zip(weights, inputs)) + mp.mpf(float(biases["hidden_bias"][h])))
         e = mp.exp(-abs(y))
         unit, slope = (max(y, 0) + mp.log1p(e)) / beta, (1 if y > 0 else e) / (1 + e)
-        outputs = [o + mp.mpf(float(w)) * unit for o, w in zip(outputs, out[:, h])]
-        by_input = [b + mp.mpf(float(out[0, h])) * slope * w for b, w in zip(by_input, weights)]
+        outputs = [o + row[h] * unit for o, row in zip(outputs, out)]
+        by_input = [b + out[0][h] * slope * w for b, w in zip(by_input, weights)]
     gradient = []
     for axis in range(3):
-        through = mp.fsum(j * b for j, b in zip(vector(row["jacobian"][axis]), by_input[3:]))
+        through = mp.fsum(j * b for j, b in zip(grid["jacobian"][n * axis : n * (axis + 1)], by_input[3:]))
         gradient.append(by_input[axis] + through / (2 * box))
     return {"outputs": outputs, "gradient": gradient}

@@ -30,6 +30,14 @@ template <class T> struct SdfNetwork {
   SdfLayer<T> layer;
 };
 
+// Gradients to a field's grid, level after level: to feature f of open level l at point p, [l stride + p F + f]; and the number that
+// the gradient to its derivative by a coordinate has as a factor, beside the gradient to that coordinate's part of the field's.
+template <class T> struct LevelPlanes {
+  T *features, *slopes;
+  int64_t stride;  // n F
+  int n_levels, n_features;
+};
+
 // Weights of all (query, source) pairs of the pre-integration lobe, structure of arrays.
 template <class T> struct LobeSide {
   const T *x, *y, *z;      // unit directions
@@ -55,18 +63,21 @@ template <class T> struct VisibilityLobe {
 template <class T> struct Kernels {
   const char* name;
 
-  // features [n, C]; jacobian [n, 3, C] or null. Points [begin, end).
+  // features [n, C]; jacobian [n, 3, C] or null; columns of closed levels become 0. Points [begin, end).
   void (*hash_encode)(const HashEncodeArgs<T>&, int64_t begin, int64_t end, T* features, T* jacobian);
   // Adds to grad_table. grad_features and grad_jacobian may be null. Level `level`, all points.
   void (*hash_scatter)(const HashEncodeArgs<T>&, int level, const T* grad_features, const T* grad_jacobian,
                        T* grad_table);
+  // The same where the gradient to the derivative by an axis is slopes times along [n, 3].
+  void (*hash_scatter_along)(const HashEncodeArgs<T>&, int level, const LevelPlanes<const T>& grad, const T* along,
+                             T* grad_table);
   // values [n] at positions [n, 3], scene units; n <= kSdfBlock, work [sdf_work_size].
   void (*sdf_values)(const SdfNetwork<T>&, int64_t n, const T* positions, T* work, T* values);
   // outputs [n, M], gradient [n, 3] d distance / d position.
   void (*sdf_layer)(const SdfLayer<T>&, const SdfPoints<T>&, T* work, T* outputs, T* gradient);
-  // grad_features [n, C] and grad_jacobian [n, 3, C], overwritten; adds to the weights' gradients.
-  void (*sdf_layer_backward)(const SdfLayer<T>&, const SdfPoints<T>&, const T* grad_outputs, const T* grad_gradient,
-                             T* work, T* grad_features, T* grad_jacobian, const SdfLayerGrad<T>&);
+  // Overwrites the block's part of the planes, whose pointers are at its first point; adds to the weights' gradients.
+  void (*sdf_layer_backward)(const SdfLayer<T>&, const SdfPoints<T>&, const SdfOutputs<const T>& grad, T* work,
+                             const LevelPlanes<T>& grad_levels, const SdfLayerGrad<T>&);
   // likeness[j] = k_ij = exp(-|x_i - x_j|^2 / 4), i = point, work memory of n; sums = {sum_j k_ij (x_i - x_j) for each
   // channel, sum_j k_ij}. planes [n_channels, n] hold x.
   void (*pair_likeness)(int64_t n, int64_t n_channels, const T* planes, int64_t point, T* likeness, T* sums);

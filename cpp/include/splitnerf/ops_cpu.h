@@ -64,16 +64,14 @@ SPLITNERF_API void light_lookup_backward(const LightPyramid<T>& pyramid, int64_t
 // positions [n, 3] -> values [n], scene units.
 template <class T> SPLITNERF_API void sdf_values(const SdfField<T>& field, int64_t n, const T* positions, T* values);
 
-// positions [n, 3], features [n, C], jacobian [n, 3, C] of the hash grid -> outputs [n, n_outputs], gradient [n, 3].
+// The field at positions [n, 3], scene units.
 template <class T>
-SPLITNERF_API void sdf_layer(const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features,
-                             const T* jacobian, T* outputs, T* gradient);
-// grads of the weights in their own shapes, all overwritten.
+SPLITNERF_API void sdf_field(const SdfField<T>& field, int64_t n, const T* positions, const SdfOutputs<T>& to);
+// Its adjoint, which evaluates the field again; overwrites all of grad. Work memory 2 n C numbers. Points are summed in an order
+// that depends on n alone: the same bits on any number of threads.
 template <class T>
-SPLITNERF_API void sdf_layer_backward(const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features,
-                                      const T* jacobian, const T* grad_outputs, const T* grad_gradient,
-                                      T* grad_features, T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias,
-                                      T* grad_out, T* grad_out_bias);
+SPLITNERF_API void sdf_field_backward(const SdfField<T>& field, int64_t n, const T* positions,
+                                      const SdfOutputs<const T>& given, const SdfFieldGrad<T>& grad);
 
 // Follows each ray through the occupied cells and asks for the distance on the way, see ray_walk.h. offsets [n_rays + 1];
 // n_evaluated [n_rays]: points at which the distance was asked for; allocate(n) makes room for the n samples that are kept.

@@ -58,13 +58,11 @@ void spread_samples(const Queue& queue, const SpreadArrays<T>& in, int64_t* size
 template <class T>
 void sdf_values(const Queue& queue, const SdfField<T>& field, int64_t n, const T* positions, T* values);
 template <class T>
-void sdf_layer(const Queue& queue, const SdfWeights<T>& weights, int64_t n, const T* positions, const T* features,
-               const T* jacobian, T* outputs, T* gradient);
+void sdf_field(const Queue& queue, const SdfField<T>& field, int64_t n, const T* positions, const SdfOutputs<T>& to);
+// The gradient to the table is added atomically.
 template <class T>
-void sdf_layer_backward(const Queue& queue, const SdfWeights<T>& weights, int64_t n, const T* positions,
-                        const T* features, const T* jacobian, const T* grad_outputs, const T* grad_gradient,
-                        T* grad_features, T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias, T* grad_out,
-                        T* grad_out_bias);
+void sdf_field_backward(const Queue& queue, const SdfField<T>& field, int64_t n, const T* positions,
+                        const SdfOutputs<const T>& given, const SdfFieldGrad<T>& grad);
 
 // Waits for the number of samples; work memory for as many as a ray can have.
 template <class T>

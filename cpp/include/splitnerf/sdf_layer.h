@@ -6,8 +6,22 @@
 #include <vector>
 
 #include "splitnerf/hash_grid.h"
+#include "splitnerf/vector_math.h"
+#include "splitnerf/weight_norm.h"
 
 namespace splitnerf {
+
+// From scene units to the unit cube of the grid, scale = 1 / (2 box).
+template <class T> SPLITNERF_HD T to_unit(T coordinate, T scale) { return coordinate * scale + T(0.5); }
+template <class T> SPLITNERF_HD Vec3<T> to_unit(Vec3<T> position, T scale) {
+  return {to_unit(position.x, scale), to_unit(position.y, scale), to_unit(position.z, scale)};
+}
+
+// The gradient to the sum y of a unit, from those to its value softplus(y) and to its slope softplus'(y). 1 - slope =
+// exp(-beta value) keeps its digits where the slope is close to 1.
+template <class T> SPLITNERF_HD T unit_backward(Softplus<T> unit, T beta, T grad_value, T grad_slope) {
+  return grad_value * unit.slope + grad_slope * beta * unit.slope * exp_of_minus(beta * unit.value);
+}
 
 // outputs = out softplus_beta(hidden [position, features] + hidden_bias) + out_bias; the first output is the distance.
 template <class T> struct SdfWeights {
@@ -16,6 +30,9 @@ template <class T> struct SdfWeights {
   const T *hidden, *hidden_bias, *out, *out_bias;  // [width, n_inputs], [width], [n_outputs, width], [n_outputs]
   T beta;
   T box;  // half size of the cube that the grid covers: d unit position / d position = 1 / (2 box)
+  // Of the rows of hidden [width] and out [n_outputs], which are then directions, see weight_norm.h; null where the rows are the
+  // weights themselves.
+  const T *hidden_length = nullptr, *out_length = nullptr;
 };
 
 // The distance field as it comes.
@@ -24,6 +41,15 @@ template <class T> struct SdfField {
   int n_active;
   HashTable table;
   SdfWeights<T> weights;
+};
+
+// What a field gives at n points: [n, n_outputs], [n, C] features of the grid, [n, 3] d first output / d position. The gradients
+// to them have the same shapes.
+template <class T> struct SdfOutputs { T *outputs, *features, *gradient; };
+
+// Gradients to the numbers of a field whose rows have lengths, in their own shapes.
+template <class T> struct SdfFieldGrad {
+  T *table, *hidden, *hidden_length, *hidden_bias, *out, *out_length, *out_bias;
 };
 
 // The same weights with rows padded to whole vectors, and transposed, as products over blocks of points need them.
@@ -43,9 +69,7 @@ template <class T> struct SdfPoints {
 };
 
 // Sums over points, laid out as in SdfLayer.
-template <class T> struct SdfLayerGrad {
-  T *hidden, *hidden_bias, *out, *out_bias;
-};
+template <class T> struct SdfLayerGrad { T *hidden, *hidden_bias, *out, *out_bias; };
 
 inline constexpr int kSdfBlock = 64;
 
@@ -63,14 +87,21 @@ template <class T> class PreparedSdfLayer {
     const int64_t inputs = padded(w.n_inputs), width = padded(w.width), outputs = padded(w.n_outputs);
     hidden_.resize(w.width * inputs), hidden_transposed_.resize(w.n_inputs * width), hidden_bias_.resize(width);
     out_.resize(w.n_outputs * width), out_transposed_.resize(w.width * outputs), out_bias_.resize(outputs);
+    const auto scale = [](const T* rows, const T* lengths, int64_t r, int64_t n) {
+      return lengths ? lengths[r] * inverse_norm(OneThread{}, n, rows + r * n) : T(1);
+    };
     for (int64_t h = 0; h < w.width; ++h) {
       hidden_bias_[h] = w.hidden_bias[h];
+      const T factor = scale(w.hidden, w.hidden_length, h, w.n_inputs);
       for (int64_t k = 0; k < w.n_inputs; ++k)
-        hidden_[h * inputs + k] = hidden_transposed_[k * width + h] = w.hidden[h * w.n_inputs + k];
-      for (int64_t m = 0; m < w.n_outputs; ++m)
-        out_[m * width + h] = out_transposed_[h * outputs + m] = w.out[m * w.width + h];
+        hidden_[h * inputs + k] = hidden_transposed_[k * width + h] = factor * w.hidden[h * w.n_inputs + k];
     }
-    for (int64_t m = 0; m < w.n_outputs; ++m) out_bias_[m] = w.out_bias[m];
+    for (int64_t m = 0; m < w.n_outputs; ++m) {
+      out_bias_[m] = w.out_bias[m];
+      const T factor = scale(w.out, w.out_length, m, w.width);
+      for (int64_t h = 0; h < w.width; ++h)
+        out_[m * width + h] = out_transposed_[h * outputs + m] = factor * w.out[m * w.width + h];
+    }
     layer_ = {w.n_inputs,
               w.width,
               w.n_outputs,

@@ -88,30 +88,29 @@ void encode_level(const HashEncodeArgs<T>& args, const S* entries, int l, int64_
   }
 }
 
-template <class T, int F>
-void scatter_level(const HashEncodeArgs<T>& args, int l, const T* grad_features, const T* grad_jacobian,
-                   T* grad_table) {
+// Gradients to a level's features and to their derivatives by the unit position.
+template <class T, int F> struct LevelGrads {
+  T value[kPoints * F] = {}, dx[kPoints * F] = {}, dy[kPoints * F] = {}, dz[kPoints * F] = {};
+};
+
+// load(b, n, grads) reads those of points [b, b + n).
+template <int F, class T, class Load>
+void scatter_level(const HashEncodeArgs<T>& args, int l, const Load& load, T* grad_table) {
   constexpr int64_t kLanes = kPoints * F;
-  const int64_t n_columns = int64_t(args.n_levels) * F;
   T* table = grad_table + args.levels[l].offset * F;
   Lanes<T, F> at;
   Cells<T, F> cells;
-  T value[kLanes] = {}, dx[kLanes] = {}, dy[kLanes] = {}, dz[kLanes] = {}, grad[8][kLanes];
+  LevelGrads<T, F> given;
+  T grad[8][kLanes];
   for (int64_t b = 0; b < args.n_points; b += kPoints) {
     const int64_t n = min_of(kPoints, args.n_points - b);
     at.load(n, args.positions + 3 * b);
     locate(args.levels[l], n, at, cells);
-    for (int64_t p = 0; p < n; ++p) {
-      if (grad_features) copy_entry<F>(grad_features + (b + p) * n_columns + l * F, value + p * F);
-      if (!grad_jacobian) continue;
-      const T* row = grad_jacobian + 3 * (b + p) * n_columns + l * F;
-      copy_entry<F>(row, dx + p * F);
-      copy_entry<F>(row + n_columns, dy + p * F);
-      copy_entry<F>(row + 2 * n_columns, dz + p * F);
-    }
+    load(b, n, given);
 #pragma omp simd
     for (int64_t q = 0; q < n * F; ++q) {
-      const Trilinear<T> g{value[q], dx[q] * cells.scale_x[q], dy[q] * cells.scale_y[q], dz[q] * cells.scale_z[q]};
+      const Trilinear<T> g{given.value[q], given.dx[q] * cells.scale_x[q], given.dy[q] * cells.scale_y[q],
+                           given.dz[q] * cells.scale_z[q]};
       const T x = cells.x[q], y = cells.y[q], z = cells.z[q];
       grad[0][q] = trilinear_backward<0>(g, x, y, z), grad[1][q] = trilinear_backward<1>(g, x, y, z);
       grad[2][q] = trilinear_backward<2>(g, x, y, z), grad[3][q] = trilinear_backward<3>(g, x, y, z);
@@ -138,9 +137,19 @@ template <class T> int cached_together(const HashEncodeArgs<T>& args, int first,
   return last;
 }
 
+// Zeros columns [open, n_columns) of some rows.
+template <class T> void clear_closed(int64_t rows, int64_t n_columns, int64_t open, T* values) {
+  if (open == n_columns) return;
+  for (int64_t r = 0; r < rows; ++r)
+    for (int64_t c = open; c < n_columns; ++c) values[r * n_columns + c] = T(0);
+}
+
 template <class T, int F, class S>
 void encode_all(const HashEncodeArgs<T>& args, const S* entries, int64_t begin, int64_t end, T* features, T* jacobian) {
   const int64_t n_columns = int64_t(args.n_levels) * F;
+  clear_closed(end - begin, n_columns, int64_t(args.n_active) * F, features + begin * n_columns);
+  if (jacobian)
+    clear_closed(3 * (end - begin), n_columns, int64_t(args.n_active) * F, jacobian + 3 * begin * n_columns);
   Lanes<T, F> at;
   Cells<T, F> cells;
   for (int first = 0, last = 0; first < args.n_active; first = last) {
@@ -174,13 +183,46 @@ template <class T>
 void hash_scatter(const HashEncodeArgs<T>& args, int level, const T* grad_features, const T* grad_jacobian,
                   T* grad_table) {
   with_features(args.n_features, [&](auto count) {
-    scatter_level<T, decltype(count)::n>(args, level, grad_features, grad_jacobian, grad_table);
+    constexpr int F = decltype(count)::n;
+    const int64_t n_columns = int64_t(args.n_levels) * F;
+    const auto load = [&](int64_t b, int64_t n, LevelGrads<T, F>& to) {
+      for (int64_t p = 0; p < n; ++p) {
+        if (grad_features) copy_entry<F>(grad_features + (b + p) * n_columns + level * F, to.value + p * F);
+        if (!grad_jacobian) continue;
+        const T* row = grad_jacobian + 3 * (b + p) * n_columns + level * F;
+        copy_entry<F>(row, to.dx + p * F);
+        copy_entry<F>(row + n_columns, to.dy + p * F);
+        copy_entry<F>(row + 2 * n_columns, to.dz + p * F);
+      }
+    };
+    scatter_level<F>(args, level, load, grad_table);
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                    \
-  template void hash_encode<T>(const HashEncodeArgs<T>&, int64_t, int64_t, T*, T*); \
-  template void hash_scatter<T>(const HashEncodeArgs<T>&, int, const T*, const T*, T*);
+template <class T>
+void hash_scatter_along(const HashEncodeArgs<T>& args, int level, const LevelPlanes<const T>& grad, const T* along,
+                        T* grad_table) {
+  with_features(args.n_features, [&](auto count) {
+    constexpr int F = decltype(count)::n;
+    const T *features = grad.features + level * grad.stride, *slopes = grad.slopes + level * grad.stride;
+    const auto load = [&](int64_t b, int64_t n, LevelGrads<T, F>& to) {
+      for (int64_t p = 0; p < n; ++p) {
+        const T* axes = along + 3 * (b + p);
+        for (int f = 0; f < F; ++f) {
+          const int64_t q = p * F + f, from = b * F + q;
+          to.value[q] = features[from];
+          to.dx[q] = axes[0] * slopes[from], to.dy[q] = axes[1] * slopes[from], to.dz[q] = axes[2] * slopes[from];
+        }
+      }
+    };
+    scatter_level<F>(args, level, load, grad_table);
+  });
+}
+
+#define SPLITNERF_INSTANTIATE(T)                                                        \
+  template void hash_encode<T>(const HashEncodeArgs<T>&, int64_t, int64_t, T*, T*);     \
+  template void hash_scatter<T>(const HashEncodeArgs<T>&, int, const T*, const T*, T*); \
+  template void hash_scatter_along<T>(const HashEncodeArgs<T>&, int, const LevelPlanes<const T>&, const T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

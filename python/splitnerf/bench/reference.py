@@ -54,12 +54,18 @@ def layer_outputs(
     return F.linear(units, out, out_bias)
 
 
-def sdf_layer(positions, features, jacobian, hidden, hidden_bias, out, out_bias, beta, box) -> tuple[Tensor, Tensor]:
-    """The layer's outputs, and the gradient of the first by the chain rule."""
-    slopes = torch.sigmoid(beta * F.linear(torch.cat([positions, features], 1), hidden, hidden_bias))
-    by_input = (slopes * out[0]) @ hidden
-    gradient = by_input[:, :3] + (jacobian * by_input[:, None, 3:]).sum(-1) / (2 * box)
-    return layer_outputs(positions, features, hidden, hidden_bias, out, out_bias, beta), gradient
+def sdf_field(
+    positions, table, hidden, hidden_length, hidden_bias, out, out_length, out_bias, beta, n_levels, base, growth, log2_size,
+    n_active, box,
+) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
+    """Outputs, features, and the gradient of the first output by differentiation, which is itself differentiated."""
+    hidden, out = (d * (length / d.norm(dim=1, keepdim=True)) for d, length in ((hidden, hidden_length), (out, out_length)))
+    with torch.enable_grad():
+        x = positions.detach().requires_grad_()
+        features = hash_encode(x / (2 * box) + 0.5, table, n_levels, base, growth, log2_size, n_active)
+        outputs = layer_outputs(x, features, hidden, hidden_bias, out, out_bias, beta)
+        (gradient,) = torch.autograd.grad(outputs[:, 0].sum(), x, create_graph=True)
+    return outputs, features, gradient
 
 
 # ---- rays ----

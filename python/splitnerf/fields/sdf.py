@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from splitnerf.devices import tensor_cores
-from splitnerf.ops import HashGrid, HashGridSpec, SdfNetwork, sdf_layer, sdf_values
+from splitnerf.ops import HashGrid, HashGridSpec, SdfNetwork, sdf_field, sdf_values
 
 SOFTPLUS_BETA = 100.0
 
@@ -37,7 +37,7 @@ class SdfField(nn.Module):
     """sdf(x) = W2 softplus_100(W1 [x, hash(x)] + b1) + b2, with weight normalisation.
 
     The gradient of one hidden layer has a closed form, so that a loss on normals needs a single backward pass. The hash
-    grid contributes through its Jacobian (:func:`splitnerf.ops.sdf_layer`).
+    grid contributes through its Jacobian (:func:`splitnerf.ops.sdf_field`).
 
     Args:
         spec: Shape of the hash grid.
@@ -117,12 +117,12 @@ class SdfField(nn.Module):
 
         Differentiable once in all parameters (not in positions).
         """
-        hidden, out = self._weights()
-        features, jacobian = self.grid.jacobian(self._to_unit(positions))
-        outputs, gradient = sdf_layer(
-            positions, features, jacobian, hidden, self.hidden_bias, out, self.out_bias, SOFTPLUS_BETA, self.box
-        )
-        return SdfSample(outputs, features, gradient)
+        return SdfSample(
+            *sdf_field(
+                positions, self.grid.table, self.hidden_direction, self.hidden_length, self.hidden_bias, self.out_direction,
+                self.out_length, self.out_bias, SOFTPLUS_BETA, self.box, self.grid.spec, self.grid.n_active, self.grid.stored(),
+            )
+        )  # fmt: skip
 
     def sample_finite_difference(self, positions: Tensor, cells: float = 1.0) -> SdfSample:
         """The values of :meth:`sample`, with the gradient by central differences (six evaluations).

@@ -40,7 +40,7 @@ from splitnerf.ops.rays import (
     surface_weights,
 )
 from splitnerf.ops.rows import take_rows
-from splitnerf.ops.sdf import SdfNetwork, sample_rays, sdf_layer, sdf_values
+from splitnerf.ops.sdf import SdfNetwork, sample_rays, sdf_field, sdf_values
 from splitnerf.ops.shading import FRESNEL_MODES, QUERIES, brdf_lut, light_queries, query_direction, split_sum_shade
 from splitnerf.ops.srgb import linear_to_srgb, srgb_to_linear
 from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_visibility, visibility_bits
@@ -53,7 +53,7 @@ __all__ = [
     "incoming_light", "light_averages", "light_filters", "light_lookup", "light_prior", "light_queries",
     "light_sum_of_levels", "linear_to_srgb", "log_chroma", "march_rays", "material_losses", "monte_carlo_light",
     "neus_weights", "occlusion_factors", "pixel_losses", "place_samples", "prefilter_light", "probe_points",
-    "quadratic_entropy", "query_direction", "read_pixels", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_layer",
+    "quadratic_entropy", "query_direction", "read_pixels", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_field",
     "sdf_values", "sh_projection", "shade_sums", "sharpness", "sparse_product", "specular_share", "split_sum_shade",
     "spread_samples", "srgb_to_linear", "summed_light", "surface_weights", "take_rows", "trace_visibility", "visibility_bits",
     "zonal_factors",

@@ -241,10 +241,13 @@ def _keep_scattered(ctx, inputs, output):
     ctx.save_for_backward(positions, grad_features)
 
 
-def _refuse_rounded_gradients(ctx, op: str, table: Tensor, stored: list[Tensor]) -> None:
-    """Raises where a 16-bit tensor requires a gradient: autograd would round it, and small gradients would vanish."""
+def refuse_rounded_gradients(ctx, op: str, table: Tensor, stored: list[Tensor], place: int = 7) -> None:
+    """Raises where a 16-bit tensor requires a gradient: autograd would round it, and small gradients would vanish.
+
+    The table is the operator's argument number 1, its copy number `place`.
+    """
     if stored:
-        refuse_gradients(ctx, op, stored=7)
+        refuse_gradients(ctx, op, stored=place)
     if ctx.needs_input_grad[1] and table.dtype in (torch.float16, torch.bfloat16):
         raise RuntimeError(
             f"{op}: no gradient to a table of {table.dtype} is defined; give it as stored, beside the float32 table"
@@ -253,7 +256,7 @@ def _refuse_rounded_gradients(ctx, op: str, table: Tensor, stored: list[Tensor])
 
 def _encode_backward(ctx, grad):
     positions, table, *stored = ctx.saved_tensors
-    _refuse_rounded_gradients(ctx, "hash_encode", table, stored)
+    refuse_rounded_gradients(ctx, "hash_encode", table, stored)
     grad_positions = grad_table = None
     if ctx.needs_input_grad[0]:
         _, jacobian = lib.hash_encode_jacobian(positions, table, *ctx.grid, *(stored or [None]))
@@ -278,7 +281,7 @@ def _scatter_backward(ctx, grad_grad_table):
 
 def _jacobian_backward(ctx, grad_features, grad_jacobian):
     positions, table, *stored = ctx.saved_tensors
-    _refuse_rounded_gradients(ctx, "hash_encode_jacobian", table, stored)
+    refuse_rounded_gradients(ctx, "hash_encode_jacobian", table, stored)
     grad_positions = grad_table = None
     if ctx.needs_input_grad[0]:
         grad_positions = lib.hash_encode_jacobian_backward_positions(

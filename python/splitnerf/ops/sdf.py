@@ -1,7 +1,6 @@
-"""The distance field: its layer over hash-grid features, its values at points, and the search for samples along rays.
+"""The distance field: in one pass with its gradient, its values alone, and the search for samples along rays.
 
-``sdf_layer`` is differentiable once in features, jacobian and weights; ``sdf_values`` and ``sample_rays`` have no
-gradient.
+``sdf_field`` is differentiable once in the table and the weights; ``sdf_values`` and ``sample_rays`` have no gradient.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import torch
 from torch import Tensor
 
 from splitnerf.ops._library import lib, refuse_gradients, register
-from splitnerf.ops.hash_grid import HashGridSpec
+from splitnerf.ops.hash_grid import HashGridSpec, refuse_rounded_gradients
 from splitnerf.ops.rays import PackedSamples
 
 
@@ -54,37 +53,56 @@ class SdfNetwork(NamedTuple):
         )  # fmt: skip
 
 
-def sdf_layer(
+def sdf_field(
     positions: Tensor,
-    features: Tensor,
-    jacobian: Tensor,
+    table: Tensor,
     hidden: Tensor,
+    hidden_length: Tensor,
     hidden_bias: Tensor,
     out: Tensor,
+    out_length: Tensor,
     out_bias: Tensor,
     beta: float,
     box: float,
-) -> tuple[Tensor, Tensor]:
-    """The network of a distance field and the distance's gradient, in one pass.
+    spec: HashGridSpec,
+    n_active: int | None = None,
+    stored: Tensor | None = None,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """A distance field at points, with the features of its hash grid and the distance's gradient, in one pass.
 
-    ``a = hidden [positions, features] + hidden_bias``, ``outputs = out softplus(a) + out_bias``, and by the chain rule
-    ``d outputs[0] / d positions = q[:3] + jacobian q[3:] / (2 box)`` with ``q = (out[0] softplus'(a)) hidden``.
+    Rows of weights are normalised: ``W = hidden_length hidden / |hidden|`` and ``V = out_length out / |out|``, row by row. With
+    ``a = W [positions, features] + hidden_bias``: ``outputs = V softplus(a) + out_bias``, and by the chain rule
+    ``gradient = q[:3] + J q[3:] / (2 box)`` with ``q = (V[0] softplus'(a)) W`` and J the derivatives of the features by the
+    position in the unit cube.
 
     Args:
-        positions: [n, 3], scene units in [-box, box].
-        features, jacobian: [n, C] and [n, 3, C] from :func:`hash_encode_jacobian` at ``positions / (2 box) + 1/2``.
-        hidden, hidden_bias: [width, 3 + C] weights and [width] biases of the hidden layer.
-        out, out_bias: [m, width] weights and [m] biases of the output layer.
+        positions: [n, 3] points, scene units, float32 or float64. Features of a point outside of [-box, box] are those of the
+            nearest point of this cube. A NaN coordinate gives NaN.
+        table: [spec.n_entries, spec.n_features] entries in the dtype of positions; or, if it needs no gradient, float16 or
+            bfloat16 with float32 positions.
+        hidden, hidden_length, hidden_bias: [width, 3 + C] directions, [width, 1] lengths and [width] biases of the hidden layer,
+            C = spec.n_outputs. A direction of zeros gives NaN.
+        out, out_length, out_bias: [m, width] directions, [m, 1] lengths and [m] biases of the output layer, m > 0.
         beta: The sharpness of the activation softplus(y) = log(1 + exp(beta y)) / beta, positive.
-        box: The half size of the cube that the grid covers, scene units.
+        box: The half size of the cube that the grid covers, scene units, positive.
+        spec: The shape of the grid.
+        n_active: The number of open levels, coarsest first; features of closed levels are 0. Default: all.
+        stored: A copy of the float32 table in float16 or bfloat16, which is read instead of the table; or None.
 
     Returns:
-        outputs [n, m] and gradient [n, 3] of the first output.
+        outputs [n, m], features [n, C] and gradient [n, 3] = d outputs[:, 0] / d positions. Differentiable once in table, weights,
+        lengths and biases; the backward pass evaluates the field again. With `stored` the gradient goes to the table.
 
     Raises:
-        ValueError: A shape, dtype or number does not fit.
+        ValueError: A shape, dtype, number or level count does not fit; the message names it.
+        RuntimeError: positions, `stored` or a 16-bit table requires a gradient; raised in the backward pass.
+
+    Source: SplitNeRF, section 4.1; weight normalisation: Salimans and Kingma 2016; grid: Mueller et al. 2022, section 3.
     """
-    return lib.sdf_layer(positions, features, jacobian, hidden, hidden_bias, out, out_bias, beta, box)
+    numbers = spec.arguments(spec.n_levels if n_active is None else n_active)
+    return lib.sdf_field(
+        positions, table, hidden, hidden_length, hidden_bias, out, out_length, out_bias, beta, *numbers, box, stored
+    )
 
 
 def sdf_values(positions: Tensor, network: SdfNetwork) -> Tensor:
@@ -162,25 +180,34 @@ def _fake_sample(rays_o, rays_d, jitter, cells, table, *rest):
     )  # fmt: skip
 
 
-def _keep_layer(ctx, inputs, output):
-    *tensors, ctx.beta, ctx.box = inputs
-    ctx.save_for_backward(*tensors)
+def _keep_field(ctx, inputs, output):
+    """Saves the tensors, and with them the table's copy if there is one; the numbers are in between."""
+    positions, table, *weights, stored = inputs
+    ctx.save_for_backward(positions, table, *weights[:6], *([] if stored is None else [stored]))
+    ctx.numbers = weights[6:]
 
 
-def _layer_backward(ctx, grad_outputs, grad_gradient):
-    refuse_gradients(ctx, "sdf_layer", positions=0)
-    return None, *lib.sdf_layer_backward(*ctx.saved_tensors, ctx.beta, ctx.box, grad_outputs, grad_gradient), None, None
+def _field_backward(ctx, *grads):
+    positions, table, *weights = ctx.saved_tensors
+    stored = weights[6:]
+    refuse_gradients(ctx, "sdf_field", positions=0)
+    refuse_rounded_gradients(ctx, "sdf_field", table, stored, 15)
+    found = lib.sdf_field_backward(positions, *(stored or [table]), *weights[:6], *ctx.numbers, *grads)
+    return None, *found, *(None for _ in ctx.numbers), None
 
 
 register(
-    "sdf_layer",
-    fake=lambda positions, features, jacobian, hidden, hidden_bias, out, *rest: (
+    "sdf_field",
+    fake=lambda positions, table, hidden, length, bias, out, *rest: (
         positions.new_empty(positions.shape[0], out.shape[0]),
+        positions.new_empty(positions.shape[0], hidden.shape[1] - 3),
         positions.new_empty(positions.shape),
     ),
-    setup_context=_keep_layer,
-    backward=_layer_backward,
+    setup_context=_keep_field,
+    backward=_field_backward,
 )
-register("sdf_layer_backward", fake=lambda positions, *rest: tuple(t.new_empty(t.shape) for t in rest[:6]))
+register(
+    "sdf_field_backward", fake=lambda positions, *tensors: tuple(positions.new_empty(t.shape) for t in tensors[:7])
+)
 register("sdf_values", fake=lambda positions, *rest: positions.new_empty(positions.shape[0]))
 register("sample_rays", fake=_fake_sample)

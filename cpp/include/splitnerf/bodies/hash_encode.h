@@ -31,9 +31,7 @@ template <class T, int F, class S> SPLITNERF_HD Pack<T, F> load_entry(const S* f
 }
 
 // The features of one level at a point, and their derivatives by its position.
-template <class T, int F> struct LevelFeatures {
-  Pack<T, F> value{}, dx{}, dy{}, dz{};
-};
+template <class T, int F> struct LevelFeatures { Pack<T, F> value{}, dx{}, dy{}, dz{}; };
 template <int F, class T, class S>
 SPLITNERF_HD LevelFeatures<T, F> level_features(const HashLevel& level, const S* table, Vec3<T> position) {
   const HashCell<T> cell = hash_cell(level, position);
@@ -68,6 +66,30 @@ template <class T, int F, bool WithJacobian, class S = T> struct HashEncodeBody 
   }
 };
 
+// Gradients to what a level gives at a point.
+template <class T, int F> using LevelGradients = LevelFeatures<T, F>;
+
+// Adds the part of corner I, and of all corners, to the gradient of the table.
+template <int I, class T, int F>
+SPLITNERF_HD void scatter_corner(const HashCell<T>& cell, const LevelGradients<T, F>& from, T* grad_table) {
+  Pack<T, F> grad;
+  for (int f = 0; f < F; ++f) {
+    const Trilinear<T> t{from.value[f], from.dx[f] * cell.scale.x, from.dy[f] * cell.scale.y,
+                         from.dz[f] * cell.scale.z};
+    grad[f] = trilinear_backward<I>(t, cell.f.x, cell.f.y, cell.f.z);
+  }
+  add_pack(grad_table + cell.index[I] * F, grad);
+}
+template <class T, int F>
+SPLITNERF_HD void scatter_level(const HashLevel& level, Vec3<T> position, const LevelGradients<T, F>& from,
+                                T* grad_table) {
+  const HashCell<T> cell = hash_cell(level, position);
+  scatter_corner<0>(cell, from, grad_table), scatter_corner<1>(cell, from, grad_table);
+  scatter_corner<2>(cell, from, grad_table), scatter_corner<3>(cell, from, grad_table);
+  scatter_corner<4>(cell, from, grad_table), scatter_corner<5>(cell, from, grad_table);
+  scatter_corner<6>(cell, from, grad_table), scatter_corner<7>(cell, from, grad_table);
+}
+
 // Adds to grad_table the gradients of open level l; grad_jacobian may be null.
 template <class T, int F> struct HashScatterBody {
   HashGridView<T> grid;
@@ -75,34 +97,14 @@ template <class T, int F> struct HashScatterBody {
   T* grad_table;
 
   SPLITNERF_HD void operator()(int64_t p, int l) const {
-    const HashCell<T> cell = hash_cell(grid.levels[l], load3(grid.positions + 3 * p));
     const int64_t columns = int64_t(grid.n_levels) * F;
-    const Pack<T, F> value = load_pack<F>(grad_features + p * columns + l * F);
-    Pack<T, F> dx{}, dy{}, dz{};
+    LevelGradients<T, F> from;
+    from.value = load_pack<F>(grad_features + p * columns + l * F);
     if (grad_jacobian) {
       const T* row = grad_jacobian + 3 * p * columns + l * F;
-      dx = load_pack<F>(row), dy = load_pack<F>(row + columns), dz = load_pack<F>(row + 2 * columns);
+      from.dx = load_pack<F>(row), from.dy = load_pack<F>(row + columns), from.dz = load_pack<F>(row + 2 * columns);
     }
-    add_corner<0>(cell, value, dx, dy, dz);
-    add_corner<1>(cell, value, dx, dy, dz);
-    add_corner<2>(cell, value, dx, dy, dz);
-    add_corner<3>(cell, value, dx, dy, dz);
-    add_corner<4>(cell, value, dx, dy, dz);
-    add_corner<5>(cell, value, dx, dy, dz);
-    add_corner<6>(cell, value, dx, dy, dz);
-    add_corner<7>(cell, value, dx, dy, dz);
-  }
-
- private:
-  template <int I>
-  SPLITNERF_HD void add_corner(const HashCell<T>& cell, const Pack<T, F>& value, const Pack<T, F>& dx,
-                               const Pack<T, F>& dy, const Pack<T, F>& dz) const {
-    Pack<T, F> grad;
-    for (int f = 0; f < F; ++f) {
-      const Trilinear<T> t{value[f], dx[f] * cell.scale.x, dy[f] * cell.scale.y, dz[f] * cell.scale.z};
-      grad[f] = trilinear_backward<I>(t, cell.f.x, cell.f.y, cell.f.z);
-    }
-    add_pack(grad_table + cell.index[I] * F, grad);
+    scatter_level(grid.levels[l], load3(grid.positions + 3 * p), from, grad_table);
   }
 };
 

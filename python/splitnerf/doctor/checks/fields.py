@@ -53,12 +53,18 @@ def difference_of_softplus(n_features: int) -> tuple[torch.Tensor, ...]:
 
 
 @check
-def sdf_layer():
-    """z + the first feature, and its gradient by the chain rule."""
-    x, features, jacobian = sphere(N), pattern(N, 4), pattern(N, 3, 4)
-    outputs, gradient = lib.sdf_layer(x, features, jacobian, *difference_of_softplus(4), 100.0, BOX)
-    yield outputs, torch.stack([x[:, 2] + features[:, 0], torch.full((N,), 7.0)], 1)
-    yield gradient, torch.tensor([0.0, 0.0, 1.0]) + jacobian[:, :, 0] / (2 * BOX)
+def sdf_field():
+    """z + a linear function of the grid, and its slopes; the weights' directions are not of the weights' lengths."""
+    x = 2 * BOX * (points() - 0.5)
+    hidden, hidden_bias, out, out_bias = difference_of_softplus(4)
+    out[1, 0] = 1.0  # a direction, of length 0
+    lengths = torch.full((2, 1), 2**0.5), torch.tensor([[2**0.5], [0.0]])
+    outputs, features, gradient = lib.sdf_field(
+        x, linear_table(), 3 * hidden, lengths[0], hidden_bias, 5 * out, lengths[1], out_bias, 100.0, *GRID, BOX, None
+    )
+    yield outputs, torch.stack([x[:, 2] + linear_features(points())[:, 0], torch.full((N,), 7.0)], 1)
+    yield features, linear_features(points())
+    yield gradient, torch.tensor([0.0, 0.0, 1.0]) + torch.tensor([1.0, 0.0, 2.0]) / (2 * BOX)
 
 
 @check

@@ -17,9 +17,9 @@ def grid() -> tuple:
     return points(), pattern(SPEC.n_entries, 2), *GRID
 
 
-def layer() -> tuple:
-    weights = pattern(5, 7) - 1, pattern(5), pattern(3, 5), pattern(3)
-    return sphere(N), pattern(N, 4), pattern(N, 3, 4), *weights, 2.0, BOX
+def field() -> tuple:
+    weights = pattern(5, 7) - 1, 1 + pattern(5, 1), pattern(5), pattern(3, 5), 1 + pattern(3, 1), pattern(3)
+    return 2 * BOX * (points() - 0.5), pattern(SPEC.n_entries, 2), *weights, 2.0, *GRID, BOX
 
 
 def material() -> tuple:
@@ -64,7 +64,7 @@ BACKWARD: dict[str, tuple[Callable[[], tuple], tuple[int, ...]]] = {
     "pixel_losses_backward": (pixels, (0, 1)),
     "prefilter_light_backward": (lambda: (sphere(N), column(0.5), sphere(256), pattern(256, 3)), (3,)),
     "query_direction_backward": (lambda: (up(), views(), column(0.5), lut(), True), (0, 1, 2)),
-    "sdf_layer_backward": (layer, (1, 2, 3, 4, 5, 6)),
+    "sdf_field_backward": (field, (1, 2, 3, 4, 5, 6, 7)),
     "shade_sums_backward": (sums, tuple(range(9))),
     "sharpness_backward": (lambda: (0.5 * pattern(N),), (0,)),
     "split_sum_shade_backward": (split_sum, tuple(range(9))),
