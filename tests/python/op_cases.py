@@ -481,7 +481,7 @@ CASES = {
     "neus_weights_backward": lambda t: with_gradients("neus_weights", neus_inputs("cpu", t, 0.01), 0),
     "surface_weights": surface_case,
     "surface_weights_backward": lambda t: with_gradients("surface_weights", surface_case(t), 1),
-    "sharpness": lambda t: (torch.linspace(-0.2, 1.1, 40, dtype=t),),
+    "sharpness": lambda t: (torch.linspace(-0.2, 1.1, 41, dtype=t),),  # no number is a bound
     "sharpness_backward": lambda t: with_gradients("sharpness", CASES["sharpness"](t)),
     "composite": composite_case,
     "composite_backward": lambda t: with_gradients("composite", composite_case(t)),
