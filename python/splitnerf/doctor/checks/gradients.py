@@ -18,7 +18,7 @@ def grid() -> tuple:
 
 
 def field() -> tuple:
-    weights = pattern(5, 7) - 1, 1 + pattern(5, 1), pattern(5), pattern(3, 5), 1 + pattern(3, 1), pattern(3)
+    weights = pattern(5, 7) - 1, 1 + pattern(5, 1), pattern(5), pattern(3, 5) - 1, 1 + pattern(3, 1), pattern(3)
     return 2 * BOX * (points() - 0.5), pattern(SPEC.n_entries, 2), *weights, 2.0, *GRID, BOX
 
 
