@@ -71,6 +71,17 @@ def sdf_values(row: dict[str, np.ndarray], shared: Rows, box: int = 1) -> dict[s
     return {"values": sdf_layer(inputs, shared)["outputs"][:1]}
 
 
+def material_network(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+    """Two layers of rectified units and sigmoids, the roughness brought to [.1, 1]."""
+    x = vector(row["features"])
+    for k in range(3):
+        weights, bias = (shared[f"{name}{k}"].numpy() for name in ("weight", "bias"))
+        x = [mp.fsum(w * a for w, a in zip(vector(of_unit), x)) + mp.mpf(float(b)) for of_unit, b in zip(weights, bias)]
+        x = [max(a, 0) if k < 2 else 1 / (1 + mp.exp(-a)) for a in x]
+    least = mp.mpf("0.1")
+    return {"albedo": x[:3], "roughness": [least + (1 - least) * x[3]], "metallic": x[4:]}
+
+
 def sdf_layer(row: dict[str, np.ndarray], shared: Rows, beta: int = 100, box: int = 1) -> dict[str, list]:
     """outputs = out softplus(a) + out_bias and d outputs[0] / d position by the chain rule."""
     inputs = vector(row["positions"]) + [mp.mpf(x) for x in row["features"]]

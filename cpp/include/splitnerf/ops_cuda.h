@@ -5,6 +5,7 @@
 
 #include "splitnerf/bodies/monte_carlo.h"
 #include "splitnerf/light_pyramid.h"
+#include "splitnerf/material_network.h"
 #include "splitnerf/neus.h"
 #include "splitnerf/ray_walk.h"
 #include "splitnerf/run_cuda.h"
@@ -65,6 +66,18 @@ void sdf_layer_backward(const Queue& queue, const SdfWeights<T>& weights, int64_
                         const T* features, const T* jacobian, const T* grad_outputs, const T* grad_gradient,
                         T* grad_features, T* grad_jacobian, T* grad_hidden, T* grad_hidden_bias, T* grad_out,
                         T* grad_out_bias);
+
+// ---- materials; weights' gradients are added in an order that depends on n alone. A network too wide for a block's shared memory
+// throws std::invalid_argument ----
+
+template <class T>
+void material_network(const Queue& queue, const MaterialWeights<T>& weights, int64_t n, const T* const* parts,
+                      const MaterialArrays<T>& to);
+template <class T>
+void material_network_backward(const Queue& queue, const MaterialWeights<T>& weights, int64_t n, const T* const* parts,
+                               const MaterialArrays<const T>& grad, const MaterialGrads<T>& to);
+
+// ---- samples of rays through the distance field ----
 
 // Waits for the number of samples; work memory for as many as a ray can have.
 template <class T>
