@@ -9,6 +9,7 @@
 #include <torch/headeronly/core/ScalarType.h>
 
 #include <initializer_list>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -102,6 +103,7 @@ inline void require(bool condition, const char* op, const std::string& what) {
 }
 
 template <class T> const T* in(const Tensor& t) { return static_cast<const T*>(t.const_data_ptr()); }
+template <class T> const T* in_or_null(const std::optional<Tensor>& t) { return t ? in<T>(*t) : nullptr; }
 template <class T> T* out(Tensor& t) { return static_cast<T*>(t.mutable_data_ptr()); }
 
 // Whether all numbers of a tensor on the CPU lie in [0, high): kernels read without a check.

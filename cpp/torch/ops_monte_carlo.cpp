@@ -1,4 +1,5 @@
 // specular_share, sample_bsdf, monte_carlo_light, summed_light and shade_sums as torch operators.
+#include <optional>
 #include <tuple>
 
 #include "check_lut.h"
@@ -167,65 +168,72 @@ std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor 
   return {grad_normals, grad_roughness, grad_light};
 }
 
-// What both directions of shade_sums read: the fields of SummedPoint and the table.
+// What both directions of shade_sums read: points with their sums, and what is mixed with them, if anything.
 struct SummedInputs {
   Kind type;
-  Tensor normals, view_dirs, albedo, roughness, metallic, all, grazing, diffuse, dielectric, lut;
+  Tensor normals, view_dirs, albedo, roughness, metallic, sums, lut;
+  std::optional<Tensor> other, share;
 
   SummedInputs(const char* op, const Tensor& n, const Tensor& v, const Tensor& a, const Tensor& rho, const Tensor& m,
-               const Tensor& specular, const Tensor& g, const Tensor& d, const Tensor& layer, const Tensor& table)
+               const Tensor& s, const Tensor& table, const std::optional<Tensor>& mixed,
+               const std::optional<Tensor>& part)
       : type(real_kind(op, "normals", n)), normals(checked(op, "normals", n, {kAny, 3}, type)),
         view_dirs(checked(op, "view_dirs", v, {n_points(), 3}, type)),
         albedo(checked(op, "albedo", a, {n_points(), 3}, type)),
         roughness(checked(op, "roughness", rho, {n_points(), 1}, type)),
         metallic(checked(op, "metallic", m, {n_points(), 1}, type)),
-        all(checked(op, "specular", specular, {n_points(), 3}, type)),
-        grazing(checked(op, "grazing", g, {n_points(), 3}, type)),
-        diffuse(checked(op, "diffuse", d, {n_points(), 3}, type)),
-        dielectric(checked(op, "dielectric", layer, {n_points(), 3}, type)), lut(checked_lut(op, table, type)) {}
+        sums(checked(op, "sums", s, {n_points(), kLightSums, 3}, type)), lut(checked_lut(op, table, type)) {
+    require(mixed.has_value() == part.has_value(), op, "other and share must be given both or neither");
+    if (!mixed) return;
+    other = checked(op, "other", *mixed, {n_points(), 3}, type);
+    share = checked(op, "share", *part, {n_points()}, type);
+  }
   int64_t n_points() const { return normals.size(0); }
   template <class T> SummedArrays<const T> arrays() const {
-    return {in<T>(normals), in<T>(view_dirs), in<T>(albedo),  in<T>(roughness), in<T>(metallic),
-            in<T>(all),     in<T>(grazing),   in<T>(diffuse), in<T>(dielectric)};
+    return {in<T>(normals), in<T>(view_dirs), in<T>(albedo), in<T>(roughness), in<T>(metallic), in<T>(sums)};
   }
 };
 
-Tensor shade_sums(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular,
-                  Tensor grazing, Tensor diffuse, Tensor dielectric, Tensor lut, bool compensate) {
+Tensor shade_sums(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor sums,
+                  Tensor lut, bool compensate, std::optional<Tensor> other, std::optional<Tensor> share) {
   const char* op = "shade_sums";
-  const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, dielectric,
-                       lut);
+  const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, sums, lut, other, share);
   Tensor radiance = empty_like_type(i.normals, {i.n_points(), 3}, i.type);
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    device.run(op, i.n_points(), ShadeSumsBody<T>{in<float>(i.lut), compensate, i.arrays<T>(), out<T>(radiance)});
+    device.run(op, i.n_points(),
+               ShadeSumsBody<T>{in<float>(i.lut), compensate, i.arrays<T>(), in_or_null<T>(i.other),
+                                in_or_null<T>(i.share), out<T>(radiance)});
   });
   return radiance;
 }
 
-std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade_sums_backward(
-    Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, Tensor grazing,
-    Tensor diffuse, Tensor dielectric, Tensor lut, bool compensate, Tensor grad_radiance) {
+std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade_sums_backward(
+    Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor sums, Tensor lut,
+    bool compensate, std::optional<Tensor> other, std::optional<Tensor> share, Tensor grad_radiance) {
   const char* op = "shade_sums_backward";
-  const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, dielectric,
-                       lut);
+  const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, sums, lut, other, share);
   const Tensor g = checked(op, "grad_radiance", grad_radiance, {i.n_points(), 3}, i.type);
-  const auto make = [&](int64_t columns) { return empty_like_type(g, {i.n_points(), columns}, i.type); };
-  Tensor grad[9] = {make(3), make(3), make(3), make(1), make(1), make(3), make(3), make(3), make(3)};
+  const auto like = [&](const Tensor& t) { return torch::stable::empty_like(t); };
+  Tensor grad[7] = {like(i.normals),   like(i.view_dirs), like(i.albedo),
+                    like(i.roughness), like(i.metallic),  like(i.sums),
+                    empty_like_type(g, {i.other ? i.n_points() : 0, 3}, i.type)};
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    const SummedArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
-                             out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])};
-    device.run(op, i.n_points(), ShadeSumsBackwardBody<T>{in<float>(i.lut), compensate, i.arrays<T>(), in<T>(g), to});
+    const SummedArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]),
+                             out<T>(grad[3]), out<T>(grad[4]), out<T>(grad[5])};
+    device.run(op, i.n_points(),
+               ShadeSumsBackwardBody<T>{in<float>(i.lut), compensate, i.arrays<T>(), in_or_null<T>(i.share), in<T>(g),
+                                        to, i.other ? out<T>(grad[6]) : nullptr});
   });
-  return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};
+  return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6]};
 }
 
 }  // namespace
 
-#define SPLITNERF_SUMMED_POINT                                                                            \
-  "Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, " \
-  "Tensor grazing, Tensor diffuse, Tensor dielectric, Tensor lut, bool compensate"
+#define SPLITNERF_SUMMED_POINT                                                                        \
+  "Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor sums, " \
+  "Tensor lut, bool compensate, "
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "specular_share(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor lut) "
@@ -246,10 +254,10 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "monte_carlo_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
       "Tensor radiance, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
-  m.def("shade_sums(" SPLITNERF_SUMMED_POINT ") -> Tensor");
+  m.def("shade_sums(" SPLITNERF_SUMMED_POINT "Tensor? other, Tensor? share) -> Tensor");
   m.def("shade_sums_backward(" SPLITNERF_SUMMED_POINT
-        ", Tensor grad_radiance) -> "
-        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
+        "Tensor? other, Tensor? share, Tensor grad_radiance) -> "
+        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 
 SPLITNERF_IMPLEMENT(m) {

@@ -1,4 +1,5 @@
 // query_direction, light_queries and split_sum_shade as torch operators.
+#include <optional>
 #include <tuple>
 
 #include "check_lut.h"
@@ -88,18 +89,21 @@ ShadeOptions checked_options(const char* op, int64_t fresnel_mode, bool compensa
   return {static_cast<FresnelMode>(fresnel_mode), compensate};
 }
 
-// The nine per-point inputs, checked and contiguous.
+// The per-point inputs, checked and contiguous. Without `diffuse`, `specular` is [2n, 3]: the diffuse light stands behind.
 struct ShadeInputs {
   Tensor normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d, lut;
+  std::optional<Tensor> indirect_s, indirect_d;
   Kind type;
   int64_t n;
   int n_channels;
+  bool is_stacked;
 
   ShadeInputs(const char* op, const Tensor& normals_in, const Tensor& view_dirs_in, const Tensor& albedo_in,
               const Tensor& roughness_in, const Tensor& metallic_in, const Tensor& specular_in,
-              const Tensor& diffuse_in, const Tensor& occlusion_s_in, const Tensor& occlusion_d_in,
-              const Tensor& lut_in)
-      : type(real_kind(op, "normals", normals_in)) {
+              const std::optional<Tensor>& diffuse_in, const Tensor& occlusion_s_in, const Tensor& occlusion_d_in,
+              const Tensor& lut_in, const std::optional<Tensor>& indirect_s_in,
+              const std::optional<Tensor>& indirect_d_in)
+      : type(real_kind(op, "normals", normals_in)), is_stacked(!diffuse_in) {
     normals = checked(op, "normals", normals_in, {kAny, 3}, type);
     n = normals.size(0);
     n_channels = occlusion_s_in.dim() == 2 && occlusion_s_in.size(1) == 1 ? 1 : 3;
@@ -107,24 +111,36 @@ struct ShadeInputs {
     albedo = checked(op, "albedo", albedo_in, {n, 3}, type);
     roughness = checked(op, "roughness", roughness_in, {n, 1}, type);
     metallic = checked(op, "metallic", metallic_in, {n, 1}, type);
-    specular = checked(op, "specular", specular_in, {n, 3}, type);
-    diffuse = checked(op, "diffuse", diffuse_in, {n, 3}, type);
+    specular = checked(op, "specular", specular_in, {is_stacked ? 2 * n : n, 3}, type);
+    if (!is_stacked) diffuse = checked(op, "diffuse", *diffuse_in, {n, 3}, type);
     occlusion_s = checked(op, "occlusion_s", occlusion_s_in, {n, n_channels}, type);
     occlusion_d = checked(op, "occlusion_d", occlusion_d_in, {n, n_channels}, type);
+    if (indirect_s_in) indirect_s = checked(op, "indirect_s", *indirect_s_in, {n, 3}, type);
+    if (indirect_d_in) indirect_d = checked(op, "indirect_d", *indirect_d_in, {n, 3}, type);
     lut = checked_lut(op, lut_in, type);
   }
   template <class T> ShadeArrays<const T> arrays() const {
-    return {in<T>(normals),  in<T>(view_dirs), in<T>(albedo),      in<T>(roughness),  in<T>(metallic),
-            in<T>(specular), in<T>(diffuse),   in<T>(occlusion_s), in<T>(occlusion_d)};
+    return {in<T>(normals),
+            in<T>(view_dirs),
+            in<T>(albedo),
+            in<T>(roughness),
+            in<T>(metallic),
+            in<T>(specular),
+            is_stacked ? in<T>(specular) + 3 * n : in<T>(diffuse),
+            in<T>(occlusion_s),
+            in<T>(occlusion_d),
+            in_or_null<T>(indirect_s),
+            in_or_null<T>(indirect_d)};
   }
 };
 
 Tensor split_sum_shade(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic,
-                       Tensor specular, Tensor diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut,
-                       int64_t fresnel_mode, bool compensate) {
+                       Tensor specular, std::optional<Tensor> diffuse, Tensor occlusion_s, Tensor occlusion_d,
+                       Tensor lut, int64_t fresnel_mode, bool compensate, std::optional<Tensor> indirect_s,
+                       std::optional<Tensor> indirect_d) {
   const char* op = "split_sum_shade";
   const ShadeInputs p(op, normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
-                      lut);
+                      lut, indirect_s, indirect_d);
   const ShadeOptions options = checked_options(op, fresnel_mode, compensate);
   Tensor radiance = empty_like_type(p.normals, {p.n, 3}, p.type);
   on_device(p.type, [&](auto zero, const auto& device) {
@@ -135,20 +151,30 @@ Tensor split_sum_shade(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor r
 }
 
 std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> split_sum_shade_backward(
-    Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, Tensor diffuse,
-    Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int64_t fresnel_mode, bool compensate, Tensor grad_radiance) {
+    Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular,
+    std::optional<Tensor> diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int64_t fresnel_mode,
+    bool compensate, std::optional<Tensor> indirect_s, std::optional<Tensor> indirect_d, Tensor grad_radiance) {
   const char* op = "split_sum_shade_backward";
   const ShadeInputs p(op, normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
-                      lut);
+                      lut, indirect_s, indirect_d);
   const ShadeOptions options = checked_options(op, fresnel_mode, compensate);
   const Tensor g = checked(op, "grad_radiance", grad_radiance, {p.n, 3}, p.type);
   const auto make = [&](int64_t columns) { return empty_like_type(p.normals, {p.n, columns}, p.type); };
-  Tensor grad[9] = {make(3),           make(3), make(3), make(1), make(1), make(3), make(3), make(p.n_channels),
+  Tensor grad[9] = {make(3),
+                    make(3),
+                    make(3),
+                    make(1),
+                    make(1),
+                    empty_like_type(p.normals, {p.specular.size(0), 3}, p.type),
+                    empty_like_type(p.normals, {p.is_stacked ? 0 : p.n, 3}, p.type),
+                    make(p.n_channels),
                     make(p.n_channels)};
   on_device(p.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    const ShadeArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]), out<T>(grad[4]),
-                            out<T>(grad[5]), out<T>(grad[6]), out<T>(grad[7]), out<T>(grad[8])};
+    T* const to_diffuse = p.is_stacked ? out<T>(grad[5]) + 3 * p.n : out<T>(grad[6]);
+    const ShadeArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]),
+                            out<T>(grad[4]), out<T>(grad[5]), to_diffuse,      out<T>(grad[7]),
+                            out<T>(grad[8]), nullptr,         nullptr};
     device.run(op, p.n, ShadeBackwardBody<T>{in<float>(p.lut), options, p.n_channels, p.arrays<T>(), in<T>(g), to});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};
@@ -158,7 +184,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tenso
 
 #define SPLITNERF_POINT                                                                                   \
   "Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, " \
-  "Tensor diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int fresnel_mode, bool compensate"
+  "Tensor? diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int fresnel_mode, bool compensate, "
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("query_direction(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) -> Tensor");
   m.def(
@@ -168,9 +194,9 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "light_queries_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean, "
       "Tensor grad_directions, Tensor grad_asked_roughness) -> (Tensor, Tensor)");
-  m.def("split_sum_shade(" SPLITNERF_POINT ") -> Tensor");
+  m.def("split_sum_shade(" SPLITNERF_POINT "Tensor? indirect_s, Tensor? indirect_d) -> Tensor");
   m.def("split_sum_shade_backward(" SPLITNERF_POINT
-        ", Tensor grad_radiance) -> "
+        "Tensor? indirect_s, Tensor? indirect_d, Tensor grad_radiance) -> "
         "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 

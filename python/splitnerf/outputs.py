@@ -147,7 +147,7 @@ def surface_of(model: SceneModel) -> Surface:
 
     def materials(points: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         field = model.surface(points)
-        material = model.material(model.head_inputs(points, field.outputs, field.features))
+        material = model.material(*model.head_inputs(points, field.outputs, field.features))
         return (*material, torch.nn.functional.normalize(field.gradient, dim=1))
 
     return Surface(*map(from_cpu, (model.sdf_field.sdf, gradient, materials)))

@@ -271,7 +271,7 @@ class World:
         return [0.1 + self.rand(self.sizes.points, 3, seed=18 + i) for i in range(n)]
 
     def split_sum(self) -> tuple:
-        return *self.shading(), *self.threes(4), brdf_lut(), 0, True
+        return *self.shading(), *self.threes(4), brdf_lut(), 0, True, None, None
 
     def query(self) -> tuple:
         normals, views, _, roughness, _ = self.shading()
@@ -436,7 +436,7 @@ FIELD = Case(
 )  # fmt: skip
 QUERY = Case("query_direction", World.query, a_point(45), reference.query_direction)
 SPLIT = Case("split_sum_shade", World.split_sum, a_point(70), reference.split_sum_shade)
-SUMS = Case("shade_sums", lambda w: (*w.shading(), *w.threes(4), brdf_lut(), True), a_point(75))
+SUMS = Case("shade_sums", lambda w: (*w.shading(), torch.stack(w.threes(4), 1), brdf_lut(), True, None, None), a_point(75))
 PREFILTER = Case(  # of a pair: a cosine 5, the lobe 10, three sums and their total 7
     "prefilter_light", World.prefiltering, lambda s, out: 22 * s.queries * s.lights,
     reference.prefilter_light,

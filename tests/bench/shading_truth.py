@@ -114,10 +114,10 @@ class TrueMaterials(torch.nn.Module):
         """The nearest point of the surface [n]."""
         return torch.from_numpy(self.tree.query(positions.numpy())[1])
 
-    def forward(self, inputs: Tensor) -> tuple[Tensor, ...]:
+    def forward(self, positions: Tensor) -> tuple[Tensor, ...]:
         if self.given is not None:
             return self.given
-        at = self.at(inputs[:, -3:])
+        at = self.at(positions)
         albedo, roughness, metallic = (x[at] for x in self.nearest)
         return albedo, roughness.clamp(min=0.05), metallic
 
@@ -142,8 +142,8 @@ class TrueScene(SceneModel):
         zeros = positions.new_zeros(len(positions), 13)
         return SdfSample(zeros, positions.new_zeros(len(positions), 0), positions)
 
-    def head_inputs(self, positions: Tensor, outputs: Tensor, features: Tensor) -> Tensor:
-        return torch.cat([outputs, positions], dim=1)
+    def head_inputs(self, positions: Tensor, outputs: Tensor, features: Tensor) -> list[Tensor]:
+        return [positions]
 
     @torch.no_grad()
     def radiance(self, x: Tensor, n: Tensor, views: Tensor, materials: tuple[Tensor, ...]) -> Tensor:

@@ -1,6 +1,9 @@
 // Kernels of a thread an item, and sums over items, against the CPU.
+#include <numeric>
+
 #include "check.h"
 #include "gpu.h"
+#include "splitnerf/bodies/corrections.h"
 #include "splitnerf/bodies/elementwise.h"
 #include "splitnerf/bodies/light_losses.h"
 #include "splitnerf/bodies/pixels.h"
@@ -23,15 +26,17 @@ TEST(PointKernels, SplitSumShading) {
           const auto rho = random.uniforms(n), metallic = random.uniforms(n), specular = random.uniforms(3 * n);
           const auto diffuse = random.uniforms(3 * n), o_s = random.uniforms(n * channels),
                      o_d = random.uniforms(n * channels), g = random.uniforms(3 * n, -1);
-          const ShadeArrays<const double> in{normals.data(), views.data(),    albedo.data(),
-                                             rho.data(),     metallic.data(), specular.data(),
-                                             diffuse.data(), o_s.data(),      o_d.data()};
+          const auto i_s = random.uniforms(3 * n), i_d = random.uniforms(3 * n);
+          const ShadeArrays<const double> in{normals.data(),  views.data(),    albedo.data(),  rho.data(),
+                                             metallic.data(), specular.data(), diffuse.data(), o_s.data(),
+                                             o_d.data(),      i_s.data(),      i_d.data()};
           auto radiance = unwritten<double>(3 * n), grad = unwritten<double>(17 * n + 2 * n * channels);
           auto radiance1 = radiance, grad1 = grad;
           const auto parts = [&](double* p) {
             return ShadeArrays<double>{p,          p + 3 * n,  p + 6 * n,
                                        p + 9 * n,  p + 10 * n, p + 11 * n,
-                                       p + 14 * n, p + 17 * n, p + 17 * n + n * channels};
+                                       p + 14 * n, p + 17 * n, p + 17 * n + n * channels,
+                                       nullptr,    nullptr};
           };
           const ShadeOptions options{mode, compensate};
           cpu::run(n, ShadeBody<double>{brdf_lut(), options, channels, in, radiance.data()});
@@ -49,20 +54,70 @@ TEST(PointKernels, SummedShading) {
       const auto normals = random.directions(n), views = random.directions(n), albedo = random.uniforms(3 * n);
       const auto rho = random.uniforms(n), metallic = random.uniforms(n), sums = random.uniforms(12 * n),
                  g = random.uniforms(3 * n, -1);
-      const SummedArrays<const double> in{normals.data(),      views.data(),        albedo.data(),
-                                          rho.data(),          metallic.data(),     sums.data(),
-                                          sums.data() + 3 * n, sums.data() + 6 * n, sums.data() + 9 * n};
-      auto radiance = unwritten<double>(3 * n), grad = unwritten<double>(23 * n), radiance1 = radiance, grad1 = grad;
-      const auto parts = [&](double* p) {
-        return SummedArrays<double>{p,          p + 3 * n,  p + 6 * n,  p + 9 * n, p + 10 * n,
-                                    p + 11 * n, p + 14 * n, p + 17 * n, p + 20 * n};
-      };
-      cpu::run(n, ShadeSumsBody<double>{brdf_lut(), compensate, in, radiance.data()});
-      cpu::run(n, ShadeSumsBackwardBody<double>{brdf_lut(), compensate, in, g.data(), parts(grad.data())});
-      on_gpu(n, ShadeSumsBody<double>{brdf_lut(), compensate, in, radiance1.data()});
-      on_gpu(n, ShadeSumsBackwardBody<double>{brdf_lut(), compensate, in, g.data(), parts(grad1.data())});
-      expect_near(radiance1, radiance, 1e-14), expect_near(grad1, grad, 1e-13);
+      const auto other = random.uniforms(3 * n), share = random.uniforms(n);
+      const SummedArrays<const double> in{normals.data(), views.data(),    albedo.data(),
+                                          rho.data(),     metallic.data(), sums.data()};
+      for (const bool mixed : {false, true}) {
+        auto radiance = unwritten<double>(3 * n), grad = unwritten<double>(26 * n), radiance1 = radiance, grad1 = grad;
+        const auto forward = [&](double* to) {
+          return ShadeSumsBody<double>{
+              brdf_lut(), compensate, in, mixed ? other.data() : nullptr, mixed ? share.data() : nullptr, to};
+        };
+        const auto backward = [&](double* p) {
+          const SummedArrays<double> to{p, p + 3 * n, p + 6 * n, p + 9 * n, p + 10 * n, p + 11 * n};
+          return ShadeSumsBackwardBody<double>{
+              brdf_lut(), compensate, in, mixed ? share.data() : nullptr, g.data(), to, mixed ? p + 23 * n : nullptr};
+        };
+        cpu::run(n, forward(radiance.data())), cpu::run(n, backward(grad.data()));
+        on_gpu(n, forward(radiance1.data())), on_gpu(n, backward(grad1.data()));
+        if (!mixed) grad.resize(23 * n), grad1.resize(23 * n);
+        expect_near(radiance1, radiance, 1e-14), expect_near(grad1, grad, 1e-13);
+      }
     }
+}
+
+TEST(PointKernels, Corrections) {
+  for (const int64_t n : {0, 1, 300}) {
+    Random random(16);
+    const int64_t n_rays = 40;
+    const auto rho = random.uniforms(n, 0.2, 0.7), weights = random.uniforms(n), opacity = random.uniforms(n_rays),
+               added = random.uniforms(3 * n), g = random.uniforms(3 * n_rays);
+    std::vector<int64_t> candidates(n), shaded(n), rays(2 * n), segment(n);
+    for (int64_t i = 0; i < n; ++i) {
+      candidates[i] = random.below(int(n)), shaded[i] = 2 * i, segment[i] = i / 3;
+      rays[2 * i] = rays[2 * i + 1] = random.below(int(n_rays));
+    }
+    const WideLobes<double> lobes{candidates.data(), rho.data(), n, 0.3, 0.6};
+    const int64_t counted = n / 2;
+    auto at = unwritten<int64_t>(n), at1 = at, offsets = unwritten<int64_t>(n + 1);
+    auto share = unwritten<double>(n), share1 = share;
+    cpu::run(n, ShareWideLobesBody<double>{lobes, &counted, at.data(), share.data()});
+    on_gpu(n, ShareWideLobesBody<double>{lobes, &counted, at1.data(), share1.data()});
+    EXPECT_EQ(at1, at), expect_near(share1, share, 1e-15);
+
+    on_gpu(n, CountWideLobesBody<double>{lobes, offsets.data()});
+    offsets[0] = 0;
+    std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
+    std::vector<int64_t> wide;
+    for (const int64_t i : candidates)
+      if (rho[i] > 0.3) wide.push_back(i);
+    ASSERT_EQ(offsets[n], int64_t(wide.size()));
+    auto packed = unwritten<int64_t>(wide.size());
+    auto shares = unwritten<double>(wide.size());
+    on_gpu(n, PackWideLobesBody<double>{lobes, offsets.data(), packed.data(), shares.data()});
+    EXPECT_EQ(packed, wide);
+    for (size_t k = 0; k < wide.size(); ++k) EXPECT_EQ(shares[k], smoothstep(0.3, 0.6, rho[wide[k]]));
+
+    const ShadedSegments<double> segments{n,           2 * n,          n_rays,         shaded.data(), rays.data(),
+                                          segment.data(), weights.data(), opacity.data(), 1e-4};
+    std::vector<double> mean(3 * n_rays, 0.5), mean1 = mean;
+    auto to_added = unwritten<double>(3 * n), to_added1 = to_added;
+    cpu::run(n, AddCorrectionsBody<double>{segments, candidates.data(), added.data(), mean.data()});
+    on_gpu(n, AddCorrectionsBody<double>{segments, candidates.data(), added.data(), mean1.data()});
+    cpu::run(n, AddCorrectionsBackwardBody<double>{segments, candidates.data(), g.data(), to_added.data()});
+    on_gpu(n, AddCorrectionsBackwardBody<double>{segments, candidates.data(), g.data(), to_added1.data()});
+    expect_near(mean1, mean, 1e-12), expect_near(to_added1, to_added, 1e-13);
+  }
 }
 
 TEST(PointKernels, QueryDirectionsAndShares) {

@@ -9,7 +9,15 @@ from __future__ import annotations
 import torch
 import trimesh
 from mesh_shapes import between, cache_of, grid_mesh
-from op_checks import as_tuple, generator, lib, unit
+from op_checks import as_tuple, generator, lib, rand, unit
+from shading_inputs import (
+    correction_inputs,
+    indirect_inputs,
+    material_inputs,
+    mixed_sums_inputs,
+    query_inputs,
+    sums_inputs,
+)
 from torch.utils._pytree import tree_map
 
 from splitnerf.fields.sdf import SdfField
@@ -98,10 +106,6 @@ def lookup_inputs(dtype=torch.float64, n: int = 18) -> tuple:
 
 
 # ---- losses ----
-
-
-def rand(*shape: int, seed: int = 0, dtype=torch.float64) -> torch.Tensor:
-    return torch.rand(*shape, generator=generator(seed), dtype=torch.float64).to(dtype)
 
 
 def pixel_inputs(n: int = 60, dtype=torch.float64) -> tuple:
@@ -268,38 +272,6 @@ def packed_samples(dtype=torch.float64, seed: int = 4) -> tuple:
 # ---- shading of sums ----
 
 
-def sums_inputs(n: int = 6, dtype=torch.float64, seed: int = 0) -> tuple:
-    g = generator(seed)
-
-    def rand(columns: int, lo: float, hi: float) -> torch.Tensor:
-        return lo + (hi - lo) * torch.rand(n, columns, generator=g, dtype=dtype)
-
-    normals = unit(torch.randn(n, 3, generator=g, dtype=dtype))
-    view_dirs = unit(normals + 0.7 * unit(torch.randn(n, 3, generator=g, dtype=dtype)))
-    sums = [rand(3, 0.5, 2.0), rand(3, 0.0, 0.3), rand(3, 0.1, 2.0), rand(3, 0.02, 0.5)]
-    return normals, view_dirs, rand(3, 0.05, 0.9), rand(1, 0.1, 0.9), rand(1, 0.1, 0.9), *sums
-
-
-# ---- shading by the split sum ----
-
-
-def query_inputs(device, dtype, mean: bool = True, n: int = 7) -> tuple:
-    """Arguments of ``query_direction``; some normals face away from the viewer."""
-    normals, views = (unit(torch.randn(n, 3, generator=generator(i), dtype=torch.float64)) for i in (0, 1))
-    roughness = torch.rand(n, 1, generator=generator(2), dtype=torch.float64) * 0.8 + 0.1
-    return *(x.to(device, dtype) for x in (normals, views, roughness)), brdf_lut(device), mean
-
-
-def split_sum_inputs(device, dtype, mode: int = 0, compensate: bool = False, channels: int = 1, n: int = 7) -> tuple:
-    """Arguments of ``split_sum_shade``."""
-    normals, views, roughness, lut, _ = query_inputs(device, dtype, n=n)
-    draw = generator(3)
-    rest = [torch.rand(n, k, generator=draw, dtype=torch.float64) for k in (3, 1, 3, 3, channels, channels)]
-    albedo, metallic, specular, diffuse, occlusion_s, occlusion_d = (x.to(device, dtype) for x in rest)
-    return (normals, views, albedo, roughness, metallic, 3 * specular, 2 * diffuse, occlusion_s, occlusion_d, lut,
-            mode, compensate)  # fmt: skip
-
-
 # ---- the distance field ----
 
 BOX, STEP = 1.5, 0.02
@@ -440,10 +412,13 @@ CASES = {
     "light_queries_backward": lambda t: with_gradients("light_queries", query_inputs("cpu", t, True, 300)),
     "take_rows": lambda t: ([rand(40, 3, dtype=t), rand(50, 1, seed=1, dtype=t)], row_numbers()),
     "put_rows": lambda t: ([rand(300, 3, dtype=t), rand(300, 1, seed=1, dtype=t)], row_numbers(), [40, 50]),
-    "split_sum_shade": lambda t: split_sum_inputs("cpu", t, 0, True, 3, 300),
-    "split_sum_shade_backward": lambda t: with_gradients(
-        "split_sum_shade", split_sum_inputs("cpu", t, 2, True, 1, 300)
-    ),
+    "split_sum_shade": indirect_inputs,
+    "split_sum_shade_backward": lambda t: with_gradients("split_sum_shade", indirect_inputs(t, 2, 1, stacked=True)),
+    "material_network": lambda t: material_inputs(300, t),
+    "material_network_backward": lambda t: with_gradients("material_network", material_inputs(300, t)),
+    "wide_lobes": lambda t: (row_numbers() % 40, rand(40, 1, dtype=t), 0.3, 0.6, torch.tensor(100)),
+    "add_corrections": correction_inputs,
+    "add_corrections_backward": lambda t: (*correction_inputs(t)[2:], rand(4, 3, seed=5, dtype=t)),
     "prefilter_light": lambda t: prefilter_inputs("cpu", t, 100, 900),
     "prefilter_light_backward": lambda t: prefilter_backward_inputs("cpu", t),
     "sample_ggx_lobe": lambda t: (*prefilter_inputs("cpu", t, 50)[:2], 70, 3),
@@ -456,8 +431,8 @@ CASES = {
     "monte_carlo_light_backward": lambda t: with_gradients("monte_carlo_light", drawn_inputs(40, 70, t)),
     "summed_light": lambda t: shared_inputs(40, dtype=t),
     "summed_light_backward": lambda t: with_gradients("summed_light", shared_inputs(40, dtype=t)),
-    "shade_sums": lambda t: (*sums_inputs(300, t), brdf_lut(), True),
-    "shade_sums_backward": lambda t: with_gradients("shade_sums", (*sums_inputs(300, t), brdf_lut(), True)),
+    "shade_sums": lambda t: mixed_sums_inputs(300, t),
+    "shade_sums_backward": lambda t: with_gradients("shade_sums", mixed_sums_inputs(300, t)),
     "linear_to_srgb": lambda t: (rand(40, 7, dtype=t),),
     "linear_to_srgb_backward": lambda t: (rand(40, 7, dtype=t), rand(40, 7, seed=1, dtype=t)),
     "srgb_to_linear": lambda t: (rand(40, 7, dtype=t),),

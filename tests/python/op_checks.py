@@ -32,6 +32,10 @@ def generator(seed: int = 0) -> torch.Generator:
     return torch.Generator().manual_seed(seed)
 
 
+def rand(*shape: int, seed: int = 0, dtype=torch.float64) -> torch.Tensor:
+    return torch.rand(*shape, generator=generator(seed), dtype=torch.float64).to(dtype)
+
+
 def unit(x: torch.Tensor) -> torch.Tensor:
     return x / x.norm(dim=-1, keepdim=True)
 

@@ -79,7 +79,8 @@ def query_of(n: int = 40, n_inputs: int = 7) -> OcclusionQuery:
         lobes,
         torch.rand(n, 1, generator=g),
     )
-    return OcclusionQuery(*(part.requires_grad_() for part in parts))
+    inputs, *rest = (part.requires_grad_() for part in parts)
+    return OcclusionQuery([inputs], *rest)
 
 
 @pytest.mark.parametrize("channels", [1, 3])
@@ -123,7 +124,7 @@ def test_the_gradient_goes_into_what_the_head_reads_of_the_field_and_not_into_th
     head.use(None)
     found = head(query)
     (found.diffuse.sum() + found.specular.sum()).backward()
-    assert query.inputs.grad.abs().sum() > 0 and head.net[0].weight.grad.abs().sum() > 0
+    assert query.inputs[0].grad.abs().sum() > 0 and head.net[0].weight.grad.abs().sum() > 0
     assert query.positions.grad is query.normals.grad is query.lobe_dirs.grad is query.roughness.grad is None
 
 
@@ -146,7 +147,7 @@ def test_a_directional_head_reads_the_lobe_by_functions_that_differ_over_the_sph
     head.net.register_forward_hook(lambda _, inputs, __: read.append(inputs[0]))
     n = len(directions)
     inputs, normals, roughness = torch.rand(n, 7), directions.flip(0), torch.rand(n, 1, generator=generator())
-    head(OcclusionQuery(inputs, directions, normals, directions, roughness))
+    head(OcclusionQuery([inputs], directions, normals, directions, roughness))
     (read,) = read
     assert read.shape == (n, 17) and torch.equal(read[:, :7], inputs)
     assert torch.equal(read[:, 7:10], directions) and torch.equal(read[:, 16:], roughness)

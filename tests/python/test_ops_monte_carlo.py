@@ -6,8 +6,9 @@ import math
 
 import pytest
 import torch
-from op_cases import drawn_inputs, shared_inputs, sums_inputs
+from op_cases import drawn_inputs, shared_inputs
 from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib
+from shading_inputs import sums_inputs
 
 from splitnerf import _core
 from splitnerf.ops import brdf_lut, monte_carlo_light, sample_bsdf, shade_sums, specular_share

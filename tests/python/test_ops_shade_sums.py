@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import pytest
 import torch
-from op_cases import sums_inputs
-from op_checks import check_op, grad_leaves, lib
+from op_cases import shared_inputs
+from op_checks import check_error, check_op, grad_leaves, lib
+from shading_inputs import mixed_sums_inputs, sums_inputs
 
-from splitnerf.ops import LightSums, brdf_lut, shade_sums, split_sum_shade
+from splitnerf.ops import LightSums, brdf_lut, shade_sums, split_sum_shade, summed_correction, summed_light
 
-DIFFERENTIABLE = tuple(range(9))
+DIFFERENTIABLE = tuple(range(6))
 
 
 def shade(*x: torch.Tensor, compensate: bool) -> torch.Tensor:
-    return shade_sums(*x[:5], LightSums(*x[5:]), compensate)
+    return shade_sums(*x[:5], LightSums(*x[5].unbind(1)), compensate)
 
 
 @pytest.mark.parametrize("compensate", [False, True])
 @pytest.mark.parametrize("turned", [1.0, -1.0])
 def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
     """Where the light is L over the specular lobe, the sums are (F1 + F2) L, F2 L and E_d L."""
-    normals, view_dirs, albedo, roughness, metallic, light, _, diffuse, _ = sums_inputs(200)
+    normals, view_dirs, albedo, roughness, metallic, sums = sums_inputs(200)
+    light, _, diffuse, _ = sums.unbind(1)
     normals = turned * normals
     one, black = torch.ones_like(albedo), torch.zeros_like(albedo)
     metal = torch.ones_like(metallic)
@@ -37,7 +39,8 @@ def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
 
 def test_light_at_grazing_angles_alone_is_reflected_whole():
     """All of the light where both Fresnel terms are 1: reflected by every material alike."""
-    normals, view_dirs, albedo, roughness, metallic, light, *_ = sums_inputs()
+    normals, view_dirs, albedo, roughness, metallic, sums = sums_inputs()
+    light = sums[:, 0]
     sums = LightSums(light, light, torch.zeros_like(light), light)
     torch.testing.assert_close(shade_sums(normals, view_dirs, albedo, roughness, metallic, sums), light)
 
@@ -45,8 +48,8 @@ def test_light_at_grazing_angles_alone_is_reflected_whole():
 @pytest.mark.parametrize("compensate", [False, True])
 def test_opcheck_and_gradcheck(compensate):
     x = sums_inputs()
-    check_op(lib.shade_sums, (*x, brdf_lut(), compensate), DIFFERENTIABLE)
-    check_op(lib.shade_sums_backward, (*x, brdf_lut(), compensate, torch.ones_like(x[0])))
+    check_op(lib.shade_sums, (*x, brdf_lut(), compensate, None, None), DIFFERENTIABLE)
+    check_op(lib.shade_sums_backward, (*x, brdf_lut(), compensate, None, None, torch.ones_like(x[0])))
     leaves = grad_leaves(x, DIFFERENTIABLE)
     assert torch.autograd.gradcheck(lambda *y: shade(*y, compensate=compensate), leaves, atol=1e-7, rtol=1e-6)
 
@@ -72,9 +75,37 @@ def test_edges_stay_finite(n_dot_v, roughness):
 
 def test_empty_batch_and_errors():
     assert shade(*sums_inputs(0), compensate=True).shape == (0, 3)
-    x = list(sums_inputs())
-    x[6] = x[6][:, :1]
-    with pytest.raises(Exception, match=r"grazing must be \[6, 3\] float64"):
-        shade(*x, compensate=False)
+    x = sums_inputs()
+    specular, grazing, diffuse, dielectric = x[5].unbind(1)
+    with pytest.raises(ValueError, match=r"grazing must be \[6, 3\], got \[6, 1\]"):
+        shade_sums(*x[:5], LightSums(specular, grazing[:, :1], diffuse, dielectric))
+    check_error(lambda: lib.shade_sums(*x[:5], x[5][:, :3], brdf_lut(), False, None, None), "shade_sums", "sums must be [6, 4, 3] float64")
+    for mixed in ((x[0], None), (None, x[3][:, 0])):
+        check_error(lambda mixed=mixed: lib.shade_sums(*x, brdf_lut(), False, *mixed), "shade_sums", "both or neither")
+    check_error(lambda: lib.shade_sums(*x, brdf_lut(), False, x[0], x[3]), "shade_sums", "share must be [6] float64")
     with pytest.raises(RuntimeError, match="no gradient to lut"):
-        lib.shade_sums(*sums_inputs(), brdf_lut().clone().requires_grad_(), False).sum().backward()
+        lib.shade_sums(*sums_inputs(), brdf_lut().clone().requires_grad_(), False, None, None).sum().backward()
+
+
+def test_a_share_turns_another_radiance_into_a_mixture():
+    """other + correction = (1 - share) other + share sums, and so for the gradients; the share itself has none."""
+    *x, lut, compensate, other, share = mixed_sums_inputs(40, torch.float64)
+    correction = lib.shade_sums(*x, lut, compensate, other, share)
+    mixture = torch.lerp(other, shade(*x, compensate=True), share[:, None])
+    torch.testing.assert_close(other + correction, mixture, rtol=1e-12, atol=1e-12)
+    inputs = (*x, lut, compensate, other, share)
+    check_op(lib.shade_sums, inputs, (*DIFFERENTIABLE, 8))
+    check_op(lib.shade_sums_backward, (*inputs, torch.ones_like(other)))
+    leaves = grad_leaves(inputs[:6], DIFFERENTIABLE)
+    other = other.requires_grad_()
+    assert torch.autograd.gradcheck(lambda *y: lib.shade_sums(*y[:6], lut, True, y[6], share), (*leaves, other), atol=1e-7, rtol=1e-6)
+    with pytest.raises(RuntimeError, match="no gradient to share"):
+        lib.shade_sums(*x, lut, True, other, share.clone().requires_grad_()).sum().backward()
+
+
+def test_the_correction_is_the_sum_less_the_split_by_its_share():
+    normals, view_dirs, roughness, *light = shared_inputs(12)
+    albedo, metallic, split, share = (torch.rand(12, *k, dtype=torch.float64) for k in ((3,), (1,), (3,), ()))
+    summed = shade_sums(normals, view_dirs, albedo, roughness, metallic, summed_light(normals, view_dirs, roughness, *light), True)
+    found = summed_correction(normals, view_dirs, albedo, roughness, metallic, split, share, *light, compensate=True)
+    torch.testing.assert_close(found, (summed - split) * share[:, None])

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 import torch
-from op_cases import query_inputs, split_sum_inputs
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
+from shading_inputs import indirect_inputs, query_inputs, split_sum_inputs
 
 from splitnerf.bench import reference
 from splitnerf.ops import brdf_lut, light_queries, query_direction, split_sum_shade
@@ -67,6 +67,29 @@ def test_shade_gradcheck(device, mode, compensate, channels):
     torch.autograd.gradcheck(lib.split_sum_shade, grad_leaves(inputs, range(9)))
 
 
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("stacked", [False, True])
+def test_indirect_light_is_light_that_nothing_hides(channels, stacked):
+    """As if the light were o L + I and nothing in its way; the light comes in two tensors or, as it answers, in one."""
+    inputs = indirect_inputs(torch.float64, channels=channels, n=40, stacked=stacked)
+    *points, specular, diffuse, occlusion_s, occlusion_d, lut, mode, gain, indirect_s, indirect_d = inputs
+    if stacked:
+        specular, diffuse = specular.chunk(2)
+    one = torch.ones(40, 1, dtype=torch.float64)
+    arriving = occlusion_s * specular + indirect_s, occlusion_d * diffuse + indirect_d
+    expected = lib.split_sum_shade(*points, *arriving, one, one, lut, mode, gain, None, None)
+    torch.testing.assert_close(lib.split_sum_shade(*inputs), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("stacked", [False, True])
+def test_gradients_with_indirect_light(stacked):
+    inputs = indirect_inputs(torch.float64, channels=1, n=4, stacked=stacked)
+    given = [i for i in range(9) if not (stacked and i == 6)]
+    torch.autograd.gradcheck(lib.split_sum_shade, grad_leaves(inputs, given))
+    check_op(lib.split_sum_shade, inputs, tuple(given))
+    check_op(lib.split_sum_shade_backward, (*inputs, torch.ones(4, 3, dtype=torch.float64)))
+
+
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("mean", [True, False])
 def test_light_queries_are_the_lobes_directions_and_the_normals_on_the_viewers_side(device, mean):
@@ -90,11 +113,13 @@ def test_missing_gradients_raise(device):
     grad = torch.ones(7, 3, dtype=torch.float64, device=device)
     for index in (0, 1, 2, 5):
         check_no_gradient(lib.query_direction_backward, (*query, grad), index)
-    for index in (*range(9), 12):
+    for index in (*range(9), 14):
         check_no_gradient(lib.split_sum_shade_backward, (*shade, grad), index)
     # The table is data, not a parameter.
     check_no_gradient(lib.query_direction, query, 3)
     check_no_gradient(lib.split_sum_shade, shade, 9)
+    for index in (12, 13):
+        check_no_gradient(lib.split_sum_shade, (*shade[:12], grad, grad), index)
 
 
 @pytest.mark.parametrize("device", DEVICES)
@@ -184,7 +209,12 @@ def test_errors_name_what_is_wrong(device):
     check_error(
         lambda: split_sum_shade(*inputs[:9], fresnel_mode="fast"), "split_sum_shade", "fresnel_mode", "exact", "fast"
     )
-    check_error(lambda: lib.split_sum_shade(*inputs[:10], 3, False), "split_sum_shade", "fresnel_mode", "3")
+    check_error(lambda: lib.split_sum_shade(*inputs[:10], 3, False, None, None), "split_sum_shade", "fresnel_mode", "3")
+    for i, name in ((12, "indirect_s"), (13, "indirect_d")):
+        bad = [*inputs]
+        bad[i] = torch.ones(7, 1)
+        check_error(lambda bad=bad: lib.split_sum_shade(*bad), "split_sum_shade", name, "[7, 3] float32", "[7, 1]")
+    check_error(lambda: lib.split_sum_shade(*inputs[:6], None, *inputs[7:]), "split_sum_shade", "specular", "[14, 3] float32")
 
 
 @pytest.mark.parametrize("compensate", [False, True])
@@ -198,6 +228,6 @@ def test_smooth_surfaces_keep_the_digits_of_their_gradient(compensate):
     for dtype in (torch.float32, torch.float64):
         inputs = [x.to(dtype) for x in (normals, view_dirs, *rest)]
         roughness = inputs[3].requires_grad_()
-        out = lib.split_sum_shade(*inputs, brdf_lut(), 0, compensate)
+        out = lib.split_sum_shade(*inputs, brdf_lut(), 0, compensate, None, None)
         found.append([torch.autograd.grad(x, roughness, retain_graph=True)[0].item() for x in out[0]])
     assert found[0] == pytest.approx(found[1], rel=1e-5)

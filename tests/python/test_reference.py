@@ -16,10 +16,10 @@ from op_cases import (
     rand,
     shared_inputs,
     sparse_inputs,
-    split_sum_inputs,
     truth,
 )
 from op_checks import as_tuple, generator, grad_leaves, lib
+from shading_inputs import mixed_sums_inputs, split_sum_inputs
 
 from splitnerf.bench import reference
 from splitnerf.bench.hash_grid import SPEC
@@ -27,7 +27,7 @@ from splitnerf.bench.hash_grid import SPEC
 # The inputs of each operator to which there is a gradient.
 DIFFERENTIABLE = {
     "hash_encode": (0, 1), "sdf_field": range(1, 8), "march_rays": (), "neus_weights": (0, 1, 2), "surface_weights": (0, 1, 3),
-    "composite": (0, 1, 3), "sharpness": (0,), "query_direction": (0, 1, 2), "split_sum_shade": range(9), "shade_sums": range(9),
+    "composite": (0, 1, 3), "sharpness": (0,), "query_direction": (0, 1, 2), "split_sum_shade": range(9), "shade_sums": (*range(6), 8),
     "monte_carlo_light": (0, 2, 5), "summed_light": (0, 2, 5), "linear_to_srgb": (0,), "srgb_to_linear": (), "prefilter_light": (3,),
     "sparse_product": (6,), "light_lookup": (0, 1, 2, 3), "cached_visibility": (), "cached_occlusion": (),
     "pixel_losses": (0, 1), "gradient_losses": (0,), "material_losses": (1,), "quadratic_entropy": (0,), "log_chroma": (0,),
@@ -63,7 +63,7 @@ def far_points(dtype: torch.dtype) -> tuple:
 OTHERS = [
     *(("split_sum_shade", lambda t, mode=mode, gain=gain: split_sum_inputs("cpu", t, mode, gain, 1, 300))
       for mode in (0, 1, 2) for gain in (False, True)),
-    ("shade_sums", lambda t: (*CASES["shade_sums"](t)[:-1], False)),
+    ("shade_sums", lambda t: mixed_sums_inputs(300, t, compensate=False)),
     ("neus_weights", lambda t: neus_inputs("cpu", t, 0.7)),
     ("sparse_product", lambda t: tuple(0.3 * x if x.is_floating_point() else x for x in sparse_inputs(t))),
     ("light_lookup", deep_light),

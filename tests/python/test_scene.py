@@ -188,7 +188,7 @@ class TestOcclusionHead:
             head.use(None)
             with torch.no_grad():
                 head.net[-1].weight.normal_()
-            query = OcclusionQuery(features, directions, directions, directions, roughness)
+            query = OcclusionQuery([features], directions, directions, directions, roughness)
             a, b = head(query).specular, head(query._replace(lobe_dirs=-directions)).specular
             assert torch.equal(a, b) != directional
             assert ((a >= 0) & (a <= 1)).all()

@@ -45,10 +45,10 @@ def test_properties_hold(claim):
 
 
 def test_every_operator_is_asked():
-    """Those that compute: maps and tables made once, what copies numbers, and classes are not asked."""
+    """Those that compute: maps and tables made once, what copies numbers or is made of others, and classes are not asked."""
     made_once = {
         "brdf_lut", "fibonacci_directions", "growth_for", "light_averages", "light_filters", "light_sum_of_levels",
-        "sh_projection", "zonal_factors", "cached_visibility", "sample_rays", "take_rows",
+        "sh_projection", "zonal_factors", "cached_visibility", "sample_rays", "summed_correction", "take_rows",
     }  # fmt: skip
     functions = {name for name in ops.__all__ if name.islower()}
     asked = {item.name.split(",")[0] for item in table.chosen([])}
@@ -311,6 +311,7 @@ def test_split_sum_by_hypothesis(normal, view, roughness, metallic, albedo):
     holds("split_sum_shade", {
         "normals": normal, "view_dirs": view, "roughness": (roughness,), "albedo": albedo, "metallic": (metallic,),
         "specular": ones, "diffuse": ones, "occlusion_s": ones, "occlusion_d": ones,
+        "indirect_s": ones, "indirect_d": ones,
     })  # fmt: skip
 
 

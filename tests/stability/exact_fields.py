@@ -81,6 +81,17 @@ def encoded(row: dict[str, np.ndarray], shared: Rows, box: int) -> dict[str, lis
     return hash_encode_jacobian(unit, shared | {"table": 1e-3 * shared["table"]})
 
 
+def material_network(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+    """Two layers of rectified units and sigmoids, the roughness brought to [.1, 1]."""
+    x = vector(row["features"])
+    for k in range(3):
+        weights, bias = (shared[f"{name}{k}"].numpy() for name in ("weight", "bias"))
+        x = [mp.fsum(w * a for w, a in zip(vector(of_unit), x)) + mp.mpf(float(b)) for of_unit, b in zip(weights, bias)]
+        x = [max(a, 0) if k < 2 else 1 / (1 + mp.exp(-a)) for a in x]
+    least = mp.mpf("0.1")
+    return {"albedo": x[:3], "roughness": [least + (1 - least) * x[3]], "metallic": x[4:]}
+
+
 def normalised(directions: np.ndarray, lengths: np.ndarray) -> list[list]:
     scales = [mp.mpf(float(n)) / mp.sqrt(mp.fsum(x**2 for x in vector(d))) for d, n in zip(directions, lengths[:, 0])]
     return [[scale * x for x in vector(d)] for d, scale in zip(directions, scales)]

@@ -62,11 +62,11 @@ def split_sum_shade(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]
     )
     cosine = turned(vector(row["normals"]), view)[1]
     f1, f2, _, layer = table(cosine, roughness)
-    names = ("albedo", "specular", "diffuse", "occlusion_s", "occlusion_d")
+    names = ("albedo", "specular", "diffuse", "occlusion_s", "occlusion_d", "indirect_s", "indirect_d")
     out: dict[str, list] = {}
     for mode in ("exact", "paper", "code", "compensated"):
         out[mode] = []
-        for albedo, l_s, l_d, o_s, o_d in zip(*(vector(row[name]) for name in names)):
+        for albedo, l_s, l_d, o_s, o_d, i_s, i_d in zip(*(vector(row[name]) for name in names)):
             if mode in ("paper", "code"):
                 f = fresnel(mode, mp.mpf("0.04") * (1 - metallic) + metallic * albedo, roughness, cosine)
                 energy, kept = f * f1 + f2, 1 - f
@@ -74,7 +74,7 @@ def split_sum_shade(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]
                 coat = layer * gain(mp.mpf("0.04"), f1, f2, mode == "compensated")
                 metal = (albedo * f1 + f2) * gain(albedo, f1, f2, mode == "compensated")
                 energy, kept = metallic * metal + (1 - metallic) * coat, 1 - coat
-            out[mode].append(o_d * (1 - metallic) * kept * albedo * l_d + o_s * energy * l_s)
+            out[mode].append((1 - metallic) * kept * albedo * (o_d * l_d + i_d) + energy * (o_s * l_s + i_s))
     return out
 
 
@@ -90,7 +90,8 @@ def shade_sums(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
             metal = gain(albedo, f1, f2, name == "compensated") * (albedo * (specular - grazing) + grazing)
             base = (1 - coat * layer) * albedo * diffuse
             values.append(metallic * metal + (1 - metallic) * (coat * dielectric + base))
-    return out
+    share = mp.mpf(float(row["share"][0]))
+    return out | {"mixed": [(x - other) * share for x, other in zip(out["compensated"], vector(row["other"]))]}
 
 
 def specular_share(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:

@@ -332,6 +332,33 @@ def spread(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     }
 
 
+def shares_of_lobes(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """All with their shares by float64 to some roundings, exactly 0 and 1 outside the band; those without one are left out."""
+    roughness, every = draw.mixed((0.3, 0.3 + 6e-8, 0.375, 0.45, 0.45 - 6e-8), draw.roughness(n)).float(), torch.arange(n)
+    at, share = ops.wide_lobes(every, roughness, 0.3, 0.45, torch.tensor(n))
+    t = ((roughness.double()[:, 0] - 0.3) / 0.15).clamp(0, 1)
+    error = (share.double() - t * t * (3 - 2 * t)).abs() - 2e-6
+    wrong = (at != every) | ((roughness[:, 0] < 0.2999999) & (share != 0)) | ((roughness[:, 0] > 0.4500001) & (share != 1))
+    left, shares = ops.wide_lobes(every, roughness, 0.3, 0.45)
+    wrong |= (torch.zeros(n).index_add(0, left, shares) != share) | (torch.bincount(left, minlength=n) != (share > 0))
+    return torch.where(wrong, 1.0, torch.maximum(error, finite_in(share[:, None], 0.0, 1.0))), {"roughness": roughness}
+
+
+def added_corrections(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """mean + correction sum(weights) / max(opacity, 1e-4) by float64 to some roundings, of two segments the first one. Weights
+    without a normal float count as 0."""
+    mean, correction = draw.radiance(n, 3).float(), (draw.signs(n, 3) * draw.radiance(n, 3)).float()
+    weights, opacity, every = draw.shares(n, 4).float(), draw.shares(n).float(), torch.arange(4 * n)
+    weights = torch.where(weights < 1e-30, 0.0, weights)
+    found = ops.add_corrections(
+        mean, correction, every[1::4], every, every // 4, every // 2, weights.reshape(-1), opacity, 1e-4
+    )
+    part = weights[:, :2].double().sum(1) / opacity.double().clamp(min=1e-4)
+    added = correction.double() * part[:, None]
+    error = (found.double() - (mean.double() + added)).abs() - 4e-7 * (mean.double().abs() + added.abs()) - 1e-38
+    return error.amax(1), {"mean": mean, "correction": correction, "weights": weights, "opacity": opacity[:, None]}
+
+
 def lobe_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     """Unit vectors above the horizon whose cosines follow the distribution of D cos: a shifted lattice in its CDF."""
     count = 8
@@ -397,6 +424,8 @@ PROPERTIES = (
     Property("probe_points", probes, "in the cube; as long as Box and Muller's formula, to a rounding"),
     Property("place_samples", placed, "on the ray in the middle of the sample, to a rounding"),
     Property("light_queries", queries_of_light, "those of query_direction, then normals that do not face away"),
+    Property("wide_lobes", shares_of_lobes, "the smoothstep's shares, in [0, 1]; without a number those with one"),
+    Property("add_corrections", added_corrections, "the mean and the correction by its segment's share, to a rounding"),
     Property("march_rays", marched, "in the box, ascending by the step, at most as many as asked for"),
     Property("spread_samples", spread, "shares in [0, 1]; every ray has a sample; constants stay themselves", size=8),
     Property("sample_ggx_lobe", lobe_samples, "unit, above the horizon, evenly spaced in the CDF of D cos", size=8),

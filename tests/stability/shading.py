@@ -12,7 +12,7 @@ from stability.entry import Entry, Rows
 from splitnerf.ops._library import lib
 
 UNITS = ("normals", "view_dirs", "light_dirs")
-IN_UNIT_RANGE = ("albedo", "roughness", "metallic", "occlusion_s", "occlusion_d")
+IN_UNIT_RANGE = ("albedo", "roughness", "metallic", "occlusion_s", "occlusion_d", "share")
 SHADED = ("normals", "view_dirs", "albedo", "roughness", "metallic")
 TABLE = {"lut": ops.brdf_lut()}  # always float32; its numbers are as uncertain as the rest
 SAMPLES = 4  # directions a point
@@ -57,11 +57,13 @@ def draw_shaded(draw: Draw, n: int) -> Rows:
         "diffuse": draw.radiance(n, 3),
         "occlusion_s": draw.shares(n, 3),
         "occlusion_d": draw.shares(n, 3),
+        "indirect_s": draw.radiance(n, 3),
+        "indirect_d": draw.radiance(n, 3),
     }
 
 
 def draw_sums(draw: Draw, n: int) -> Rows:
-    light = {name: draw.radiance(n, 3) for name in ops.LightSums._fields}
+    light = {name: draw.radiance(n, 3) for name in (*ops.LightSums._fields, "other")} | {"share": draw.shares(n, 1)}
     return within_the_light(draw_material(draw, n) | light)
 
 
@@ -90,13 +92,14 @@ def draw_lit(draw: Draw, n: int) -> Rows:
 def shade_modes(rows: Rows, shared: Rows) -> Rows:
     given = [rows[name] for name in (*SHADED, "specular", "diffuse", "occlusion_s", "occlusion_d")]
     modes = {mode: (i, False) for i, mode in enumerate(ops.FRESNEL_MODES)} | {"compensated": (0, True)}
-    return {name: lib.split_sum_shade(*given, shared["lut"].float(), *mode) for name, mode in modes.items()}
+    indirect = rows["indirect_s"], rows["indirect_d"]
+    return {name: lib.split_sum_shade(*given, shared["lut"].float(), *mode, *indirect) for name, mode in modes.items()}
 
 
 def shade_from_sums(rows: Rows, shared: Rows) -> Rows:
-    given = [rows[name] for name in (*SHADED, *ops.LightSums._fields)]
-    modes = {"single": False, "compensated": True}
-    return {name: lib.shade_sums(*given, shared["lut"].float(), mode) for name, mode in modes.items()}
+    given = [*(rows[name] for name in SHADED), torch.stack([rows[name] for name in ops.LightSums._fields], 1)]
+    modes = {"single": (False, None, None), "compensated": (True, None, None), "mixed": (True, rows["other"], rows["share"][:, 0])}
+    return {name: lib.shade_sums(*given, shared["lut"].float(), *mode) for name, mode in modes.items()}
 
 
 def share_of_lobe(rows: Rows, shared: Rows) -> Rows:
@@ -189,7 +192,7 @@ ENTRIES = (
         repair=lambda rows: within_the_light(repaired(rows)),
         conditioned=True,
         bound=2e-6,
-        smooth=(*SHADED, *ops.LightSums._fields),
+        smooth=(*SHADED, *ops.LightSums._fields, "other"),
         gradient_bound=4e-6,
         exact=exact_shading.shade_sums,
         exact_bound=1e-14,

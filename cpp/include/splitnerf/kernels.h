@@ -8,6 +8,7 @@
 #include "splitnerf/config.h"
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/light_pyramid.h"
+#include "splitnerf/material_network.h"
 #include "splitnerf/occlusion.h"
 #include "splitnerf/sdf_layer.h"
 #include "splitnerf/split_sum.h"
@@ -81,6 +82,11 @@ template <class T> struct Kernels {
   // likeness[j] = k_ij = exp(-|x_i - x_j|^2 / 4), i = point, work memory of n; sums = {sum_j k_ij (x_i - x_j) for each
   // channel, sum_j k_ij}. planes [n_channels, n] hold x.
   void (*pair_likeness)(int64_t n, int64_t n_channels, const T* planes, int64_t point, T* likeness, T* sums);
+  // inputs [n, input_columns] of the first layer, padded -> outputs [n, 5]; n <= kMaterialBlock, work [material_work_size].
+  void (*material_network)(const MaterialNetwork<T>&, int64_t n, const T* inputs, T* work, T* outputs);
+  // grad_outputs [n, 5] -> grad_inputs [n, input_columns], overwritten; adds to grads [grad_size].
+  void (*material_network_backward)(const MaterialNetwork<T>&, int64_t n, const T* inputs, const T* grad_outputs,
+                                    T* work, T* grad_inputs, T* grads);
   // sums[i - begin] = {sum K r, sum K g, sum K b, sum K} over the sources, for queries [begin, end).
   void (*lobe_gather)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
   // sums[i - begin] = {sum K r, sum K g, sum K b} over the queries, for lights [begin, end).

@@ -98,6 +98,14 @@ template <class T> struct IncomingLight {
   T measure;  // 0: does not count
   Vec3<T> radiance;
 };
+// As [4, 3] numbers side by side.
+template <class T> SPLITNERF_HD LightSums<T> load_sums(const T* sums) {
+  return {load3(sums), load3(sums + 3), load3(sums + 6), load3(sums + 9)};
+}
+template <class T> SPLITNERF_HD void store_sums(T* to, const LightSums<T>& s) {
+  store3(to, s.all), store3(to + 3, s.grazing), store3(to + 6, s.diffuse), store3(to + 9, s.dielectric);
+}
+
 // The threads of the group share the directions; all of them get the sums.
 template <class T, class Group, class Incoming>
 SPLITNERF_HD LightSums<T> sum_light(const Group& group, Vec3<T> normal, Vec3<T> view, T roughness, int n,
@@ -218,9 +226,9 @@ SPLITNERF_HD SummedPoint<T> shade_sums_backward(const float* lut, bool compensat
   return out;
 }
 
-// The fields of SummedPoint as arrays, 3 values each but for roughness and metallic.
+// The fields of SummedPoint as arrays, 3 values each but for roughness and metallic; sums [n, 4, 3] in the order of LightSums.
 template <class T> struct SummedArrays {
-  T *normals, *view_dirs, *albedo, *roughness, *metallic, *all, *grazing, *diffuse, *dielectric;
+  T *normals, *view_dirs, *albedo, *roughness, *metallic, *sums;
 };
 
 }  // namespace splitnerf

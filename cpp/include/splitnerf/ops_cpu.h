@@ -14,6 +14,7 @@
 #include "splitnerf/bodies/shading.h"
 #include "splitnerf/bodies/visibility_cache.h"
 #include "splitnerf/hash_grid.h"
+#include "splitnerf/material_network.h"
 #include "splitnerf/occlusion.h"
 #include "splitnerf/ray_walk.h"
 #include "splitnerf/run.h"
@@ -89,6 +90,18 @@ SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& mar
 template <class T>
 SPLITNERF_API void spread_samples(const SpreadArrays<T>& in, int64_t* sizes, int64_t* first, int64_t* second, T* share,
                                   const SpreadAllocator& allocator);
+
+// ---- materials ----
+
+// parts: the inputs, n_parts arrays [n, columns] as MaterialWeights says -> albedo [n, 3], roughness [n], metallic [n].
+template <class T>
+SPLITNERF_API void material_network(const MaterialWeights<T>& weights, int64_t n, const T* const* parts,
+                                    const MaterialArrays<T>& to);
+// All gradients are overwritten. The weights' are summed over tasks of points that depend on n alone: the same bits on any number of
+// threads.
+template <class T>
+SPLITNERF_API void material_network_backward(const MaterialWeights<T>& weights, int64_t n, const T* const* parts,
+                                             const MaterialArrays<const T>& grad, const MaterialGrads<T>& to);
 
 // ---- occlusion ----
 

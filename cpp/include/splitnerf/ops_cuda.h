@@ -6,6 +6,7 @@
 #include "splitnerf/bodies/monte_carlo.h"
 #include "splitnerf/bodies/rays.h"
 #include "splitnerf/light_pyramid.h"
+#include "splitnerf/material_network.h"
 #include "splitnerf/neus.h"
 #include "splitnerf/ray_walk.h"
 #include "splitnerf/run_cuda.h"
@@ -63,6 +64,18 @@ void sdf_field(const Queue& queue, const SdfField<T>& field, int64_t n, const T*
 template <class T>
 void sdf_field_backward(const Queue& queue, const SdfField<T>& field, int64_t n, const T* positions,
                         const SdfOutputs<const T>& given, const SdfFieldGrad<T>& grad);
+
+// ---- materials; weights' gradients are added in an order that depends on n alone. A network too wide for a block's shared memory
+// throws std::invalid_argument ----
+
+template <class T>
+void material_network(const Queue& queue, const MaterialWeights<T>& weights, int64_t n, const T* const* parts,
+                      const MaterialArrays<T>& to);
+template <class T>
+void material_network_backward(const Queue& queue, const MaterialWeights<T>& weights, int64_t n, const T* const* parts,
+                               const MaterialArrays<const T>& grad, const MaterialGrads<T>& to);
+
+// ---- samples of rays through the distance field ----
 
 // Waits for the number of samples; work memory for as many as a ray can have.
 template <class T>

@@ -248,12 +248,22 @@ template <class T> struct ShadePoint {
   T roughness, metallic;
   Vec3<T> specular, diffuse;         // g(query direction, roughness) and g(n, 1)
   Vec3<T> occlusion_s, occlusion_d;  // the paper's o: 1 = open
+  Vec3<T> indirect_s, indirect_d;    // light that the object itself sends to the point, in the normalisation of g
 };
 
-// Many points: [n, 3] but for roughness and metallic [n]; occlusion factors [n, 3] or [n].
+// Many points: [n, 3] but for roughness and metallic [n]; occlusion factors [n, 3] or [n]; indirect light, or null for none.
 template <class T> struct ShadeArrays {
   T *normals, *view_dirs, *albedo, *roughness, *metallic, *specular, *diffuse, *occlusion_s, *occlusion_d;
+  T *indirect_s, *indirect_d;
 };
+
+// The light that arrives at a point, of one channel.
+template <class T> struct ArrivingAt {
+  T specular, diffuse;
+};
+template <class T> SPLITNERF_HD ArrivingAt<T> arriving(const ShadePoint<T>& p, int c) {
+  return {p.specular[c] * p.occlusion_s[c] + p.indirect_s[c], p.diffuse[c] * p.occlusion_d[c] + p.indirect_d[c]};
+}
 
 // Of one channel: the albedo E of the specular lobe, and the share of light that it leaves to a diffuse base.
 //   exact: E = m E_m + (1 - m) E_d,  kept = 1 - E_d;  E_m = gain (albedo F1 + F2), E_d of the dielectric layer
@@ -300,7 +310,8 @@ SPLITNERF_HD ChannelAlbedoGrad<T> channel_albedo_backward(ShadeOptions options, 
           T(0)};
 }
 
-// L = o_d (1 - m) kept albedo g(n, 1) + o_s E g(d, rho).        Source: SplitNeRF Eq. (6)-(10), (17).
+// L = (1 - m) kept albedo (o_d g(n, 1) + i_d) + E (o_s g(d, rho) + i_s), i the indirect light.
+// Source: SplitNeRF Eq. (6)-(10), (17); the paper has no i.
 template <class T>
 SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, const ShadePoint<T>& p) {
   const T nv = dot(p.normal, p.view) * facing(p.normal, p.view), m = p.metallic;
@@ -308,14 +319,14 @@ SPLITNERF_HD Vec3<T> split_sum_shade(const float* lut, ShadeOptions options, con
   Vec3<T> radiance;
   SPLITNERF_UNROLL for (int c = 0; c < 3; ++c) {
     const ChannelAlbedo<T> e = channel_albedo(options, table, nv, p.roughness, m, p.albedo[c]);
+    const ArrivingAt<T> light = arriving(p, c);
     // The light first: shares of it may be so small that their product has no float.
-    radiance[c] = p.diffuse[c] * e.kept * (T(1) - m) * p.albedo[c] * p.occlusion_d[c] +
-                  p.specular[c] * e.specular * p.occlusion_s[c];
+    radiance[c] = light.diffuse * e.kept * (T(1) - m) * p.albedo[c] + light.specular * e.specular;
   }
   return radiance;
 }
 
-// Gradients to every field of the point; recomputes the forward pass and so needs nothing saved.
+// Gradients to every field of the point but the indirect light; recomputes the forward pass and so needs nothing saved.
 template <class T>
 SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptions options, const ShadePoint<T>& p,
                                                     Vec3<T> grad) {
@@ -327,15 +338,16 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
     const T albedo = p.albedo[c], l_d = p.diffuse[c], l_s = p.specular[c], o_d = p.occlusion_d[c],
             o_s = p.occlusion_s[c], g = grad[c];
     const ChannelAlbedo<T> e = channel_albedo(options, table, nv, p.roughness, m, albedo);
-    // radiance = o_d kept (1 - m) albedo l_d + o_s e l_s
-    const T sent = l_d * e.kept * (T(1) - m), grad_base = l_d * o_d * albedo * g;
-    out.occlusion_d[c] = sent * albedo * g;
+    const ArrivingAt<T> light = arriving(p, c);
+    // radiance = kept (1 - m) albedo light.diffuse + e light.specular,  light = o l + i
+    const T grad_base = light.diffuse * albedo * g;
+    out.occlusion_d[c] = l_d * e.kept * (T(1) - m) * albedo * g;
     out.occlusion_s[c] = l_s * e.specular * g;
     out.diffuse[c] = g * o_d * e.kept * (T(1) - m) * albedo;
     out.specular[c] = g * o_s * e.specular;
     const ChannelAlbedoGrad<T> d = channel_albedo_backward(options, table, nv, p.roughness, m, albedo,
-                                                           {l_s * o_s * g, grad_base * (T(1) - m)});
-    out.albedo[c] = sent * o_d * g + d.albedo;
+                                                           {light.specular * g, grad_base * (T(1) - m)});
+    out.albedo[c] = light.diffuse * e.kept * (T(1) - m) * g + d.albedo;
     out.metallic += d.metallic - grad_base * e.kept;
     out.roughness += d.roughness;
     grad_nv += d.n_dot_v;

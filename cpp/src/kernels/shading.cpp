@@ -12,6 +12,7 @@ constexpr int kLanes = 16;  // points of a block, one a lane
 template <class T> struct ShadeBlock {
   alignas(64) T normal[3 * kLanes], view[3 * kLanes], albedo[3 * kLanes], roughness[kLanes], metallic[kLanes];
   T specular[3 * kLanes], diffuse[3 * kLanes], occlusion_s[3 * kLanes], occlusion_d[3 * kLanes];
+  T indirect_s[3 * kLanes], indirect_d[3 * kLanes];
 };
 
 // Rows [first, first + n) of [points, kColumns] to one array a column, zeros behind them, and back. A whole block has a
@@ -55,6 +56,12 @@ template <class T> void store_factors(T* columns, int64_t first, int n, int n_ch
   store_rows<1>(columns, first, n, rows);
 }
 
+// Indirect light, zeros where there is none.
+template <class T> void load_indirect(const T* rows, int64_t first, int n, T* columns) {
+  if (rows) return load_rows<3>(rows, first, n, columns);
+  for (int i = 0; i < 3 * kLanes; ++i) columns[i] = T(0);
+}
+
 template <class T> ShadeBlock<T> load_block(const ShadeArrays<const T>& in, int64_t first, int n, int n_channels) {
   ShadeBlock<T> b;
   load_rows<3>(in.normals, first, n, b.normal);
@@ -66,6 +73,8 @@ template <class T> ShadeBlock<T> load_block(const ShadeArrays<const T>& in, int6
   load_rows<3>(in.diffuse, first, n, b.diffuse);
   load_factors(in.occlusion_s, first, n, n_channels, b.occlusion_s);
   load_factors(in.occlusion_d, first, n, n_channels, b.occlusion_d);
+  load_indirect(in.indirect_s, first, n, b.indirect_s);
+  load_indirect(in.indirect_d, first, n, b.indirect_d);
   return b;
 }
 
@@ -88,8 +97,9 @@ template <class T> SPLITNERF_HD void set_lane3(T* columns, int i, Vec3<T> v) {
   columns[i] = v.x, columns[kLanes + i] = v.y, columns[2 * kLanes + i] = v.z;
 }
 template <class T> SPLITNERF_HD ShadePoint<T> lane(const ShadeBlock<T>& b, int i) {
-  return {lane3(b.normal, i),   lane3(b.view, i),    lane3(b.albedo, i),      b.roughness[i],         b.metallic[i],
-          lane3(b.specular, i), lane3(b.diffuse, i), lane3(b.occlusion_s, i), lane3(b.occlusion_d, i)};
+  return {lane3(b.normal, i),      lane3(b.view, i),       lane3(b.albedo, i),    b.roughness[i],
+          b.metallic[i],           lane3(b.specular, i),   lane3(b.diffuse, i),   lane3(b.occlusion_s, i),
+          lane3(b.occlusion_d, i), lane3(b.indirect_s, i), lane3(b.indirect_d, i)};
 }
 
 // One point. A function of its own: what is declared inside a simd loop would be kept in memory, once a lane.

@@ -173,10 +173,11 @@ def gain(f0: Tensor | float, f1: Tensor, f2: Tensor, compensate: bool) -> Tensor
 
 
 def split_sum_shade(
-    normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d, lut, mode, compensate
-) -> Tensor:
-    """o_d (1 - metallic) kept albedo L_d + o_s E L_s. Mode exact: E of metal and dielectric, mixed, and the dielectric's
-    1 - E; paper and code: E = F F1 + F2 and 1 - F."""
+    normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d, lut, mode, compensate,
+    indirect_s=None, indirect_d=None,
+) -> Tensor:  # fmt: skip
+    """(1 - metallic) kept albedo (o_d L_d + I_d) + E (o_s L_s + I_s). Mode exact: E of metal and dielectric, mixed, and the
+    dielectric's 1 - E; paper and code: E = F F1 + F2 and 1 - F. Without `diffuse`, `specular` holds L_s of all and then L_d."""
     _, cosine = facing(normals, view_dirs)
     f1, f2, _, layer = brdf_table(lut, cosine, roughness).split(1, 1)
     if mode:
@@ -188,19 +189,24 @@ def split_sum_shade(
         coat = layer * gain(0.04, f1, f2, compensate)
         metal = (albedo * f1 + f2) * gain(albedo, f1, f2, compensate)
         energy, kept = metallic * metal + (1 - metallic) * coat, 1 - coat
-    return occlusion_d * (1 - metallic) * kept * albedo * diffuse + occlusion_s * energy * specular
+    light_s, light_d = specular.chunk(2) if diffuse is None else (specular, diffuse)
+    arriving_s = occlusion_s * light_s + (0 if indirect_s is None else indirect_s)
+    arriving_d = occlusion_d * light_d + (0 if indirect_d is None else indirect_d)
+    return (1 - metallic) * kept * albedo * arriving_d + energy * arriving_s
 
 
 def shade_sums(
-    normals, view_dirs, albedo, roughness, metallic, specular, grazing, diffuse, dielectric, lut, compensate
+    normals, view_dirs, albedo, roughness, metallic, sums, lut, compensate, other=None, share=None
 ) -> Tensor:
-    """Radiance reflected from sums over the light; `grazing` is the sum with Schlick's factor (1 - v.h)^5, `dielectric`
-    that with the exact Fresnel factor."""
+    """Radiance reflected from sums [n, 4, 3] over the light: of the lobe, with Schlick's factor (1 - v.h)^5, of the diffuse
+    light, and with the exact Fresnel factor. With `other` its difference to that radiance, times `share`."""
+    specular, grazing, diffuse, dielectric = sums.unbind(1)
     _, cosine = facing(normals, view_dirs)
     f1, f2, _, layer = brdf_table(lut, cosine, roughness).split(1, 1)
     coat = gain(0.04, f1, f2, compensate)
     metal = gain(albedo, f1, f2, compensate) * (albedo * (specular - grazing) + grazing)
-    return metallic * metal + (1 - metallic) * (coat * dielectric + (1 - coat * layer) * albedo * diffuse)
+    summed = metallic * metal + (1 - metallic) * (coat * dielectric + (1 - coat * layer) * albedo * diffuse)
+    return summed if other is None else (summed - other) * share[:, None]
 
 
 def fresnel_dielectric(cosine: Tensor) -> Tensor:

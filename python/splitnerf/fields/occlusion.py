@@ -18,14 +18,14 @@ class OcclusionQuery(NamedTuple):
     """The points of a lookup of occlusion factors; each kind of occlusion reads the values that it needs.
 
     Attributes:
-        inputs: [n, n_inputs] inputs of the occlusion head.
+        inputs: [n, columns] each, the inputs of the occlusion head, n_inputs columns together.
         positions: [n, 3] positions on the surface, scene units.
         normals: [n, 3] unit normals, on the viewer's side.
         lobe_dirs: [n, 3] unit axes of the specular lobe.
         roughness: [n, 1] perceptual roughness in [0, 1].
     """
 
-    inputs: Tensor
+    inputs: Sequence[Tensor]
     positions: Tensor
     normals: Tensor
     lobe_dirs: Tensor
@@ -231,10 +231,10 @@ class OcclusionHead(OcclusionModel):
 
     def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:
         """The factors o_d and o_s, [n, n_channels] each, for every point; segments are not used."""
-        features = query.inputs
+        features = list(query.inputs)
         if self.directional:
             x, y, z = query.lobe_dirs.unbind(-1)
             products = torch.stack([x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1, z * z * z], dim=-1)
-            features = torch.cat([features, query.lobe_dirs, products, query.roughness], dim=-1)
-        out = torch.sigmoid(self.net(features))
+            features += [query.lobe_dirs, products, query.roughness]
+        out = torch.sigmoid(self.net(torch.cat(features, dim=-1)))
         return Occlusion(out[:, : self.n_channels], out[:, self.n_channels :])

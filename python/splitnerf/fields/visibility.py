@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -12,7 +13,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf import _core
-from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, lobe_roughness
+from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, LightTexels, lobe_roughness
 from splitnerf.fields.occlusion import (
     Materials,
     Occlusion,
@@ -23,12 +24,37 @@ from splitnerf.fields.occlusion import (
     Senders,
     TracedBits,
 )
-from splitnerf.ops import MeshScene, VisibilityCache, cached_occlusion, cached_visibility, query_direction, take_rows
+from splitnerf.ops import (
+    MeshScene,
+    SparseMap,
+    VisibilityCache,
+    cached_occlusion,
+    cached_visibility,
+    query_direction,
+    sparse_product,
+    take_rows,
+)
 
 TEXELS_PER_CELL = 8  # fewest texels per direction of a light without texels of its own
 LOBE_DIRECTIONS = 15  # fewest directions within a lobe that a sum over the directions resolves
 DIM = 1e-12  # power of a cell, W / m^2, below which its direction is that of its centre
 SHADED_CHUNK = 1 << 15  # vertices shaded at a time
+
+
+class Cells(NamedTuple):
+    """Which texels of a light lie in which of k cells.
+
+    Attributes:
+        texels: [t, 3] the texels' directions.
+        cell: [t] int64, the cell of each texel.
+        means: The [k, t] matrix that takes the mean over the texels of each cell, by their solid angles.
+        solid_angles: [k] solid angles of the cells, sr.
+    """
+
+    texels: Tensor
+    cell: Tensor
+    means: SparseMap
+    solid_angles: Tensor
 
 
 def bit_counts(words: Tensor) -> Tensor:
@@ -79,7 +105,7 @@ class VisibilityBits(OcclusionModel):
         for name in ("centres", "directions", "aims"):
             self.register_buffer(name, directions.clone(), persistent=False)
         self.register_buffer("light", torch.ones_like(directions), persistent=False)
-        self._cells: tuple[Tensor, Tensor] | None = None  # the light's texels, and the cell that holds each
+        self._cells: Cells | None = None
         self.cache: VisibilityCache | None = None
         self.senders: Senders | None = None
         self.radiance: Tensor | None = None  # of each sender
@@ -89,7 +115,7 @@ class VisibilityBits(OcclusionModel):
         """Aims each cell's direction at its light, so that a lamp's shadow falls where the lamp stands."""
         texels = light.maps.partition(TEXELS_PER_CELL * len(self.centres), self.centres.device)
         power = texels.radiance.sum(1, keepdim=True) * texels.solid_angles[:, None]
-        cell = self._cell_of(texels.directions)
+        cell = self._cells_of(texels).cell
         towards = torch.zeros_like(self.centres).index_add(0, cell, texels.directions * power)
         self.aims = F.normalize(towards + DIM * self.centres, dim=1)
 
@@ -156,16 +182,22 @@ class VisibilityBits(OcclusionModel):
         """The light's mean over each direction's cell, differentiable in the light. A texel belongs to one cell, so
         that the cells have the power of the light."""
         texels = light.partition(TEXELS_PER_CELL * len(self.centres), self.centres.device)
-        cell = self._cell_of(texels.directions)
-        weighted = torch.cat([texels.radiance * texels.solid_angles[:, None], texels.solid_angles[:, None]], dim=1)
-        sums = weighted.new_zeros(len(self.directions), 4).index_add(0, cell, weighted)
-        return CellLight(sums[:, :3] / sums[:, 3:], self.directions, sums[:, 3].detach())
+        cells = self._cells_of(texels)
+        return CellLight(sparse_product(cells.means, texels.radiance), self.directions, cells.solid_angles)
 
-    def _cell_of(self, texels: Tensor) -> Tensor:
-        """The cell [t] int64 of each texel's direction [t, 3]: the nearest of the cells' centres."""
-        if self._cells is None or self._cells[0] is not texels:
-            self._cells = texels, torch.cat([(part @ self.centres.T).argmax(1) for part in texels.split(4096)])
-        return self._cells[1]
+    @torch.no_grad()
+    def _cells_of(self, texels: LightTexels) -> Cells:
+        """The cells of these texels: each belongs to the nearest of the cells' centres."""
+        directions, areas, _ = texels
+        if self._cells is None or self._cells.texels is not directions:
+            cell = torch.cat([(part @ self.centres.T).argmax(1) for part in directions.split(4096)])
+            solid_angles = areas.new_zeros(len(self.centres)).index_add(0, cell, areas)
+            weights, order = areas / solid_angles[cell], cell.argsort(stable=True)
+            starts = F.pad(cell.bincount(minlength=len(self.centres)).cumsum(0), (1, 0))
+            every = torch.arange(len(cell) + 1, device=cell.device)
+            means = SparseMap(starts, order.int(), weights[order], every, cell.int(), weights)
+            self._cells = Cells(directions, cell, means, solid_angles)
+        return self._cells
 
     @property
     def summed_from(self) -> float:
@@ -211,7 +243,7 @@ class VisibilityBits(OcclusionModel):
     def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:
         """The factors at points; with segments, those of each segment's leader for all of its points."""
         if segments is not None:
-            leaders = self.answer(OcclusionQuery(*take_rows(list(query), segments.leaders)), None)
+            leaders = self.answer(OcclusionQuery((), *take_rows(list(query[1:]), segments.leaders)), None)
             known = [part for part in leaders if part is not None]
             return Occlusion(*take_rows(known, segments.segment))
         o_d, o_s, i_d, i_s = cached_occlusion(

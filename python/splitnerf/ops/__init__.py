@@ -1,6 +1,7 @@
 """The operators of SplitNeRF: ``torch.ops.splitnerf.*`` with typed, documented wrappers."""
 
 from splitnerf.ops.adamw import AdamW, adamw_step_
+from splitnerf.ops.corrections import add_corrections, wide_lobes
 from splitnerf.ops.hash_grid import HashGrid, HashGridSpec, growth_for, hash_encode, hash_encode_jacobian
 from splitnerf.ops.incoming_light import IncomingLight, TexturedSurface, incoming_light
 from splitnerf.ops.light import fibonacci_directions, prefilter_light, sample_ggx_lobe
@@ -16,12 +17,14 @@ from splitnerf.ops.light_pyramid import (
     zonal_factors,
 )
 from splitnerf.ops.losses import gradient_losses, material_losses, pixel_losses, quadratic_entropy
+from splitnerf.ops.materials import material_network
 from splitnerf.ops.monte_carlo import (
     LightSums,
     monte_carlo_light,
     sample_bsdf,
     shade_sums,
     specular_share,
+    summed_correction,
     summed_light,
 )
 from splitnerf.ops.occlusion import MeshScene, occlusion_factors, trace_visibility
@@ -48,13 +51,13 @@ from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_v
 __all__ = [
     "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "EdgeRuns", "FRESNEL_MODES", "HashGrid", "HashGridSpec",
     "IncomingLight", "LightSums", "MeshScene", "PackedSamples", "PixelList", "QUERIES", "SdfNetwork", "ShadingSubset",
-    "SparseMap", "TexturedSurface", "VisibilityCache", "adamw_step_", "brdf_lut", "cached_occlusion", "cached_visibility",
+    "SparseMap", "TexturedSurface", "VisibilityCache", "adamw_step_", "add_corrections", "brdf_lut", "cached_occlusion", "cached_visibility",
     "composite", "draw_rays", "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian",
     "incoming_light", "light_averages", "light_filters", "light_lookup", "light_prior", "light_queries",
-    "light_sum_of_levels", "linear_to_srgb", "log_chroma", "march_rays", "material_losses", "monte_carlo_light",
+    "light_sum_of_levels", "linear_to_srgb", "log_chroma", "march_rays", "material_losses", "material_network", "monte_carlo_light",
     "neus_weights", "occlusion_factors", "pixel_losses", "place_samples", "prefilter_light", "probe_points",
     "quadratic_entropy", "query_direction", "read_pixels", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_field",
     "sdf_values", "sh_projection", "shade_sums", "sharpness", "sparse_product", "specular_share", "split_sum_shade",
-    "spread_samples", "srgb_to_linear", "summed_light", "surface_weights", "take_rows", "trace_visibility", "visibility_bits",
-    "zonal_factors",
+    "spread_samples", "srgb_to_linear", "summed_correction", "summed_light", "surface_weights", "take_rows", "trace_visibility", "visibility_bits",
+    "wide_lobes", "zonal_factors",
 ]  # fmt: skip

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import torch
 from torch import Tensor
 
 from splitnerf.ops._library import lib, refuse_gradients, register
@@ -155,7 +156,42 @@ def shade_sums(
     Raises:
         ValueError: A shape or dtype does not fit.
     """
-    return lib.shade_sums(normals, view_dirs, albedo, roughness, metallic, *sums, brdf_lut(normals.device), compensate)
+    for name, part in zip(LightSums._fields, sums):
+        if part.shape != normals.shape:
+            raise ValueError(f"shade_sums: {name} must be {list(normals.shape)}, got {list(part.shape)}")
+    stacked, table = torch.stack(tuple(sums), 1), brdf_lut(normals.device)
+    return lib.shade_sums(normals, view_dirs, albedo, roughness, metallic, stacked, table, compensate, None, None)
+
+
+def summed_correction(
+    normals: Tensor, view_dirs: Tensor, albedo: Tensor, roughness: Tensor, metallic: Tensor, split: Tensor, share: Tensor,
+    directions: Tensor, solid_angles: Tensor, radiance: Tensor, visible: Tensor, sent: Tensor | None = None,
+    compensate: bool = False,
+) -> Tensor:  # fmt: skip
+    """What the sum over directions adds to another radiance of points to replace it by a share.
+
+    ``(shade_sums(summed_light(...)) - split) share``
+
+    Args:
+        normals, view_dirs, albedo, roughness, metallic, compensate: See :func:`shade_sums`.
+        split: [n, 3] linear radiance that is replaced, that of the split sum.
+        share: [n] share of the sum in [0, 1]; no gradient.
+        directions, solid_angles, radiance, visible, sent: The light, see :func:`summed_light`.
+
+    Returns:
+        [n, 3] linear radiance to add. Differentiable once in normals, albedo, roughness, metallic, split and radiance.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+
+    Source: SplitNeRF Eq. (4)-(6), by quadrature.
+    """
+    nothing = normals.new_empty(0, len(directions), 3)
+    sums = lib.summed_light(
+        normals, view_dirs, roughness, directions, solid_angles, radiance, visible, nothing if sent is None else sent
+    )
+    table = brdf_lut(normals.device)
+    return lib.shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, table, compensate, split, share)
 
 
 def _keep(ctx, inputs, output):
@@ -175,13 +211,15 @@ def _shared_backward(ctx, grad_sums):
 
 
 def _keep_summed(ctx, inputs, output):
-    ctx.save_for_backward(*inputs[:10])
-    ctx.compensate = inputs[10]
+    ctx.save_for_backward(*inputs[:7], *inputs[8:])
+    ctx.compensate = inputs[7]
 
 
 def _summed_backward(ctx, grad):
-    refuse_gradients(ctx, "shade_sums", lut=9)
-    return *lib.shade_sums_backward(*ctx.saved_tensors, ctx.compensate, grad), None, None
+    refuse_gradients(ctx, "shade_sums", lut=6, share=9)
+    *points, other, share = ctx.saved_tensors
+    *grads, grad_other = lib.shade_sums_backward(*points, ctx.compensate, other, share, grad)
+    return *grads, None, None, None if other is None else grad_other, None
 
 
 register(
@@ -229,5 +267,7 @@ register(
 )
 register(
     "shade_sums_backward",
-    fake=lambda *inputs: tuple(t.new_empty(t.shape) for t in inputs[:9]),
-)
+    fake=lambda *inputs: (
+        *(t.new_empty(t.shape) for t in inputs[:6]), inputs[0].new_empty((0, 3) if inputs[8] is None else inputs[8].shape)
+    ),
+)  # fmt: skip

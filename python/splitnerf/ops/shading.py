@@ -87,41 +87,48 @@ def split_sum_shade(
     roughness: Tensor,
     metallic: Tensor,
     specular: Tensor,
-    diffuse: Tensor,
+    diffuse: Tensor | None,
     occlusion_s: Tensor,
     occlusion_d: Tensor,
     fresnel_mode: str = "exact",
     compensate: bool = False,
+    indirect_s: Tensor | None = None,
+    indirect_d: Tensor | None = None,
 ) -> Tensor:
     """Outgoing linear radiance of points under the pre-integrated light, in one pass.
 
-    ``L = o_d (1 - m)(1 - E_d) albedo g(n, 1) + o_s [m (albedo F1 + F2) + (1 - m) E_d] g(d, rho)``: a metal with
-    Schlick's Fresnel term and a diffuse base under a dielectric of index 1.5 with the exact one, mixed, as the path
-    tracer and Blender have it. g(n, 1) is irradiance / pi, so no further pi appears.
+    ``L = (1 - m)(1 - E_d) albedo (o_d g(n, 1) + i_d) + [m (albedo F1 + F2) + (1 - m) E_d] (o_s g(d, rho) + i_s)``: a
+    metal with Schlick's Fresnel term and a diffuse base under a dielectric of index 1.5 with the exact one, mixed, as
+    the path tracer and Blender have it. g(n, 1) is irradiance / pi, so no further pi appears.
 
     Args:
         normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
         albedo: [n, 3] linear, in [0, 1].
         roughness, metallic: [n, 1], in [0, 1].
-        specular: [n, 3] radiance g(d, rho); d from :func:`query_direction`.
-        diffuse: [n, 3] radiance g(n, 1).
+        specular: [n, 3] radiance g(d, rho); d from :func:`query_direction`. Or, with ``diffuse`` None, [2 n, 3]: what
+            the light answers to :func:`light_queries`, g(d, rho) of all points and then g(n, 1) of all.
+        diffuse: [n, 3] radiance g(n, 1), or None.
         occlusion_s, occlusion_d: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open.
         fresnel_mode: The form of the Fresnel term: ``exact`` (above), ``paper`` or ``code``. The last two mix the
             materials' reflectances, ``F0 = .04 (1 - m) + m albedo``, and apply the term twice, as published.
         compensate: Whether to compensate for multiple scattering: each lobe's ``E [1 + F0 (1/(F1 + F2) - 1)]`` with F0
             the albedo of the metal and .04 of the dielectric (Turquin 2019), as in Blender's Principled BSDF.
+        indirect_s, indirect_d: [n, 3] light i_s and i_d >= 0 that the object itself sends to the points, in the
+            normalisation of g, or None for none; no gradient.
 
     Returns:
         [n, 3] linear radiance.
 
     Raises:
         ValueError: A shape, dtype or mode does not fit.
+
+    Source: SplitNeRF Eq. (6)-(10), (17), which have no indirect light.
     """
     if fresnel_mode not in FRESNEL_MODES:
         raise ValueError(f"split_sum_shade: fresnel_mode must be one of {FRESNEL_MODES}, got {fresnel_mode!r}")
     return lib.split_sum_shade(
         normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
-        brdf_lut(normals.device), FRESNEL_MODES.index(fresnel_mode), compensate,
+        brdf_lut(normals.device), FRESNEL_MODES.index(fresnel_mode), compensate, indirect_s, indirect_d,
     )  # fmt: skip
 
 
@@ -143,14 +150,17 @@ def _queries_backward(ctx, *grads):
 
 
 def _keep_shade(ctx, inputs, output):
-    ctx.save_for_backward(*inputs[:10])
-    ctx.options = inputs[10:]
+    ctx.save_for_backward(*inputs[:10], *inputs[12:])
+    ctx.options = inputs[10:12]
 
 
 def _shade_backward(ctx, grad):
-    refuse_gradients(ctx, "split_sum_shade", lut=9)
-    grads = lib.split_sum_shade_backward(*ctx.saved_tensors, *ctx.options, grad)
-    return *grads, None, None, None
+    refuse_gradients(ctx, "split_sum_shade", lut=9, indirect_s=12, indirect_d=13)
+    *points, indirect_s, indirect_d = ctx.saved_tensors
+    grads = list(lib.split_sum_shade_backward(*points, *ctx.options, indirect_s, indirect_d, grad))
+    if points[6] is None:
+        grads[6] = None
+    return *grads, None, None, None, None, None
 
 
 register(
@@ -185,5 +195,5 @@ register(
 )
 register(
     "split_sum_shade_backward",
-    fake=lambda *inputs: tuple(t.new_empty(t.shape) for t in inputs[:9]),
+    fake=lambda normals, *rest: tuple(normals.new_empty((0, 3) if t is None else t.shape) for t in (normals, *rest[:8])),
 )

@@ -25,7 +25,7 @@ from splitnerf.fields import (
 )
 from splitnerf.fields.occlusion import TracedBits
 from splitnerf.fields.sdf import SdfSample
-from splitnerf.ops import HashGridSpec, light_queries, shade_sums, sharpness, split_sum_shade, summed_light, take_rows
+from splitnerf.ops import HashGridSpec, light_queries, sharpness, split_sum_shade, summed_correction, take_rows, wide_lobes
 
 START_BOUNCES = 3  # bounces of indirect light on a new mesh
 SUMMED_BAND = 0.15  # width in roughness of the transition from the split sum to the sum over directions
@@ -51,6 +51,12 @@ class ShadedPoints(NamedTuple):
     occlusion_s: Tensor
     facing: Tensor
     lobe_dirs: Tensor
+
+
+def on_surface(positions: Tensor, normals: Tensor, sdf: Tensor) -> Tensor:
+    """Points [n, 3] moved along their unit normals [n, 3] by their signed distances [n] on to the surface, scene units; no
+    gradient."""
+    return torch.addcmul(positions.detach(), normals.detach(), sdf.detach()[:, None], value=-1.0)
 
 
 def make_light(config: Config) -> Light:
@@ -143,10 +149,10 @@ class SceneModel(nn.Module):
             return self.sdf_field.sample(positions)
         return self.sdf_field.sample_finite_difference(positions)
 
-    def head_inputs(self, positions: Tensor, outputs: Tensor, features: Tensor) -> Tensor:
-        if self.config.materials.inputs == "outputs":
-            return outputs
-        return torch.cat([outputs, positions, features], dim=1)
+    def head_inputs(self, positions: Tensor, outputs: Tensor, features: Tensor) -> list[Tensor]:
+        """What the material and occlusion heads read, joined by columns: by the setting ``materials.inputs`` the SDF's outputs
+        alone, or with positions and hash features."""
+        return [outputs] if self.config.materials.inputs == "outputs" else [outputs, positions, features]
 
     def evaluate_light(self) -> EvaluatedLight:
         """The evaluated light, valid until its parameters move."""
@@ -177,20 +183,15 @@ class SceneModel(nn.Module):
         """
         c = self.config
         inputs = self.head_inputs(positions, outputs, features)
-        albedo, roughness, metallic = self.material(inputs)
+        albedo, roughness, metallic = self.material(*inputs)
         asked = light_queries(normals, view_dirs, roughness, c.shading.query)
-        light_s, light_d = light(*asked).chunk(2)
         lobe_dirs, facing = asked[0].chunk(2)
-        query = OcclusionQuery(inputs, positions - normals * outputs[:, :1], facing, lobe_dirs, roughness)
-        occlusion = self.occlusion(query, segments)
-        factor_s, factor_d = occlusion.specular, occlusion.diffuse
-        if occlusion.indirect_specular is not None:
-            light_s = factor_s * light_s + occlusion.indirect_specular
-            light_d = factor_d * light_d + occlusion.indirect_diffuse
-            factor_s = factor_d = torch.ones_like(roughness)
+        occlusion = self.occlusion(
+            OcclusionQuery(inputs, on_surface(positions, normals, outputs[:, 0]), facing, lobe_dirs, roughness), segments
+        )
         shaded = split_sum_shade(
-            normals, view_dirs, albedo, roughness, metallic, light_s, light_d, factor_s, factor_d,
-            c.shading.fresnel, c.shading.compensate,
+            normals, view_dirs, albedo, roughness, metallic, light(*asked), None, occlusion.specular, occlusion.diffuse,
+            c.shading.fresnel, c.shading.compensate, occlusion.indirect_specular, occlusion.indirect_diffuse,
         )  # fmt: skip
         return ShadedPoints(
             shaded, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, facing, lobe_dirs
@@ -202,8 +203,7 @@ class SceneModel(nn.Module):
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
         """The difference between the radiance by quadrature and that by the split sum.
 
-        The quadrature sums BRDF times light over the directions of the visibility bits. It replaces the split sum with
-        a
+        The quadrature sums BRDF times light over the directions of the visibility bits. It replaces the split sum with a
         smooth transition in roughness, where the directions resolve the lobe: with 256 directions the transition is
         from roughness 0.3 to 0.45. Narrower lobes are not corrected.
 
@@ -223,24 +223,18 @@ class SceneModel(nn.Module):
 
         Source: SplitNeRF Eq. (4)-(6), by quadrature.
         """
-        over = (points.roughness.detach()[candidates, 0] - self.occlusion.summed_from) / SUMMED_BAND + 0.5
-        if n_candidates is None:
-            wide = (over > 0).nonzero().squeeze(1)
-            at, t = candidates[wide], over[wide, None].clamp(max=1.0)
-        else:
-            counts = torch.arange(len(candidates), device=candidates.device) < n_candidates
-            at, t = candidates, (over * counts)[:, None].clamp(0.0, 1.0)
+        middle, half = self.occlusion.summed_from, 0.5 * SUMMED_BAND
+        at, share = wide_lobes(candidates, points.roughness.detach(), middle - half, middle + half, n_candidates)
         of_points = [
             normals, points.albedo, points.roughness, points.metallic, points.radiance, view_dirs, on_surface, points.facing.detach(),
         ]  # fmt: skip
         normals, albedo, roughness, metallic, split, view_dirs, on_surface, facing = take_rows(of_points, at)
         visible, sent = self.occlusion.visibility(on_surface, facing)
         cells = light.cells
-        sums = summed_light(
-            normals, view_dirs, roughness, cells.directions, cells.solid_angles, cells.radiance, visible, sent
-        )
-        radiance = shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, self.config.shading.compensate)
-        return at, (radiance - split) * (t * t * (3.0 - 2.0 * t))
+        return at, summed_correction(
+            normals, view_dirs, albedo, roughness, metallic, split, share, cells.directions, cells.solid_angles, cells.radiance,
+            visible, sent, self.config.shading.compensate,
+        )  # fmt: skip
 
     @property
     def sums_light(self) -> bool:
@@ -268,7 +262,7 @@ class SceneModel(nn.Module):
 
         def materials(positions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
             field = self.surface(positions)
-            return self.material(self.head_inputs(positions, field.outputs, field.features))
+            return self.material(*self.head_inputs(positions, field.outputs, field.features))
 
         def reflect(n: Tensor, view_dirs: Tensor, here: Sequence[Tensor], light_s: Tensor, light_d: Tensor) -> Tensor:
             one = torch.ones_like(here[1])

@@ -12,6 +12,7 @@ from splitnerf.config import Config
 from splitnerf.fields import EvaluatedLight, RaySegments
 from splitnerf.ops import (
     PackedSamples,
+    add_corrections,
     composite,
     linear_to_srgb,
     march_rays,
@@ -21,7 +22,7 @@ from splitnerf.ops import (
     surface_weights,
     take_rows,
 )
-from splitnerf.render.model import SceneModel, ShadedPoints
+from splitnerf.render.model import SceneModel, ShadedPoints, on_surface
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
 from splitnerf.render.rays import image_rays
 
@@ -225,20 +226,18 @@ def render_rays(
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
     mean = composite(weights, values, samples.offsets, opacity, MIN_OPACITY)
     if model.sums_light:
-        on_surface = positions - normals.detach() * sdf.detach()[:, None]
         at, correction = model.quadrature_correction(
             light,
-            on_surface,
+            on_surface(positions, normals, sdf),
             normals,
             view_dirs,
             points,
             spread.heaviest,
             None if capacity is None else spread.sizes[1],
         )
-        carried = shares.new_zeros(len(spread.leaders)).index_add(0, spread.stretch, shares)  # weight of each segment
-        ray = samples.ray_indices[shaded[at]]
-        part = carried[spread.stretch[at]] / opacity.detach().clamp(min=MIN_OPACITY)[ray]
-        mean = mean.index_add(0, ray, correction * part[:, None])
+        mean = add_corrections(
+            mean, correction, at, shaded, samples.ray_indices, spread.stretch, shares, opacity.detach(), MIN_OPACITY
+        )
     return RenderedRays(
         mean, c.shading.compositing == "linear", opacity, samples, found.evaluated, found.n_found, weights, values, field.gradient,
         found.beside,

@@ -95,8 +95,7 @@ template <class T, class Light> struct SumLightBody {
     const LightSums<T> s =
         sum_light(group, load3(normals + 3 * p), load3(view_dirs + 3 * p), roughness[p], n, light.of_point(p));
     if (group.lane() > 0) return;
-    T* to = sums + 3 * kLightSums * p;
-    store3(to, s.all), store3(to + 3, s.grazing), store3(to + 6, s.diffuse), store3(to + 9, s.dielectric);
+    store_sums(sums + 3 * kLightSums * p, s);
   }
 };
 
@@ -110,10 +109,9 @@ template <class T, class Light, class Receive> struct SumLightBackwardBody {
   Receive receive;
 
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t p) const {
-    const T* g = grad_sums + 3 * kLightSums * p;
     const LightSumsGrad<T> out =
         sum_light_backward(group, load3(normals + 3 * p), load3(view_dirs + 3 * p), roughness[p], n, light.of_point(p),
-                           LightSums<T>{load3(g), load3(g + 3), load3(g + 6), load3(g + 9)},
+                           load_sums(grad_sums + 3 * kLightSums * p),
                            [&](int i, Vec3<T> grad) { receive(p, i, grad); });
     if (group.lane() > 0) return;
     store3(grad_normals + 3 * p, out.normal);

@@ -81,6 +81,11 @@ template <class T> SPLITNERF_HD void store_factors(T* factors, int64_t i, int n_
   factors[i] = sum(grad);
 }
 
+// Indirect light, which not all points have.
+template <class T> SPLITNERF_HD Vec3<T> load_indirect(const T* light, int64_t i) {
+  return light ? load3(light + 3 * i) : Vec3<T>{T(0), T(0), T(0)};
+}
+
 template <class T>
 SPLITNERF_HD ShadePoint<T> load_shade_point(const ShadeArrays<const T>& in, int64_t i, int n_channels) {
   return {load3(in.normals + 3 * i),
@@ -91,7 +96,9 @@ SPLITNERF_HD ShadePoint<T> load_shade_point(const ShadeArrays<const T>& in, int6
           load3(in.specular + 3 * i),
           load3(in.diffuse + 3 * i),
           load_factors(in.occlusion_s, i, n_channels),
-          load_factors(in.occlusion_d, i, n_channels)};
+          load_factors(in.occlusion_d, i, n_channels),
+          load_indirect(in.indirect_s, i),
+          load_indirect(in.indirect_d, i)};
 }
 
 template <class T> struct ShadeBody {
@@ -148,22 +155,22 @@ template <class T> struct SpecularShareBody {
 SPLITNERF_ON_GPU(SpecularShareBody);
 
 template <class T> SPLITNERF_HD SummedPoint<T> load_summed_point(const SummedArrays<const T>& in, int64_t i) {
-  return {load3(in.normals + 3 * i),
-          load3(in.view_dirs + 3 * i),
-          load3(in.albedo + 3 * i),
-          in.roughness[i],
-          in.metallic[i],
-          {load3(in.all + 3 * i), load3(in.grazing + 3 * i), load3(in.diffuse + 3 * i), load3(in.dielectric + 3 * i)}};
+  return {load3(in.normals + 3 * i), load3(in.view_dirs + 3 * i), load3(in.albedo + 3 * i),
+          in.roughness[i],           in.metallic[i],              load_sums(in.sums + 3 * kLightSums * i)};
 }
 
+// The radiance of the sums; or, where another radiance is given, the difference to it times a share: what turns that one into a
+// mixture of both.
 template <class T> struct ShadeSumsBody {
   const float* lut;
   bool compensate;
   SummedArrays<const T> in;
+  const T *other, *share;  // [n, 3] and [n], or null
   T* radiance;
 
   SPLITNERF_HD void operator()(int64_t i) const {
-    store3(radiance + 3 * i, shade_sums(lut, compensate, load_summed_point(in, i)));
+    const Vec3<T> summed = shade_sums(lut, compensate, load_summed_point(in, i));
+    store3(radiance + 3 * i, other ? (summed - load3(other + 3 * i)) * share[i] : summed);
   }
 };
 SPLITNERF_ON_GPU(ShadeSumsBody);
@@ -172,21 +179,21 @@ template <class T> struct ShadeSumsBackwardBody {
   const float* lut;
   bool compensate;
   SummedArrays<const T> in;
-  const T* grad_radiance;
+  const T *share, *grad_radiance;
   SummedArrays<T> grad;
+  T* grad_other;  // or null, as share
 
   SPLITNERF_HD void operator()(int64_t i) const {
-    const SummedPoint<T> g =
-        shade_sums_backward(lut, compensate, load_summed_point(in, i), load3(grad_radiance + 3 * i));
+    const Vec3<T> given = load3(grad_radiance + 3 * i), to_sum = share ? given * share[i] : given;
+    // radiance = (summed - other) share
+    if (grad_other) store3(grad_other + 3 * i, -to_sum);
+    const SummedPoint<T> g = shade_sums_backward(lut, compensate, load_summed_point(in, i), to_sum);
     store3(grad.normals + 3 * i, g.normal);
     store3(grad.view_dirs + 3 * i, g.view);
     store3(grad.albedo + 3 * i, g.albedo);
     grad.roughness[i] = g.roughness;
     grad.metallic[i] = g.metallic;
-    store3(grad.all + 3 * i, g.light.all);
-    store3(grad.grazing + 3 * i, g.light.grazing);
-    store3(grad.diffuse + 3 * i, g.light.diffuse);
-    store3(grad.dielectric + 3 * i, g.light.dielectric);
+    store_sums(grad.sums + 3 * kLightSums * i, g.light);
   }
 };
 SPLITNERF_ON_GPU(ShadeSumsBackwardBody);

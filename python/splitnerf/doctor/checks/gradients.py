@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+import torch
+from torch import Tensor
+
 from splitnerf.doctor.checks.fields import BOX, GRID, SPEC, points
 from splitnerf.doctor.checks.light import pyramid
 from splitnerf.doctor.checks.losses import metals, neighbours, pixels
 from splitnerf.doctor.checks.rays import between, offsets, plane_inputs, surface_inputs
 from splitnerf.doctor.checks.shading import LINEAR, up, views
-from splitnerf.doctor.table import CHECKS, N, column, lut, pattern, slopes, sphere
+from splitnerf.doctor.table import CHECKS, N, check, column, lut, pattern, slopes, sphere
 from splitnerf.ops._library import lib
 
 
@@ -28,11 +31,13 @@ def material() -> tuple:
 
 
 def split_sum() -> tuple:
-    return *material(), pattern(N, 3), 2 * pattern(N, 3), column(0.7), column(0.6), lut(), 0, True
+    light = pattern(N, 3), 2 * pattern(N, 3), column(0.7), column(0.6)
+    return *material(), *light, lut(), 0, True, 0.3 * pattern(N, 3), 0.1 * pattern(N, 3)
 
 
 def sums() -> tuple:
-    return *material(), *(k * pattern(N, 3) for k in (1.0, 0.1, 0.8, 0.05)), lut(), True
+    light = torch.stack([k * pattern(N, 3) for k in (1.0, 0.1, 0.8, 0.05)], 1)
+    return *material(), light, lut(), True, pattern(N, 3), pattern(N)
 
 
 def drawn_light() -> tuple:
@@ -45,8 +50,16 @@ def shared_light() -> tuple:
     return up(), views(), column(0.5), *light
 
 
+def corrections() -> tuple:
+    """Of N rays, each with two samples in a segment."""
+    every = torch.arange(2 * N)
+    rays = pattern(N, 3), 2 * pattern(2 * N, 3), every, every, every // 2, every // 2
+    return *rays, 0.1 + 0.1 * pattern(2 * N), 0.2 + 0.3 * pattern(N), 1e-4
+
+
 # The inputs of the forward operator, and those to which the backward pass gives a gradient.
 BACKWARD: dict[str, tuple[Callable[[], tuple], tuple[int, ...]]] = {
+    "add_corrections_backward": (corrections, (0, 1)),
     "composite_backward": (lambda: (pattern(N), pattern(N, 3), offsets(), pattern(3), 0.75), (0, 1, 3)),
     "gradient_losses_backward": (neighbours, (0,)),
     "hash_encode_backward": (grid, (1,)),
@@ -65,7 +78,7 @@ BACKWARD: dict[str, tuple[Callable[[], tuple], tuple[int, ...]]] = {
     "prefilter_light_backward": (lambda: (sphere(N), column(0.5), sphere(256), pattern(256, 3)), (3,)),
     "query_direction_backward": (lambda: (up(), views(), column(0.5), lut(), True), (0, 1, 2)),
     "sdf_field_backward": (field, (1, 2, 3, 4, 5, 6, 7)),
-    "shade_sums_backward": (sums, tuple(range(9))),
+    "shade_sums_backward": (sums, (*range(6), 8)),
     "sharpness_backward": (lambda: (0.5 * pattern(N),), (0,)),
     "split_sum_shade_backward": (split_sum, tuple(range(9))),
     "summed_light_backward": (shared_light, (0, 2, 5)),
@@ -85,3 +98,14 @@ def by_differences(backward: str) -> Callable[[], Iterator[tuple]]:
 
 
 CHECKS.update((name, by_differences(name)) for name in BACKWARD)
+
+
+@check
+def material_network_backward():
+    """Differences of the forward operator, by inputs in two parts, weights and biases."""
+    inputs = pattern(N, 2), pattern(N, 3), pattern(4, 5) - 1, pattern(5, 4) - 1, pattern(4) + 0.3, pattern(5) - 1
+
+    def network(a: Tensor, b: Tensor, *numbers: Tensor) -> tuple[Tensor, ...]:
+        return lib.material_network([a, b], list(numbers[:2]), list(numbers[2:]), 0.2)
+
+    yield from slopes(network, inputs, tuple(range(6)))

@@ -6,7 +6,7 @@ import math
 
 import torch
 
-from splitnerf.doctor.table import N, axis, check, column, lut, sphere
+from splitnerf.doctor.table import N, axis, check, column, lut, pattern, sphere
 from splitnerf.ops._library import lib
 
 LINEAR, SRGB = (0.001, 0.2140411, 1.0), (0.01292, 0.5, 1.0)  # the same colours
@@ -52,7 +52,7 @@ def light_queries():
 def split_sum_shade():
     """A white furnace: white of any roughness and metallic under white light is white."""
     white, even = torch.ones(N, 3), torch.linspace(0, 1, N)[:, None]
-    yield lib.split_sum_shade(up(), views(), white, even, even, white, white, white, white, lut(), 0, True), white
+    yield lib.split_sum_shade(up(), views(), white, even, even, white, white, white, white, lut(), 0, True, None, None), white
 
 
 N_DOT_V = (16 / 31) ** 2  # at a column of the split sum's table
@@ -71,9 +71,41 @@ def furnace_sums() -> torch.Tensor:
 @check
 def shade_sums():
     """A white furnace: white of any metallic under white light is white."""
-    sums = (torch.ones(N, 3) * integral for integral in furnace_sums())
+    sums = furnace_sums()[None, :, None].repeat(N, 1, 3)
     metallic = torch.linspace(0, 1, N)[:, None]
-    yield lib.shade_sums(up(), slanted(), torch.ones(N, 3), column(1.0), metallic, *sums, lut(), True), torch.ones(N, 3)
+    yield lib.shade_sums(up(), slanted(), torch.ones(N, 3), column(1.0), metallic, sums, lut(), True, None, None), torch.ones(N, 3)
+
+
+@check
+def material_network():
+    """Two rectified units whose sum is |x|, and sigmoids of multiples of it; the roughness above .2."""
+    x = torch.linspace(-2, 2, N)[:, None]
+    weights = [torch.tensor([[1.0], [-1.0]]), torch.arange(5.0)[:, None].repeat(1, 2)]
+    albedo, roughness, metallic = lib.material_network([x], weights, [torch.zeros(2), torch.full((5,), -1.0)], 0.2)
+    share = 1 / (1 + torch.exp(1 - x.abs() * torch.arange(5.0)))
+    yield albedo, share[:, :3]
+    yield roughness, 0.2 + 0.8 * share[:, 3:4]
+    yield metallic, share[:, 4:]
+
+
+@check
+def wide_lobes():
+    """t^2 (3 - 2 t) from a roughness of .25 to .75, but for the last point, which does not count."""
+    at, share = lib.wide_lobes(torch.arange(N), torch.linspace(0, 1, N)[:, None], 0.25, 0.75, torch.tensor(N - 1))
+    t = (2 * torch.linspace(0, 1, N) - 0.5).clamp(0, 1)
+    yield at, torch.arange(N)
+    yield share, (t * t * (3 - 2 * t)) * (torch.arange(N) < N - 1)
+
+
+@check
+def add_corrections():
+    """Each ray has a sample in front with a quarter of its opacity, which is corrected, and one behind."""
+    every = torch.arange(2 * N)
+    weights, opacity = torch.tensor([0.2, 0.6]).repeat(N), torch.full((N,), 0.8)
+    found = lib.add_corrections(
+        torch.ones(N, 3), pattern(N, 3), every[::2], every, every // 2, every, weights, opacity, 1e-4
+    )
+    yield found, 1 + 0.25 * pattern(N, 3)
 
 
 @check
