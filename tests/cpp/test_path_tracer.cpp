@@ -277,7 +277,7 @@ TEST(Principled, DirectionalAlbedoIsTheSplitSum) {
           const BsdfValue<double> f = bsdf.evaluate(bsdf.sample(random_unit<double>(i), u.x, u.y));
           if (f.pdf > 0) sum += f.f_cos * (1 / (f.pdf * kPoints));
         }
-        const ShadePoint<double> p{{0, 0, 1}, view, albedo, roughness, metallic, one, one, one, one};
+        const ShadePoint<double> p{{0, 0, 1}, view, albedo, roughness, metallic, one, one, one, one, {}, {}};
         const Vec3<double> split = split_sum_shade(brdf_lut(), {FresnelMode::kExact, true}, p);
         for (int c = 0; c < 3; ++c)
           EXPECT_NEAR(sum[c], split[c], 0.01 * split[c] + 1e-3) << roughness << " " << cosine << " " << metallic;

@@ -140,7 +140,7 @@ TEST(QueryDirection, AdjointFollowsCentralDifferences) {
 
 ShadePoint<double> white_point(Random& random) {
   const Vec3<double> one{1, 1, 1};
-  return {random.direction(), random.direction(), one, random.uniform(), 0, one, one, one, one};
+  return {random.direction(), random.direction(), one, random.uniform(), 0, one, one, one, one, {}, {}};
 }
 
 // Under white light a white dielectric returns (1 - E) + E; a white metal E, which compensation fills up to 1.
@@ -199,7 +199,8 @@ TEST(Shading, AdjointFollowsCentralDifferences) {
         std::vector<double> gradient(x.size()), radiance(3 * n);
         const auto arrays = [&](auto* p) {
           return ShadeArrays<std::remove_pointer_t<decltype(p)>>{
-              p + at[0], p + at[1], p + at[2], p + at[3], p + at[4], p + at[5], p + at[6], p + at[7], p + at[8]};
+              p + at[0], p + at[1], p + at[2], p + at[3], p + at[4], p + at[5], p + at[6], p + at[7], p + at[8],
+              nullptr,   nullptr};
         };
         const auto f = [&] {
           cpu::run(n, ShadeBody<double>{brdf_lut(), options, channels, arrays(static_cast<const double*>(x.data())),
@@ -222,10 +223,12 @@ TEST(Shading, FloatFollowsDouble) {
   for (int i = 0; i < 200; ++i) {
     ShadePoint<double> p = white_point(random);
     p.albedo = {random.uniform(), random.uniform(), random.uniform()}, p.metallic = random.uniform();
+    p.indirect_s = {random.uniform(), 0, 2}, p.indirect_d = {0, random.uniform(), 1};
     ShadePoint<float> q;
     const auto narrow = [](Vec3<double> v) { return Vec3<float>{float(v.x), float(v.y), float(v.z)}; };
     q = {narrow(p.normal),   narrow(p.view),    narrow(p.albedo),      float(p.roughness),   float(p.metallic),
-         narrow(p.specular), narrow(p.diffuse), narrow(p.occlusion_s), narrow(p.occlusion_d)};
+         narrow(p.specular), narrow(p.diffuse), narrow(p.occlusion_s), narrow(p.occlusion_d),
+         narrow(p.indirect_s), narrow(p.indirect_d)};
     const Vec3<double> exact = split_sum_shade(brdf_lut(), {}, p);
     const Vec3<float> got = split_sum_shade(brdf_lut(), {}, q);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], exact[c], 2e-5);

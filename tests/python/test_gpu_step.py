@@ -81,10 +81,8 @@ def test_a_level_without_gradient_is_found(prepared, there, level):
 
 def test_a_dropped_gradient_is_found(prepared, there, monkeypatch):
     """Of the visible light's sum to its colours, and of all of a parameter."""
-    summed = rendering.summed_light
-    monkeypatch.setattr(
-        rendering, "summed_light", lambda n, v, r, d, a, colours, *rest: summed(n, v, r, d, a, colours.detach(), *rest)
-    )
+    corrected = rendering.summed_correction
+    monkeypatch.setattr(rendering, "summed_correction", lambda *x: corrected(*x[:9], x[9].detach(), *x[10:]))
     assert wrong(prepared, there) == {f"gradient, light.texels, level {i}" for i in range(3)}
     monkeypatch.undo()
     there.model.material.net[0].bias.requires_grad_(False)
