@@ -123,7 +123,7 @@ struct Materials {
         albedo(checked(op, "albedo", albedo_in, {n(), 3}, type)), shares(checked(op, "shares", shares_in, {n()}, type)),
         smooth_l1(smooth_l1) {}
   int64_t n() const { return metallic.size(0); }
-  template <class T> MaterialArrays<T> view() const {
+  template <class T> MaterialLossArrays<T> view() const {
     return {in<T>(albedo), in<T>(metallic), in<T>(shares), smooth_l1};
   }
 };

@@ -406,7 +406,7 @@ TEST(PointKernels, MaterialLosses) {
     for (const bool smooth : {false, true}) {
       Random random(75);
       const auto albedo = random.uniforms(3 * n), metallic = random.uniforms(n), shares = random.uniforms(n);
-      const MaterialArrays<double> in{albedo.data(), metallic.data(), shares.data(), smooth};
+      const MaterialLossArrays<double> in{albedo.data(), metallic.data(), shares.data(), smooth};
       const double grad[] = {1.5, -0.5, 0.25};
       const auto run = [&](const auto& launch) {
         std::vector<std::vector<double>> out{unwritten<double>(3), unwritten<double>(1), unwritten<double>(n)};

@@ -125,7 +125,7 @@ template <class T> struct SamplesOfPairsBackwardBody {
 SPLITNERF_ON_GPU(SamplesOfPairsBackwardBody);
 
 // What the losses of materials read.
-template <class T> struct MaterialArrays {
+template <class T> struct MaterialLossArrays {
   const T *albedo, *metallic, *shares;
   bool smooth_l1;
 
@@ -137,7 +137,7 @@ template <class T> struct MaterialArrays {
 // sums = {metal, binary, dark, share}
 template <class T> struct MaterialLossesBody {
   static constexpr int n_sums = 4;
-  MaterialArrays<T> in;
+  MaterialLossArrays<T> in;
   T *losses, *total;  // [3], and the sum of the shares
 
   SPLITNERF_HD void operator()(int64_t i, double* sums) const {
@@ -154,7 +154,7 @@ template <class T> struct MaterialLossesBody {
 SPLITNERF_ON_GPU(MaterialLossesBody);
 
 template <class T> struct MaterialLossesBackwardBody {
-  MaterialArrays<T> in;
+  MaterialLossArrays<T> in;
   const T *total, *grad_losses;
   T* grad_metallic;
 
