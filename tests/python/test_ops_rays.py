@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from op_cases import OFFSETS, composite_inputs, march_inputs, neus_inputs, packed_samples, surface_case, surface_inputs
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib
+from ray_inputs import OFFSETS, composite_inputs, march_inputs, neus_inputs, packed_samples, surface_case, surface_inputs
 
 from splitnerf.bench import reference
 from splitnerf.ops import (
