@@ -129,7 +129,8 @@ def trace(
 def one_of_each_run(n: int, share: float, generator: torch.Generator) -> Tensor:
     """Random numbers [m] int64 below n, ascending, where m is about ``share`` of n: one of each run of n / m.
 
-    Each number has the same chance; one on the border of two runs may come twice. The host knows how many there are, so that it does not wait for a GPU.
+    Each number has the same chance; one on the border of two runs may come twice. The host knows how many
+    there are, so that it does not wait for a GPU.
     """
     m = min(n, round(share * n))
     first = torch.arange(m, device=generator.device)

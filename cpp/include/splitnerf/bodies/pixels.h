@@ -136,8 +136,8 @@ template <class T> struct ProbesBody {
 };
 SPLITNERF_ON_GPU(ProbesBody);
 
-// positions [n_room + n_anywhere + n_beside]: the midpoints of the samples in the first of n_rows and, up to n_room, the first of them again; then
-// given points; then points beside samples, chosen by a number in [0, 1). Without samples the room is filled with zeros.
+// positions [n_room + n_anywhere + n_beside]: the midpoints of the samples, which fill the first of n_rows, and, up to n_room, the
+// first of them again; then given points; then points beside samples, chosen by a number in [0, 1). Without samples the room is filled with zeros.
 template <class T> struct PlaceSamplesBody {
   int64_t n_rays, n_rows, n_room, n_anywhere;
   const T *rays_o, *rays_d;
