@@ -19,11 +19,19 @@ from urllib.parse import quote, urlsplit
 import numpy as np
 import pytest
 from gltf_builder import Gltf
+from painted_ball import looking
 
 import splitnerf.view
 from splitnerf.cli import BAD_INPUT, DONE, main
-from splitnerf.data.images import encode_image, read_image, write_image
+from splitnerf.data.environment import rotate_environment
+from splitnerf.data.frames import read_frames
+from splitnerf.data.images import decode_image, encode_image, read_image, write_image
+from splitnerf.data.reading import Reading
+from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.view import final
 from splitnerf.view import server as server_module
+from splitnerf.view.final import Camera, Tracer
+from splitnerf.view.photos import Photos
 from splitnerf.view.server import ViewServer
 from splitnerf.view.shown import MOST_DROPPED, Shown, as_halves
 
@@ -55,8 +63,8 @@ def run(tmp_path):
 
 
 @contextmanager
-def serving(*paths, light=None, host="127.0.0.1"):
-    with ViewServer(Shown(list(paths), light), host) as server:
+def serving(*paths, light=None, photos=None, host="127.0.0.1"):
+    with ViewServer(Shown(list(paths), light), photos, host) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
         try:
@@ -237,6 +245,147 @@ def test_a_light_of_many_rows_is_made_smaller(run, tmp_path, monkeypatch):
     assert light[..., :3] == pytest.approx(blocks, rel=1e-3)
 
 
+# ---- photos ----
+
+
+def test_photos_are_served_with_their_cameras(run, data):
+    with serving(run, photos=Photos(data, Reading())) as server:
+        cameras = json.loads(ask(server, "scene.json")[2])["cameras"]
+        frames = [frame for split in ("train", "test") for frame in read_frames(data, split)[0]]
+        assert [camera["name"] for camera in cameras] == [frame.name for frame in frames]
+        assert np.array_equal(np.reshape(cameras[3]["pose"], (4, 4)), frames[3].pose)
+        assert (cameras[3]["width"], cameras[3]["height"]) == (24, 24)
+        status, headers, content = ask(server, "photos/3")
+        assert status == 200 and headers["Content-Type"] == "image/png"
+        assert np.array_equal(decode_image(content, "photo"), read_image(frames[3].image_path))
+        assert ask(server, f"photos/{len(frames)}")[0] == 404
+
+
+def test_large_photos_are_averaged_down_and_masks_hide_nothing(run, data, tmp_path, monkeypatch):
+    monkeypatch.setattr("splitnerf.view.photos.LARGEST", 10)
+    with serving(run, photos=Photos(data, Reading())) as server:
+        assert decode_image(ask(server, "photos/0")[2], "photo").shape == (8, 8, 4)
+    shutil.copytree(data, tmp_path / "data")
+    for path in (tmp_path / "data").rglob("transforms*.json"):
+        content = json.loads(path.read_text())
+        for frame in content["frames"]:
+            frame["mask_path"] = "none.png"
+        write_image(path.parent / "none.png", np.zeros((24, 24), np.float32))
+        path.write_text(json.dumps(content))
+    photo = read_frames(tmp_path / "data", "train")[0][0].image_path
+    write_image(photo, np.full((24, 24, 3), 0.5, np.float32))
+    monkeypatch.undo()
+    with serving(run, photos=Photos(tmp_path / "data", Reading())) as server:
+        assert (decode_image(ask(server, "photos/0")[2], "photo")[..., 3] == 1).all()
+
+
+def test_a_photo_that_is_gone_is_said(run, data, tmp_path):
+    shutil.copytree(data, tmp_path / "data")
+    photos = Photos(tmp_path / "data", Reading())
+    with serving(run, photos=photos) as server:
+        shutil.rmtree(tmp_path / "data")
+        status, line = error_of(ask(server, "photos/0"))
+        assert status == 422 and "r_000.png: cannot be read (No such file" in line
+    with serving(run) as server:
+        assert json.loads(ask(server, "scene.json")[2])["cameras"] == [] and ask(server, "photos/0")[0] == 404
+
+
+# ---- path tracing ----
+
+
+def camera_of(width, height, **changes):
+    """A camera 3 above the triangle's plane that sees all of it, for JSON."""
+    pose = looking(-np.pi / 2, 0.0) + np.array([[0, 0, 0, 0.4], [0, 0, 0, 0], [0, 0, 0, 0.4], [0, 0, 0, 0]])
+    lens = [1.5 * width, 1.5 * width, width / 2, height / 2]
+    return {"pose": pose.ravel().tolist(), "intrinsics": lens, "width": width, "height": height, "turn": 0, "lights": [0]} | changes
+
+
+def streamed(server, **camera):
+    """(asset, spp, picture) of each picture of a stream."""
+    status, _, content = ask(server, "final", method="POST", body=json.dumps(camera).encode())
+    assert status == 200
+    pictures = []
+    while content:
+        asset, width, height, spp, length = server_module.PICTURE.unpack_from(content)
+        content = content[server_module.PICTURE.size :]
+        pictures.append((asset, spp, np.frombuffer(content[:length], "<f2").reshape(height, width, 4)))
+        content = content[length:]
+    return pictures
+
+
+def test_pictures_are_those_of_the_path_tracer(run, monkeypatch):
+    """Strips of a picture and passes add up to what one call of the tracer says, also with the light turned."""
+    monkeypatch.setattr(final, "PASSES", (1, 1, 62))
+    monkeypatch.setattr(final, "FIRST_SIDE", 20)
+    monkeypatch.setattr(final, "PATHS_A_CALL", 500)
+    asset = Shown([run]).sources[0].asset
+    with serving(run) as server:
+        for turn in (0, 90):
+            camera = camera_of(60, 40, turn=turn)
+            pictures = streamed(server, **camera)
+            assert [(asset, spp, picture.shape) for asset, spp, picture in pictures] == [
+                (0, 1, (13, 20, 4)), (0, 1, (40, 60, 4)), (0, 2, (40, 60, 4)), (0, 64, (40, 60, 4))]  # fmt: skip
+            expected = AssetRenderer(asset).render(
+                rotate_environment(sky(), turn), np.reshape(camera["pose"], (4, 4)), camera["intrinsics"], 60, 40, spp=256
+            )  # fmt: skip
+            best = pictures[-1][2].astype(np.float32)
+            assert 0.1 < expected["alpha"].mean() < 0.9
+            assert np.abs(best[..., 3] - expected["alpha"]).max() < 0.25 and np.abs(best[..., 3] - expected["alpha"]).mean() < 0.01
+            inside = expected["alpha"] > 0.99
+            assert best[inside, :3].mean(axis=0) == pytest.approx(expected["radiance"][inside].mean(axis=0), rel=0.03)
+
+
+def test_two_assets_are_traced_in_turns(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(final, "PASSES", (1, 1))
+    with serving(run, triangle().write(tmp_path / "other.glb")) as server:
+        pictures = streamed(server, **camera_of(16, 16, lights=[0, 1]))
+    assert [(asset, spp) for asset, spp, _ in pictures] == [(0, 1), (1, 1), (0, 1), (1, 1), (0, 2), (1, 2)]
+
+
+def test_a_newer_request_ends_the_one_before(run, monkeypatch):
+    monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
+    tracer = Tracer(Shown([run]))
+    camera = Camera.of(camera_of(16, 16), 1)
+    first = tracer.pictures(camera, lambda: False)
+    assert next(first).spp == 1
+    second = []
+    thread = threading.Thread(target=lambda: second.append(next(tracer.pictures(camera, lambda: False))))
+    thread.start()
+    assert sum(1 for _ in first) < 1_000_000  # else it would not end
+    thread.join()
+    assert second[0].spp == 1
+    third = tracer.pictures(camera, lambda: True)
+    assert list(third) == []
+
+
+def test_a_page_that_goes_ends_its_request(run, monkeypatch):
+    monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
+    with serving(run) as server:
+        body = json.dumps(camera_of(16, 16)).encode()
+        with socket.create_connection(server.server_address) as page:
+            path = urlsplit(server.url).path
+            page.sendall(
+                f"POST {path}final HTTP/1.1\r\nHost: {urlsplit(server.url).netloc}\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body
+            )
+            assert page.recv(12).startswith(b"HTTP/1.0 200")
+        with server.tracer._working:  # is free once the stream has ended
+            pass
+
+
+def test_cameras_beyond_reason_are_refused(run, served):
+    good = camera_of(16, 16)
+    for changes in (
+        {"width": 0}, {"width": 1 << 20}, {"width": 4000, "height": 4000}, {"intrinsics": [1, 1, 8]}, {"intrinsics": [0, 1, 8, 8]},
+        {"intrinsics": ["x", 1, 8, 8]}, {"pose": [0] * 16}, {"pose": [1] * 4}, {"pose": None}, {"lights": []}, {"lights": [7]},
+        {"turn": float("nan")}, {"turn": 1e9}, {"height": None},
+    ):  # fmt: skip
+        status, line = error_of(ask(served, "final", method="POST", body=json.dumps(good | changes).encode()))
+        assert status == 422 and "\n" not in line, changes
+    assert ask(served, "final", method="POST", body=b"{")[0] == 400
+    assert ask(served, "final", method="POST", body=b"[]")[0] == 422
+    assert ask(served, "final", method="POST", body=b" " * 70_000)[0] == 413
+
+
 # ---- the command ----
 
 
@@ -260,6 +409,7 @@ def test_what_cannot_be_shown_is_refused_before_anything_is_served(run, tmp_path
     assert "empty: has no mesh.glb" in refused(capsys, tmp_path / "empty")
     assert "absent.glb: no such file" in refused(capsys, tmp_path / "absent.glb")
     assert "bad.hdr: " in refused(capsys, run, "--light", tmp_path / "bad.hdr")
+    assert "absent: no such folder" in refused(capsys, run, "--data", tmp_path / "absent")
     assert "--port must lie between 0 and 65535" in refused(capsys, run, "--port", 70000)
 
 

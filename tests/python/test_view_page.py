@@ -13,15 +13,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from painted_ball import sky, with_textures
+from painted_ball import looking, sky, with_textures
 from PIL import Image
 
 import splitnerf.view
 from splitnerf.data.environment import rotate_environment
-from splitnerf.data.images import linear_to_srgb, write_image
+from splitnerf.data.images import area_average, linear_to_srgb, read_image, write_image
+from splitnerf.data.reading import Reading
 from splitnerf.export.glb import write_glb
-from splitnerf.relight.cameras import turntable
+from splitnerf.relight.cameras import bounding_sphere, turntable
 from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.view.photos import Photos
 from splitnerf.view.server import ViewServer
 from splitnerf.view.shown import Shown
 
@@ -30,6 +32,7 @@ LOOK = Path(__file__).parents[1] / "viewer/look.mjs"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 SIZE = 160
 TURN = 90
+CLICKED = 1  # the number of the photo whose camera is clicked
 BARE = "#names, #said, #fold, #legend { display: none !important } #canvas { outline: 0 !important }"  # the picture alone
 
 pytestmark = pytest.mark.skipif(
@@ -45,9 +48,9 @@ def lamps():
     return light
 
 
-def look(shown, steps):
+def look(shown, steps, photos=None):
     """What the page says while it does the steps."""
-    with ViewServer(shown) as server:
+    with ViewServer(shown, photos) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
         try:
@@ -127,9 +130,77 @@ def traced(run):
     return {turn: picture(turn) for turn in (0, TURN, -TURN, 180)}
 
 
+@pytest.fixture(scope="module")
+def photos(run):
+    """The ball through three cameras whose lens looks past the middle, path traced, as a data set."""
+    folder = run.parent / "data"
+    source, frames = Shown([run]).sources[0], []
+    lens = (200.0, 190.0, 95.0, 50.0)
+    for i, (azimuth, elevation) in enumerate(((0.4, 0.5), (-2.0, 0.2), (2.5, -0.3))):
+        pose = looking(azimuth, elevation, 5.0)
+        images = AssetRenderer(source.asset).render(lamps(), pose, lens, SIZE, 120, spp=64)
+        straight = linear_to_srgb(np.clip(images["radiance"] / np.maximum(images["alpha"], 1e-6)[..., None], 0, 1))
+        write_image(folder / f"{i}.png", np.dstack([straight, images["alpha"]]))
+        frames.append({"file_path": f"{i}.png", "transform_matrix": pose.tolist()})
+    intrinsics = dict(zip(("fl_x", "fl_y", "cx", "cy"), lens)) | {"w": SIZE, "h": 120}
+    (folder / "transforms.json").write_text(json.dumps(intrinsics | {"frames": frames}))
+    return Photos(folder, Reading())
+
+
+@pytest.fixture(scope="module")
+def through(run, photos):
+    """Pictures by name, and what the page said, of a second walk: through the photos' cameras, path traced, two assets."""
+    folder = run.parent / "through"
+    folder.mkdir()
+
+    def picture(name):
+        return {"do": "picture", "path": str(folder / f"{name}.png")}
+
+    def keys(*names):
+        return [{"do": "key", "key": name} for name in names]
+
+    def split(value):
+        return {"do": "set", "selector": "#split", "value": value}
+
+    x, y = place_of_camera(run, photos, CLICKED)
+    bare = {"do": "style", "content": BARE + "#split-row { display: none !important }"}
+    chosen = {"do": "text", "script": "document.getElementById('through').selectedOptions[0].textContent"}
+    steps = [
+        {"do": "size", "width": 700, "height": 440}, {"do": "open"}, *keys("n"), picture("whole"), *keys("r"),
+        bare, {"do": "size", "width": SIZE, "height": SIZE}, *keys("h", "b", "n", "n"), split(100), picture("photo"),
+        split(0), picture("render"), *keys("5"), picture("outline"), *keys("1"), chosen | {"name": "second"},
+        {"do": "drag", "from": [80, 80], "to": [82, 80]}, chosen | {"name": "left"}, *keys("r"),
+        *keys("c", "-", "-", "-", "-", "-", "-", "-", "-"), picture("frusta"),
+        {"do": "click", "x": x, "y": y}, chosen | {"name": "clicked"},
+        *keys("r", "c", "f"), picture("final"), {"do": "text", "name": "said", "script": "document.getElementById('said').textContent"},
+        {"do": "set", "selector": "#turn", "value": TURN}, picture("turned"), *keys("f"), picture("again"),
+    ]  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("splitnerf.view.final.PASSES", (1, 1, 30))
+        told = look(Shown([run]), steps, photos)
+    return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
+
+
+def place_of_camera(run, photos, number):
+    """The pixel in which a photo's camera is seen from the front, eight keys farther away."""
+    view = turntable(Shown([run]).sources[0].asset, 1, size=(SIZE, SIZE))[0]
+    centre = bounding_sphere(Shown([run]).sources[0].asset)[0]
+    eye = centre + (view.pose[:3, 3] - centre) / 0.9**8
+    place = view.pose[:3, :3].T @ (np.reshape(photos.cameras()[number]["pose"], (4, 4))[:3, 3] - eye)
+    assert place[2] < 0
+    return [SIZE / 2 + view.intrinsics[0] * place[0] / -place[2], SIZE / 2 - view.intrinsics[1] * place[1] / -place[2]]
+
+
 def psnr(picture, traced):
     truth, inside = traced
     return -10 * np.log10(((picture - truth)[inside] ** 2).mean())
+
+
+def smooth_psnr(picture, traced):
+    """Of the means of 8 x 8 pixels, in which the noise of both is small, where the object fills them."""
+    truth, inside = traced
+    full = area_average(inside.astype(np.float32), 8) == 1
+    return psnr(area_average(picture, 8), (area_average(truth, 8), full))
 
 
 def middle(picture):
@@ -201,3 +272,55 @@ def test_a_dropped_light_lights_and_a_damaged_one_is_said(seen):
 def test_a_narrow_window_has_room_for_both(seen):
     told, _ = seen
     assert told["texts"]["overflow"] == 0 and told["texts"]["stage"] > 250
+
+
+def test_a_photo_lies_where_its_camera_draws_the_object(through, run):
+    """The lens looks past the middle, and is not square."""
+    told, pictures = through
+    complaints = [line for line in told["console"] if not line.startswith("warning: ")]
+    assert complaints == [] and told["texts"]["second"] == "2"  # every 8th is for testing and comes last
+    stored = read_image(run.parent / "data/2.png")
+    inside = stored[..., 3] > 0.999
+    grey = np.float32([0x8F, 0x92, 0x96]) / 255
+    photo, render = (pictures[name][20:140] for name in ("photo", "render"))
+    assert np.abs(photo - (stored[..., :3] * stored[..., 3:] + grey * (1 - stored[..., 3:])))[inside].max() < 0.01
+    assert psnr(render, (stored[..., :3], inside)) > 30
+    drawn = np.abs(pictures["outline"][20:140] - grey).max(axis=2) > 0.05
+    wrong = {shift: (drawn != (np.roll(stored[..., 3], shift, axis=(0, 1)) > 0.15)).sum() for shift in (0, -1, 1)}
+    print(wrong)
+    assert wrong[0] < 0.01 * inside.sum() and wrong[0] < min(wrong[-1], wrong[1]) / 2
+    assert np.abs(pictures["render"][:20] - grey).max() < 0.01  # beside the photo
+
+
+def test_cameras_are_left_and_clicked(through, photos):
+    told, pictures = through
+    assert told["texts"]["left"] == "none" and told["texts"]["clicked"] == photos.cameras()[CLICKED]["name"]
+    rows, columns = np.indices((SIZE, SIZE)) - SIZE / 2
+    lines = (pictures["frusta"][..., 2] - pictures["frusta"][..., 0] > 0.1) & (np.hypot(rows, columns) > 40)
+    assert 20 < lines.sum() < 1000
+
+
+def test_the_final_picture_is_the_path_tracers(through, traced):
+    told, pictures = through
+    assert told["texts"]["said"] == "path traced, 32 paths a pixel"
+    for name, turn in (("final", 0), ("turned", TURN)):
+        scores = {other: smooth_psnr(pictures[name], traced[other]) for other in traced}
+        print(name, scores, smooth_psnr(pictures["again"], traced[turn]))
+        assert scores[turn] > 45 and all(scores[other] < 35 for other in traced if other != turn)
+    assert not np.array_equal(pictures["again"], pictures["turned"])
+
+
+def test_two_assets_stand_side_by_side(run, ball, tmp_path):
+    dark = np.full((64, 64, 3), 0.02, np.float32)
+    write_glb(tmp_path / "dark.glb", with_textures(ball, albedo_texture=dark))
+    steps = [
+        {"do": "size", "width": 2 * SIZE, "height": SIZE}, {"do": "open"},
+        {"do": "text", "name": "names", "script": "document.getElementById('names').innerText"},
+        {"do": "style", "content": BARE}, {"do": "key", "key": "h"}, {"do": "key", "key": "2"},
+        {"do": "picture", "path": str(tmp_path / "two.png")},
+    ]  # fmt: skip
+    told = look(Shown([run, tmp_path / "dark.glb"]), steps)
+    picture = pixels(tmp_path / "two.png")
+    assert told["texts"]["names"].split() == ["mine", "dark.glb"]
+    for half, albedo in ((picture[:, :SIZE], 0.4), (picture[:, SIZE:], 0.02)):
+        assert middle(half) == pytest.approx([float(linear_to_srgb(np.float32([albedo]))[0])] * 3, abs=0.02)

@@ -10,20 +10,28 @@ import hmac
 import ipaddress
 import json
 import secrets
+import select
 import socket
 import socketserver
+import struct
 import sys
 import threading
+from contextlib import closing
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
 from importlib.resources import files
+from itertools import chain
 from urllib.parse import parse_qs, urlsplit
 
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
+from splitnerf.view.final import Camera, Tracer
+from splitnerf.view.photos import Photos
 from splitnerf.view.shown import Shown, Source, as_halves
 
 LARGEST_UPLOAD = 128 << 20  # bytes of a light
+LARGEST_QUESTION = 1 << 16  # bytes of a camera
+PICTURE = struct.Struct("<5I")  # asset, width, height, paths a pixel, bytes that follow
 PATIENCE = 60.0  # seconds that a connection may be silent
 SAFETY = {
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' blob: data:; "
@@ -48,6 +56,7 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
 
     Args:
         shown: The assets and lights.
+        photos: The photos whose cameras are shown, or None.
         host: The address to listen at.
         port: The port; 0 takes a free one.
 
@@ -61,8 +70,8 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
     daemon_threads = True
     allow_reuse_address = True
 
-    def __init__(self, shown: Shown, host: str = "127.0.0.1", port: int = 0):
-        self.shown, self.host = shown, host
+    def __init__(self, shown: Shown, photos: Photos | None = None, host: str = "127.0.0.1", port: int = 0):
+        self.shown, self.photos, self.host, self.tracer = shown, photos, host, Tracer(shown)
         self.page = files("splitnerf.view").joinpath("viewer.html").read_bytes()
         self.uploading = threading.Lock()
         self._token = secrets.token_urlsafe(16)
@@ -92,6 +101,11 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
             return True
         return self.host in ("0.0.0.0", "::") and is_number(name)
 
+    def server_close(self) -> None:
+        """Ends what is being traced, and listens no more."""
+        self.tracer.stop()
+        super().server_close()
+
     def handle_error(self, request, client_address) -> None:
         """One line for what goes wrong in a thread; a page that was closed says nothing."""
         error = sys.exc_info()[1]
@@ -118,10 +132,11 @@ class Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         self._answered({
             "": self._page, "scene.json": self._scene, "assets": self._asset, "lights": self._light, "deviations": self._deviations,
+            "photos": self._photo,
         })  # fmt: skip
 
     def do_POST(self) -> None:
-        self._answered({"lights": self._dropped})
+        self._answered({"lights": self._dropped, "final": self._final})
 
     def log_message(self, format: str, *args: object) -> None:
         """Nothing: the terminal is for errors."""
@@ -131,7 +146,7 @@ class Handler(BaseHTTPRequestHandler):
         try:
             inner = self._checked_path()
             name, _, rest = inner.partition("/")
-            if name not in answers or (rest and name in ("", "scene.json")):
+            if name not in answers or (rest and name in ("", "scene.json", "final")):
                 raise Refused(HTTPStatus.NOT_FOUND, "there is nothing at this address")
             answers[name](rest)
         except Refused as refused:
@@ -154,7 +169,8 @@ class Handler(BaseHTTPRequestHandler):
         self._send(self.server.page, "text/html; charset=utf-8")
 
     def _scene(self, _: str) -> None:
-        self._send(json.dumps(self.server.shown.description()).encode(), "application/json")
+        cameras = [] if self.server.photos is None else self.server.photos.cameras()
+        self._send(json.dumps(self.server.shown.description() | {"cameras": cameras}).encode(), "application/json")
 
     def _asset(self, rest: str) -> None:
         self._send(self._source(rest).content, "model/gltf-binary")
@@ -170,6 +186,31 @@ class Handler(BaseHTTPRequestHandler):
         if deviations is None:
             raise Refused(HTTPStatus.NOT_FOUND, "this asset has no uncertainty.exr")
         self._send_halves(as_halves(deviations))
+
+    def _photo(self, rest: str) -> None:
+        number = self._number(rest)
+        if self.server.photos is None or number >= len(self.server.photos):
+            raise Refused(HTTPStatus.NOT_FOUND, "there is no such photo")
+        self._send(self.server.photos.png(number), "image/png")
+
+    def _final(self, _: str) -> None:
+        """A stream of pictures, each after its PICTURE; it ends where the page closes it, or asks for another one."""
+        try:
+            content = json.loads(self._body(LARGEST_QUESTION))
+        except (ValueError, RecursionError):
+            raise Refused(HTTPStatus.BAD_REQUEST, "the camera is no JSON; load the page again") from None
+        camera = Camera.of(content, len(self.server.shown.sources))
+        with closing(self.server.tracer.pictures(camera, self._is_gone)) as pictures:
+            first = next(pictures, None)  # before the head, so that an error can still be said
+            self._send_head("application/octet-stream")
+            for picture in () if first is None else chain([first], pictures):
+                sizes = (picture.asset, picture.width, picture.height, picture.spp, len(picture.content))
+                self.wfile.write(PICTURE.pack(*sizes) + picture.content)
+
+    def _is_gone(self) -> bool:
+        """Whether the page has closed this connection."""
+        readable, _, _ = select.select([self.connection], [], [], 0)
+        return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
 
     def _dropped(self, rest: str) -> None:
         name = parse_qs(urlsplit(self.path).query).get("name", ["light"])[0]
@@ -204,15 +245,15 @@ class Handler(BaseHTTPRequestHandler):
 
     def _send_halves(self, picture: tuple[int, int, bytes]) -> None:
         width, height, content = picture
-        self._send(content, "application/octet-stream", size=f"{width}x{height}")
+        self._send(content, "application/octet-stream", Picture_Size=f"{width}x{height}")
 
-    def _send(self, content: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, size: str = "") -> None:
-        self.send_response(status)
-        for name, value in SAFETY.items():
-            self.send_header(name, value)
-        if size:
-            self.send_header("Picture-Size", size)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(content)))
-        self.end_headers()
+    def _send(self, content: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, **headers: str) -> None:
+        self._send_head(kind, status, Content_Length=str(len(content)), **headers)
         self.wfile.write(content)
+
+    def _send_head(self, kind: str, status: HTTPStatus = HTTPStatus.OK, **headers: str) -> None:
+        """Sends the head of an answer; names of headers have _ for -."""
+        self.send_response(status)
+        for name, value in (SAFETY | {"Content-Type": kind} | headers).items():
+            self.send_header(name.replace("_", "-"), value)
+        self.end_headers()

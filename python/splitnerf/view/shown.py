@@ -24,7 +24,6 @@ from splitnerf.report.last_stage import KNOWN_COLOURS, QUANTITIES, UNKNOWN_COLOU
 MOST_ROWS = 1024  # of a light that is kept
 MOST_DROPPED = 8  # lights that were dropped onto the page; an older one is forgotten
 BRIGHTEST_HALF = float(np.finfo(np.float16).max)
-WHITE = "white"
 Read = TypeVar("Read")
 
 
@@ -76,7 +75,7 @@ class Shown:
         self._next, self._lock = 0, threading.Lock()
         self._first = None if light is None else self._add(light_of(light, light.name))
         self.sources = [self._source(path) for path in paths]
-        self._add(Light(WHITE, np.ones((8, 16, 3), np.float32)))
+        self._white = self._add(Light("white", np.ones((8, 16, 3), np.float32)))
         self._kept = self._next  # lights up to here are never forgotten
 
     def light(self, number: int) -> Light | None:
@@ -115,6 +114,7 @@ class Shown:
             ],
             "lights": lights,
             "first_light": self._first,
+            "white": self._white,
             "problems": self.problems,
             "camera": {
                 "position": front.pose[:3, 3].tolist(), "target": centre.tolist(), "radius": radius, "half_field": float(HALF_FIELD),

@@ -1,7 +1,9 @@
 // The page of `splitnerf view`: reads what there is to show, and ties panel, keys and picture together.
+import { Cameras } from "./cameras.js";
 import { listenForFiles } from "./drop.js";
+import { Final } from "./final.js";
 import { Panel, showLegend } from "./panel.js";
-import { readAsset, readDeviations, readLight, readScene, sendLight } from "./server.js";
+import { readAsset, readDeviations, readLight, readPhoto, readScene, sendLight } from "./server.js";
 import { Viewer } from "./viewer.js";
 
 /** One line at the bottom of the picture; an empty one takes it away. */
@@ -13,19 +15,22 @@ function say(words, wrong = false) {
 
 const failed = (error) => say(error.message, true);
 
-/** Gives each asset the light that the panel names; what comes too late for a newer choice is dropped. */
-function lightsOf(viewer, description) {
-  let wanted;
-  return async (chosen) => {
-    if (chosen === wanted) return;
-    wanted = chosen;
-    const own = (i) => description.sources[i].light ?? description.lights.at(-1).number;
-    const numbers = viewer.views.map((_, i) => (chosen === "own" ? own(i) : Number(chosen)));
-    const textures = await Promise.all(numbers.map(readLight));
-    if (chosen !== wanted) return;
-    viewer.views.forEach((view, i) => view.setLight(textures[i]));
-    viewer.draw();
-  };
+/** The assets' lights: gives each the one that the panel names; what comes too late for a newer choice is dropped. */
+class Lights {
+  constructor(viewer, description) {
+    Object.assign(this, { viewer, description, numbers: [] });
+  }
+
+  async choose(chosen) {
+    if (chosen === this.chosen) return;
+    this.chosen = chosen;
+    const { sources, white } = this.description;
+    this.numbers = sources.map((source) => (chosen === "own" ? (source.light ?? white) : Number(chosen)));
+    const textures = await Promise.all(this.numbers.map(readLight));
+    if (chosen !== this.chosen) return;
+    this.viewer.views.forEach((view, i) => view.setLight(textures[i]));
+    this.viewer.draw();
+  }
 }
 
 async function start() {
@@ -38,20 +43,29 @@ async function start() {
   );
 
   const viewer = new Viewer(document.getElementById("canvas"), description);
-  const light = lightsOf(viewer, description);
+  const lights = new Lights(viewer, description);
+  const final = new Final(viewer, () => lights.numbers, say, failed);
+  let cameras; // made after the panel, which says at once what it shows
   const panel = new Panel(description, (values) => {
     viewer.set(values);
+    cameras?.show(values.cameras);
+    cameras?.look(values.through);
     showLegend(description.uncertainty, values);
-    light(values.light).catch(failed);
+    lights.choose(values.light).catch(failed);
+    final.set(values.final);
   });
+  cameras = new Cameras(viewer, description.cameras);
+  cameras.changed = (number) => panel.setThrough(number);
+  cameras.failed = (number) => readPhoto(number).catch(failed); // asks again, for the server's words
   panel.listen(viewer);
+  document.getElementById("home").addEventListener("click", () => viewer.home());
   listenForFiles(async (file) => {
     say(`reading ${file.name} …`);
     try {
       const number = await sendLight(file);
-      const { lights } = await readScene();
-      for (const one of lights) one.own = owners.includes(one.number);
-      panel.setLights(lights, number);
+      const now = await readScene();
+      for (const one of now.lights) one.own = owners.includes(one.number);
+      panel.setLights(now.lights, number);
       panel.tell();
       say("");
     } catch (error) {

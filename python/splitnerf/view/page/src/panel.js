@@ -9,7 +9,10 @@ const KEYS = [
   [", .", "darker, brighter"],
   ["b", "background"],
   ["t", "tone mapping"],
+  ["f", "final: path traced"],
   ["r", "front view"],
+  ["c", "the photos' cameras"],
+  ["n p", "through the next, the previous one"],
   ["h", "hide the panel"],
 ];
 const STEP = Math.PI / 36; // radians of the camera a key
@@ -23,6 +26,8 @@ export class Panel {
     this.fillChannels(description.sources.some((source) => source.uncertainty));
     this.fill(field("quantity"), description.uncertainty.quantities.map((name, i) => [i, name]));
     this.setLights(description.lights, description.first_light ?? undefined);
+    this.fill(field("through"), [[-1, "none"], ...description.cameras.map((camera, i) => [i, camera.name])]);
+    field("photo-fields").hidden = description.cameras.length === 0;
     field("keys").innerHTML = KEYS.map(([key, words]) => `<dt>${key}</dt><dd>${words}</dd>`).join("");
     field("panel").addEventListener("input", () => this.tell());
     field("panel").addEventListener("submit", (event) => event.preventDefault());
@@ -42,7 +47,15 @@ export class Panel {
       tone: field("tone").value,
       background: field("background").checked,
       blur: number("blur"),
+      final: field("final").checked,
+      cameras: field("cameras").checked,
+      through: number("through"),
     };
+  }
+
+  /** Says in the panel which photo's camera is looked through, -1 for none. */
+  setThrough(number) {
+    field("through").value = number;
   }
 
   /** The lights to choose from; "own" is each run's own. */
@@ -104,8 +117,13 @@ export class Panel {
       field("tone").value = field("tone").value === "none" ? "aces" : "none";
       this.tell();
     };
-    const background = () => {
-      field("background").checked = !field("background").checked;
+    const toggle = (id) => () => {
+      field(id).checked = !field(id).checked;
+      this.tell();
+    };
+    const photo = (steps) => () => {
+      const options = field("through").options.length; // the first one is "none"
+      field("through").selectedIndex = (field("through").selectedIndex + steps + options) % options;
       this.tell();
     };
     return {
@@ -121,7 +139,11 @@ export class Panel {
       "]": () => this.step("turn", 5),
       ",": () => this.step("exposure", -5),
       ".": () => this.step("exposure", 5),
-      b: background,
+      b: toggle("background"),
+      f: toggle("final"),
+      c: toggle("cameras"),
+      n: photo(1),
+      p: photo(-1),
       t: tone,
       r: () => viewer.home(),
       h: () => this.fold(),

@@ -1,35 +1,41 @@
 // The picture: one scene an asset, side by side, with one camera. The world is the data's, z up.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import { channelUniforms, withChannels } from "./channels.js";
+import { matrixOf } from "./cameras.js";
+import { PLAIN, View } from "./view.js";
 
-const Z_UP = Math.PI / 2; // about x: from the y up of GLB files and of three's lights
-const PLAIN = new THREE.Color(0x8f9296);
 const TONES = { none: THREE.LinearToneMapping, aces: THREE.ACESFilmicToneMapping }; // linear: exposure alone
 
-export class Viewer {
+/** Tells "drawn" after each picture, and "left" where the user moves away from a photo's camera. */
+export class Viewer extends EventTarget {
   constructor(canvas, description) {
+    super();
     this.canvas = canvas;
     this.start = description.camera;
-    this.halfField = description.camera.half_field;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
     this.renderer.autoClear = false;
+    this.renderer.setClearColor(PLAIN);
     this.camera = new THREE.PerspectiveCamera();
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.addEventListener("start", () => this.leave());
     this.controls.addEventListener("change", () => this.draw());
     this.views = description.sources.map(() => new View(description.uncertainty));
+    this.overlay = new THREE.Scene();
+    this.boxes = [];
+    this.through = null; // the photo's camera that is looked through
+    this.factor = 1; // its exposure
     this.home();
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
   /** The camera of `splitnerf relight`: the object's front, from 20 degrees above. */
   home() {
+    this.leave();
     const { position, target, radius } = this.start;
     this.camera.position.set(...position);
     this.controls.target.set(...target);
-    this.controls.minDistance = 1.02 * 0.1 * radius;
+    this.controls.minDistance = 0.1 * radius;
     this.controls.maxDistance = 50 * radius;
     this.controls.update();
     this.draw();
@@ -37,10 +43,10 @@ export class Viewer {
 
   /** Turns the camera about the object, by radians, and moves it nearer by a factor. */
   move(azimuth, elevation, nearer = 1) {
-    const arm = new THREE.Spherical();
+    this.leave();
     const toYUp = new THREE.Quaternion().setFromUnitVectors(this.camera.up, new THREE.Vector3(0, 1, 0));
     const offset = this.camera.position.clone().sub(this.controls.target).applyQuaternion(toYUp);
-    arm.setFromVector3(offset);
+    const arm = new THREE.Spherical().setFromVector3(offset);
     arm.theta += azimuth;
     arm.phi -= elevation;
     arm.radius = Math.min(Math.max(arm.radius * nearer, this.controls.minDistance), this.controls.maxDistance);
@@ -50,16 +56,32 @@ export class Viewer {
     this.draw();
   }
 
-  /** Sets what all assets share: the names are those of the panel's fields. */
-  set({ channel, quantity, turn, exposure, tone, background, blur }) {
-    this.renderer.toneMapping = TONES[tone];
-    this.renderer.toneMappingExposure = 2 ** exposure;
-    for (const view of this.views) {
-      view.uniforms.channel.value = channel;
-      view.uniforms.quantity.value = quantity;
-      view.setBackground(background && channel === 0, blur);
-      view.turnLight((turn * Math.PI) / 180);
+  /** Looks through a photo's camera, at its exposure; null leaves it. Moving on turns about the point that it looks at. */
+  lookThrough(camera) {
+    this.through = camera;
+    this.factor = camera?.exposure ?? 1;
+    if (camera) {
+      const centre = new THREE.Vector3(...this.start.target);
+      matrixOf(camera.pose).decompose(this.camera.position, this.camera.quaternion, new THREE.Vector3());
+      const forward = new THREE.Vector3(0, 0, -1).applyQuaternion(this.camera.quaternion);
+      const depth = Math.max(centre.sub(this.camera.position).dot(forward), this.controls.minDistance);
+      this.controls.target.copy(this.camera.position).addScaledVector(forward, depth);
     }
+    this.draw();
+  }
+
+  leave() {
+    if (!this.through) return;
+    this.lookThrough(null);
+    this.controls.update();
+    this.dispatchEvent(new Event("left"));
+  }
+
+  /** Sets what all assets share: the names are those of the panel's fields. */
+  set(values) {
+    this.values = values;
+    this.renderer.toneMapping = TONES[values.tone];
+    for (const view of this.views) view.set(values);
     this.draw();
   }
 
@@ -77,61 +99,48 @@ export class Viewer {
     const size = this.renderer.getSize(new THREE.Vector2());
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     if (size.x !== width || size.y !== height) this.renderer.setSize(width, height, false);
-    this.setLens(width / this.views.length / height);
+    this.renderer.toneMappingExposure = this.factor * 2 ** this.values.exposure;
+    this.renderer.setScissorTest(false);
+    this.renderer.clear();
     this.renderer.setScissorTest(true);
+    this.boxes = this.views.map((_, i) => this.box((i * width) / this.views.length, width / this.views.length, height));
+    this.setLens(this.boxes[0][2], this.boxes[0][3]);
     this.views.forEach((view, i) => {
-      const box = [(i * width) / this.views.length, 0, width / this.views.length, height];
-      this.renderer.setViewport(...box);
-      this.renderer.setScissor(...box);
-      this.renderer.clear();
-      this.renderer.render(view.scene, this.camera);
+      this.renderer.setViewport(...this.boxes[i]);
+      this.renderer.setScissor(...this.boxes[i]);
+      view.render(this.renderer, this.camera);
+      this.renderer.render(this.overlay, this.camera);
     });
+    this.dispatchEvent(new Event("drawn"));
   }
 
-  /** The field of view of the shorter side is always the same. */
-  setLens(aspect) {
-    const half = aspect < 1 ? Math.atan(Math.tan(this.halfField) / aspect) : this.halfField;
-    const distance = this.camera.position.distanceTo(this.controls.target);
-    Object.assign(this.camera, { aspect, fov: (half * 360) / Math.PI });
-    this.camera.near = Math.max(distance - 3 * this.start.radius, 0.01 * distance);
-    this.camera.far = distance + 100 * this.start.radius;
-    this.camera.updateProjectionMatrix();
-  }
-}
-
-/** One asset in its light. */
-class View {
-  constructor(uncertainty) {
-    this.scene = new THREE.Scene();
-    this.uniforms = channelUniforms(uncertainty);
-    this.light = null;
-    this.setBackground(true, 0);
-    this.turnLight(0);
+  /** [left, bottom, width, height] of a picture in its part of the window: of a photo's shape where its camera is looked through. */
+  box(left, width, height) {
+    if (!this.through) return [left, 0, width, height];
+    const scale = Math.min(width / this.through.width, height / this.through.height);
+    const [across, up] = [scale * this.through.width, scale * this.through.height];
+    return [left + (width - across) / 2, (height - up) / 2, across, up];
   }
 
-  async setAsset(glb) {
-    const { scene } = await new GLTFLoader().parseAsync(glb, "");
-    scene.rotation.x = Z_UP;
-    scene.traverse((part) => {
-      if (part.isMesh) part.material = withChannels(part.material, this.uniforms);
-    });
-    this.scene.add(scene);
+  /** [fx, fy, cx, cy] in pixels of a picture. The field of view of the shorter side is always the same, but a photo's. */
+  intrinsics(width, height) {
+    if (this.through) {
+      const [fx, fy, cx, cy] = this.through.intrinsics;
+      const [across, down] = [width / this.through.width, height / this.through.height];
+      return [fx * across, fy * down, cx * across, cy * down];
+    }
+    const focal = Math.min(width, height) / 2 / Math.tan(this.start.half_field);
+    return [focal, focal, width / 2, height / 2];
   }
 
-  setLight(texture) {
-    this.light?.dispose();
-    this.light = this.scene.environment = texture;
-    this.setBackground(this.hasBackground, this.scene.backgroundBlurriness);
-  }
-
-  setBackground(shown, blur) {
-    this.hasBackground = shown;
-    this.scene.background = shown && this.light ? this.light : PLAIN;
-    this.scene.backgroundBlurriness = blur;
-  }
-
-  /** Turns the light about the vertical, counter-clockwise seen from above. */
-  turnLight(angle) {
-    for (const rotation of [this.scene.environmentRotation, this.scene.backgroundRotation]) rotation.set(Z_UP, 0, angle, "ZYX");
+  setLens(width, height) {
+    const [fx, fy, cx, cy] = this.intrinsics(width, height);
+    const distance = this.camera.position.distanceTo(new THREE.Vector3(...this.start.target));
+    const near = Math.max(distance - 3 * this.start.radius, 0.01 * distance);
+    const far = distance + 100 * this.start.radius;
+    const edges = [-cx / fx, (width - cx) / fx, cy / fy, (cy - height) / fy].map((slope) => near * slope);
+    this.camera.projectionMatrix.makePerspective(...edges, near, far);
+    this.camera.projectionMatrixInverse.copy(this.camera.projectionMatrix).invert();
+    this.camera.updateMatrixWorld();
   }
 }
