@@ -445,9 +445,14 @@ def test_another_host_is_said(run, capsys, monkeypatch):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_in_peace(run, number):
+    """Also while the path tracer works."""
     words = [sys.executable, "-m", "splitnerf", "view", str(run), "--no-browser"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline().startswith("http://127.0.0.1:")
+        url = urlsplit(process.stdout.readline().strip())
+        assert url.hostname == "127.0.0.1"
+        page = http.client.HTTPConnection(url.hostname, url.port, timeout=60)
+        page.request("POST", f"{url.path}final", json.dumps(camera_of(1000, 1000)))
+        assert page.getresponse().status == 200
         process.send_signal(number)
         assert process.wait(60) == DONE
         assert process.stderr.read() == ""
