@@ -249,9 +249,10 @@ def test_a_light_of_many_rows_is_made_smaller(run, tmp_path, monkeypatch):
 
 
 def test_photos_are_served_with_their_cameras(run, data):
-    with serving(run, photos=Photos(data, Reading())) as server:
+    with serving(run, photos=Photos(data)) as server:
         cameras = json.loads(ask(server, "scene.json")[2])["cameras"]
-        frames = [frame for split in ("train", "test") for frame in read_frames(data, split)[0]]
+        frames = read_frames(data, "train", Reading(eval_mode="all"))[0]
+        assert len(frames) == 8
         assert [camera["name"] for camera in cameras] == [frame.name for frame in frames]
         assert np.array_equal(np.reshape(cameras[3]["pose"], (4, 4)), frames[3].pose)
         assert (cameras[3]["width"], cameras[3]["height"]) == (24, 24)
@@ -263,7 +264,7 @@ def test_photos_are_served_with_their_cameras(run, data):
 
 def test_large_photos_are_averaged_down_and_masks_hide_nothing(run, data, tmp_path, monkeypatch):
     monkeypatch.setattr("splitnerf.view.photos.LARGEST", 10)
-    with serving(run, photos=Photos(data, Reading())) as server:
+    with serving(run, photos=Photos(data)) as server:
         assert decode_image(ask(server, "photos/0")[2], "photo").shape == (8, 8, 4)
     shutil.copytree(data, tmp_path / "data")
     for path in (tmp_path / "data").rglob("transforms*.json"):
@@ -275,13 +276,13 @@ def test_large_photos_are_averaged_down_and_masks_hide_nothing(run, data, tmp_pa
     photo = read_frames(tmp_path / "data", "train")[0][0].image_path
     write_image(photo, np.full((24, 24, 3), 0.5, np.float32))
     monkeypatch.undo()
-    with serving(run, photos=Photos(tmp_path / "data", Reading())) as server:
+    with serving(run, photos=Photos(tmp_path / "data")) as server:
         assert (decode_image(ask(server, "photos/0")[2], "photo")[..., 3] == 1).all()
 
 
 def test_a_photo_that_is_gone_is_said(run, data, tmp_path):
     shutil.copytree(data, tmp_path / "data")
-    photos = Photos(tmp_path / "data", Reading())
+    photos = Photos(tmp_path / "data")
     with serving(run, photos=photos) as server:
         shutil.rmtree(tmp_path / "data")
         status, line = error_of(ask(server, "photos/0"))

@@ -9,7 +9,6 @@ from contextlib import suppress
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
-from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.errors import InputError
 
 LOCAL = "127.0.0.1"
@@ -27,7 +26,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add("other", type=Path, nargs="?", metavar="OTHER", help="a second one, shown beside the first with the same camera")
     add("--light", type=Path, metavar="MAP", help="equirectangular .exr or .hdr that is shown first")
     add("--data", type=Path, metavar="DATA", help="the data that RUN was trained on: shows their cameras and photos")
-    add_reading_options(parser, "as in training")
     add("--port", type=int, default=0, metavar="N", help="of the page's address (default: a free one)")
     add("--host", default=LOCAL, metavar="H", help=f"the address to listen at; another than {LOCAL} lets other machines in")
     add("--no-browser", action="store_true", help="print the address only")
@@ -43,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     if not 0 <= args.port < 1 << 16:
         raise InputError(f"--port must lie between 0 and 65535, got {args.port}")
     shown = Shown([args.source] + ([args.other] if args.other else []), args.light)
-    photos = Photos(args.data, reading_of(args, args.source)) if args.data else None
+    photos = Photos(args.data) if args.data else None
     with ViewServer(shown, photos, args.host, args.port) as server, suppress(KeyboardInterrupt):  # the way to end it
         if args.host != LOCAL:
             print(f"splitnerf: note: listens at {args.host}: whoever knows the address below can look", file=sys.stderr)

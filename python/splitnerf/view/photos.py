@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.frames import has_test_split, read_frames
+from splitnerf.data.frames import read_frames
 from splitnerf.data.images import encode_image
-from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.photos import check_files, load_photo
 from splitnerf.data.pixels import decoded
@@ -21,23 +20,20 @@ LARGEST = 1600  # pixels of a photo's longer side in the page
 
 
 class Photos:
-    """The photos of a data set, training views first.
+    """All photos of a data set, in its order.
 
     Args:
         root: The data's folder.
-        reading: What the data leave open, as in training.
 
     Raises:
         InputError: The data cannot be used, or an image is missing.
     """
 
-    def __init__(self, root: Path, reading: Reading):
+    def __init__(self, root: Path):
         if not root.is_dir():
             raise InputError(f"{root}: no such folder; give the folder of the data that the run was trained on")
-        self._frames: list[Frame] = read_frames(root, "train", reading)[0]
-        if has_test_split(root, reading):
-            self._frames += read_frames(root, "test", reading)[0]
-        self._frames = [replace(frame, mask_path=None, dynamic_mask_path=None) for frame in self._frames]
+        frames, _ = read_frames(root, "train", Reading(eval_mode="all"))
+        self._frames = [replace(frame, mask_path=None, dynamic_mask_path=None) for frame in frames]
         (self.height, self.width), _ = check_files(self._frames, 1)
 
     def __len__(self) -> int:
