@@ -31,7 +31,7 @@ LOOK = Path(__file__).parents[1] / "viewer/look.mjs"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 SIZE = 160
 TURN = 90
-CLICKED = 1  # the number of the photo whose camera is clicked
+CLICKED = 2  # the number of the photo whose camera is clicked
 BARE = "#names, #said, #fold, #legend { display: none !important } #canvas { outline: 0 !important }"  # the picture alone
 
 pytestmark = pytest.mark.skipif(
