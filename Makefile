@@ -5,6 +5,7 @@
 # make stability   asks each operator STABILITY_CASES times and writes docs/benchmarks/stability.md; more in STABILITY_OPTIONS
 # make tables   says which tables under docs/ are stale
 # make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
+# make viewer   builds the page of splitnerf view from its sources (needs Node and npm)
 # make fuzz   feeds each reader damaged files for FUZZ_SECONDS, in four parts: tracing takes memory with every run
 VENV ?= .venv
 PYTHON ?= python3
@@ -20,7 +21,7 @@ CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || tr
 CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 READERS := json colmap neus png exr hdr glb checkpoint
 
-.PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants clean
+.PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -62,6 +63,9 @@ pytest: install
 mutants: install
 	$(BIN)/python -m pip install --quiet -e '.[mutants]' --no-build-isolation
 	$(BIN)/python tests/mutants.py $(MUTANTS)
+
+viewer:
+	cd python/splitnerf/view/page && npm ci --no-audit --no-fund && npm run build
 
 test-slow: install
 	$(BIN)/python -m pytest -q -m slow

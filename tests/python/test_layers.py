@@ -16,7 +16,7 @@ LAYERS = [
     {"workflow"},
     {"delivery"},
     {"capture"},
-    {"training", "inspection", "separation"},
+    {"training", "inspection", "separation", "view"},
     {"outputs", "report"},
     {"evaluate", "refinement", "relight", "synth"},
     {"export", "render"},

@@ -1,0 +1,63 @@
+// One asset in its light.
+import * as THREE from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { channelUniforms, withChannels } from "./channels.js";
+import { Plate } from "./final.js";
+
+const Z_UP = Math.PI / 2; // about x: from the y up of GLB files and of three's lights
+export const PLAIN = new THREE.Color(0x8f9296);
+
+export class View {
+  constructor(uncertainty) {
+    this.scene = new THREE.Scene();
+    this.object = new THREE.Group();
+    this.scene.add(this.object);
+    this.uniforms = channelUniforms(uncertainty);
+    this.light = null;
+    this.plate = new Plate();
+  }
+
+  async setAsset(glb) {
+    const { scene } = await new GLTFLoader().parseAsync(glb, "");
+    scene.rotation.x = Z_UP;
+    scene.traverse((part) => {
+      if (part.isMesh) part.material = withChannels(part.material, this.uniforms);
+    });
+    this.object.add(scene);
+  }
+
+  /** The light, an equirectangular texture that becomes this view's own. */
+  setLight(texture) {
+    this.light?.dispose();
+    this.light = this.scene.environment = texture;
+    this.setBackground();
+  }
+
+  /** Sets what the panel says; the light turns about the vertical, counter-clockwise seen from above. */
+  set(values) {
+    this.values = values;
+    this.uniforms.channel.value = values.channel;
+    this.uniforms.quantity.value = values.quantity;
+    const angle = (values.turn * Math.PI) / 180;
+    for (const rotation of [this.scene.environmentRotation, this.scene.backgroundRotation]) rotation.set(Z_UP, 0, angle, "ZYX");
+    this.setBackground();
+  }
+
+  /** The light is the background of the shaded picture alone. */
+  setBackground() {
+    const shown = this.light && this.values.background && this.values.channel === 0;
+    this.scene.background = shown ? this.light : PLAIN;
+    this.scene.backgroundBlurriness = this.values.blur;
+  }
+
+  /** Shows a path-traced picture in place of three's; null takes it away. */
+  setPicture(texture) {
+    this.plate.set(texture);
+    this.object.visible = !texture;
+  }
+
+  render(renderer, camera) {
+    renderer.render(this.scene, camera);
+    if (!this.object.visible) renderer.render(this.plate.mesh, camera);
+  }
+}

@@ -1,0 +1,259 @@
+"""The viewer's web server: it answers from memory, and only those who know its address.
+
+The first part of every path is a random token, so that neither other users of the machine nor pages in the same browser can
+ask. `Host` and `Origin` are checked besides: a foreign page cannot pass for this one by a name that leads here.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import json
+import secrets
+import select
+import socket
+import socketserver
+import struct
+import sys
+import threading
+from contextlib import closing
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler
+from importlib.resources import files
+from itertools import chain
+from urllib.parse import parse_qs, urlsplit
+
+from splitnerf.errors import InputError, plain
+from splitnerf.files import reason
+from splitnerf.view.final import Camera, Tracer
+from splitnerf.view.photos import Photos
+from splitnerf.view.shown import Shown, Source, as_halves
+
+LARGEST_UPLOAD = 128 << 20  # bytes of a light
+LARGEST_QUESTION = 1 << 16  # bytes of a camera
+PICTURE = struct.Struct("<5I")  # asset, width, height, paths a pixel, bytes that follow
+PATIENCE = 60.0  # seconds that a connection may be silent
+SAFETY = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' blob: data:; "
+    "connect-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+
+
+class Refused(Exception):
+    """A request that is not answered: a status, and one line for the page."""
+
+    def __init__(self, status: HTTPStatus, line: str):
+        super().__init__(line)
+        self.status = status
+
+
+class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
+    """Serves the page and what it shows, each request in a thread of its own.
+
+    Args:
+        shown: The assets and lights.
+        photos: The photos whose cameras are shown, or None.
+        host: The address to listen at.
+        port: The port; 0 takes a free one.
+
+    Attributes:
+        url: The address of the page, token included.
+
+    Raises:
+        InputError: The address or the port cannot be used.
+    """
+
+    daemon_threads = True
+    allow_reuse_address = True
+
+    def __init__(self, shown: Shown, photos: Photos | None = None, host: str = "127.0.0.1", port: int = 0):
+        self.shown, self.photos, self.host, self.tracer = shown, photos, host, Tracer(shown)
+        self.page = files("splitnerf.view").joinpath("viewer.html").read_bytes()
+        self.uploading = threading.Lock()
+        self._token = secrets.token_urlsafe(16)
+        self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        try:
+            super().__init__((host, port), Handler)
+        except OSError as error:
+            raise InputError(f"{host}, port {port}: cannot be listened at ({reason(error)}); give another --host or --port") from None
+        name = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(host, f"[{host}]" if ":" in host else host)
+        self.url = f"http://{name}:{self.server_address[1]}/{self._token}/"
+
+    def inner_path(self, path: str) -> str | None:
+        """What follows the token in a path; None where the token is missing or wrong."""
+        token, _, inner = path.lstrip("/").partition("/")
+        return inner if hmac.compare_digest(token.encode(), self._token.encode()) else None
+
+    def is_own(self, address: str) -> bool:
+        """Whether a `Host`, or an `Origin` without its scheme, is this server's: a name of another machine may lead here."""
+        try:
+            parts = urlsplit(f"//{address}")
+            name, port = parts.hostname or "", parts.port or 80
+        except ValueError:
+            return False
+        if port != self.server_address[1]:
+            return False
+        if name in ("localhost", "127.0.0.1", "::1", self.host.lower(), urlsplit(self.url).hostname):
+            return True
+        return self.host in ("0.0.0.0", "::") and is_number(name)
+
+    def server_close(self) -> None:
+        """Ends what is being traced, and listens no more."""
+        self.tracer.stop()
+        super().server_close()
+
+    def handle_error(self, request, client_address) -> None:
+        """One line for what goes wrong in a thread; a page that was closed says nothing."""
+        error = sys.exc_info()[1]
+        if not isinstance(error, (ConnectionError, TimeoutError)):
+            print(f"splitnerf: note: a request failed ({plain(f'{type(error).__name__}: {error}')})", file=sys.stderr)
+
+
+def is_number(name: str) -> bool:
+    """Whether a host is written as an IP address, which no other name server can have given."""
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+class Handler(BaseHTTPRequestHandler):
+    """Answers one request."""
+
+    server: ViewServer
+    timeout = PATIENCE
+    server_version, sys_version = "splitnerf", ""
+
+    def do_GET(self) -> None:
+        self._answered({
+            "": self._page, "scene.json": self._scene, "assets": self._asset, "lights": self._light, "deviations": self._deviations,
+            "photos": self._photo,
+        })  # fmt: skip
+
+    def do_POST(self) -> None:
+        self._answered({"lights": self._dropped, "final": self._final})
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Nothing: the terminal is for errors."""
+
+    def _answered(self, answers: dict) -> None:
+        """Checks where a request comes from, and answers it with the function of its path."""
+        try:
+            inner = self._checked_path()
+            name, _, rest = inner.partition("/")
+            if name not in answers or (rest and name in ("", "scene.json", "final")):
+                raise Refused(HTTPStatus.NOT_FOUND, "there is nothing at this address")
+            answers[name](rest)
+        except Refused as refused:
+            self._send(json.dumps({"error": str(refused)}).encode(), "application/json", refused.status)
+        except InputError as error:
+            self._send(json.dumps({"error": str(error)}).encode(), "application/json", HTTPStatus.UNPROCESSABLE_ENTITY)
+
+    def _checked_path(self) -> str:
+        """What follows the token in the path of a request that may be answered."""
+        origin = self.headers.get("Origin")
+        own = self.server.is_own(self.headers.get("Host", ""))
+        if not own or (origin is not None and not (origin.startswith("http://") and self.server.is_own(origin[7:]))):
+            raise Refused(HTTPStatus.FORBIDDEN, "this request comes from another page; open the address that splitnerf printed")
+        inner = self.server.inner_path(urlsplit(self.path).path)
+        if inner is None:
+            raise Refused(HTTPStatus.FORBIDDEN, "the token is missing or wrong; open the address that splitnerf printed")
+        return inner
+
+    def _page(self, _: str) -> None:
+        self._send(self.server.page, "text/html; charset=utf-8")
+
+    def _scene(self, _: str) -> None:
+        cameras = [] if self.server.photos is None else self.server.photos.cameras()
+        self._send(json.dumps(self.server.shown.description() | {"cameras": cameras}).encode(), "application/json")
+
+    def _asset(self, rest: str) -> None:
+        self._send(self._source(rest).content, "model/gltf-binary")
+
+    def _light(self, rest: str) -> None:
+        light = self.server.shown.light(self._number(rest))
+        if light is None:
+            raise Refused(HTTPStatus.NOT_FOUND, "this light is no longer kept; drop it again")
+        self._send_halves(as_halves(light.radiance))
+
+    def _deviations(self, rest: str) -> None:
+        deviations = self._source(rest).deviations
+        if deviations is None:
+            raise Refused(HTTPStatus.NOT_FOUND, "this asset has no uncertainty.exr")
+        self._send_halves(as_halves(deviations))
+
+    def _photo(self, rest: str) -> None:
+        number = self._number(rest)
+        if self.server.photos is None or number >= len(self.server.photos):
+            raise Refused(HTTPStatus.NOT_FOUND, "there is no such photo")
+        self._send(self.server.photos.png(number), "image/png")
+
+    def _final(self, _: str) -> None:
+        """A stream of pictures, each after its PICTURE; it ends where the page closes it, or asks for another one."""
+        try:
+            content = json.loads(self._body(LARGEST_QUESTION))
+        except (ValueError, RecursionError):
+            raise Refused(HTTPStatus.BAD_REQUEST, "the camera is no JSON; load the page again") from None
+        camera = Camera.of(content, len(self.server.shown.sources))
+        with closing(self.server.tracer.pictures(camera, self._is_gone)) as pictures:
+            first = next(pictures, None)  # before the head, so that an error can still be said
+            self._send_head("application/octet-stream")
+            for picture in () if first is None else chain([first], pictures):
+                sizes = (picture.asset, picture.width, picture.height, picture.spp, len(picture.content))
+                self.wfile.write(PICTURE.pack(*sizes) + picture.content)
+
+    def _is_gone(self) -> bool:
+        """Whether the page has closed this connection."""
+        readable, _, _ = select.select([self.connection], [], [], 0)
+        return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
+
+    def _dropped(self, rest: str) -> None:
+        name = parse_qs(urlsplit(self.path).query).get("name", ["light"])[0]
+        if rest:
+            raise Refused(HTTPStatus.NOT_FOUND, "there is nothing at this address")
+        with self.server.uploading:
+            number = self.server.shown.drop(name, self._body(LARGEST_UPLOAD))
+        self._send(json.dumps({"number": number}).encode(), "application/json")
+
+    def _body(self, most: int) -> bytes:
+        """The body of a request, of at most so many bytes."""
+        length = self.headers.get("Content-Length", "")
+        if not (length.isascii() and length.isdigit() and len(length) < 16):
+            raise Refused(HTTPStatus.LENGTH_REQUIRED, "the request does not say how long it is")
+        if int(length) > most:
+            raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the file is larger than {most >> 20} MB; make it smaller")
+        body = self.rfile.read(int(length))
+        if len(body) < int(length):
+            raise Refused(HTTPStatus.BAD_REQUEST, "the request ended early")
+        return body
+
+    def _source(self, text: str) -> Source:
+        number = self._number(text)
+        if number >= len(self.server.shown.sources):
+            raise Refused(HTTPStatus.NOT_FOUND, "there is no such asset")
+        return self.server.shown.sources[number]
+
+    def _number(self, text: str) -> int:
+        if not (text.isascii() and text.isdigit() and len(text) < 10):
+            raise Refused(HTTPStatus.NOT_FOUND, "there is nothing at this address")
+        return int(text)
+
+    def _send_halves(self, picture: tuple[int, int, bytes]) -> None:
+        width, height, content = picture
+        self._send(content, "application/octet-stream", Picture_Size=f"{width}x{height}")
+
+    def _send(self, content: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, **headers: str) -> None:
+        self._send_head(kind, status, Content_Length=str(len(content)), **headers)
+        self.wfile.write(content)
+
+    def _send_head(self, kind: str, status: HTTPStatus = HTTPStatus.OK, **headers: str) -> None:
+        """Sends the head of an answer; names of headers have _ for -."""
+        self.send_response(status)
+        for name, value in (SAFETY | {"Content-Type": kind} | headers).items():
+            self.send_header(name.replace("_", "-"), value)
+        self.end_headers()

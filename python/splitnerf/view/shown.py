@@ -1,0 +1,195 @@
+"""What the viewer shows: assets, and lights to show them in."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import TypeVar
+
+import numpy as np
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.environment import read_environment, resize_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import read_image
+from splitnerf.errors import InputError, plain
+from splitnerf.notes import note
+from splitnerf.refinement.uncertainty import UNKNOWN
+from splitnerf.relight.cameras import HALF_FIELD, bounding_sphere, turntable
+from splitnerf.report.last_stage import KNOWN_COLOURS, QUANTITIES, UNKNOWN_COLOURS
+
+MOST_ROWS = 1024  # of a light that is kept
+MOST_DROPPED = 8  # lights that were dropped onto the page; an older one is forgotten
+BRIGHTEST_HALF = float(np.finfo(np.float16).max)
+Read = TypeVar("Read")
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light: its name, and [h, 2 h, 3] float32 linear radiance of at most 1024 rows, see `read_environment`."""
+
+    name: str
+    radiance: np.ndarray
+
+
+@dataclass(frozen=True)
+class Source:
+    """One asset.
+
+    Attributes:
+        name: What the page calls it.
+        content: The bytes of its GLB.
+        asset: The same, read by the program; the path tracer draws it.
+        light: The number of the run's own light, or None.
+        deviations: [h, w, 4] float32, the run's `uncertainty.exr`, or None.
+    """
+
+    name: str
+    content: bytes
+    asset: Asset
+    light: int | None
+    deviations: np.ndarray | None
+
+
+class Shown:
+    """One or two assets and their lights. Lights that are dropped onto the page are added while it is shown.
+
+    Args:
+        paths: Runs' folders or GLB files, at least one.
+        light: An environment map that is shown first, or None.
+
+    Attributes:
+        sources: The assets.
+        problems: One line for each file beside an asset that cannot be read.
+
+    Raises:
+        InputError: An asset or the light cannot be read.
+    """
+
+    def __init__(self, paths: list[Path], light: Path | None = None):
+        self.problems: list[str] = []
+        self._lights: dict[int, Light] = {}
+        self._next, self._lock = 0, threading.Lock()
+        self._first = None if light is None else self._add(light_of(light, light.name))
+        self.sources = [self._source(path) for path in paths]
+        self._white = self._add(Light("white", np.ones((8, 16, 3), np.float32)))
+        self._kept = self._next  # lights up to here are never forgotten
+
+    def light(self, number: int) -> Light | None:
+        """A light by its number; None where there is none."""
+        with self._lock:
+            return self._lights.get(number)
+
+    def drop(self, name: str, content: bytes) -> int:
+        """Adds a light out of the bytes of an .exr or .hdr file; returns its number.
+
+        Raises:
+            InputError: It is none; the message names the file.
+        """
+        name = plain(PurePosixPath(name.replace("\\", "/")).name)[:100]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"light{Path(name).suffix.lower()}"
+            path.write_bytes(content)
+            try:
+                number = self._add(light_of(path, name))
+            except InputError as error:
+                raise InputError(str(error).replace(str(path), name)) from None
+        with self._lock:
+            for old in [n for n in self._lights if n >= self._kept][:-MOST_DROPPED]:
+                del self._lights[old]
+        return number
+
+    def description(self) -> dict:
+        """What the page needs to know, for JSON. The camera is that of `splitnerf relight`; lengths are the data's, z is up."""
+        centre, radius = bounding_sphere(self.sources[0].asset)
+        front = turntable(self.sources[0].asset, 1, size=None)[0]
+        with self._lock:
+            lights = [{"number": number, "name": light.name} for number, light in self._lights.items()]
+        return {
+            "sources": [
+                {"name": source.name, "light": source.light, "uncertainty": source.deviations is not None} for source in self.sources
+            ],
+            "lights": lights,
+            "first_light": self._first,
+            "white": self._white,
+            "problems": self.problems,
+            "camera": {
+                "position": front.pose[:3, 3].tolist(), "target": centre.tolist(), "radius": radius, "half_field": float(HALF_FIELD),
+            },
+            "uncertainty": {
+                "quantities": QUANTITIES, "unknown": UNKNOWN.tolist(), "known_colours": KNOWN_COLOURS.tolist(),
+                "unknown_colours": UNKNOWN_COLOURS.tolist(),
+            },
+        }  # fmt: skip
+
+    def _add(self, light: Light) -> int:
+        with self._lock:
+            self._lights[self._next] = light
+            self._next += 1
+            return self._next - 1
+
+    def _source(self, path: Path) -> Source:
+        """The asset of a run's folder or a GLB; the light and the deviations beside a `mesh.glb` belong to it."""
+        glb = path / "mesh.glb" if path.is_dir() else path
+        if path.is_dir() and not glb.is_file():
+            raise InputError(f"{path}: has no mesh.glb; finish its training, or give a .glb file")
+        asset = read_asset(glb)
+        content = glb.read_bytes()
+        if not content.startswith(b"glTF"):
+            raise InputError(f"{glb}: is a .gltf, whose parts the page cannot load; export it as GLB")
+        light = deviations = None
+        if glb.name == "mesh.glb":
+            own = f"light of {run_name(glb)}"
+            light = self._beside(glb.with_name("environment.exr"), lambda beside: self._add(light_of(beside, own)))
+            deviations = self._beside(glb.with_name("uncertainty.exr"), read_deviations)
+        return Source(run_name(glb), content, asset, light, deviations)
+
+    def _beside(self, path: Path, read: Callable[[Path], Read]) -> Read | None:
+        """What `read` makes of a file; None where there is none, or where it cannot be read, which becomes a line."""
+        if not path.exists():
+            return None
+        try:
+            return read(path)
+        except InputError as error:
+            self.problems.append(str(error))
+            note(str(error))
+            return None
+
+
+def run_name(glb: Path) -> str:
+    """What a GLB is called: a run's by the name of its folder."""
+    return glb.resolve().parent.name if glb.name == "mesh.glb" else glb.name
+
+
+def light_of(path: Path, name: str) -> Light:
+    """The light of an .exr or .hdr file, made smaller where it has more rows than are kept.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    radiance = read_environment(path)
+    height = min(radiance.shape[0], MOST_ROWS)
+    return Light(name, resize_environment(radiance, height, 2 * height))
+
+
+def read_deviations(path: Path) -> np.ndarray:
+    """[h, w, 4] float32 of an `uncertainty.exr`.
+
+    Raises:
+        InputError: It is none.
+    """
+    pixels = read_image(path)
+    if pixels.shape[2] != 4 or not np.isfinite(pixels).all() or pixels.min() < 0:
+        raise InputError(f"{path}: is no map of four deviations; run splitnerf refine again")
+    return pixels
+
+
+def as_halves(pixels: np.ndarray) -> tuple[int, int, bytes]:
+    """(width, height, float16 RGBA, row by row from the top) of [h, w, 3 | 4]; a fourth channel that is missing is 1, and what
+    halves cannot hold becomes their largest number, 65504."""
+    if pixels.shape[2] == 3:
+        pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
+    return pixels.shape[1], pixels.shape[0], np.minimum(pixels, BRIGHTEST_HALF).astype("<f2").tobytes()

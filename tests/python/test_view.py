@@ -1,0 +1,499 @@
+"""The viewer's server: what it serves is what was given, to nobody but the page that it printed the address of."""
+
+from __future__ import annotations
+
+import hashlib
+import http.client
+import json
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import quote, urlsplit
+
+import numpy as np
+import pytest
+from gltf_builder import Gltf
+from painted_ball import looking
+
+import splitnerf.view
+from splitnerf.cli import BAD_INPUT, DONE, main
+from splitnerf.data.environment import rotate_environment
+from splitnerf.data.frames import read_frames
+from splitnerf.data.images import area_average, decode_image, encode_image, read_image, write_image
+from splitnerf.data.reading import Reading
+from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.view import final
+from splitnerf.view import server as server_module
+from splitnerf.view.final import Camera, Tracer
+from splitnerf.view.photos import Photos
+from splitnerf.view.server import ViewServer
+from splitnerf.view.shown import MOST_DROPPED, Shown, as_halves
+
+PAGE = Path(splitnerf.view.__file__).parent
+
+
+def sky(height=8):
+    """Every texel has its own radiance."""
+    return np.arange(1, height * 2 * height * 3 + 1, dtype=np.float32).reshape(height, 2 * height, 3) / 64
+
+
+def triangle():
+    """A document of one grey triangle."""
+    document = Gltf()
+    grey = document.material(pbrMetallicRoughness={"baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0})
+    document.node(mesh=document.mesh(document.primitive(material=grey)))
+    return document
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A run's folder: an asset, its light, and what the photos leave open."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    triangle().write(folder / "mesh.glb")
+    write_image(folder / "environment.exr", sky())
+    write_image(folder / "uncertainty.exr", np.linspace(0, 0.5, 4 * 4 * 4, dtype=np.float32).reshape(4, 4, 4))
+    return folder
+
+
+@contextmanager
+def serving(*paths, light=None, photos=None, host="127.0.0.1"):
+    with ViewServer(Shown(list(paths), light), photos, host) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        try:
+            yield server
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+@pytest.fixture
+def served(run):
+    with serving(run) as server:
+        yield server
+
+
+def ask(server, path, *, method="GET", body=None, token=True, **headers):
+    """(status, headers, body) of one request; header names have _ for -."""
+    connection = http.client.HTTPConnection("127.0.0.1", server.server_address[1], timeout=20)
+    connection.putrequest(method, (urlsplit(server.url).path if token else "/") + path, skip_host="Host" in headers)
+    if body is not None and "Content_Length" not in headers:
+        headers["Content_Length"] = str(len(body))
+    for name, value in headers.items():
+        connection.putheader(name.replace("_", "-"), value)
+    connection.endheaders(body)
+    answer = connection.getresponse()
+    content = answer.read()
+    connection.close()
+    return answer.status, answer.headers, content
+
+
+def error_of(answer):
+    return answer[0], json.loads(answer[2])["error"]
+
+
+def halves(answer):
+    width, height = map(int, answer[1]["Picture-Size"].split("x"))
+    return np.frombuffer(answer[2], "<f2").reshape(height, width, 4)
+
+
+# ---- what is served ----
+
+
+def test_what_is_served_is_what_is_on_the_disk(run, served):
+    assert ask(served, "")[2] == (PAGE / "viewer.html").read_bytes()
+    assert ask(served, "assets/0")[2] == (run / "mesh.glb").read_bytes()
+    scene = json.loads(ask(served, "scene.json")[2])
+    assert scene["sources"] == [{"name": "mine", "light": 0, "uncertainty": True}] and scene["problems"] == []
+    assert [light["name"] for light in scene["lights"]] == ["light of mine", "white"]
+    light = halves(ask(served, "lights/0"))
+    assert np.array_equal(light[..., :3], sky().astype(np.float16)) and (light[..., 3] == 1).all()
+    assert np.array_equal(halves(ask(served, "deviations/0")), read_image(run / "uncertainty.exr").astype(np.float16))
+    assert (halves(ask(served, "lights/1")) == 1).all()
+
+
+def test_two_assets_and_a_given_light(run, tmp_path):
+    other = triangle().write(tmp_path / "other.glb")
+    write_image(tmp_path / "studio.hdr", np.full((4, 8, 3), 2, np.float32))
+    with serving(run, other, light=tmp_path / "studio.hdr") as server:
+        scene = json.loads(ask(server, "scene.json")[2])
+        assert [source["name"] for source in scene["sources"]] == ["mine", "other.glb"]
+        assert scene["first_light"] == 0 and scene["lights"][0]["name"] == "studio.hdr"
+        assert scene["sources"][1] == {"name": "other.glb", "light": None, "uncertainty": False}
+        assert ask(server, "assets/1")[2] == other.read_bytes()
+        assert ask(server, "deviations/1")[0] == ask(server, "assets/2")[0] == 404
+
+
+def test_what_is_damaged_beside_the_asset_becomes_a_line(run, capsys):
+    (run / "environment.exr").write_bytes((run / "environment.exr").read_bytes()[:200])
+    write_image(run / "uncertainty.exr", np.ones((4, 4, 3), np.float32))
+    with serving(run) as server:
+        scene = json.loads(ask(server, "scene.json")[2])
+    assert [line.split(": ")[0] for line in scene["problems"]] == [str(run / n) for n in ("environment.exr", "uncertainty.exr")]
+    assert scene["sources"] == [{"name": "mine", "light": None, "uncertainty": False}]
+    assert capsys.readouterr().err.count("note: ") == 2
+
+
+def test_a_sun_brighter_than_halves_stays_finite():
+    width, height, content = as_halves(np.full((2, 4, 3), 1e7, np.float32))
+    assert (width, height) == (4, 2) and np.frombuffer(content, "<f2")[0] == 65504
+
+
+# ---- who may ask ----
+
+
+def test_every_request_needs_the_token(served):
+    for path in ("", "scene.json", "assets/0", "x/scene.json", served.url[-10:] + "scene.json"):
+        assert error_of(ask(served, path, token=False)) == (
+            403, "the token is missing or wrong; open the address that splitnerf printed")  # fmt: skip
+    assert ask(served, "lights", method="POST", body=b"x", token=False)[0] == 403
+    with ViewServer(served.shown) as second:
+        assert urlsplit(second.url).path != urlsplit(served.url).path and len(urlsplit(second.url).path) > 20
+
+
+def test_other_hosts_and_origins_are_refused(served):
+    port = served.server_address[1]
+    for host in (f"127.0.0.1:{port}", f"localhost:{port}", f"[::1]:{port}"):
+        assert ask(served, "scene.json", Host=host)[0] == 200
+        assert ask(served, "scene.json", Origin=f"http://{host}")[0] == 200
+    for host in (f"evil.example:{port}", "127.0.0.1", f"127.0.0.1:{port + 1}", "", f"127.0.0.1:{port}.evil.example", "[", "a:b"):
+        assert ask(served, "scene.json", Host=host)[0] == 403, host
+    for origin in ("null", "http://evil.example", f"https://127.0.0.1:{port}", f"http://evil.example:{port}", "http://127.0.0.1"):
+        assert ask(served, "lights?name=a.exr", method="POST", body=b"x", Origin=origin)[0] == 403, origin
+
+
+def test_a_server_for_all_machines_answers_to_addresses_alone(run):
+    with serving(run, host="0.0.0.0") as server:
+        port = server.server_address[1]
+        assert ask(server, "scene.json", Host=f"192.168.1.20:{port}")[0] == 200
+        assert ask(server, "scene.json", Host=f"{socket.gethostname()}:{port}")[0] == 200
+        assert ask(server, "scene.json", Host=f"evil.example:{port}")[0] == 403
+        assert ask(server, "scene.json", token=False)[0] == 403
+
+
+def test_no_other_file_is_served(run, served):
+    (run / "secret.txt").write_text("secret")
+    paths = ("secret.txt", "../secret.txt", "assets/../../secret.txt", "assets/%2e%2e/secret.txt", "assets//etc/passwd", "assets/-1",
+             "assets/0/x", "assets/", "assets/1e0", "assets/٠", "lights/99999999999999", "page/package.json", "scene.json/x")  # fmt: skip
+    for path in paths:
+        assert ask(served, quote(path, safe="/%"))[0] == 404, path
+    assert ask(served, "assets/0", method="POST", body=b"")[0] == 404
+    assert ask(served, "assets/0", method="PUT", body=b"")[0] == 501
+
+
+def test_pages_are_told_to_load_nothing_from_elsewhere(served):
+    headers = ask(served, "")[1]
+    assert headers["Content-Security-Policy"].startswith("default-src 'none'") and "http" not in headers["Content-Security-Policy"]
+    assert headers["Referrer-Policy"] == "no-referrer" and headers["X-Content-Type-Options"] == "nosniff"
+
+
+# ---- lights that are dropped ----
+
+
+def drop(server, name, content, **headers):
+    return ask(server, f"lights?name={quote(name)}", method="POST", body=content, **headers)
+
+
+@pytest.mark.parametrize("suffix", [".hdr", ".exr"])
+def test_a_dropped_light_is_read_and_served(served, suffix):
+    status, _, content = drop(served, f"C:\\lights\\studio{suffix}", encode_image(sky(), suffix, "light"))
+    assert status == 200
+    number = json.loads(content)["number"]
+    assert halves(ask(served, f"lights/{number}"))[..., :3] == pytest.approx(sky(), rel=0.02, abs=0.02)
+    assert {"number": number, "name": f"studio{suffix}"} in json.loads(ask(served, "scene.json")[2])["lights"]
+
+
+def test_damaged_lights_are_refused_in_one_line(served, tmp_path):
+    good = encode_image(sky(), ".exr", "light")
+    cases = {
+        "cut.exr": good[:200], "text.hdr": b"hello", "empty.hdr": b"", "../../x\n.exr": good[:99], "photo.png": good, "none": good,
+        "square.exr": encode_image(np.ones((8, 8, 3), np.float32), ".exr", "light"),
+        "black.exr": encode_image(np.zeros((8, 16, 3), np.float32), ".exr", "light"),
+    }  # fmt: skip
+    for name, content in cases.items():
+        status, line = error_of(drop(served, name, content))
+        assert status == 422 and "\n" not in line and "/tmp" not in line and str(tmp_path) not in line, (name, line)
+    assert len(json.loads(ask(served, "scene.json")[2])["lights"]) == 2
+
+
+def test_uploads_have_limits(served, monkeypatch):
+    monkeypatch.setattr(server_module, "LARGEST_UPLOAD", 1 << 20)
+    assert error_of(drop(served, "a.exr", b"x", Content_Length=str((1 << 20) + 1))) == (
+        413, "the file is larger than 1 MB; make it smaller")  # fmt: skip
+    for length in ("", "-1", "1e3", "9" * 40):
+        assert drop(served, "a.exr", b"", Content_Length=length)[0] == 411, length
+    good = encode_image(sky(), ".exr", "light")
+    first = json.loads(drop(served, "0.exr", good)[2])["number"]
+    for i in range(MOST_DROPPED):
+        drop(served, f"{i + 1}.exr", good)
+    assert error_of(ask(served, f"lights/{first}")) == (404, "this light is no longer kept; drop it again")
+    assert ask(served, f"lights/{first + 1}")[0] == ask(served, "lights/0")[0] == 200
+
+
+def test_a_light_of_many_rows_is_made_smaller(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("splitnerf.view.shown.MOST_ROWS", 4)
+    with serving(run) as server:
+        light = halves(ask(server, "lights/0"))
+    blocks = sky().reshape(4, 2, 8, 2, 3).mean(axis=(1, 3))
+    assert light[..., :3] == pytest.approx(blocks, rel=1e-3)
+
+
+# ---- photos ----
+
+
+def test_photos_are_served_with_their_cameras(run, data):
+    with serving(run, photos=Photos(data)) as server:
+        cameras = json.loads(ask(server, "scene.json")[2])["cameras"]
+        frames = read_frames(data, "train", Reading(eval_mode="all"))[0]
+        assert len(frames) == 8
+        assert [camera["name"] for camera in cameras] == [frame.name for frame in frames]
+        assert np.array_equal(np.reshape(cameras[3]["pose"], (4, 4)), frames[3].pose)
+        assert (cameras[3]["width"], cameras[3]["height"]) == (24, 24)
+        status, headers, content = ask(server, "photos/3")
+        assert status == 200 and headers["Content-Type"] == "image/png"
+        assert np.array_equal(decode_image(content, "photo"), read_image(frames[3].image_path))
+        assert ask(server, f"photos/{len(frames)}")[0] == 404
+
+
+def test_large_photos_are_averaged_down_and_masks_hide_nothing(run, data, tmp_path, monkeypatch):
+    monkeypatch.setattr("splitnerf.view.photos.LARGEST", 10)
+    with serving(run, photos=Photos(data)) as server:
+        assert decode_image(ask(server, "photos/0")[2], "photo").shape == (8, 8, 4)
+    shutil.copytree(data, tmp_path / "data")
+    for path in (tmp_path / "data").rglob("transforms*.json"):
+        content = json.loads(path.read_text())
+        for frame in content["frames"]:
+            frame["mask_path"] = "none.png"
+        write_image(path.parent / "none.png", np.zeros((24, 24), np.float32))
+        path.write_text(json.dumps(content))
+    photo = read_frames(tmp_path / "data", "train")[0][0].image_path
+    write_image(photo, np.full((24, 24, 3), 0.5, np.float32))
+    monkeypatch.undo()
+    with serving(run, photos=Photos(tmp_path / "data")) as server:
+        assert (decode_image(ask(server, "photos/0")[2], "photo")[..., 3] == 1).all()
+
+
+def test_a_photo_that_is_gone_is_said(run, data, tmp_path):
+    shutil.copytree(data, tmp_path / "data")
+    photos = Photos(tmp_path / "data")
+    with serving(run, photos=photos) as server:
+        shutil.rmtree(tmp_path / "data")
+        status, line = error_of(ask(server, "photos/0"))
+        assert status == 422 and "r_000.png: cannot be read (No such file" in line
+    with serving(run) as server:
+        assert json.loads(ask(server, "scene.json")[2])["cameras"] == [] and ask(server, "photos/0")[0] == 404
+
+
+# ---- path tracing ----
+
+
+def camera_of(width, height, **changes):
+    """A camera 3 above the triangle's plane that sees all of it, for JSON."""
+    pose = looking(-np.pi / 2, 0.0) + np.array([[0, 0, 0, 0.4], [0, 0, 0, 0], [0, 0, 0, 0.4], [0, 0, 0, 0]])
+    lens = [1.5 * width, 1.5 * width, width / 2, height / 2]
+    return {"pose": pose.ravel().tolist(), "intrinsics": lens, "width": width, "height": height, "turn": 0, "lights": [0]} | changes
+
+
+def streamed(server, **camera):
+    """(asset, spp, picture) of each picture of a stream."""
+    status, _, content = ask(server, "final", method="POST", body=json.dumps(camera).encode())
+    assert status == 200
+    pictures = []
+    while content:
+        asset, width, height, spp, length = server_module.PICTURE.unpack_from(content)
+        content = content[server_module.PICTURE.size :]
+        pictures.append((asset, spp, np.frombuffer(content[:length], "<f2").reshape(height, width, 4)))
+        content = content[length:]
+    return pictures
+
+
+def test_pictures_are_those_of_the_path_tracer(run, monkeypatch):
+    """Strips of a picture and passes add up to what one call of the tracer says, also with the light turned."""
+    monkeypatch.setattr(final, "PASSES", (1, 1, 62))
+    monkeypatch.setattr(final, "FIRST_SIDE", 20)
+    monkeypatch.setattr(final, "PATHS_A_CALL", 500)
+    asset = Shown([run]).sources[0].asset
+    with serving(run) as server:
+        for turn in (0, 90):
+            camera = camera_of(60, 40, turn=turn)
+            pictures = streamed(server, **camera)
+            assert [(asset, spp, picture.shape) for asset, spp, picture in pictures] == [
+                (0, 1, (13, 20, 4)), (0, 1, (40, 60, 4)), (0, 2, (40, 60, 4)), (0, 64, (40, 60, 4))]  # fmt: skip
+            expected = AssetRenderer(asset).render(
+                rotate_environment(sky(), turn), np.reshape(camera["pose"], (4, 4)), camera["intrinsics"], 60, 40, spp=256
+            )  # fmt: skip
+            small, first, _, best = (picture.astype(np.float32) for _, _, picture in pictures)
+            assert 0.1 < expected["alpha"].mean() < 0.9
+            assert np.abs(best[..., 3] - expected["alpha"]).max() < 0.25 and np.abs(best[..., 3] - expected["alpha"]).mean() < 0.01
+            inside = expected["alpha"] > 0.99
+            truth = expected["radiance"][inside]
+            assert best[inside, :3].mean(axis=0) == pytest.approx(truth.mean(axis=0), rel=0.03)
+            noise = [((picture[inside, :3] - truth) ** 2).mean() for picture in (first, best)]
+            assert noise[1] < noise[0] / 100  # of 64 paths and of one; 40 where all calls draw the same numbers
+            thirds = area_average(expected["alpha"][:39], 3)
+            assert np.abs(small[..., 3] - thirds).mean() < 0.1  # the same view in fewer pixels
+
+
+def test_two_assets_are_traced_in_turns(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(final, "PASSES", (1, 1))
+    with serving(run, triangle().write(tmp_path / "other.glb")) as server:
+        pictures = streamed(server, **camera_of(16, 16, lights=[0, 1]))
+    assert [(asset, spp) for asset, spp, _ in pictures] == [(0, 1), (1, 1), (0, 1), (1, 1), (0, 2), (1, 2)]
+
+
+def test_a_newer_request_ends_the_one_before(run, monkeypatch):
+    monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
+    tracer = Tracer(Shown([run]))
+    camera = Camera.of(camera_of(16, 16), 1)
+    first = tracer.pictures(camera, lambda: False)
+    assert next(first).spp == 1
+    second = []
+    thread = threading.Thread(target=lambda: second.append(next(tracer.pictures(camera, lambda: False))))
+    thread.start()
+    assert sum(1 for _ in first) < 1_000_000  # else it would not end
+    thread.join()
+    assert second[0].spp == 1
+    third = tracer.pictures(camera, lambda: True)
+    assert list(third) == []
+
+
+def test_a_page_that_goes_ends_its_request(run, monkeypatch):
+    monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
+    with serving(run) as server:
+        body = json.dumps(camera_of(16, 16)).encode()
+        with socket.create_connection(server.server_address) as page:
+            path = urlsplit(server.url).path
+            page.sendall(
+                f"POST {path}final HTTP/1.1\r\nHost: {urlsplit(server.url).netloc}\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body
+            )
+            assert page.recv(12).startswith(b"HTTP/1.0 200")
+        with server.tracer._working:  # is free once the stream has ended
+            pass
+
+
+def test_cameras_beyond_reason_are_refused(run, served):
+    good = camera_of(16, 16)
+    for changes in (
+        {"width": 0}, {"width": 1 << 20}, {"width": 4000, "height": 4000}, {"intrinsics": [1, 1, 8]}, {"intrinsics": [0, 1, 8, 8]},
+        {"intrinsics": ["x", 1, 8, 8]}, {"pose": [0] * 16}, {"pose": [1] * 4}, {"pose": None}, {"lights": []}, {"lights": [7]},
+        {"turn": float("nan")}, {"turn": 1e9}, {"height": None},
+    ):  # fmt: skip
+        status, line = error_of(ask(served, "final", method="POST", body=json.dumps(good | changes).encode()))
+        assert status == 422 and "\n" not in line, changes
+    assert ask(served, "final", method="POST", body=b"{")[0] == 400
+    assert ask(served, "final", method="POST", body=b"[]")[0] == 422
+    assert ask(served, "final", method="POST", body=b" " * 70_000)[0] == 413
+
+
+# ---- the command ----
+
+
+def refused(capsys, *words):
+    assert main(["view", "--no-browser", *map(str, words)]) == BAD_INPUT
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if "note: " not in line)
+    return line
+
+
+def test_what_cannot_be_shown_is_refused_before_anything_is_served(run, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("splitnerf.view.server.ViewServer.__init__", lambda *_: pytest.fail("served"))
+    content = (run / "mesh.glb").read_bytes()
+    (tmp_path / "cut.glb").write_bytes(content[: len(content) // 2])
+    (tmp_path / "text.glb").write_text("hello")
+    (tmp_path / "parts.gltf").write_bytes(json.dumps(gltf_in_parts(tmp_path)).encode())
+    (tmp_path / "bad.hdr").write_text("hello")
+    (tmp_path / "empty").mkdir()
+    assert "cut.glb: truncated GLB" in refused(capsys, tmp_path / "cut.glb")
+    assert "text.glb: is neither" in refused(capsys, run, tmp_path / "text.glb")
+    assert "parts.gltf: is a .gltf" in refused(capsys, tmp_path / "parts.gltf")
+    assert "empty: has no mesh.glb" in refused(capsys, tmp_path / "empty")
+    assert "absent.glb: no such file" in refused(capsys, tmp_path / "absent.glb")
+    assert "bad.hdr: " in refused(capsys, run, "--light", tmp_path / "bad.hdr")
+    assert "absent: no such folder" in refused(capsys, run, "--data", tmp_path / "absent")
+    assert "--port must lie between 0 and 65535" in refused(capsys, run, "--port", 70000)
+
+
+def gltf_in_parts(folder):
+    document = triangle()
+    (folder / "parts.bin").write_bytes(document.binary)
+    return {k: v for k, v in document.json.items() if v != []} | {
+        "buffers": [{"byteLength": len(document.binary), "uri": "parts.bin"}]
+    }
+
+
+def test_a_port_in_use_and_a_foreign_address_are_refused(run, capsys):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        line = refused(capsys, run, "--port", port)
+        assert line == f"splitnerf: 127.0.0.1, port {port}: cannot be listened at (Address already in use); give another --host or --port"
+    assert "give another --host" in refused(capsys, run, "--host", "192.0.2.1")
+    assert "give another --host" in refused(capsys, run, "--host", "no.such.host.invalid")
+
+
+def test_another_host_is_said(run, capsys, monkeypatch):
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ViewServer, "serve_forever", interrupted)
+    assert main(["view", "--no-browser", str(run)]) == DONE
+    said = capsys.readouterr()
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{20,}/\n", said.out) and "note" not in said.err
+    assert main(["view", "--no-browser", str(run), "--host", "0.0.0.0"]) == DONE
+    said = capsys.readouterr()
+    assert "listens at 0.0.0.0" in said.err and re.fullmatch(r"http://\S+:\d+/[\w-]{20,}/\n", said.out)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_in_peace(run, number):
+    """Also while the path tracer works."""
+    words = [sys.executable, "-m", "splitnerf", "view", str(run), "--no-browser"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        url = urlsplit(process.stdout.readline().strip())
+        assert url.hostname == "127.0.0.1"
+        page = http.client.HTTPConnection(url.hostname, url.port, timeout=60)
+        page.request("POST", f"{url.path}final", json.dumps(camera_of(1000, 1000)))
+        assert page.getresponse().status == 200
+        process.send_signal(number)
+        assert process.wait(60) == DONE
+        assert process.stderr.read() == ""
+
+
+# ---- the page ----
+
+
+def sources_of_the_page(folder: Path) -> list[Path]:
+    return [folder / n for n in ("build.mjs", "package-lock.json", "package.json")] + sorted((folder / "src").iterdir())
+
+
+def hash_of_the_sources(folder: Path) -> str:
+    """As build.mjs computes it."""
+    digest = hashlib.sha256()
+    for path in sources_of_the_page(folder):
+        digest.update(f"{path.relative_to(folder).as_posix()}\n".encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def test_the_page_was_built_from_the_sources(tmp_path):
+    """Where this fails: `make viewer`."""
+    page = (PAGE / "viewer.html").read_text(encoding="utf-8")
+    assert f"sources {hash_of_the_sources(PAGE / 'page')}" in page
+    shutil.copytree(PAGE / "page", tmp_path / "page", ignore=shutil.ignore_patterns("node_modules"))
+    with open(tmp_path / "page/src/style.css", "a") as file:
+        file.write("\n")
+    assert hash_of_the_sources(tmp_path / "page") not in page
+
+
+def test_the_page_names_the_licence_and_loads_nothing():
+    page = (PAGE / "viewer.html").read_text(encoding="utf-8")
+    for text in (page, (PAGE / "LICENSES").read_text()):
+        assert "three.js authors" in text and "Permission is hereby granted" in text
+    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=\"(?!data:)", page)
+    assert not re.search(r"\{\{\w+\}\}", page[:5000])
+    for path in sources_of_the_page(PAGE / "page"):
+        assert path.name == "package-lock.json" or len(path.read_text().splitlines()) < 500

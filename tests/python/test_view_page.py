@@ -1,0 +1,328 @@
+"""The viewer's page in Chromium: its picture is that of the path tracer, and its controls do what they say.
+
+Skipped where Node, Chromium or the packages of the page's sources (`npm ci` there, or `make viewer`) are missing.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from painted_ball import looking, sky, with_textures
+from PIL import Image
+
+import splitnerf.view
+from splitnerf.data.environment import rotate_environment
+from splitnerf.data.images import area_average, linear_to_srgb, read_image, write_image
+from splitnerf.export.glb import write_glb
+from splitnerf.relight.cameras import bounding_sphere, turntable
+from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.view.photos import Photos
+from splitnerf.view.server import ViewServer
+from splitnerf.view.shown import Shown
+
+SOURCES = Path(splitnerf.view.__file__).parent / "page"
+LOOK = Path(__file__).parents[1] / "viewer/look.mjs"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+SIZE = 160
+TURN = 90
+CLICKED = 2  # the number of the photo whose camera is clicked
+BARE = "#names, #said, #fold, #legend { display: none !important } #canvas { outline: 0 !important }"  # the picture alone
+
+pytestmark = pytest.mark.skipif(
+    not (shutil.which("node") and CHROMIUM and (SOURCES / "node_modules/playwright-core").is_dir()),
+    reason="needs node, chromium and `make viewer`",
+)
+
+
+def lamps():
+    """A grey sky with a warm and a blue lamp; no turn looks like another."""
+    light = sky(32)
+    light[10:16, 4:10] = (1, 4, 14)
+    return light
+
+
+def look(shown, steps, photos=None):
+    """What the page says while it does the steps."""
+    with ViewServer(shown, photos) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        try:
+            words = ["node", str(LOOK), str(SOURCES), CHROMIUM, server.url]
+            done = subprocess.run(words, input=json.dumps(steps), capture_output=True, text=True, timeout=300)
+        finally:
+            server.shutdown()
+            thread.join()
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def pixels(path):
+    return np.asarray(Image.open(path).convert("RGB"), np.float32) / 255
+
+
+@pytest.fixture(scope="module")
+def run(ball, tmp_path_factory):
+    """A run's folder with a ball whose halves differ."""
+    folder = tmp_path_factory.mktemp("page") / "mine"
+    folder.mkdir()
+    materials = np.full((64, 64, 2), (0.4, 0.0), np.float32)
+    write_glb(folder / "mesh.glb", with_textures(ball, roughness_metallic_texture=materials))
+    write_image(folder / "environment.exr", lamps())
+    write_image(folder / "uncertainty.exr", np.full((8, 8, 4), (0.05, 9, 0.1, 0.1), np.float32))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def seen(run):
+    """Pictures by name, and what the page said, of one walk through the page."""
+    folder = run.parent
+    write_image(folder / "red.hdr", np.full((8, 16, 3), (1.0, 0.1, 0.1), np.float32))
+    (folder / "cut.exr").write_bytes((run / "environment.exr").read_bytes()[:300])
+
+    def picture(name):
+        return {"do": "picture", "path": str(folder / f"{name}.png")}
+
+    def keys(*names):
+        return [{"do": "key", "key": name} for name in names]
+
+    said = {"do": "text", "script": "document.getElementById('said').textContent"}
+    names = ("albedo", "roughness", "metallic", "normals", "uncertainty")
+    steps = [
+        {"do": "size", "width": 700, "height": 440}, {"do": "open"}, picture("whole"), said | {"name": "start"},
+        {"do": "style", "content": BARE}, {"do": "size", "width": SIZE, "height": SIZE}, *keys("h", "b"), picture("shaded"),
+        {"do": "set", "selector": "#turn", "value": TURN}, picture("turned"),
+        {"do": "set", "selector": "#turn", "value": 0},
+        *(step for i, name in enumerate(names) for step in (*keys(str(i + 2)), picture(name))),
+        {"do": "set", "selector": "#quantity", "value": 1}, picture("unknown"), *keys("1"),
+        *keys("."), picture("brighter"), *keys(",", "t"), picture("aces"), *keys("t"),
+        *keys("ArrowLeft", "ArrowUp", "-"), picture("moved"),
+        {"do": "text", "name": "home", "script": "document.getElementById('home').click()"}, picture("home"),
+        {"do": "drag", "from": [80, 80], "to": [110, 80]}, picture("dragged"), *keys("r"),
+        {"do": "drop", "path": str(folder / "red.hdr")}, picture("red"),
+        {"do": "text", "name": "light", "script": "document.querySelector('#light option:checked').textContent"},
+        {"do": "drop", "path": str(folder / "cut.exr")}, picture("kept"), said | {"name": "damaged"},
+        *keys("b"), {"do": "set", "selector": "#blur", "value": 0}, picture("background"),
+        *keys("h"), {"do": "size", "width": 340, "height": 600}, picture("narrow"),
+        {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
+        {"do": "text", "name": "stage", "script": "[canvas.clientWidth, canvas.clientHeight]"},
+    ]  # fmt: skip
+    told = look(Shown([run]), steps)
+    return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
+
+
+@pytest.fixture(scope="module")
+def traced(run):
+    """By turns of the light: the picture of `splitnerf relight`, and where it shows the object alone."""
+    source = Shown([run]).sources[0]
+    view = turntable(source.asset, 1, size=(SIZE, SIZE))[0]
+
+    def picture(turn):
+        light = rotate_environment(lamps(), turn)
+        images = AssetRenderer(source.asset).render(light, view.pose, view.intrinsics, SIZE, SIZE, spp=64)
+        return linear_to_srgb(np.clip(images["radiance"], 0, 1)), images["alpha"] > 0.999
+
+    return {turn: picture(turn) for turn in (0, TURN, -TURN, 180)}
+
+
+@pytest.fixture(scope="module")
+def photos(run):
+    """The ball through three cameras whose lens looks past the middle, path traced, as a data set."""
+    folder = run.parent / "data"
+    source, frames = Shown([run]).sources[0], []
+    lens = (200.0, 190.0, 95.0, 50.0)
+    for i, (azimuth, elevation) in enumerate(((0.4, 0.5), (-2.0, 0.2), (2.5, -0.3))):
+        pose = looking(azimuth, elevation, 5.0)
+        images = AssetRenderer(source.asset).render(lamps(), pose, lens, SIZE, 120, spp=64)
+        straight = linear_to_srgb(np.clip(images["radiance"] / np.maximum(images["alpha"], 1e-6)[..., None], 0, 1))
+        write_image(folder / f"{i}.png", np.dstack([straight, images["alpha"]]))
+        frames.append({"file_path": f"{i}.png", "transform_matrix": pose.tolist()})
+    intrinsics = dict(zip(("fl_x", "fl_y", "cx", "cy"), lens)) | {"w": SIZE, "h": 120}
+    (folder / "transforms.json").write_text(json.dumps(intrinsics | {"frames": frames}))
+    return Photos(folder)
+
+
+@pytest.fixture(scope="module")
+def through(run, photos):
+    """Pictures by name, and what the page said, of a second walk: through the photos' cameras, path traced, two assets."""
+    folder = run.parent / "through"
+    folder.mkdir()
+
+    def picture(name):
+        return {"do": "picture", "path": str(folder / f"{name}.png")}
+
+    def keys(*names):
+        return [{"do": "key", "key": name} for name in names]
+
+    def split(value):
+        return {"do": "set", "selector": "#split", "value": value}
+
+    x, y = place_of_camera(run, photos, CLICKED)
+    bare = {"do": "style", "content": BARE + "#split-row { display: none !important }"}
+    chosen = {"do": "text", "script": "document.getElementById('through').selectedOptions[0].textContent"}
+    steps = [
+        {"do": "size", "width": 700, "height": 440}, {"do": "open"}, *keys("n"), picture("whole"), *keys("r"),
+        bare, {"do": "size", "width": SIZE, "height": SIZE}, *keys("h", "b", "n", "n"), split(100), picture("photo"),
+        split(0), picture("render"), *keys("5"), picture("outline"), *keys("1"), chosen | {"name": "second"},
+        {"do": "drag", "from": [80, 80], "to": [82, 80]}, chosen | {"name": "left"}, *keys("r"),
+        *keys("c", "-", "-", "-", "-", "-", "-", "-", "-"), picture("frusta"),
+        {"do": "click", "x": x, "y": y}, chosen | {"name": "clicked"},
+        *keys("r", "c", "f"), picture("final"), {"do": "text", "name": "said", "script": "document.getElementById('said').textContent"},
+        {"do": "set", "selector": "#turn", "value": TURN}, picture("turned"), *keys("f"), picture("again"),
+    ]  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("splitnerf.view.final.PASSES", (1, 1, 30))
+        told = look(Shown([run]), steps, photos)
+    return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
+
+
+def place_of_camera(run, photos, number):
+    """The pixel in which a photo's camera is seen from the front, eight keys farther away."""
+    view = turntable(Shown([run]).sources[0].asset, 1, size=(SIZE, SIZE))[0]
+    centre = bounding_sphere(Shown([run]).sources[0].asset)[0]
+    eye = centre + (view.pose[:3, 3] - centre) / 0.9**8
+    place = view.pose[:3, :3].T @ (np.reshape(photos.cameras()[number]["pose"], (4, 4))[:3, 3] - eye)
+    assert place[2] < 0
+    return [SIZE / 2 + view.intrinsics[0] * place[0] / -place[2], SIZE / 2 - view.intrinsics[1] * place[1] / -place[2]]
+
+
+def psnr(picture, traced):
+    truth, inside = traced
+    return -10 * np.log10(((picture - truth)[inside] ** 2).mean())
+
+
+def smooth_psnr(picture, traced):
+    """Of the means of 8 x 8 pixels, in which the noise of both is small, where the object fills them."""
+    truth, inside = traced
+    full = area_average(inside.astype(np.float32), 8) == 1
+    return psnr(area_average(picture, 8), (area_average(truth, 8), full))
+
+
+def middle(picture):
+    """The mean colour of 10 x 10 pixels."""
+    half = SIZE // 2
+    return picture[half - 5 : half + 5, half - 5 : half + 5].mean(axis=(0, 1))
+
+
+def test_the_page_loads_without_a_complaint(seen):
+    told, _ = seen
+    refused = [line for line in told["console"] if "422" in line]  # Chromium says so of the damaged light
+    assert len(refused) == 1
+    assert [line for line in told["console"] if not line.startswith("warning: ") and line not in refused] == []
+    assert told["texts"]["start"] == ""
+
+
+def test_the_light_is_turned_as_relight_turns_it(seen, traced):
+    _, pictures = seen
+    for name, turn in (("shaded", 0), ("turned", TURN)):
+        scores = {other: psnr(pictures[name], traced[other]) for other in traced}
+        print(name, scores)
+        assert scores[turn] > 26
+        assert all(scores[turn] > scores[other] + 6 for other in traced if other != turn)
+
+
+def test_maps_show_their_numbers(seen):
+    _, pictures = seen
+    assert middle(pictures["albedo"]) == pytest.approx([float(linear_to_srgb(np.float32([0.4]))[0])] * 3, abs=0.01)
+    assert middle(pictures["roughness"]) == pytest.approx([0.4] * 3, abs=0.01)
+    assert middle(pictures["metallic"]) == pytest.approx([0] * 3, abs=0.01)
+    # The middle of the ball looks at the camera: from the front (-y), from 20 degrees above.
+    towards = np.array([0, -np.cos(np.radians(20)), np.sin(np.radians(20))])
+    assert middle(pictures["normals"]) == pytest.approx(0.5 * towards + 0.5, abs=0.02)
+
+
+def test_uncertainty_has_the_colours_of_the_report(seen):
+    from splitnerf.refinement.uncertainty import UNKNOWN
+    from splitnerf.report.last_stage import UNKNOWN_COLOURS, coloured
+
+    _, pictures = seen
+    assert 0.05 < float(UNKNOWN[0])
+    expected = coloured((np.full((1, 1, 4), 0.05), np.ones((1, 1))), 0)[0, 0]
+    assert middle(pictures["uncertainty"]) == pytest.approx(expected, abs=0.01)
+    stripes = np.unique((255 * pictures["unknown"][70:90, 70:90]).round().reshape(-1, 3), axis=0)
+    assert stripes == pytest.approx(np.sort(255 * UNKNOWN_COLOURS, axis=0).round(), abs=1.01)
+
+
+def test_keys_and_the_pointer_move_what_they_say(seen):
+    _, pictures = seen
+    before = middle(pictures["shaded"])
+    brighter = middle(pictures["brighter"])
+    assert (brighter > before + 0.03).all()
+    for name in ("aces", "moved", "dragged"):
+        assert np.abs(pictures[name] - pictures["shaded"]).mean() > 0.01, name
+    assert np.abs(pictures["home"] - pictures["shaded"]).max() < 0.02
+
+
+def test_a_dropped_light_lights_and_a_damaged_one_is_said(seen):
+    told, pictures = seen
+    assert told["texts"]["light"] == "red.hdr"
+    red, green, blue = middle(pictures["red"])
+    assert red > 2 * green and green == pytest.approx(blue, abs=0.02)
+    assert np.array_equal(pictures["kept"], pictures["red"])
+    assert told["texts"]["damaged"].startswith("cut.exr: ") and "\n" not in told["texts"]["damaged"]
+    corner = pictures["background"][:10, :10].mean(axis=(0, 1))
+    assert corner == pytest.approx(linear_to_srgb(np.float32([1, 0.1, 0.1])), abs=0.02)
+
+
+def test_a_narrow_window_has_room_for_both(seen):
+    told, _ = seen
+    assert told["texts"]["overflow"] == 0
+    width, height = told["texts"]["stage"]
+    assert width == 340 and height > 250
+
+
+def test_a_photo_lies_where_its_camera_draws_the_object(through, run):
+    """The lens looks past the middle, and is not square."""
+    told, pictures = through
+    complaints = [line for line in told["console"] if not line.startswith("warning: ")]
+    assert complaints == [] and told["texts"]["second"] == "1"
+    stored = read_image(run.parent / "data/1.png")
+    inside = stored[..., 3] > 0.999
+    grey = np.float32([0x8F, 0x92, 0x96]) / 255
+    photo, render = (pictures[name][20:140] for name in ("photo", "render"))
+    assert np.abs(photo - (stored[..., :3] * stored[..., 3:] + grey * (1 - stored[..., 3:])))[inside].max() < 0.01
+    assert psnr(render, (stored[..., :3], inside)) > 30
+    drawn = np.abs(pictures["outline"][20:140] - grey).max(axis=2) > 0.05
+    wrong = {shift: (drawn != (np.roll(stored[..., 3], shift, axis=(0, 1)) > 0.15)).sum() for shift in (0, -1, 1)}
+    print(wrong)
+    assert wrong[0] < 0.01 * inside.sum() and wrong[0] < min(wrong[-1], wrong[1]) / 2
+    assert np.abs(pictures["render"][:20] - grey).max() < 0.01  # beside the photo
+
+
+def test_cameras_are_left_and_clicked(through):
+    told, pictures = through
+    assert told["texts"]["left"] == "none" and told["texts"]["clicked"] == str(CLICKED)
+    rows, columns = np.indices((SIZE, SIZE)) - SIZE / 2
+    lines = (pictures["frusta"][..., 2] - pictures["frusta"][..., 0] > 0.1) & (np.hypot(rows, columns) > 40)
+    assert 20 < lines.sum() < 1000
+
+
+def test_the_final_picture_is_the_path_tracers(through, traced):
+    told, pictures = through
+    assert told["texts"]["said"] == "path traced, 32 paths a pixel"
+    for name, turn in (("final", 0), ("turned", TURN)):
+        scores = {other: smooth_psnr(pictures[name], traced[other]) for other in traced}
+        print(name, scores, smooth_psnr(pictures["again"], traced[turn]))
+        assert scores[turn] > 45 and all(scores[other] < 35 for other in traced if other != turn)
+    assert not np.array_equal(pictures["again"], pictures["turned"])
+
+
+def test_two_assets_stand_side_by_side(run, ball, tmp_path):
+    dark = np.full((64, 64, 3), 0.02, np.float32)
+    write_glb(tmp_path / "dark.glb", with_textures(ball, albedo_texture=dark))
+    steps = [
+        {"do": "size", "width": 2 * SIZE, "height": SIZE}, {"do": "open"},
+        {"do": "text", "name": "names", "script": "document.getElementById('names').innerText"},
+        {"do": "style", "content": BARE}, {"do": "key", "key": "h"}, {"do": "key", "key": "2"},
+        {"do": "picture", "path": str(tmp_path / "two.png")},
+    ]  # fmt: skip
+    told = look(Shown([run, tmp_path / "dark.glb"]), steps)
+    picture = pixels(tmp_path / "two.png")
+    assert told["texts"]["names"].split() == ["mine", "dark.glb"]
+    for half, albedo in ((picture[:, :SIZE], 0.4), (picture[:, SIZE:], 0.02)):
+        assert middle(half) == pytest.approx([float(linear_to_srgb(np.float32([albedo]))[0])] * 3, abs=0.02)

@@ -1,0 +1,77 @@
+// Opens the viewer's page in Chromium and does what standard input asks, a JSON list of steps; tests/python/test_view_page.py
+// writes it. Prints {"console": [...], "texts": {...}} as JSON; pictures go to the paths that steps name.
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { basename } from "node:path";
+
+const [packages, executablePath, url] = process.argv.slice(2);
+const { chromium } = createRequire(`${packages}/package.json`)("playwright-core");
+const args = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--force-color-profile=srgb"];
+const browser = await chromium.launch({ executablePath, args, chromiumSandbox: process.getuid() !== 0 });
+const page = await browser.newPage();
+const told = { console: [], texts: {} };
+let open = 0; // requests
+page.on("request", () => (open += 1));
+for (const end of ["requestfinished", "requestfailed"]) page.on(end, () => (open -= 1));
+page.on("console", (message) => told.console.push(`${message.type()}: ${message.text()}`));
+page.on("pageerror", (error) => told.console.push(`error: ${error.stack}`));
+
+/** Waits until nothing is loaded and two pictures are equal. */
+async function settled() {
+  for (let last = ""; ; ) {
+    const now = open ? "" : (await page.screenshot()).toString("base64");
+    if (now && now === last) return;
+    last = now;
+    await page.waitForTimeout(300);
+  }
+}
+
+const steps = {
+  size: ({ width, height }) => page.setViewportSize({ width, height }),
+  open: async () => {
+    await page.goto(url);
+    await page.waitForSelector("body.ready", { timeout: 120000 });
+  },
+  style: ({ content }) => page.addStyleTag({ content }),
+  key: ({ key }) => page.keyboard.press(key),
+  focus: ({ selector }) => page.focus(selector),
+  click: ({ x, y }) => page.mouse.click(x, y),
+  drag: async ({ from, to }) => {
+    await page.mouse.move(...from);
+    await page.mouse.down();
+    await page.mouse.move(...to, { steps: 4 });
+    await page.mouse.up();
+  },
+  set: ({ selector, value }) =>
+    page.$eval(
+      selector,
+      (field, given) => {
+        if (typeof given === "boolean") field.checked = given;
+        else field.value = given;
+        field.dispatchEvent(new Event("input", { bubbles: true }));
+      },
+      value,
+    ),
+  drop: async ({ path }) => {
+    const content = readFileSync(path).toString("base64");
+    const data = await page.evaluateHandle(
+      ([name, text]) => {
+        const transfer = new DataTransfer();
+        transfer.items.add(new File([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))], name));
+        return transfer;
+      },
+      [basename(path), content],
+    );
+    await page.dispatchEvent("body", "dragenter", { dataTransfer: data });
+    await page.dispatchEvent("body", "drop", { dataTransfer: data });
+  },
+  picture: ({ path }) => page.screenshot({ path }),
+  text: async ({ name, script }) => (told.texts[name] = await page.evaluate(script)),
+};
+
+for (const step of JSON.parse(readFileSync(0, "utf8"))) {
+  await steps[step.do](step);
+  if (step.do !== "size" || page.url() !== "about:blank") await settled();
+}
+console.log(JSON.stringify(told));
+await browser.close();
