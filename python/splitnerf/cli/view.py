@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.help import examples
 from splitnerf.errors import InputError
 
 LOCAL = "127.0.0.1"
@@ -19,6 +20,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "view", help="look at an asset in the browser",
         description="Serves a page that shows RUN's mesh.glb, or a GLB file, in the light that the run recovered, and its "
         "maps. Other lights (.hdr, .exr) can be dropped onto the page. Ctrl-C ends it.",
+        epilog=examples("splitnerf view runs/data --data data", "splitnerf view runs/a runs/b --light studio.hdr"),
     )  # fmt: skip
     # fmt: off
     add = parser.add_argument
