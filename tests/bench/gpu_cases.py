@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
-from gpu_world import CORNERS, Sizes, TINY, World
+from gpu_world import CORNERS, Sizes, World
 from op_cases import CASES as TEST_INPUTS
 from op_cases import with_gradients
 from torch import Tensor

@@ -33,7 +33,8 @@ from splitnerf.bench.provenance import header, provenance
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("cpp", "python/splitnerf/ops")
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "python")]
-from gpu_cases import TINY, Case, Sizes, World, all_cases, bytes_moved, lib  # noqa: E402
+from gpu_cases import Case, all_cases, bytes_moved  # noqa: E402
+from gpu_world import TINY, Sizes, World, lib  # noqa: E402
 from op_checks import as_tuple, has_cuda_kernel  # noqa: E402
 from op_cases import ROUNDED_ALIKE, moved, truth  # noqa: E402
 

@@ -118,6 +118,19 @@ REPLACED = {
 }  # fmt: skip
 
 
+class PlainAdamW(torch.optim.AdamW):
+    """torch's, which asks the host whether a step is allowed."""
+
+    counted = ()  # it counts no step that is not allowed
+
+    def step(self, allowed: Tensor) -> None:
+        if allowed:
+            super().step()
+
+    def take_back(self, counted: tuple) -> None:
+        """Nothing."""
+
+
 def use_plain_torch() -> None:
     """From here on every operator of a step is torch code."""
     for module, functions in REPLACED.items():
@@ -128,7 +141,7 @@ def use_plain_torch() -> None:
 
     def unfused(model, config):
         groups = make(model, config).param_groups
-        return torch.optim.AdamW(
+        return PlainAdamW(
             [{k: g[k] for k in ("params", "lr", "weight_decay", "rate")} for g in groups], betas=(0.9, 0.99), eps=1e-15
         )
 

@@ -162,7 +162,7 @@ def test_the_docs_have_the_tables_place():
 
 
 PROFILE = """
-| 2.5 | 38% | 1.0 | 2568.9 | `layer_kernel<float>(long, SdfLayer<float>)` |
+| 2.5 | 38% | 1.0 | 2568.9 | `field_kernel<float>(long, SdfLayer<float>)` |
 | 1.0 | 15% | 1.1 | 973.1 | `for_each_group_kernel<CachedOcclusionBody<float> >(long, CachedOcclusionBody<float>)` |
 | 0.9 | 10% | 1.0 | 9.1 | `at::native::index_elementwise_kernel<128, 4>` |
 | 0.8 | 10% | 1.0 | 9.1 | `gemm_of_somebody_kernel<128, 4>` |
@@ -170,8 +170,8 @@ PROFILE = """
 COUNTS = """==PROF== Connected
 "ID","Kernel Name","dram","us","sm","cache","warps"
 "","","%","ns","%","%","%"
-"0","void splitnerf::layer_kernel<float>(long)","10","1,000","55.5","30","20"
-"1","void splitnerf::layer_kernel<float>(long)","10","3,000","56.5","30","20"
+"0","void splitnerf::field_kernel<float>(long)","10","1,000","55.5","30","20"
+"1","void splitnerf::field_kernel<float>(long)","10","3,000","56.5","30","20"
 "2","other","10","3,000","56.5","30","20"
 """
 IN_COUNTS = dict(zip(("us", "sm", "cache", "dram", "warps"), gpu_limits.METRICS))
@@ -191,11 +191,11 @@ def test_the_costliest_kernels_are_counted(tmp_path, monkeypatch, capsys):
     profile.write_text(PROFILE)
     monkeypatch.setattr("sys.argv", ["gpu_limits.py", str(profile), "--out", str(tmp_path), "--", "train", "--steps", "9"])
     assert gpu_limits.main() == 0
-    assert capsys.readouterr().out == "share of the limit: layer_kernel 56 %\n"
+    assert capsys.readouterr().out == "share of the limit: field_kernel 56 %\n"
     asked = (tmp_path / "asked").read_text()
-    assert "regex:layer_kernel|CachedOcclusionBody " in asked and asked.endswith("all train --steps 9\n")
+    assert "regex:field_kernel|CachedOcclusionBody " in asked and asked.endswith("all train --steps 9\n")
     text = (tmp_path / "limits.md").read_text()
-    assert "| `layer_kernel` | 2.0 | 56.0 | 30.0 | 10.0 | 20.0 |" in text and "| `CachedOcclusionBody` | not seen |" in text
+    assert "| `field_kernel` | 2.0 | 56.0 | 30.0 | 10.0 | 20.0 |" in text and "| `CachedOcclusionBody` | not seen |" in text
     for name in ("counts", "limits.csv"):
         (tmp_path / name).unlink()
     assert gpu_limits.main() == 1 and "counted nothing" in capsys.readouterr().out
