@@ -17,6 +17,7 @@ from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
+from splitnerf.render import model, renderer
 from splitnerf.render.renderer import find_samples
 from splitnerf.workflow import reconstruct
 
@@ -51,8 +52,22 @@ def test_modules_and_gradients_stay_there(monkeypatch):
 
 @pytest.mark.parametrize("name", ["cpu", "fast", "paper"])
 def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeypatch, name):
-    """Beside the operators that must know how many samples there are, which count their waits in C++."""
+    """Operators that must know how many samples there are wait within, unless they are told what to have room for."""
     waits = []
+
+    def waiting(module, name, is_told):
+        operator = getattr(module, name)
+
+        def called(*args, **kwargs):
+            gpu.waits[name] += not is_told(*args, **kwargs)
+            return operator(*args, **kwargs)
+
+        monkeypatch.setattr(module, name, called)
+
+    waiting(renderer, "march_rays", lambda *_: False)
+    waiting(renderer, "sample_rays", lambda *_, room, **__: room > 0)
+    waiting(renderer, "spread_samples", lambda *args: args[5] is not None)
+    waiting(model, "wide_lobes", lambda *args: args[4] is not None)
 
     def counted(*args, **kwargs):
         waits.append(gpu.waits.total())
@@ -65,7 +80,7 @@ def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeyp
         assert trained.finished and trained.model.device == GPU and trained.grid.cells.device == GPU
     assert all(isinstance(p, GpuTensor) for p in trained.model.parameters())
     each = statistics.median(b - a for a, b in itertools.pairwise(waits[-20:]))
-    assert each <= {"cpu": 0, "fast": 0, "paper": 1}[name]
+    assert each <= {"cpu": 0, "fast": 0, "paper": 2}[name]
 
 
 @pytest.mark.parametrize("settings", [{}, {"sparse_steps": True, "table_dtype": "float16"}])

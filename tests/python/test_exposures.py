@@ -98,7 +98,10 @@ class TestLearning:
         beside = target * torch.tensor([1, 1, 1, 0.5])
         for bad in (dict(target=clipped), dict(target=dark), dict(target=beside), dict(opacity=0.5 * opacity)):
             found.learn(**dict(view=view, target=target, mean=mean, opacity=opacity) | bad)
+        found.learn(view, target, mean, opacity, torch.tensor(False))  # nor does a step that is not allowed
         assert torch.equal(found.factors, torch.ones(2, 3)) and not found.sums.any()
+        found.learn(view, target, mean, opacity, torch.tensor(True))
+        assert found.sums.any()
 
     @pytest.mark.parametrize("refine, photographed, compositing, learned", [
         ("auto", True, "linear", True), ("auto", False, "linear", False), ("yes", False, "linear", True),
