@@ -11,7 +11,7 @@
 
 #include <algorithm>
 
-#include "launch.cuh"
+#include "tile_size.cuh"
 #include "splitnerf/accumulate.h"
 #include "splitnerf/ops_cuda.h"
 
@@ -20,8 +20,7 @@ namespace {
 
 constexpr int kLanes = 16;                 // columns are padded to a multiple of this
 constexpr int kUnits = 8, kShare = 4;      // columns at a time; threads that share a point
-constexpr int kPointChoices[] = {64, 32};  // points of a tile
-constexpr int kMostThreads = 64 * kShare;
+constexpr int kMostThreads = kTilePoints[0] * kShare;
 constexpr int kMostSums = 256;  // lists of the weights' gradients, one a block
 
 // ---- the numbers as the tiles read them, and their gradients ----
@@ -220,21 +219,6 @@ __global__ void __launch_bounds__(kMostThreads)
   }
 }
 
-// The number of points of a tile with so many rows, and its shared memory, which the kernel is set to allow.
-struct TileSize {
-  int points, bytes;
-};
-template <class T, class Kernel> TileSize tile_size(const char* op, int rows, Kernel kernel) {
-  const int most = most_shared_memory(op);
-  for (const int points : kPointChoices) {
-    const int64_t bytes = int64_t{rows} * (points + 1) * int64_t{sizeof(T)};
-    if (bytes > most) continue;
-    allow_shared_memory(op, kernel, bytes);
-    return {points, static_cast<int>(bytes)};
-  }
-  throw std::invalid_argument(std::string(op) + ": the layers are too wide for this GPU's shared memory");
-}
-
 }  // namespace
 
 template <class T>
@@ -244,7 +228,7 @@ void material_network(const Queue& queue, const MaterialWeights<T>& weights, int
   if (n == 0) return;
   const MaterialNetwork<T> net = prepare(queue, op, weights);
   const auto kernel = network_kernel<T>;
-  const TileSize tile = tile_size<T>(op, forward_rows(net), kernel);
+  const TileSize tile = tile_size<T>(op, forward_rows(net), kernel, "the layers are too wide");
   launch(queue, op, kernel, blocks_for(n, tile.points), tile.points * kShare, tile.bytes, n, net,
          Parts<const T>(weights, parts), to);
 }
@@ -255,7 +239,7 @@ void material_network_backward(const Queue& queue, const MaterialWeights<T>& wei
   const char* op = "material_network_backward";
   const MaterialNetwork<T> net = prepare(queue, op, weights);
   const auto kernel = backward_kernel<T>;
-  const TileSize tile = tile_size<T>(op, forward_rows(net) + 2 * widest(net), kernel);
+  const TileSize tile = tile_size<T>(op, forward_rows(net) + 2 * widest(net), kernel, "the layers are too wide");
   const int n_sums = static_cast<int>(std::min<int64_t>((n + tile.points - 1) / tile.points, kMostSums));
   T* const sums = queue.scratch<T>(std::max(n_sums, 1) * net.grad_size());
   if (n_sums > 0)

@@ -1,5 +1,6 @@
 // The distance alone, at points and along rays.
 #include "sdf_prepare.cuh"
+#include "tile_size.cuh"
 #include "splitnerf/ops_cuda.h"
 #include "splitnerf/bodies/rays.h"
 #include "splitnerf/bodies/sdf_layer.h"
@@ -8,7 +9,6 @@
 namespace splitnerf::cuda {
 namespace {
 
-constexpr int kPointChoices[] = {64, 32};  // threads of a block, one a point of its tile
 constexpr int kWalkThreads = 128;          // threads of a block that walks along rays
 constexpr int kWalkWarps = kWalkThreads / Warp::size, kWalkPoints = Warp::size / kWalkLanes;
 constexpr int kMostCopied = 40 * 1024;  // bytes of weights that it copies: with more, too few blocks share a processor
@@ -88,21 +88,6 @@ template <class T, class S> HashGridView<T, S> field_grid(const SdfField<T>& fie
   return make_view<T>(field.shape, field.n_active, nullptr, table);
 }
 
-// The number of points of a tile with this number of rows, and its shared memory, which the kernel is set to allow.
-struct TileSize {
-  int points, bytes;
-};
-template <class T, class Kernel> TileSize tile_size(const char* op, int rows, Kernel kernel) {
-  const int most = most_shared_memory(op);
-  for (const int points : kPointChoices) {
-    const int64_t bytes = int64_t{rows} * (points + 1) * int64_t{sizeof(T)};
-    if (bytes > most) continue;
-    allow_shared_memory(op, kernel, bytes);
-    return {points, static_cast<int>(bytes)};
-  }
-  throw std::invalid_argument(std::string(op) + ": features are too many for this GPU's shared memory");
-}
-
 }  // namespace
 
 template <class T>
@@ -113,7 +98,7 @@ void sdf_values(const Queue& queue, const SdfField<T>& field, int64_t n, const T
   with_features(field.shape.n_features, [&](auto count) {
     field.table.template read_as<T>([&](auto* table) {
       const auto kernel = values_kernel<T, decltype(count)::n, Pointee<decltype(table)>>;
-      const TileSize tile = tile_size<T>(op, field.weights.n_inputs, kernel);
+      const TileSize tile = tile_size<T>(op, field.weights.n_inputs, kernel, "features are too many");
       launch(queue, op, kernel, blocks_for(n, tile.points), tile.points, tile.bytes, n, field_grid(field, table), layer,
              positions, values);
     });

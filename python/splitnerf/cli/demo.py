@@ -18,7 +18,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "demo", help="render a small scene, reconstruct it and print the errors against its truth",
         description="Makes a scene with known shape, materials and sky, renders it with the built-in path tracer, "
         "trains on it and prints the errors. Nothing is downloaded.",
-        epilog=examples("splitnerf demo", "splitnerf demo --max-minutes 1 --out /tmp/demo --overwrite"),
+        epilog=examples("splitnerf demo", "splitnerf demo --max-minutes 1 --out runs/short --overwrite"),
     )  # fmt: skip
     parser.add_argument(
         "--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)"
