@@ -6,6 +6,8 @@
 # make tables   says which tables under docs/ are stale
 # make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
 # make viewer   builds the page of splitnerf view from its sources (needs Node and npm)
+# make wheels   builds a wheel for each Python from 3.10 to 3.13 that is found, into build/wheels
+# make lock   renews third_party/requirements.lock, the versions and hashes of what `make install` brings
 # make fuzz   feeds each reader damaged files for FUZZ_SECONDS, in four parts: tracing takes memory with every run
 VENV ?= .venv
 PYTHON ?= python3
@@ -21,7 +23,7 @@ CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || tr
 CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 READERS := json colmap neus png exr hdr glb checkpoint
 
-.PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer clean
+.PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer lock wheels clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -79,8 +81,15 @@ install: $(VENV)/.installed
 SOURCES := $(shell find cpp third_party -type f) CMakeLists.txt pyproject.toml
 $(VENV)/.installed: $(SOURCES) | system
 	sh third_party/install_python_packages.sh $(PYTHON) $(VENV)
-	$(CACHED) $(BIN)/python -m pip install --quiet --no-build-isolation -e '.[test]'
+	$(CACHED) $(BIN)/python -m pip install --quiet --no-build-isolation --no-deps -e .
 	@touch $@
+
+lock: install
+	$(BIN)/python -m pip install --quiet uv
+	sh third_party/lock.sh $(BIN)/python
+
+wheels: install
+	TORCH_PYTHON=$(BIN)/python sh third_party/build_wheels.sh build/wheels
 
 clean:
 	rm -rf build $(VENV)

@@ -1,8 +1,9 @@
 #!/bin/sh
-# Makes the virtual environment and brings torch and the build tools into it.
+# Makes the virtual environment and brings into it torch, and what third_party/requirements.lock names, which pip checks by hashes.
 #   install_python_packages.sh PYTHON VENV
 set -eu
-python=$1 venv=$2 torch=2.13.0
+python=$1 venv=$2 here=$(dirname "$0")
+torch=$(cat "$here/torch_version")
 
 if [ ! -x "$venv/bin/python" ]; then
   # A torch that the system's Python has already is kept.
@@ -21,4 +22,4 @@ if ! "$venv/bin/python" -c "import torch" 2>/dev/null; then
       $pip install --quiet "torch==$torch" --extra-index-url https://download.pytorch.org/whl/cpu
   fi
 fi
-$pip install --quiet "scikit-build-core>=0.10" "pybind11>=2.13" "cmake>=3.22" ninja
+$pip install --quiet --no-deps --require-hashes -r "$here/requirements.lock"

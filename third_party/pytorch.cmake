@@ -3,20 +3,21 @@
 # A build with isolation hides that environment behind PYTHONPATH, so a second look runs with -I. The
 # headers of the stable ABI and libtorch are all that is needed; no part of torch's own CMake package,
 # which would ask for CUDA on machines without it.
-set(find_torch "import os, torch; print(os.path.dirname(torch.__file__) + ';' + torch.__version__)")
+set(SPLITNERF_TORCH "" CACHE PATH "Folder of an installed torch package, of any Python (default: that of the Python that builds)")
+set(torch_dir ${SPLITNERF_TORCH})
+set(find_torch "import importlib.util as u; print(u.find_spec('torch').submodule_search_locations[0])")
 foreach(flags "" "-I")
-  execute_process(COMMAND ${Python_EXECUTABLE} ${flags} -c "${find_torch}"
-    OUTPUT_VARIABLE torch_found OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE torch_result)
-  if(torch_result EQUAL 0)
-    break()
+  if(NOT torch_dir)
+    execute_process(COMMAND ${Python_EXECUTABLE} ${flags} -c "${find_torch}"
+      OUTPUT_VARIABLE torch_dir OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
   endif()
 endforeach()
-if(NOT torch_result EQUAL 0)
+if(NOT EXISTS "${torch_dir}/version.py")
   message(FATAL_ERROR "PyTorch was not found by ${Python_EXECUTABLE}. To install it: "
     "pip install 'torch>=2.11' (add --index-url https://download.pytorch.org/whl/cpu where there is no GPU).")
 endif()
-list(GET torch_found 0 torch_dir)
-list(GET torch_found 1 torch_version)
+file(STRINGS "${torch_dir}/version.py" torch_version REGEX "^__version__ *=")
+string(REGEX REPLACE ".*['\"]([^'\"]+)['\"].*" "\\1" torch_version "${torch_version}")
 if(torch_version VERSION_LESS 2.11)
   message(FATAL_ERROR "PyTorch ${torch_version} is too old: the operators need 2.11 or newer.")
 endif()
