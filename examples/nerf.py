@@ -106,7 +106,7 @@ def test(model, data, path):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("data", nargs="?")
-    parser.add_argument("--steps", type=int, default=1000)
+    parser.add_argument("--steps", type=int, default=2000)
     parser.add_argument("--out", default="nerf.png")
     arguments = parser.parse_args()
     torch.manual_seed(0)
