@@ -3,8 +3,8 @@
     blender --background --python blender_import.py -- ASSET.glb LIGHT.exr CAMERAS.json [--blend FILE]
     python blender_import.py ASSET.glb LIGHT.exr CAMERAS.json      (Python 3.11 with bpy==5.0.1)
 
-CAMERAS.json is a transforms.json; `splitnerf relight --path CAMERAS.json` renders the same views. --against 000.png prints
-the PSNR against such a picture, over white. Needs Blender alone, not this project.
+CAMERAS.json is a transforms.json; `splitnerf relight --path CAMERAS.json` renders the same views. --against 000.png
+prints the PSNR against such a picture, over white. Needs Blender alone, not this project.
 """
 
 import argparse
@@ -34,7 +34,7 @@ def set_light(path: str, degrees: float) -> None:
 
 
 def set_camera(path: str, frame: int, size: int) -> None:
-    """Takes pose, lens and size of a transforms.json, whose axes (OpenGL, world z up) are Blender's. Pixels are square."""
+    """Takes pose, lens and size of a transforms.json, whose axes (OpenGL, z up) are Blender's. Pixels are square."""
     cameras = json.loads(Path(path).read_text())
     lens, scene = cameras | cameras["frames"][frame], bpy.context.scene
     scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))

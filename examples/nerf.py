@@ -1,7 +1,8 @@
 """A NeRF: a hash grid and two small networks learn density and colour from images with known cameras.
 
-nerf.py [DATA] [--steps N] [--out FILE]; DATA is any layout that `splitnerf train` reads (default: the demo's scene,
-which is rendered first). Prints the PSNR of held-out views and writes them as a PNG: photos above, renderings below.
+nerf.py [DATA] [--steps N] [--rays N] [--out FILE]; DATA is any layout that `splitnerf train` reads (default: the
+demo's scene, which is rendered first). Prints the PSNR of held-out views and writes them as a PNG: images above,
+renderings below.
 """
 
 import argparse
@@ -17,7 +18,7 @@ from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.ops import HashGridSpec, PackedSamples, composite, hash_encode, march_rays, neus_weights
 from splitnerf.render.rays import image_rays
 
-BOX, STEP, RESOLUTION, RAYS = 1.5, 0.025, 48, 1024  # load_dataset brings the object into the box [-BOX, BOX]^3
+BOX, STEP, RESOLUTION = 1.5, 0.025, 48  # load_dataset brings the object into the box [-BOX, BOX]^3
 SPEC = HashGridSpec(n_levels=10, base_resolution=12, growth=1.4, log2_table_size=15)
 AXIS = (torch.arange(RESOLUTION) + 0.5) / RESOLUTION * 2 * BOX - BOX
 CENTRES = torch.stack(torch.meshgrid(AXIS, AXIS, AXIS, indexing="ij"), dim=-1).view(-1, 3)
@@ -71,7 +72,7 @@ def all_rays(data):
     return *(torch.cat(x) for x in zip(*rays)), pixels
 
 
-def train(data, steps):
+def train(data, steps, n_rays):
     model = NeRF()
     optimiser = torch.optim.Adam(model.parameters(), lr=1e-2, eps=1e-15)
     schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.05 ** (1 / steps))
@@ -79,10 +80,10 @@ def train(data, steps):
     for step in range(steps):
         if step % 32 == 0 and step > 0:
             model.find_empty_cells()
-        i = torch.randint(len(pixels), (RAYS,))
-        background, alpha = torch.rand(RAYS, 3), pixels[i, 3:]
+        i = torch.randint(len(pixels), (n_rays,))
+        background, alpha = torch.rand(n_rays, 3), pixels[i, 3:]
         truth = pixels[i, :3] * alpha + background * (1 - alpha)
-        loss = (model(rays_o[i], rays_d[i], background, torch.rand(RAYS)) - truth).square().mean()
+        loss = (model(rays_o[i], rays_d[i], background, torch.rand(n_rays)) - truth).square().mean()
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
@@ -107,12 +108,14 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("data", nargs="?")
     parser.add_argument("--steps", type=int, default=2000)
+    parser.add_argument("--rays", type=int, default=1024, help="of a step")
     parser.add_argument("--out", default="nerf.png")
     arguments = parser.parse_args()
     torch.manual_seed(0)
     with tempfile.TemporaryDirectory() as folder:
         data = arguments.data or write_demo_dataset(folder)
-        test(train(load_dataset(data, "train"), arguments.steps), load_dataset(data, "test"), arguments.out)
+        model = train(load_dataset(data, "train"), arguments.steps, arguments.rays)
+        test(model, load_dataset(data, "test"), arguments.out)
 
 
 if __name__ == "__main__":

@@ -59,7 +59,8 @@ def pictures(folder: Path, queries: list[str]) -> list[np.ndarray]:
     try:
         for i, query in enumerate(queries):
             path = folder / f"{i}.png"
-            steps = [{"do": "size", "width": SIZE, "height": SIZE}, {"do": "open"}, {"do": "picture", "path": str(path)}]
+            window = {"do": "size", "width": SIZE, "height": SIZE}
+            steps = [window, {"do": "open"}, {"do": "picture", "path": str(path)}]
             url = f"http://127.0.0.1:{server.server_port}/index.html?{query}"
             words = ["node", str(ROOT / "tests/viewer/look.mjs"), str(SOURCES), CHROMIUM, url]
             done = subprocess.run(words, input=json.dumps(steps), capture_output=True, text=True, timeout=300)
