@@ -41,6 +41,24 @@ def with_textures(asset: Asset, **textures: np.ndarray) -> Asset:
     return replace(asset, materials=[replace(asset.materials[0], **textures)])
 
 
+def orange(asset: Asset) -> Asset:
+    """Another asset with saturated colours, and normals whose green channel shows when it is flipped."""
+    size = asset.materials[0].normal_texture.shape[:2]
+    values = {
+        "albedo_texture": (0.8, 0.4, 0.1),
+        "roughness_metallic_texture": (0.4, 0.0),
+        "normal_texture": (0.0, 0.4, 0.84**0.5),
+    }
+    return with_textures(asset, **{name: np.full((*size, len(x)), x, np.float32) for name, x in values.items()})
+
+
+def lamps() -> np.ndarray:
+    """A grey sky with a warm and a blue lamp; no turn looks like another."""
+    light = sky(32)
+    light[10:16, 4:10] = (1, 4, 14)
+    return light
+
+
 def sky(height: int = 16) -> np.ndarray:
     """A bright lamp over a gradient."""
     map_ = np.full((height, 2 * height, 3), 0.5, np.float32) * np.linspace(1.5, 0.5, height)[:, None, None]

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
 import runpy
+import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+import torch
+import trimesh
+from painted_ball import lamps, looking, orange
 
-from splitnerf.data.images import read_image
+from splitnerf.cli import main
+from splitnerf.data.images import read_image, write_image
+from splitnerf.demo.scene import write_demo_dataset
+from splitnerf.export.glb import write_glb
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+BLENDER = os.environ.get("SPLITNERF_BLENDER_PYTHON") or sys.executable  # bpy 5.0 wants an older NumPy than OpenImageIO
 
 
 @pytest.fixture
@@ -33,7 +44,7 @@ def number(pattern: str, text: str) -> float:
 
 
 def test_every_example_is_tested():
-    tested = set(re.findall(r'run\("(\w+\.py)"', Path(__file__).read_text()))
+    tested = set(re.findall(r'run\w*\("(\w+\.py)"', Path(__file__).read_text()))
     assert tested == {path.name for path in EXAMPLES.glob("*.py")}
 
 
@@ -71,3 +82,94 @@ def test_rays(run, tmp_path):
     assert number(r"opacity ([\d.]+)", out) > 0.999
     centre = read_image(tmp_path / "normals.png")[80, 80]
     assert centre == pytest.approx([0.5, 0, 0.5], abs=0.02)  # the normal towards the camera, -y
+
+
+def test_nerf(run, tmp_path):
+    data, picture = write_demo_dataset(tmp_path / "data", size=32, n_train=24, n_test=2, spp=16), tmp_path / "nerf.png"
+    out = run("nerf.py", str(data), "--steps", "200", "--rays", "200", "--out", str(picture))
+    assert number(r"views: ([\d.]+) dB", out) > 19
+    assert read_image(picture).shape == (64, 64, 3)
+
+
+def test_the_nerf_weighs_as_a_density_does():
+    """Its weights against w_i = T_i (1 - exp(-density_i length_i)), T_i the product of what came before, in float64."""
+    names = runpy.run_path(str(EXAMPLES / "nerf.py"))
+    generator = torch.Generator().manual_seed(0)
+    lengths, counts = torch.rand(300, generator=generator) * 0.05, torch.tensor([0, 100, 1, 199])
+    density = 10 ** (torch.rand(300, generator=generator) * 5 - 2)  # 0.01 to 1000
+    density.requires_grad_()
+    offsets = torch.cat([torch.zeros(1, dtype=torch.int64), counts.cumsum(0)])
+    ray_indices = torch.repeat_interleave(torch.arange(4), counts)
+    samples = names["PackedSamples"](ray_indices, torch.zeros(300), lengths, offsets)
+    weights, opacity = names["density_weights"](density, samples)
+    exact = density.detach().double().requires_grad_()
+    expected = []
+    for depth in (exact * lengths.double()).split(counts.tolist()):
+        before = torch.cat([depth.new_zeros(1), depth.cumsum(0)])[: len(depth)]
+        expected.append(torch.exp(-before) * -torch.expm1(-depth))
+    expected = torch.cat(expected)
+    assert (weights - expected).abs().max() < 1e-5
+    assert opacity.tolist() == pytest.approx([x.sum().item() for x in expected.split(counts.tolist())], abs=2e-4)
+    pull = torch.rand(300, generator=generator)
+    (weights * pull).sum().backward()
+    (expected * pull).sum().backward()
+    assert (density.grad - exact.grad).abs().max() < 1e-3 * exact.grad.abs().max()
+
+
+def plane_under_a_ball(height: float) -> tuple[trimesh.Trimesh, int]:
+    """A disc of radius 300, dense in the middle and a unit ball this high above it; the disc has so many vertices."""
+    radii, n = np.geomspace(0.05, 300, 40), 32
+    turns = np.exp(2j * np.pi * np.arange(n) / n)
+    rim = np.concatenate([[0], np.outer(radii, turns).ravel()])
+    ring = 1 + np.arange(n), 1 + np.roll(np.arange(n), -1)
+    faces = [np.column_stack([np.zeros(n, int), *ring])]
+    for i in range(len(radii) - 1):
+        (a, b), (c, d) = (tuple(x + i * n for x in ring), tuple(x + (i + 1) * n for x in ring))
+        faces += [np.column_stack([a, c, d]), np.column_stack([a, d, b])]
+    disc = trimesh.Trimesh(np.column_stack([rim.real, rim.imag, 0 * rim.real]), np.concatenate(faces), process=False)
+    ball = trimesh.creation.icosphere(4).apply_translation((0, 0, height))
+    return trimesh.util.concatenate([disc, ball]), len(rim)
+
+
+def test_occlusion_bake(run, tmp_path):
+    """A ball of radius 1 above a plane hides h / (x^2 + h^2)^(3/2) of it; the plane hides (1 - n_z) / 2 of the ball."""
+    height = 1.3
+    mesh, n_disc = plane_under_a_ball(height)
+    mesh.export(tmp_path / "mesh.ply")
+    out = run("occlusion_bake.py", str(tmp_path / "mesh.ply"), str(tmp_path / "baked.ply"), "4096")
+    baked = trimesh.load(tmp_path / "baked.ply", process=False)
+    assert np.allclose(baked.vertices, mesh.vertices, atol=1e-4)
+    x, y, z = np.asarray(mesh.vertices).T
+    distance = np.hypot(x, y)
+    exact = np.where(np.arange(len(x)) < n_disc, 1 - height / (distance**2 + height**2) ** 1.5, (1 + z - height) / 2)
+    error = np.abs(baked.visual.vertex_colors[:, 0] / 255 - exact)[distance < 30]
+    assert error.max() < 0.01 and error.mean() < 0.003, (error.max(), error.mean())
+    assert number(r"(\d+) vertices", out) == len(x)
+
+
+def run_blender(name: str, *arguments: str) -> str:
+    """What an example prints in a Python that has bpy; skips without one."""
+    has_bpy = "import importlib.util as i, sys; sys.exit(i.find_spec('bpy') is None)"
+    if subprocess.run([BLENDER, "-c", has_bpy]).returncode:
+        pytest.skip("needs bpy: pip install bpy==5.0.1, or SPLITNERF_BLENDER_PYTHON, a Python that has it")
+    done = subprocess.run([BLENDER, str(EXAMPLES / name), *arguments], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_blender_shows_what_relight_shows(ball, tmp_path):
+    """Asset, light with a turn, camera with a shifted lens, exposure and colours: the same picture."""
+    write_glb(tmp_path / "mesh.glb", orange(ball))
+    write_image(tmp_path / "light.exr", lamps())
+    lens = {"fl_x": 150.0, "fl_y": 150.0, "cx": 70.0, "cy": 40.0, "w": 120, "h": 96}
+    cameras = tmp_path / "transforms.json"
+    cameras.write_text(json.dumps(lens | {"frames": [{"transform_matrix": looking(0.4, 0.5, 5.0).tolist()}]}))
+    out = tmp_path / "lit"
+    common = ["--rotate-env", "50", "--exposure", "0.5", "--spp", "64"]
+    asked = ["relight", str(tmp_path / "mesh.glb"), "--env", str(tmp_path / "light.exr"), "--path", str(cameras)]
+    assert main([*asked, *common, "--out", str(out)]) == 0
+    words = [str(tmp_path / name) for name in ("mesh.glb", "light.exr", "transforms.json")]
+    blend = ["--blend", str(tmp_path / "scene.blend"), "--out", str(tmp_path / "view.png")]
+    said = run_blender("blender_import.py", *words, *common, *blend, "--against", str(out / "000.png"))
+    assert number(r"000\.png: ([\d.]+) dB", said) > 35
+    assert (tmp_path / "scene.blend").stat().st_size > 10000

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from painted_ball import looking, sky, with_textures
+from painted_ball import lamps, looking, with_textures
 from PIL import Image
 
 import splitnerf.view
@@ -38,13 +38,6 @@ pytestmark = pytest.mark.skipif(
     not (shutil.which("node") and CHROMIUM and (SOURCES / "node_modules/playwright-core").is_dir()),
     reason="needs node, chromium and `make viewer`",
 )
-
-
-def lamps():
-    """A grey sky with a warm and a blue lamp; no turn looks like another."""
-    light = sky(32)
-    light[10:16, 4:10] = (1, 4, 14)
-    return light
 
 
 def look(shown, steps, photos=None):

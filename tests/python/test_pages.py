@@ -1,0 +1,39 @@
+"""The lines of the examples that the pages show are the examples' own."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from splitnerf.relight.cameras import path_views
+
+ROOT = Path(__file__).parents[2]
+SHOWN = re.compile(r"<!-- not run: lines of (\S+),.*?-->\n```\w+\n(.*?)```", re.DOTALL)
+
+
+@pytest.mark.parametrize("page, n_blocks", [("own_code.md", 4), ("other_programs.md", 4)])
+def test_what_a_page_shows_of_an_example_is_in_it(page, n_blocks):
+    shown = SHOWN.findall((ROOT / "docs" / page).read_text())
+    assert len(shown) == n_blocks
+    for name, lines in shown:
+        script = [line.strip() for line in (ROOT / name).read_text().splitlines()]
+        wanted = [line.strip() for line in lines.splitlines()]
+        runs = (script[i : i + len(wanted)] for i in range(len(script)))
+        assert wanted in [[re.sub(r"^\)  # fmt: skip$", ")", line) for line in run] for run in runs], (name, wanted[0])
+
+
+def test_the_pages_link_to_files():
+    for page in ("own_code.md", "other_programs.md"):
+        links = re.findall(r"\]\(([^)#:]+)[^):]*\)", (ROOT / "docs" / page).read_text())
+        assert links and all((ROOT / "docs" / link).exists() for link in links), (page, links)
+
+
+def test_the_camera_that_a_page_gives_looks_at_the_front(tmp_path):
+    (text,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "other_programs.md").read_text(), re.DOTALL)
+    (tmp_path / "camera.json").write_text(text)
+    (view,) = path_views(tmp_path / "camera.json", None)
+    assert (view.pose[:3, 3] == (0, -3, 0)).all() and (view.pose[:3, 2] == (0, -1, 0)).all()
+    assert (view.width, view.height) == (512, 512) == tuple(json.loads(text)[name] for name in "wh")
