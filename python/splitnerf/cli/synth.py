@@ -33,9 +33,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--spp", type=int, default=256, metavar="N", help="paths a pixel (default: 256)")
     parser.add_argument(
         "--layout",
-        choices=["blender", "nerfactor", "tensoir"],
+        choices=[
+            "blender", "nerfactor", "tensoir", "shiny", "stanford-orb", "owl", "openillumination", "dtc", "glossy", "glossy-real",
+            "neus",
+        ],
         default="blender",
-        help="how the files are named (default: blender)",
+        help="whose files the data look like (default: blender); the first three hold full truth, and only these, "
+        "stanford-orb, owl and openillumination take --relight",
     )
     parser.add_argument(
         "--renderer",
