@@ -75,6 +75,7 @@ class Written:
 
 def write_set(folder: Path, layout: str, relights: bool) -> Written:
     """Renders the scene in the form of a set."""
+    folder.mkdir(exist_ok=True, parents=True)
     asset_path = write_object(folder)
     lights = {
         "studio": patches((40, 35, (8, 7, 5)), (200, -10, (0.3, 0.6, 1.5))),

@@ -77,6 +77,11 @@ def refuse_data(folder: Path) -> None:
         raise InputError(f"{folder}: holds a data set, which results would replace; give another --out")
 
 
+def spread_views(frames: list[Frame], count: int) -> list[Frame]:
+    """At most `count` of the frames, evenly spread from the first one."""
+    return frames[:: max(1, len(frames) // count)][:count]
+
+
 def split_rule(root: Path, reading: Reading = Reading()) -> str:
     """How the views are split, in words for the user."""
     if reading.eval_mode == "auto":
