@@ -7,13 +7,14 @@ import pickle
 
 import numpy as np
 import pytest
-from published_scenes import FOCAL, RELIT, SIZE, TEST, TRAIN, Written, write_set
+from published_scenes import FOCAL, RELIT, SIZE, TEST, TRAIN, Written, patches, write_object, write_set
+from scipy.spatial.transform import Rotation
 
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
-from splitnerf.data.environment import turn_environment
+from splitnerf.data.environment import directions_of_texels, turn_environment
 from splitnerf.data.frames import layout_of, read_frames
-from splitnerf.data.images import read_hdr
+from splitnerf.data.images import read_hdr, write_image
 from splitnerf.data.layouts import (
     colmap, dtc, glossy, neus, openillumination, owl, stanford_orb, transforms, view_folders,
 )  # fmt: skip
@@ -119,6 +120,82 @@ def test_albedo_and_normals_of_those_that_have_them(written):
             assert np.median(np.abs(truth.albedo[solid] - maps["albedo"][solid])) < 0.004
 
 
+# ---- what the sets' documents say, without any constant or function that writer and reader share ----
+
+
+def seen_by(pose: np.ndarray, point: np.ndarray, f: float, c: float) -> np.ndarray:
+    """The pixel in which a camera with this pose, OpenGL axes, sees a point: x to the right, y up, -z ahead."""
+    x, y, z = pose[:3, :3].T @ (point - pose[:3, 3])
+    return np.array([c + f * x / -z, c - f * y / -z])
+
+
+POINT = np.array([0.3, -0.2, 0.45])
+
+
+def test_owl_projects_by_k_r_t_and_has_its_own_curve(tmp_path):
+    (tmp_path / "inputs").mkdir()
+    k, r, t = np.diag([50.0, 50, 1]), Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), np.array([0.1, 0.2, 4.0])
+    k[:2, 2] = 8
+    rows = [*k, *r, t, (16, 16, 3)]
+    (tmp_path / "inputs/camera_0000.txt").write_text("\n".join(" ".join(map(str, map(float, row))) for row in rows))
+    (tmp_path / "inputs/exposure.txt").write_text("-1.5")
+    write_image(tmp_path / "inputs/image_0000.png", np.full((16, 16, 3), 128 / 255))
+    write_image(tmp_path / "inputs/mask_0000.png", np.ones((16, 16)))
+    frame = owl.read(tmp_path, "train")[0]
+    x = k @ (r @ POINT + t)
+    assert seen_by(frame.pose, POINT, 50, 8) == pytest.approx(x[:2] / x[2])
+    linear, _ = read_lit_photo(frame)
+    assert linear[0, 0] == pytest.approx(np.full(3, (128 / 255) ** 2.2 / 2**-1.5), rel=1e-5)
+
+
+def test_dtc_and_glossy_project_with_opencv_axes(tmp_path):
+    motion = np.eye(4)
+    motion[:3, :3], motion[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 4.0)
+    x, y, z = (motion @ [*POINT, 1])[:3]
+    for name in ("png/a.png", "0.png"):
+        write_image(tmp_path / name, np.ones((16, 16, 3)))
+    camera = {"image": "a.png", "T_camera_world": motion.tolist(), "intrinsic": {"fx": 50, "fy": 50, "cx": 7.5, "cy": 7.5}}
+    (tmp_path / "camera_poses.json").write_text(json.dumps({"cameras": [camera]}))
+    k = np.array([[50.0, 0, 8], [0, 50, 8], [0, 0, 1]])
+    (tmp_path / "0-camera.pkl").write_bytes(pickle.dumps((motion[:3].astype(np.float32), k)))
+    for frame in (dtc.read(tmp_path)[0], glossy.read(tmp_path)[0]):
+        assert lens_intrinsics(frame.lens, (16, 16)) == pytest.approx([50, 50, 8, 8])
+        assert seen_by(frame.pose, POINT, 50, 8) == pytest.approx([8 + 50 * x / z, 8 + 50 * y / z], abs=1e-4)
+
+
+def test_a_camera_of_openillumination_looks_along_its_z(tmp_path):
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 0.3)
+    frame = {"file_path": "./images/C3", "transform_matrix": pose.tolist(), "camera_angle_x": 0.5, "calib_imgw": 16}
+    (tmp_path / "output").mkdir()
+    (tmp_path / "output/transforms_train.json").write_text(json.dumps({"frames": {"C3": frame}}))
+    write_image(tmp_path / "Lights/013/raw_undistorted/C3.JPG", np.ones((16, 16, 3)))
+    found = openillumination.read(tmp_path, "train")[0]
+    point = pose[:3] @ [0.1, 0.2, 1.0, 1]  # to the right of the axis and below it
+    f = 8 / np.tan(0.25)
+    assert seen_by(found.pose, point, f, 8) == pytest.approx([8 + 0.1 * f, 8 + 0.2 * f])
+
+
+@pytest.mark.parametrize(("row", "column", "axis"), [(8, 16, (0, 0, -1)), (8, 24, (1, 0, 0)), (8, 8, (-1, 0, 0)), (0, 3, (0, 1, 0))])
+def test_the_light_of_stanford_orb_is_in_the_camera_axes(tmp_path, row, column, axis):
+    """The centre of the map is what the camera looks at, a quarter to the right what is to its right, the top row up."""
+    root = tmp_path / "blender_HDR/cup_scene001"
+    (root / "train_mask").mkdir(parents=True)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 0.3)
+    frame = {"scene_name": "cup_scene004", "file_path": "test/0003", "camera_angle_x": 0.4, "transform_matrix": pose.tolist()}
+    for name in ("train", "novel"):
+        (root / f"transforms_{name}.json").write_text(json.dumps({"frames": [frame]}))
+    write_image(root.with_name("cup_scene004") / "test/0003.exr", np.ones((8, 8, 3), np.float32))
+    light = np.zeros((16, 32, 3), np.float32)
+    light[row if row == 0 else slice(row - 1, row + 1), slice(None) if row == 0 else slice(column - 1, column + 1)] = 1
+    write_image(tmp_path / "ground_truth/cup_scene004/env_map/0003.exr", light)
+    radiance = stanford_orb.relit(root, {})[0].radiance()[..., 0]
+    directions, areas = directions_of_texels(16)
+    mean = (directions * (radiance * areas)[..., None]).sum(axis=(0, 1))
+    assert mean / np.linalg.norm(mean) == pytest.approx(pose[:3, :3] @ axis, abs=0.03)
+
+
 def damaged(scene: Written, name: str) -> tuple:
     """A file of the set and what to write into it."""
     return {
@@ -157,10 +234,6 @@ def test_a_scene_that_leads_out_of_the_folder_is_refused(tmp_path):
 
 
 def test_a_layout_without_other_lights_refuses_them(tmp_path, capsys):
-    from published_scenes import patches, write_object
-
-    from splitnerf.data.images import write_image
-
     write_image(tmp_path / "a.exr", patches())
     map_path = str(tmp_path / "a.exr")
     arguments = [str(write_object(tmp_path)), "--light", map_path, "--relight", map_path, "--out", str(tmp_path / "out")]

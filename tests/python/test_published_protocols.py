@@ -62,12 +62,12 @@ def test_orb_means_over_the_whole_frame_and_clips():
     """A difference of d on all k pixels inside gives k / n d^2: PSNR-L in sRGB; PSNR-H after a factor, above 4 nothing counts."""
     mask = box(2, 22)
     share = stanford_orb.eroded(mask).mean()
-    truth, image = (np.full((SIDE, SIDE, 3), value) for value in (0.25, 0.16))
+    truth, image = (np.full((SIDE, SIDE, 3), value) for value in (0.81, 0.49))
     high, low = stanford_orb.image_psnr(image, truth, mask, scaled=False)
-    difference = linear_to_srgb(np.float64(0.25)) - linear_to_srgb(np.float64(0.16))
+    difference = linear_to_srgb(np.float64(0.81)) - linear_to_srgb(np.float64(0.49))
     assert low == pytest.approx(-10 * np.log10(share * difference**2), abs=1e-4)
-    factor = linear_to_srgb(np.float64(0.25)) / 0.25
-    assert high == pytest.approx(-10 * np.log10(share * (factor * 0.09) ** 2), abs=1e-4)
+    factor = linear_to_srgb(np.float64(0.81)) / 0.81
+    assert high == pytest.approx(-10 * np.log10(share * (factor * 0.32) ** 2), abs=1e-4)
     brightest = 5 * np.ones((SIDE, SIDE, 3))  # the factor is 1, as the truth clipped to 1 is white
     assert stanford_orb.image_psnr(9 * brightest, brightest, mask, scaled=False) == (PERFECT, PERFECT)
     assert stanford_orb.image_psnr(0.5 * brightest, brightest, mask, scaled=False)[0] < 10
@@ -154,10 +154,10 @@ def test_nerfactor_takes_four_views_of_the_test():
 def test_tensoir_albedo_is_to_the_power_and_white_outside():
     alpha = (box(6, 18) > 0).astype(float)
     truth = FolderTruth(None, alpha, np.full((SIDE, SIDE, 3), 0.36), None)
-    albedo = np.full((SIDE, SIDE, 3), 0.18)
-    assert tensoir.albedo_error(albedo, truth, np.full(3, 2.0)) == pytest.approx(0, abs=1e-12)
+    maps = {"albedo": np.full((SIDE, SIDE, 3), 0.18), "alpha": alpha}
+    assert tensoir.albedo_error(maps, truth, np.full(3, 2.0)) == pytest.approx(0, abs=1e-12)
     expected = alpha.mean() * (0.36 ** (1 / 2.2) - 0.18 ** (1 / 2.2)) ** 2
-    assert tensoir.albedo_error(albedo, truth, np.ones(3)) == pytest.approx(expected)
+    assert tensoir.albedo_error(maps, truth, np.ones(3)) == pytest.approx(expected)
 
 
 def test_tensoir_normals_count_the_background_as_equal():

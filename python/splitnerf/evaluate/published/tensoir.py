@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.frames import spread_views
+from splitnerf.data.images import over_background
 from splitnerf.data.layouts import view_folders as layout
 from splitnerf.evaluate.metrics import median_scale, psnr, ssim
 from splitnerf.evaluate.published.common import Column, Delivered, Options, Scores, angles_deg, mean_of, srgb_on_white, unit
@@ -46,7 +47,7 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
             image = srgb_on_white(maps)
             result |= {"view_psnr": psnr(image, truth.image), "view_ssim": ssim(image, truth.image)}
         if truth.albedo is not None:
-            errors.append(albedo_error(maps["albedo"], truth, scale))
+            errors.append(albedo_error(maps, truth, scale))
         if truth.normal is not None:
             result["normals"] = whole_normals(maps, truth)
         images.append(result)
@@ -75,16 +76,18 @@ def albedo_scale(delivered: Delivered, frames: list) -> np.ndarray:
         truth = read_truth(frame)
         if truth.albedo is not None:
             known = truth.alpha > 0
-            ours.append(delivered.render(frame, None)["albedo"][known])
-            theirs.append(truth.albedo[known])
+            maps = delivered.render(frame, None)
+            ours.append(over_background(maps["albedo"], maps["alpha"])[known])
+            theirs.append(over_background(truth.albedo, truth.alpha)[known])
     return median_scale(np.concatenate(ours), np.concatenate(theirs)) if ours else np.ones(3)
 
 
-def albedo_error(albedo: np.ndarray, truth: FolderTruth, scale: np.ndarray) -> float:
-    """The mean squared error of albedo [H, W, 3] times the scale, white outside, to the power of 1 / 2.2."""
-    known = truth.alpha[..., None] > 0
-    theirs = truth.albedo * truth.alpha[..., None] + 1 - truth.alpha[..., None]
-    ours = np.where(known, np.clip(albedo * scale, 0, 1), 1.0)
+def albedo_error(maps: dict[str, np.ndarray], truth: FolderTruth, scale: np.ndarray) -> float:
+    """The mean squared error of albedo over white, times the scale where the truth's alpha is not 0, white elsewhere, to the
+    power of 1 / 2.2."""
+    ours = over_background(maps["albedo"], maps["alpha"]) * scale
+    ours = np.where(truth.alpha[..., None] > 0, np.clip(ours, 0, 1), 1.0)
+    theirs = over_background(truth.albedo, truth.alpha)
     return float(np.mean((ours ** (1 / GAMMA) - theirs ** (1 / GAMMA)) ** 2))
 
 
