@@ -21,6 +21,7 @@ from splitnerf.data.layouts import (
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.lit_photos import read_lit_photo
+from splitnerf.data.photos import load_photo
 from splitnerf.data.reading import Reading
 from splitnerf.data.relit import map_files
 from splitnerf.data.truth import load_view_truths
@@ -33,6 +34,7 @@ SETS = {  # the module that reads it, and whether it has photos in other lights
     "glossy": (glossy, False), "glossy-real": (colmap, False), "neus": (neus, False),
 }  # fmt: skip
 LEAST = {"openillumination": 32.0}  # dB: JPEG
+RANDOM = np.random.default_rng(11)
 QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 
@@ -194,6 +196,20 @@ def test_the_light_of_stanford_orb_is_in_the_camera_axes(tmp_path, row, column, 
     directions, areas = directions_of_texels(16)
     mean = (directions * (radiance * areas)[..., None]).sum(axis=(0, 1))
     assert mean / np.linalg.norm(mean) == pytest.approx(pose[:3, :3] @ axis, abs=0.03)
+
+
+def test_radiance_a_little_below_0_is_noise(tmp_path):
+    pixels = RANDOM.uniform(0.1, 0.5, (16, 16, 3)).astype(np.float32)
+    pixels[3, 4] = -0.01
+    for factor, good in ((1, True), (100, False)):
+        write_image(tmp_path / "a.exr", np.where(pixels < 0, factor * pixels, pixels))
+        frame = Frame("a", tmp_path / "a.exr", np.eye(4), {"camera_angle_x": 0.5})
+        if good:
+            rgba = load_photo(frame, 1, "object").rgba
+            assert not rgba[3, 4, :3].any() and rgba[..., :3].any(axis=-1).sum() == 255
+            continue
+        with pytest.raises(InputError, match="a.exr: has NaN, infinite or negative pixels"):
+            load_photo(frame, 1, "object")
 
 
 def damaged(scene: Written, name: str) -> tuple:

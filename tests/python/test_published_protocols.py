@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
 import json
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from splitnerf.evaluate.published import dtu, glossy, nerfactor, openilluminatio
 from splitnerf.evaluate.published.common import Delivered
 from splitnerf.evaluate.published.folders import FolderTruth
 from splitnerf.evaluate.published.table import PROTOCOLS, published, table
+from splitnerf.synth.layouts import LAYOUTS
 
 SIDE = 24
 RANDOM = np.random.default_rng(5)
@@ -208,6 +211,17 @@ def test_dtu_counts_the_observed_and_what_is_above_the_plane():
     kept = dtu.thinned(RANDOM.uniform(0, 3, (4000, 3)))
     apart = np.linalg.norm(kept[:, None] - kept[None], axis=-1) + np.eye(len(kept))
     assert apart.min() > dtu.SPACING and len(kept) > 500
+
+
+def test_the_command_line_knows_all_protocols_and_layouts():
+    choices = {a.dest: a.choices for name in ("evaluate", "synth") for a in parser_of(name)._actions if a.choices}
+    assert tuple(choices["protocol"]) == tuple(PROTOCOLS) and tuple(choices["layout"]) == LAYOUTS
+
+
+def parser_of(name: str) -> argparse.ArgumentParser:
+    commands = argparse.ArgumentParser().add_subparsers()
+    import_module(f"splitnerf.cli.{name}").add_parser(commands)
+    return commands.choices[name]
 
 
 def test_published_numbers_fit_their_tables():

@@ -22,11 +22,11 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Path-traces the test views of DATA, of the asset that RUN's last stage fitted or of a GLB file (a RUN "
         "without a last stage is rendered from its checkpoint), relights the asset under the data's maps, and writes "
         "evaluation.json and report.html into RUN (for a file FILE_evaluation.json beside it). Without --data it reads the "
-        "scores written before, for --table.",
+        "scores written before, for --table. With --protocol it scores by the rules of a published set.",
         epilog=examples(
             "splitnerf evaluate runs/a --data data",
             "splitnerf evaluate runs/a runs/b --table table.md",
-            "splitnerf evaluate runs/teapot --data blender_HDR/teapot_scene001 --protocol stanford-orb",
+            "splitnerf evaluate runs/a --data car/test --protocol owl",
         ),
     )  # fmt: skip
     parser.add_argument("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
@@ -45,8 +45,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--spp", type=int, default=128, metavar="N", help="paths a pixel of what is path traced (default: 128)"
     )
     parser.add_argument(
-        "--views", type=int, metavar="N", help="test views, evenly spread (default: all; 20 with --lights); with --protocol "
-        "tensoir and shiny alone, and less than the protocol's",
+        "--views", type=int, metavar="N", help="test views, evenly spread (default: all; 20 with --lights)"
     )
     parser.add_argument(
         "--lights",
@@ -55,12 +54,11 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         "--protocol", choices=SETS, metavar="SET",
-        help="score mesh.glb as a published set is scored, beside published numbers, and write SET.json into RUN (for a file "
-        f"FILE_SET.json beside it): {', '.join(SETS)}",
+        help=f"score mesh.glb as a published set is, beside published numbers, and write RUN/SET.json: {', '.join(SETS)}",
     )  # fmt: skip
     parser.add_argument(
         "--truth", type=Path, metavar="FOLDER",
-        help="for --protocol: DTU's Points and ObsMask (dtu), the models (dtc), ground_truth (stanford-orb, if it is elsewhere)",
+        help="for --protocol: DTU's Points and ObsMask, DTC's models, or Stanford-ORB's ground_truth if it is elsewhere",
     )  # fmt: skip
     parser.add_argument(
         "--maps",
