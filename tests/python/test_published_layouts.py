@@ -178,7 +178,9 @@ def test_a_camera_of_openillumination_looks_along_its_z(tmp_path):
     assert seen_by(found.pose, point, f, 8) == pytest.approx([8 + 0.1 * f, 8 + 0.2 * f])
 
 
-@pytest.mark.parametrize(("row", "column", "axis"), [(8, 16, (0, 0, -1)), (8, 24, (1, 0, 0)), (8, 8, (-1, 0, 0)), (0, 3, (0, 1, 0))])
+@pytest.mark.parametrize(
+    ("row", "column", "axis"), [(8, 16, (0, 0, -1)), (8, 24, (1, 0, 0)), (8, 8, (-1, 0, 0)), (0, 3, (0, 1, 0))]
+)
 def test_the_light_of_stanford_orb_is_in_the_camera_axes(tmp_path, row, column, axis):
     """The centre of the map is what the camera looks at, a quarter to the right what is to its right, the top row up."""
     root = tmp_path / "blender_HDR/cup_scene001"

@@ -21,7 +21,8 @@ from splitnerf.evaluate.published.common import Column, Delivered, Options, Scor
 
 LAYOUT = layout
 COLUMNS: tuple[Column, ...] = (
-    ("chamfer", "chamfer, mm", "{:.2f}"), ("accuracy", "mesh to scan, mm", "{:.2f}"), ("completeness", "scan to mesh, mm", "{:.2f}"),
+    ("chamfer", "chamfer, mm", "{:.2f}"), ("accuracy", "mesh to scan, mm", "{:.2f}"),
+    ("completeness", "scan to mesh, mm", "{:.2f}"),
 )  # fmt: skip
 SPACING, FARTHEST, PATCH = 0.2, 20.0, 60.0  # mm
 DENSITY = 4.0  # points a square of the spacing, before they are thinned

@@ -64,7 +64,7 @@ def curve(linear: np.ndarray) -> np.ndarray:
 
 
 def masked_ssim(image: np.ndarray, photo: np.ndarray, mask: np.ndarray) -> float:
-    """The mean over the mask of the structural similarity of both images, black outside: 7 x 7 windows, as scikit-image has it."""
+    """The mean over the mask of both images' structural similarity, black outside: 7 x 7 windows, as scikit-image has it."""
     if min(mask.shape) < 7:
         raise InputError("SSIM needs photos of at least 7 x 7 pixels")
     pair = (np.float64(x * mask[..., None]) for x in (image, photo))

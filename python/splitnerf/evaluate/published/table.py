@@ -31,7 +31,5 @@ def table(name: str, ours: dict[str, float | None], label: str) -> str:
         values = (row.get(key) for key, _, _ in columns)
         cells.append([row["method"], *("-" if x is None else f.format(x) for x, (_, _, f) in zip(values, columns))])
     widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))]
-    return "\n".join(
-        "  ".join(cell.ljust(width) if i == 0 else cell.rjust(width) for i, (cell, width) in enumerate(zip(line, widths))).rstrip()
-        for line in cells
-    )
+    padded = [[cell.rjust(width) for cell, width in zip(line, widths)] for line in cells]
+    return "\n".join("  ".join([line[0].ljust(widths[0]), *rest[1:]]).rstrip() for line, rest in zip(cells, padded))
