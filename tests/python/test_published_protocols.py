@@ -126,7 +126,10 @@ def test_owl_ssim_counts_inside_the_mask():
     other = photo.copy()
     other[12:] = 0
     assert owl.masked_ssim(other, photo, mask) == pytest.approx(1)
-    assert owl.masked_ssim(photo * np.float32(0.5), photo, mask) < 0.95
+    flat = np.full((SIDE, SIDE, 3), 0.8, np.float32)  # without variance: (2 a b + c) / (a^2 + b^2 + c) in whole windows
+    expected = (2 * 0.8 * 0.4 + 1e-4) / (0.8**2 + 0.4**2 + 1e-4)
+    assert owl.masked_ssim(flat / 2, flat, np.ones_like(mask)) == pytest.approx(expected, abs=1e-6)
+    assert owl.masked_ssim(flat / 2, flat, mask) < expected + 1e-6
 
 
 # ---- the others ----
