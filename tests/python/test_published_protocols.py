@@ -163,6 +163,8 @@ def test_tensoir_albedo_is_to_the_power_and_white_outside():
     truth = FolderTruth(None, alpha, np.full((SIDE, SIDE, 3), 0.36), None)
     maps = {"albedo": np.full((SIDE, SIDE, 3), 0.18), "alpha": alpha}
     assert tensoir.albedo_error(maps, truth, np.full(3, 2.0)) == pytest.approx(0, abs=1e-12)
+    bright = {"albedo": np.full((SIDE, SIDE, 3), 0.72), "alpha": alpha}
+    assert tensoir.albedo_error(bright, truth, np.full(3, 0.5)) == pytest.approx(0, abs=1e-12)
     expected = alpha.mean() * (0.36 ** (1 / 2.2) - 0.18 ** (1 / 2.2)) ** 2
     assert tensoir.albedo_error(maps, truth, np.ones(3)) == pytest.approx(expected)
 
