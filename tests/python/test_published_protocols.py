@@ -174,6 +174,8 @@ def test_tensoir_normals_count_the_background_as_equal():
     up, side = (np.broadcast_to(np.array(n, float), (SIDE, SIDE, 3)) for n in ((0, 0, 1), (1, 0, 0)))
     found = tensoir.whole_normals({"normal": side, "alpha": alpha}, FolderTruth(None, alpha, None, up))
     assert found == pytest.approx(90 * alpha.mean())
+    nothing = {"normal": side, "alpha": np.zeros_like(alpha)}  # shows the background where the truth points down
+    assert tensoir.whole_normals(nothing, FolderTruth(None, alpha, None, -up)) == pytest.approx(180 * alpha.mean())
 
 
 def test_shiny_normals_are_weighted():
