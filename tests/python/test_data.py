@@ -92,7 +92,7 @@ def test_view_folders(tmp_path):
     centre = SIZE // 4
     assert truth.normal[centre, centre] == pytest.approx([0, -0.6, 0.8], abs=0.006)
     assert truth.normal_mask[centre, centre] and not truth.normal_mask[0, 0] and not truth.normal[0, 0].any()
-    assert truth.albedo[centre, centre] == pytest.approx([0.2158605, 0.0512695, 1], abs=1e-4)
+    assert truth.albedo[centre, centre] == pytest.approx([128 / 255, 64 / 255, 1], abs=1e-4)  # linear
 
 
 BAD_FOLDERS = {

@@ -11,7 +11,9 @@ from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.cli.summary import print_scores
 from splitnerf.errors import InputError
 
-NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env")
+NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env", "protocol", "truth")
+OWN_RULES = ("sheet", "lights", "table", "eval_mode", "mask_kind")  # options of this project's protocol
+SETS = ("stanford-orb", "owl", "openillumination", "dtc", "nerfactor", "tensoir", "shiny", "glossy", "dtu")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -20,8 +22,12 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Path-traces the test views of DATA, of the asset that RUN's last stage fitted or of a GLB file (a RUN "
         "without a last stage is rendered from its checkpoint), relights the asset under the data's maps, and writes "
         "evaluation.json and report.html into RUN (for a file FILE_evaluation.json beside it). Without --data it reads the "
-        "scores written before, for --table.",
-        epilog=examples("splitnerf evaluate runs/a --data data", "splitnerf evaluate runs/a runs/b --table table.md"),
+        "scores written before, for --table. With --protocol it scores by the rules of a published set.",
+        epilog=examples(
+            "splitnerf evaluate runs/a --data data",
+            "splitnerf evaluate runs/a runs/b --table table.md",
+            "splitnerf evaluate runs/a --data car/test --protocol owl",
+        ),
     )  # fmt: skip
     parser.add_argument("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
     parser.add_argument(
@@ -46,6 +52,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         choices=["low", "high"],
         help="a published relighting protocol, 20 views: low, 8 low-frequency probes; high, 7 maps",
     )
+    parser.add_argument(
+        "--protocol", choices=SETS, metavar="SET",
+        help=f"score mesh.glb as a published set is, beside published numbers, and write RUN/SET.json: {', '.join(SETS)}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--truth", type=Path, metavar="FOLDER",
+        help="for --protocol: DTU's Points and ObsMask, DTC's models, or Stanford-ORB's ground_truth if it is elsewhere",
+    )  # fmt: skip
     parser.add_argument(
         "--maps",
         type=Path,
@@ -77,6 +91,9 @@ def run(args: argparse.Namespace) -> int:
     data = args.data or []
     evaluations = []
     for i, target in enumerate(args.targets):
+        if args.protocol:
+            score_by_set(target, data[min(i, len(data) - 1)], args)
+            continue
         if data:
             scores = evaluate_target(target, data[min(i, len(data) - 1)], args)
         else:
@@ -102,11 +119,20 @@ def check_usage(args: argparse.Namespace) -> None:
         InputError: Two options exclude each other, or a file would be lost; the message names them.
     """
     from splitnerf.evaluate.jobs import holds_evaluation
+    from splitnerf.evaluate.published.job import holds_published
     from splitnerf.evaluate.table import holds_table
 
     given = [name for name in NEEDS_DATA if getattr(args, name) is not None]
     if not args.data and given:
         raise InputError(f"--{given[0]} needs --data; without it the scores written before are read")
+    ruled_out = [name for name in OWN_RULES if getattr(args, name) is not None]
+    if args.protocol and (ruled_out or args.downscale != 1):
+        name = (ruled_out or ["downscale"])[0].replace("_", "-")
+        raise InputError(f"--{name} does not go with --protocol, which has rules of its own; leave it out")
+    if args.protocol and args.views is not None and args.protocol not in ("tensoir", "shiny"):
+        raise InputError(f"--views does not go with --protocol {args.protocol}, which chooses its views; leave it out")
+    if args.truth is not None and not args.protocol:
+        raise InputError("--truth needs --protocol; leave it out")
     if args.data and len(args.data) not in (1, len(args.targets)):
         raise InputError(
             f"--data was given {len(args.data)} times for {len(args.targets)} runs; give it once, or once each"
@@ -116,7 +142,8 @@ def check_usage(args: argparse.Namespace) -> None:
             raise InputError(f"--{name} takes one run, got {len(args.targets)}; evaluate them one by one")
     if args.sheet is not None and args.sheet.suffix.lower() not in (".png", ".jpg"):
         raise InputError(f"{args.sheet}: a sheet must end in .png or .jpg")
-    for name, path, is_ours in (("table", args.table, holds_table), ("out", args.out, holds_evaluation)):
+    holds = holds_published if args.protocol else holds_evaluation
+    for name, path, is_ours in (("table", args.table, holds_table), ("out", args.out, holds)):
         if path is not None and path.is_file() and path.stat().st_size and not is_ours(path):
             raise InputError(f"{path}: is no earlier result, and would be replaced; give another --{name}")
 
@@ -142,6 +169,29 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
         write_sheet(args.sheet, e.dataset, e.predictions, e.truths, e.scores, e.relit)
         print(f"sheet: {args.sheet}")
     return evaluated.scores
+
+
+def score_by_set(target: Path, data: Path, args: argparse.Namespace) -> None:
+    """Scores one run or file by the protocol of a published set, writes the scores, and prints them beside published ones."""
+    from splitnerf.data.json_files import write_json
+    from splitnerf.evaluate.jobs import is_asset
+    from splitnerf.evaluate.published.common import Options
+    from splitnerf.evaluate.published.job import published_path, score_published
+    from splitnerf.evaluate.published.table import table
+
+    if args.env is not None and not is_asset(target):
+        raise InputError(f"{target}: is no GLB file, and a run has its own light; leave --env out")
+    options = Options(args.spp, args.maps, args.truth, args.views)
+    content = score_published(target, data, args.protocol, options, args.env)
+    path = args.out or published_path(target, args.protocol)
+    write_json(path, content)
+    print(f"{args.protocol}, {len(content['images'])} images, {args.spp} paths a pixel:")
+    print(table(args.protocol, content["scores"], f"{scene_name(target)}, this scene"))
+    for note in content["notes"]:
+        print(f"note: {note}")
+    if content["published"]["rows"]:
+        print(f"published: {content['published']['source']} ({content['published']['date']})")
+    print(f"scores: {path}")
 
 
 def scene_name(target: Path) -> str:

@@ -8,6 +8,10 @@ from pathlib import Path
 from splitnerf.cli.exit_codes import DONE
 from splitnerf.cli.help import examples
 
+LAYOUTS = (
+    "blender", "nerfactor", "tensoir", "shiny", "stanford-orb", "owl", "openillumination", "dtc", "glossy", "glossy-real", "neus",
+)  # fmt: skip
+
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
@@ -33,10 +37,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--spp", type=int, default=256, metavar="N", help="paths a pixel (default: 256)")
     parser.add_argument(
         "--layout",
-        choices=["blender", "nerfactor", "tensoir"],
-        default="blender",
-        help="how the files are named (default: blender)",
-    )
+        choices=LAYOUTS, metavar="SET", default="blender",
+        help=f"whose files the data look like (default: blender): {', '.join(LAYOUTS)}; the first three hold full truth, and "
+        "only these, stanford-orb, owl and openillumination take --relight",
+    )  # fmt: skip
     parser.add_argument(
         "--renderer",
         choices=["project", "blender"],

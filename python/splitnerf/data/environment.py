@@ -13,6 +13,8 @@ from splitnerf.notes import note
 
 ASPECT_TOLERANCE = 0.02
 BRIGHTEST = 1e12  # W / m^2 / sr; the sun has 1e7
+MAP_ROWS = 512  # of a map that is turned
+FINER = 3  # samples across a texel of a turned map
 NEGATIVE_SHARE = 1e-3  # largest share of the map's sum; resampling and compression leave so much
 
 
@@ -136,6 +138,20 @@ def rotate_environment(radiance: np.ndarray, degrees: float) -> np.ndarray:
     share = shift - whole
     near = np.roll(radiance, -whole, axis=1)
     return ((1 - share) * near + share * np.roll(near, -1, axis=1)).astype(radiance.dtype)
+
+
+def turn_environment(radiance: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """The light of a map in another world.
+
+    Args:
+        radiance: [h, 2 h, 3] equirectangular.
+        turn: [3, 3] the rotation from that world to the map's.
+
+    Returns:
+        [h, 2 h, 3] float32; each texel is the mean of `FINER` x `FINER` samples.
+    """
+    directions, _ = directions_of_texels(FINER * radiance.shape[0])
+    return area_average(sample_environment(radiance, directions @ np.asarray(turn).T), FINER)
 
 
 def resize_environment(image: np.ndarray, height: int, width: int) -> np.ndarray:

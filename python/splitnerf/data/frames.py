@@ -8,12 +8,15 @@ from types import ModuleType
 
 import numpy as np
 
-from splitnerf.data.layouts import colmap, neus, transforms, view_folders
+from splitnerf.data.layouts import (
+    colmap, dtc, glossy, neus, openillumination, owl, stanford_orb, transforms, view_folders,
+)  # fmt: skip
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 
-LAYOUTS = (transforms, view_folders, neus, colmap)  # the first that a folder has counts
+LAYOUTS = (stanford_orb, transforms, view_folders, owl, openillumination, dtc, glossy, neus, colmap)
+"""The first that a folder has counts."""
 TEST_STRIDE = 8
 WORDS = {"train": r"(?<![a-z])train", "test": r"(?<![a-z])(test|eval)"}  # in the path of a split's image
 FAR = 1e3  # distances between the cameras; farther from the origin, float32 loses what pixels show
@@ -39,7 +42,7 @@ def read_frames(root: Path, split: str, reading: Reading = Reading()) -> tuple[l
     if layout is None:
         raise InputError(
             f"{root}: has neither transforms_{split}.json nor transforms.json, nor view folders like train_000, nor "
-            f"{neus.CAMERAS}, nor a COLMAP model in sparse/0; give the folder that holds one"
+            f"{neus.CAMERAS}, nor a COLMAP model in sparse/0, nor the files of a published set; give the folder that holds one"
         )
     if reading.eval_mode == "auto" and layout.splits(root) is not None:
         frames = layout.read(root, split)
@@ -72,6 +75,11 @@ def refuse_data(folder: Path) -> None:
     """Raises InputError where a folder holds a data set: results would replace the truth beside the photos."""
     if layout_of(folder) is not None:
         raise InputError(f"{folder}: holds a data set, which results would replace; give another --out")
+
+
+def spread_views(frames: list[Frame], count: int) -> list[Frame]:
+    """At most `count` of the frames, evenly spread from the first one."""
+    return frames[:: max(1, len(frames) // count)][:count]
 
 
 def split_rule(root: Path, reading: Reading = Reading()) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch.nn.functional import interpolate
 
+from splitnerf.data.environment import NEGATIVE_SHARE
 from splitnerf.data.images import (
     HDR_SUFFIXES, LDR_SUFFIXES, area_average, downscale_rgba, linear_to_srgb, read_codes, read_header, read_image,
 )  # fmt: skip
@@ -174,13 +175,25 @@ def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
         colour = linear_to_srgb(values[..., :n_colours] ** np.float32(gamma))
         return np.concatenate([colour, values[..., n_colours:]], axis=-1), 1.0
     if not (pixels.min() >= 0 and pixels.max() < np.inf):  # false for NaN
-        raise InputError(f"{path}: has NaN, infinite or negative pixels; clean or re-export it")
+        pixels = _without_noise(pixels, path)
     colour, alpha = pixels[..., :n_colours], pixels[..., -1:]
     if pixels.shape[2] in (2, 4):  # EXR's alpha is associated
         colour = np.where(alpha > LEAST_ALPHA, colour / np.maximum(alpha, LEAST_ALPHA), 0.0)
     scale = min(1.0, PEAK / max(float(np.quantile(colour, BRIGHT)), 1e-6))
     kept = linear_to_srgb((colour * np.float32(scale)).clip(0, 1))
     return np.concatenate([kept, pixels[..., n_colours:].clip(0, 1)], axis=-1), scale
+
+
+def _without_noise(pixels: np.ndarray, path: Path) -> np.ndarray:
+    """The values with negative ones set to 0, where these sum to at most a thousandth, as the noise of raw photos does.
+
+    Raises:
+        InputError: There are more, or NaN or infinite ones.
+    """
+    dark, total = -pixels.sum(where=pixels < 0, dtype=np.float64), pixels.sum(where=pixels > 0, dtype=np.float64)
+    if not (np.isfinite(pixels).all() and dark <= NEGATIVE_SHARE * total):
+        raise InputError(f"{path}: has NaN, infinite or negative pixels; clean or re-export it")
+    return np.maximum(pixels, 0)
 
 
 def _read_pixels(path: Path) -> np.ndarray:

@@ -6,7 +6,8 @@ Files, `r_N` standing for the image's own name, each optional:
     r_N_normal.exr   world-space normals, multiplied by coverage; alpha is the coverage
     r_N_normal.png   world-space normals, negative components clipped to 0, sRGB-encoded (the NeRF Blender scenes)
     light.hdr, mesh.ply   in the dataset's folder
-In view folders (:mod:`splitnerf.data.layouts.view_folders`) `albedo.png` and `normal.png` lie beside `rgba.png`.
+Beside an image that has `r_N_alpha.png` too (Shiny Blender), `r_N_normal.png` is n / 2 + 1 / 2, linear.
+In view folders (:mod:`splitnerf.data.layouts.view_folders`) `albedo.png`, linear, and `normal.png` lie beside `rgba.png`.
 """
 
 from __future__ import annotations
@@ -169,7 +170,10 @@ def _load_view(image_path: Path, dataset: Dataset) -> ViewTruth:
         return read_map(image_path, path, channels, dataset)
 
     albedo = read("albedo.png", 4)
-    if albedo is not None:
+    if albedo is not None and in_folder:
+        averaged = area_average(np.concatenate([albedo[..., :3] * albedo[..., 3:4], albedo[..., 3:4]], axis=-1), factor)
+        truth.albedo = averaged[..., :3] / np.maximum(averaged[..., 3:], 1e-8)
+    elif albedo is not None:
         truth.albedo = srgb_to_linear(downscale_rgba(albedo, factor)[..., :3])
 
     orm = read("orm.png", 4)
@@ -187,7 +191,7 @@ def _load_view(image_path: Path, dataset: Dataset) -> ViewTruth:
     if encoded is None:
         return truth
     alpha = read_image(image_path)[..., -1]
-    if in_folder:
+    if in_folder or image_path.with_name(f"{image_path.stem}_alpha.png").is_file():
         averaged = area_average((2 * encoded[..., :3] - 1) * alpha[..., None], factor)
         truth.normal, truth.normal_mask = _unit(averaged, area_average(alpha, factor) > OPAQUE)
     else:

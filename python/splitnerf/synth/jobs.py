@@ -20,8 +20,9 @@ from splitnerf.files import LOCK, held
 from splitnerf.notes import note
 from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_SPP, MOST_VIEWS, AssetRenderer
 from splitnerf.synth.cameras import orbit, spiral
+from splitnerf.synth.layouts import LAYOUTS, WRITERS
 from splitnerf.synth.placed import write_placed_glb
-from splitnerf.synth.writer import LAYOUTS, SceneWriter
+from splitnerf.synth.writer import Writer
 
 RENDERERS = ("project", "blender")
 CAMERA_ANGLE_X = 0.6911112070083618  # radians, as in the NeRF Blender scenes
@@ -48,7 +49,7 @@ class SynthSettings:
         train: Number of train views.
         test: Number of test views.
         spp: Paths a pixel.
-        layout: One of :data:`splitnerf.synth.writer.LAYOUTS`.
+        layout: One of :data:`splitnerf.synth.layouts.LAYOUTS`.
         renderer: "project" for the path tracer, "blender" for Blender's Cycles.
         seed: The seed of the renderings and of the first camera's azimuth.
     """
@@ -71,6 +72,8 @@ class SynthSettings:
         for name, known in (("layout", LAYOUTS), ("renderer", RENDERERS)):
             if getattr(self, name) not in known:
                 raise InputError(f"--{name} must be one of {', '.join(known)}, got {getattr(self, name)}")
+        if (self.layout, self.renderer) == ("glossy", "blender"):
+            raise InputError("--layout glossy needs depths, which --renderer blender does not give; leave --renderer out")
 
 
 def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, settings: SynthSettings) -> Path:
@@ -88,10 +91,10 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
         settings: What to render.
 
     Returns:
-        `out`.
+        The folder to train on: `out`, or one in it where the layout has one.
 
     Raises:
-        InputError: The asset, a map, the folder or a setting cannot be used, or Blender is missing.
+        InputError: The asset, a map, the folder, the layout or a setting cannot be used, or Blender is missing.
         OSError: A file cannot be written.
     """
     settings.check()
@@ -100,6 +103,9 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
     names = [path.stem.removeprefix(PREFIX) for path in relight]
     if len(set(names)) < len(names):
         raise InputError(f"--relight: two maps are called {max(names, key=names.count)}; rename one")
+    writer: Writer = WRITERS[settings.layout](out, CAMERA_ANGLE_X)
+    if relight and not writer.relights:
+        raise InputError(f"--relight: the layout {settings.layout} has no images in other lights; leave it out")
     maps = [resized(read_environment(path)) for path in (light, *relight)]
     original = read_asset(asset)
     if any(any(material.emission) for material in original.materials):
@@ -114,19 +120,18 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
         renderer = AssetRenderer(normalised(original, centre, scale))
 
     with held(out):
-        writer = SceneWriter(out, CAMERA_ANGLE_X, settings.layout)
         write_placed_glb(asset, out / "asset.glb", centre, scale)
         writer.mesh((original.vertices - centre) * scale, original.triangles)
         stored = writer.light(maps[0])
         stored_relight = {name: writer.light(environment, name) for name, environment in zip(names, maps[1:])}
         render_views(renderer, writer, stored, stored_relight, settings)
         writer.close()
-    return out
+    return writer.root
 
 
 def render_views(
     renderer: ViewRenderer,
-    writer: SceneWriter,
+    writer: Writer,
     light: np.ndarray,
     relight: dict[str, np.ndarray],
     settings: SynthSettings,
@@ -162,7 +167,7 @@ def render_views(
                 writer.view(split, i, pose, shot(light, pose))
         for name, environment in relight.items():
             for i, pose in enumerate(cameras["test"]):
-                writer.relit("test", i, name, shot(environment, pose))
+                writer.relit("test", i, name, pose, shot(environment, pose))
 
 
 def unit_sphere(asset: Asset) -> tuple[np.ndarray, float]:

@@ -1,4 +1,4 @@
-"""Writes rendered views as a dataset, in any layout that :mod:`splitnerf.data.frames` reads.
+"""Writes rendered views as a dataset, in the layouts that hold full truth; all others are in :mod:`splitnerf.synth.layouts`.
 
 Layouts:
     blender     `transforms_{train,test}.json`, `{train,test}/r_000.png`; for test views also `_albedo.png`, `_orm.png`
@@ -7,13 +7,14 @@ Layouts:
                 `albedo.png`, `normal.png` and `rgba_<map>.png`.
     tensoir     the same, with truth for the train views too.
 
-In the dataset's folder of each: `light.hdr`, `relight_<map>.hdr`, `mesh.ply`. Colours are sRGB with straight alpha,
-normals world space without the normal map.
+In the dataset's folder of each: `light.hdr`, `relight_<map>.hdr`, `mesh.ply`. Colours are sRGB with straight alpha (but the
+albedo of nerfactor and tensoir is linear), normals world space without the normal map.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -23,8 +24,30 @@ from splitnerf.data.json_files import write_json
 from splitnerf.data.relit import PREFIX, relit_path
 from splitnerf.export.mesh import write_mesh_ply
 
-LAYOUTS = ("blender", "nerfactor", "tensoir")
+FULL_TRUTH = ("blender", "nerfactor", "tensoir")
 Maps = dict[str, np.ndarray]
+
+
+class Writer(Protocol):
+    """What a layout's class takes, see :class:`SceneWriter`; `close` writes the files that name the views, last.
+
+    Attributes:
+        root: The folder to train on.
+        relights: Whether the layout has images under other lights.
+    """
+
+    root: Path
+    relights: bool
+
+    def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray: ...
+
+    def mesh(self, vertices: np.ndarray, triangles: np.ndarray) -> None: ...
+
+    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None: ...
+
+    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None: ...
+
+    def close(self) -> None: ...
 
 
 class SceneWriter:
@@ -33,13 +56,16 @@ class SceneWriter:
     Args:
         out: The dataset's folder; made where it is missing.
         camera_angle_x: Horizontal field of view of all cameras, in radians.
-        layout: One of `LAYOUTS`.
+        layout: One of `FULL_TRUTH`.
 
     Raises:
         OSError: A file cannot be written (any method).
     """
 
+    relights = True
+
     def __init__(self, out: Path, camera_angle_x: float, layout: str = "blender"):
+        self.root = Path(out)
         self.out, self.camera_angle_x, self.layout = Path(out), camera_angle_x, layout
         self._views: dict[str, list[tuple[Path, dict]]] = {}
 
@@ -72,7 +98,7 @@ class SceneWriter:
                 `roughness`, `metallic` and `smooth_normal`.
         """
         image = self._image_path(split, index)
-        write_image(image, _rgba(maps))
+        write_image(image, straight_rgba(maps))
         height, width = maps["alpha"].shape
         if self.layout == "blender":
             entry = {"file_path": f"./{split}/{image.stem}", "transform_matrix": pose.tolist()}
@@ -83,10 +109,9 @@ class SceneWriter:
         if split == "test" or self.layout == "tensoir":
             self._write_truth(image, maps)
 
-    def relit(self, split: str, index: int, name: str, maps: Maps) -> None:
-        """Writes a relit view under map `name`, after a call of :meth:`view` for it; `maps` are those of that
-        method."""
-        write_image(relit_path(self._image_path(split, index), name), _rgba(maps))
+    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None:
+        """Writes a relit view under map `name`, after a call of :meth:`view` for it; `pose` and `maps` are as there."""
+        write_image(relit_path(self._image_path(split, index), name), straight_rgba(maps))
 
     def close(self) -> None:
         """Writes the poses, which complete the dataset."""
@@ -105,11 +130,11 @@ class SceneWriter:
 
     def _write_truth(self, image: Path, maps: Maps) -> None:
         alpha, normal = maps["alpha"][..., None], maps["smooth_normal"]
-        albedo = np.concatenate([linear_to_srgb(maps["albedo"]), alpha], axis=-1)
         if self.layout != "blender":
-            write_image(image.with_name("albedo.png"), albedo)
+            write_image(image.with_name("albedo.png"), np.concatenate([maps["albedo"], alpha], axis=-1))
             write_image(image.with_name("normal.png"), np.concatenate([0.5 * normal + 0.5, alpha], axis=-1))
             return
+        albedo = np.concatenate([linear_to_srgb(maps["albedo"]), alpha], axis=-1)
         orm = np.stack([maps["alpha"] > 0, maps["roughness"], maps["metallic"], maps["alpha"]], axis=-1)
         write_image(image.with_name(f"{image.stem}_albedo.png"), albedo)
         write_image(image.with_name(f"{image.stem}_orm.png"), orm)
@@ -118,7 +143,7 @@ class SceneWriter:
         write_image(image.with_name(f"{image.stem}_normal.exr"), premultiplied, half=True)
 
 
-def _rgba(maps: Maps) -> np.ndarray:
+def straight_rgba(maps: Maps) -> np.ndarray:
     """[H, W, 4] sRGB, straight alpha."""
     alpha = maps["alpha"][..., None]
     return np.concatenate([linear_to_srgb(maps["radiance"] / np.maximum(alpha, 1e-8)), alpha], axis=-1)

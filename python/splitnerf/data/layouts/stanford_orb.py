@@ -1,0 +1,91 @@
+"""Stanford-ORB, a capture in the blender form: `blender_HDR/OBJECT_scene00N` or `blender_LDR/OBJECT_scene00N`.
+
+    transforms_train.json, transforms_test.json   as NeRF-Blender's, without suffixes; poses have OpenGL axes
+    train/0000.exr or .png, test/...              RGB: linear radiance, or sRGB
+    train_mask/0000.png, test_mask/...            white is the object
+    transforms_novel.json                         photos of the same object in other scenes: `scene_name`, the capture whose
+                                                  folder beside this one holds the photo; its own `camera_angle_x`; the pose in
+                                                  this capture's world
+    ../../ground_truth/SCENE/env_map/0000.exr     the light of the photo SCENE/test/0000, in the axes of its camera (OpenGL):
+                                                  -z in the map's centre, +x to the right of it, y up
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.json_files import need, read_json
+from splitnerf.data.layouts.frame import Frame, checked_pose, listed_image
+from splitnerf.data.layouts.lit import LitView, map_in_world
+from splitnerf.data.lens import read_lens
+from splitnerf.errors import InputError
+
+SPLITS = ("train", "test")
+NOVEL = "transforms_novel.json"
+MAP_FROM_CAMERA = np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]])  # x towards the centre, y to the left, z up
+
+
+def present(root: Path) -> bool:
+    """Whether a folder is a capture."""
+    return _file(root, "train").is_file() and (root / "train_mask").is_dir()
+
+
+def splits(root: Path) -> list[str]:
+    """The splits that have a file."""
+    return [split for split in SPLITS if _file(root, split).is_file()]
+
+
+def read(root: Path, split: str | None) -> list[Frame]:
+    """The frames of a split, or all.
+
+    Raises:
+        InputError: A file is missing or cannot be used.
+    """
+    names = splits(root) if split is None else [split]
+    return [frame for name in names for frame in (_frame(root, *entry) for entry in _entries(_file(root, name)))]
+
+
+def relit(root: Path, maps: dict[str, Path]) -> list[LitView]:
+    """The photos of `transforms_novel.json` with their lights; `maps` is not needed.
+
+    Raises:
+        InputError: A file is missing or cannot be used.
+    """
+    path, views = root / NOVEL, []
+    for entry, meta, index, _ in _entries(path):
+        scene = need(entry, "scene_name", path, f" in frame {index}")
+        if not isinstance(scene, str) or Path(scene).name != scene:
+            raise InputError(f"{path}: 'scene_name' of frame {index} is no folder's name: {str(scene)[:40]!r}; repair it")
+        frame = _frame(root.absolute().parent / scene, entry, meta, index, path)
+        turn = MAP_FROM_CAMERA @ frame.pose[:3, :3].T
+        light = ground_truth(root, scene) / "env_map" / f"{frame.image_path.stem}.exr"
+        views.append(LitView(frame, scene, map_in_world(light, turn)))
+    return views
+
+
+def ground_truth(root: Path, scene: str | None = None) -> Path:
+    """The folder of a capture's truth; `scene` is the capture's name, None for this one."""
+    return root.absolute().parents[1] / "ground_truth" / (root.absolute().name if scene is None else scene)
+
+
+def _file(root: Path, split: str) -> Path:
+    return root / f"transforms_{split}.json"
+
+
+def _entries(path: Path) -> list[tuple[dict, dict, int, Path]]:
+    meta = read_json(path, "frames")
+    entries = need(meta, "frames", path)
+    if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
+        raise InputError(f"{path}: 'frames' must be a list of objects; repair it")
+    return [(entry, meta, index, path) for index, entry in enumerate(entries)]
+
+
+def _frame(folder: Path, entry: dict, meta: dict, index: int, path: Path) -> Frame:
+    where = f" in frame {index}"
+    image = listed_image(folder, str(need(entry, "file_path", path, where)), path)
+    pose = checked_pose(need(entry, "transform_matrix", path, where), f"{path}: transform_matrix of frame {index}")
+    angle = entry.get("camera_angle_x", meta.get("camera_angle_x"))
+    mask = image.parent.with_name(f"{image.parent.name}_mask") / f"{image.stem}.png"
+    return Frame(image.stem, image, pose, *read_lens({"camera_angle_x": angle}, str(path)), mask, "object")

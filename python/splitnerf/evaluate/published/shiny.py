@@ -1,0 +1,48 @@
+"""Shiny Blender: novel views on white, and the angle of normals weighted by coverage.
+
+Source: Verbin et al., Ref-NeRF, CVPR 2022; multinerf's loader and evaluation. The set has no relit images.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.frames import spread_views
+from splitnerf.data.images import over_background, read_image
+from splitnerf.data.layouts import transforms as layout
+from splitnerf.evaluate.metrics import psnr, ssim
+from splitnerf.evaluate.published.common import Column, Delivered, Options, Scores, angles_deg, mean_of, srgb_on_white, unit
+from splitnerf.progress import tracked
+
+LAYOUT = layout
+COLUMNS: tuple[Column, ...] = (
+    ("view_psnr", "novel, PSNR", "{:.2f}"), ("view_ssim", "novel, SSIM", "{:.3f}"), ("normals", "normals, degrees", "{:.2f}"),
+)  # fmt: skip
+
+
+def score(delivered: Delivered, root: Path, options: Options) -> Scores:
+    """Scores the test views."""
+    images, notes, frames = [], [], layout.read(root, "test")
+    if options.views is not None:
+        notes.append(f"{options.views} of {len(frames)} test views")
+        frames = spread_views(frames, options.views)
+    for frame in tracked(frames, "views, image"):
+        rgba, maps = read_image(frame.image_path), delivered.render(frame, delivered.environment)
+        result = {"name": frame.name}
+        if delivered.environment is not None:
+            image, truth = srgb_on_white(maps), over_background(rgba[..., :3], rgba[..., 3])
+            result |= {"view_psnr": psnr(image, truth), "view_ssim": ssim(image, truth)}
+        path = frame.image_path.with_name(f"{frame.image_path.stem}_normal.png")
+        if path.is_file():
+            truth = unit(2 * read_image(path)[..., :3] - 1)
+            result["normals"] = weighted_angle(unit(maps["normal"]), truth, maps["alpha"] * rgba[..., 3])
+        images.append(result)
+    return Scores({key: mean_of(images, key) for key, _, _ in COLUMNS}, images, notes)
+
+
+def weighted_angle(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray) -> float | None:
+    """The mean angle in degrees between unit normals [H, W, 3], weighted [H, W]; None without weight."""
+    total = weights.sum(dtype=np.float64)
+    return float((angles_deg(prediction, truth) * weights).sum() / total) if total > 0 else None

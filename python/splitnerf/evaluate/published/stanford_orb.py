@@ -1,0 +1,132 @@
+"""Stanford-ORB: relit and novel views as PSNR-H and PSNR-L, normals and shape.
+
+Source: Kuang et al., Stanford-ORB: A Real-World 3D Object Inverse Rendering Benchmark, 2023; its repository's
+orb/utils/metrics.py, test.py and eval_mesh.py.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from scipy.ndimage import binary_erosion
+
+from splitnerf.data.images import area_average, linear_to_srgb, read_header
+from splitnerf.data.layouts import stanford_orb as layout
+from splitnerf.data.layouts.frame import Frame
+from splitnerf.data.lit_photos import read_lit_photo
+from splitnerf.data.truth import read_mesh
+from splitnerf.errors import InputError
+from splitnerf.evaluate.metrics import lsq_scale, psnr
+from splitnerf.evaluate.published.common import Column, Delivered, Options, Scores, mean_of, nearest, unit
+from splitnerf.progress import tracked
+
+LAYOUT = layout
+COLUMNS: tuple[Column, ...] = (
+    ("psnr_h", "relit, PSNR-H", "{:.2f}"), ("psnr_l", "relit, PSNR-L", "{:.2f}"), ("view_psnr_h", "novel, PSNR-H", "{:.2f}"),
+    ("view_psnr_l", "novel, PSNR-L", "{:.2f}"), ("normals", "normals, 1 - cos", "{:.3f}"), ("chamfer", "chamfer, 2e3", "{:.2f}"),
+)  # fmt: skip
+SIDE = 512  # pixels at which images are compared
+EROSION = np.ones((5, 5), bool)
+BRIGHTEST = 4.0  # at which PSNR-H clips
+SAMPLES = 30_000  # of the surface
+
+
+def score(delivered: Delivered, root: Path, options: Options) -> Scores:
+    """Scores the photos of `transforms_novel.json` and `transforms_test.json`, the normals of the latter, and the mesh."""
+    images = []
+    views = layout.relit(root, {}) if (root / layout.NOVEL).is_file() else []
+    for view in tracked(views, "relit, image"):
+        maps, photo, mask = _pair(delivered, view.frame, view.radiance())
+        high, low = image_psnr(maps["radiance"], photo, mask, scaled=True)
+        images.append({"name": f"{view.light}/{view.frame.name}", "psnr_h": high, "psnr_l": low})
+    for frame in tracked(layout.read(root, "test"), "novel, image"):
+        maps, photo, mask = _pair(delivered, frame, delivered.environment)
+        result = {"name": f"{root.name}/{frame.name}", "normals": _normals(maps, frame, mask, root, options)}
+        if delivered.environment is not None:
+            result["view_psnr_h"], result["view_psnr_l"] = image_psnr(maps["radiance"], photo, mask, scaled=False)
+        images.append(result)
+    means = {key: mean_of(images, key) for key, _, _ in COLUMNS} | {"chamfer": _chamfer(delivered, root, options)}
+    return Scores(means, images)
+
+
+def image_psnr(prediction: np.ndarray, truth: np.ndarray, mask: np.ndarray, *, scaled: bool) -> tuple[float, float]:
+    """PSNR-H and PSNR-L in dB.
+
+    Both images are black outside of the mask, eroded by 5 x 5, and the error is the mean over the whole frame. With
+    `scaled` each channel of the prediction has the factor that least squares give in linear light. PSNR-H: both images times
+    mean(sRGB(y)) / mean(y) of the truth y clipped to 1, then clipped at 4, linear. PSNR-L: clipped at 1, in sRGB. Neither is
+    less than that of an image that is .5 inside.
+
+    Args:
+        prediction: [H, W, 3] linear.
+        truth: [H, W, 3] linear.
+        mask: [H, W] in [0, 1].
+        scaled: Whether the prediction is known up to a factor per channel.
+    """
+    inside = eroded(mask)
+    x, y = (np.asarray(image, np.float64) * inside[..., None] for image in (prediction, np.maximum(truth, 0)))
+    low = y.clip(0, 1)
+    brighten = linear_to_srgb(low).mean() / low.mean() if low.mean() > 1e-8 else 1.0
+    scale = lsq_scale(x[inside], y[inside]) if scaled else np.ones(3)
+    grey = 0.5 * inside[..., None] * np.ones(3)
+
+    bright, encoded = (y * brighten).clip(0, BRIGHTEST), linear_to_srgb(low)
+    high = psnr((x * scale * brighten).clip(0, BRIGHTEST), bright)
+    low_range = psnr(linear_to_srgb((x * scale).clip(0, 1)), encoded)
+    return max(high, psnr(grey, bright)), max(low_range, psnr(grey, encoded))
+
+
+def eroded(mask: np.ndarray) -> np.ndarray:
+    """[H, W] bool, the pixels of a mask [H, W] in [0, 1] above .5 whose 5 x 5 neighbours in the image are so too."""
+    return binary_erosion(mask > 0.5, EROSION, border_value=1)
+
+
+def normal_distance(prediction: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float:
+    """The mean of 1 - cos of the angle between normals [H, W, 3] of any length, over the eroded mask."""
+    inside = eroded(mask)
+    return float((1 - (unit(prediction) * unit(truth)).sum(axis=-1))[inside].mean()) if inside.any() else 0.0
+
+
+def chamfer(mesh: trimesh.Trimesh, truth: np.ndarray) -> float:
+    """2000 times the mean of both directions' mean squared distance between points spread over a mesh and points [n, 3]: what
+    the paper's table shows, which is twice what it says."""
+    points = np.asarray(trimesh.sample.sample_surface(mesh, SAMPLES, seed=0)[0])
+    return float(1e3 * ((nearest(truth, points) ** 2).mean() + (nearest(points, truth) ** 2).mean()))
+
+
+def _pair(delivered: Delivered, frame: Frame, light: np.ndarray | None) -> tuple[dict, np.ndarray, np.ndarray]:
+    factor = _factor(frame)
+    photo, mask = read_lit_photo(frame, factor)
+    return delivered.render(frame, light, factor), photo, mask
+
+
+def _factor(frame: Frame) -> int:
+    return max(1, read_header(frame.image_path).height // SIDE)
+
+
+def _normals(maps: dict, frame: Frame, mask: np.ndarray, root: Path, options: Options) -> float | None:
+    path = _truth(root, options) / "surface_normal" / f"{frame.name}.npy"
+    if not path.is_file():
+        return None
+    try:
+        truth = np.load(path, allow_pickle=False)
+    except Exception as error:  # NumPy raises whatever it meets
+        raise InputError(f"{path}: cannot be read as an array ({str(error)[:80]}); replace it") from None
+    factor = _factor(frame)
+    if truth.shape != (mask.shape[0] * factor, mask.shape[1] * factor, 3):
+        raise InputError(f"{path}: is {list(truth.shape)}, not of its photo's size; replace it")
+    ours = maps["normal"] @ frame.pose[:3, :3]  # in the camera's axes, OpenGL
+    return normal_distance(ours, area_average(truth.astype(np.float32), factor), mask)
+
+
+def _chamfer(delivered: Delivered, root: Path, options: Options) -> float | None:
+    path = _truth(root, options) / "mesh_blender" / "mesh.obj"
+    if not path.is_file():
+        return None
+    return chamfer(trimesh.Trimesh(delivered.vertices, delivered.asset.triangles, process=False), read_mesh(path).vertices)
+
+
+def _truth(root: Path, options: Options) -> Path:
+    return layout.ground_truth(root) if options.truth is None else options.truth / root.absolute().name

@@ -1,0 +1,259 @@
+"""Published sets: what is written in the form of each is read again with the same cameras, and light that fits the photos."""
+
+from __future__ import annotations
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+from published_scenes import FOCAL, RELIT, SIZE, TEST, TRAIN, Written, patches, write_object, write_set
+from scipy.spatial.transform import Rotation
+
+from splitnerf.cli import BAD_INPUT, main
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.environment import directions_of_texels, turn_environment
+from splitnerf.data.frames import layout_of, read_frames
+from splitnerf.data.images import read_hdr, write_image
+from splitnerf.data.layouts import (
+    colmap, dtc, glossy, neus, openillumination, owl, stanford_orb, transforms, view_folders,
+)  # fmt: skip
+from splitnerf.data.layouts.frame import Frame
+from splitnerf.data.lens import lens_intrinsics
+from splitnerf.data.lit_photos import read_lit_photo
+from splitnerf.data.photos import load_photo
+from splitnerf.data.reading import Reading
+from splitnerf.data.relit import map_files
+from splitnerf.data.truth import load_view_truths
+from splitnerf.errors import InputError
+from splitnerf.evaluate.metrics import psnr
+
+SETS = {  # the module that reads it, and whether it has photos in other lights
+    "stanford-orb": (stanford_orb, True), "owl": (owl, True), "openillumination": (openillumination, True), "dtc": (dtc, False),
+    "nerfactor": (view_folders, True), "tensoir": (view_folders, True), "shiny": (transforms, False),
+    "glossy": (glossy, False), "glossy-real": (colmap, False), "neus": (neus, False),
+}  # fmt: skip
+LEAST = {"openillumination": 32.0}  # dB: JPEG
+RANDOM = np.random.default_rng(11)
+QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+
+
+@pytest.fixture(scope="module", params=SETS)
+def written(request, tmp_path_factory) -> tuple[str, Written]:
+    return request.param, write_set(tmp_path_factory.mktemp(request.param), request.param, SETS[request.param][1])
+
+
+def fits(frame: Frame, rendered: dict[str, np.ndarray]) -> float:
+    """PSNR in dB of a rendering and a photo, to the power of 1 / 2.2, on pixels in the mask that are not clipped."""
+    photo, mask = read_lit_photo(frame)
+    known = (mask > 0.99) & (photo * frame.exposure < 0.95).all(axis=-1)
+    return psnr(*(image[known].clip(0, 1) ** (1 / 2.2) for image in (rendered["radiance"], photo)))
+
+
+def test_it_is_recognised_and_the_cameras_are_those_that_were_written(written):
+    name, scene = written
+    layout, _ = SETS[name]
+    assert layout_of(scene.root) is layout
+    frames = read_frames(scene.root, "train", Reading("all"))[0]
+    expected = [*scene.train, *scene.test] if name != "owl" else [*scene.train]
+    assert len(frames) == len(expected)
+    for frame, pose in zip(frames, expected):
+        assert frame.pose == pytest.approx(pose, abs=1e-9)
+        assert lens_intrinsics(frame.lens, (SIZE, SIZE)) == pytest.approx([FOCAL, FOCAL, SIZE / 2, SIZE / 2], rel=1e-9)
+        assert frame.distortion is None
+
+
+def test_the_truth_from_each_camera_looks_like_the_photo(written):
+    """And not like it from a camera with other axes, with its motion the other way round, or seen in a mirror."""
+    name, scene = written
+    light, worst = read_hdr(scene.root / "light.hdr"), LEAST.get(name, 34)
+    frames = read_frames(scene.root, "train", Reading("all"))[0]
+    for frame in frames[1:4:2]:
+        right = scene.render(light, frame.pose)
+        assert fits(frame, right) > worst, fits(frame, right)
+        assert fits(frame, {"radiance": right["radiance"][:, ::-1]}) < worst - 6
+    for wrong in (frame.pose @ np.diag([1.0, -1, -1, 1]), frame.pose @ np.diag([-1.0, -1, 1, 1]), np.linalg.inv(frame.pose)):
+        assert fits(frame, scene.render(light, wrong, 16)) < worst - 6
+
+
+def test_the_light_of_each_relit_photo_makes_it(written):
+    """And not the light mirrored or turned by a quarter, in the world or in its own axes."""
+    name, scene = written
+    layout, relights = SETS[name]
+    if not relights:
+        assert not hasattr(layout, "relit") or layout is view_folders
+        return
+    maps = map_files(scene.root, prefixed=True) if layout is view_folders else {}
+    views = layout.relit(scene.root, maps)
+    same = TEST if name == "owl" else 0
+    assert len(views) == same + TEST * len(RELIT)
+    poses = np.repeat(scene.test, len(RELIT), axis=0) if maps else np.tile(scene.test, (3, 1, 1))
+    worst = LEAST.get(name, 33)
+    for view, pose in list(zip(views, poses))[:: 3 if len(views) > 4 else 1]:
+        light = view.radiance()
+        assert view.frame.pose == pytest.approx(pose, abs=1e-9)
+        assert fits(view.frame, scene.render(light, pose)) > worst, fits(view.frame, scene.render(light, pose))
+    for wrong in (light[:, ::-1], light[::-1], turn_environment(light, QUARTER), turn_environment(light, QUARTER.T)):
+        assert fits(view.frame, scene.render(wrong, pose, 16)) < worst - 4
+
+
+def test_a_trainer_reads_it(written):
+    name, scene = written
+    data = load_dataset(scene.root, "train", masked=name != "glossy-real")
+    seen = TRAIN + TEST - 1 if SETS[name][0].splits(scene.root) is None else TRAIN
+    assert len(data) == seen and data.height == SIZE
+    if name != "glossy-real":
+        assert 0.1 < (data.images[..., 3] > 0.5).mean() < 0.6
+    if name == "stanford-orb":  # radiance above 1 is kept
+        assert (data.exposures < 1).any() and (data.images[..., :3].max() > 1.05)
+
+
+def test_albedo_and_normals_of_those_that_have_them(written):
+    name, scene = written
+    if name not in ("nerfactor", "tensoir", "shiny"):
+        return
+    data = load_dataset(scene.root, "test")
+    for truth, pose in zip(load_view_truths(data), scene.test):
+        maps = scene.render(scene.lights["studio"], pose)
+        solid = maps["alpha"] > 0.999
+        unit = maps["smooth_normal"] / np.maximum(np.linalg.norm(maps["smooth_normal"], axis=-1, keepdims=True), 1e-8)
+        assert (np.sum(unit * truth.normal, -1)[solid & truth.normal_mask] > 0.98).mean() > 0.98
+        if name != "shiny":
+            assert np.median(np.abs(truth.albedo[solid] - maps["albedo"][solid])) < 0.004
+
+
+# ---- what the sets' documents say, without any constant or function that writer and reader share ----
+
+
+def seen_by(pose: np.ndarray, point: np.ndarray, f: float, c: float) -> np.ndarray:
+    """The pixel in which a camera with this pose, OpenGL axes, sees a point: x to the right, y up, -z ahead."""
+    x, y, z = pose[:3, :3].T @ (point - pose[:3, 3])
+    return np.array([c + f * x / -z, c - f * y / -z])
+
+
+POINT = np.array([0.3, -0.2, 0.45])
+
+
+def test_owl_projects_by_k_r_t_and_has_its_own_curve(tmp_path):
+    (tmp_path / "inputs").mkdir()
+    k, r, t = np.diag([50.0, 50, 1]), Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), np.array([0.1, 0.2, 4.0])
+    k[:2, 2] = 8
+    rows = [*k, *r, t, (16, 16, 3)]
+    (tmp_path / "inputs/camera_0000.txt").write_text("\n".join(" ".join(map(str, map(float, row))) for row in rows))
+    (tmp_path / "inputs/exposure.txt").write_text("-1.5")
+    write_image(tmp_path / "inputs/image_0000.png", np.full((16, 16, 3), 128 / 255))
+    write_image(tmp_path / "inputs/mask_0000.png", np.ones((16, 16)))
+    frame = owl.read(tmp_path, "train")[0]
+    x = k @ (r @ POINT + t)
+    assert seen_by(frame.pose, POINT, 50, 8) == pytest.approx(x[:2] / x[2])
+    linear, _ = read_lit_photo(frame)
+    assert linear[0, 0] == pytest.approx(np.full(3, (128 / 255) ** 2.2 / 2**-1.5), rel=1e-5)
+
+
+def test_dtc_and_glossy_project_with_opencv_axes(tmp_path):
+    motion = np.eye(4)
+    motion[:3, :3], motion[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 4.0)
+    x, y, z = (motion @ [*POINT, 1])[:3]
+    for name in ("png/a.png", "0.png"):
+        write_image(tmp_path / name, np.ones((16, 16, 3)))
+    camera = {"image": "a.png", "T_camera_world": motion.tolist(), "intrinsic": {"fx": 50, "fy": 50, "cx": 7.5, "cy": 7.5}}
+    (tmp_path / "camera_poses.json").write_text(json.dumps({"cameras": [camera]}))
+    k = np.array([[50.0, 0, 8], [0, 50, 8], [0, 0, 1]])
+    (tmp_path / "0-camera.pkl").write_bytes(pickle.dumps((motion[:3].astype(np.float32), k)))
+    for frame in (dtc.read(tmp_path)[0], glossy.read(tmp_path)[0]):
+        assert lens_intrinsics(frame.lens, (16, 16)) == pytest.approx([50, 50, 8, 8])
+        assert seen_by(frame.pose, POINT, 50, 8) == pytest.approx([8 + 50 * x / z, 8 + 50 * y / z], abs=1e-4)
+
+
+def test_a_camera_of_openillumination_looks_along_its_z(tmp_path):
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 0.3)
+    frame = {"file_path": "./images/C3", "transform_matrix": pose.tolist(), "camera_angle_x": 0.5, "calib_imgw": 16}
+    (tmp_path / "output").mkdir()
+    (tmp_path / "output/transforms_train.json").write_text(json.dumps({"frames": {"C3": frame}}))
+    write_image(tmp_path / "Lights/013/raw_undistorted/C3.JPG", np.ones((16, 16, 3)))
+    found = openillumination.read(tmp_path, "train")[0]
+    point = pose[:3] @ [0.1, 0.2, 1.0, 1]  # to the right of the axis and below it
+    f = 8 / np.tan(0.25)
+    assert seen_by(found.pose, point, f, 8) == pytest.approx([8 + 0.1 * f, 8 + 0.2 * f])
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "axis"), [(8, 16, (0, 0, -1)), (8, 24, (1, 0, 0)), (8, 8, (-1, 0, 0)), (0, 3, (0, 1, 0))]
+)
+def test_the_light_of_stanford_orb_is_in_the_camera_axes(tmp_path, row, column, axis):
+    """The centre of the map is what the camera looks at, a quarter to the right what is to its right, the top row up."""
+    root = tmp_path / "blender_HDR/cup_scene001"
+    (root / "train_mask").mkdir(parents=True)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 0.3)
+    frame = {"scene_name": "cup_scene004", "file_path": "test/0003", "camera_angle_x": 0.4, "transform_matrix": pose.tolist()}
+    for name in ("train", "novel"):
+        (root / f"transforms_{name}.json").write_text(json.dumps({"frames": [frame]}))
+    write_image(root.with_name("cup_scene004") / "test/0003.exr", np.ones((8, 8, 3), np.float32))
+    light = np.zeros((16, 32, 3), np.float32)
+    light[row if row == 0 else slice(row - 1, row + 1), slice(None) if row == 0 else slice(column - 1, column + 1)] = 1
+    write_image(tmp_path / "ground_truth/cup_scene004/env_map/0003.exr", light)
+    radiance = stanford_orb.relit(root, {})[0].radiance()[..., 0]
+    directions, areas = directions_of_texels(16)
+    mean = (directions * (radiance * areas)[..., None]).sum(axis=(0, 1))
+    assert mean / np.linalg.norm(mean) == pytest.approx(pose[:3, :3] @ axis, abs=0.03)
+
+
+def test_radiance_a_little_below_0_is_noise(tmp_path):
+    pixels = RANDOM.uniform(0.1, 0.5, (16, 16, 3)).astype(np.float32)
+    pixels[3, 4] = -0.01
+    for factor, good in ((1, True), (100, False)):
+        write_image(tmp_path / "a.exr", np.where(pixels < 0, factor * pixels, pixels))
+        frame = Frame("a", tmp_path / "a.exr", np.eye(4), {"camera_angle_x": 0.5})
+        if good:
+            rgba = load_photo(frame, 1, "object").rgba
+            assert not rgba[3, 4, :3].any() and rgba[..., :3].any(axis=-1).sum() == 255
+            continue
+        with pytest.raises(InputError, match="a.exr: has NaN, infinite or negative pixels"):
+            load_photo(frame, 1, "object")
+
+
+def damaged(scene: Written, name: str) -> tuple:
+    """A file of the set and what to write into it."""
+    return {
+        "stanford-orb": ("transforms_train.json", b'{"frames": [7]}', "list of objects"),
+        "owl": ("inputs/camera_0000.txt", b"1 0 0\n0 1 nan\n", "must hold 24 finite numbers"),
+        "openillumination": ("output/transforms_train.json", b'{"frames": []}', "object of objects"),
+        "dtc": ("camera_poses.json", b'{"cameras": [{"image": "0000.png"}]}', "missing key 'T_camera_world'"),
+        "glossy": ("0-camera.pkl", pickle.dumps(print), "asks for builtins.print"),
+        "nerfactor": ("train_000/metadata.json", b"{}", "missing key"),
+    }.get(name)
+
+
+def test_damage_is_one_line(written, capsys):
+    name, scene = written
+    case = damaged(scene, name)
+    if case is None:
+        return
+    path, content, message = scene.root / case[0], case[1], case[2]
+    whole = path.read_bytes()
+    path.write_bytes(content)
+    try:
+        with pytest.raises(InputError, match=message) as caught:
+            read_frames(scene.root, "train", Reading("all"))
+        assert len(str(caught.value).splitlines()) == 1 and str(path) in str(caught.value)
+    finally:
+        path.write_bytes(whole)
+
+
+def test_a_scene_that_leads_out_of_the_folder_is_refused(tmp_path):
+    (tmp_path / "train_mask").mkdir()
+    frame = {"scene_name": "../other", "file_path": "test/0000", "transform_matrix": np.eye(4).tolist()}
+    for name in ("train", "novel"):
+        (tmp_path / f"transforms_{name}.json").write_text(json.dumps({"frames": [frame]}))
+    with pytest.raises(InputError, match="'scene_name' of frame 0 is no folder's name"):
+        stanford_orb.relit(tmp_path, {})
+
+
+def test_a_layout_without_other_lights_refuses_them(tmp_path, capsys):
+    write_image(tmp_path / "a.exr", patches())
+    map_path = str(tmp_path / "a.exr")
+    arguments = [str(write_object(tmp_path)), "--light", map_path, "--relight", map_path, "--out", str(tmp_path / "out")]
+    assert main(["synth", *arguments, "--layout", "dtc"]) == BAD_INPUT
+    assert "the layout dtc has no images in other lights" in capsys.readouterr().err and not (tmp_path / "out").exists()

@@ -1,0 +1,238 @@
+"""The protocols of published sets: closed forms of their formulas."""
+
+from __future__ import annotations
+
+import argparse
+from importlib import import_module
+
+import numpy as np
+import pytest
+import trimesh
+
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.images import linear_to_srgb
+from splitnerf.data.layouts.frame import Frame
+from splitnerf.data.layouts.lit import LitView
+from splitnerf.errors import InputError
+from splitnerf.evaluate.published import dtu, glossy, nerfactor, openillumination, owl, shiny, stanford_orb, tensoir
+from splitnerf.evaluate.published.common import Delivered
+from splitnerf.evaluate.published.folders import FolderTruth
+from splitnerf.evaluate.published.table import PROTOCOLS, published, table
+from splitnerf.synth.layouts import LAYOUTS
+
+SIDE = 24
+RANDOM = np.random.default_rng(5)
+PERFECT = 100.0  # dB
+
+
+def picture(most: float = 0.9) -> np.ndarray:
+    return RANDOM.uniform(0.05, most, (SIDE, SIDE, 3))
+
+
+def box(low: int, high: int) -> np.ndarray:
+    mask = np.zeros((SIDE, SIDE))
+    mask[low:high, low:high] = 1
+    return mask
+
+
+# ---- Stanford-ORB ----
+
+
+def test_orb_forgives_a_factor_per_channel_and_nothing_else():
+    truth, mask = picture(), box(3, 20)
+    scaled = truth * [0.2, 3.0, 1.7]
+    assert stanford_orb.image_psnr(scaled, truth, mask, scaled=True) == (PERFECT, PERFECT)
+    assert max(stanford_orb.image_psnr(scaled, truth, mask, scaled=False)) < 20
+    assert max(stanford_orb.image_psnr(truth**2, truth, mask, scaled=True)) < 30
+
+
+def test_orb_erodes_two_pixels_of_the_mask_but_not_at_the_image_edge():
+    """A mask shifted by one or two pixels with wrong values there does not count, by three it does."""
+    truth, mask = picture(), box(4, 20)
+    for wrong, expected in ((2, True), (3, False)):
+        image = truth.copy()
+        image[4 : 4 + wrong] = 7.0
+        assert (stanford_orb.image_psnr(image, truth, mask, scaled=False)[0] == PERFECT) is expected
+    assert stanford_orb.eroded(np.ones((SIDE, SIDE))).all() and stanford_orb.eroded(mask).sum() == 12 * 12
+    assert not stanford_orb.eroded(0.5 * np.ones((SIDE, SIDE))).any()
+
+
+def test_orb_means_over_the_whole_frame_and_clips():
+    """A difference of d on all k pixels inside gives k / n d^2: PSNR-L in sRGB; PSNR-H after a factor, above 4 nothing counts."""
+    mask = box(2, 22)
+    share = stanford_orb.eroded(mask).mean()
+    truth, image = (np.full((SIDE, SIDE, 3), value) for value in (0.81, 0.49))
+    high, low = stanford_orb.image_psnr(image, truth, mask, scaled=False)
+    difference = linear_to_srgb(np.float64(0.81)) - linear_to_srgb(np.float64(0.49))
+    assert low == pytest.approx(-10 * np.log10(share * difference**2), abs=1e-4)
+    factor = linear_to_srgb(np.float64(0.81)) / 0.81
+    assert high == pytest.approx(-10 * np.log10(share * (factor * 0.32) ** 2), abs=1e-4)
+    brightest = 5 * np.ones((SIDE, SIDE, 3))  # the factor is 1, as the truth clipped to 1 is white
+    assert stanford_orb.image_psnr(9 * brightest, brightest, mask, scaled=False) == (PERFECT, PERFECT)
+    assert stanford_orb.image_psnr(0.5 * brightest, brightest, mask, scaled=False)[0] < 10
+
+
+def test_orb_is_never_worse_than_grey():
+    truth, mask = np.full((SIDE, SIDE, 3), 0.5), np.ones((SIDE, SIDE))
+    low = stanford_orb.image_psnr(np.zeros_like(truth), truth, mask, scaled=False)[1]
+    assert low == pytest.approx(-20 * np.log10(linear_to_srgb(np.float64(0.5)) - 0.5), abs=1e-4)
+
+
+def test_orb_normals_and_chamfer():
+    mask = np.ones((8, 8))
+    straight, turned = np.zeros((8, 8, 3)), np.zeros((8, 8, 3))
+    straight[..., 2], turned[..., 2], turned[..., 0] = 2.0, 1.0, np.sqrt(3)
+    assert stanford_orb.normal_distance(turned, straight, mask) == pytest.approx(0.5)
+    flat = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
+    points = np.asarray(trimesh.sample.sample_surface(flat, 20_000, seed=1)[0]) + [0, 0, 0.1]
+    assert stanford_orb.chamfer(flat, points) == pytest.approx(2e3 * 0.01, rel=0.01)
+
+
+# ---- Objects With Lighting ----
+
+
+@pytest.mark.parametrize(("stops", "gains"), [(-3.0, (1, 1, 1)), (4.0, (1, 1.2, 0.8)), (0.0, (0.6, 1, 1.8))])
+def test_owl_finds_exposure_and_gains(stops, gains):
+    photo, mask = picture(), box(2, 20) > 0
+    linear = photo**2.2 / 2.0**stops / np.array(gains)
+    image = owl.tone_mapped(linear, photo, mask)
+    assert np.abs(image - photo)[mask].max() < 2e-3
+
+
+def test_owl_keeps_gains_within_their_bounds():
+    photo, mask = np.full((SIDE, SIDE, 3), 0.5), np.ones((SIDE, SIDE), bool)
+    image = owl.tone_mapped(photo**2.2 * [1, 1, 1e-3], photo, mask)
+    assert np.abs(image[..., :2] - 0.5).max() < 2e-3
+    assert image[0, 0, 2] == pytest.approx(0.5 * (1e-3 * 2) ** (1 / 2.2), rel=0.01)
+
+
+def test_owl_fits_on_what_the_photo_does_not_clip_and_inside_the_mask():
+    photo, mask = picture(0.7), box(0, 12) > 0
+    linear = photo**2.2 * 0.25
+    photo[:9], linear[:9] = 1.0, 0.01  # clipped, as most of the mask is
+    linear[12:] = 50.0
+    image = owl.tone_mapped(linear, photo, mask)
+    assert np.abs(image - photo)[9:12, :12].max() < 2e-3
+    assert not (owl.tone_mapped(np.zeros_like(linear), photo, mask)).any()
+
+
+def test_owl_ssim_counts_inside_the_mask():
+    photo, mask = np.float32(picture()), box(0, 12) > 0
+    other = photo.copy()
+    other[12:] = 0
+    assert owl.masked_ssim(other, photo, mask) == pytest.approx(1)
+    flat = np.full((SIDE, SIDE, 3), 0.8, np.float32)  # without variance: (2 a b + c) / (a^2 + b^2 + c) in whole windows
+    expected = (2 * 0.8 * 0.4 + 1e-4) / (0.8**2 + 0.4**2 + 1e-4)
+    assert owl.masked_ssim(flat / 2, flat, np.ones_like(mask)) == pytest.approx(expected, abs=1e-6)
+    assert owl.masked_ssim(flat / 2, flat, mask) < expected + 1e-6
+
+
+# ---- the others ----
+
+
+def test_pixels_in_srgb():
+    pixels = np.full((7, 3), 0.25)
+    expected = -20 * np.log10(linear_to_srgb(np.float64(0.25)) - linear_to_srgb(np.float64(0.16)))
+    assert openillumination.srgb_psnr(pixels * 0.64, pixels) == pytest.approx(expected, abs=1e-6)
+    assert openillumination.srgb_psnr(pixels + 5, pixels + 1) == PERFECT
+
+
+def test_nerfactor_scale_is_of_least_squares_on_opaque_pixels():
+    truth, alpha = picture(), np.where(box(4, 20) > 0, 1.0, 0.85)
+    ours = np.where(alpha[..., None] > 0.9, truth / [2.0, 0.5, 1.25], 9.0)
+    assert nerfactor.albedo_scale({"albedo": ours}, truth, alpha) == pytest.approx([2.0, 0.5, 1.25])
+
+
+def test_nerfactor_takes_four_views_of_the_test():
+    def view(number: int) -> LitView:
+        return LitView(Frame(f"test_{number:03d}", None, np.eye(4), {}), "city", None)
+
+    names = [v.frame.name for v in nerfactor.chosen([view(i) for i in range(200)], None)]
+    assert names == ["test_049", "test_099", "test_149", "test_199"]
+    with pytest.raises(InputError, match="none of the test views 49, 99, 149, 199"):
+        nerfactor.chosen([view(3)], None)
+
+
+def test_tensoir_albedo_is_to_the_power_and_white_outside():
+    alpha = (box(6, 18) > 0).astype(float)
+    truth = FolderTruth(None, alpha, np.full((SIDE, SIDE, 3), 0.36), None)
+    maps = {"albedo": np.full((SIDE, SIDE, 3), 0.18), "alpha": alpha}
+    assert tensoir.albedo_error(maps, truth, np.full(3, 2.0)) == pytest.approx(0, abs=1e-12)
+    bright = {"albedo": np.full((SIDE, SIDE, 3), 0.72), "alpha": alpha}
+    assert tensoir.albedo_error(bright, truth, np.full(3, 0.5)) == pytest.approx(0, abs=1e-12)
+    expected = alpha.mean() * (0.36 ** (1 / 2.2) - 0.18 ** (1 / 2.2)) ** 2
+    assert tensoir.albedo_error(maps, truth, np.ones(3)) == pytest.approx(expected)
+
+
+def test_tensoir_normals_count_the_background_as_equal():
+    alpha = box(0, 12)
+    up, side = (np.broadcast_to(np.array(n, float), (SIDE, SIDE, 3)) for n in ((0, 0, 1), (1, 0, 0)))
+    found = tensoir.whole_normals({"normal": side, "alpha": alpha}, FolderTruth(None, alpha, None, up))
+    assert found == pytest.approx(90 * alpha.mean())
+    nothing = {"normal": side, "alpha": np.zeros_like(alpha)}  # shows the background where the truth points down
+    assert tensoir.whole_normals(nothing, FolderTruth(None, alpha, None, -up)) == pytest.approx(180 * alpha.mean())
+
+
+def test_shiny_normals_are_weighted():
+    up, side = (np.broadcast_to(np.array(n, float), (2, 2, 3)) for n in ((0, 0, 1), (0, 1, 0)))
+    mixed = np.where(np.array([[[True], [False]], [[False], [False]]]), side, up)
+    assert shiny.weighted_angle(mixed, up, np.array([[3.0, 1], [0, 2]])) == pytest.approx(45)
+    assert shiny.weighted_angle(mixed, up, np.zeros((2, 2))) is None
+
+
+def test_albedo_is_scaled_before_relighting():
+    asset = Asset(
+        "a", np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), np.eye(3, dtype=np.float32), np.zeros(1, np.int32),
+        [Material(albedo=(0.2, 0.4, 0.8)), Material(albedo=(0.5, 1, 1), albedo_texture=np.full((2, 2, 3), 0.4, np.float32))],
+    )  # fmt: skip
+    plain, textured = Delivered(asset, None, np.zeros(3), 1).with_albedo(np.array([2.0, 0.5, 3.0])).asset.materials
+    assert plain.albedo == pytest.approx((0.4, 0.2, 1.0))
+    assert textured.albedo == (1, 1, 1) and textured.albedo_texture[0, 0] == pytest.approx([0.4, 0.2, 1.0])
+
+
+def test_glossy_distance_of_two_planes():
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, 300), np.linspace(0, 1, 300)))
+    plane = np.stack([x, y, 0 * x], axis=1)
+    assert glossy.chamfer(plane + [0, 0, 0.05], plane) == pytest.approx(0.05, rel=0.02)
+    assert glossy.thinned(np.array([[0, 0, 0], [0.002, 0, 0], [1, 1, 1]])) == pytest.approx(np.array([[0.001, 0, 0], [1, 1, 1]]))
+
+
+def test_dtu_counts_the_observed_and_what_is_above_the_plane():
+    scan = np.stack(np.meshgrid(np.arange(0, 30, 0.5), np.arange(0, 30, 0.5), [0.0]), axis=-1).reshape(-1, 3)
+    below = scan + [0, 0, -15]
+    ours = scan + [0, 0, 0.75]
+    far = np.array([[10.0, 10, 15], [10, 10, 25]])  # one of them more than 20 mm away
+    volume = np.array([[0.0, 0, 0], [30, 30, 30]])
+    observed, plane = np.ones((31, 31, 31), bool), np.array([0, 0, 1.0, 10])
+    got = dtu.distances(ours, np.concatenate([scan, below]), volume, 1.0, observed, plane)
+    assert got == pytest.approx((0.75, 0.75))
+    accuracy, _ = dtu.distances(np.concatenate([ours, far]), scan, volume, 1.0, observed, plane)
+    assert accuracy == pytest.approx((0.75 * len(ours) + 15) / (len(ours) + 1))
+    observed[:, :, 10:] = False
+    accuracy, _ = dtu.distances(np.concatenate([ours, far]), scan, volume, 1.0, observed, plane)
+    assert accuracy == pytest.approx(0.75)
+    kept = dtu.thinned(RANDOM.uniform(0, 3, (4000, 3)))
+    apart = np.linalg.norm(kept[:, None] - kept[None], axis=-1) + np.eye(len(kept))
+    assert apart.min() > dtu.SPACING and len(kept) > 500
+
+
+def test_the_command_line_knows_all_protocols_and_layouts():
+    choices = {a.dest: a.choices for name in ("evaluate", "synth") for a in parser_of(name)._actions if a.choices}
+    assert tuple(choices["protocol"]) == tuple(PROTOCOLS) and tuple(choices["layout"]) == LAYOUTS
+
+
+def parser_of(name: str) -> argparse.ArgumentParser:
+    commands = argparse.ArgumentParser().add_subparsers()
+    import_module(f"splitnerf.cli.{name}").add_parser(commands)
+    return commands.choices[name]
+
+
+def test_published_numbers_fit_their_tables():
+    for name, protocol in PROTOCOLS.items():
+        keys = {key for key, _, _ in protocol.COLUMNS}
+        content = published(name)
+        assert all(set(row) <= keys | {"method"} for row in content["rows"])
+        assert bool(content["rows"]) == bool(content["source"]) == bool(content["date"])
+    text = table("stanford-orb", {"psnr_h": 20.0, "psnr_l": None}, "mine").splitlines()
+    assert text[0].split("  ")[-1] == "relit, PSNR-L" and "normals" not in text[0]
+    assert text[1].split() == ["mine", "20.00", "-"] and text[2].split() == ["DiffReg-PBIR", "27.22", "34.98"]
