@@ -33,7 +33,7 @@ from splitnerf.view import server as server_module
 from splitnerf.view.final import Camera, Tracer
 from splitnerf.view.photos import Photos
 from splitnerf.view.server import ViewServer
-from splitnerf.view.shown import MOST_DROPPED, Shown, as_halves
+from splitnerf.view.shown import MOST_DROPPED, Shown
 
 PAGE = Path(splitnerf.view.__file__).parent
 

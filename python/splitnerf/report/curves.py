@@ -9,7 +9,9 @@ from markupsafe import Markup, escape
 
 WIDTH, HEIGHT = 460, 250
 LEFT, RIGHT, TOP, BOTTOM = 52, 12, 12, 34
-PALETTE = ("#3b82c4", "#d9822b", "#3f9d63", "#b5539a", "#8a7ad1", "#c2524a", "#2c9c9c", "#98863a")
+PALETTE = (
+    "#3b82c4", "#d9822b", "#3f9d63", "#b5539a", "#8a7ad1", "#c2524a", "#2c9c9c", "#98863a", "#8d9298", "#6aa84f", "#d46a9f", "#5c6bc0",
+)  # fmt: skip
 MAX_POINTS = 400
 
 Series = Sequence[tuple[float, float]]
@@ -72,6 +74,17 @@ def line_chart(title: str, series: Mapping[str, Series], *, log: bool = False, a
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(title)}">{"".join(parts)}</svg>'
         f'<ul class="legend">{"".join(legend)}</ul></figure>'
     )
+
+
+def curve_data(title: str, series: Mapping[str, Series], *, log: bool = False) -> dict | None:
+    """The same lines for the page's script: `x`, and `series` of `name` and `values`, None where a line has no number; None
+    where no line has any. Lines are thinned as the drawn ones; a script may draw zeros and below on a linear axis."""
+    kept = {name: dict(_thinned([p for p in points if _drawable(p, False)])) for name, points in series.items()}
+    xs = sorted(set().union(*kept.values())) if kept else []
+    if not xs:
+        return None
+    lines = [{"name": name, "values": [points.get(x) for x in xs]} for name, points in kept.items() if points]
+    return {"title": title, "log": log, "x": xs, "series": lines}
 
 
 def _drawable(point: tuple[float, float], log: bool) -> bool:
