@@ -28,6 +28,7 @@ from splitnerf.data.frames import read_frames
 from splitnerf.data.images import area_average, decode_image, encode_image, read_image, write_image
 from splitnerf.data.reading import Reading
 from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.report.browser import as_halves
 from splitnerf.view import final
 from splitnerf.view import server as server_module
 from splitnerf.view.final import Camera, Tracer

@@ -30,13 +30,13 @@ def asset_section(path: Path | None) -> dict | None:
         return None
     try:
         camera = camera_of(read_asset(path))
-        content, note = fitted(path)
+        content, note = fitted(path, MOST_BYTES)
     except InputError as error:
         return {"packed": None, "camera": None, "note": str(error)}
     return {"packed": content and packed(content), "camera": camera, "note": note}
 
 
-def fitted(path: Path, most_bytes: int = MOST_BYTES) -> tuple[bytes | None, str]:
+def fitted(path: Path, most_bytes: int) -> tuple[bytes | None, str]:
     """The bytes of a GLB, at most so many, and a line about what was changed: textures whose longer side has more pixels than
     2048, 1024, 512 or 256 are averaged down, as far as is needed. None where even the last does not help.
 
@@ -61,26 +61,27 @@ def with_smaller_textures(document: Document, side: int) -> bytes:
         InputError: A part is damaged.
     """
     tree = copy.deepcopy(document.json)
-    images = {image["bufferView"] for image in tree.get("images", []) if "bufferView" in image}
+    images = {image["bufferView"]: image for image in tree.get("images", []) if "bufferView" in image}
     binary = bytearray()
     for number, view in enumerate(tree.get("bufferViews", [])):
         content = document.view(number)
-        content = smaller_image(content, side) if number in images else content
+        if number in images and (smaller := smaller_image(content, side)):
+            content, images[number]["mimeType"] = smaller, "image/png"
         view |= {"buffer": 0, "byteOffset": len(binary), "byteLength": len(content)}
         binary += content + bytes(-len(content) % 4)
     tree["buffers"] = [{"byteLength": len(binary)}]
-    for image in tree.get("images", []):
-        if "bufferView" in image:
-            image["mimeType"] = "image/png"
     text = json.dumps(tree).encode()
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
     return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
 
 
-def smaller_image(content: bytes, side: int) -> bytes:
-    """An encoded image as a PNG of at most `side` pixels a side, by averages of whole blocks."""
+def smaller_image(content: bytes, side: int) -> bytes | None:
+    """An encoded image as a PNG of at most `side` pixels a side, by averages of whole blocks; None where it is so already."""
     with Image.open(io.BytesIO(content)) as image:
+        factor = math.ceil(max(image.size) / side)
+        if factor == 1:
+            return None
         file = io.BytesIO()
-        image.reduce(math.ceil(max(image.size) / side)).save(file, "PNG", optimize=True)
+        image.reduce(factor).save(file, "PNG", optimize=True)
     return file.getvalue()

@@ -23,7 +23,7 @@ MAPS = {
 }
 KINDS = {"rgb": "colour", "albedo": "colour", "normal": "normal"}  # of the others: "number"
 LARGEST_ERRORS = {"colour": 0.25, "number": 0.5, "normal": 45.0}  # where the scale of error maps ends
-MOST_PIXELS = 640  # of a picture's longer side
+MOST_PIXELS = 512  # of a picture's longer side
 
 
 def comparison(left: str, right: str, kind: str) -> dict:
@@ -82,7 +82,7 @@ def _map_picture(maps: Mapping, key: str) -> Markup:
 
 def averaged(values: np.ndarray, alpha: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """A map [H, W, C] and its coverage [H, W], None for 1, averaged down by the least whole factor after which no side has more
-    than 640 pixels; values count by their coverage."""
+    than 512 pixels; values count by their coverage."""
     alpha = np.ones(values.shape[:2], np.float32) if alpha is None else alpha
     factor = math.ceil(max(values.shape[:2]) / MOST_PIXELS)
     factor = min(factor, *values.shape[:2])

@@ -25,6 +25,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
+from splitnerf.report.browser import as_halves
 from splitnerf.view.final import Camera, Tracer
 from splitnerf.view.photos import Photos
 from splitnerf.view.shown import Shown, Source
