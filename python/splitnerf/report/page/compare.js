@@ -52,6 +52,11 @@ class Stage {
     this.said = element("p", { class: "said" });
     article.append(this.box, this.said);
     this.slider.addEventListener("input", () => this.place());
+    this.slider.addEventListener("pointerdown", () => (this.before = this.slider.value));
+    this.slider.addEventListener("pointercancel", () => {
+      this.slider.value = this.before; // the finger scrolls the page
+      this.place();
+    });
     this.box.addEventListener("pointermove", (event) => this.point(event));
     this.box.addEventListener("pointerleave", () => this.say());
     this.name = article.querySelector("h3").firstChild.textContent.trim();
