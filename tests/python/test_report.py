@@ -329,3 +329,13 @@ def test_curves_for_the_script_share_their_steps():
     assert data["x"] == [0, 1, 2] and data["log"]
     assert data["series"] == [{"name": "a", "values": [1.0, None, 0.0]}, {"name": "b", "values": [None, 5.0, None]}]
     assert curve_data("none", {"a": [(0, float("nan"))]}) is None
+
+
+def test_long_curves_for_the_script_are_thinned_alike():
+    """A line that begins late has its values at the steps of the others; the last step is as it is."""
+    long, late = [(i, float(i)) for i in range(10_001)], [(i, 2.0 * i) for i in range(5_000, 10_001)]
+    data = curve_data("terms", {"long": long, "late": late})
+    assert len(data["x"]) <= 402 and data["x"][-1] == 10_000 and data["x"][0] == 12.5
+    first, second = (one["values"] for one in data["series"])
+    assert first == data["x"] and second[:192] == [None] * 192
+    assert all(b == 2 * a for a, b in zip(first[193:], second[193:]))

@@ -77,7 +77,7 @@ class Chart {
       const value = plot.data[i + 1][idx];
       return line.show && value != null ? [element("div", {}, element("i", { style: `background:${this.colours[i % this.colours.length]}` }), `${line.label} ${short(value, 4)}`)] : [];
     });
-    this.tip.replaceChildren(element("b", {}, `step ${plot.data[0][idx]}`), ...rows);
+    this.tip.replaceChildren(element("b", {}, `step ${Math.round(plot.data[0][idx])}`), ...rows);
     const right = left > plot.over.clientWidth / 2;
     Object.assign(this.tip.style, { left: right ? "" : `${left + 12}px`, right: right ? `${plot.over.clientWidth - left + 12}px` : "" });
   }
