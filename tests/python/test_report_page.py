@@ -54,20 +54,20 @@ def report(ball, tmp_path_factory):
     """Two views, red beside blue; a light with one bright texel; a ball; nine steps of training."""
     folder = tmp_path_factory.mktemp("report")
     materials = np.full((64, 64, 2), (0.25, 0.0), np.float32)
-    write_glb(folder / "mesh.glb", with_textures(ball, albedo_texture=np.float32(np.full((64, 64, 3), (0.6, 0.3, 0.1))), roughness_metallic_texture=materials))
+    brown = np.full((64, 64, 3), (0.6, 0.3, 0.1), np.float32)
+    write_glb(folder / "mesh.glb", with_textures(ball, albedo_texture=brown, roughness_metallic_texture=materials))
     tilted = plain(BLUE)
     tilted["normal"] = np.tile(np.float32([0.5, 0, 0.75**0.5]), (40, 60, 1))
     tilted["roughness"] = tilted["roughness"] + 0.25
     views = [{"name": f"r_{i}", "truth": plain(RED), "prediction": tilted} for i in range(2)]
     true = np.full((128, 256, 3), 0.5, np.float32)
     true[LAMP] = (64.0, 8.0, 1.0)
-    history = [
-        {"step": 100 * i, "loss": 2.0**-i, "psnr": 20.0 + i, "loss_colour": 10.0**-i, "loss_light": 0.5, "loss_late": 0.0 if i < 5 else 1e-3}
-        for i in range(9)
-    ]
+    terms = [{"loss_colour": 10.0**-i, "loss_light": 0.5, "loss_late": 0.0 if i < 5 else 1e-3} for i in range(9)]
+    history = [{"step": 100 * i, "loss": 2.0**-i, "psnr": 20.0 + i} | terms[i] for i in range(9)]
+    summary = {"Result": {"PSNR": 30.0}, "Settings": {f"s{i}": i for i in range(30)}}
     write_report(
-        folder / "report.html", title="two </script> views", summary={"Result": {"PSNR": 30.0}, "Settings": {f"s{i}": i for i in range(30)}},
-        views=views, lights=[], light_truth=true, light=sky(32), history=history, timings={"training": 3.0}, asset=folder / "mesh.glb",
+        folder / "report.html", title="two </script> views", summary=summary, views=views, lights=[], light_truth=true, light=sky(32),
+        history=history, timings={"training": 3.0}, asset=folder / "mesh.glb",
     )  # fmt: skip
     return folder / "report.html"
 
@@ -93,29 +93,35 @@ def seen(report):
 
     stage, object_ = "#views .stage", "#object canvas"
     true_light = "#light .widget figure:nth-child(2) canvas"
-    bare = {"do": "style", "content": ".tag, .divider, .cross { display: none !important } .sky { border-radius: 0 !important } .stage:focus-within, canvas { outline: 0 !important }"}
+    hidden = ".tag, .divider, .cross { display: none !important } .sky { border-radius: 0 !important }"
+    bare = {"do": "style", "content": hidden + ".stage:focus-within, canvas { outline: 0 !important }"}
+    asked = "performance.getEntriesByType('resource').map((e) => e.name).filter((n) => !/^(blob|data):/.test(n))"
+    maps = [step for name in ("albedo", "roughness", "metallic", "normals") for step in (click(name, "object"), part(name, object_))]
+    chart, terms = "#training figure:nth-child(2)", "#training figure:nth-child(3)"
     steps = [
         {"do": "size", "width": 700, "height": 600}, {"do": "open"}, bare,
-        {"do": "text", "name": "asked", "script": "performance.getEntriesByType('resource').map((e) => e.name).filter((n) => !/^(blob|data):/.test(n))"},
+        {"do": "text", "name": "asked", "script": asked},
         {"do": "text", "name": "live", "script": "[...document.querySelectorAll('.live')].map((e) => e.id)"},
         {"do": "text", "name": "static", "script": "[...document.querySelectorAll('.static')].filter((e) => e.checkVisibility()).length"},
         part("half", stage), point(stage, 0.25, 0.5, press=True), part("quarter", stage), text("readout", "#views .said"),
-        {"do": "focus", "selector": "#views .stage input"}, {"do": "key", "key": "PageUp"}, *[{"do": "key", "key": "ArrowLeft"}] * 2, part("keys", stage),
+        {"do": "focus", "selector": "#views .stage input"},
+        {"do": "key", "key": "PageUp"}, *[{"do": "key", "key": "ArrowLeft"}] * 2, part("keys", stage),
         click("error", "views"), part("error", stage), text("mean", "#views .said"), text("scale", "#views .legend-row"),
         click("normals", "views"), text("angle", "#views .said"), click("roughness", "views"), text("rough", "#views .said"),
         part("light", true_light), {"do": "set", "selector": "#light .range input", "value": -5}, part("dark", true_light),
         point(true_light, (LAMP[1] + 0.5) / 256, (LAMP[0] + 0.5) / 128), text("radiance", "#light .said"),
-        point("#training figure:nth-child(2) .u-over", 0.25, 0.5), text("tip", "#training figure:nth-child(2) .tip"),
-        point("#training figure:nth-child(2) .u-over", 0.99, 0.5), text("last", "#training figure:nth-child(2) .tip"),
-        point("#training figure:nth-child(3) .u-over", 0.99, 0.5), text("terms", "#training figure:nth-child(3) .tip"),
-        point("#training figure:nth-child(3) .u-legend .u-series:nth-child(2)", 0.5, 0.5, press=True),
-        point("#training figure:nth-child(3) .u-over", 0.98, 0.5), text("fewer", "#training figure:nth-child(3) .tip"),
-        {"do": "text", "name": "linear", "script": "document.querySelector('#training figure:nth-child(3) .axis input').click()"},
-        point("#training figure:nth-child(3) .u-over", 0.02, 0.5), text("zero", "#training figure:nth-child(3) .tip"),
-        part("shaded", object_), *(step for name in ("albedo", "roughness", "metallic", "normals") for step in (click(name, "object"), part(name, object_))),
+        point(f"{chart} .u-over", 0.25, 0.5), text("tip", f"{chart} .tip"),
+        point(f"{chart} .u-over", 0.99, 0.5), text("last", f"{chart} .tip"),
+        point(f"{terms} .u-over", 0.99, 0.5), text("terms", f"{terms} .tip"),
+        point(f"{terms} .u-legend .u-series:nth-child(2)", 0.5, 0.5, press=True),
+        point(f"{terms} .u-over", 0.98, 0.5), text("fewer", f"{terms} .tip"),
+        {"do": "text", "name": "linear", "script": f"document.querySelector('{terms} .axis input').click()"},
+        point(f"{terms} .u-over", 0.02, 0.5), text("zero", f"{terms} .tip"),
+        part("shaded", object_), *maps,
         click("shaded", "object"), click("true light", "object"), part("other", object_),
         {"do": "set", "selector": "#object .range:nth-of-type(2) input", "value": 2}, part("brighter", object_),
-        {"do": "size", "width": 380, "height": 700}, {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
+        {"do": "size", "width": 380, "height": 700},
+        {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
     ]  # fmt: skip
     told = look(report, steps)
     return told, {path.stem: np.asarray(Image.open(path).convert("RGB"), np.float32) / 255 for path in folder.glob("*.png")}
@@ -168,7 +174,8 @@ def test_the_exposure_changes_the_lights_pixels(seen):
     y, x = (place + 2.5 for place in np.unravel_index(red.argmax(), red.shape))
     height, width = pictures["dark"].shape[:2]
     assert (y / height * 128, x / width * 256) == pytest.approx((LAMP[0] + 0.5, LAMP[1] + 0.5), abs=1)
-    assert told["texts"]["radiance"].startswith("azimuth 162°, elevation 82°: recovered light") and "true light 64 8 1" in told["texts"]["radiance"]
+    radiance = told["texts"]["radiance"]
+    assert radiance.startswith("azimuth 162°, elevation 82°: recovered light") and "true light 64 8 1" in radiance
 
 
 def test_curves_say_the_values_under_the_pointer(seen):

@@ -9,6 +9,7 @@ const { chromium } = createRequire(`${packages}/package.json`)("playwright-core"
 const args = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--force-color-profile=srgb"];
 const browser = await chromium.launch({ executablePath, args, chromiumSandbox: process.getuid() !== 0 });
 const page = await browser.newPage();
+page.setDefaultTimeout(120000); // a busy machine without a GPU draws for seconds
 const told = { console: [], texts: {} };
 let open = 0; // requests
 page.on("request", () => (open += 1));

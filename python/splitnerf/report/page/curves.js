@@ -49,7 +49,7 @@ class Chart {
       series: [
         { label: "step" },
         ...series.map(({ name }, i) => ({
-          label: name, stroke: this.colours[i % this.colours.length], width: 1.8, spanGaps: true, show: !this.hidden.has(name), points: { show: x.length < 3 },
+          label: name, stroke: this.colour(i), width: 1.8, spanGaps: true, show: !this.hidden.has(name), points: { show: x.length < 3 },
         })),
       ],
       cursor: { drag: { x: true, y: false }, points: { size: 6 } },
@@ -61,6 +61,10 @@ class Chart {
     };
     this.plot = new uPlot(options, [x, ...values], this.place);
     this.plot.over.append(this.tip);
+  }
+
+  colour(number) {
+    return this.colours[number % this.colours.length];
   }
 
   keep(name, shown) {
@@ -75,7 +79,8 @@ class Chart {
     if (this.tip.hidden) return;
     const rows = plot.series.slice(1).flatMap((line, i) => {
       const value = plot.data[i + 1][idx];
-      return line.show && value != null ? [element("div", {}, element("i", { style: `background:${this.colours[i % this.colours.length]}` }), `${line.label} ${short(value, 4)}`)] : [];
+      if (!line.show || value == null) return [];
+      return [element("div", {}, element("i", { style: `background:${this.colour(i)}` }), `${line.label} ${short(value, 4)}`)];
     });
     this.tip.replaceChildren(element("b", {}, `step ${Math.round(plot.data[0][idx])}`), ...rows);
     const right = left > plot.over.clientWidth / 2;

@@ -51,9 +51,8 @@ class Light {
     this.canvas = element("canvas", { width, height, role: "img", "aria-label": name });
     this.cross = element("i", { class: "cross", hidden: true });
     this.limit = element("span");
-    this.figure = element(
-      "figure", { class: "card" }, element("div", { class: "sky" }, this.canvas, this.cross), element("figcaption", {}, `${name}; white is a radiance of `, this.limit),
-    );
+    const caption = element("figcaption", {}, `${name}; white is a radiance of `, this.limit);
+    this.figure = element("figure", { class: "card" }, element("div", { class: "sky" }, this.canvas, this.cross), caption);
   }
 
   /** Draws the light: `white` and more is white, the sRGB curve. */

@@ -6,7 +6,10 @@ import { element, range, tabs, unpacked } from "./elements.js";
 
 const SHOWN = CHANNELS.filter((name) => name !== "uncertainty");
 const STEP = Math.PI / 36; // radians of the camera a key
-const KEYS = { ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, STEP], ArrowDown: [0, -STEP], "+": [0, 0, 0.9], "=": [0, 0, 0.9], "-": [0, 0, 1 / 0.9] };
+const KEYS = {
+  ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, STEP], ArrowDown: [0, -STEP],
+  "+": [0, 0, 0.9], "=": [0, 0, 0.9], "-": [0, 0, 1 / 0.9],
+};
 
 export async function object(section, { camera, lights, uncertainty }) {
   const glb = document.getElementById("glb");
@@ -45,10 +48,11 @@ export async function object(section, { camera, lights, uncertainty }) {
   panel.append(tabs("What is shown", SHOWN, (i) => set({ channel: CHANNELS.indexOf(SHOWN[i]) })));
   if (lights.length > 1) panel.append(tabs("Light", lights.map((one) => one.name), light));
   else if (lights.length) light(0);
+  const behind = element("input", { type: "checkbox", checked: true, onchange: () => set({ background: behind.checked }) });
   panel.append(
     range("Turn the light", { min: -180, max: 180, step: 1, unit: "°" }, (turn) => set({ turn })),
     range("Exposure", { min: -6, max: 6, step: 0.1, unit: " EV" }, (exposure) => set({ exposure })),
-    element("label", { class: "axis" }, element("input", { type: "checkbox", checked: true, onchange: (event) => set({ background: event.target.checked }) }), " light behind"),
+    element("label", { class: "axis" }, behind, " light behind"),
     element("button", { type: "button", onclick: () => viewer.home() }, "front view"),
     element("span", { class: "hint" }, "drag to turn; click, then the wheel zooms"),
   );
