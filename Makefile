@@ -5,7 +5,7 @@
 # make stability   asks each operator STABILITY_CASES times and writes docs/benchmarks/stability.md; more in STABILITY_OPTIONS
 # make tables   says which tables under docs/ are stale
 # make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
-# make viewer   builds the page of splitnerf view from its sources (needs Node and npm)
+# make viewer   builds the page of splitnerf view and the script of report.html from their sources (needs Node and npm)
 # make wheels   builds a wheel for each Python from 3.10 to 3.13 that is found, into build/wheels
 # make lock   renews third_party/requirements.lock, the versions and hashes of what `make install` brings
 # make fuzz   feeds each reader damaged files for FUZZ_SECONDS, in four parts: tracing takes memory with every run

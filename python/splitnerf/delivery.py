@@ -199,9 +199,10 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
         truth = {key: value for key, value in vars(truths[i]).items() if key != "name"}
         truth |= {"rgb": views.images[i, ..., :3], "alpha": views.images[i, ..., 3]}
         pages.append({"name": views.frame_names[i], "truth": truth, "prediction": prediction})
+    light = run / "environment.exr"
     write_report(
         run / "report.html",
-        title=views.name,
+        title=f"{run.resolve().name} · {views.name}",
         summary={"Result": headline(evaluated.scores), "All scores": evaluated.scores, "Settings": asdict(model.config)},
         views=pages,
         last_stage=last_stage_page(run, views, predictions, shown, evaluated.scores) if is_refined(run) else None,
@@ -209,6 +210,9 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
         light_truth=load_scene_truth(views.root).light,
         history=read_metrics(run / METRICS),
         timings=timings,
+        light=read_environment(light) if light.is_file() else None,
+        asset=run / "mesh.glb",
+        albedo_scale=evaluated.scores["albedo"] and evaluated.scores["albedo"]["lsq"]["scale"],
     )
 
 

@@ -353,7 +353,7 @@ def test_the_report_shows_before_and_after_and_what_is_open(run):
     page = (run / "report.html").read_text()
     pictures = Pictures()
     pictures.feed(page)
-    for name in ("before", "after", "error before x4", "error after x4"):
+    for name in ("photo", "before", "after"):
         assert sum(alt.endswith(f", {name}") for alt in pictures.found) == 2, name  # test views
     assert sum(alt.startswith("deviation of") for alt in pictures.found) == 8
     for text in ("one factor per colour channel", "are saturated in the photos", "The last stage", "What the photos leave open"):
@@ -373,7 +373,8 @@ def test_the_reports_numbers_are_those_of_its_pictures():
     section = last_stage_section(page)
     assert section["rows"][0][1:] == ("20.00 dB", "40.00 dB") and section["rows"][2][1:] == ("0.2", "0.1")
     assert [q["unknown"] for q in section["quantities"]] == ["0 %", "25 %", "0 %", "0 %"]
-    assert section["saturated"] == "12.5 %" and len(section["views"][0]["cells"]) == 5
+    assert section["saturated"] == "12.5 %" and len(section["views"][0]["cells"]) == 3
+    assert section["views"][0]["score"] == "20.00 → 40.00 dB"
 
 
 def test_what_is_unknown_is_striped_and_the_rest_on_a_scale():

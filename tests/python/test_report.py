@@ -1,7 +1,13 @@
-"""The report: self-contained, escaped, and complete with and without truth."""
+"""The report without its script: self-contained, escaped, and complete with and without truth."""
 
 from __future__ import annotations
 
+import base64
+import gzip
+import hashlib
+import html
+import io
+import json
 import os
 import re
 from html.parser import HTMLParser
@@ -9,25 +15,47 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from painted_ball import with_textures
+from PIL import Image
 
+import splitnerf.report
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import linear_to_srgb
+from splitnerf.export.glb import write_glb
 from splitnerf.report import write_report
-from splitnerf.report.curves import line_chart
+from splitnerf.report.asset import fitted
+from splitnerf.report.browser import script_json
+from splitnerf.report.curves import curve_data, line_chart
+from splitnerf.report.pictures import data_uri
 
-VOID = {"meta", "img", "br", "line", "circle", "polyline"}
+REPORT = Path(splitnerf.report.__file__).parent
+PAGE = REPORT.parent / "view/page"
+
+VOID = {"meta", "img", "br", "link", "line", "circle", "polyline"}
+HOSTILE = "</script><script>alert(1)</script><!--"
 
 
 class Balanced(HTMLParser):
-    """Fails on a closing tag that does not match; counts pictures."""
+    """Fails on a closing tag that does not match; keeps pictures, scripts by their id, and what other elements refer to."""
 
     def __init__(self):
         super().__init__()
-        self.open, self.pictures = [], []
+        self.open, self.pictures, self.scripts, self.references, self.script = [], [], {}, [], None
 
     def handle_starttag(self, tag, attributes):
         if tag == "img":
             self.pictures.append(dict(attributes))
+        if tag == "script":
+            self.script = dict(attributes).get("id", "bundle")
+            assert self.script not in self.scripts
+            self.scripts[self.script] = ""
+        self.references += [value for name, value in attributes if name in ("src", "href")]
         if tag not in VOID:
             self.open.append(tag)
+
+    def handle_data(self, text):
+        if self.open and self.open[-1] == "script":
+            self.scripts[self.script] += text
 
     def handle_startendtag(self, tag, attributes):
         pass
@@ -55,6 +83,7 @@ def write(tmp_path, **changes):
         "views": [make_view(True)],
         "lights": [{"roughness": r, "g": light, "g_bar": light} for r in (0, 0.25, 0.5, 1)],
         "light_truth": light,
+        "light": light,
         "history": [
             {"step": s, "loss": 1 / (s + 1), "psnr": 20 + s, "loss_light": 0.1, "loss_nan": np.nan} for s in range(9)
         ],
@@ -65,30 +94,203 @@ def write(tmp_path, **changes):
     parser = Balanced()
     parser.feed(page)
     assert parser.open == []
-    return page, parser.pictures
+    return page, parser
+
+
+def refuse(constant):
+    raise AssertionError(f"{constant} in JSON")
+
+
+def data_of(parsed):
+    """What the page's script reads."""
+    return json.loads(parsed.scripts["data"], parse_constant=refuse)
+
+
+def halves_of(light):
+    """[h, w, 4] of a light in the page."""
+    content = gzip.decompress(base64.b64decode(light["packed"]))
+    return np.frombuffer(content, "<f2").reshape(light["height"], light["width"], 4).astype(np.float32)
+
+
+def picture_of(image):
+    """The pixels of an <img>."""
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(image["src"].partition(",")[2]))), np.float32) / 255
 
 
 def test_report_holds_every_part(tmp_path):
-    page, pictures = write(tmp_path)
-    # 5 maps of truth and 7 of the prediction; 4 lights with estimates and the true one.
-    assert len(pictures) == 12 + 9
+    page, parsed = write(tmp_path)
+    # 5 maps of truth and 7 of the prediction; two lights; 4 roughnesses with estimates.
+    assert len(parsed.pictures) == 12 + 2 + 8
     assert page.count("<svg") == 3
     assert ">0.1</text>" in re.search(r"Loss</figcaption>.*", page)[0]  # decades, not quarters
-    for text in ("20.00 dB", "29.32", "nested.on", "ρ = 0.25", "true light", "hash_encode", "width:75.0%"):
+    for text in ("20.00 dB", "29.32", "nested.on", "ρ = 0.25", "true light", "hash_encode", "width:75.0%", "one factor per colour channel"):
         assert text in page
+    for anchor in (reference for reference in parsed.references if reference.startswith("#")):
+        assert f'id="{anchor[1:]}"' in page
 
 
 def test_report_is_self_contained_and_escaped(tmp_path):
-    page, pictures = write(tmp_path)
-    assert all(picture["src"].startswith("data:image/png;base64,") for picture in pictures)
-    assert not re.search(r"https?://|<script|<link|@import", page)
+    page, parsed = write(tmp_path)
+    assert all(picture["src"].startswith("data:image/png;base64,") for picture in parsed.pictures)
+    assert all(reference.startswith(("data:", "#")) for reference in parsed.references)
+    own = page.replace(parsed.scripts["bundle"], "")
+    assert not re.search(r"https?://|@import", own) and "default-src 'none'" in own
     assert "&lt;script&gt;" in page and "&lt;mlp&gt;" in page and "r_&lt;0&gt;" in page
 
 
+def test_no_name_ends_the_script(tmp_path):
+    history = [{"step": s, "loss": 1.0, f"loss_{HOSTILE}": 0.5} for s in range(3)]
+    changes = {"title": HOSTILE, "summary": {HOSTILE: {HOSTILE: HOSTILE}}, "timings": {HOSTILE: 1.0}, "history": history}
+    page, parsed = write(tmp_path, views=[make_view(True) | {"name": HOSTILE}], **changes)
+    assert set(parsed.scripts) == {"data", "bundle"}
+    assert data_of(parsed)["charts"][1]["series"][0]["name"] == HOSTILE
+    assert "alert(1)</script>" not in page and "<!--" not in page
+
+
+def test_what_is_not_finite_never_reaches_the_script(tmp_path):
+    light = np.full((4, 8, 3), 2.0)
+    light[0, 0] = (np.nan, np.inf, 1e9)
+    history = [{"step": s, "loss": value, "psnr": value} for s, value in enumerate((1.0, np.nan, np.inf, 2.0))]
+    _, parsed = write(tmp_path, light=light, history=history)
+    found = data_of(parsed)
+    assert found["charts"][0]["x"] == [0, 3] and found["charts"][0]["series"][0]["values"] == [1.0, 2.0]
+    assert np.isfinite(found["lights"][0]["white"]) and np.isfinite(halves_of(found["lights"][0])).all()
+    assert "null" not in script_json([1.0, {"a": (2, "x")}]) and script_json({"a": [np.float32("nan")]}) == '{"a":[null]}'
+
+
 def test_report_without_truth_or_history(tmp_path):
-    page, pictures = write(tmp_path, views=[make_view(False)], lights=[], light_truth=None, history=[], timings={})
-    assert len(pictures) == 7
-    assert "<h2>Light</h2>" not in page and "<svg" not in page and "dB<" not in page
+    changes = {"lights": [], "light_truth": None, "light": None, "history": [], "timings": {}}
+    page, parsed = write(tmp_path, views=[make_view(False)], **changes)
+    assert len(parsed.pictures) == 7
+    assert "<h2>Light</h2>" not in page and "<svg" not in page and "dB<" not in page and "<h2>Object</h2>" not in page
+    assert data_of(parsed)["charts"] == [] and data_of(parsed)["lights"] == []
+
+
+def test_lights_are_carried_in_16_bits(tmp_path):
+    """256 x 128 texels of the delivered light, the true one, and the one before the last stage, in the light's own order."""
+    light = np.random.default_rng(0).gamma(0.5, 2.0, (256, 512, 3)).astype(np.float32)
+    light[0, 0] = 1e6
+    _, parsed = write(tmp_path, light=light)
+    delivered, true = data_of(parsed)["lights"]
+    assert (delivered["name"], true["name"]) == ("recovered light", "true light")
+    expected = np.minimum(light.reshape(128, 2, 256, 2, 3).mean((1, 3)), 65504)
+    assert np.allclose(halves_of(delivered)[..., :3], expected, rtol=1e-3, atol=1e-6) and (halves_of(delivered)[..., 3] == 1).all()
+    assert delivered["white"] == pytest.approx(3 * light.mean(), rel=1e-5)
+
+
+def test_pictures_have_at_most_512_pixels_a_side_and_count_by_coverage(tmp_path):
+    view = make_view(True)
+    wide = {"rgb": np.zeros((4, 1300, 3)), "alpha": np.zeros((4, 1300)), "roughness": np.full((4, 1300), 0.25)}
+    wide["alpha"][:, ::3], wide["roughness"][:, ::3] = 1.0, 0.75
+    _, parsed = write(tmp_path, views=[view | {"truth": {}, "prediction": wide}])
+    rough = next(picture_of(image) for image in parsed.pictures if image.get("data-picture") == "roughness")
+    assert rough.shape == (1, 433, 4)
+    assert np.allclose(rough[..., 0], 0.75, atol=0.01) and np.allclose(rough[..., 3], 1 / 3, atol=0.01)
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+@pytest.mark.parametrize(("side", "kind"), [(200, "png"), (201, "webp")])
+def test_pictures_are_carried_without_loss(side, kind, channels):
+    codes = np.random.default_rng(0).integers(1, 256, (side, side, channels))
+    uri = data_uri(codes / np.float32(255))
+    assert uri.startswith(f"data:image/{kind};base64,")
+    mode = {1: "L", 3: "RGB", 4: "RGBA"}[channels]
+    found = Image.open(io.BytesIO(base64.b64decode(uri.partition(",")[2]))).convert(mode)
+    assert np.array_equal(np.asarray(found).reshape(codes.shape), codes)
+
+
+def test_albedo_is_shown_under_the_factor_of_its_score(tmp_path):
+    _, parsed = write(tmp_path, albedo_scale=[1.0, 2.0, 10.0])
+    found = {image.get("data-picture"): picture_of(image) for image in parsed.pictures}
+    expected = linear_to_srgb(np.float32([0.2, 0.4, 1.0]))
+    assert np.allclose(found["albedo"][0, 0, :3], expected, atol=0.01)
+    assert np.allclose(found["truth albedo"][0, 0, :3], expected[0], atol=0.01)
+
+
+def test_every_comparison_names_pictures_that_are_there(tmp_path):
+    page, parsed = write(tmp_path)
+    pairs = json.loads(html.unescape(re.search(r'data-pairs="([^"]*)"', page)[1]))
+    there = {image.get("data-picture") for image in parsed.pictures}
+    assert [pair["name"] for pair in pairs][:5] == ["image", "albedo", "roughness", "metallic", "normals"]
+    assert all(pair["right"] in there for pair in pairs) and all(pair["left"] in there for pair in pairs[:5])
+
+
+# ---- the 3D view's file ----
+
+
+@pytest.fixture
+def glb(ball, tmp_path):
+    """A ball with textures of noise, which do not compress."""
+    noise = np.random.default_rng(0).random((512, 512, 3)).astype(np.float32)
+    write_glb(tmp_path / "mesh.glb", with_textures(ball, albedo_texture=noise))
+    return tmp_path / "mesh.glb"
+
+
+def test_a_small_glb_is_carried_as_it_is(tmp_path, glb):
+    page, parsed = write(tmp_path, asset=glb)
+    assert gzip.decompress(base64.b64decode(parsed.scripts["glb"])) == glb.read_bytes()
+    camera = data_of(parsed)["camera"]
+    assert camera["radius"] == pytest.approx(1.0, abs=0.01) and "<h2>Object</h2>" in page
+
+
+def test_textures_of_a_large_glb_are_averaged_down_until_it_fits(glb, tmp_path):
+    whole = read_asset(glb)
+    content, note = fitted(glb, glb.stat().st_size - 1)
+    assert "at most 256 pixels a side" in note and len(content) < glb.stat().st_size / 2
+    (tmp_path / "small.glb").write_bytes(content)
+    small = read_asset(tmp_path / "small.glb")
+    for name in ("vertices", "triangles", "normals", "uv", "tangents"):
+        assert np.array_equal(getattr(small, name), getattr(whole, name)), name
+    stored = linear_to_srgb(whole.materials[0].albedo_texture)
+    expected = stored.reshape(256, 2, 256, 2, 3).mean((1, 3))
+    assert np.abs(linear_to_srgb(small.materials[0].albedo_texture) - expected).max() < 0.005
+    assert fitted(glb, glb.stat().st_size)[1] == ""
+
+
+def test_a_glb_that_does_not_fit_or_cannot_be_read_is_said(tmp_path, glb, monkeypatch):
+    content, note = fitted(glb, 1000)
+    assert content is None and "too much for this page" in note
+    monkeypatch.setattr("splitnerf.report.asset.MOST_BYTES", 1000)
+    (tmp_path / "cut.glb").write_bytes(glb.read_bytes()[:500])
+    for path, words in ((glb, "too much for this page"), (tmp_path / "cut.glb", "truncated GLB")):
+        page, parsed = write(tmp_path, asset=path)
+        assert words in page and "glb" not in parsed.scripts
+    assert "<h2>Object</h2>" not in write(tmp_path, asset=tmp_path / "none.glb")[0]
+
+
+# ---- the script ----
+
+
+def sources_of_the_script(bundle):
+    """The files that the bundle's first line names, after the tools that made it."""
+    tools = [PAGE / name for name in ("build.mjs", "package-lock.json", "package.json")]
+    named = re.match(r"/\* sources [0-9a-f]{64}: (.*)", bundle)[1].split()
+    return tools + [PAGE / name for name in named]
+
+
+def hash_of(paths):
+    """As build.mjs computes it."""
+    digest = hashlib.sha256()
+    for path in paths:
+        digest.update(f"{Path(os.path.relpath(path, PAGE)).as_posix()}\n".encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def test_the_script_was_built_from_the_sources():
+    """Where this fails: `make viewer`."""
+    bundle = (REPORT / "report.js").read_text(encoding="utf-8")
+    sources = sources_of_the_script(bundle)
+    assert f"sources {hash_of(sources)}: " in bundle
+    names = {path.name for path in sources}
+    assert names >= {path.name for path in (REPORT / "page").iterdir()} | {"viewer.js", "channels.js", "halves.js"}
+    assert all(len(path.read_text().splitlines()) < 500 for path in sources if path.name != "package-lock.json")
+
+
+def test_the_script_names_the_licences_and_fits_into_a_page():
+    bundle = (REPORT / "report.js").read_text(encoding="utf-8")
+    for text in (bundle, (REPORT / "LICENSES").read_text()):
+        assert "three.js authors" in text and "Leon Sorokin" in text and text.count("Permission is hereby granted") == 2
+    assert "</script" not in bundle.lower() and "<!--" not in bundle
 
 
 def test_failed_report_keeps_the_old_one(tmp_path, monkeypatch):
@@ -120,3 +322,20 @@ def test_chart_of_a_constant_and_of_many_points():
     chart = str(line_chart("long", {"a": [(i, float(i)) for i in range(10_001)]}))
     assert len(re.search(r'points="([^"]*)"', chart)[1].split()) <= 400
     assert "<b>1e+04</b>" in chart
+
+
+def test_curves_for_the_script_share_their_steps():
+    data = curve_data("terms", {"a": [(0, 1.0), (2, 0.0)], "b": [(1, 5.0), (2, float("nan"))], "c": []}, log=True)
+    assert data["x"] == [0, 1, 2] and data["log"]
+    assert data["series"] == [{"name": "a", "values": [1.0, None, 0.0]}, {"name": "b", "values": [None, 5.0, None]}]
+    assert curve_data("none", {"a": [(0, float("nan"))]}) is None
+
+
+def test_long_curves_for_the_script_are_thinned_alike():
+    """A line that begins late has its values at the steps of the others; the last step is as it is."""
+    long, late = [(i, float(i)) for i in range(10_001)], [(i, 2.0 * i) for i in range(5_000, 10_001)]
+    data = curve_data("terms", {"long": long, "late": late})
+    assert len(data["x"]) <= 402 and data["x"][-1] == 10_000 and data["x"][0] == 12.5
+    first, second = (one["values"] for one in data["series"])
+    assert first == data["x"] and second[:192] == [None] * 192
+    assert all(b == 2 * a for a, b in zip(first[193:], second[193:]))

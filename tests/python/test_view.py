@@ -28,12 +28,13 @@ from splitnerf.data.frames import read_frames
 from splitnerf.data.images import area_average, decode_image, encode_image, read_image, write_image
 from splitnerf.data.reading import Reading
 from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.report.browser import as_halves
 from splitnerf.view import final
 from splitnerf.view import server as server_module
 from splitnerf.view.final import Camera, Tracer
 from splitnerf.view.photos import Photos
 from splitnerf.view.server import ViewServer
-from splitnerf.view.shown import MOST_DROPPED, Shown, as_halves
+from splitnerf.view.shown import MOST_DROPPED, Shown
 
 PAGE = Path(splitnerf.view.__file__).parent
 

@@ -1,5 +1,5 @@
-// Opens the viewer's page in Chromium and does what standard input asks, a JSON list of steps; tests/python/test_view_page.py
-// writes it. Prints {"console": [...], "texts": {...}} as JSON; pictures go to the paths that steps name.
+// Opens a page in Chromium and does what standard input asks, a JSON list of steps; tests/python/test_view_page.py and
+// test_report_page.py write it. Prints {"console": [...], "texts": {...}} as JSON; pictures go to the paths that steps name.
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { basename } from "node:path";
@@ -9,6 +9,7 @@ const { chromium } = createRequire(`${packages}/package.json`)("playwright-core"
 const args = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--force-color-profile=srgb"];
 const browser = await chromium.launch({ executablePath, args, chromiumSandbox: process.getuid() !== 0 });
 const page = await browser.newPage();
+page.setDefaultTimeout(120000); // a busy machine without a GPU draws for seconds
 const told = { console: [], texts: {} };
 let open = 0; // requests
 page.on("request", () => (open += 1));
@@ -27,6 +28,7 @@ async function settled() {
 }
 
 const steps = {
+  before: ({ script }) => page.addInitScript(script), // in the page, before its own
   size: ({ width, height }) => page.setViewportSize({ width, height }),
   open: async () => {
     await page.goto(url);
@@ -36,6 +38,13 @@ const steps = {
   key: ({ key }) => page.keyboard.press(key),
   focus: ({ selector }) => page.focus(selector),
   click: ({ x, y }) => page.mouse.click(x, y),
+  point: async ({ selector, place, press }) => {
+    const part = page.locator(selector).first();
+    await part.scrollIntoViewIfNeeded();
+    const { x, y, width, height } = await part.boundingBox();
+    const target = [x + place[0] * width, y + place[1] * height];
+    await (press ? page.mouse.click(...target) : page.mouse.move(...target));
+  },
   drag: async ({ from, to }) => {
     await page.mouse.move(...from);
     await page.mouse.down();
@@ -65,6 +74,7 @@ const steps = {
     await page.dispatchEvent("body", "dragenter", { dataTransfer: data });
     await page.dispatchEvent("body", "drop", { dataTransfer: data });
   },
+  part: ({ selector, path }) => page.locator(selector).first().screenshot({ path }),
   picture: ({ path }) => page.screenshot({ path }),
   text: async ({ name, script }) => (told.texts[name] = await page.evaluate(script)),
 };

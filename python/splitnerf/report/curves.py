@@ -9,7 +9,9 @@ from markupsafe import Markup, escape
 
 WIDTH, HEIGHT = 460, 250
 LEFT, RIGHT, TOP, BOTTOM = 52, 12, 12, 34
-PALETTE = ("#3b82c4", "#d9822b", "#3f9d63", "#b5539a", "#8a7ad1", "#c2524a", "#2c9c9c", "#98863a")
+PALETTE = (
+    "#3b82c4", "#d9822b", "#3f9d63", "#b5539a", "#8a7ad1", "#c2524a", "#2c9c9c", "#98863a", "#8d9298", "#6aa84f", "#d46a9f", "#5c6bc0",
+)  # fmt: skip
 MAX_POINTS = 400
 
 Series = Sequence[tuple[float, float]]
@@ -74,6 +76,25 @@ def line_chart(title: str, series: Mapping[str, Series], *, log: bool = False, a
     )
 
 
+def curve_data(title: str, series: Mapping[str, Series], *, log: bool = False) -> dict | None:
+    """The same lines for the page's script: `x`, and `series` of `name` and `values`, None where a line has no number; None
+    where no line has any. Of more than about MAX_POINTS steps there are means of neighbours, the same for all lines, the last
+    step as it is. `log` says how the page starts: it may draw zeros and below on a linear axis."""
+    kept = {name: {x: y for x, y in points if _drawable((x, y), False)} for name, points in series.items()}
+    xs = sorted(set().union(*kept.values()))
+    if not xs:
+        return None
+    stride = math.ceil(len(xs) / MAX_POINTS)
+    groups = [xs[i : min(i + stride, len(xs) - 1)] for i in range(0, len(xs) - 1, stride)] + [xs[-1:]]
+    found = {name: [[points[x] for x in group if x in points] for group in groups] for name, points in kept.items() if points}
+    lines = [{"name": name, "values": [_mean(values) if values else None for values in rows]} for name, rows in found.items()]
+    return {"title": title, "log": log, "x": [_mean(group) for group in groups], "series": lines}
+
+
+def _mean(values: Sequence[float]) -> float:
+    return sum(values) / len(values)
+
+
 def _drawable(point: tuple[float, float], log: bool) -> bool:
     return all(math.isfinite(value) for value in point) and (point[1] > 0 or not log)
 
@@ -84,7 +105,7 @@ def _thinned(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
     if stride <= 1:
         return points
     groups = [points[i : i + stride] for i in range(0, len(points), stride)]
-    means = [(sum(x for x, _ in g) / len(g), sum(y for _, y in g) / len(g)) for g in groups]
+    means = [(_mean([x for x, _ in g]), _mean([y for _, y in g])) for g in groups]
     return means[:-1] + [points[-1]]
 
 

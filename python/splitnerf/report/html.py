@@ -5,28 +5,19 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 from markupsafe import Markup
 
-from splitnerf.data.images import linear_to_srgb, over_background
-from splitnerf.evaluate.metrics import psnr
-from splitnerf.report.curves import line_chart
+from splitnerf.report.asset import asset_section
+from splitnerf.report.browser import script_json, uncertainty_scale
+from splitnerf.report.curves import PALETTE, curve_data, line_chart
 from splitnerf.report.last_stage import last_stage_section
+from splitnerf.report.light import embedded_light, panels_section
 from splitnerf.report.page import write_html
-from splitnerf.report.pictures import WHITE_PER_MEAN, data_uri, tonemapped, white_of
-
-COLUMNS = {
-    "rgb": "image",
-    "albedo": "albedo",
-    "roughness": "roughness",
-    "metallic": "metallic",
-    "normal": "normals",
-    "occlusion_diffuse": "occlusion, diffuse",
-    "occlusion_specular": "occlusion, specular",
-}
-FOLD_ROWS = 14
-
+from splitnerf.report.views import views_section
 
 def write_report(
     path: str | os.PathLike,
@@ -39,14 +30,17 @@ def write_report(
     history: Sequence[Mapping],
     timings: Mapping[str, float],
     last_stage: Mapping | None = None,
+    light: np.ndarray | None = None,
+    asset: Path | None = None,
+    albedo_scale: Sequence[float] | None = None,
 ) -> None:
-    """Writes a self-contained HTML page, atomically.
+    """Writes a self-contained HTML page, atomically: pictures and tables, and a script that makes them answer.
 
     Args:
         path: The file to write.
         title: Heading, for example the scene's name.
         summary: Tables by name, each row name -> value; nested mappings become dotted rows. The first is shown as
-            tiles, so it should hold a few key numbers; long ones (the configuration) are folded.
+            tiles, so it should hold a few key numbers; the others are folded.
         views: Per test view `name`, `truth` and `prediction`; both map names of float arrays, each optional: `rgb`
             [H, W, 3] sRGB straight, `alpha` [H, W], `albedo` [H, W, 3] linear, `roughness` [H, W], `metallic` [H, W],
             `normal` [H, W, 3] unit world, `occlusion_diffuse` and `occlusion_specular` [H, W] or [H, W, 1 | 3];
@@ -57,12 +51,19 @@ def write_report(
         history: Lines of `metrics.jsonl`: `step`, `loss`, `psnr`, `loss_*`; each but `step` optional.
         timings: Seconds by part of the run.
         last_stage: What the last stage changed, see :func:`splitnerf.report.last_stage.last_stage_section`; None without one.
+        light: [h, w, 3] linear radiance that is delivered, or None.
+        asset: The GLB that is delivered; None, or one that is not there, for a page without a 3D view.
+        albedo_scale: [3] the factor of the albedo under which it is scored, see `evaluation.json`; None for 1.
 
     Raises:
         OSError: The page cannot be written.
     """
     tables = [{"name": name, "rows": _rows(table)} for name, table in summary.items()]
     total = sum(timings.values())
+    before = None if last_stage is None else last_stage["lights"][0]
+    named = (("recovered light", light), ("true light", light_truth), ("before the last stage", before))
+    embedded = [embedded_light(name, radiance) for name, radiance in named if radiance is not None]
+    glb, charts = asset_section(asset), _charts(history)
     write_html(
         path,
         "splitnerf.report",
@@ -70,15 +71,26 @@ def write_report(
         title=title,
         tiles=tables[0] if tables else None,
         tables=tables[1:],
-        fold_rows=FOLD_ROWS,
-        views=[_view(view) for view in views],
+        views=views_section(views, albedo_scale) if views else None,
         last_stage=None if last_stage is None else last_stage_section(last_stage),
-        lights=_lights(lights, light_truth),
-        charts=_charts(history),
+        lights=embedded,
+        panels=panels_section(lights),
+        charts=[line_chart(title, series, log=log) for title, series, log in charts],
+        asset=glb,
         timings=[
             {"name": name, "value": f"{seconds:.4g} s", "share": 100 * seconds / total if total > 0 else 0}
             for name, seconds in timings.items()
         ],
+        data=script_json(
+            {
+                "lights": [{key: value for key, value in one.items() if key != "picture"} for one in embedded],
+                "charts": [curve_data(title, series, log=log) for title, series, log in charts],
+                "colours": PALETTE,
+                "camera": glb and glb["camera"],
+                "uncertainty": uncertainty_scale(),
+            }
+        ),
+        script=Markup(files("splitnerf.report").joinpath("report.js").read_text(encoding="utf-8")),
     )
 
 
@@ -104,73 +116,19 @@ def _text(value: object) -> str:
     return str(value)
 
 
-def _view(view: Mapping) -> dict:
-    truth = {key: value for key, value in view["truth"].items() if value is not None}
-    prediction = {key: value for key, value in view["prediction"].items() if value is not None}
-    columns = [key for key in COLUMNS if key in truth or key in prediction]
-    score = None
-    if "rgb" in truth and "rgb" in prediction:
-        whites = [over_background(m["rgb"], m["alpha"]) if "alpha" in m else m["rgb"] for m in (prediction, truth)]
-        score = f"{psnr(*whites):.2f} dB"
-    rows = [
-        {"name": name, "cells": [_map_picture(maps, key) if key in maps else None for key in columns]}
-        for name, maps in (("truth", truth), ("SplitNeRF", prediction))
-    ]
-    return {"name": view["name"], "score": score, "columns": [COLUMNS[key] for key in columns], "rows": rows}
+def _charts(history: Sequence[Mapping]) -> list[tuple[str, dict, bool]]:
+    """Title, lines by name, and whether the axis is logarithmic, of each chart that has a number."""
 
-
-def _map_picture(maps: Mapping, key: str) -> Markup:
-    """One map as a transparent PNG: linear colours encoded, normals mapped from [-1, 1] to [0, 1]."""
-    values = np.asarray(maps[key], dtype=np.float32)
-    if key == "albedo":
-        values = linear_to_srgb(np.clip(values, 0, 1))
-    elif key == "normal":
-        values = values * 0.5 + 0.5
-    values = values[..., None] if values.ndim == 2 else values
-    values = np.nan_to_num(np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values)
-    alpha = np.asarray(maps.get("alpha", np.ones(values.shape[:2])), dtype=np.float32)
-    if key == "normal" and "normal_mask" in maps:
-        alpha = alpha * maps["normal_mask"]
-    return data_uri(np.concatenate([values, alpha[..., None]], axis=2))
-
-
-def _lights(lights: Sequence[Mapping], light_truth: np.ndarray | None) -> dict | None:
-    """Tonemapped by one exposure for all predictions and one for the truth, as their overall scale is free."""
-    if not lights and light_truth is None:
-        return None
-    columns, notes = [], []
-    if lights:
-        sharpest = min(lights, key=lambda light: light["roughness"])
-        white = white_of(sharpest["g"])
-        notes.append(f"recovered light divided by {white:.3g}")
-        for light in lights:
-            estimate = light.get("g_bar")
-            columns.append(
-                {
-                    "name": f"ρ = {light['roughness']:g}",
-                    "g": tonemapped(light["g"], white),
-                    "g_bar": None if estimate is None else tonemapped(estimate, white),
-                }
-            )
-    if light_truth is not None:
-        white = white_of(light_truth)
-        notes.append(f"true light divided by {white:.3g}")
-        columns.append({"name": "true light", "g": tonemapped(light_truth, white), "g_bar": None})
-    note = f"Exposure: {', '.join(notes)} ({WHITE_PER_MEAN} times the mean radiance), clipped to [0, 1], sRGB."
-    return {"columns": columns, "note": note}
-
-
-def _charts(history: Sequence[Mapping]) -> list[Markup]:
     def series(key: str) -> list[tuple[float, float]]:
         return [(float(line["step"]), float(line[key])) for line in history if _number(line.get(key))]
 
     parts = sorted({key for line in history for key in line if key.startswith("loss_")})
     charts = [
-        line_chart("PSNR (dB)", {"psnr": series("psnr")}),
-        line_chart("Loss", {"loss": series("loss")}, log=True),
-        line_chart("Terms of the loss", {key.removeprefix("loss_"): series(key) for key in parts}, log=True),
+        ("PSNR of the batch (dB)", {"psnr": series("psnr")}, False),
+        ("Loss", {"loss": series("loss")}, True),
+        ("Terms of the loss", {key.removeprefix("loss_"): series(key) for key in parts}, True),
     ]
-    return [chart for chart in charts if chart]
+    return [chart for chart in charts if any(chart[1].values())]
 
 
 def _number(value: object) -> bool:

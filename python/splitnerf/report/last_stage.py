@@ -10,10 +10,11 @@ import numpy as np
 from splitnerf.data.images import over_background
 from splitnerf.evaluate.metrics import psnr
 from splitnerf.refinement.uncertainty import UNKNOWN
-from splitnerf.report.pictures import data_uri, tonemapped, white_of
+from splitnerf.report.pictures import data_uri
+from splitnerf.report.views import averaged, comparison
 
-ERROR_GAIN = 4
-PICTURES = ("photo", "before", "after", f"error before x{ERROR_GAIN}", f"error after x{ERROR_GAIN}")
+PICTURES = ("photo", "before", "after")
+PAIRS = (("before", "after"), ("photo", "before"), ("photo", "after"))  # that the page compares
 QUANTITIES = ("albedo", "roughness", "metallic", "normal")
 # Colours of deviations from 0 to UNKNOWN, and beyond it.
 KNOWN_COLOURS = np.float32([[0.10, 0.18, 0.38], [0.16, 0.48, 0.62], [0.55, 0.78, 0.55], [0.98, 0.88, 0.42]])
@@ -27,7 +28,7 @@ def last_stage_section(page: Mapping) -> dict:
     Args:
         page: `views`, each with `name`, `pictures` (photo, before and after, [H, W, 3] sRGB on white), `coverage` (mean
             squared errors before and after) and `uncertain` (deviations [H, W, 4] and coverage [H, W]); `summary`, the scores'
-            part of the last stage; `lights`, linear maps [h, w, 3] before and after.
+            part of the last stage; `lights`, linear maps [h, w, 3] before and after, are shown with the lights.
     """
     views, summary, rows = page["views"], page["summary"], []
     scores = np.array([[psnr(view["pictures"][i], view["pictures"][0]) for i in (1, 2)] for view in views])
@@ -41,18 +42,21 @@ def last_stage_section(page: Mapping) -> dict:
     rows.append(("all photos: colours inside, PSNR before the first and the last step", *(f"{v:.2f} dB" for v in summary["photos_psnr"])))
     return {
         "pictures": PICTURES,
-        "views": [{"name": view["name"], "cells": [data_uri(p) for p in _with_errors(view["pictures"])]} for view in views],
+        "pairs": [comparison(*pair, "colour") | {"name": " | ".join(pair), "sides": pair} for pair in PAIRS],
+        "views": [
+            {"name": view["name"], "score": "{:.2f} → {:.2f} dB".format(*score), "cells": [data_uri(averaged(p)[0]) for p in view["pictures"]]}
+            for view, score in zip(views, scores)
+        ],
         "rows": rows,
-        "lights": _lights(page["lights"]),
         "steps": summary["steps"],
         "seconds": f"{summary['seconds']:.0f}",
-        "gain": ERROR_GAIN,
         "quantities": [
             {"name": name, "limit": _limit(name, limit), "unknown": f"{100 * share:.0f} %"}
             for name, limit, share in zip(QUANTITIES, UNKNOWN.tolist(), _unknown_shares(views))
         ],
         "uncertain": [
-            {"name": view["name"], "cells": [data_uri(coloured(view["uncertain"], i)) for i in range(len(QUANTITIES))]} for view in views
+            {"name": view["name"], "cells": [data_uri(coloured(smaller, i)) for i in range(len(QUANTITIES))]}
+            for view, smaller in ((view, averaged(*view["uncertain"])) for view in views)
         ],
         "legend": data_uri(_legend()),
         "saturated": f"{100 * summary['saturated']:.1f} %",
@@ -90,13 +94,3 @@ def _unknown_shares(views: Sequence[Mapping]) -> np.ndarray:
     """[4] the share of the views' covered pixels at which each quantity is unknown."""
     values = np.concatenate([values[alpha > 0.9] for values, alpha in (view["uncertain"] for view in views)])
     return (values > UNKNOWN.numpy()).mean(0) if len(values) else np.zeros(len(UNKNOWN))
-
-
-def _with_errors(pictures: Sequence[np.ndarray]) -> list[np.ndarray]:
-    photo = pictures[0]
-    return [*pictures, *(np.clip(ERROR_GAIN * np.abs(picture - photo), 0, 1) for picture in pictures[1:])]
-
-
-def _lights(lights: Sequence[np.ndarray]) -> list[dict]:
-    white = white_of(lights[0])
-    return [{"name": name, "picture": tonemapped(light, white)} for name, light in zip(("before", "after"), lights)]

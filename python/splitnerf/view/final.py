@@ -12,7 +12,8 @@ from splitnerf.data.environment import rotate_environment
 from splitnerf.data.layouts.frame import checked_pose
 from splitnerf.errors import InputError
 from splitnerf.render.path_traced import AssetRenderer
-from splitnerf.view.shown import Shown, as_halves
+from splitnerf.report.browser import as_halves
+from splitnerf.view.shown import Shown
 
 FIRST_SIDE = 256  # pixels of the first picture's longer side
 LARGEST_SIDE, MOST_PIXELS = 4096, 1 << 22

@@ -25,9 +25,10 @@ from urllib.parse import parse_qs, urlsplit
 
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
+from splitnerf.report.browser import as_halves
 from splitnerf.view.final import Camera, Tracer
 from splitnerf.view.photos import Photos
-from splitnerf.view.shown import Shown, Source, as_halves
+from splitnerf.view.shown import Shown, Source
 
 LARGEST_UPLOAD = 128 << 20  # bytes of a light
 LARGEST_QUESTION = 1 << 16  # bytes of a camera

@@ -17,13 +17,10 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image
 from splitnerf.errors import InputError, plain
 from splitnerf.notes import note
-from splitnerf.refinement.uncertainty import UNKNOWN
-from splitnerf.relight.cameras import HALF_FIELD, bounding_sphere, turntable
-from splitnerf.report.last_stage import KNOWN_COLOURS, QUANTITIES, UNKNOWN_COLOURS
+from splitnerf.report.browser import camera_of, uncertainty_scale
 
 MOST_ROWS = 1024  # of a light that is kept
 MOST_DROPPED = 8  # lights that were dropped onto the page; an older one is forgotten
-BRIGHTEST_HALF = float(np.finfo(np.float16).max)
 Read = TypeVar("Read")
 
 
@@ -104,8 +101,6 @@ class Shown:
 
     def description(self) -> dict:
         """What the page needs to know, for JSON. The camera is that of `splitnerf relight`; lengths are the data's, z is up."""
-        centre, radius = bounding_sphere(self.sources[0].asset)
-        front = turntable(self.sources[0].asset, 1, size=None)[0]
         with self._lock:
             lights = [{"number": number, "name": light.name} for number, light in self._lights.items()]
         return {
@@ -116,14 +111,9 @@ class Shown:
             "first_light": self._first,
             "white": self._white,
             "problems": self.problems,
-            "camera": {
-                "position": front.pose[:3, 3].tolist(), "target": centre.tolist(), "radius": radius, "half_field": float(HALF_FIELD),
-            },
-            "uncertainty": {
-                "quantities": QUANTITIES, "unknown": UNKNOWN.tolist(), "known_colours": KNOWN_COLOURS.tolist(),
-                "unknown_colours": UNKNOWN_COLOURS.tolist(),
-            },
-        }  # fmt: skip
+            "camera": camera_of(self.sources[0].asset),
+            "uncertainty": uncertainty_scale(),
+        }
 
     def _add(self, light: Light) -> int:
         with self._lock:
@@ -185,11 +175,3 @@ def read_deviations(path: Path) -> np.ndarray:
     if pixels.shape[2] != 4 or not np.isfinite(pixels).all() or pixels.min() < 0:
         raise InputError(f"{path}: is no map of four deviations; run splitnerf refine again")
     return pixels
-
-
-def as_halves(pixels: np.ndarray) -> tuple[int, int, bytes]:
-    """(width, height, float16 RGBA, row by row from the top) of [h, w, 3 | 4]; a fourth channel that is missing is 1, and what
-    halves cannot hold becomes their largest number, 65504."""
-    if pixels.shape[2] == 3:
-        pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
-    return pixels.shape[1], pixels.shape[0], np.minimum(pixels, BRIGHTEST_HALF).astype("<f2").tobytes()

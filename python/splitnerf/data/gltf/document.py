@@ -107,7 +107,7 @@ class Document:
         """The encoded bytes of an image, and its name for messages."""
         image = self.json["images"][index]
         name = f"{self.path}: image {index}" + (f" '{image['name']}'" if "name" in image else "")
-        return (self._view(image["bufferView"]) if "bufferView" in image else self._resource(image["uri"])), name
+        return (self.view(image["bufferView"]) if "bufferView" in image else self._resource(image["uri"])), name
 
     def _split_glb(self, data: bytes) -> tuple[bytes, bytes | None]:
         """The JSON chunk and the binary one, or None."""
@@ -132,14 +132,15 @@ class Document:
 
     def _table(self, view: int, offset: int, dtype: np.dtype, width: int, count: int) -> np.ndarray:
         stride = self.json["bufferViews"][view].get("byteStride", dtype.itemsize * width)
-        data = self._view(view)
+        data = self.view(view)
         if stride < dtype.itemsize * width:
             raise InputError(f"{self.path}: damaged, a byteStride is shorter than what it parts; export it again")
         if count and offset + stride * (count - 1) + dtype.itemsize * width > len(data):
             raise InputError(f"{self.path}: damaged, an accessor reaches beyond its buffer view; export it again")
         return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
 
-    def _view(self, index: int) -> bytes:
+    def view(self, index: int) -> bytes:
+        """The bytes of a buffer view."""
         view = self.json["bufferViews"][index]
         data, start = self._buffer(view["buffer"]), view.get("byteOffset", 0)
         if start + view["byteLength"] > len(data):

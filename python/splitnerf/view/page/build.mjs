@@ -1,26 +1,51 @@
-// Builds ../viewer.html, one file without others: the page, its style, and its script with three.js.
+// Builds the pages' bundles, each one file without others: ../viewer.html, the whole page of splitnerf view, and
+// ../../report/report.js, the script of report.html, which takes modules of the viewer.
 import { createHash } from "node:crypto";
 import { readFileSync, readdirSync, writeFileSync } from "node:fs";
-import { dirname, join } from "node:path";
+import { dirname, join, relative } from "node:path";
 import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
 
 const here = dirname(fileURLToPath(import.meta.url));
+const report = join(here, "..", "..", "report");
 const text = (name) => readFileSync(join(here, name), "utf8");
+const options = {
+  bundle: true, minify: true, write: false, absWorkingDir: here, legalComments: "none", charset: "utf8", nodePaths: [join(here, "node_modules")],
+};
+const scripts = { ...options, format: "iife", target: "es2022" };
 
-/** What the page is made of, in the order of its hash: tests/python/test_view.py computes the same. */
-const sources = ["build.mjs", "package-lock.json", "package.json", ...readdirSync(join(here, "src")).sort().map((name) => `src/${name}`)];
-const hash = createHash("sha256");
-for (const name of sources) hash.update(`${name}\n`).update(readFileSync(join(here, name)));
+/** The hash of what a bundle is made of: tests/python/test_view.py computes the same. */
+function hashOf(names) {
+  const hash = createHash("sha256");
+  for (const name of names) hash.update(`${name}\n`).update(readFileSync(join(here, name)));
+  return hash.digest("hex");
+}
 
-const options = { bundle: true, minify: true, write: false, absWorkingDir: here, legalComments: "none", charset: "utf8" };
-const script = await build({ ...options, entryPoints: ["src/main.js"], format: "iife", target: "es2022" });
+const tools = ["build.mjs", "package-lock.json", "package.json"];
+const licences = (packages) => packages.map((name) => `${name}:\n\n${text(`node_modules/${name}/LICENSE`).trim()}`).join("\n\n\n");
+const size = (content) => `${(content.length / 1024).toFixed(0)} KiB`;
+/** Within an element of a page nothing in a script may look like the element's end. */
+const embeddable = (script) => script.replaceAll("</script", "<\\/script").replaceAll("<!--", "<\\!--");
+
+const script = await build({ ...scripts, entryPoints: ["src/main.js"] });
 const style = await build({ ...options, entryPoints: ["src/style.css"] });
-
-const licence = text("node_modules/three/LICENSE").trim();
-const insert = { HASH: hash.digest("hex"), LICENCE: licence, STYLE: style.outputFiles[0].text, SCRIPT: script.outputFiles[0].text };
-insert.SCRIPT = insert.SCRIPT.replaceAll("</script", "<\\/script");
+const insert = {
+  HASH: hashOf([...tools, ...readdirSync(join(here, "src")).sort().map((name) => `src/${name}`)]),
+  LICENCES: licences(["three"]),
+  STYLE: style.outputFiles[0].text,
+  SCRIPT: embeddable(script.outputFiles[0].text),
+};
 const page = text("src/page.html").replace(/\{\{(\w+)\}\}/g, (_, name) => insert[name]);
 writeFileSync(join(here, "..", "viewer.html"), page);
-writeFileSync(join(here, "..", "LICENSES"), `viewer.html contains three.js:\n\n${licence}\n`);
-console.log(`viewer.html: ${(page.length / 1024).toFixed(0)} KiB`);
+writeFileSync(join(here, "..", "LICENSES"), `viewer.html contains ${insert.LICENCES}\n`);
+console.log(`viewer.html: ${size(page)}`);
+
+const entry = relative(here, join(report, "page", "main.js"));
+const reports = await build({ ...scripts, entryPoints: [entry], loader: { ".css": "text" }, metafile: true });
+const own = Object.keys(reports.metafile.inputs).filter((name) => !name.startsWith("node_modules/")).sort();
+const used = licences(["three", "uplot"]);
+const head = `/* sources ${hashOf([...tools, ...own])}: ${own.join(" ")}\ncontains ${used}\n*/\n`;
+const bundle = head + embeddable(reports.outputFiles[0].text);
+writeFileSync(join(report, "report.js"), bundle);
+writeFileSync(join(report, "LICENSES"), `report.js contains ${used}\n`);
+console.log(`report.js: ${size(bundle)}`);

@@ -1,5 +1,5 @@
 // What the page asks its server. All addresses are relative: the token in the page's own address goes with them.
-import * as THREE from "three";
+import { asLight, halves } from "./halves.js";
 
 /** The answer to a request; an Error with the server's one line where it refuses. */
 async function asked(address, options) {
@@ -19,13 +19,7 @@ export const readScene = async () => (await asked("scene.json")).json();
 export const readAsset = async (number) => (await asked(`assets/${number}`)).arrayBuffer();
 export const readPhoto = async (number) => (await asked(`photos/${number}`)).blob();
 
-/** A light [h, w] as three's equirectangular texture. three's y-up directions meet the texels as in docs/data.md. */
-export async function readLight(number) {
-  const texture = await readHalves(`lights/${number}`);
-  texture.mapping = THREE.EquirectangularReflectionMapping;
-  texture.flipY = true; // three's v runs from the bottom, the rows from the top
-  return texture;
-}
+export const readLight = async (number) => asLight(await readHalves(`lights/${number}`));
 
 /** The deviations in the asset's texture coordinates, whose v runs from the top. */
 export const readDeviations = (number) => readHalves(`deviations/${number}`);
@@ -72,11 +66,4 @@ async function readHalves(address) {
   const answer = await asked(address);
   const [width, height] = answer.headers.get("Picture-Size").split("x").map(Number);
   return halves(await answer.arrayBuffer(), width, height);
-}
-
-function halves(buffer, width, height) {
-  const texture = new THREE.DataTexture(new Uint16Array(buffer), width, height, THREE.RGBAFormat, THREE.HalfFloatType);
-  texture.minFilter = texture.magFilter = THREE.LinearFilter;
-  texture.needsUpdate = true;
-  return texture;
 }

@@ -1,0 +1,215 @@
+"""The report's page in Chromium, from a file: its controls do what they say, and what they show is what was written.
+
+Skipped where Node, Chromium or the packages of the pages' sources (`npm ci` there, or `make viewer`) are missing.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from painted_ball import sky, with_textures
+from PIL import Image
+
+import splitnerf.view
+from splitnerf.data.images import linear_to_srgb
+from splitnerf.export.glb import write_glb
+from splitnerf.report import write_report
+
+SOURCES = Path(splitnerf.view.__file__).parent / "page"
+LOOK = Path(__file__).parents[1] / "viewer/look.mjs"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+RED, BLUE = (0.8, 0.2, 0.2), (0.2, 0.2, 0.7)
+LAMP = (5, 12)  # row and column of a texel of the true light
+NO_WEBGL = """const plain = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...rest) { return kind.startsWith("webgl") ? null : plain.call(this, kind, ...rest); };"""
+
+pytestmark = pytest.mark.skipif(
+    not (shutil.which("node") and CHROMIUM and (SOURCES / "node_modules/playwright-core").is_dir()),
+    reason="needs node, chromium and `make viewer`",
+)
+
+
+def look(page, steps):
+    """What the page says while it does the steps."""
+    words = ["node", str(LOOK), str(SOURCES), CHROMIUM, page.as_uri()]
+    done = subprocess.run(words, input=json.dumps(steps), capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def plain(colour, alpha=1.0):
+    return {
+        "rgb": np.full((40, 60, 3), colour), "alpha": np.full((40, 60), alpha), "albedo": np.full((40, 60, 3), 0.25),
+        "roughness": np.full((40, 60), 0.5), "normal": np.tile(np.float32([0, 0, 1]), (40, 60, 1)),
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def report(ball, tmp_path_factory):
+    """Two views, red beside blue; a light with one bright texel; a ball; nine steps of training."""
+    folder = tmp_path_factory.mktemp("report")
+    materials = np.full((64, 64, 2), (0.25, 0.0), np.float32)
+    brown = np.full((64, 64, 3), (0.6, 0.3, 0.1), np.float32)
+    write_glb(folder / "mesh.glb", with_textures(ball, albedo_texture=brown, roughness_metallic_texture=materials))
+    tilted = plain(BLUE)
+    tilted["normal"] = np.tile(np.float32([0.5, 0, 0.75**0.5]), (40, 60, 1))
+    tilted["roughness"] = tilted["roughness"] + 0.25
+    views = [{"name": f"r_{i}", "truth": plain(RED), "prediction": tilted} for i in range(2)]
+    true = np.full((128, 256, 3), 0.5, np.float32)
+    true[LAMP] = (64.0, 8.0, 1.0)
+    terms = [{"loss_colour": 10.0**-i, "loss_light": 0.5, "loss_late": 0.0 if i < 5 else 1e-3} for i in range(9)]
+    history = [{"step": 100 * i, "loss": 2.0**-i, "psnr": 20.0 + i} | terms[i] for i in range(9)]
+    summary = {"Result": {"PSNR": 30.0}, "Settings": {f"s{i}": i for i in range(30)}}
+    write_report(
+        folder / "report.html", title="two </script> views", summary=summary, views=views, lights=[], light_truth=true, light=sky(32),
+        history=history, timings={"training": 3.0}, asset=folder / "mesh.glb",
+    )  # fmt: skip
+    return folder / "report.html"
+
+
+@pytest.fixture(scope="module")
+def seen(report):
+    """Pictures by name, and what the page said, of one walk through the page."""
+    folder = report.parent / "pictures"
+    folder.mkdir()
+
+    def part(name, selector):
+        return {"do": "part", "selector": selector, "path": str(folder / f"{name}.png")}
+
+    def click(words, section):
+        script = f"[...document.querySelectorAll('#{section} button')].find((b) => b.textContent === '{words}').click()"
+        return {"do": "text", "name": words, "script": script}
+
+    def text(name, selector):
+        return {"do": "text", "name": name, "script": f"document.querySelector('{selector}')?.innerText"}
+
+    def point(selector, x, y, press=False):
+        return {"do": "point", "selector": selector, "place": [x, y], "press": press}
+
+    stage, object_ = "#views .stage", "#object canvas"
+    true_light = "#light .widget figure:nth-child(2) canvas"
+    hidden = ".tag, .divider, .cross { display: none !important } .sky { border-radius: 0 !important }"
+    bare = {"do": "style", "content": hidden + ".stage:focus-within, canvas { outline: 0 !important }"}
+    asked = "performance.getEntriesByType('resource').map((e) => e.name).filter((n) => !/^(blob|data):/.test(n))"
+    maps = [step for name in ("albedo", "roughness", "metallic", "normals") for step in (click(name, "object"), part(name, object_))]
+    chart, terms = "#training figure:nth-child(2)", "#training figure:nth-child(3)"
+    steps = [
+        {"do": "size", "width": 700, "height": 600}, {"do": "open"}, bare,
+        {"do": "text", "name": "asked", "script": asked},
+        {"do": "text", "name": "live", "script": "[...document.querySelectorAll('.live')].map((e) => e.id)"},
+        {"do": "text", "name": "static", "script": "[...document.querySelectorAll('.static')].filter((e) => e.checkVisibility()).length"},
+        part("half", stage), point(stage, 0.25, 0.5, press=True), part("quarter", stage), text("readout", "#views .said"),
+        {"do": "focus", "selector": "#views .stage input"},
+        {"do": "key", "key": "PageUp"}, *[{"do": "key", "key": "ArrowLeft"}] * 2, part("keys", stage),
+        click("error", "views"), part("error", stage), text("mean", "#views .said"), text("scale", "#views .legend-row"),
+        click("normals", "views"), text("angle", "#views .said"), click("roughness", "views"), text("rough", "#views .said"),
+        part("light", true_light), {"do": "set", "selector": "#light .range input", "value": -5}, part("dark", true_light),
+        point(true_light, (LAMP[1] + 0.5) / 256, (LAMP[0] + 0.5) / 128), text("radiance", "#light .said"),
+        point(f"{chart} .u-over", 0.25, 0.5), text("tip", f"{chart} .tip"),
+        point(f"{chart} .u-over", 0.99, 0.5), text("last", f"{chart} .tip"),
+        point(f"{terms} .u-over", 0.99, 0.5), text("terms", f"{terms} .tip"),
+        point(f"{terms} .u-legend .u-series:nth-child(2)", 0.5, 0.5, press=True),
+        point(f"{terms} .u-over", 0.98, 0.5), text("fewer", f"{terms} .tip"),
+        {"do": "text", "name": "linear", "script": f"document.querySelector('{terms} .axis input').click()"},
+        point(f"{terms} .u-over", 0.02, 0.5), text("zero", f"{terms} .tip"),
+        part("shaded", object_), *maps,
+        click("shaded", "object"), click("true light", "object"), part("other", object_),
+        {"do": "set", "selector": "#object .range:nth-of-type(2) input", "value": 2}, part("brighter", object_),
+        {"do": "size", "width": 380, "height": 700},
+        {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
+    ]  # fmt: skip
+    told = look(report, steps)
+    return told, {path.stem: np.asarray(Image.open(path).convert("RGB"), np.float32) / 255 for path in folder.glob("*.png")}
+
+
+def middle(picture):
+    """The mean colour of the middle's 10 x 10 pixels."""
+    y, x = picture.shape[0] // 2, picture.shape[1] // 2
+    return picture[y - 5 : y + 5, x - 5 : x + 5].mean(axis=(0, 1))
+
+
+def share_of(picture, colour):
+    """The share of a picture's middle row that has a colour."""
+    return (np.abs(picture[picture.shape[0] // 2] - np.float32(colour)).max(axis=1) < 0.02).mean()
+
+
+def test_the_file_loads_without_a_complaint_or_a_request(seen):
+    told, _ = seen
+    assert [line for line in told["console"] if not line.startswith("warning: ")] == []
+    assert told["texts"]["asked"] == []
+    assert told["texts"]["live"] == ["object", "views", "light", "training"] and told["texts"]["static"] == 0
+
+
+def test_the_slider_parts_truth_and_prediction(seen):
+    told, pictures = seen
+    for name, share in (("half", 0.5), ("quarter", 0.25), ("keys", 0.34)):
+        assert share_of(pictures[name], RED) == pytest.approx(share, abs=0.02), name
+        assert share_of(pictures[name], BLUE) == pytest.approx(1 - share, abs=0.02), name
+    assert told["texts"]["readout"].startswith("15, 20: truth 0.80 0.20 0.20 · SplitNeRF 0.20 0.20 0.70 · difference 0.36")
+
+
+def test_the_error_map_has_the_difference_and_says_its_scale(seen):
+    told, pictures = seen
+    texts = told["texts"]
+    means = {name: float(texts[name].removeprefix("mean ").removesuffix("°")) for name in ("mean", "rough", "angle")}
+    assert means["mean"] == pytest.approx(1.1 / 3, abs=0.005) and means["rough"] == pytest.approx(0.25, abs=0.005)
+    assert means["angle"] == pytest.approx(30.0, abs=0.5)
+    assert texts["angle"].endswith("°") and "0.25 and more" in texts["scale"]
+    assert middle(pictures["error"]) == pytest.approx(np.float32([252, 240, 150]) / 255, abs=0.02)  # beyond the scale
+
+
+def test_the_exposure_changes_the_lights_pixels(seen):
+    """The lights lie on a card whose white is three times the mean; five stops darker, the lamp alone is left."""
+    told, pictures = seen
+    white = 3 * (0.5 + (64 + 8 + 1 - 1.5) / (3 * 128 * 256))
+    for name, stops in (("light", 0), ("dark", -5)):
+        expected = float(linear_to_srgb(np.float32([0.5 / white * 2.0**stops]))[0])
+        assert middle(pictures[name]) == pytest.approx([expected] * 3, abs=0.01), name
+    red = pictures["dark"][2:-2, 2:-2, 0]  # without what the browser rounds to
+    y, x = (place + 2.5 for place in np.unravel_index(red.argmax(), red.shape))
+    height, width = pictures["dark"].shape[:2]
+    assert (y / height * 128, x / width * 256) == pytest.approx((LAMP[0] + 0.5, LAMP[1] + 0.5), abs=1)
+    radiance = told["texts"]["radiance"]
+    assert radiance.startswith("azimuth 162°, elevation 82°: recovered light") and "true light 64 8 1" in radiance
+
+
+def test_curves_say_the_values_under_the_pointer(seen):
+    texts = seen[0]["texts"]
+    assert texts["tip"].split("\n") == ["step 200", "loss 0.25"] and texts["last"].split("\n") == ["step 800", "loss 0.003906"]
+    assert texts["terms"].split("\n") == ["step 800", "colour 1.000e-8", "late 0.001", "light 0.5"]
+    assert texts["fewer"].split("\n") == ["step 800", "colour 1.000e-8", "light 0.5"]
+    assert texts["zero"].split("\n") == ["step 0", "colour 1", "light 0.5"]
+
+
+def test_the_asset_turns_up_in_each_channel(seen):
+    _, pictures = seen
+    albedo = linear_to_srgb(np.float32([0.6, 0.3, 0.1]))
+    assert middle(pictures["albedo"]) == pytest.approx(albedo, abs=0.02)
+    assert middle(pictures["roughness"]) == pytest.approx([0.25] * 3, abs=0.02)
+    assert middle(pictures["metallic"]) == pytest.approx([0.0] * 3, abs=0.02)
+    front = np.float32([0, -np.cos(np.radians(20)), np.sin(np.radians(20))]) / 2 + 0.5
+    assert middle(pictures["normals"]) == pytest.approx(front, abs=0.02)
+    shaded = middle(pictures["shaded"])
+    assert shaded[0] > shaded[1] > shaded[2] > 0.02
+    assert np.abs(pictures["other"] - pictures["shaded"]).mean() > 0.02
+    assert (middle(pictures["brighter"]) > middle(pictures["other"]) + 0.1).all()
+
+
+def test_a_narrow_window_does_not_scroll_sideways(seen):
+    assert seen[0]["texts"]["overflow"] == 0
+
+
+def test_without_webgl_one_line_takes_the_place_of_the_object(report):
+    steps = [
+        {"do": "before", "script": NO_WEBGL}, {"do": "size", "width": 700, "height": 440}, {"do": "open"},
+        {"do": "text", "name": "said", "script": "document.querySelector('#object').innerText"},
+        {"do": "text", "name": "live", "script": "[...document.querySelectorAll('.live')].map((e) => e.id)"},
+    ]  # fmt: skip
+    told = look(report, steps)
+    assert told["console"] == [] and told["texts"]["live"] == ["views", "light", "training"]
+    assert "no WebGL 2" in told["texts"]["said"]
