@@ -25,7 +25,7 @@ MEMORY = 4.0  # GB of a scene, photos included
 GPU = 0.25  # of a scene: four at once made a third more steps together than one alone did on an H100, see docs/cuda.md
 OBJECT_STORE = 100 << 20  # bytes; results are small
 SHARE_OF_FREE = 0.9  # of the free memory of this machine, for the scenes
-LONGEST_FOLDER = 25  # letters of the folder of Ray's own: a socket's path in it has at most 103 on every system
+LONGEST_FOLDER = 37  # letters of the folder of Ray's own: its sockets' paths have 64 more, and a system allows 103
 # Read when Ray is imported: no report of its use, sockets on 127.0.0.1 alone, and answers to those alone who have the token.
 NO_REPORT = {"RAY_USAGE_STATS_ENABLED": "0"}
 ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
@@ -116,7 +116,7 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
     import ray
 
     (out / LOGS).mkdir(exist_ok=True)
-    own = None if address else _own_folder()
+    own = None if address else own_folder()
     with open(out / LOGS / "ray.log", "a", encoding="utf-8", errors="backslashreplace") as log:
         with redirect_stdout(log), redirect_stderr(log):
             try:
@@ -149,8 +149,9 @@ def _connect(ray: ModuleType, address: str) -> None:
         raise InputError(f"--address {address}: no Ray cluster answers ({why}); start one by `ray start --head`") from None
 
 
-def _own_folder() -> str:
+def own_folder() -> str:
     """A folder for Ray's sockets and logs that no other user reads, with a short name."""
-    places = [tempfile.gettempdir(), "/tmp"]
-    place = next((place for place in places if len(place) <= LONGEST_FOLDER - len("/sn-12345678")), places[-1])
+    place = tempfile.gettempdir()
+    if len(place) > LONGEST_FOLDER - len("/sn-12345678"):
+        place = "/tmp"
     return tempfile.mkdtemp(prefix="sn-", dir=place)

@@ -48,7 +48,8 @@ class Scene:
 
     def begin(self, options: Sequence[str]) -> None:
         """Forgets what became of it."""
-        self.__init__(self.name, self.data, list(options))
+        self.options, self.state, self.error, self.fingerprint = list(options), WAITING, "", ""
+        self.steps, self.minutes, self.scores, self.attempts = None, 0.0, {}, 0
 
 
 def scene_name(data: str, taken: Iterable[str]) -> str:

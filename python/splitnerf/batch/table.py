@@ -54,7 +54,7 @@ class Rows:
 
     def row(self, scene: Scene) -> str:
         """A scene's row; why it failed stands in the place of its scores."""
-        name = scene.name if len(scene.name) <= LONGEST else scene.name[: LONGEST - 1] + "…"
+        name = scene.name if len(scene.name) <= LONGEST else scene.name[: LONGEST - 1] + "~"
         if scene.state == DONE or not scene.error:
             return self._row(name, cells(scene))
         return f"{self._row(name, cells(scene)[:3])}  {plain(scene.error)}"
