@@ -83,7 +83,7 @@ class Progress:
         self._is_terminal = self._stream.isatty()
         self._bar = tqdm(
             total=100.0, initial=100.0 * start, file=self._stream, disable=not self._is_terminal, leave=leave,
-            bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining} {postfix}",
+            bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining}{postfix}",
         )  # fmt: skip
         self._start, self._started, self._told = start, time.monotonic(), 0.0
 
@@ -93,7 +93,10 @@ class Progress:
     def show(self, progress: float, told: str) -> None:
         if self._is_terminal:
             self._bar.set_postfix_str(told, refresh=False)
-            self._bar.update(100.0 * progress - self._bar.n)
+            made = 100.0 * progress - self._bar.n
+            self._bar.update(made)
+            if made <= 0:
+                self._bar.refresh()  # its clock goes on
             return
         elapsed = time.monotonic() - self._started
         if elapsed - self._told >= LINE_EVERY or progress >= 1.0:

@@ -434,7 +434,7 @@ def test_the_table_alone_needs_no_ray(tmp_path, monkeypatch, capsys):
     assert main(["batch", "/a", str(tmp_path / "b"), "--out", str(out), "--steps", "4"]) == FAILED
     said = capsys.readouterr()
     assert said.err == "" and said.out.count("a      done           4     2.0   30.00") == 2
-    assert "b      refused        -       -  b: bad" in said.out and "1 done, 1 refused; table: " in said.out
+    assert "b      refused        -       -  b: bad" in said.out and "1 done, 1 refused (PSNR in dB" in said.out
 
 
 def test_progress_is_that_of_the_runs_that_have_begun(tmp_path):
@@ -448,6 +448,12 @@ def test_progress_is_that_of_the_runs_that_have_begun(tmp_path):
         (tmp_path / name / LOCK).touch()
     share, text = watch.look(batch.asked[1:])
     assert share == pytest.approx((1 + 0.8 * 1.5) / 4) and text == "b 50%, c last stage, 1 waiting"
+    many = Batch(tmp_path, [], [Scene(20 * "x" + str(i), "/", []) for i in range(6)], [], 3, False)
+    for scene in many.asked:
+        (tmp_path / scene.name).mkdir()
+        (tmp_path / scene.name / LOCK).touch()
+    share, text = Watch(many).look(many.asked)
+    assert text.split(", ") == 4 * [15 * "x" + "~ 0%"] + ["2 more at work"]
 
 
 def test_a_batch_is_not_written_into_data(data, capsys):

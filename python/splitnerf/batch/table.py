@@ -43,6 +43,11 @@ def cells(scene: Scene) -> list[str]:
     return [scene.state, "-" if scene.steps is None else str(scene.steps), minutes, *scores]
 
 
+def shortened(name: str, n_letters: int) -> str:
+    """A name of at most so many letters; '~' stands for the others."""
+    return name if len(name) <= n_letters else name[: n_letters - 1] + "~"
+
+
 class Rows:
     """The rows of the terminal, as wide as these scenes need it."""
 
@@ -54,7 +59,7 @@ class Rows:
 
     def row(self, scene: Scene) -> str:
         """A scene's row; why it failed stands in the place of its scores."""
-        name = scene.name if len(scene.name) <= LONGEST else scene.name[: LONGEST - 1] + "~"
+        name = shortened(scene.name, LONGEST)
         if scene.state == DONE or not scene.error:
             return self._row(name, cells(scene))
         return f"{self._row(name, cells(scene)[:3])}  {plain(scene.error)}"

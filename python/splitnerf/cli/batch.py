@@ -119,7 +119,7 @@ def given_options(args: argparse.Namespace) -> list[str]:
 def shown(batch: Batch, n_left: int) -> Iterator[Told]:
     """Prints the table's rows as they come, under its head, and beside them what goes on."""
     from splitnerf.batch.job import Told
-    from splitnerf.batch.table import UNITS, Rows
+    from splitnerf.batch.table import Rows
 
     rows, out, err = Rows(batch.asked), sys.stdout, sys.stderr  # Ray's words go elsewhere, see ray_on
     with Progress(1.0 - n_left / len(batch.asked), leave=False) if n_left else nullcontext() as bar:
@@ -128,7 +128,7 @@ def shown(batch: Batch, n_left: int) -> Iterator[Told]:
             with bar.aside() if bar else nullcontext():
                 print(escaped(text), file=stream, flush=True)
 
-        say(f"{rows.head()}   ({UNITS})", out)
+        say(rows.head(), out)
         yield Told(
             row=lambda scene: say(rows.row(scene), out),
             note=lambda text: say(f"splitnerf: note: {text}", err),
@@ -140,9 +140,10 @@ def conclusion(batch: Batch, all_ended: bool) -> int:
     """Prints how many scenes ended how, and what to do about it; returns the exit code."""
     from splitnerf.batch.scenes import LOGS, REFUSED, TABLE
     from splitnerf.batch.scenes import DONE as SCENE_DONE
+    from splitnerf.batch.table import UNITS
 
     counts = Counter(scene.state for scene in batch.asked)
-    print(f"{', '.join(f'{count} {state}' for state, count in counts.items())}; table: {batch.out / TABLE}")
+    print(f"{', '.join(f'{count} {state}' for state, count in counts.items())} ({UNITS}); table: {batch.out / TABLE}")
     if not all_ended:
         print("stopped; to go on, repeat the command.")
         return INTERRUPTED
