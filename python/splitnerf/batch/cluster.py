@@ -29,6 +29,7 @@ LONGEST_FOLDER = 37  # letters of the folder of Ray's own: its sockets' paths ha
 # Read when Ray is imported: no report of its use, sockets on 127.0.0.1 alone, and answers to those alone who have the token.
 NO_REPORT = {"RAY_USAGE_STATS_ENABLED": "0"}
 ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
+NO_KILL = {"RAY_kill_child_processes_on_worker_exit": "false"}  # they save their state, see splitnerf.batch.child.become
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
     """
     if find_spec("ray") is None:
         raise InputError("batch needs the package ray: pip install 'splitnerf[batch]'")
-    os.environ.update(NO_REPORT if address else NO_REPORT | ALONE | {"RAY_AUTH_TOKEN": secrets.token_hex(32)})
+    os.environ.update(NO_REPORT if address else NO_REPORT | ALONE | NO_KILL | {"RAY_AUTH_TOKEN": secrets.token_hex(32)})
     import ray
 
     (out / LOGS).mkdir(exist_ok=True)
