@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -19,7 +20,7 @@ import pytest
 from tiny_runs import SMALL, as_options
 
 from splitnerf.batch.scenes import known_scenes
-from splitnerf.cli import DONE, FAILED, INTERRUPTED
+from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
 pytestmark = [
     pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install 'splitnerf[batch]'"),
@@ -178,6 +179,15 @@ def test_a_damaged_scene_stops_no_other_and_nobody_else_reaches_ray(data, tmp_pa
     again = call(good, bad, "--out", out, "--steps", 4)
     assert again.end() == FAILED and again.err == ""
     assert sorted(again.out.splitlines()[1:3]) == sorted(first.out.splitlines()[1:3])
+
+
+def test_a_cluster_that_is_not_there_is_one_line(tmp_path, call):
+    with socket.socket() as taken:  # a port at which nobody listens
+        taken.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{taken.getsockname()[1]}"
+        asked = call(tmp_path, "--out", tmp_path / "out", "--address", address)
+        assert asked.program.wait(PATIENCE) == BAD_INPUT
+    assert asked.err.startswith(f"splitnerf: --address {address}: no Ray cluster answers") and len(asked.err.splitlines()) == 1
 
 
 @pytest.mark.slow

@@ -212,7 +212,7 @@ def test_a_damaged_scene_is_refused_with_its_last_word(tmp_path):
 @pytest.mark.parametrize(
     "said, code, error",
     [
-        ("splitnerf: note: a\nsplitnerf: data: bad\n 10% 00:10\n", 2, "data: bad"), ("Segmentation fault\n\n", 1, "Segmentation fault"),
+        ("splitnerf: data: bad\nsplitnerf: note: a\n 10% 00:10\n", 2, "data: bad"), ("Segmentation fault\n\n", 1, "Segmentation fault"),
         ("", 1, "ended with exit code 1"), ("splitnerf: x\n", -9, "was killed by SIGKILL"), ("splitnerf: x\n", 0, ""),
         ("splitnerf: \x1b[31mred\n", 1, r"\x1b[31mred"), ("y" * 9000, 1, "y" * 500),
     ],

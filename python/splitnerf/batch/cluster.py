@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
+import socket
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
+from typing import TextIO
 
 from splitnerf.batch.scenes import LOGS
 from splitnerf.doctor.machine import GIB, TRAINING_GIB, processors
@@ -23,6 +25,7 @@ GB = 1e9
 TRAINING = TRAINING_GIB * GIB / GB  # GB of memory of a training without its photos
 MEMORY = 4.0  # GB of a scene, photos included
 GPU = 0.25  # of a scene: four at once made a third more steps together than one alone did on an H100, see docs/cuda.md
+PATIENCE = 10.0  # seconds for a cluster to answer
 OBJECT_STORE = 100 << 20  # bytes; results are small
 SHARE_OF_FREE = 0.9  # of the free memory of this machine, for the scenes
 LONGEST_FOLDER = 37  # letters of the folder of Ray's own: its sockets' paths have 64 more, and a system allows 103
@@ -114,6 +117,8 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
     if find_spec("ray") is None:
         raise InputError("batch needs the package ray: pip install 'splitnerf[batch]'")
     os.environ.update(NO_REPORT if address else NO_REPORT | ALONE | NO_KILL | {"RAY_AUTH_TOKEN": secrets.token_hex(32)})
+    if address and Path("~/.ray/auth_token").expanduser().is_file():  # `ray start` wrote it, and its cluster asks for it
+        os.environ.setdefault("RAY_AUTH_MODE", "token")
     import ray
 
     (out / LOGS).mkdir(exist_ok=True)
@@ -121,14 +126,15 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
     with open(out / LOGS / "ray.log", "a", encoding="utf-8", errors="backslashreplace") as log:
         with redirect_stdout(log), redirect_stderr(log):
             try:
-                if own is None:
-                    _connect(ray, address)
-                else:
-                    ray.init(
-                        address="local", num_cpus=processors(), object_store_memory=OBJECT_STORE, include_dashboard=False,
-                        logging_level="error", log_to_driver=False, _temp_dir=own,
-                        _memory=int(SHARE_OF_FREE * memory_bytes()[1]),
-                    )  # fmt: skip
+                with _compiled_words_to(log):
+                    if own is None:
+                        _connect(ray, address)
+                    else:
+                        ray.init(
+                            address="local", num_cpus=processors(), object_store_memory=OBJECT_STORE, include_dashboard=False,
+                            logging_level="error", log_to_driver=False, _temp_dir=own,
+                            _memory=int(SHARE_OF_FREE * memory_bytes()[1]),
+                        )  # fmt: skip
                 with ended_by_signals():  # Ray put one of its own in the place of SIGTERM's
                     yield ray
             finally:
@@ -142,10 +148,25 @@ def machines_of(ray: ModuleType) -> list[dict[str, float]]:
     return [node["Resources"] for node in ray.nodes() if node["Alive"] and node["Resources"].get("CPU")]
 
 
-def _connect(ray: ModuleType, address: str) -> None:
+@contextmanager
+def _compiled_words_to(log: TextIO) -> Iterator[None]:
+    """Within the block standard error is a file, for compiled code too, which knows nothing of Python's streams."""
+    kept = os.dup(2)
+    os.dup2(log.fileno(), 2)
     try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+def _connect(ray: ModuleType, address: str) -> None:
+    host, _, port = address.rpartition(":")
+    try:
+        if port.isdigit():  # Ray itself would try for minutes
+            socket.create_connection((host.rpartition("/")[2].strip("[]"), int(port)), PATIENCE).close()
         ray.init(address=address, logging_level="error", log_to_driver=False)
-    except (ConnectionError, ValueError, ray.exceptions.RayError) as error:
+    except (OSError, ValueError, OverflowError, ray.exceptions.RayError) as error:
         why = plain(str(error).strip()).partition(". ")[0]
         raise InputError(f"--address {address}: no Ray cluster answers ({why}); start one by `ray start --head`") from None
 
