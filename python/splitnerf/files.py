@@ -101,11 +101,23 @@ def held(folder: Path) -> Iterator[None]:
         _remove_empty(made)
 
 
+def is_held(folder: Path) -> bool:
+    """Whether a program, which may be this one, holds a folder."""
+    try:
+        with open(folder / LOCK, "rb") as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:  # there is no lock, or this file system has none
+        pass
+    return False
+
+
 def remove_partial(folder: Path) -> None:
-    """Removes what a program that was killed left half-written in a folder, and in those in it."""
-    for pattern in (f".*{PARTIAL}*", f"*/.*{PARTIAL}*"):
-        for leftover in folder.glob(pattern):
-            leftover.unlink(missing_ok=True)
+    """Removes what a program that was killed left half-written in a folder, and in those in it that no other program holds."""
+    inner = (leftover for leftover in folder.glob(f"*/.*{PARTIAL}*") if not is_held(leftover.parent))
+    for leftover in (*folder.glob(f".*{PARTIAL}*"), *inner):
+        leftover.unlink(missing_ok=True)
 
 
 def reason(error: OSError) -> str:

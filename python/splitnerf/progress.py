@@ -79,10 +79,11 @@ class Progress:
     """Shows the share done, the time left and a text: as a bar on a terminal, elsewhere as a line every ten seconds."""
 
     def __init__(self, start: float, leave: bool = True):
-        self._is_terminal = sys.stderr.isatty()
+        self._stream = sys.stderr
+        self._is_terminal = self._stream.isatty()
         self._bar = tqdm(
-            total=100.0, initial=100.0 * start, file=sys.stderr, disable=not self._is_terminal, leave=leave,
-            bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining} {postfix}",
+            total=100.0, initial=100.0 * start, file=self._stream, disable=not self._is_terminal, leave=leave,
+            bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining}{postfix}",
         )  # fmt: skip
         self._start, self._started, self._told = start, time.monotonic(), 0.0
 
@@ -92,14 +93,24 @@ class Progress:
     def show(self, progress: float, told: str) -> None:
         if self._is_terminal:
             self._bar.set_postfix_str(told, refresh=False)
-            self._bar.update(100.0 * progress - self._bar.n)
+            made = 100.0 * progress - self._bar.n
+            self._bar.update(made)
+            if made <= 0:
+                self._bar.refresh()  # its clock goes on
             return
         elapsed = time.monotonic() - self._started
         if elapsed - self._told >= LINE_EVERY or progress >= 1.0:
             self._told = elapsed
-            left = elapsed * (1.0 - progress) / max(progress - self._start, 1e-9)
-            times = "<".join(tqdm.format_interval(seconds) for seconds in (elapsed, left))
-            print(f"{100 * progress:3.0f}% {times} {told}", file=sys.stderr, flush=True)
+            made = progress - self._start
+            left = tqdm.format_interval(elapsed * (1.0 - progress) / made) if made > 0 else "?"
+            print(f"{100 * progress:3.0f}% {tqdm.format_interval(elapsed)}<{left} {told}", file=self._stream, flush=True)
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """Within the block other lines are written, and a terminal shows no bar."""
+        self._bar.clear()
+        yield
+        self._bar.refresh()
 
     def __exit__(self, *exception) -> None:
         self._bar.close()

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import runpy
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ import pytest
 import torch
 import trimesh
 from painted_ball import lamps, looking, orange
+from tiny_runs import SMALL, as_options
 
 from splitnerf.cli import main
 from splitnerf.data.images import read_image, write_image
@@ -173,3 +175,31 @@ def test_blender_shows_what_relight_shows(ball, tmp_path):
     said = run_blender("blender_import.py", *words, *common, *blend, "--against", str(out / "000.png"))
     assert number(r"000\.png: ([\d.]+) dB", said) > 35
     assert (tmp_path / "scene.blend").stat().st_size > 10000
+
+
+# A signal warns a job while it waits for its process.
+WARNED = """
+import runpy, signal, subprocess, sys
+job, again, start = runpy.run_path(sys.argv[1], run_name="example")["Training"](), [], subprocess.Popen
+subprocess.Popen = lambda command: start(["sleep", "600"])
+signal.signal(signal.SIGALRM, lambda *_: again.append(job.checkpoint("a", "b", ["c"])))
+signal.setitimer(signal.ITIMER_REAL, 0.5)
+code = job("a", "b", ["c"])
+print(type(again[0].function).__name__, again[0].args, code)
+"""
+
+
+def test_slurm_batch(run, data, tmp_path, monkeypatch):
+    """Without Slurm: submitit runs the jobs here. A damaged scene stops no other."""
+    submitit = pytest.importorskip("submitit", reason="submitit is not installed: pip install submitit")
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad/transforms_train.json").write_text("{")
+    monkeypatch.setattr(sys, "exit", lambda code: codes.append(code))
+    codes: list[int] = []
+    words = [str(data), str(tmp_path / "bad"), "--out", str(tmp_path / "out"), "--cluster", "local", "--"]
+    out = run("slurm_batch.py", *words, "--steps", "4", *as_options(SMALL))
+    assert codes == [1] and (tmp_path / "out/tiny/mesh.glb").is_file() and not (tmp_path / "out/bad").exists()
+    assert out.splitlines()[0] == "tiny: done" and out.splitlines()[1].startswith("bad: failed (2), see ")
+
+    warned = subprocess.run([sys.executable, "-c", WARNED, str(EXAMPLES / "slurm_batch.py")], capture_output=True, text=True, timeout=120)
+    assert warned.stdout == f"Training ('a', 'b', ['c']) {-signal.SIGTERM}\n", warned.stderr

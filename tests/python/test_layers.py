@@ -11,7 +11,7 @@ import pytest
 LAYERS = [
     {"train", "__main__"},
     {"cli"},
-    {"bench", "demo"},
+    {"batch", "bench", "demo"},
     {"ablate"},
     {"workflow"},
     {"delivery"},

@@ -11,7 +11,7 @@ import sys
 
 import splitnerf
 from splitnerf.cli import (
-    ablate, bench, demo, doctor, evaluate, export, info, inspect, prepare, refine, relight, synth, train, view,
+    ablate, batch, bench, demo, doctor, evaluate, export, info, inspect, prepare, refine, relight, synth, train, view,
 )  # fmt: skip
 from splitnerf.cli.completion import SHELLS, PrintCompletion
 from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
@@ -21,7 +21,7 @@ from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
 from splitnerf.progress import ended_by_signals
 
-COMMANDS = (prepare, inspect, train, export, refine, relight, view, evaluate, synth, ablate, bench, demo, doctor, info)
+COMMANDS = (prepare, inspect, train, batch, export, refine, relight, view, evaluate, synth, ablate, bench, demo, doctor, info)
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "build_parser", "main"]
 
 

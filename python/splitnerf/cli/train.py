@@ -82,14 +82,21 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.config import parse_setting
     from splitnerf.files import held
 
     if args.resume and args.overwrite:
         raise InputError("--resume and --overwrite exclude each other")
+    run, settings = args.out or Path("runs") / args.data.resolve().name, settings_of(args)
+    with held(run):
+        return train_in(run, args, settings)
+
+
+def settings_of(args: argparse.Namespace) -> dict[str, object]:
+    """The settings that the options give, by name."""
+    from splitnerf.config import parse_setting
+
     if args.max_minutes is not None and args.max_minutes <= 0:
         raise InputError(f"--max-minutes must be positive, got {args.max_minutes}")
-    run = args.out or Path("runs") / args.data.resolve().name
     settings = dict(parse_setting(text) for text in args.settings)
     settings |= budget(args.steps, args.max_minutes) | reading_options(args)
     if args.seed is not None:
@@ -98,8 +105,7 @@ def run(args: argparse.Namespace) -> int:
         settings["refinement.enabled"] = False
     if args.deterministic:
         settings["run.deterministic"] = True
-    with held(run):
-        return train_in(run, args, settings)
+    return settings
 
 
 def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object]) -> int:

@@ -1,0 +1,226 @@
+"""splitnerf batch on Ray: scenes that are killed, damaged and interrupted; who can reach it; what it leaves."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from tiny_runs import SMALL, as_options
+
+from splitnerf.batch.scenes import known_scenes
+from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED
+
+pytestmark = [
+    pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install 'splitnerf[batch]'"),
+    pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="there is no /proc to look at processes in"),
+]
+PATIENCE = 600.0  # seconds
+
+
+class Call:
+    """`splitnerf batch` as a program of its own.
+
+    Args:
+        folder: Where its words go.
+        words: Its arguments.
+    """
+
+    def __init__(self, folder: Path, *words: str):
+        folder.mkdir()
+        self._folder, self.temporary = folder, Path(tempfile.mkdtemp(dir="/tmp"))  # short enough for Ray's sockets
+        environment = {**os.environ, "TMPDIR": str(self.temporary), "OMP_NUM_THREADS": "1"}
+        command = [sys.executable, "-m", "splitnerf", "batch", *words, *as_options(SMALL)]
+        with open(folder / "out", "w") as out, open(folder / "err", "w") as err:
+            self.program = subprocess.Popen(command, stdout=out, stderr=err, env=environment)
+
+    @property
+    def out(self) -> str:
+        return (self._folder / "out").read_text()
+
+    @property
+    def err(self) -> str:
+        return (self._folder / "err").read_text()
+
+    def wait_until(self, seen: Callable[[], object]) -> object:
+        """What is seen, once it is true."""
+        until = time.monotonic() + PATIENCE
+        while not (found := seen()):
+            assert self.program.poll() is None and time.monotonic() < until, self.out + self.err
+            time.sleep(0.1)
+        return found
+
+    def end(self) -> int:
+        """Waits for its end; returns the exit code. Nothing of Ray is left then."""
+        code = self.program.wait(PATIENCE)
+        assert [name for name in commands().values() if "raylet" in name and str(self.temporary) in name] == []
+        assert list(self.temporary.glob("sn-*")) == [] and "Traceback" not in self.err
+        assert all(re.match(r"(splitnerf: note: |[ \d]{3}% )", line) for line in self.err.splitlines()), self.err
+        return code
+
+    def kill(self) -> None:
+        if self.program.poll() is None:
+            self.program.kill()
+            self.program.wait()
+        shutil.rmtree(self.temporary, ignore_errors=True)
+
+
+@pytest.fixture
+def call(tmp_path):
+    """Starts a batch; what is left of it ends with the test."""
+    calls: list[Call] = []
+
+    def start(*words: object) -> Call:
+        calls.append(Call(tmp_path / f"call_{len(calls)}", *map(str, words)))
+        return calls[-1]
+
+    yield start
+    for started in calls:
+        started.kill()
+
+
+def commands() -> dict[int, str]:
+    """The command lines of all processes, by their number."""
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            found[int(path.parent.name)] = path.read_bytes().replace(b"\0", b" ").decode(errors="replace")
+        except OSError:
+            pass
+    return found
+
+
+def parents() -> dict[int, int]:
+    """The parent of each process."""
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            found[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            pass
+    return found
+
+
+def family(of: int) -> set[int]:
+    """A process and all that descend from it."""
+    members, tree = {of}, parents()
+    while new := {child for child, parent in tree.items() if parent in members} - members:
+        members |= new
+    return members
+
+
+def listeners(processes: set[int]) -> set[str]:
+    """The addresses, as /proc writes them, at which processes listen by TCP."""
+    sockets = set()
+    for process in processes:
+        for handle in Path(f"/proc/{process}/fd").glob("*"):
+            try:
+                sockets.add(os.readlink(handle))
+            except OSError:
+                pass
+    found = set()
+    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
+        for line in Path(table).read_text().splitlines()[1:]:
+            _, local, _, state, *_, = line.split()
+            if state == "0A" and f"socket:[{line.split()[9]}]" in sockets:
+                found.add(local.partition(":")[0])
+    return found
+
+
+LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
+
+
+def scenes_of(data: Path, folder: Path, *names: str) -> list[Path]:
+    """Copies of a data set, without the true mesh, whose distances take longer than all else."""
+    for name in names:
+        shutil.copytree(data, folder / name, ignore=shutil.ignore_patterns("mesh.ply"))
+    return [folder / name for name in names]
+
+
+def damage(scene: Path) -> None:
+    path = scene / "transforms_train.json"
+    path.write_text(path.read_text()[:100])
+
+
+def worker_of(run: Path) -> int | None:
+    """The worker of Ray's under which a run is trained, once it has a checkpoint."""
+    if not (run / "checkpoint.pt").is_file():
+        return None
+    trained = [number for number, words in commands().items() if f"--out {run} " in words and " batch " not in words]
+    tree = parents()
+    return next((tree[number] for number in trained if number in tree), None)
+
+
+def test_a_damaged_scene_stops_no_other_and_nobody_else_reaches_ray(data, tmp_path, call):
+    good, bad = scenes_of(data, tmp_path / "scenes", "good", "bad")
+    damage(bad)
+    out = tmp_path / "out"
+    first = call(good, bad, "--out", out, "--steps", 4, "--cores-per-scene", "0.5")
+    seen = first.wait_until(lambda: listeners(family(first.program.pid)))
+    while first.program.poll() is None:
+        seen |= listeners(family(first.program.pid))
+        time.sleep(0.2)
+    assert seen and seen <= LOOPBACK
+    assert first.end() == FAILED
+    assert (out / "good/mesh.glb").is_file() and not (out / "bad").exists()
+    assert f"refused        -       -  {bad}/transforms_train.json: is not valid json" in first.out
+    assert [(scene.name, scene.state) for scene in known_scenes(out)] == [("good", "done"), ("bad", "refused")]
+    again = call(good, bad, "--out", out, "--steps", 4)
+    assert again.end() == FAILED and again.err == ""
+    assert sorted(again.out.splitlines()[1:3]) == sorted(first.out.splitlines()[1:3])
+
+
+def test_a_cluster_that_is_not_there_is_one_line(tmp_path, call):
+    with socket.socket() as taken:  # a port at which nobody listens
+        taken.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{taken.getsockname()[1]}"
+        asked = call(tmp_path, "--out", tmp_path / "out", "--address", address)
+        assert asked.program.wait(PATIENCE) == BAD_INPUT
+    assert asked.err.startswith(f"splitnerf: --address {address}: no Ray cluster answers") and len(asked.err.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_six_scenes_of_which_one_is_killed_and_one_damaged(data, tmp_path, call):
+    """And all are interrupted on their way; the same command goes on each time. Its last call does nothing."""
+    scenes = scenes_of(data, tmp_path / "scenes", "ball", "cup", "fox", "kettle", "pot", "vase")
+    damage(scenes[2])
+    out, good = tmp_path / "out", [scene for scene in scenes if scene.name != "fox"]
+    words = (*scenes, "--out", out, "--steps", 400, "--set", "checkpoint_minutes=0.01")
+    first = call(*words)
+    os.kill(first.wait_until(lambda: worker_of(out / "ball")), signal.SIGKILL)
+    first.wait_until(lambda: "splitnerf: note: ball: its worker was killed; it goes on from its last checkpoint" in first.err)
+    first.wait_until(lambda: sum((out / scene.name / "mesh.glb").exists() for scene in good) >= 2)
+    first.program.send_signal(signal.SIGINT)
+    assert first.end() == INTERRUPTED and "stopped; to go on, repeat the command." in first.out
+    assert not list(out.glob("*/lock")) and not list(out.rglob(".*"))
+    states = {scene.name: scene.state for scene in known_scenes(out)}
+    assert set(states.values()) <= {"done", "stopped", "waiting", "refused"} and "done" in states.values()
+    finished = {name: (out / name / "mesh.glb").stat().st_mtime_ns for name, state in states.items() if state == "done"}
+
+    second = call(*words)
+    assert second.end() == FAILED
+    print(second.out)
+    assert all((out / scene.name / name).is_file() for scene in good for name in ("mesh.glb", "environment.exr"))
+    assert finished == {name: (out / name / "mesh.glb").stat().st_mtime_ns for name in finished}
+    lines = (out / "ball/metrics.jsonl").read_text().splitlines()
+    assert [json.loads(line)["step"] for line in (lines[0], lines[-1])] == [1, 400]
+    assert second.out.count(" done ") == 5 and second.out.count("is not valid json") == 1 and not (out / "fox").exists()
+
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.name != "lock"}
+    third = call(*words)
+    assert third.end() == FAILED and third.err == ""
+    assert sorted(third.out.splitlines()[1:7]) == sorted(second.out.splitlines()[1:7])
+    assert before == {path: path.stat().st_mtime_ns for path in out.rglob("*")}
+    fixed = call(*words[:2], "--out", out, "--steps", 400, "--set", "checkpoint_minutes=0.01")
+    assert fixed.end() == DONE
