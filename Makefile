@@ -6,6 +6,7 @@
 # make tables   says which tables under docs/ are stale
 # make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
 # make docs   builds the documentation into build/docs (HTML, to be read without a network)
+# make figures   draws the figures of docs/method.md with the operators
 # make viewer   builds the page of splitnerf view from its sources (needs Node and npm)
 # make fuzz   feeds each reader damaged files for FUZZ_SECONDS, in four parts: tracing takes memory with every run
 VENV ?= .venv
@@ -22,7 +23,7 @@ CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || tr
 CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 READERS := json colmap neus png exr hdr glb checkpoint
 
-.PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs clean
+.PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -72,6 +73,9 @@ docs: install
 	$(BIN)/python -m pip install --quiet -e '.[docs]' --no-build-isolation
 	$(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
 	@echo build/docs/index.html
+
+figures: install
+	$(BIN)/python tests/bench/method_figures.py
 
 test-slow: install
 	$(BIN)/python -m pytest -q -m slow

@@ -39,7 +39,6 @@ SHORTER = {
     "export": ["--faces", "500", "--texture-size", "64", "--resolution", "32", "--formats", "glb,obj"],
     "refine": ["--sweeps", "1"],
     "relight": ["--spp", "1", "--size", "16", "--overwrite"],
-    "evaluate": ["--spp", "1", "--views", "1"],
     "synth": ["--size", "16", "--train", "4", "--test", "2", "--spp", "1"],
 }
 
@@ -70,7 +69,8 @@ def shorter(words: list[str]) -> list[str]:
     """A command as it is run: file names in place of patterns, few pixels and steps."""
     words = [name for word in words for name in (sorted(map(str, Path().glob(word))) if "*" in word else [word])]
     turns = ["--turntable", "2"] if "--turntable" in words else []
-    return [*words[1:], *SHORTER.get(words[1], []), *turns]
+    views = ["--spp", "1", "--views", "1"] if words[1] == "evaluate" and "--data" in words else []
+    return [*words[1:], *SHORTER.get(words[1], []), *turns, *views]
 
 
 def run_shell(block: Block) -> None:
