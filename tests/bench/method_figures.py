@@ -161,7 +161,7 @@ def occlusion(size: int = 96) -> plt.Figure:
     axes[2].plot(line, 1 - 0.25 / far * (height / far.sqrt()), color="black", linewidth=1, label=r"$1 - (r/l)^2 \cos\theta$")
     axes[2].plot(ticks, o_d.reshape(size, size)[size // 2], ".", color=BLUE, markersize=4, label="$o_d$, 512 rays a point")
     axes[2].set_xlabel("place on the plane")
-    axes[2].legend(loc="upper center", frameon=False)
+    axes[2].legend(loc="upper center", frameon=False, fontsize=8)
     return figure
 
 

@@ -140,3 +140,15 @@ def test_the_pages_build_without_a_warning(tmp_path):
     page = (tmp_path / "reference" / "rays.html").read_text()
     assert r"\alpha = \max" in page and "_static/tex-svg.js" in page
     assert not re.search(r'(?:src|href)="https?://[^"]+\.(?:js|css|woff2?)', page)  # nothing is fetched when it is read
+
+
+def test_the_method_s_figures_are_those_that_the_program_draws(tmp_path, monkeypatch):
+    """Each is shown, and the quick ones are drawn."""
+    monkeypatch.syspath_prepend(ROOT / "tests" / "bench")
+    import method_figures
+
+    shown = re.findall(r"\(figures/method_(\w+)\.png\)", (ROOT / "docs" / "method.md").read_text())
+    assert sorted(shown) == sorted(method_figures.FIGURES)
+    for name in ("lobe", "neus"):
+        method_figures.FIGURES[name]().savefig(tmp_path / "figure.png")
+        assert (tmp_path / "figure.png").stat().st_size > 10_000
