@@ -30,7 +30,7 @@ else:
     import tomli as tomllib
 
 COMMANDS = next(a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction)).choices
-PAGES_WITH_CODE = [page for page in PAGES if any(b.language in ("sh", "python", "json", "") for b in blocks_of(page))]
+PAGES_WITH_CODE = [page for page in PAGES if not all(block.language.startswith("{") for block in blocks_of(page))]
 SPHINX = ("sphinx", "myst_parser", "furo", "sphinxarg", "sphinx_copybutton", "sphinx-mathjax-offline")
 
 # What is put behind a command's own options: the last one counts.
