@@ -19,6 +19,7 @@ from markdown_it import MarkdownIt
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 NOT_RUN = re.compile(r"<!-- not run(?:, (?P<start>[^:]+))?: (?P<why>.+?) -->", re.DOTALL)
+PROGRAMS = ("splitnerf ", "make ", "pip ", "python ")  # a block without a language that begins so is one of commands
 PAGE_NOT_RUN = re.compile(r"<!-- page not run: .+? -->", re.DOTALL)
 
 
@@ -29,7 +30,7 @@ class Block:
     Attributes:
         page: The file that holds it.
         line: The number of its first line.
-        language: The word behind the fence, "" of an indented block.
+        language: The word behind the fence, or what the code says of itself.
         text: The code.
         runs: Whether it is run.
         left_out: How lines begin that are not run.
@@ -68,11 +69,11 @@ def blocks_of(page: Path) -> list[Block]:
         if token.type == "html_block":
             before += NOT_RUN.finditer(token.content)
         if token.type in ("fence", "code_block"):
-            language = (token.info.split() or [""])[0]
+            language = (token.info.split() or ["sh" if token.content.startswith(PROGRAMS) else ""])[0]
             starts = [mark["start"] for mark in before if mark["start"]]
             runs = not PAGE_NOT_RUN.search(text) and not any(mark["start"] is None for mark in before)
             found.append(Block(page, token.map[0] + 1, language, token.content, runs, starts))
-        if token.type not in ("html_block",):
+        if token.type != "html_block":
             before = []
     return found
 
