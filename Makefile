@@ -71,7 +71,7 @@ viewer:
 
 docs: install
 	$(BIN)/python -m pip install --quiet -e '.[docs]' --no-build-isolation
-	$(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
+	$(BIN)/python -m sphinx -W --keep-going -q -a -E -b html -d build/doctrees docs build/docs
 	@echo build/docs/index.html
 
 figures: install
