@@ -5,6 +5,8 @@
 # make stability   asks each operator STABILITY_CASES times and writes docs/benchmarks/stability.md; more in STABILITY_OPTIONS
 # make tables   says which tables under docs/ are stale
 # make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
+# make docs   builds the documentation into build/docs (HTML, to be read without a network)
+# make figures   draws the figures of docs/method.md with the operators
 # make viewer   builds the page of splitnerf view and the script of report.html from their sources (needs Node and npm)
 # make wheels   builds a wheel for each Python from 3.10 to 3.13 that is found, into build/wheels
 # make lock   renews third_party/requirements.lock, the versions and hashes of what `make install` brings
@@ -23,7 +25,7 @@ CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || tr
 CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 READERS := json colmap neus png exr hdr glb checkpoint
 
-.PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer lock wheels clean
+.PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures lock wheels clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -68,6 +70,14 @@ mutants: install
 
 viewer:
 	cd python/splitnerf/view/page && npm ci --no-audit --no-fund && npm run build
+
+docs: install
+	$(BIN)/python -m pip install --quiet -e '.[docs]' --no-build-isolation
+	$(BIN)/python -m sphinx -W --keep-going -q -a -E -b html -d build/doctrees docs build/docs
+	@echo build/docs/index.html
+
+figures: install
+	$(BIN)/python tests/bench/method_figures.py
 
 test-slow: install
 	$(BIN)/python -m pytest -q -m slow

@@ -18,10 +18,13 @@ def adamw_step_(
     param: Tensor, grad: Tensor, exp_avg: Tensor, exp_avg_sq: Tensor, *, lr: float, beta1: float, beta2: float, eps: float,
     weight_decay: float, step: int, sparse: bool = False, copy: Tensor | None = None,
 ) -> None:  # fmt: skip
-    """One step of AdamW, written to param, exp_avg and exp_avg_sq.
+    r"""One step of AdamW, written to param, exp_avg and exp_avg_sq.
 
-    ``m = beta1 m + (1 - beta1) g``, ``v = beta2 v + (1 - beta2) g^2``,
-    ``p = p (1 - lr weight_decay) - lr (m / (1 - beta1^step)) / (sqrt(v / (1 - beta2^step)) + eps)``.
+    .. math::
+
+       m &\leftarrow \beta_1 m + (1 - \beta_1)\, g, \qquad v \leftarrow \beta_2 v + (1 - \beta_2)\, g^2 \\
+       p &\leftarrow p\, (1 - lr\, weight\_decay)
+           - lr\, \frac{m / (1 - \beta_1^{step})}{\sqrt{v / (1 - \beta_2^{step})} + \epsilon}
 
     A NaN gradient makes its parameter and both moments NaN. A gradient whose square times 1 - beta2 overflows the dtype
     makes v infinite; from then on only weight decay moves its parameter. A gradient whose square underflows counts as 0
@@ -39,7 +42,7 @@ def adamw_step_(
         sparse: Whether to skip rows (of the last dimension) whose gradients are all exactly 0: param and both moments
             do not change there.
         copy: A rounded copy of param in float16 or bfloat16, contiguous, that the step also writes; it is rounded as by
-            :func:`splitnerf.ops.hash_grid.rounded`.
+            the grid's own copy is.
 
     Raises:
         ValueError: A shape, dtype or number does not fit; the message names it.

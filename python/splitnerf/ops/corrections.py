@@ -35,9 +35,12 @@ def add_corrections(
     mean: Tensor, correction: Tensor, at: Tensor, shaded: Tensor, ray_indices: Tensor, segment: Tensor, weights: Tensor,
     opacity: Tensor, min_opacity: float,
 ) -> Tensor:  # fmt: skip
-    """Adds what shaded samples are corrected by to the colours of their rays, each by the share that its segment carries.
+    r"""Adds what shaded samples are corrected by to the colours of their rays, each by the share that its segment carries.
 
-    ``mean[ray] += correction sum(weights of the sample's segment) / max(opacity[ray], min_opacity)``
+    .. math::
+
+       mean_{ray} \leftarrow mean_{ray}
+           + correction\, \frac{\sum_{segment} weights}{\max(opacity_{ray}, min\_opacity)}
 
     Args:
         mean: [n_rays, 3] colours of the rays.

@@ -2,12 +2,12 @@
 
 Defined gradients (any other raises RuntimeError):
 
-===========================  =======  ===========  ================  ===============
-function                     to table to positions second order      note
-===========================  =======  ===========  ================  ===============
-``hash_encode``              yes      yes          yes, both         through the Jacobian
-``hash_encode_jacobian``     yes      yes          no                features and Jacobian
-===========================  =======  ===========  ================  ===============
+========================  ========  ============  ============  =====================
+function                  to table  to positions  second order  note
+========================  ========  ============  ============  =====================
+``hash_encode``           yes       yes           yes, both     through the Jacobian
+``hash_encode_jacobian``  yes       yes           no            features and Jacobian
+========================  ========  ============  ============  =====================
 
 The operators can read a 16-bit copy (``stored``) of a float32 table: lookups gather half the memory, all computation is
 in float32, and the table itself gets its gradient in float32. docs/ops.md lists the errors.
@@ -214,6 +214,7 @@ class HashGrid(nn.Module):
         return None if self.copy is None else self.copy.of(self.table)
 
     def forward(self, positions: Tensor) -> Tensor:
+        """Features [n, C] of positions [n, 3] in the unit cube; see :func:`hash_encode`."""
         return hash_encode(positions, self.table, self.spec, self.n_active, self.stored())
 
     def jacobian(self, positions: Tensor) -> tuple[Tensor, Tensor]:

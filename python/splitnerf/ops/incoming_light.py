@@ -17,7 +17,7 @@ class TexturedSurface(NamedTuple):
     Attributes:
         scene: The mesh.
         normals, tangents, uv: [n_vertices, 3], [n_vertices, 4] and [n_vertices, 2] float32, see
-            :class:`splitnerf.data.asset.Asset`.
+            ``splitnerf.data.asset.Asset``.
         albedo_map: [h, w, 3] linear, in [0, 1].
         roughness_metallic_map: [h, w, 2] in [0, 1].
         normal_map: [h, w, 3] tangent-space normals.

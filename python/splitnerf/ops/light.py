@@ -15,11 +15,14 @@ from splitnerf.ops._library import lib, refuse_gradients, register
 
 
 def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, light: Tensor) -> Tensor:
-    """Estimates gbar(w_s, rho) from light samples that all queries share.
+    r"""Estimates gbar(w_s, rho) from light samples that all queries share.
 
-    ``gbar = sum_i D(w_i, w_s, rho) L_i (w_i.w_s)+ / sum_i D (w_i.w_s)+``. The light directions should
-    cover the sphere uniformly (:func:`fibonacci_directions` with a random rotation). The weights of the
-    s n pairs are never stored: memory is O(s + n).
+    .. math::
+
+       \bar g(w_s, \rho) = \frac{\sum_i D(w_i, w_s, \rho)\, L_i\, (w_i \cdot w_s)^+}{\sum_i D(w_i, w_s, \rho)\, (w_i \cdot w_s)^+}
+
+    The light directions should cover the sphere uniformly (:func:`fibonacci_directions` with a random rotation). The weights of
+    the s n pairs are never stored: memory is O(s + n).
 
     Args:
         query_dirs: [s, 3] unit directions w_s.

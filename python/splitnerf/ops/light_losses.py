@@ -27,10 +27,14 @@ def log_chroma(radiance: Tensor) -> Tensor:
 
 
 def light_prior(texels: Tensor, level_sizes: Sequence[int]) -> Tensor:
-    """How far a light is from a smooth and grey one: the sum over its levels of the mean cost of a texel.
+    r"""How far a light is from a smooth and grey one: the sum over its levels of the mean cost of a texel.
 
     The mean over the coarsest level, the brightness of the whole light, costs nothing: it is taken from that level's texels. A
-    texel d then costs ``ln(1 + b^2 / (3 .5^2)) + ln(1 + c / (3 .2^2))``, b the mean of its channels and c that of (d - b)^2.
+    texel d then costs
+
+    .. math:: \ln\left(1 + \frac{b^2}{3 \cdot .5^2}\right) + \ln\left(1 + \frac{c}{3 \cdot .2^2}\right) ,
+
+    b the mean of its channels and c that of :math:`(d - b)^2`.
 
     Args:
         texels: [T, 3] log radiance beside the coarser levels, the coarsest level first, float32 or float64.

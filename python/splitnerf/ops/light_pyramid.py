@@ -108,10 +108,10 @@ def sparse_product(matrix: SparseMap, values: Tensor) -> Tensor:
 def light_lookup(
     directions: Tensor, roughness: Tensor, levels: Tensor, sh: Tensor, resolutions: Tensor, nodes: Tensor, zonal: Tensor
 ) -> Tensor:
-    """g(w, rho) from filtered maps and spherical harmonics.
+    r"""g(w, rho) from filtered maps and spherical harmonics.
 
     Below ``nodes[0]`` g is the first map; between nodes g is linear in rho between their maps; from the last node on
-    ``g = sum_lm zonal_l(rho) sh_lm Y_lm(w)``. Maps are read bilinearly, also across the seams of the octahedron.
+    :math:`g = \sum_{lm} zonal_l(\rho)\, sh_{lm}\, Y_{lm}(w)`. Maps are read bilinearly, also across the seams of the octahedron.
     Spherical harmonics ring around strong lamps: where their sum x is below e, a thousandth of the mean light, it is
     replaced by e exp(x/e - 1), and so is its gradient.
 

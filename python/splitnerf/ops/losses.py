@@ -58,7 +58,7 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> Tenso
         beside: [m] int64, the sample beside each neighbour.
 
     Returns:
-        [2]: eikonal, the mean of (|g| - 1)^2, and smoothness, the weighted mean distance of unit normals; 0 without
+        [2]: eikonal, the mean of :math:`(|g| - 1)^2`, and smoothness, the weighted mean distance of unit normals; 0 without
         points. Differentiable in the gradients.
 
     Raises:
@@ -94,7 +94,9 @@ def material_losses(
 
 
 def quadratic_entropy(x: Tensor) -> Tensor:
-    """The entropy -ln mean exp(-|x_i - x_j|^2 / 4) over all pairs of points, with i = j.
+    r"""The entropy of points, over all n^2 pairs of them, i = j included.
+
+    .. math:: -\ln \frac{1}{n^2} \sum_{i,j} e^{-|x_i - x_j|^2 / 4}
 
     Args:
         x: [n, c] points, n > 0; coordinates divided by the width within which points count as similar.

@@ -19,14 +19,14 @@ from splitnerf.ops.shading import brdf_lut
 
 
 class LightSums(NamedTuple):
-    """Integrals of incoming light over the lobes of points, [n, 3] each.
+    r"""Integrals of incoming light over the lobes of points, [n, 3] each.
 
     Attributes:
-        specular: The integral of D V L (n.l) over directions l: the GGX lobe without the Fresnel term.
-        grazing: The integral of D V L (n.l) (1 - v.h)^5, with Schlick's factor, so that the lobe reflects
+        specular: :math:`\int D V L\, (n \cdot l)\, dl`, the GGX lobe without the Fresnel term.
+        grazing: :math:`\int D V L\, (n \cdot l) (1 - v \cdot h)^5\, dl`, with Schlick's factor, so that the lobe reflects
             F0 (specular - grazing) + grazing.
         diffuse: The irradiance over pi.
-        dielectric: The integral of D V L (n.l) F_d, with the exact Fresnel factor of a dielectric of index 1.5.
+        dielectric: :math:`\int D V L\, (n \cdot l) F_d\, dl`, with the exact Fresnel factor of a dielectric of index 1.5.
     """
 
     specular: Tensor
@@ -138,9 +138,13 @@ def shade_sums(
     sums: LightSums,
     compensate: bool = False,
 ) -> Tensor:
-    """Outgoing linear radiance of points from integrals of incoming light that contain the Fresnel terms.
+    r"""Outgoing linear radiance of points from integrals of incoming light that contain the Fresnel terms.
 
-    ``L = m gain_m (albedo (specular - grazing) + grazing) + (1 - m) [gain_d dielectric + (1 - E_d) albedo diffuse]``,
+    .. math::
+
+       L = m\, gain_m \left[albedo\, (specular - grazing) + grazing\right]
+           + (1 - m) \left[gain_d\, dielectric + (1 - E_d)\, albedo\, diffuse\right]
+
     with E_d and the gains of multiple scattering as in :func:`splitnerf.ops.split_sum_shade` in its ``exact`` mode.
 
     Args:

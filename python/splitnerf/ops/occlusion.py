@@ -86,10 +86,12 @@ def occlusion_factors(
     seed: int = 0,
     n_channels: int = 1,
 ) -> tuple[Tensor, Tensor]:
-    """The shares of the diffuse and of the specular light that reach points without meeting the mesh.
+    r"""The shares of the diffuse and of the specular light that reach points without meeting the mesh.
 
-    ``o_d = sum L_i V_i / sum L_i`` over cosine-weighted directions about the normal; o_s is the same ratio over
-    directions of the lobe D(w)(w.d)+ about ``lobe_dirs``. Each point is sampled, traced and summed by itself, so that
+    .. math:: o_d = \frac{\sum_i L_i V_i}{\sum_i L_i}
+
+    over cosine-weighted directions about the normal; o_s is the same ratio over directions of the lobe
+    :math:`D(w) (w \cdot d)^+` about ``lobe_dirs``. Each point is sampled, traced and summed by itself, so that
     no [points, rays] array exists. Where the light is black, the factors are the shares of open directions.
 
     Args:

@@ -71,10 +71,14 @@ def march_rays(
 def neus_weights(
     f_prev: Tensor, f_next: Tensor, s: Tensor, offsets: Tensor, min_transmittance: float = 0.0
 ) -> tuple[Tensor, Tensor]:
-    """Rendering weights of an SDF's samples, in log space.
+    r"""Rendering weights of an SDF's samples, in log space.
 
-    ``alpha = (Phi(f_prev) - Phi(f_next))+ / Phi(f_prev)``, ``Phi(f) = sigmoid(s f)``, computed as
-    ``tau = log1p(expm1(d) sigmoid(-s f_prev))``, ``d = s (f_prev - f_next)+``; the transmittance is a sum of tau.
+    With :math:`\Phi(f) = 1 / (1 + e^{-s f})` the opacity of a sample is
+
+    .. math:: \alpha = \max\left(0, \frac{\Phi(f_{prev}) - \Phi(f_{next})}{\Phi(f_{prev})}\right) .
+
+    It is computed as the optical depth :math:`\tau = \ln(1 + (e^d - 1) \Phi(-f_{prev}))`,
+    :math:`d = s \max(0, f_{prev} - f_{next})`; the transmittance is :math:`e^{-\sum \tau}`.
 
     Args:
         f_prev, f_next: [n] signed distances at the start and the end of each sample, scene units.
@@ -106,11 +110,16 @@ def surface_weights(
     min_transmittance: float = 0.0,
     n_samples: int | None = None,
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Normals and rendering weights of samples, from the distance and its gradient at the samples' midpoints.
+    r"""Normals and rendering weights of samples, from the distance and its gradient at the samples' midpoints.
 
-    ``n = gradient / |gradient|``, ``half = step / 2 c(d . n)``; the weights are :func:`neus_weights` of ``sdf - half``
-    and ``sdf + half``, where ``c(x) = -(relu(1/2 - x/2)(1 - anneal) + relu(-x) anneal)``. A field gradient shorter than
-    .001 gets no gradient in the backward pass.
+    With :math:`n = \nabla f / |\nabla f|` and the ray's direction d, both ends are estimated from the middle:
+
+    .. math::
+
+       f_{prev}, f_{next} &= f \mp \tfrac{1}{2}\, c(d \cdot n)\, step \\
+       c(x) &= -\left[(1 - anneal) \max(0, \tfrac{1}{2} - \tfrac{x}{2}) + anneal\, \max(0, -x)\right]
+
+    The weights are :func:`neus_weights` of these ends. A field gradient shorter than .001 gets no gradient in the backward pass.
 
     Args:
         sdf, gradient: [n] signed distances (scene units), or [n, c] with the distances in the first column, and their gradients

@@ -68,12 +68,18 @@ def sdf_field(
     n_active: int | None = None,
     stored: Tensor | None = None,
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """A distance field at points, with the features of its hash grid and the distance's gradient, in one pass.
+    r"""A distance field at points, with the features of its hash grid and the distance's gradient, in one pass.
 
-    Rows of weights are normalised: ``W = hidden_length hidden / |hidden|`` and ``V = out_length out / |out|``, row by row. With
-    ``a = W [positions, features] + hidden_bias``: ``outputs = V softplus(a) + out_bias``, and by the chain rule
-    ``gradient = q[:3] + J q[3:] / (2 box)`` with ``q = (V[0] softplus'(a)) W`` and J the derivatives of the features by the
-    position in the unit cube.
+    Rows of weights are normalised, row by row:
+
+    .. math::
+
+       W &= hidden\_length\ \frac{hidden}{|hidden|}, \qquad V = out\_length\ \frac{out}{|out|} \\
+       a &= W\, [positions, features] + hidden\_bias \\
+       outputs &= V\, \mathrm{softplus}(a) + out\_bias
+
+    By the chain rule the gradient is :math:`q_{0..2} + J\, q_{3..} / (2\, box)` with
+    :math:`q = (V_0\, \mathrm{softplus}'(a))\, W`, and J the derivatives of the features by the position in the unit cube.
 
     Args:
         positions: [n, 3] points, scene units, float32 or float64. Features of a point outside of [-box, box] are those of the

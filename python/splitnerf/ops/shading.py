@@ -37,10 +37,15 @@ def brdf_lut(device: torch.device | str = "cpu") -> Tensor:
 
 
 def query_direction(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean") -> Tensor:
-    """The direction at which the pre-integrated light is looked up for the specular lobe.
+    r"""The direction at which the pre-integrated light is looked up for the specular lobe.
 
-    ``d = normalize((1 - k) n + k w_r)``, w_r the mirror direction, ``k = lerp(1, chi(n.v, rho),
-    smoothstep(.3, .4, rho))``; a normal that faces away from the viewer is negated first.
+    .. math::
+
+       d &= \mathrm{normalize}((1 - k)\, n + k\, w_r) \\
+       k &= \mathrm{lerp}(1,\ \chi(n \cdot v, \rho),\ \mathrm{smoothstep}(.3, .4, \rho))
+
+    with the mirror direction :math:`w_r` and :math:`\chi` from :func:`brdf_lut`. A normal that faces away from the viewer is
+    negated first.
 
     Args:
         normals: [n, 3] unit.
@@ -95,11 +100,15 @@ def split_sum_shade(
     indirect_s: Tensor | None = None,
     indirect_d: Tensor | None = None,
 ) -> Tensor:
-    """Outgoing linear radiance of points under the pre-integrated light, in one pass.
+    r"""Outgoing linear radiance of points under the pre-integrated light, in one pass.
 
-    ``L = (1 - m)(1 - E_d) albedo (o_d g(n, 1) + i_d) + [m (albedo F1 + F2) + (1 - m) E_d] (o_s g(d, rho) + i_s)``: a
-    metal with Schlick's Fresnel term and a diffuse base under a dielectric of index 1.5 with the exact one, mixed, as
-    the path tracer and Blender have it. g(n, 1) is irradiance / pi, so no further pi appears.
+    .. math::
+
+       L = (1 - m)(1 - E_d)\, albedo\, \left(o_d\, g(n, 1) + i_d\right)
+           + \left[m\, (albedo\, F_1 + F_2) + (1 - m)\, E_d\right] \left(o_s\, g(d, \rho) + i_s\right)
+
+    A metal with Schlick's Fresnel term and a diffuse base under a dielectric of index 1.5 with the exact one are mixed, as the
+    path tracer and Blender have it. g(n, 1) is irradiance / pi, so no further pi appears.
 
     Args:
         normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.

@@ -1,7 +1,7 @@
 """Visibility bits cached on a mesh: occlusion factors and one bounce of light without tracing rays in a training step.
 
-The bits are traced on the CPU (:func:`visibility_bits`, :meth:`VisibilityCache.trace`); the lookups run on the device
-that :meth:`VisibilityCache.to` copied them to.
+The bits are traced on the CPU (:func:`splitnerf.ops.visibility_bits`, :meth:`splitnerf.ops.VisibilityCache.trace`); the
+lookups run on the device that :meth:`splitnerf.ops.VisibilityCache.to` copied them to.
 
 No operator here has a gradient; a backward pass raises.
 """
@@ -85,6 +85,7 @@ class VisibilityCache:
         return VisibilityCache(*(x.to(device) if isinstance(x, Tensor) else x for x in moved))
 
     def n_bytes(self) -> int:
+        """The memory of all its tensors."""
         tensors = (self.vertices, self.normals, self.directions, self.bits, self.hits, self.starts, self.order)
         return sum(t.numel() * t.element_size() for t in tensors)
 
@@ -93,16 +94,21 @@ def cached_occlusion(
     cache: VisibilityCache, positions: Tensor, normals: Tensor, lobe_dirs: Tensor, roughness: Tensor, light: Tensor,
     radiance: Tensor | None = None,
 ) -> tuple[Tensor, Tensor, Tensor | None, Tensor | None]:  # fmt: skip
-    """Occlusion factors of points, and the light that the mesh itself sends to them, from the cached bits.
+    r"""Occlusion factors of points, and the light that the mesh itself sends to them, from the cached bits.
 
     V_i is the open share of direction i among the vertices around the point, weighted by distance and by agreement of
     normals. A vertex does not count for directions below its own horizon; if no vertex counts, V_i = 1. Then
-    ``o_d = sum V_i L_i (w_i.n)+ / sum L_i (w_i.n)+``. o_s is the same ratio with D(w_i, d)(w_i.d)+ [w_i.n > 0] in place
-    of the cosine, where D is at least about two directions wide.
+
+    .. math:: o_d = \frac{\sum_i V_i L_i\, (w_i \cdot n)^+}{\sum_i L_i\, (w_i \cdot n)^+}
+
+    o_s is the same ratio with :math:`D(w_i, d) (w_i \cdot d)^+ [w_i \cdot n > 0]` in place of the cosine, where D is at least
+    about two directions wide.
 
     With ``radiance``, C_i is its row that ``hits`` names for direction i:
-    ``i_d = sum (1 - V_i) C_i (w_i.n)+ / sum (w_i.n)+``, and i_s is the same mean over the lobe. They are added to
-    o_d g(n, 1) and o_s g(d, rho).
+
+    .. math:: i_d = \frac{\sum_i (1 - V_i)\, C_i\, (w_i \cdot n)^+}{\sum_i (w_i \cdot n)^+}
+
+    and i_s is the same mean over the lobe. They are added to o_d g(n, 1) and o_s g(d, rho).
 
     Where no vertex is near, or all near vertices are open in all directions above the horizon, the factors are exactly
     1 and the added light is 0. Where the light is black, the factors are the shares of open directions. Input that is

@@ -1,0 +1,154 @@
+"""The documentation: its commands and snippets run, its reference is complete, and it builds.
+
+Commands run on a tiny scene with options that make them short; :mod:`doc_blocks` says how a page marks what cannot run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from doc_blocks import PAGES, ROOT, Block, blocks_of, inline_commands, name_of
+from tiny_runs import SMALL, as_options, train
+
+import splitnerf.ops as ops
+from splitnerf.cli import DONE, build_parser, main
+from splitnerf.data.images import write_image
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+COMMANDS = next(a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction)).choices
+PAGES_WITH_CODE = [page for page in PAGES if not all(block.language.startswith("{") for block in blocks_of(page))]
+SPHINX = ("sphinx", "myst_parser", "furo", "sphinxarg", "sphinx_copybutton", "sphinx-mathjax-offline")
+
+# What is put behind a command's own options: the last one counts.
+SHORTER = {
+    "train": ["--steps", "8", "--overwrite", *as_options(SMALL)],
+    "export": ["--faces", "500", "--texture-size", "64", "--resolution", "32", "--formats", "glb,obj"],
+    "refine": ["--sweeps", "1"],
+    "relight": ["--spp", "1", "--size", "16", "--overwrite"],
+    "synth": ["--size", "16", "--train", "4", "--test", "2", "--spp", "1"],
+}
+
+
+@pytest.fixture(scope="session")
+def small_world(data, tmp_path_factory) -> Path:
+    """A folder with what the pages call DATA, runs/..., studio.exr and so on, all of them tiny."""
+    world = tmp_path_factory.mktemp("world")
+    shutil.copytree(data, world / "DATA")
+    assert train(data, world / "runs" / "demo", "--steps", "8") == DONE
+    shutil.copytree(data, world / "runs" / "demo" / "data")
+    for name in ("mine", "other", "boombox"):
+        shutil.copytree(world / "runs" / "demo", world / "runs" / name)
+    shutil.copy(world / "runs" / "demo" / "mesh.glb", world / "asset.glb")
+    for name in ("studio.exr", "city.hdr", "sunset.hdr"):
+        write_image(world / name, np.random.default_rng(0).random((8, 16, 3), dtype=np.float32))
+    return world
+
+
+@pytest.fixture
+def world(small_world, tmp_path, monkeypatch) -> Path:
+    """A copy of it to work in."""
+    monkeypatch.chdir(shutil.copytree(small_world, tmp_path / "world"))
+    return Path.cwd()
+
+
+def shorter(words: list[str]) -> list[str]:
+    """A command as it is run: file names in place of patterns, few pixels and steps."""
+    words = [name for word in words for name in (sorted(map(str, Path().glob(word))) if "*" in word else [word])]
+    turns = ["--turntable", "2"] if "--turntable" in words else []
+    views = ["--spp", "1", "--views", "1"] if words[1] == "evaluate" and "--data" in words else []
+    return [*words[1:], *SHORTER.get(words[1], []), *turns, *views]
+
+
+def run_shell(block: Block) -> None:
+    """Parses the commands of a block, and runs those that are not marked."""
+    known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    for words in block.commands:
+        if words[0] == "splitnerf":
+            build_parser().parse_args(words[1:])
+            if block.runs_command(words):
+                if words[1] == "synth":
+                    shutil.rmtree(words[words.index("--out") + 1], ignore_errors=True)
+                assert main(shorter(words)) == DONE, f"{block}: {words}"
+        elif words[0] == "make":
+            assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(), re.MULTILINE), f"{block}: {words}"
+        elif words[:2] == ["pip", "install"]:
+            assert set(re.findall(r"splitnerf\[(\w+)\]", " ".join(words))) <= set(known), f"{block}: {words}"
+        elif words[0] == "python":
+            assert (ROOT / words[1]).is_file(), f"{block}: {words}"
+        else:
+            assert not block.runs_command(words), f"{block}: {words[0]} cannot be tested; mark it, see doc_blocks.py"
+
+
+@pytest.mark.parametrize("page", PAGES_WITH_CODE, ids=name_of)
+def test_code_runs(page, world, capsys):
+    """In the order of the page, as a reader would type it."""
+    names = {"__name__": "__main__"}
+    for block in blocks_of(page):
+        if block.language == "sh":
+            run_shell(block)
+        elif block.language == "python" and block.runs:
+            exec(compile(block.text, str(block), "exec"), names)
+        elif block.language == "json":
+            json.loads(block.text)
+        else:
+            known = block.language == "text" or block.language.startswith("{")
+            assert known or not block.runs, f"{block}: {block.language!r} cannot be tested; mark it, see doc_blocks.py"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_commands_in_the_text_have_the_options_that_they_name(page):
+    for words in inline_commands(page):
+        assert words[1] in COMMANDS, words
+        parser = COMMANDS[words[1]]
+        nested = [c for a in parser._actions if isinstance(a, argparse._SubParsersAction) for c in a.choices.values()]
+        known = {option for p in (parser, *nested) for option in p._option_string_actions}
+        assert {word.partition("=")[0] for word in words if word.startswith("--")} <= known, words
+
+
+def test_links_of_the_readme_lead_to_files():
+    links = re.findall(r"\]\(([^)#]+)[^)]*\)", (ROOT / "README.md").read_text())
+    assert links and all((ROOT / link).exists() for link in links if "://" not in link), links
+
+
+def test_the_reference_holds_every_operator():
+    pages = "\n".join(page.read_text() for page in (ROOT / "docs" / "reference").glob("*.md"))
+    held = re.findall(r"^\.\. (?:autofunction|autoclass|py:data):: (\w+)$", pages, re.MULTILINE)
+    assert sorted(held) == sorted(ops.__all__)
+
+
+@pytest.mark.skipif(
+    any(importlib.util.find_spec(name) is None for name in SPHINX), reason="Sphinx is not there: pip install splitnerf[docs]"
+)
+def test_the_pages_build_without_a_warning(tmp_path):
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", str(ROOT / "docs"), str(tmp_path)]
+    built = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    assert built.returncode == 0, built.stderr
+    page = (tmp_path / "reference" / "rays.html").read_text()
+    assert r"\alpha = \max" in page and "_static/tex-svg.js" in page
+    assert not re.search(r'(?:src|href)="https?://[^"]+\.(?:js|css|woff2?)', page)  # nothing is fetched when it is read
+
+
+def test_the_method_s_figures_are_those_that_the_program_draws(tmp_path, monkeypatch):
+    """Each is shown, and the quick ones are drawn."""
+    monkeypatch.syspath_prepend(ROOT / "tests" / "bench")
+    import method_figures
+
+    shown = re.findall(r"\(figures/method_(\w+)\.png\)", (ROOT / "docs" / "method.md").read_text())
+    assert sorted(shown) == sorted(method_figures.FIGURES)
+    for name in ("lobe", "neus"):
+        method_figures.FIGURES[name]().savefig(tmp_path / "figure.png")
+        assert (tmp_path / "figure.png").stat().st_size > 10_000
