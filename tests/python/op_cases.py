@@ -295,11 +295,11 @@ def with_more(op: str, inputs: tuple, *shared: int, kept: tuple[int, ...] = ()) 
 
 def step_inputs(dtype) -> tuple:
     """Arguments of ``step_numbers``: a gradient of several items, short ones, an empty one, and one number that is too large."""
-    shapes = (5000, 3), (7,), (0, 2), (33, 1), ()
+    shapes = (5000, 3), (7,), (0, 2), (33, 1), (1,)
     gradients = [rand(*shape, seed=i, dtype=dtype) for i, shape in enumerate(shapes)]
-    terms, counts = [rand(2, seed=9, dtype=dtype), rand(seed=8, dtype=dtype)], [torch.tensor(70), torch.tensor([40, 9, 12])]
+    terms, counts = [rand(2, seed=9, dtype=dtype), rand(1, seed=8, dtype=dtype)[0]], [torch.tensor(70), torch.tensor([40, 9, 12])]
     limits = torch.full((10,), 1e6, dtype=dtype).index_fill(0, torch.tensor([5]), 40.0)
-    return gradients, terms, counts, torch.randint(9, (300,), generator=generator(7)), rand(seed=6, dtype=dtype), limits
+    return gradients, terms, counts, torch.randint(9, (300,), generator=generator(7)), rand(1, seed=6, dtype=dtype)[0], limits
 
 
 def hash_backward(op: str, dtype, first: int) -> tuple:
