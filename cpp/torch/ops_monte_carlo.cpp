@@ -145,10 +145,14 @@ Tensor summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor d
 
 std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness,
                                                          Tensor directions, Tensor solid_angles, Tensor radiance,
-                                                         Tensor visible, Tensor sent, Tensor grad_sums) {
+                                                         Tensor visible, Tensor sent, Tensor grad_sums,
+                                                         std::optional<Tensor> more_normals,
+                                                         std::optional<Tensor> more_roughness) {
   const char* op = "summed_light_backward";
   const SharedInputs i(op, normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent);
   const Tensor g = checked(op, "grad_sums", grad_sums, {i.n_points(), kLightSums, 3}, i.type);
+  const auto more_n = checked_if(op, "more_normals", more_normals, {i.n_points(), 3}, i.type);
+  const auto more_rho = checked_if(op, "more_roughness", more_roughness, {i.n_points(), 1}, i.type);
   const auto like = [&](const Tensor& t) { return torch::stable::empty_like(t); };
   Tensor grad_normals = like(i.normals), grad_roughness = like(i.roughness), grad_light = like(i.radiance);
   on_device(i.type, [&](auto zero, const auto& device) {
@@ -163,7 +167,9 @@ std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor 
                                                                           in<T>(g),
                                                                           out<T>(grad_normals),
                                                                           out<T>(grad_roughness),
-                                                                          to_light});
+                                                                          to_light,
+                                                                          in_or_null<T>(more_n),
+                                                                          in_or_null<T>(more_rho)});
   });
   return {grad_normals, grad_roughness, grad_light};
 }
@@ -250,7 +256,8 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor "
       "solid_angles, "
-      "Tensor radiance, Tensor visible, Tensor sent, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
+      "Tensor radiance, Tensor visible, Tensor sent, Tensor grad_sums, Tensor? more_normals=None, "
+      "Tensor? more_roughness=None) -> (Tensor, Tensor, Tensor)");
   m.def(
       "monte_carlo_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
       "Tensor radiance, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");

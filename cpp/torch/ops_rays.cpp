@@ -140,17 +140,19 @@ Tensor composite(Tensor weights, Tensor values, Tensor offsets, std::optional<Te
 // The gradient to the opacity is empty where there is none.
 std::tuple<Tensor, Tensor, Tensor> composite_backward(Tensor weights, Tensor values, Tensor offsets,
                                                       std::optional<Tensor> opacity, double least_opacity,
-                                                      Tensor grad_sums) {
+                                                      Tensor grad_sums, std::optional<Tensor> more_opacity) {
   const char* op = "composite_backward";
   const Weighed x(op, weights, values, offsets, opacity, least_opacity);
   const Tensor g = checked(op, "grad_sums", grad_sums, {x.n_rays(), x.values.size(1)}, x.type);
+  const auto more = checked_if(op, "more_opacity", more_opacity, {x.opacity ? x.n_rays() : 0}, x.type);
   Tensor grad_w = empty_like_type(g, {x.weights.size(0)}, x.type),
          grad_v = empty_like_type(g, {x.weights.size(0), x.values.size(1)}, x.type),
          grad_o = empty_like_type(g, {x.opacity ? x.n_rays() : 0}, x.type);
   on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, x.n_rays(),
-               CompositeBackwardBody<T>{x.view<T>(), in<T>(g), out<T>(grad_w), out<T>(grad_v), out<T>(grad_o)});
+               CompositeBackwardBody<T>{x.view<T>(), in<T>(g), out<T>(grad_w), out<T>(grad_v), out<T>(grad_o),
+                                        in_or_null<T>(more)});
   });
   return {grad_w, grad_v, grad_o};
 }
@@ -205,20 +207,26 @@ std::tuple<Tensor, Tensor, Tensor> surface_weights_backward(Tensor sdf, Tensor g
                                                             Tensor offsets, Tensor step, Tensor anneal,
                                                             double min_transmittance, int64_t n_samples, Tensor weights,
                                                             Tensor grad_normals, Tensor grad_weights,
-                                                            Tensor grad_opacity) {
+                                                            Tensor grad_opacity, std::optional<Tensor> more_sdf,
+                                                            std::optional<Tensor> more_gradient) {
   const char* op = "surface_weights_backward";
   const Surface x(op, sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance, n_samples);
   const Tensor w = checked(op, "weights", weights, {x.n}, x.type);
   const Tensor gn = checked(op, "grad_normals", grad_normals, {x.n, 3}, x.type);
   const Tensor gw = checked(op, "grad_weights", grad_weights, {x.n}, x.type);
   const Tensor ga = checked(op, "grad_opacity", grad_opacity, {x.n_rays()}, x.type);
+  const auto more_s = x.sdf.dim() == 2
+                          ? checked_if(op, "more_sdf", more_sdf, {x.n_rows(), x.stride()}, x.type)
+                          : checked_if(op, "more_sdf", more_sdf, {x.n_rows()}, x.type);
+  const auto more_g = checked_if(op, "more_gradient", more_gradient, {x.n_rows(), 3}, x.type);
   Tensor grad_sdf = torch::stable::empty_like(x.sdf), grad_gradient = empty_like_type(w, {x.n_rows(), 3}, x.type);
   Tensor grad_s = empty_like_type(w, {x.n_rays()}, x.type);
   on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, x.n_rays(),
                SurfaceWeightsBackwardBody<T>{x.view<T>(), in<T>(w), in<T>(gn), in<T>(gw), in<T>(ga), out<T>(grad_sdf),
-                                             out<T>(grad_gradient), out<T>(grad_s), device.template scratch<T>(x.n)});
+                                             out<T>(grad_gradient), out<T>(grad_s), device.template scratch<T>(x.n),
+                                             in_or_null<T>(more_s), in_or_null<T>(more_g)});
   });
   return {grad_sdf, grad_gradient, grad_s};
 }
@@ -353,8 +361,8 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "Tensor weights, Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
   m.def("surface_weights(" SPLITNERF_SURFACE "=-1) -> (Tensor, Tensor, Tensor)");
   m.def("surface_weights_backward(" SPLITNERF_SURFACE
-        ", Tensor weights, Tensor grad_normals, "
-        "Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
+        ", Tensor weights, Tensor grad_normals, Tensor grad_weights, Tensor grad_opacity, "
+        "Tensor? more_sdf=None, Tensor? more_gradient=None) -> (Tensor, Tensor, Tensor)");
   m.def(
       "spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray, int "
       "max_shaded=-1, int max_stretches=-1, Tensor? unit=None) -> (Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, "
@@ -368,7 +376,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "Tensor");
   m.def(
       "composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor? opacity, float least_opacity, Tensor "
-      "grad_sums) -> (Tensor, Tensor, Tensor)");
+      "grad_sums, Tensor? more_opacity=None) -> (Tensor, Tensor, Tensor)");
   m.def("sharpness(Tensor variance) -> Tensor");
   m.def("sharpness_backward(Tensor variance, Tensor grad_s) -> Tensor");
 }

@@ -1,4 +1,4 @@
-// take_rows and put_rows as torch operators.
+// take_rows, put_rows and clear_unless_ as torch operators.
 #include <algorithm>
 #include <vector>
 
@@ -70,15 +70,34 @@ std::vector<Tensor> put_rows(std::vector<Tensor> tensors, Tensor index, std::vec
   return sums;
 }
 
+void clear_unless(std::vector<Tensor> tensors, Tensor kept) {
+  const char* op = "clear_unless_";
+  check_count(op, tensors.size());
+  const Kind type = real_kind(op, "tensors", tensors[0]);
+  const Tensor flag = checked(op, "kept", kept, {}, type.with(ScalarType::Bool));
+  for (const Tensor& t : tensors) {
+    require(t.is_contiguous(), op, "tensors must be contiguous, as they are written to");
+    require(t.scalar_type() == type.type && t.device() == type.device, op, "tensors must have one dtype and device");
+  }
+  on_device(type, [&](auto zero, const auto& device) {
+    using T = decltype(zero);
+    RowArrays<T> arrays;
+    for (Tensor& t : tensors) arrays.add(t.numel(), t.numel(), 1, nullptr, out<T>(t));
+    device.run(op, arrays.count(), ClearUnlessBody<T>{in<bool>(flag), {arrays}});
+  });
+}
+
 }  // namespace
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("take_rows(Tensor[] tensors, Tensor index) -> Tensor[]");
+  m.def("clear_unless_(Tensor(a!)[] tensors, Tensor kept) -> ()");
   m.def("put_rows(Tensor[] tensors, Tensor index, int[] n_rows) -> Tensor[]");
 }
 
 SPLITNERF_IMPLEMENT(m) {
   m.impl("take_rows", TORCH_BOX(&take_rows));
+  m.impl("clear_unless_", TORCH_BOX(&clear_unless));
   m.impl("put_rows", TORCH_BOX(&put_rows));
 }
 

@@ -63,7 +63,9 @@ std::tuple<Tensor, Tensor> light_queries(Tensor normals, Tensor view_dirs, Tenso
 }
 
 std::tuple<Tensor, Tensor> light_queries_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut,
-                                                  bool mean, Tensor grad_directions, Tensor grad_asked_roughness) {
+                                                  bool mean, Tensor grad_directions, Tensor grad_asked_roughness,
+                                                  std::optional<Tensor> more_normals,
+                                                  std::optional<Tensor> more_roughness) {
   const char* op = "light_queries_backward";
   const Kind type = real_kind(op, "normals", normals);
   const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
@@ -73,12 +75,15 @@ std::tuple<Tensor, Tensor> light_queries_backward(Tensor normals, Tensor view_di
   const Tensor table = checked_lut(op, lut, type);
   const Tensor g = checked(op, "grad_directions", grad_directions, {2 * points, 3}, type);
   const Tensor g_rho = checked(op, "grad_asked_roughness", grad_asked_roughness, {2 * points, 1}, type);
+  const auto more_n = checked_if(op, "more_normals", more_normals, {points, 3}, type);
+  const auto more_rho = checked_if(op, "more_roughness", more_roughness, {points, 1}, type);
   Tensor grad_n = empty_like_type(n, {points, 3}, type), grad_rho = empty_like_type(n, {points, 1}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, points,
                LightQueriesBackwardBody<T>{in<float>(table), mean, points, in<T>(n), in<T>(v), in<T>(rho), in<T>(g),
-                                           in<T>(g_rho), out<T>(grad_n), out<T>(grad_rho)});
+                                           in<T>(g_rho), out<T>(grad_n), out<T>(grad_rho), in_or_null<T>(more_n),
+                                           in_or_null<T>(more_rho)});
   });
   return {grad_n, grad_rho};
 }
@@ -153,12 +158,18 @@ Tensor split_sum_shade(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor r
 std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> split_sum_shade_backward(
     Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular,
     std::optional<Tensor> diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int64_t fresnel_mode,
-    bool compensate, std::optional<Tensor> indirect_s, std::optional<Tensor> indirect_d, Tensor grad_radiance) {
+    bool compensate, std::optional<Tensor> indirect_s, std::optional<Tensor> indirect_d, Tensor grad_radiance,
+    std::optional<Tensor> more_normals, std::optional<Tensor> more_albedo, std::optional<Tensor> more_roughness,
+    std::optional<Tensor> more_metallic) {
   const char* op = "split_sum_shade_backward";
   const ShadeInputs p(op, normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
                       lut, indirect_s, indirect_d);
   const ShadeOptions options = checked_options(op, fresnel_mode, compensate);
   const Tensor g = checked(op, "grad_radiance", grad_radiance, {p.n, 3}, p.type);
+  const auto more_n = checked_if(op, "more_normals", more_normals, {p.n, 3}, p.type),
+             more_a = checked_if(op, "more_albedo", more_albedo, {p.n, 3}, p.type),
+             more_rho = checked_if(op, "more_roughness", more_roughness, {p.n, 1}, p.type),
+             more_m = checked_if(op, "more_metallic", more_metallic, {p.n, 1}, p.type);
   const auto make = [&](int64_t columns) { return empty_like_type(p.normals, {p.n, columns}, p.type); };
   Tensor grad[9] = {make(3),
                     make(3),
@@ -175,7 +186,10 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tenso
     const ShadeArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]),
                             out<T>(grad[4]), out<T>(grad[5]), to_diffuse,      out<T>(grad[7]),
                             out<T>(grad[8]), nullptr,         nullptr};
-    device.run(op, p.n, ShadeBackwardBody<T>{in<float>(p.lut), options, p.n_channels, p.arrays<T>(), in<T>(g), to});
+    const MaterialGradients<T> more{in_or_null<T>(more_n), in_or_null<T>(more_a), in_or_null<T>(more_rho),
+                                    in_or_null<T>(more_m)};
+    device.run(op, p.n,
+               ShadeBackwardBody<T>{in<float>(p.lut), options, p.n_channels, p.arrays<T>(), in<T>(g), to, more});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};
 }
@@ -193,10 +207,12 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("light_queries(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) -> (Tensor, Tensor)");
   m.def(
       "light_queries_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean, "
-      "Tensor grad_directions, Tensor grad_asked_roughness) -> (Tensor, Tensor)");
+      "Tensor grad_directions, Tensor grad_asked_roughness, Tensor? more_normals=None, Tensor? more_roughness=None) -> "
+      "(Tensor, Tensor)");
   m.def("split_sum_shade(" SPLITNERF_POINT "Tensor? indirect_s, Tensor? indirect_d) -> Tensor");
   m.def("split_sum_shade_backward(" SPLITNERF_POINT
-        "Tensor? indirect_s, Tensor? indirect_d, Tensor grad_radiance) -> "
+        "Tensor? indirect_s, Tensor? indirect_d, Tensor grad_radiance, Tensor? more_normals=None, "
+        "Tensor? more_albedo=None, Tensor? more_roughness=None, Tensor? more_metallic=None) -> "
         "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 

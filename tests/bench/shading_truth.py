@@ -154,7 +154,7 @@ class TrueScene(SceneModel):
             field = self.surface(p)
             points = self.shade(light, p, field.outputs, field.features, normals, toward)
             every = torch.arange(len(p))
-            correction = self.quadrature_correction(light, p, normals, toward, points, every)
+            correction = self.quadrature_correction(light, toward, points, every)
             rows.append(points.radiance.index_add(0, *correction))
         self.material.given = None
         return torch.cat(rows)

@@ -98,20 +98,25 @@ TEST(GroupKernels, SurfaceWeightsAndTheirGradients) {
     in.sdf = sdf.data(), in.stride = int64_t(stride), in.n_rows = int64_t(rows);
     Random random(2);
     const auto gn = random.uniforms(3 * n, -1), gw = random.uniforms(n, -1), go = random.uniforms(n_rays, -1);
+    const auto more_sdf = random.uniforms(stride * rows, -1), more_gradient = random.uniforms(3 * rows, -1);
+    const bool adds = stride > 1;  // with another reader of both
+    const double *const others[2] = {adds ? more_sdf.data() : nullptr, adds ? more_gradient.data() : nullptr};
     std::vector<double> normals(3 * n, 9), w(n, 9), o(n_rays), to_sdf(stride * rows, 9), to_gradient(3 * rows, 9),
         to_s(n_rays), depths(n);
     cpu::run(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals.data(), w.data(), o.data()});
     cpu::run(in.rays.n_rays,
              SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(), to_sdf.data(),
-                                                to_gradient.data(), to_s.data(), depths.data()});
+                                                to_gradient.data(), to_s.data(), depths.data(), others[0], others[1]});
     std::vector<double> normals8(3 * n, 7), w8(n, 7), o8(n_rays), to_sdf8(stride * rows, 7), to_gradient8(3 * rows, 7),
         to_s8(n_rays), depths8 = unwritten<double>(int64_t(n));
     on_gpu(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals8.data(), w8.data(), o8.data()});
     on_gpu(in.rays.n_rays,
            SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(), to_sdf8.data(),
-                                              to_gradient8.data(), to_s8.data(), depths8.data()});
+                                              to_gradient8.data(), to_s8.data(), depths8.data(), others[0], others[1]});
     expect_near(normals8, normals, 0), expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
-    for (const double last : {w8.back(), to_gradient8.back(), to_sdf8.back(), normals8.back()}) EXPECT_EQ(last, 0);
+    for (const double last : {w8.back(), normals8.back()}) EXPECT_EQ(last, 0);
+    EXPECT_EQ(to_gradient8.back(), adds ? more_gradient.back() : 0);
+    EXPECT_EQ(to_sdf8.back(), adds ? more_sdf.back() : 0);
     expect_near(to_sdf8, to_sdf, 1e-13), expect_near(to_gradient8, to_gradient, 1e-13);
     expect_near(to_s8, to_s, 1e-13);
   }
@@ -122,14 +127,15 @@ TEST(GroupKernels, CompositeAndItsGradients) {
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays), channels = 5;
   Random random(4);
   const auto w = random.uniforms(n), v = random.uniforms(n * channels, -1), g = random.uniforms(n_rays * channels, -1),
-             opacity = random.uniforms(n_rays);
+             opacity = random.uniforms(n_rays), more = random.uniforms(n_rays, -1);
   for (const double* divisor : {static_cast<const double*>(nullptr), opacity.data()}) {
     const CompositeArrays<double> in{r.packed(), int64_t(channels), w.data(), v.data(), divisor, 0.3};
     const auto run = [&](const auto& launch) {
       std::vector<std::vector<double>> out{std::vector<double>(n_rays * channels, 9), std::vector<double>(n, 9),
                                            std::vector<double>(n * channels, 9), std::vector<double>(n_rays, 9)};
       launch(CompositeBody<double>{in, out[0].data()});
-      launch(CompositeBackwardBody<double>{in, g.data(), out[1].data(), out[2].data(), out[3].data()});
+      launch(CompositeBackwardBody<double>{in, g.data(), out[1].data(), out[2].data(), out[3].data(),
+                                           divisor ? more.data() : nullptr});
       return out;
     };
     const auto a = run([&](const auto&body) { cpu::run(in.rays.n_rays, body); }),
@@ -331,7 +337,7 @@ void check_summed_light(int64_t n, int k, bool with_sent) {
   const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n, 0.05, 1);
   const auto dirs = random.directions(k), angles = random.uniforms(k), radiance = random.uniforms(3 * k);
   const auto visible = random.uniforms(n * k), sent = random.uniforms(3 * n * k),
-             g = random.uniforms(3 * kLightSums * n, -1);
+             g = random.uniforms(3 * kLightSums * n, -1), more = random.uniforms(4 * n, -1);
   const SharedLight<double> light{
       k, dirs.data(), angles.data(), radiance.data(), visible.data(), with_sent ? sent.data() : nullptr};
   auto sums = unwritten<double>(3 * kLightSums * n), to_n = unwritten<double>(3 * n), to_rho = unwritten<double>(n),
@@ -341,7 +347,8 @@ void check_summed_light(int64_t n, int k, bool with_sent) {
   const auto backward = [&](std::vector<double>& n, std::vector<double>& rho_grad, std::vector<double>& light_grad) {
     return SharedLightBackwardBody<double>{k,          normals.data(),  views.data(),
                                            rho.data(), {light},         g.data(),
-                                           n.data(),   rho_grad.data(), {k, visible.data(), light_grad.data()}};
+                                           n.data(),   rho_grad.data(), {k, visible.data(), light_grad.data()},
+                                           more.data(), more.data() + 3 * (more.size() / 4)};
   };
   Gpu gpu;
   cpu::shared_light_backward(n, backward(to_n, to_rho, to_light));

@@ -8,6 +8,7 @@
 #include "splitnerf/bodies/light_losses.h"
 #include "splitnerf/bodies/pixels.h"
 #include "splitnerf/bodies/rows.h"
+#include "splitnerf/bodies/step_numbers.h"
 #include "splitnerf/light_tables.h"
 #include "splitnerf/ops_cpu.h"
 
@@ -38,11 +39,13 @@ TEST(PointKernels, SplitSumShading) {
                                        p + 14 * n, p + 17 * n, p + 17 * n + n * channels,
                                        nullptr,    nullptr};
           };
+          const auto more = random.uniforms(8 * n, -1);
+          const MaterialGradients<double> others{more.data(), more.data() + 3 * n, more.data() + 6 * n, more.data() + 7 * n};
           const ShadeOptions options{mode, compensate};
           cpu::run(n, ShadeBody<double>{brdf_lut(), options, channels, in, radiance.data()});
-          cpu::run(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad.data())});
+          cpu::run(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad.data()), others});
           on_gpu(n, ShadeBody<double>{brdf_lut(), options, channels, in, radiance1.data()});
-          on_gpu(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad1.data())});
+          on_gpu(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad1.data()), others});
           expect_near(radiance1, radiance, 1e-14), expect_near(grad1, grad, 1e-13);
         }
 }
@@ -324,18 +327,72 @@ TEST(PointKernels, TakenAndAddedRows) {
   }
 }
 
+TEST(PointKernels, RowsAreClearedUnlessTheyAreKept) {
+  for (const bool kept : {false, true})
+    for (const int64_t m : {0, 1, 700}) {
+      Random random(106);
+      const std::vector<double> before[] = {random.uniforms(m), random.uniforms(5)};
+      std::vector<double> values[] = {before[0], before[1]};
+      values[1][2] = NAN;
+      RowArrays<double> arrays;
+      for (auto& x : values) arrays.add(int64_t(x.size()), int64_t(x.size()), 1, nullptr, x.data());
+      on_gpu(arrays.count(), ClearUnlessBody<double>{&kept, {arrays}});
+      EXPECT_EQ(std::isnan(values[1][2]), kept);
+      values[1][2] = kept ? before[1][2] : values[1][2];
+      for (int k = 0; k < 2; ++k) expect_near(values[k], kept ? before[k] : std::vector<double>(before[k].size()), 0);
+    }
+}
+
+// Gradients of several sizes, in items of the GPU's size and of the CPU's; more items than threads that add up.
+TEST(PointKernels, StepNumbers) {
+  for (const auto& [most, n_rays] :
+       std::initializer_list<std::pair<int64_t, int64_t>>{{0, 0}, {1, 1}, {700, 300}, {4097, 1}, {540000, 300}}) {
+    Random random(107);
+    const std::vector<double> gradients[] = {random.uniforms(most, -1), {}, random.uniforms(7), random.uniforms(1)};
+    std::vector<int64_t> evaluated(n_rays);
+    for (int64_t& x : evaluated) x = random.below(9);
+    const std::vector<double> terms = random.uniforms(3);
+    const std::vector<int64_t> counts{5, 70};
+    const double s = 60;
+    double squares = 0, sum = 0;
+    for (const auto& x : gradients)
+      for (const double v : x) squares += v * v;
+    for (const int64_t x : evaluated) sum += double(x);
+    const std::vector<double> expected{terms[0], terms[1], terms[2], std::sqrt(squares), 5, 70, sum, s};
+    for (const double limit : {1e6, 70.0}) {
+      const std::vector<double> limits(8, limit);
+      const auto run = [&](int64_t per_item, const auto& launch) {
+        auto numbers = unwritten<double>(8);
+        bool allowed = limit < 100;
+        StepNumbersBody<double> body;
+        body.per_item = per_item;
+        for (const auto& x : gradients) body.add_gradient(x.data(), int64_t(x.size()));
+        for (const double& x : terms) body.terms[body.n_terms++] = &x;
+        for (const int64_t& x : counts) body.counts[body.n_counts++] = &x;
+        body.n_evaluated = n_rays, body.evaluated = evaluated.data(), body.s = &s, body.limits = limits.data();
+        body.numbers = numbers.data(), body.allowed = &allowed;
+        launch(body.count(), body);
+        expect_near(numbers, expected, 1e-10);
+        EXPECT_EQ(allowed, limit > 100);
+      };
+      run(4096, [](int64_t n, const auto& body) { cpu::run(n, body); });
+      run(4, [](int64_t n, const auto& body) { on_gpu(n, body); });
+    }
+  }
+}
+
 TEST(PointKernels, LightQueries) {
   for (const int64_t n : {0, 1, 300})
     for (const bool mean : {false, true}) {
       Random random(115);
       const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n),
-                 g = random.uniforms(6 * n, -1), g_rho = random.uniforms(2 * n, -1);
+                 g = random.uniforms(6 * n, -1), g_rho = random.uniforms(2 * n, -1), more = random.uniforms(4 * n, -1);
       const auto run = [&](const auto& launch) {
         auto out = unwritten<double>(12 * n);
         double* p = out.data();
         launch(LightQueriesBody<double>{brdf_lut(), mean, n, normals.data(), views.data(), rho.data(), p, p + 6 * n});
         launch(LightQueriesBackwardBody<double>{brdf_lut(), mean, n, normals.data(), views.data(), rho.data(), g.data(),
-                                                g_rho.data(), p + 8 * n, p + 11 * n});
+                                                g_rho.data(), p + 8 * n, p + 11 * n, more.data(), more.data() + 3 * n});
         return out;
       };
       const auto a = run([&](const auto&body) { cpu::run(n, body); }),

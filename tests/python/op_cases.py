@@ -287,6 +287,21 @@ def with_gradients(op: str, inputs: tuple, *between: int) -> tuple:
     return *inputs, *(outputs[i] for i in between), *ones_like_outputs(op, inputs)
 
 
+def with_more(op: str, inputs: tuple, *shared: int, kept: tuple[int, ...] = ()) -> tuple:
+    """The same with the gradients that other readers of some inputs found."""
+    more = (torch.randn(inputs[i].shape, generator=generator(20 + i), dtype=torch.float64).to(inputs[i].dtype) for i in shared)
+    return *with_gradients(op, inputs, *kept), *more
+
+
+def step_inputs(dtype) -> tuple:
+    """Arguments of ``step_numbers``: a gradient of several items, short ones, an empty one, and one number that is too large."""
+    shapes = (5000, 3), (7,), (0, 2), (33, 1), (1,)
+    gradients = [rand(*shape, seed=i, dtype=dtype) for i, shape in enumerate(shapes)]
+    terms, counts = [rand(2, seed=9, dtype=dtype), rand(1, seed=8, dtype=dtype)[0]], [torch.tensor(70), torch.tensor([40, 9, 12])]
+    limits = torch.full((10,), 1e6, dtype=dtype).index_fill(0, torch.tensor([5]), 40.0)
+    return gradients, terms, counts, torch.randint(9, (300,), generator=generator(7)), rand(1, seed=6, dtype=dtype)[0], limits
+
+
 def hash_backward(op: str, dtype, first: int) -> tuple:
     """positions (and from `first` = 2 the table), the gradients, the grid's numbers."""
     inputs = hash_inputs("cpu", dtype, 200)
@@ -303,11 +318,12 @@ CASES = {
     "query_direction": lambda t: query_inputs("cpu", t, True, 300),
     "query_direction_backward": lambda t: with_gradients("query_direction", query_inputs("cpu", t, True, 300)),
     "light_queries": lambda t: query_inputs("cpu", t, True, 300),
-    "light_queries_backward": lambda t: with_gradients("light_queries", query_inputs("cpu", t, True, 300)),
+    "light_queries_backward": lambda t: with_more("light_queries", query_inputs("cpu", t, True, 300), 0, 2),
     "take_rows": lambda t: ([rand(40, 3, dtype=t), rand(50, 1, seed=1, dtype=t)], row_numbers()),
     "put_rows": lambda t: ([rand(300, 3, dtype=t), rand(300, 1, seed=1, dtype=t)], row_numbers(), [40, 50]),
+    "step_numbers": step_inputs,
     "split_sum_shade": indirect_inputs,
-    "split_sum_shade_backward": lambda t: with_gradients("split_sum_shade", indirect_inputs(t, 2, 1, stacked=True)),
+    "split_sum_shade_backward": lambda t: with_more("split_sum_shade", indirect_inputs(t, 2, 1, stacked=True), 0, 2, 3, 4),
     "material_network": lambda t: material_inputs(300, t),
     "material_network_backward": lambda t: with_gradients("material_network", material_inputs(300, t)),
     "wide_lobes": lambda t: (row_numbers() % 40, rand(40, 1, dtype=t), 0.3, 0.6, torch.tensor(100)),
@@ -324,7 +340,7 @@ CASES = {
     "monte_carlo_light": lambda t: drawn_inputs(40, 70, t),
     "monte_carlo_light_backward": lambda t: with_gradients("monte_carlo_light", drawn_inputs(40, 70, t)),
     "summed_light": lambda t: shared_inputs(40, dtype=t),
-    "summed_light_backward": lambda t: with_gradients("summed_light", shared_inputs(40, dtype=t)),
+    "summed_light_backward": lambda t: with_more("summed_light", shared_inputs(40, dtype=t), 0, 2),
     "shade_sums": lambda t: mixed_sums_inputs(300, t),
     "shade_sums_backward": lambda t: with_gradients("shade_sums", mixed_sums_inputs(300, t)),
     "linear_to_srgb": lambda t: (rand(40, 7, dtype=t),),
@@ -349,11 +365,11 @@ CASES = {
     "neus_weights": lambda t: neus_inputs("cpu", t, 0.01),
     "neus_weights_backward": lambda t: with_gradients("neus_weights", neus_inputs("cpu", t, 0.01), 0),
     "surface_weights": surface_case,
-    "surface_weights_backward": lambda t: with_gradients("surface_weights", surface_case(t), 1),
+    "surface_weights_backward": lambda t: with_more("surface_weights", surface_case(t), 0, 1, kept=(1,)),
     "sharpness": lambda t: (torch.linspace(-0.2, 1.1, 41, dtype=t),),  # no number is a bound
     "sharpness_backward": lambda t: with_gradients("sharpness", CASES["sharpness"](t)),
     "composite": composite_case,
-    "composite_backward": lambda t: with_gradients("composite", composite_case(t)),
+    "composite_backward": lambda t: with_more("composite", composite_case(t), 3),
     "spread_samples": spread_inputs,
     "sample_rays": sample_rays_inputs,
     "sdf_field": lambda t: sdf_field_inputs(150, t),

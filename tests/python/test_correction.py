@@ -37,13 +37,15 @@ def with_mesh(mesh: trimesh.Trimesh, **settings: object) -> SceneModel:
 
 
 def points_at(roughness: torch.Tensor, split: float) -> tuple:
-    """Where they are, their normals and views, and the points, whose radiance by the split sum is said to be this."""
+    """Their views, and the points, whose radiance by the split sum is said to be this."""
     n, g = len(roughness), generator(2)
     normals = unit(torch.randn(n, 3, generator=g))
     views = unit(normals + 0.5 * unit(torch.randn(n, 3, generator=g)))
     one = torch.ones(n, 1)
-    points = ShadedPoints(torch.full((n, 3), split), torch.full((n, 3), 0.5), roughness, 0 * one, one, one, normals, views)
-    return 0.5 * normals, normals, views, points
+    albedo = torch.full((n, 3), 0.5)
+    return views, ShadedPoints(
+        torch.full((n, 3), split), normals, albedo, roughness, 0 * one, one, one, normals, views, 0.5 * normals
+    )
 
 
 def test_the_sum_comes_in_smoothly_over_its_band():
@@ -73,11 +75,11 @@ def test_the_sum_holds_what_the_mesh_sends():
     x, n = bits.cache.vertices[::5], bits.cache.normals[::5]
     inner = x[:, 2] < -0.1
     one = torch.ones(len(x), 1)
-    points = ShadedPoints(torch.zeros(len(x), 3), torch.ones(len(x), 3), one, 0 * one, one, one, n, n)
+    points = ShadedPoints(torch.zeros(len(x), 3), n, torch.ones(len(x), 3), one, 0 * one, one, one, n, n, x)
     light, found = model.evaluate_light(), []
     for sent in (torch.ones_like(bits.radiance), None):
         bits.radiance = sent
-        found.append(model.quadrature_correction(light, x, n, n, points, torch.arange(len(x)))[1])
+        found.append(model.quadrature_correction(light, n, points, torch.arange(len(x)))[1])
     torch.testing.assert_close(found[0][inner], torch.ones(int(inner.sum()), 3), rtol=0, atol=0.05)
     assert (found[1][inner] < 0.75).all()
 
@@ -86,10 +88,10 @@ def test_visibility_is_asked_on_the_viewers_side():
     model = with_mesh(trimesh.creation.icosphere(2, 0.5))
     asked, visibility = [], model.occlusion.visibility
     model.occlusion.visibility = lambda positions, normals: asked.append((positions, normals)) or visibility(positions, normals)
-    on_surface, normals, views, points = points_at(torch.full((6, 1), 0.9), 0.0)
+    views, points = points_at(torch.full((6, 1), 0.9), 0.0)
     at = torch.tensor([4, 1, 2])
-    model.quadrature_correction(model.evaluate_light(), on_surface, -normals, views, points, at)
-    assert torch.equal(asked[0][0], on_surface[at]) and torch.equal(asked[0][1], normals[at])
+    model.quadrature_correction(model.evaluate_light(), views, points._replace(normals=-points.normals), at)
+    assert torch.equal(asked[0][0], points.on_surface[at]) and torch.equal(asked[0][1], points.facing[at])
 
 
 def test_a_new_mesh_is_lit_and_its_light_bounces_three_times(monkeypatch):
@@ -114,8 +116,8 @@ def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
     rays = torch.tensor([[4.0, 0.3, 0], [4.0, 5.0, 0], [4.0, -0.2, 0.2]]), torch.tensor([[-1.0, 0, 0]] * 3), torch.full((3,), 0.5)
     asked = {}
 
-    def added(light, on_surface, normals, views, points, candidates, *_):
-        asked.update(on_surface=on_surface, candidates=candidates)
+    def added(light, views, points, candidates, *_):
+        asked.update(on_surface=points.on_surface, candidates=candidates)
         return candidates, torch.tensor([[1.0] * 3, [3.0] * 3])
 
     light, found = model.evaluate_light(), find_samples(model, cells, *rays)

@@ -70,11 +70,11 @@ def test_a_step_has_no_more_launches_than_it_had(tmp_path):
     """Those of our operators are as many as their launchers make, each once a step."""
     said = run("launches.py", "--steps", 8, "--out", tmp_path / "launches.md")
     launches = float(re.match(r"(\d+) launches a step", said)[1])
-    assert 90 < launches <= 135
-    for line in ("| sample_rays | 6.0 |", "| spread_samples | 3.0 |", "| sdf_field_backward | 5.0 |"):
+    assert 80 < launches <= 105
+    for line in ("| sample_rays | 7.0 |", "| spread_samples | 3.0 |", "| sdf_field_backward | 5.0 |"):
         assert line in said
     counted = [float(x) for x in re.findall(r"^\| [a-z_]+ \| ([\d.]+) \|$", said, re.MULTILINE)]
-    assert sum(counted) == pytest.approx(launches, rel=0.01)
+    assert sum(counted) == pytest.approx(launches, rel=0.02)  # each line is rounded to a tenth
     assert said.strip() in (tmp_path / "launches.md").read_text()
 
 

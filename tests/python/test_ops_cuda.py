@@ -12,7 +12,7 @@ from splitnerf import _core
 ON_THE_CPU_ALONE = {  # Embree; once a mesh
     "trace_visibility", "occlusion_factors", "incoming_light", "visibility_bits", "vertex_grids"
 }  # fmt: skip
-WRITES_TO_ARGUMENTS = {"adamw_step_", "adamw_steps_"}  # have no outputs: see test_ops_adamw.py
+WRITES_TO_ARGUMENTS = {"adamw_step_", "adamw_steps_", "clear_unless_"}  # have no outputs: see test_ops_adamw.py, test_ops_rows.py
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64], ids=["float32", "float64"])

@@ -12,7 +12,7 @@ from op_checks import check_error, check_op, devices, floats, generator, lib
 from torch.utils._pytree import tree_map
 from torch.utils.checkpoint import checkpoint
 
-from splitnerf.ops import linear_to_srgb, take_rows
+from splitnerf.ops import clear_unless, linear_to_srgb, take_rows
 from splitnerf.ops import _library
 
 INDEX = torch.tensor([4, 0, 0, 2])
@@ -42,6 +42,26 @@ def test_gradients_of_a_row_add_up_and_those_of_others_are_0(device):
     counts = torch.tensor([2.0, 0, 1, 0, 1], device=device, dtype=torch.float64)[:, None]
     assert torch.equal(a.grad, counts.expand(5, 3)) and b.grad is None
     torch.testing.assert_close(c.grad, 2 * counts * c.detach())
+
+
+@each_device
+@pytest.mark.parametrize("kept", [True, False])
+def test_arrays_are_cleared_unless_they_are_kept(device, kept):
+    """With all bits as they were, or 0 wherever a number was, of any kind."""
+    given = [torch.randn(700, 3, device=device), torch.full((5,), torch.nan, device=device), torch.empty(0, 2, device=device)]
+    before = [x.clone() for x in given]
+    clear_unless(given, torch.tensor(kept, device=device))
+    for x, y in zip(given, before):
+        assert torch.equal(x.isnan(), y.isnan()) and torch.equal(x.nan_to_num(9.0), y.nan_to_num(9.0)) if kept else (x == 0).all()
+
+
+def test_what_cannot_be_cleared_is_refused():
+    kept, given = torch.tensor(False), torch.zeros(4, 3)
+    torch.library.opcheck(lib.clear_unless_, ([given], kept))
+    check_error(lambda: clear_unless([given.t()], kept), "clear_unless_", "contiguous")
+    check_error(lambda: clear_unless([given, given.double()], kept), "clear_unless_", "one dtype")
+    check_error(lambda: clear_unless([given], kept[None]), "clear_unless_", "kept must be []", "[1] bool")
+    check_error(lambda: clear_unless([], kept), "clear_unless_", "tensors must be 1 to 16")
 
 
 def test_a_result_that_is_not_used_costs_no_gradient():

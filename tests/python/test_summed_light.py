@@ -76,9 +76,9 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
     )
     one = torch.ones(200, 3)
     split = split_sum_shade(n, views, albedo, rough, metal, light[:200], light[200:], one, one, "exact", True)
-    points = ShadedPoints(split, albedo, rough, metal, one, one, n, n)
+    points = ShadedPoints(split, n, albedo, rough, metal, one, one, n, n, 0.5 * n)
     every = torch.arange(len(n))
-    summed = split.index_add(0, *model.quadrature_correction(lit, 0.5 * n, n, views, points, every))
+    summed = split.index_add(0, *model.quadrature_correction(lit, views, points, every))
     bright = n @ model.light.axis > 0
 
     def error(radiance: torch.Tensor) -> float:
@@ -86,7 +86,7 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
 
     assert error(summed) < 0.035 and 0.06 < error(split) < 0.09
     narrow = points._replace(roughness=torch.full((200, 1), 0.29))
-    assert len(model.quadrature_correction(lit, 0.5 * n, n, views, narrow, every)[0]) == 0  # too narrow for so few directions
+    assert len(model.quadrature_correction(lit, views, narrow, every)[0]) == 0  # too narrow for so few directions
 
 
 @pytest.mark.parametrize("metallic", [0.0, 1.0])
@@ -106,7 +106,7 @@ def test_the_furnace_of_the_whole_model(metallic):
     rough = 0.05 + 0.95 * torch.rand(k, 1, generator=g)
     model.material = Given((torch.ones(k, 3), rough, torch.full((k, 1), metallic)))
     points = model.shade(lit, 0.5 * n, torch.zeros(k, 13), torch.zeros(k, 4), n, views)
-    summed = points.radiance.index_add(0, *model.quadrature_correction(lit, 0.5 * n, n, views, points, torch.arange(k)))
+    summed = points.radiance.index_add(0, *model.quadrature_correction(lit, views, points, torch.arange(k)))
     torch.testing.assert_close(points.radiance, torch.ones(k, 3), rtol=0, atol=0.01)
     assert summed[rough[:, 0] > 0.45].mean().item() == pytest.approx(1.0, abs=0.002)
     assert (summed - 1).abs().max() < 0.05

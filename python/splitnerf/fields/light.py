@@ -12,6 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from splitnerf import _core
+from splitnerf.ops import clear_unless
 
 SAMPLES_RATE = 0.03  # update rate of the running means that decide the light loss's number of directions
 FEWEST_SAMPLES = 64
@@ -160,9 +161,9 @@ class EvaluatedLight:
 
     def keep_grad(self, kept: Tensor) -> None:
         """Makes the accumulated gradients 0 where ``kept``, a [] bool on their device, is false."""
-        for leaf in self.leaves:
-            if leaf.grad is not None:
-                leaf.grad = torch.where(kept, leaf.grad, 0.0)
+        grads = [leaf.grad for leaf in self.leaves if leaf.grad is not None]
+        if grads:
+            clear_unless(grads, kept)
 
 
 def leaf_of(value: Tensor) -> Tensor:

@@ -42,22 +42,23 @@ from splitnerf.ops.rays import (
     spread_samples,
     surface_weights,
 )
-from splitnerf.ops.rows import take_rows
+from splitnerf.ops.rows import clear_unless, take_rows
 from splitnerf.ops.sdf import SdfNetwork, sample_rays, sdf_field, sdf_values
 from splitnerf.ops.shading import FRESNEL_MODES, QUERIES, brdf_lut, light_queries, query_direction, split_sum_shade
 from splitnerf.ops.srgb import linear_to_srgb, srgb_to_linear
+from splitnerf.ops.step_numbers import step_numbers
 from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_visibility, visibility_bits
 
 __all__ = [
     "AdamW", "CELL_EMPTY", "CELL_OCCUPIED", "CELL_OPAQUE", "EdgeRuns", "FRESNEL_MODES", "HashGrid", "HashGridSpec",
     "IncomingLight", "LightSums", "MeshScene", "PackedSamples", "PixelList", "QUERIES", "SdfNetwork", "ShadingSubset",
     "SparseMap", "TexturedSurface", "VisibilityCache", "adamw_step_", "add_corrections", "brdf_lut", "cached_occlusion", "cached_visibility",
-    "composite", "draw_rays", "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian",
+    "clear_unless", "composite", "draw_rays", "fibonacci_directions", "gradient_losses", "growth_for", "hash_encode", "hash_encode_jacobian",
     "incoming_light", "light_averages", "light_filters", "light_lookup", "light_prior", "light_queries",
     "light_sum_of_levels", "linear_to_srgb", "log_chroma", "march_rays", "material_losses", "material_network", "monte_carlo_light",
     "neus_weights", "occlusion_factors", "pixel_losses", "place_samples", "prefilter_light", "probe_points",
     "quadratic_entropy", "query_direction", "read_pixels", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_field",
     "sdf_values", "sh_projection", "shade_sums", "sharpness", "sparse_product", "specular_share", "split_sum_shade",
-    "spread_samples", "srgb_to_linear", "summed_correction", "summed_light", "surface_weights", "take_rows", "trace_visibility", "visibility_bits",
+    "spread_samples", "srgb_to_linear", "step_numbers", "summed_correction", "summed_light", "surface_weights", "take_rows", "trace_visibility", "visibility_bits",
     "wide_lobes", "zonal_factors",
 ]  # fmt: skip

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import torch
+from torch import Tensor
 from torch.autograd import forward_ad
 
 from splitnerf import _core
@@ -59,6 +60,21 @@ class Operator:
             return self._operator(*arguments)
 
 
+    def handing_on(self, *arguments: object) -> tuple[tuple[Tensor, ...], tuple[Tensor, ...]]:
+        """The results, and once more the arguments that :func:`register` names with ``hands_on``, for who reads them next.
+
+        Where several readers of a tensor follow one another so, each adds what the next one sends back to its own gradient, and
+        torch adds nothing.
+        """
+        name = self._packet.__name__
+        which = _HANDED_ON[name]
+        if is_transformed() or not (torch.is_grad_enabled() and torch._C._any_requires_grad(*arguments)):
+            found = self(*arguments)
+            return found if isinstance(found, tuple) else (found,), tuple(arguments[i] for i in which)
+        found = _HANDING_NODES[name](*arguments)
+        return found[: -len(which)], found[-len(which) :]
+
+
 class Operators:
     """All of ``torch.ops.splitnerf``, each an :class:`Operator`, made here: within ``torch.compile`` none can be made."""
 
@@ -79,6 +95,8 @@ class Operators:
 lib = Operators()
 below_autograd = torch._C._AutoDispatchBelowAutograd
 _NODES: dict[str, Callable] = {}
+_HANDING_NODES: dict[str, Callable] = {}
+_HANDED_ON: dict[str, tuple[int, ...]] = {}
 
 
 def is_transformed() -> bool:
@@ -114,6 +132,32 @@ def node_of(name: str, backward: Callable, setup_context: Callable) -> Callable:
     methods = {"forward": staticmethod(forward), "backward": staticmethod(of_output)}
     node = type(f"{name}_gradient", (torch.autograd.Function,), methods)
     return (lambda *arguments: node.apply(sizes_of(arguments), *flattened(arguments))) if has_lists else node.apply
+
+
+def handing_node_of(name: str, backward: Callable, setup_context: Callable, which: tuple[int, ...]) -> Callable:
+    """The gradient of an operator without lists as a node that returns its arguments ``which`` as well, and gives ``backward`` the
+    gradients to these, or None, as `more`."""
+    operator = getattr(torch.ops.splitnerf, name).default
+
+    def forward(ctx, *arguments):
+        with below_autograd():
+            output = operator(*arguments)
+        setup_context(ctx, arguments, output)
+        outputs = output if isinstance(output, tuple) else (output,)
+        ctx.shapes = [(x.shape, x.dtype, x.device) for x in outputs]
+        ctx.set_materialize_grads(False)  # else zeros are made for what nobody reads next
+        return (*outputs, *(arguments[i] for i in which))
+
+    def of_output(ctx, *grads):
+        own = [
+            torch.zeros(shape, dtype=dtype, device=device) if grad is None else grad
+            for grad, (shape, dtype, device) in zip(grads, ctx.shapes)
+        ]
+        found = backward(ctx, *own, more=grads[len(own) :])
+        return found if isinstance(found, tuple) else (found,)
+
+    methods = {"forward": staticmethod(forward), "backward": staticmethod(of_output)}
+    return type(f"{name}_handing_on", (torch.autograd.Function,), methods).apply
 
 
 def is_list(argument: object) -> bool:
@@ -161,10 +205,12 @@ def is_dual(argument: object) -> bool:
     return isinstance(argument, torch.Tensor) and forward_ad.unpack_dual(argument).tangent is not None
 
 
-def register(name: str, *, fake, backward=None, setup_context=None) -> None:
+def register(name: str, *, fake, backward=None, setup_context=None, hands_on: tuple[int, ...] = ()) -> None:
     """Registers the fake implementation and the gradient of ``splitnerf::name``.
 
-    An operator without ``backward`` raises in a backward pass; it never returns a gradient of zeros.
+    An operator without ``backward`` raises in a backward pass; it never returns a gradient of zeros. With ``hands_on``, positions of
+    arguments, ``backward`` takes `more`, what :meth:`Operator.handing_on` says: the gradients that other readers of these arguments
+    found, each None where there is none, to be added to its own.
     """
     qualified = f"splitnerf::{name}"
     torch.library.register_fake(qualified, fake)
@@ -175,6 +221,9 @@ def register(name: str, *, fake, backward=None, setup_context=None) -> None:
     torch.library.register_autograd(qualified, backward or refuse, setup_context=setup_context, lib=_FRAGMENT)
     if backward:
         _NODES[name] = node_of(name, backward, setup_context)
+    if hands_on:
+        _HANDED_ON[name] = hands_on
+        _HANDING_NODES[name] = handing_node_of(name, backward, setup_context, hands_on)
 
 
 _FRAGMENT = NoDuals("splitnerf", "FRAGMENT")

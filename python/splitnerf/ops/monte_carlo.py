@@ -191,7 +191,7 @@ def summed_correction(
     Source: SplitNeRF Eq. (4)-(6), by quadrature.
     """
     nothing = normals.new_empty(0, len(directions), 3)
-    sums = lib.summed_light(
+    (sums,), (normals, roughness) = lib.summed_light.handing_on(
         normals, view_dirs, roughness, directions, solid_angles, radiance, visible, nothing if sent is None else sent
     )
     table = brdf_lut(normals.device)
@@ -208,9 +208,9 @@ def _backward(ctx, grad_sums):
     return normals, None, roughness, None, None, radiance
 
 
-def _shared_backward(ctx, grad_sums):
+def _shared_backward(ctx, grad_sums, more=(None, None)):
     refuse_gradients(ctx, "summed_light", view_dirs=1, directions=3, solid_angles=4, visible=6, sent=7)
-    normals, roughness, radiance = lib.summed_light_backward(*ctx.saved_tensors, grad_sums)
+    normals, roughness, radiance = lib.summed_light_backward(*ctx.saved_tensors, grad_sums, *more)
     return normals, None, roughness, None, None, radiance, None, None
 
 
@@ -256,6 +256,7 @@ register(
     fake=lambda normals, *rest: normals.new_empty(normals.shape[0], len(LightSums._fields), 3),
     setup_context=_keep,
     backward=_shared_backward,
+    hands_on=(0, 2),
 )
 register(
     "summed_light_backward",

@@ -109,7 +109,8 @@ def surface_weights(
     anneal: float | Tensor = 1.0,
     min_transmittance: float = 0.0,
     n_samples: int | None = None,
-) -> tuple[Tensor, Tensor, Tensor]:
+    hand_on: bool = False,
+) -> tuple[Tensor, ...]:
     r"""Normals and rendering weights of samples, from the distance and its gradient at the samples' midpoints.
 
     With :math:`n = \nabla f / |\nabla f|` and the ray's direction d, both ends are estimated from the middle:
@@ -131,19 +132,26 @@ def surface_weights(
         anneal: The annealing of the cosine: 0 at the start of a training, 1 when done; a number or a tensor [].
         min_transmittance: The transmittance below which samples get weight 0, see :func:`neus_weights`.
         n_samples: Only so many of the first points are samples, as if the others were not there; None: all.
+        hand_on: Whether sdf and gradient are returned as well, for who reads them next: the gradients that come back are added
+            to this operator's own, without a launch of their own.
 
     Returns:
-        normals [n_samples, 3], weights [n_samples] and opacity [n_rays]. Differentiable once in sdf, gradient and s.
+        normals [n_samples, 3], weights [n_samples] and opacity [n_rays], then what is handed on. Differentiable once in sdf,
+        gradient and s.
 
     Raises:
         ValueError: A shape, dtype or number does not fit.
 
     Source: NeuS Eq. (13) and its released code's estimate of both ends from one evaluation.
     """
-    return lib.surface_weights(
+    arguments = (
         sdf, gradient, rays_d, s, offsets, _as_tensor(step, sdf), _as_tensor(anneal, sdf), min_transmittance,
         -1 if n_samples is None else n_samples,
     )  # fmt: skip
+    if not hand_on:
+        return lib.surface_weights(*arguments)
+    found, handed = lib.surface_weights.handing_on(*arguments)
+    return *found, *handed
 
 
 def sharpness(variance: Tensor) -> Tensor:
@@ -237,8 +245,9 @@ def spread_samples(
 
 
 def composite(
-    weights: Tensor, values: Tensor, offsets: Tensor, opacity: Tensor | None = None, least_opacity: float = 1e-4
-) -> Tensor:
+    weights: Tensor, values: Tensor, offsets: Tensor, opacity: Tensor | None = None, least_opacity: float = 1e-4,
+    hand_on: bool = False,
+) -> Tensor | tuple[Tensor, Tensor]:  # fmt: skip
     """Weighted sum of the samples' values along each ray or, with the rays' opacity o, their mean: sum / max(o, least).
 
     Args:
@@ -247,6 +256,7 @@ def composite(
         offsets: [n_rays + 1] int64, see :class:`PackedSamples`.
         opacity: [n_rays] what the sums are divided by; None: they are not.
         least_opacity: A smaller opacity counts as this one, and gets no gradient; positive.
+        hand_on: Whether the opacity is returned as well, see :func:`surface_weights`.
 
     Returns:
         [n_rays, c] sums or means; 0 for a ray without samples. Differentiable once in weights, values and opacity.
@@ -254,7 +264,10 @@ def composite(
     Raises:
         ValueError: A shape, dtype or the order of the offsets does not fit.
     """
-    return lib.composite(weights, values, offsets, opacity, least_opacity)
+    if not hand_on:
+        return lib.composite(weights, values, offsets, opacity, least_opacity)
+    (sums,), (opacity,) = lib.composite.handing_on(weights, values, offsets, opacity, least_opacity)
+    return sums, opacity
 
 
 def _fake_march(rays_o, rays_d, jitter, cells, box, step, max_samples):
@@ -285,9 +298,9 @@ def _keep_composite(ctx, inputs, output):
     ctx.save_for_backward(*tensors)
 
 
-def _composite_backward(ctx, grad):
+def _composite_backward(ctx, grad, more=(None,)):
     *_, opacity = tensors = ctx.saved_tensors
-    by_weights, by_values, by_opacity = lib.composite_backward(*tensors, ctx.least_opacity, grad)
+    by_weights, by_values, by_opacity = lib.composite_backward(*tensors, ctx.least_opacity, grad, *more)
     return by_weights, by_values, None, None if opacity is None else by_opacity, None
 
 
@@ -324,7 +337,7 @@ def _keep_surface(ctx, inputs, output):
     ctx.save_for_backward(*tensors, output[1])
 
 
-def _surface_backward(ctx, grad_normals, grad_weights, grad_opacity):
+def _surface_backward(ctx, grad_normals, grad_weights, grad_opacity, more=(None, None)):
     refuse_gradients(ctx, "surface_weights", rays_d=2, step=5, anneal=6)
     *tensors, weights = ctx.saved_tensors
     grad_sdf, grad_gradient, grad_s = lib.surface_weights_backward(
@@ -335,6 +348,7 @@ def _surface_backward(ctx, grad_normals, grad_weights, grad_opacity):
         grad_normals,
         grad_weights,
         grad_opacity,
+        *more,
     )
     return grad_sdf, grad_gradient, None, grad_s.sum(), None, None, None, None, None
 
@@ -350,6 +364,7 @@ register(
     fake=_fake_surface,
     setup_context=_keep_surface,
     backward=_surface_backward,
+    hands_on=(0, 1),
 )
 register(
     "surface_weights_backward",
@@ -392,10 +407,11 @@ register(
     fake=lambda weights, values, offsets, *rest: values.new_empty(offsets.shape[0] - 1, values.shape[1]),
     setup_context=_keep_composite,
     backward=_composite_backward,
+    hands_on=(3,),
 )
 register(
     "composite_backward",
-    fake=lambda weights, values, offsets, opacity=None, least_opacity=1.0, grad=None: (
+    fake=lambda weights, values, offsets, opacity=None, *rest: (
         weights.new_empty(weights.shape), values.new_empty(values.shape),
         weights.new_empty(0 if opacity is None else opacity.shape[0]),
     ),

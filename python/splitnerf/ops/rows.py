@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import torch
 from torch import Tensor
 
 from splitnerf.ops._library import lib, register
@@ -22,6 +23,19 @@ def take_rows(tensors: list[Tensor], index: Tensor) -> list[Tensor]:
         ValueError: A shape or dtype does not fit, or (on the CPU) a number is out of range.
     """
     return list(lib.take_rows(tensors, index))
+
+
+def clear_unless(tensors: list[Tensor], kept: Tensor) -> None:
+    """Makes all numbers of some tensors 0 where `kept` is false, with one launch on a GPU for all of them.
+
+    Args:
+        tensors: 1 to 16 contiguous tensors of one dtype, which are written to.
+        kept: [] bool on their device, which the host need not know.
+
+    Raises:
+        ValueError: A shape or dtype does not fit.
+    """
+    lib.clear_unless_(tensors, kept)
 
 
 def _keep_taken(ctx, inputs, output):
@@ -56,6 +70,7 @@ register(
     setup_context=_keep_taken,
     backward=_taken_backward,
 )
+torch.library.register_fake("splitnerf::clear_unless_", lambda *arguments: None)
 register(
     "put_rows",
     fake=lambda tensors, index, n_rows: [x.new_empty(n, x.shape[1]) for x, n in zip(tensors, n_rows)],

@@ -64,15 +64,19 @@ def query_direction(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query
     return lib.query_direction(normals, view_dirs, roughness, brdf_lut(normals.device), query == "mean")
 
 
-def light_queries(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean") -> tuple[Tensor, Tensor]:
+def light_queries(
+    normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean", hand_on: bool = False
+) -> tuple[Tensor, ...]:
     """What shading asks the pre-integrated light, for the specular and for the diffuse light at once.
 
     Args:
         normals, view_dirs, roughness, query: See :func:`query_direction`.
+        hand_on: Whether normals and roughness are returned as well, see :func:`surface_weights`.
 
     Returns:
         directions [2 n, 3]: those of :func:`query_direction`, then the normals on the viewer's side.
         roughness [2 n, 1]: the points' own, then 1.
+        What is handed on.
         Differentiable once in normals and roughness.
 
     Raises:
@@ -82,7 +86,11 @@ def light_queries(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: 
     """
     if query not in QUERIES:
         raise ValueError(f"light_queries: query must be one of {QUERIES}, got {query!r}")
-    return lib.light_queries(normals, view_dirs, roughness, brdf_lut(normals.device), query == "mean")
+    arguments = normals, view_dirs, roughness, brdf_lut(normals.device), query == "mean"
+    if not hand_on:
+        return lib.light_queries(*arguments)
+    found, handed = lib.light_queries.handing_on(*arguments)
+    return *found, *handed
 
 
 def split_sum_shade(
@@ -99,7 +107,8 @@ def split_sum_shade(
     compensate: bool = False,
     indirect_s: Tensor | None = None,
     indirect_d: Tensor | None = None,
-) -> Tensor:
+    hand_on: bool = False,
+) -> Tensor | tuple[Tensor, ...]:
     r"""Outgoing linear radiance of points under the pre-integrated light, in one pass.
 
     .. math::
@@ -124,9 +133,10 @@ def split_sum_shade(
             the albedo of the metal and .04 of the dielectric (Turquin 2019), as in Blender's Principled BSDF.
         indirect_s, indirect_d: [n, 3] light i_s and i_d >= 0 that the object itself sends to the points, in the
             normalisation of g, or None for none; no gradient.
+        hand_on: Whether normals, albedo, roughness and metallic are returned as well, see :func:`surface_weights`.
 
     Returns:
-        [n, 3] linear radiance.
+        [n, 3] linear radiance, then what is handed on.
 
     Raises:
         ValueError: A shape, dtype or mode does not fit.
@@ -135,10 +145,14 @@ def split_sum_shade(
     """
     if fresnel_mode not in FRESNEL_MODES:
         raise ValueError(f"split_sum_shade: fresnel_mode must be one of {FRESNEL_MODES}, got {fresnel_mode!r}")
-    return lib.split_sum_shade(
+    arguments = (
         normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
         brdf_lut(normals.device), FRESNEL_MODES.index(fresnel_mode), compensate, indirect_s, indirect_d,
     )  # fmt: skip
+    if not hand_on:
+        return lib.split_sum_shade(*arguments)
+    found, handed = lib.split_sum_shade.handing_on(*arguments)
+    return *found, *handed
 
 
 def _keep_query(ctx, inputs, output):
@@ -152,9 +166,9 @@ def _query_backward(ctx, grad):
     return *grads, None, None
 
 
-def _queries_backward(ctx, *grads):
+def _queries_backward(ctx, *grads, more=(None, None)):
     refuse_gradients(ctx, "light_queries", view_dirs=1, lut=3)
-    grad_normals, grad_roughness = lib.light_queries_backward(*ctx.saved_tensors, ctx.mean, *grads)
+    grad_normals, grad_roughness = lib.light_queries_backward(*ctx.saved_tensors, ctx.mean, *grads, *more)
     return grad_normals, None, grad_roughness, None, None
 
 
@@ -163,10 +177,10 @@ def _keep_shade(ctx, inputs, output):
     ctx.options = inputs[10:12]
 
 
-def _shade_backward(ctx, grad):
+def _shade_backward(ctx, grad, more=(None, None, None, None)):
     refuse_gradients(ctx, "split_sum_shade", lut=9, indirect_s=12, indirect_d=13)
     *points, indirect_s, indirect_d = ctx.saved_tensors
-    grads = list(lib.split_sum_shade_backward(*points, *ctx.options, indirect_s, indirect_d, grad))
+    grads = list(lib.split_sum_shade_backward(*points, *ctx.options, indirect_s, indirect_d, grad, *more))
     if points[6] is None:
         grads[6] = None
     return *grads, None, None, None, None, None
@@ -191,6 +205,7 @@ register(
     ),
     setup_context=_keep_query,
     backward=_queries_backward,
+    hands_on=(0, 2),
 )  # fmt: skip
 register(
     "light_queries_backward",
@@ -201,6 +216,7 @@ register(
     fake=lambda normals, *rest: normals.new_empty(normals.shape),
     setup_context=_keep_shade,
     backward=_shade_backward,
+    hands_on=(0, 2, 3, 4),
 )
 register(
     "split_sum_shade_backward",

@@ -36,14 +36,17 @@ class ShadedPoints(NamedTuple):
 
     Attributes:
         radiance: [n, 3] linear radiance towards the camera.
+        normals: [n, 3] unit normals, as they were given.
         albedo: [n, 3] linear, in [0, 1].
         roughness, metallic: [n, 1] in [0, 1]; the roughness is perceptual.
         occlusion_d, occlusion_s: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open.
         facing: [n, 3] unit normals, on the viewer's side.
         lobe_dirs: [n, 3] unit query directions of the specular light.
+        on_surface: [n, 3] the points moved on to the surface, scene units; no gradient.
     """
 
     radiance: Tensor
+    normals: Tensor
     albedo: Tensor
     roughness: Tensor
     metallic: Tensor
@@ -51,6 +54,7 @@ class ShadedPoints(NamedTuple):
     occlusion_s: Tensor
     facing: Tensor
     lobe_dirs: Tensor
+    on_surface: Tensor
 
 
 def on_surface(positions: Tensor, normals: Tensor, sdf: Tensor) -> Tensor:
@@ -184,22 +188,21 @@ class SceneModel(nn.Module):
         c = self.config
         inputs = self.head_inputs(positions, outputs, features)
         albedo, roughness, metallic = self.material(*inputs)
-        asked = light_queries(normals, view_dirs, roughness, c.shading.query)
+        *asked, normals, roughness = light_queries(normals, view_dirs, roughness, c.shading.query, hand_on=True)
         lobe_dirs, facing = asked[0].chunk(2)
-        occlusion = self.occlusion(
-            OcclusionQuery(inputs, on_surface(positions, normals, outputs[:, 0]), facing, lobe_dirs, roughness), segments
-        )
-        shaded = split_sum_shade(
+        surface = on_surface(positions, normals, outputs[:, 0])
+        occlusion = self.occlusion(OcclusionQuery(inputs, surface, facing, lobe_dirs, roughness), segments)
+        shaded, normals, albedo, roughness, metallic = split_sum_shade(
             normals, view_dirs, albedo, roughness, metallic, light(*asked), None, occlusion.specular, occlusion.diffuse,
-            c.shading.fresnel, c.shading.compensate, occlusion.indirect_specular, occlusion.indirect_diffuse,
+            c.shading.fresnel, c.shading.compensate, occlusion.indirect_specular, occlusion.indirect_diffuse, hand_on=True,
         )  # fmt: skip
         return ShadedPoints(
-            shaded, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, facing, lobe_dirs
+            shaded, normals, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, facing, lobe_dirs, surface
         )
 
     def quadrature_correction(
-        self, light: EvaluatedLight, on_surface: Tensor, normals: Tensor, view_dirs: Tensor, points: ShadedPoints,
-        candidates: Tensor, n_candidates: Tensor | None = None,
+        self, light: EvaluatedLight, view_dirs: Tensor, points: ShadedPoints, candidates: Tensor,
+        n_candidates: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
         """The difference between the radiance by quadrature and that by the split sum.
 
@@ -209,8 +212,7 @@ class SceneModel(nn.Module):
 
         Args:
             light: The evaluated light.
-            on_surface: [n, 3] positions on the surface, scene units.
-            normals, view_dirs: [n, 3] unit; view_dirs point to the camera.
+            view_dirs: [n, 3] unit, to the camera.
             points: The result of :meth:`shade` for the points.
             candidates: [k] int64, the indices of points that may be corrected.
             n_candidates: [] int64, the number of leading candidates that count. The others get a correction of 0, and
@@ -226,7 +228,8 @@ class SceneModel(nn.Module):
         middle, half = self.occlusion.summed_from, 0.5 * SUMMED_BAND
         at, share = wide_lobes(candidates, points.roughness.detach(), middle - half, middle + half, n_candidates)
         of_points = [
-            normals, points.albedo, points.roughness, points.metallic, points.radiance, view_dirs, on_surface, points.facing.detach(),
+            points.normals, points.albedo, points.roughness, points.metallic, points.radiance, view_dirs, points.on_surface,
+            points.facing.detach(),
         ]  # fmt: skip
         normals, albedo, roughness, metallic, split, view_dirs, on_surface, facing = take_rows(of_points, at)
         visible, sent = self.occlusion.visibility(on_surface, facing)

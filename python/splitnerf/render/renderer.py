@@ -22,7 +22,7 @@ from splitnerf.ops import (
     surface_weights,
     take_rows,
 )
-from splitnerf.render.model import SceneModel, ShadedPoints, on_surface
+from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
 from splitnerf.render.rays import image_rays
 
@@ -84,6 +84,7 @@ class RenderedRays:
         mean: [n_rays, 3] colour of the object alone, un-premultiplied, not clipped above 1.
         linear: Whether `mean` is linear; otherwise it is sRGB.
         opacity: [n_rays] in [0, 1].
+        s: [] sharpness of the density, 1 / scene units.
         samples: The packed samples.
         evaluated, n_found: See :class:`FoundSamples`.
         weights: [n] rendering weights.
@@ -104,6 +105,7 @@ class RenderedRays:
     mean: Tensor
     linear: bool
     opacity: Tensor
+    s: Tensor
     samples: PackedSamples
     evaluated: Tensor
     n_found: Tensor
@@ -201,22 +203,23 @@ def render_rays(
     """
     c = model.config
     samples, step, n = found.packed, found.step, len(found.directions)
-    field = model.surface(found.positions)
-    normals, weights, opacity = surface_weights(
+    field, s = model.surface(found.positions), model.s
+    normals, weights, opacity, outputs, gradient = surface_weights(
         field.outputs,
         field.gradient,
         found.rays_d,
-        model.s,
+        s,
         samples.offsets,
         step=step,
         anneal=found.anneal,
         min_transmittance=c.sampling.min_transmittance,
         n_samples=n,
+        hand_on=True,
     )
 
     spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP, capacity, step)
     shaded = spread.shaded
-    of_samples = [found.positions, found.directions, normals, field.outputs, field.features]
+    of_samples = [found.positions, found.directions, normals, outputs, field.features]
     positions, directions, normals, outputs, features = take_rows(of_samples, shaded)
     view_dirs = -directions
     sdf = outputs[:, 0]
@@ -224,12 +227,10 @@ def render_rays(
     points = model.shade(light, positions, outputs, features, normals, view_dirs, segments)
     radiance = points.radiance if c.shading.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
-    mean = composite(weights, values, samples.offsets, opacity, MIN_OPACITY)
+    mean, opacity = composite(weights, values, samples.offsets, opacity, MIN_OPACITY, hand_on=True)
     if model.sums_light:
         at, correction = model.quadrature_correction(
             light,
-            on_surface(positions, normals, sdf),
-            normals,
             view_dirs,
             points,
             spread.heaviest,
@@ -239,7 +240,7 @@ def render_rays(
             mean, correction, at, shaded, samples.ray_indices, spread.stretch, shares, opacity.detach(), MIN_OPACITY
         )
     return RenderedRays(
-        mean, c.shading.compositing == "linear", opacity, samples, found.evaluated, found.n_found, weights, values, field.gradient,
+        mean, c.shading.compositing == "linear", opacity, s, samples, found.evaluated, found.n_found, weights, values, gradient,
         found.beside,
         shaded, spread.sizes, shares, positions, normals, sdf, points,
     )  # fmt: skip

@@ -241,7 +241,7 @@ class Training:
         if light_moves(c, self.step):
             light.backward()
             self.light = None
-        past = PastStep.of(self.step + 1, batch, ray, terms, self.take_step.room, self.watch.norm(), self.model.s)
+        past = PastStep.of(self.step + 1, batch, ray, terms, self.take_step.room, self.watch.gradients())
         if self.reads_late:  # else gradients of results without room would stay in the light
             light.keep_grad(past.allowed)
         self.optimiser.step(allowed=past.allowed)

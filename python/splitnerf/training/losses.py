@@ -60,10 +60,6 @@ class Terms(dict[str, Term]):
         flat = values.detach().reshape(-1)
         self.update((name, Term(weight, flat[i])) for i, (name, weight) in enumerate(weights.items()) if weight is not None)
 
-    def values_with(self, *others: Tensor) -> Tensor:
-        """The terms' values in their order, then other numbers [m]: one vector, for one copy to the host."""
-        return torch.cat([*(term.value[None] for term in self.values()), *others])
-
     def backward(self) -> None:
         """Takes the gradients of the weighted sum. The weights seed the backward pass, so that the sum itself is never
         computed."""

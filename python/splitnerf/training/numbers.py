@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from splitnerf.devices import start_fetching
+from splitnerf.ops import step_numbers
 from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.batches import Batch
 from splitnerf.training.finite import LARGEST
@@ -63,12 +64,12 @@ class PastStep:
 
     @classmethod
     def of(
-        cls, step: int, batch: Batch, ray: RenderedRays, terms: Terms, room: Room, norm: Tensor, s: Tensor
+        cls, step: int, batch: Batch, ray: RenderedRays, terms: Terms, room: Room, gradients: list[Tensor]
     ) -> PastStep:
-        """Starts to fetch the numbers of a step from its device; ``norm`` [] is that of all gradients, ``s`` [] the sharpness."""
-        found = ray.n_found[None]
-        numbers = terms.values_with(norm[None], found, ray.sizes, ray.evaluated.sum()[None], s.detach()[None])
-        allowed = (numbers.abs() < _limits(len(terms), room, numbers.device)).all()
+        """Starts to fetch the numbers of a step with these gradients from its device."""
+        values, counts = [term.value for term in terms.values()], [ray.n_found, ray.sizes]
+        limits = _limits(len(terms), room, ray.mean.device)
+        numbers, allowed = step_numbers(gradients, values, counts, ray.evaluated, ray.s.detach(), limits)
         return cls(step, batch, ray, terms, room, allowed, start_fetching(numbers))
 
     def read(self) -> StepNumbers:

@@ -107,6 +107,7 @@ template <class T, class Light, class Receive> struct SumLightBackwardBody {
   const T* grad_sums;
   T *grad_normals, *grad_roughness;
   Receive receive;
+  const T *more_normals = nullptr, *more_roughness = nullptr;  // gradients of other readers, or null
 
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t p) const {
     const LightSumsGrad<T> out =
@@ -114,8 +115,8 @@ template <class T, class Light, class Receive> struct SumLightBackwardBody {
                            load_sums(grad_sums + 3 * kLightSums * p),
                            [&](int i, Vec3<T> grad) { receive(p, i, grad); });
     if (group.lane() > 0) return;
-    store3(grad_normals + 3 * p, out.normal);
-    grad_roughness[p] = out.roughness;
+    store3(grad_normals + 3 * p, out.normal + load3_if(more_normals, p));
+    grad_roughness[p] = out.roughness + load_if(more_roughness, p);
   }
 };
 

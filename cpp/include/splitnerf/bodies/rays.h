@@ -137,17 +137,19 @@ template <class T> struct SurfaceWeightsBody {
 };
 SPLITNERF_ON_GPU(SurfaceWeightsBody);
 
-// grad_sdf [n_rows, stride] and grad_gradient [n_rows, 3]; `depths` [n] is work memory.
+// grad_sdf [n_rows, stride] and grad_gradient [n_rows, 3], to which those of other readers of sdf and gradient are added, where
+// they are not null; `depths` [n] is work memory.
 template <class T> struct SurfaceWeightsBackwardBody {
   SurfaceSamples<T> in;
   const T *weights, *grad_normals, *grad_weights, *grad_opacity;
   T *grad_sdf, *grad_gradient, *grad_s_rays, *depths;
+  const T *more_sdf = nullptr, *more_gradient = nullptr;
 
   SPLITNERF_HD void store(int64_t i, T by_sdf, Vec3<T> by_gradient) const {
-    T* row = grad_sdf + i * in.stride;
-    row[0] = by_sdf;
-    for (int64_t c = 1; c < in.stride; ++c) row[c] = T(0);
-    store3(grad_gradient + 3 * i, by_gradient);
+    const int64_t row = i * in.stride;
+    grad_sdf[row] = by_sdf + load_if(more_sdf, row);
+    for (int64_t c = row + 1; c < row + in.stride; ++c) grad_sdf[c] = load_if(more_sdf, c);
+    store3(grad_gradient + 3 * i, by_gradient + load3_if(more_gradient, i));
   }
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
     const SampleRange ray = in.rays.samples_of(r);
@@ -218,6 +220,7 @@ template <class T> struct CompositeBackwardBody {
   CompositeArrays<T> in;
   const T* grad_sums;
   T *grad_weights, *grad_values, *grad_opacity;
+  const T* more_opacity = nullptr;  // gradient of another reader, or null
 
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
     const SampleRange ray = in.rays.samples_of(r);
@@ -235,7 +238,8 @@ template <class T> struct CompositeBackwardBody {
     }
     if (in.opacity) {
       pulled = group.sum(pulled);
-      if (group.lane() == 0) grad_opacity[r] = in.opacity[r] >= in.least ? T(-pulled / double(divisor)) : T(0);
+      const T own = in.opacity[r] >= in.least ? T(-pulled / double(divisor)) : T(0);
+      if (group.lane() == 0) grad_opacity[r] = own + load_if(more_opacity, r);
     }
     in.rays.for_each_unowned(group, r, [&](int64_t i) {
       grad_weights[i] = T(0);

@@ -51,6 +51,17 @@ template <class T> struct ClearArraysBody {
 };
 SPLITNERF_ON_GPU(ClearArraysBody);
 
+// Clears unless a flag is true.
+template <class T> struct ClearUnlessBody {
+  const bool* kept;
+  ClearArraysBody<T> clear;
+
+  SPLITNERF_HD void operator()(int64_t i) const {
+    if (!*kept) clear(i);
+  }
+};
+SPLITNERF_ON_GPU(ClearUnlessBody);
+
 template <class T> struct AddRowsBody {
   static constexpr bool adds_to_shared = true;
   const int64_t* index;

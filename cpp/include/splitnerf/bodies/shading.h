@@ -61,13 +61,15 @@ template <class T> struct LightQueriesBackwardBody {
   int64_t n;
   const T *normals, *view_dirs, *roughness, *grad_directions, *grad_asked_roughness;
   T *grad_normals, *grad_roughness;
+  const T *more_normals = nullptr, *more_roughness = nullptr;  // gradients of other readers, or null
 
   SPLITNERF_HD void operator()(int64_t i) const {
     const Vec3<T> normal = load3(normals + 3 * i), view = load3(view_dirs + 3 * i);
     const QueryDirectionGrad<T> g =
         query_direction_backward(lut, mean, normal, view, roughness[i], load3(grad_directions + 3 * i));
-    store3(grad_normals + 3 * i, g.normal + load3(grad_directions + 3 * (n + i)) * facing(normal, view));
-    grad_roughness[i] = g.roughness + grad_asked_roughness[i];
+    store3(grad_normals + 3 * i,
+           g.normal + load3(grad_directions + 3 * (n + i)) * facing(normal, view) + load3_if(more_normals, i));
+    grad_roughness[i] = g.roughness + grad_asked_roughness[i] + load_if(more_roughness, i);
   }
 };
 SPLITNERF_ON_GPU(LightQueriesBackwardBody);
@@ -81,11 +83,6 @@ template <class T> SPLITNERF_HD void store_factors(T* factors, int64_t i, int n_
   factors[i] = sum(grad);
 }
 
-// Indirect light, which not all points have.
-template <class T> SPLITNERF_HD Vec3<T> load_indirect(const T* light, int64_t i) {
-  return light ? load3(light + 3 * i) : Vec3<T>{T(0), T(0), T(0)};
-}
-
 template <class T>
 SPLITNERF_HD ShadePoint<T> load_shade_point(const ShadeArrays<const T>& in, int64_t i, int n_channels) {
   return {load3(in.normals + 3 * i),
@@ -97,8 +94,8 @@ SPLITNERF_HD ShadePoint<T> load_shade_point(const ShadeArrays<const T>& in, int6
           load3(in.diffuse + 3 * i),
           load_factors(in.occlusion_s, i, n_channels),
           load_factors(in.occlusion_d, i, n_channels),
-          load_indirect(in.indirect_s, i),
-          load_indirect(in.indirect_d, i)};
+          load3_if(in.indirect_s, i),
+          load3_if(in.indirect_d, i)};
 }
 
 template <class T> struct ShadeBody {
@@ -114,6 +111,11 @@ template <class T> struct ShadeBody {
 };
 SPLITNERF_ON_GPU(ShadeBody);
 
+// The gradients of other readers of the same arguments, each [n, 3] or [n], or null.
+template <class T> struct MaterialGradients {
+  const T *normals, *albedo, *roughness, *metallic;
+};
+
 template <class T> struct ShadeBackwardBody {
   const float* lut;
   ShadeOptions options;
@@ -121,6 +123,7 @@ template <class T> struct ShadeBackwardBody {
   ShadeArrays<const T> in;
   const T* grad_radiance;
   ShadeArrays<T> grad;
+  MaterialGradients<T> more = {};
 
   SPLITNERF_HD void operator()(int64_t i) const {
     const ShadePoint<T> g =
@@ -134,6 +137,13 @@ template <class T> struct ShadeBackwardBody {
     store3(grad.diffuse + 3 * i, g.diffuse);
     store_factors(grad.occlusion_s, i, n_channels, g.occlusion_s);
     store_factors(grad.occlusion_d, i, n_channels, g.occlusion_d);
+    add_more(i);
+  }
+  SPLITNERF_HD void add_more(int64_t i) const {
+    store3(grad.normals + 3 * i, load3(grad.normals + 3 * i) + load3_if(more.normals, i));
+    store3(grad.albedo + 3 * i, load3(grad.albedo + 3 * i) + load3_if(more.albedo, i));
+    grad.roughness[i] += load_if(more.roughness, i);
+    grad.metallic[i] += load_if(more.metallic, i);
   }
 };
 SPLITNERF_ON_GPU(ShadeBackwardBody);

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch.nn import functional as F
 
@@ -121,3 +123,26 @@ def adamw_steps_():
     for average, square, gradient in zip(averages, squares, gradients):
         yield average, 0.1 * gradient
         yield square, 0.01 * gradient**2
+
+
+@check
+def step_numbers():
+    """A loss of .5, gradients whose norm is 5 and N points: all below 100, then N not below N."""
+    gradients, evaluated = [torch.full((N, 1), 3.0 / N**0.5), torch.tensor(4.0)], torch.ones(N, dtype=torch.int64)
+    expected = torch.tensor([0.5, 5.0, 7.0, N, 2.0])
+    for limits in (torch.full((5,), 100.0), expected + torch.tensor([1.0, 1.0, 1.0, 0.0, 1.0])):
+        numbers, allowed = lib.step_numbers(
+            gradients, [torch.tensor(0.5)], [torch.tensor([7])], evaluated, torch.tensor(2.0), limits
+        )
+        yield numbers, expected
+        yield allowed, torch.tensor(bool(limits[3] > N))
+
+
+@check
+def clear_unless_():
+    """Two arrays, one of which holds what is no number, kept and cleared."""
+    for kept in (True, False):
+        arrays = [pattern(N), torch.full((5,), 2.0 if kept else math.nan)]
+        lib.clear_unless_(arrays, torch.tensor(kept))
+        yield arrays[0], pattern(N) * kept
+        yield arrays[1], torch.full((5,), 2.0 * kept)
