@@ -16,6 +16,7 @@ from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.batches import Batch
 from splitnerf.training.finite import LARGEST
 from splitnerf.training.losses import Terms
+from splitnerf.training.ranks import Agreed
 from splitnerf.training.step import Room
 
 
@@ -27,16 +28,16 @@ class StepNumbers(NamedTuple):
         loss: The weighted sum.
         gradient_norm: The Euclidean norm of all gradients.
         counts: The samples found, and those shaded and their segments.
-        n_evaluated: The number of points evaluated to find the samples.
         s: The sharpness of the density.
+        agreed: The counts of all processes of the training, and what else they agreed on.
     """
 
     values: dict[str, float]
     loss: float
     gradient_norm: float
     counts: Room
-    n_evaluated: float
     s: float
+    agreed: Agreed
 
 
 @dataclass
@@ -63,27 +64,30 @@ class PastStep:
 
     @classmethod
     def of(
-        cls, step: int, batch: Batch, ray: RenderedRays, terms: Terms, room: Room, norm: Tensor, s: Tensor
-    ) -> PastStep:
-        """Starts to fetch the numbers of a step from its device; ``norm`` [] is that of all gradients, ``s`` [] the sharpness."""
-        found = ray.n_found[None]
-        numbers = terms.values_with(norm[None], found, ray.sizes, ray.evaluated.sum()[None], s.detach()[None])
-        allowed = (numbers.abs() < _limits(len(terms), room, numbers.device)).all()
+        cls, step: int, batch: Batch, ray: RenderedRays, terms: Terms, room: Room, norm: Tensor, s: Tensor,
+        agreed: Tensor | None = None,
+    ) -> PastStep:  # fmt: skip
+        """Starts to fetch the numbers of a step from its device; ``norm`` [] is that of all gradients, ``s`` [] the sharpness,
+        ``agreed`` what the processes of the training agreed on, if there are several."""
+        own = norm[None], s.detach()[None], ray.n_found[None], ray.sizes, ray.evaluated.sum()[None]
+        numbers = terms.values_with(*own) if agreed is None else terms.values_with(*own, agreed)
+        allowed = (numbers.abs() < _limits(len(terms), room, agreed is not None, numbers.device)).all()
         return cls(step, batch, ray, terms, room, allowed, start_fetching(numbers))
 
     def read(self) -> StepNumbers:
         """The numbers; waits until they are there."""
         numbers, wait = self.fetched
         wait()
-        *values, norm, n_samples, n_shaded, _, n_segments, n_evaluated, s = numbers.tolist()
+        values, (norm, s, *counts) = (part.tolist() for part in numbers.tensor_split([len(self.terms)]))
         loss = sum(term.weight * value for term, value in zip(self.terms.values(), values))
-        counts = Room(n_samples, n_shaded, n_segments)
-        return StepNumbers(dict(zip(self.terms, values)), loss, norm, counts, n_evaluated, s)
+        own, agreed = Agreed(*counts[:5]), Agreed(*counts[-len(Agreed._fields) :])
+        return StepNumbers(dict(zip(self.terms, values)), loss, norm, Room(own.samples, own.shaded, own.segments), s, agreed)
 
 
 @functools.lru_cache(maxsize=256)
-def _limits(n_terms: int, room: Room, device: torch.device) -> Tensor:
+def _limits(n_terms: int, room: Room, several: bool, device: torch.device) -> Tensor:
     """What each of a step's numbers must stay below."""
-    counts = room.samples + 0.5, room.shaded + 0.5, math.inf, room.segments + 0.5
+    counts = Agreed(room.samples + 0.5, room.shaded + 0.5, math.inf, room.segments + 0.5, math.inf)
+    of_all = Agreed(*[math.inf] * len(counts))._replace(without_room=0.5) if several else ()
     with torch.inference_mode(False):
-        return torch.tensor([math.inf] * n_terms + [LARGEST, *counts, math.inf, math.inf], device=device)
+        return torch.tensor([*[math.inf] * n_terms, LARGEST, math.inf, *counts[:5], *of_all], device=device)
