@@ -14,6 +14,7 @@ from tiny_runs import tiny
 
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.training import meshes
 from splitnerf.training.batches import Batch
 from splitnerf.training.finite import Diverged
 from splitnerf.training.loop import Training
@@ -24,7 +25,7 @@ SHARED = {"normal_smoothness": 0.0, "priors_from": 1.0, "foreground_share": 0.6,
 CASES = {
     "shared": SHARED | {"steps": 20, "mesh_every": 0.15},
     "exposures": SHARED | {"steps": 200, "exposure_refine": "yes"},
-    "all": {"steps": 20, "mesh_every": 0.2, "priors_from": 0.2, "open_below": 0.0, "indirect_every": 4},
+    "all": {"steps": 20, "mesh_every": 0.2, "priors_from": 0.2, "open_below": 0.0, "indirect_every": 4, "background_meshes": True},
     "mlp": {"steps": 8, "mesh_every": 0.2, "occlusion": "mlp", "light": "mlp", "shading": "split", "sparse_steps": True},
 }
 N_STEPS = {"shared": 6, "exposures": 8}
@@ -36,7 +37,7 @@ def settings(case: str) -> Config:
 
 
 def steps(training: Training, n: int) -> dict[str, dict[str, torch.Tensor]]:
-    """Makes n steps; returns the gradients of the first, and the parameters and the photos' exposures after the last."""
+    """Makes n steps; returns the gradients of the first, and the parameters, the photos' exposures and the mesh after the last."""
     grads = {}
     for i in range(n):
         training.ranks.stops(False, training.started)
@@ -45,7 +46,11 @@ def steps(training: Training, n: int) -> dict[str, dict[str, torch.Tensor]]:
         if i == 0:
             grads = {name: p.grad.clone() for name, p in training.model.named_parameters() if p.grad is not None}
     parameters = {name: p.detach().clone() for name, p in training.model.named_parameters()}
-    return {"grads": grads, "parameters": parameters, "exposures": {"sums": training.exposures.sums}}
+    training.mesh.poll(wait=True)
+    mesh = training.mesh.current
+    surface = {} if mesh is None else {"vertices": mesh.vertices, "faces": mesh.faces}
+    surface |= {"bits": mesh.bits.cache.bits} if mesh and mesh.bits else {}
+    return {"grads": grads, "parameters": parameters, "exposures": {"sums": training.exposures.sums}, "mesh": surface}
 
 
 def trained(case: str, dataset: Dataset, run: Path, ranks: Alone = ALONE, resume: bool = False) -> dict:
@@ -53,9 +58,14 @@ def trained(case: str, dataset: Dataset, run: Path, ranks: Alone = ALONE, resume
     training = Training(dataset, settings(case), run, torch.device("cpu"), ranks)
     if resume:
         training.restore()
+    torch.rand(ranks.rank)  # the grid's random numbers are those of the first process all the same
     result = steps(training, N_STEPS.get(case, settings(case).run.steps))
     training.save()
     return result
+
+
+def refuse(*_: object) -> None:
+    raise AssertionError("another process than the first one makes a mesh")
 
 
 def words_of_a_bad_ray(dataset: Dataset, run: Path, ranks: Alone) -> str:
@@ -83,6 +93,8 @@ def words_of_a_bad_ray(dataset: Dataset, run: Path, ranks: Alone) -> str:
 def main() -> None:
     dataset, folder = load_dataset(Path(sys.argv[1])), Path(sys.argv[2])
     with joined() as ranks:
+        if not ranks.is_first:
+            meshes.make_mesh = meshes.make_beside = refuse
         for case in CASES:
             torch.save(trained(case, dataset, folder / case, ranks), folder / f"{case}_{ranks.rank}.pt")
         resumed = trained("shared", dataset, folder / "resumed", ranks, resume=True)

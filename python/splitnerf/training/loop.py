@@ -243,9 +243,8 @@ class Training:
 
     def update_grid(self, **how: int | bool) -> None:
         """Classes the grid's cells again, see :meth:`splitnerf.render.occupancy.OccupancyGrid.update`."""
-        if self.ranks.is_first:
-            self.grid.update(self.model.sdf_field.sdf, self.model.s_value, **how)
-        self.grid.cells = self.ranks.spread(self.grid.cells)
+        self.ranks.align(self.model.device)
+        self.grid.update(self.ranks.divided(self.model.sdf_field.sdf), self.model.s_value, **how)
 
     def advance(self, bar: Progress) -> None:
         """Makes one step: draws rays, takes gradients, moves parameters; and reads the numbers of a step, on a GPU of the one

@@ -16,6 +16,7 @@ from typing import NamedTuple, TypeVar
 import torch
 import torch.distributed as dist
 from torch import Tensor
+from torch.nn.functional import pad
 
 from splitnerf.devices import pinned
 from splitnerf.errors import InputError
@@ -104,9 +105,13 @@ class Alone:
         """What ``make`` returns on the first process, on all."""
         return make()
 
-    def spread(self, x: Tensor) -> Tensor:
-        """The first process's tensor, written over those of the others."""
-        return x
+    def divided(self, function: Callable[[Tensor], Tensor]) -> Callable[[Tensor], Tensor]:
+        """A function from points [n, 3] to values [n], of which each process evaluates a part of the points; all call it with the same
+        ones."""
+        return function
+
+    def align(self, device: torch.device) -> None:
+        """Gives torch's own random numbers on a device the state that they have in the first process."""
 
     def read(self, agreed: Agreed) -> None:
         """Takes in what the processes agreed on in a step, once it is known."""
@@ -138,7 +143,7 @@ class Ranks(Alone):
     """The processes of one torchrun. Each draws the whole batch and takes every ``size``-th ray of it.
 
     A step has two collectives: a few dozen numbers between the forward and the backward pass, by :meth:`agree`, and all gradients
-    after it. Decisions that depend on time or on counts are taken from the former, so that they are equal everywhere.
+    after it, by :meth:`sum_gradients`. Decisions that depend on time or on counts are taken from the former, so that they are equal everywhere.
 
     Args:
         rank, size: The number of this process, and of all.
@@ -162,11 +167,15 @@ class Ranks(Alone):
         return Batch(*parts, type(probes)(*(x[mine].contiguous() for x in probes)))
 
     def whole(self, x: Tensor) -> Tensor:
+        return self._gathered(x).transpose(0, 1).flatten(0, 1)
+
+    def _gathered(self, x: Tensor) -> Tensor:
+        """The tensors [n, ...] of all processes, [size, n, ...]."""
         x = x.detach().contiguous()
-        rows = x.new_empty(self.size, *x.shape)
+        parts = x.new_empty(self.size, *x.shape)
         with lost_ranks():
-            dist.all_gather(list(rows.unbind(0)), x)
-        return rows.transpose(0, 1).flatten(0, 1)
+            dist.all_gather(list(parts.unbind(0)), x)
+        return parts
 
     def divisible(self, n: int) -> int:
         return max(self.size, n - n % self.size)
@@ -212,10 +221,23 @@ class Ranks(Alone):
             dist.broadcast_object_list(made, src=0, device=torch.device("cpu"))
         return made[0]
 
-    def spread(self, x: Tensor) -> Tensor:
+    def divided(self, function: Callable[[Tensor], Tensor]) -> Callable[[Tensor], Tensor]:
+        def together(points: Tensor) -> Tensor:
+            n = -(-len(points) // self.size)
+            values = function(points[self.rank * n : (self.rank + 1) * n])
+            return self._gathered(pad(values, (0, n - len(values)))).flatten()[: len(points)]
+
+        return together
+
+    def align(self, device: torch.device) -> None:
+        is_gpu = device.type == "cuda"
+        state = torch.cuda.get_rng_state(device) if is_gpu else torch.get_rng_state()
         with lost_ranks():
-            dist.broadcast(x, src=0)
-        return x
+            dist.broadcast(state, src=0)
+        if is_gpu:
+            torch.cuda.set_rng_state(state, device)
+        else:
+            torch.set_rng_state(state)
 
     def read(self, agreed: Agreed) -> None:
         self._agreed = agreed
