@@ -21,13 +21,18 @@ from splitnerf.training.loop import Training
 from splitnerf.training.ranks import ALONE, Alone, joined
 
 # Every term whose points are not a choice among those of one process: the sum is then that of one process.
-SHARED = {"normal_smoothness": 0.0, "priors_from": 1.0, "foreground_share": 0.6, "hull_until": 0.0, "open_below": 0.0, "grid_every": 4}
+SHARED = {
+    "normal_smoothness": 0.0, "priors_from": 1.0, "foreground_share": 0.6, "hull_until": 0.0, "open_below": 0.0, "grid_every": 4,
+}  # fmt: skip
 CASES = {
     "shared": SHARED | {"steps": 20, "mesh_every": 0.15},
     "exposures": SHARED | {"steps": 200, "exposure_refine": "yes"},
-    "all": {"steps": 20, "mesh_every": 0.2, "priors_from": 0.2, "open_below": 0.0, "indirect_every": 4, "grid_every": 3, "background_meshes": True},
+    "all": {
+        "steps": 20, "mesh_every": 0.2, "priors_from": 0.2, "open_below": 0.0, "indirect_every": 4, "grid_every": 3,
+        "background_meshes": True,
+    },
     "mlp": {"steps": 8, "mesh_every": 0.2, "occlusion": "mlp", "light": "mlp", "shading": "split", "sparse_steps": True},
-}
+}  # fmt: skip
 N_STEPS = {"shared": 6, "exposures": 8}
 
 

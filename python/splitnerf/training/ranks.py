@@ -143,7 +143,8 @@ class Ranks(Alone):
     """The processes of one torchrun. Each draws the whole batch and takes every ``size``-th ray of it.
 
     A step has two collectives: a few dozen numbers between the forward and the backward pass, by :meth:`agree`, and all gradients
-    after it, by :meth:`sum_gradients`. Decisions that depend on time or on counts are taken from the former, so that they are equal everywhere.
+    after it, by :meth:`sum_gradients`. Decisions that depend on time or on counts are taken from the former, so that they are equal
+    everywhere.
 
     Args:
         rank, size: The number of this process, and of all.
@@ -286,7 +287,8 @@ def lost_ranks() -> Iterator[None]:
     except RuntimeError as error:  # gloo's and NCCL's
         ignore_signals()
         raise RankLost(
-            "another process of this training has ended, so all do; to go on from the last checkpoint, repeat the command with --resume"
+            "another process of this training has ended, so all do; to go on from the last checkpoint, repeat the command with "
+            f"--resume ({str(error).partition(chr(10))[0]})"
         ) from error
 
 
