@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_mo
 from splitnerf.training.loop import TrainedScene, Training, check_repeatable, check_same_scene
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS
+from splitnerf.training.ranks import ALONE, Alone
 
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 RUN_FILES = (
@@ -113,34 +114,60 @@ def reconstruct(
     device: torch.device | str = "cpu",
     resume: bool = False,
     overwrite: bool = False,
+    ranks: Alone = ALONE,
 ) -> tuple[TrainedScene, dict | None]:
     """Trains on a dataset and fills the run's folder. Returns the scene and, when finished, its evaluation.
+
+    Of several processes, each of which calls this, the first one alone writes; the others return no evaluation.
 
     Raises:
         InputError: The data, the settings or the run's folder cannot be used; nothing was written or deleted.
         Diverged, EmptyMesh, OSError: See :func:`splitnerf.training.loop.train`.
     """
     check_repeatable(config, device)
-    with held(run):
-        check_run(run, resume=resume, overwrite=overwrite)
-        config, dataset, test = load_with_masks(data, run, config, downscale, overwrite)
-        training = Training(dataset, config, run, torch.device(device))
+    with held_by_first(run, ranks):
+        config, dataset, test = load_in_turn(data, run, config, downscale, resume, overwrite, ranks)
+        training = Training(dataset, config, run, torch.device(device), ranks)
         if resume:
             training.restore()
-        if overwrite:
-            clear_run(run)
-        if dataset.origin.any():
-            meaning = "add it to positions to get those of the data"
-            write_json(run / ORIGIN, {"origin": dataset.origin.tolist(), "meaning": meaning})
-        config.write(run / "config.toml")
+        if ranks.is_first:
+            begin_run(run, config, dataset, overwrite)
         trained = training.complete()
-        if not trained.finished:
+        if not (trained.finished and ranks.is_first):
             return trained, None
         (run / EXPOSURES).unlink(missing_ok=True)
         if trained.exposures is not None:
             dataset = dataset.exposed(trained.exposures)
             write_exposures(run, dataset)
         return trained, finish(trained, dataset, test, run, resume=resume)
+
+
+def held_by_first(run: Path, ranks: Alone) -> AbstractContextManager[None]:
+    """See :func:`splitnerf.files.held`: the first process holds the folder for all."""
+    return held(run) if ranks.is_first else nullcontext()
+
+
+def load_in_turn(
+    data: Path, run: Path, config: Config, downscale: int, resume: bool, overwrite: bool, ranks: Alone
+) -> tuple[Config, Dataset, Dataset | None]:
+    """The result of :func:`load_with_masks` in all processes. The first one checks the folder and finds missing masks, the
+    others then read what it found."""
+    loaded = None
+    if ranks.is_first:
+        check_run(run, resume=resume, overwrite=overwrite)
+        loaded = load_with_masks(data, run, config, downscale, overwrite)
+    config = ranks.of_first(lambda: loaded[0])
+    return loaded or (config, *load_with_masks(data, run, config, downscale, overwrite=False)[1:])
+
+
+def begin_run(run: Path, config: Config, dataset: Dataset, overwrite: bool) -> None:
+    """Writes what a run's folder holds from the start; with ``overwrite`` deletes what a run before left there."""
+    if overwrite:
+        clear_run(run)
+    if dataset.origin.any():
+        meaning = "add it to positions to get those of the data"
+        write_json(run / ORIGIN, {"origin": dataset.origin.tolist(), "meaning": meaning})
+    config.write(run / "config.toml")
 
 
 def load_with_masks(

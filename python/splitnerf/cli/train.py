@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
 from splitnerf.cli.help import examples
 from splitnerf.cli.reading import add_reading_options, reading_options
 from splitnerf.cli.summary import print_scores, print_summary
 from splitnerf.errors import InputError
+
+if TYPE_CHECKING:
+    from splitnerf.config import Config
+    from splitnerf.training.ranks import Alone
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -22,7 +27,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf train data --max-minutes 30", "splitnerf train data --preset fast --downscale 2 --out runs/fast",
             "splitnerf train data --resume auto",
             after="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient alone skips "
-            "its step. The message names where it came from, and the last checkpoint stands: --resume goes on from it.",
+            "its step. The message names where it came from, and the last checkpoint stands: --resume goes on from it. Several processes "
+            "train one scene by `torchrun --nproc-per-node N -m splitnerf.train data` (docs/ranks.md).",
         ),
     )  # fmt: skip
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images; masks help, else the object is looked for")
@@ -82,13 +88,14 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.files import held
+    from splitnerf.training.ranks import joined
+    from splitnerf.workflow import held_by_first
 
     if args.resume and args.overwrite:
         raise InputError("--resume and --overwrite exclude each other")
     run, settings = args.out or Path("runs") / args.data.resolve().name, settings_of(args)
-    with held(run):
-        return train_in(run, args, settings)
+    with joined() as ranks, held_by_first(run, ranks):
+        return train_in(run, args, settings, ranks)
 
 
 def settings_of(args: argparse.Namespace) -> dict[str, object]:
@@ -108,13 +115,56 @@ def settings_of(args: argparse.Namespace) -> dict[str, object]:
     return settings
 
 
-def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object]) -> int:
-    """Trains in a folder that this program holds, and prints the outcome; returns the exit code."""
-    from splitnerf.config import preset
+def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object], ranks: Alone) -> int:
+    """Trains in a folder that the first of the processes holds, and prints the outcome; returns the exit code."""
     from splitnerf.devices import choose_device
     from splitnerf.evaluate.jobs import read_evaluation
+    from splitnerf.training.ranks import one_gpu_each
+    from splitnerf.workflow import reconstruct
+
+    plan = ranks.of_first(lambda: planned(run, args, settings))
+    if plan.is_finished:
+        print(f"{run}: is finished")
+        print_scores(read_evaluation(run))
+        return DONE
+    device = choose_device(plan.device)
+    one_gpu_each(device, ranks)
+    trained, evaluation = reconstruct(
+        args.data, run, plan.config, downscale=args.downscale, device=device, resume=plan.resume, overwrite=plan.overwrite, ranks=ranks
+    )
+    if not ranks.is_first:
+        return DONE
+    if evaluation is None:
+        where = "in the last stage" if trained.finished else f"at step {trained.step}"
+        print(f"stopped {where}; the state is in {run}. To go on, repeat the command with --resume.")
+        return INTERRUPTED
+    print_summary(run, evaluation, trained.step, trained.seconds, device.type)
+    return DONE
+
+
+class Plan(NamedTuple):
+    """What a command does in its run's folder.
+
+    Attributes:
+        config: The settings.
+        device: The name of the device.
+        resume, overwrite: What it does with a run that stands there.
+        is_finished: Whether that run is finished, and nothing is left to do.
+    """
+
+    config: Config
+    device: str
+    resume: bool
+    overwrite: bool
+    is_finished: bool
+
+
+def planned(run: Path, args: argparse.Namespace, settings: dict[str, object]) -> Plan:
+    """What a command does. Raises InputError where its options do not fit the run that stands there."""
+    from splitnerf.config import preset
+    from splitnerf.devices import choose_device
     from splitnerf.training.checkpoint import config_of, load_checkpoint
-    from splitnerf.workflow import begin_or_go_on, is_finished, reconstruct
+    from splitnerf.workflow import begin_or_go_on, is_finished
 
     resume, overwrite = begin_or_go_on(run) if args.resume == "auto" else (bool(args.resume), args.overwrite)
     begun = config_of(load_checkpoint(run / "checkpoint.pt")) if resume else None
@@ -125,19 +175,8 @@ def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object]) -
         if args.preset and not (args.resume == "auto" and args.preset == base.run.preset):
             raise InputError("--preset cannot change in a run that is resumed")
     config = base.replace(settings)
-    if args.resume == "auto" and config == base and is_finished(run):
-        print(f"{run}: is finished")
-        print_scores(read_evaluation(run))
-        return DONE
-    trained, evaluation = reconstruct(
-        args.data, run, config, downscale=args.downscale, device=device, resume=resume, overwrite=overwrite
-    )
-    if evaluation is None:
-        where = "in the last stage" if trained.finished else f"at step {trained.step}"
-        print(f"stopped {where}; the state is in {run}. To go on, repeat the command with --resume.")
-        return INTERRUPTED
-    print_summary(run, evaluation, trained.step, trained.seconds, device.type)
-    return DONE
+    finished = args.resume == "auto" and config == base and is_finished(run)
+    return Plan(config, device.type, resume, overwrite, finished)
 
 
 def device_for(wanted: str, deterministic: bool) -> str:

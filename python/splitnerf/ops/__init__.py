@@ -16,7 +16,14 @@ from splitnerf.ops.light_pyramid import (
     sparse_product,
     zonal_factors,
 )
-from splitnerf.ops.losses import gradient_losses, material_losses, pixel_losses, quadratic_entropy
+from splitnerf.ops.losses import (
+    gradient_losses,
+    material_losses,
+    pixel_losses,
+    quadratic_entropy,
+    totalled_gradient_losses,
+    totalled_material_losses,
+)
 from splitnerf.ops.materials import material_network
 from splitnerf.ops.monte_carlo import (
     LightSums,

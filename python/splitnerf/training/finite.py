@@ -15,6 +15,7 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
 
 MOST_SKIPPED = 10  # steps in a row
+UNEXPLAINED = "none of what it comes from"
 LARGEST = 1e18  # norm of a gradient; the optimiser squares its values, in single precision
 
 
@@ -107,7 +108,7 @@ def explain_loss(
         model: The scene.
     """
     bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term))
-    found = first_not_finite(_data_flow(dataset, batch, model, ray)) or "none of what it comes from"
+    found = first_not_finite(_data_flow(dataset, batch, model, ray)) or UNEXPLAINED
     return Diverged(
         f"step {step}: the loss is not finite ({bad}); first not finite: {found}; "
         "repair the data, or lower --set learning_rate, and --resume"

@@ -145,9 +145,9 @@ class GraphedStep(RoomyStep):
                 ours.grad = theirs.grad.clone() if ours.grad is None else ours.grad.add_(theirs.grad)
         return recorded.outputs
 
-    def settle(self, counts: Room, room: Room, s: float) -> bool:
+    def settle(self, counts: Room, room: Room, s: float, elsewhere: bool = False) -> bool:
         """As :meth:`RoomyStep.settle`; graphs are dropped where a step had too little room."""
-        complete = super().settle(counts, room, s)
+        complete = super().settle(counts, room, s, elsewhere)
         if not complete:
             self._graphs.clear()
         return complete

@@ -40,6 +40,7 @@ from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS, add_metrics, keep_metrics
 from splitnerf.training.numbers import PastStep, StepNumbers
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
+from splitnerf.training.ranks import ALONE, Alone
 from splitnerf.training.repeatable import same_bits
 from splitnerf.training.room import RoomyStep
 from splitnerf.training.schedule import light_moves, light_period, next_ray_count
@@ -65,8 +66,9 @@ class TrainedScene:
 
 
 def train(
-    dataset: Dataset, config: Config, run: Path, *, device: torch.device | str = "cpu", resume: bool = False
-) -> TrainedScene:
+    dataset: Dataset, config: Config, run: Path, *, device: torch.device | str = "cpu", resume: bool = False,
+    ranks: Alone = ALONE,
+) -> TrainedScene:  # fmt: skip
     """Trains a scene and keeps a checkpoint, a log and previews in the run's folder.
 
     The schedule (learning rate, levels, annealing, meshes) follows the progress in [0, 1]: the larger of the share of
@@ -78,17 +80,19 @@ def train(
         config: The run's settings; with ``resume`` pass those of the checkpoint.
         run: The run's folder; it must exist.
         device: The device of images, fields and samples; meshes are extracted and traced on the CPU.
-        resume: Whether to continue from ``run/checkpoint.pt``, which any device may have written.
+        resume: Whether to continue from ``run/checkpoint.pt``, which any device, and any number of processes, may have written.
+        ranks: The processes that train together, each of which calls this; the first one writes the files.
 
     Raises:
         InputError: The checkpoint belongs to another scene or cannot be read, or the settings ask for equal bits on a
             device that cannot repeat them.
         splitnerf.training.finite.Diverged: Numbers are no longer finite, by the rule in that class; the last checkpoint
             is kept.
+        splitnerf.training.ranks.RankLost: Another process has ended; the last checkpoint is kept.
         OSError: The disk is full; the last checkpoint is kept.
     """
     check_repeatable(config, device)
-    training = Training(dataset, config, run, torch.device(device))
+    training = Training(dataset, config, run, torch.device(device), ranks)
     if resume:
         training.restore()
     return training.complete()
@@ -98,12 +102,12 @@ class Training:
     """A training: its scene, optimiser and schedule, with the state that a checkpoint stores.
 
     Args:
-        dataset, config, run, device: See :func:`train`.
+        dataset, config, run, device, ranks: See :func:`train`.
     """
 
-    def __init__(self, dataset: Dataset, config: Config, run: Path, device: torch.device):
+    def __init__(self, dataset: Dataset, config: Config, run: Path, device: torch.device, ranks: Alone = ALONE):
         c = self.config = config
-        self.dataset, self.run = dataset, run
+        self.dataset, self.run, self.ranks = dataset, run, ranks
         self.fingerprint = dataset_fingerprint(dataset)
         torch.manual_seed(c.run.seed)
         self.generator = torch.Generator(device).manual_seed(c.run.seed)
@@ -118,18 +122,20 @@ class Training:
             lenses = source.intrinsics / source.hull_factor
             hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.possible, source.poses, lenses)
         self.grid = make_grid(c, hull, device)
-        self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
-        step = Step if device.type == "cpu" else GraphedStep if c.run.cuda_graphs else RoomyStep
+        self.mesh = SurfaceMesh(self.model, background=c.mesh.background, ranks=ranks)
+        graphs = c.run.cuda_graphs and not ranks.several  # a graph holds no collective
+        step = Step if device.type == "cpu" else GraphedStep if graphs else RoomyStep
         seen = None if dataset.surroundings is None else SeenLight(dataset.surroundings, self.generator.device)
-        self.take_step = step(self.model, self.grid, self.mesh, self.generator, seen)
+        self.take_step = step(self.model, self.grid, self.mesh, self.generator, seen, ranks)
         self.watch = GradientWatch(self.model.parameters())
+        self.of_light = set(self.model.light.parameters())
         self.light: EvaluatedLight | None = None  # evaluated; None after its parameters moved
         self.environment: Tensor | None = None  # the light that weighs traced occlusion
         self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.sampling.initial_rays, 0.0
         self.psnr_mean: float | None = None
         self.unread: deque[PastStep] = deque()
         self.reads_late = 0 if device.type == "cpu" else 1  # steps; a GPU goes on while the host reads
-        self.started = self.saved_at = time.monotonic()
+        self.started, self.saved_at = time.monotonic(), 0.0  # a time of the clock, and seconds of the run
         self.first = True  # step of the run
         self.resumed_at = 0
 
@@ -155,31 +161,36 @@ class Training:
         if content["occlusion_light"]:
             self.model.occlusion.restore_light(content["occlusion_light"])
         self.first, self.resumed_at = self.step == 0, self.step
-        self.started = time.monotonic() - self.seconds
+        self.started, self.saved_at = time.monotonic() - self.seconds, self.seconds
 
     def complete(self) -> TrainedScene:
         """Trains to the end of the schedule, or until a signal asks to stop."""
         c = self.config
-        keep_metrics(self.run / METRICS, self.step)
+        if self.ranks.is_first:
+            keep_metrics(self.run / METRICS, self.step)
         with (
             Interrupt() as interrupt, Progress(self.progress) as bar, same_bits(c.run.deterministic),
             tensor_cores(c.run.tensor_cores), self.take_step.stream(),
         ):  # fmt: skip
             if self.step:
                 interrupt.attempt(self.preview_if_due)  # that an interruption left out
-            while self.progress < 1.0 and not (interrupt.asked and self.may_stop):
+            while self.progress < 1.0 and not (self.ranks.stops(interrupt.asked, self.started) and self.may_stop):
                 self.refresh()
                 self.advance(bar)
                 interrupt.attempt(self.preview_if_due)
-                if time.monotonic() - self.saved_at > 60.0 * c.run.checkpoint_minutes and self.may_stop:
+                if self.seconds - self.saved_at > 60.0 * c.run.checkpoint_minutes and self.may_stop:
                     self.save()
             self.finish()
+        self.ranks.leave()
         return self.result()
 
     def save(self) -> None:
         """Writes the checkpoint."""
         self.settle()
         check_state(self.step, self.model, self.optimiser)
+        self.saved_at = self.seconds
+        if not self.ranks.is_first:
+            return
         save_checkpoint(
             self.run / "checkpoint.pt", config=self.config, fingerprint=self.fingerprint,
             state=dict(
@@ -193,7 +204,6 @@ class Training:
                 box_from_world=torch.from_numpy(self.dataset.box_from_world), **self.mesh.state(),
             ),
         )  # fmt: skip
-        self.saved_at = time.monotonic()
 
     @property
     def progress(self) -> float:
@@ -214,8 +224,7 @@ class Training:
         model.open_levels(progress)
         set_learning_rate(self.optimiser, c, step, progress)
         if self.first or step % c.sampling.grid_every == 0:
-            use_hull = progress < c.sampling.hull_until
-            self.grid.update(model.sdf_field.sdf, model.s_value, first=self.first, step=step, use_hull=use_hull)
+            self.update_grid(first=self.first, step=step, use_hull=progress < c.sampling.hull_until)
         if model.occlusion.needs_mesh and progress - self.mesh.asked_at >= c.mesh.every:
             check_state(step, model, self.optimiser)
             self.mesh.request(progress)
@@ -232,29 +241,39 @@ class Training:
         if c.occlusion.indirect and step % c.occlusion.indirect_every == 0:
             model.refresh_indirect(self.light)
 
+    def update_grid(self, **how: int | bool) -> None:
+        """Classes the grid's cells again, see :meth:`splitnerf.render.occupancy.OccupancyGrid.update`."""
+        self.ranks.align(self.model.device)
+        self.grid.update(self.ranks.divided(self.model.sdf_field.sdf), self.model.s_value, **how)
+
     def advance(self, bar: Progress) -> None:
         """Makes one step: draws rays, takes gradients, moves parameters; and reads the numbers of a step, on a GPU of the one
         before."""
         c, light = self.config, self.light
-        batch = draw_batch(self.source, self.n_rays, c, self.exposures.factors)
+        drawn = draw_batch(self.source, self.ranks.divisible(self.n_rays), c, self.exposures.factors)
+        batch = self.ranks.part(drawn)
         ray, terms = self.take_step(batch, light, self.environment, self.step, self.progress)
         if light_moves(c, self.step):
             light.backward()
             self.light = None
-        past = PastStep.of(self.step + 1, batch, ray, terms, self.take_step.room, self.watch.gradients())
+        self.ranks.sum_gradients(p for p in self.watch.parameters if self.light is None or p not in self.of_light)
+        past = PastStep.of(
+            self.step + 1, batch, ray, terms, self.take_step.room, self.watch.gradients(), self.take_step.agreed
+        )
         if self.reads_late:  # else gradients of results without room would stay in the light
             light.keep_grad(past.allowed)
         self.optimiser.step(allowed=past.allowed)
         past.counted = self.optimiser.counted
         if self.exposures.learned and self.progress > BEGIN:
-            self.exposures.learn(batch.view, batch.target, ray.mean, ray.opacity, past.allowed)
+            mean, opacity = self.ranks.whole(ray.mean), self.ranks.whole(ray.opacity)
+            self.exposures.learn(drawn.view, drawn.target, mean, opacity, past.allowed)
         self.unread.append(past)
         self.step, self.first = self.step + 1, False
         self.settle(bar, self.reads_late)
 
     def preview_if_due(self) -> None:
         """Writes a preview where the last one is old enough."""
-        if self.progress - self.previewed_at >= self.config.run.preview_every:
+        if self.ranks.is_first and self.progress - self.previewed_at >= self.config.run.preview_every:
             write_preview(self.run, self.model, self.grid, self.dataset, self.step)
             self.previewed_at = self.progress
 
@@ -267,22 +286,27 @@ class Training:
         while len(self.unread) > left:
             past = self.unread.popleft()
             numbers = past.read()
-            complete = self.take_step.settle(numbers.counts, past.room, numbers.s)
+            self.ranks.read(agreed := numbers.agreed)
+            complete = self.take_step.settle(numbers.counts, past.room, numbers.s, agreed.without_room > 0)
             if complete and not math.isfinite(numbers.loss):
-                raise explain_loss(past.step - 1, numbers.values, self.dataset, past.batch, self.model, past.ray)
+                raise self.ranks.clearest(
+                    explain_loss(past.step - 1, numbers.values, self.dataset, past.batch, self.model, past.ray)
+                )
             if not complete or not self.watch.allows(past.step - 1, numbers.gradient_norm):
                 self.optimiser.take_back(past.counted)
             if complete:
                 psnr = -10.0 * math.log10(max(numbers.values["colour"], 1e-10))
                 self.psnr_mean = psnr if self.psnr_mean is None else 0.95 * self.psnr_mean + 0.05 * psnr
-            self.n_rays = next_ray_count(len(past.batch.target), numbers.counts.samples, self.config)
-            self.seconds = time.monotonic() - self.started
+            n_rays = self.ranks.size * len(past.batch.target)
+            self.n_rays = next_ray_count(n_rays, agreed.samples, self.config)
+            self.seconds = self.ranks.seconds(self.started)
             if bar is not None:
-                bar.show(self.progress, self.told(past.step, numbers.n_evaluated / len(past.batch.target)))
+                bar.show(self.progress, self.told(past.step, agreed.evaluated / n_rays))
             is_last = self.progress >= 1.0 and not self.unread
             if past.step % LOG_EVERY == 0 or past.step <= LOG_EVERY or is_last:
                 check_state(self.step, self.model, self.optimiser)
-                add_metrics(self.run / METRICS, self.line(past, numbers))
+                if self.ranks.is_first:
+                    add_metrics(self.run / METRICS, self.line(past, numbers))
 
     def told(self, step: int, samples_per_ray: float) -> str:
         """What the bar tells of a step: its number, the batches' mean PSNR in dB and the samples per ray."""
@@ -291,13 +315,14 @@ class Training:
 
     def line(self, past: PastStep, numbers: StepNumbers) -> dict[str, object]:
         """The values of one line of metrics.jsonl, by name."""
-        evaluated, counts, n_rays = max(1, numbers.n_evaluated), numbers.counts, len(past.batch.target)
+        agreed, n_rays = numbers.agreed, self.ranks.size * len(past.batch.target)
+        evaluated = max(1, agreed.evaluated)
         return {
             "step": past.step, "seconds": round(self.seconds, 3), "progress": self.progress, "loss": numbers.loss,
             **{f"loss_{name}": term.weight * numbers.values[name] for name, term in past.terms.items()},
             "psnr": self.psnr_mean,
-            "rays": n_rays, "samples_per_ray": numbers.n_evaluated / n_rays,
-            "kept": counts.samples / evaluated, "shaded": counts.shaded / evaluated,
+            "rays": n_rays, "samples_per_ray": agreed.evaluated / n_rays,
+            "kept": agreed.samples / evaluated, "shaded": agreed.shaded / evaluated,
             "s": numbers.s, "is_unoccluded": self.model.occlusion.is_unoccluded,
             "skipped": self.watch.skipped + self.take_step.n_discarded,
         }  # fmt: skip
@@ -314,7 +339,7 @@ class Training:
             self.mesh.request(1.0)
             self.mesh.poll(wait=True)
         if finished:
-            self.grid.update(self.model.sdf_field.sdf, self.model.s_value)
+            self.update_grid()
         self.save()
 
     def result(self) -> TrainedScene:

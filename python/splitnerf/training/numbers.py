@@ -17,6 +17,7 @@ from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.batches import Batch
 from splitnerf.training.finite import LARGEST
 from splitnerf.training.losses import Terms
+from splitnerf.training.ranks import Agreed
 from splitnerf.training.step import Room
 
 
@@ -28,16 +29,16 @@ class StepNumbers(NamedTuple):
         loss: The weighted sum.
         gradient_norm: The Euclidean norm of all gradients.
         counts: The samples found, and those shaded and their segments.
-        n_evaluated: The number of points evaluated to find the samples.
         s: The sharpness of the density.
+        agreed: The counts of all processes of the training, and what else they agreed on.
     """
 
     values: dict[str, float]
     loss: float
     gradient_norm: float
     counts: Room
-    n_evaluated: float
     s: float
+    agreed: Agreed
 
 
 @dataclass
@@ -64,22 +65,32 @@ class PastStep:
 
     @classmethod
     def of(
-        cls, step: int, batch: Batch, ray: RenderedRays, terms: Terms, room: Room, gradients: list[Tensor]
-    ) -> PastStep:
-        """Starts to fetch the numbers of a step with these gradients from its device."""
+        cls, step: int, batch: Batch, ray: RenderedRays, terms: Terms, room: Room, gradients: list[Tensor],
+        agreed: Tensor | None = None,
+    ) -> PastStep:  # fmt: skip
+        """Starts to fetch the numbers of a step with these gradients from its device; ``agreed`` is what the processes of the
+        training agreed on, if there are several."""
         values, counts = [term.value for term in terms.values()], [ray.n_found, ray.sizes]
         limits = _limits(len(terms), room, ray.mean.device)
         numbers, allowed = step_numbers(gradients, values, counts, ray.evaluated, ray.s.detach(), limits)
+        if agreed is not None:
+            allowed = allowed & (agreed[Agreed._fields.index("without_room")] < 0.5)
+            numbers = torch.cat([numbers, agreed])
         return cls(step, batch, ray, terms, room, allowed, start_fetching(numbers))
 
     def read(self) -> StepNumbers:
         """The numbers; waits until they are there."""
         numbers, wait = self.fetched
         wait()
-        *values, norm, n_samples, n_shaded, _, n_segments, n_evaluated, s = numbers.tolist()
+        values, (norm, *counts, s) = (part.tolist() for part in numbers[: self.n_own].tensor_split([len(self.terms)]))
         loss = sum(term.weight * value for term, value in zip(self.terms.values(), values))
-        counts = Room(n_samples, n_shaded, n_segments)
-        return StepNumbers(dict(zip(self.terms, values)), loss, norm, counts, n_evaluated, s)
+        own, agreed = Agreed(*counts), Agreed(*(numbers[self.n_own :].tolist() or counts))
+        return StepNumbers(dict(zip(self.terms, values)), loss, norm, Room(own.samples, own.shaded, own.segments), s, agreed)
+
+    @property
+    def n_own(self) -> int:
+        """How many of the numbers are of this process alone: terms, norm, five counts, sharpness."""
+        return len(self.terms) + 7
 
 
 @functools.lru_cache(maxsize=256)
