@@ -101,6 +101,12 @@ class Progress:
             times = "<".join(tqdm.format_interval(seconds) for seconds in (elapsed, left))
             print(f"{100 * progress:3.0f}% {times} {told}", file=sys.stderr, flush=True)
 
+    def skip(self, seconds: float) -> None:
+        """Leaves out the last seconds, in which nothing was done."""
+        self._started += seconds
+        if self._is_terminal:  # else tqdm keeps no time
+            self._bar.start_t += seconds
+
     def __exit__(self, *exception) -> None:
         self._bar.close()
 

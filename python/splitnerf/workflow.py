@@ -33,6 +33,8 @@ from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_mo
 from splitnerf.training.loop import TrainedScene, Training, check_repeatable, check_same_scene
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS
+from splitnerf.training.observer import Observer
+from splitnerf.training.schedule import progress_of
 
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 RUN_FILES = (
@@ -113,8 +115,10 @@ def reconstruct(
     device: torch.device | str = "cpu",
     resume: bool = False,
     overwrite: bool = False,
+    observers: Sequence[Observer] = (),
 ) -> tuple[TrainedScene, dict | None]:
-    """Trains on a dataset and fills the run's folder. Returns the scene and, when finished, its evaluation.
+    """Trains on a dataset and fills the run's folder, while observers look on. Returns the scene and, when finished, its
+    evaluation.
 
     Raises:
         InputError: The data, the settings or the run's folder cannot be used; nothing was written or deleted.
@@ -124,7 +128,7 @@ def reconstruct(
     with held(run):
         check_run(run, resume=resume, overwrite=overwrite)
         config, dataset, test = load_with_masks(data, run, config, downscale, overwrite)
-        training = Training(dataset, config, run, torch.device(device))
+        training = Training(dataset, config, run, torch.device(device), observers)
         if resume:
             training.restore()
         if overwrite:
@@ -140,7 +144,7 @@ def reconstruct(
         if trained.exposures is not None:
             dataset = dataset.exposed(trained.exposures)
             write_exposures(run, dataset)
-        return trained, finish(trained, dataset, test, run, resume=resume)
+        return trained, finish(trained, dataset, test, run, resume=resume, observers=training.observers)
 
 
 def load_with_masks(
@@ -180,7 +184,7 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     config = config_of(content)
     model = SceneModel(config)
     restore_model(model, content, run / "checkpoint.pt")
-    model.open_levels(1.0)
+    model.open_levels(progress_of(config, content["step"], content["seconds"]))
     SurfaceMesh(model).restore(content)
     grid = make_grid(config)
     if config.sampling.occupancy == "average":  # averages over the training cannot be recomputed

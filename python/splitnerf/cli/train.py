@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
 from splitnerf.cli.help import examples
 from splitnerf.cli.reading import add_reading_options, reading_options
 from splitnerf.cli.summary import print_scores, print_summary
 from splitnerf.errors import InputError
+
+if TYPE_CHECKING:
+    from splitnerf.training.observer import Observer
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -20,7 +26,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "report.html into the run's folder.",
         epilog=examples(
             "splitnerf train data --max-minutes 30", "splitnerf train data --preset fast --downscale 2 --out runs/fast",
-            "splitnerf train data --resume auto",
+            "splitnerf train data --resume auto", "splitnerf train data --view",
             after="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient alone skips "
             "its step. The message names where it came from, and the last checkpoint stands: --resume goes on from it.",
         ),
@@ -37,7 +43,19 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="continue the run in --out from its checkpoint; auto: begin where there is none, leave a finished run alone",
     )  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
+    parser.add_argument(
+        "--view", nargs="?", const=0, type=port, metavar="PORT",
+        help="print the address of a page that shows the run while it trains, and can pause, save or stop it (default port: a free one)",
+    )  # fmt: skip
+    parser.add_argument("--tensorboard", type=Path, metavar="DIR", help="write the curves and previews for TensorBoard, too")
     parser.set_defaults(execute=run)
+
+
+def port(text: str) -> int:
+    """A port's number; 0 is a free one."""
+    if not (text.isascii() and text.isdigit() and int(text) < 1 << 16):
+        raise argparse.ArgumentTypeError(f"PORT must lie between 0 and 65535, got '{text}'; give DATA before --view")
+    return int(text)
 
 
 def add_alias(parser: argparse.ArgumentParser, alias: str, option: str) -> None:
@@ -98,12 +116,22 @@ def run(args: argparse.Namespace) -> int:
         settings["refinement.enabled"] = False
     if args.deterministic:
         settings["run.deterministic"] = True
-    with held(run):
-        return train_in(run, args, settings)
+    with ExitStack() as stack:
+        observers = []
+        if args.tensorboard:
+            from splitnerf.training.tensorboard import TensorBoard
+
+            observers.append(stack.enter_context(TensorBoard(args.tensorboard)))
+        if args.view is not None:
+            from splitnerf.view.watched import watched
+
+            observers.append(stack.enter_context(watched(run.resolve().name, args.view)))
+        stack.enter_context(held(run))
+        return train_in(run, args, settings, observers)
 
 
-def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object]) -> int:
-    """Trains in a folder that this program holds, and prints the outcome; returns the exit code."""
+def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object], observers: Sequence[Observer] = ()) -> int:
+    """Trains in a folder that this program holds, while observers look on, and prints the outcome; returns the exit code."""
     from splitnerf.config import preset
     from splitnerf.devices import choose_device
     from splitnerf.evaluate.jobs import read_evaluation
@@ -124,8 +152,9 @@ def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object]) -
         print_scores(read_evaluation(run))
         return DONE
     trained, evaluation = reconstruct(
-        args.data, run, config, downscale=args.downscale, device=device, resume=resume, overwrite=overwrite
-    )
+        args.data, run, config, downscale=args.downscale, device=device, resume=resume, overwrite=overwrite,
+        observers=observers,
+    )  # fmt: skip
     if evaluation is None:
         where = "in the last stage" if trained.finished else f"at step {trained.step}"
         print(f"stopped {where}; the state is in {run}. To go on, repeat the command with --resume.")

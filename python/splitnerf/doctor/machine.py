@@ -38,6 +38,7 @@ PACKAGES = (
     Package("rawpy", "rawpy", "raw", "RAW photographs, in prepare"),
     Package("imageio_ffmpeg", "imageio-ffmpeg", "video", "MP4 files, in relight"),
     Package("pxr", "usd-core", "usd", "USDZ files, in export"),
+    Package("tensorboard", "tensorboard", "tensorboard", "TensorBoard's files, in train"),
     Package("lpips", "lpips", "lpips", "LPIPS scores, in evaluate"),
     Package("bpy", "bpy", "blender", "--renderer blender, in synth"),
 )

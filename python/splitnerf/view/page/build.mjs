@@ -1,4 +1,4 @@
-// Builds ../viewer.html, one file without others: the page, its style, and its script with three.js.
+// Builds ../viewer.html, one file without others: the page, its style, and its script with three.js and uPlot.
 import { createHash } from "node:crypto";
 import { readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
@@ -17,10 +17,12 @@ const options = { bundle: true, minify: true, write: false, absWorkingDir: here,
 const script = await build({ ...options, entryPoints: ["src/main.js"], format: "iife", target: "es2022" });
 const style = await build({ ...options, entryPoints: ["src/style.css"] });
 
-const licence = text("node_modules/three/LICENSE").trim();
+const licence = [["three.js", "three"], ["uPlot", "uplot"]]
+  .map(([name, folder]) => `${name}:\n\n${text(`node_modules/${folder}/LICENSE`).trim()}`)
+  .join("\n\n");
 const insert = { HASH: hash.digest("hex"), LICENCE: licence, STYLE: style.outputFiles[0].text, SCRIPT: script.outputFiles[0].text };
 insert.SCRIPT = insert.SCRIPT.replaceAll("</script", "<\\/script");
 const page = text("src/page.html").replace(/\{\{(\w+)\}\}/g, (_, name) => insert[name]);
 writeFileSync(join(here, "..", "viewer.html"), page);
-writeFileSync(join(here, "..", "LICENSES"), `viewer.html contains three.js:\n\n${licence}\n`);
+writeFileSync(join(here, "..", "LICENSES"), `viewer.html contains the following.\n\n${licence}\n`);
 console.log(`viewer.html: ${(page.length / 1024).toFixed(0)} KiB`);
