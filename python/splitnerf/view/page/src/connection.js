@@ -29,6 +29,7 @@ export class Connection {
   close(words) {
     this.closed = true;
     this.source.close();
+    this.line.classList.add("calm");
     this.line.textContent = words;
   }
 
