@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 from types import SimpleNamespace
 
 import pytest
@@ -115,20 +114,11 @@ def test_a_checkpoint_is_saved_when_asked(data, tmp_path):
 
 
 def test_a_pause_is_no_time_of_training(data, tmp_path):
-    class Pausing(Observer):
-        seconds = 0.0
-
-        def between_steps(self, training):
-            if training.step < 8 or self.seconds > 0.3:
-                return None
-            self.since = getattr(self, "since", time.monotonic())
-            self.seconds = time.monotonic() - self.since
-            return Wish.PAUSE
-
-    pausing, began = Pausing(), time.monotonic()
-    scene = trained(data, tmp_path, tiny(steps=16), pausing)
-    assert scene.step == 16 and pausing.seconds > 0.3
-    assert scene.seconds <= time.monotonic() - began - 0.3
+    asking = Asking(8, *[Wish.PAUSE] * 3)
+    training = Training(load_dataset(data), tiny(steps=16), tmp_path, CPU, [asking])
+    started = training.started
+    assert training.complete().step == 16 and not asking.wishes
+    assert training.started - started >= 0.99 * 3 * observer_module.PAUSE
 
 
 def test_the_time_of_a_pause_is_told(monkeypatch):

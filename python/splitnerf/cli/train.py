@@ -26,7 +26,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "report.html into the run's folder.",
         epilog=examples(
             "splitnerf train data --max-minutes 30", "splitnerf train data --preset fast --downscale 2 --out runs/fast",
-            "splitnerf train data --resume auto", "splitnerf train data --view",
+            "splitnerf train data --resume auto --view",
             after="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient alone skips "
             "its step. The message names where it came from, and the last checkpoint stands: --resume goes on from it.",
         ),
@@ -45,7 +45,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
     parser.add_argument(
         "--view", nargs="?", const=0, type=port, metavar="PORT",
-        help="print the address of a page that shows the run while it trains, and can pause, save or stop it (default port: a free one)",
+        help="a page that shows and steers the run while it trains",
     )  # fmt: skip
     parser.add_argument("--tensorboard", type=Path, metavar="DIR", help="write the curves and previews for TensorBoard, too")
     parser.set_defaults(execute=run)
@@ -95,7 +95,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="KEY=VALUE",
         dest="settings",
-        help="change one setting; `splitnerf info --settings` lists them",
+        help="change a setting (see `splitnerf info --settings`)",
     )
 
 
