@@ -87,7 +87,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-refine",
         action="store_true",
-        help="no last stage: deliver what training exports, and give training all minutes",
+        help="deliver what training exports, without a last stage",
     )
     parser.add_argument(
         "--set",
