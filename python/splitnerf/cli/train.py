@@ -45,7 +45,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
     parser.add_argument(
         "--view", nargs="?", const=0, type=port, metavar="PORT",
-        help="a page that shows and steers the run while it trains",
+        help="show the run in a page while it trains",
     )  # fmt: skip
     parser.add_argument("--tensorboard", type=Path, metavar="DIR", help="write the curves and previews for TensorBoard, too")
     parser.set_defaults(execute=run)
@@ -87,7 +87,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-refine",
         action="store_true",
-        help="deliver what training exports, without a last stage",
+        help="no last stage: deliver what training exports, and give training all minutes",
     )
     parser.add_argument(
         "--set",
