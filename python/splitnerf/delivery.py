@@ -35,6 +35,7 @@ from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.report import write_report
 from splitnerf.training.loop import TrainedScene
 from splitnerf.training.metrics import METRICS, read_metrics
+from splitnerf.training.observer import Observer
 from splitnerf.training.repeatable import same_bits
 
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
@@ -54,7 +55,9 @@ def export_folder(run: Path) -> Path:
     return run / TRAINED if is_refined(run) else run
 
 
-def finish(trained: TrainedScene, dataset: Dataset, test: Dataset | None, run: Path, *, resume: bool) -> dict | None:
+def finish(
+    trained: TrainedScene, dataset: Dataset, test: Dataset | None, run: Path, *, resume: bool, observers: Observer = Observer()
+) -> dict | None:
     """Makes the files of a trained run: meshes, environment, evaluation and report, after a last stage if it has one.
 
     Without a surface (:class:`EmptyMesh`) the environment, the evaluation and the report are still written.
@@ -64,6 +67,7 @@ def finish(trained: TrainedScene, dataset: Dataset, test: Dataset | None, run: P
         dataset, test: The train split, and the test split or None.
         run: The run's folder.
         resume: Whether to go on with the last stage, if the scene has not changed since it was interrupted.
+        observers: Who looks on.
 
     Returns:
         The evaluation; None where the last stage was interrupted.
@@ -71,6 +75,7 @@ def finish(trained: TrainedScene, dataset: Dataset, test: Dataset | None, run: P
     config, timings, mesh, failure = trained.model.config, {"training": trained.seconds}, None, None
     last_stage = config.refinement.enabled
     if not (last_stage and resume and trained.n_new == 0 and (run / STATE).is_file()):
+        observers.delivering("export")
         clock = time.monotonic()
         discard_last_stage(run)
         try:
@@ -78,8 +83,9 @@ def finish(trained: TrainedScene, dataset: Dataset, test: Dataset | None, run: P
         except EmptyMesh as error:
             failure = error
         timings["export"] = time.monotonic() - clock
-    if last_stage and not failure and not refine_trained(run, dataset, config, resume):
+    if last_stage and not failure and not refine_trained(run, dataset, config, resume, observers):
         return None
+    observers.delivering("evaluation", run)
     clock = time.monotonic()
     views = test if test is not None else dataset
     if is_refined(run):
@@ -95,7 +101,7 @@ def finish(trained: TrainedScene, dataset: Dataset, test: Dataset | None, run: P
     return evaluated.scores
 
 
-def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool) -> bool:
+def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, observers: Observer) -> bool:
     """Makes the last stage of a run, from what training exported to the run or, in a run that goes on, to RUN/trained.
 
     Photos or an asset that it cannot use leave it out, with a note; the run then delivers what training exported.
@@ -109,6 +115,7 @@ def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool) ->
     """
     if not (run / STATE).is_file():  # else what stands in the run may be a result of the stage that goes on
         move_assets(run, run / TRAINED)
+    observers.delivering("last stage", run / TRAINED)
     settings = RefinementSettings(
         sweeps=config.refinement_sweeps, minutes=config.refinement_minutes, seed=abs(config.run.seed) % (1 << 31)
     )

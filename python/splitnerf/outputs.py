@@ -45,15 +45,17 @@ def render_maps(model: SceneModel, grid: OccupancyGrid, dataset: Dataset, index:
     return {name: value.cpu().numpy() for name, value in maps.items()}
 
 
-def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Dataset, step: int) -> None:
-    """``previews/step_NNNNNN.png``: the first view's photo, render, albedo and normals side by side."""
+def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Dataset, step: int) -> Path:
+    """``previews/step_NNNNNN.png``: the first view's photo, render, albedo and normals side by side; returns its path."""
     maps = render_maps(model, grid, dataset, 0)
     photo = over_background(dataset.images[0, ..., :3], dataset.images[0, ..., 3])
     panels = [photo] + [
         over_background(rgb, maps["alpha"])
         for rgb in (maps["rgb"], linear_to_srgb(maps["albedo"]), 0.5 * maps["normal"] + 0.5)
     ]
-    write_image(run / "previews" / f"step_{step:06d}.png", np.concatenate(panels, axis=1).astype(np.float32))
+    path = run / "previews" / f"step_{step:06d}.png"
+    write_image(path, np.concatenate(panels, axis=1).astype(np.float32))
+    return path
 
 
 @dataclass(frozen=True)

@@ -112,6 +112,12 @@ class Progress:
         yield
         self._bar.refresh()
 
+    def skip(self, seconds: float) -> None:
+        """Leaves out the last seconds, in which nothing was done."""
+        self._started += seconds
+        if self._is_terminal:  # else tqdm keeps no time
+            self._bar.start_t += seconds
+
     def __exit__(self, *exception) -> None:
         self._bar.close()
 

@@ -33,7 +33,9 @@ from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_mo
 from splitnerf.training.loop import TrainedScene, Training, check_repeatable, check_same_scene
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS
+from splitnerf.training.observer import Observer
 from splitnerf.training.ranks import ALONE, Alone
+from splitnerf.training.schedule import progress_of
 
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 RUN_FILES = (
@@ -115,8 +117,10 @@ def reconstruct(
     resume: bool = False,
     overwrite: bool = False,
     ranks: Alone = ALONE,
+    observers: Sequence[Observer] = (),
 ) -> tuple[TrainedScene, dict | None]:
-    """Trains on a dataset and fills the run's folder. Returns the scene and, when finished, its evaluation.
+    """Trains on a dataset and fills the run's folder, while observers look on. Returns the scene and, when finished, its
+    evaluation.
 
     Of several processes, each of which calls this, the first one alone writes; the others return no evaluation.
 
@@ -127,7 +131,7 @@ def reconstruct(
     check_repeatable(config, device)
     with held_by_first(run, ranks):
         config, dataset, test = load_in_turn(data, run, config, downscale, resume, overwrite, ranks)
-        training = Training(dataset, config, run, torch.device(device), ranks)
+        training = Training(dataset, config, run, torch.device(device), observers, ranks)
         if resume:
             training.restore()
         if ranks.is_first:
@@ -139,7 +143,7 @@ def reconstruct(
         if trained.exposures is not None:
             dataset = dataset.exposed(trained.exposures)
             write_exposures(run, dataset)
-        return trained, finish(trained, dataset, test, run, resume=resume)
+        return trained, finish(trained, dataset, test, run, resume=resume, observers=training.observers)
 
 
 def held_by_first(run: Path, ranks: Alone) -> AbstractContextManager[None]:
@@ -207,7 +211,7 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     config = config_of(content)
     model = SceneModel(config)
     restore_model(model, content, run / "checkpoint.pt")
-    model.open_levels(1.0)
+    model.open_levels(progress_of(config, content["step"], content["seconds"]))
     SurfaceMesh(model).restore(content)
     grid = make_grid(config)
     if config.sampling.occupancy == "average":  # averages over the training cannot be recomputed

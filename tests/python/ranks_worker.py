@@ -60,7 +60,7 @@ def steps(training: Training, n: int) -> dict[str, dict[str, torch.Tensor]]:
 
 def trained(case: str, dataset: Dataset, run: Path, ranks: Alone = ALONE, resume: bool = False) -> dict:
     run.mkdir(exist_ok=True, parents=True)
-    training = Training(dataset, settings(case), run, torch.device("cpu"), ranks)
+    training = Training(dataset, settings(case), run, torch.device("cpu"), ranks=ranks)
     if resume:
         training.restore()
     torch.rand(ranks.rank)  # the grid's random numbers are those of the first process all the same
@@ -76,7 +76,7 @@ def refuse(*_: object) -> None:
 def words_of_a_bad_ray(dataset: Dataset, run: Path, ranks: Alone) -> str:
     """What each process says where a photo's value in the last one's rays is not a number."""
     run.mkdir()
-    training = Training(dataset, settings("shared"), run, torch.device("cpu"), ranks)
+    training = Training(dataset, settings("shared"), run, torch.device("cpu"), ranks=ranks)
     part = ranks.part
 
     def bad(batch: Batch) -> Batch:

@@ -5,41 +5,27 @@ Skipped where Node, Chromium or the packages of the pages' sources (`npm ci` the
 
 from __future__ import annotations
 
-import json
-import shutil
-import subprocess
-from pathlib import Path
-
 import numpy as np
 import pytest
+from looking_at import look_at, needs_chromium
 from painted_ball import sky, with_textures
 from PIL import Image
 
-import splitnerf.view
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.export.glb import write_glb
 from splitnerf.report import write_report
 
-SOURCES = Path(splitnerf.view.__file__).parent / "page"
-LOOK = Path(__file__).parents[1] / "viewer/look.mjs"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 RED, BLUE = (0.8, 0.2, 0.2), (0.2, 0.2, 0.7)
 LAMP = (5, 12)  # row and column of a texel of the true light
 NO_WEBGL = """const plain = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function (kind, ...rest) { return kind.startsWith("webgl") ? null : plain.call(this, kind, ...rest); };"""
 
-pytestmark = pytest.mark.skipif(
-    not (shutil.which("node") and CHROMIUM and (SOURCES / "node_modules/playwright-core").is_dir()),
-    reason="needs node, chromium and `make viewer`",
-)
+pytestmark = needs_chromium
 
 
 def look(page, steps):
     """What the page says while it does the steps."""
-    words = ["node", str(LOOK), str(SOURCES), CHROMIUM, page.as_uri()]
-    done = subprocess.run(words, input=json.dumps(steps), capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return look_at(page.as_uri(), steps)
 
 
 def plain(colour, alpha=1.0):

@@ -6,17 +6,14 @@ Skipped where Node, Chromium or the packages of the page's sources (`npm ci` the
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
-import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
+from looking_at import keys, look_at, needs_chromium, serving
+from looking_at import picture as picture_at
 from painted_ball import lamps, looking, with_textures
 from PIL import Image
 
-import splitnerf.view
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.images import area_average, linear_to_srgb, read_image, write_image
 from splitnerf.export.glb import write_glb
@@ -26,33 +23,18 @@ from splitnerf.view.photos import Photos
 from splitnerf.view.server import ViewServer
 from splitnerf.view.shown import Shown
 
-SOURCES = Path(splitnerf.view.__file__).parent / "page"
-LOOK = Path(__file__).parents[1] / "viewer/look.mjs"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 SIZE = 160
 TURN = 90
 CLICKED = 2  # the number of the photo whose camera is clicked
 BARE = "#names, #said, #fold, #legend { display: none !important } #canvas { outline: 0 !important }"  # the picture alone
 
-pytestmark = pytest.mark.skipif(
-    not (shutil.which("node") and CHROMIUM and (SOURCES / "node_modules/playwright-core").is_dir()),
-    reason="needs node, chromium and `make viewer`",
-)
+pytestmark = needs_chromium
 
 
 def look(shown, steps, photos=None):
     """What the page says while it does the steps."""
-    with ViewServer(shown, photos) as server:
-        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
-        thread.start()
-        try:
-            words = ["node", str(LOOK), str(SOURCES), CHROMIUM, server.url]
-            done = subprocess.run(words, input=json.dumps(steps), capture_output=True, text=True, timeout=300)
-        finally:
-            server.shutdown()
-            thread.join()
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    with serving(ViewServer(shown, photos)) as server:
+        return look_at(server.url, steps)
 
 
 def pixels(path):
@@ -79,10 +61,7 @@ def seen(run):
     (folder / "cut.exr").write_bytes((run / "environment.exr").read_bytes()[:300])
 
     def picture(name):
-        return {"do": "picture", "path": str(folder / f"{name}.png")}
-
-    def keys(*names):
-        return [{"do": "key", "key": name} for name in names]
+        return picture_at(folder / f"{name}.png")
 
     said = {"do": "text", "script": "document.getElementById('said').textContent"}
     names = ("albedo", "roughness", "metallic", "normals", "uncertainty")
@@ -147,10 +126,7 @@ def through(run, photos):
     folder.mkdir()
 
     def picture(name):
-        return {"do": "picture", "path": str(folder / f"{name}.png")}
-
-    def keys(*names):
-        return [{"do": "key", "key": name} for name in names]
+        return picture_at(folder / f"{name}.png")
 
     def split(value):
         return {"do": "set", "selector": "#split", "value": value}

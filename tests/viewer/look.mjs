@@ -1,8 +1,10 @@
-// Opens a page in Chromium and does what standard input asks, a JSON list of steps; tests/python/test_view_page.py and
-// test_report_page.py write it. Prints {"console": [...], "texts": {...}} as JSON; pictures go to the paths that steps name.
+// Opens a page in Chromium and does what standard input asks, a step in JSON on each line; tests/python/looking_at.py
+// writes them, and hears of each step when it is done. Prints {"console": [...], "texts": {...}} at the end, as JSON; pictures go
+// to the paths that steps name.
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { basename } from "node:path";
+import { createInterface } from "node:readline";
 
 const [packages, executablePath, url] = process.argv.slice(2);
 const { chromium } = createRequire(`${packages}/package.json`)("playwright-core");
@@ -12,14 +14,17 @@ const page = await browser.newPage();
 page.setDefaultTimeout(120000); // a busy machine without a GPU draws for seconds
 const told = { console: [], texts: {} };
 let open = 0; // requests
-page.on("request", () => (open += 1));
-for (const end of ["requestfinished", "requestfailed"]) page.on(end, () => (open -= 1));
+const ends = (request) => !request.url().endsWith("/events"); // that stream lasts as long as the page
+page.on("request", (request) => (open += ends(request)));
+for (const end of ["requestfinished", "requestfailed"]) page.on(end, (request) => (open -= ends(request)));
+page.on("dialog", (dialog) => dialog.accept());
 page.on("console", (message) => told.console.push(`${message.type()}: ${message.text()}`));
 page.on("pageerror", (error) => told.console.push(`error: ${error.stack}`));
 
 /** Waits until nothing is loaded and two pictures are equal. */
 async function settled() {
-  for (let last = ""; ; ) {
+  for (let last = "", limit = Date.now() + 200000; ; ) {
+    if (Date.now() > limit) throw new Error(`the page does not come to rest; ${open} requests are open`);
     const now = open ? "" : (await page.screenshot()).toString("base64");
     if (now && now === last) return;
     last = now;
@@ -32,8 +37,13 @@ const steps = {
   size: ({ width, height }) => page.setViewportSize({ width, height }),
   open: async () => {
     await page.goto(url);
-    await page.waitForSelector("body.ready", { timeout: 120000 });
+    await page.waitForSelector("body.ready");
   },
+  wait: async ({ script }) => {
+    for (const limit = Date.now() + 120000; !(await page.evaluate(script)); await page.waitForTimeout(100))
+      if (Date.now() > limit) throw new Error(`${script}: is not true; ${await page.evaluate("document.body.innerText")}`);
+  },
+  press: ({ selector }) => page.click(selector),
   style: ({ content }) => page.addStyleTag({ content }),
   key: ({ key }) => page.keyboard.press(key),
   focus: ({ selector }) => page.focus(selector),
@@ -79,9 +89,11 @@ const steps = {
   text: async ({ name, script }) => (told.texts[name] = await page.evaluate(script)),
 };
 
-for (const step of JSON.parse(readFileSync(0, "utf8"))) {
+for await (const line of createInterface({ input: process.stdin })) {
+  const step = JSON.parse(line);
   await steps[step.do](step);
-  if (step.do !== "size" || page.url() !== "about:blank") await settled();
+  if (!step.restless && (step.do !== "size" || page.url() !== "about:blank")) await settled();
+  console.log("done");
 }
 console.log(JSON.stringify(told));
 await browser.close();

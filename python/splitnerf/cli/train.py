@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +17,7 @@ from splitnerf.errors import InputError
 if TYPE_CHECKING:
     from splitnerf.config import Config
     from splitnerf.training.ranks import Alone
+    from splitnerf.training.observer import Observer
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -25,7 +28,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "report.html into the run's folder.",
         epilog=examples(
             "splitnerf train data --max-minutes 30", "splitnerf train data --preset fast --downscale 2 --out runs/fast",
-            "splitnerf train data --resume auto",
+            "splitnerf train data --resume auto --view",
             after="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient alone skips "
             "its step. The message names where it came from, and the last checkpoint stands: --resume goes on from it. Several processes "
             "train one scene by `torchrun --nproc-per-node N -m splitnerf.train data` (docs/ranks.md).",
@@ -43,7 +46,19 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="continue the run in --out from its checkpoint; auto: begin where there is none, leave a finished run alone",
     )  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
+    parser.add_argument(
+        "--view", nargs="?", const=0, type=port, metavar="PORT",
+        help="show the run in a page while it trains",
+    )  # fmt: skip
+    parser.add_argument("--tensorboard", type=Path, metavar="DIR", help="write the curves and previews for TensorBoard, too")
     parser.set_defaults(execute=run)
+
+
+def port(text: str) -> int:
+    """A port's number; 0 is a free one."""
+    if not (text.isascii() and text.isdigit() and int(text) < 1 << 16):
+        raise argparse.ArgumentTypeError(f"PORT must lie between 0 and 65535, got '{text}'; give DATA before --view")
+    return int(text)
 
 
 def add_alias(parser: argparse.ArgumentParser, alias: str, option: str) -> None:
@@ -83,7 +98,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="KEY=VALUE",
         dest="settings",
-        help="change one setting; `splitnerf info --settings` lists them",
+        help="change a setting (see `splitnerf info --settings`)",
     )
 
 
@@ -94,8 +109,26 @@ def run(args: argparse.Namespace) -> int:
     if args.resume and args.overwrite:
         raise InputError("--resume and --overwrite exclude each other")
     run, settings = args.out or Path("runs") / args.data.resolve().name, settings_of(args)
-    with joined() as ranks, held_by_first(run, ranks):
-        return train_in(run, args, settings, ranks)
+    with joined() as ranks, ExitStack() as stack:
+        observers = list(map(stack.enter_context, observers_of(args, run, ranks)))
+        stack.enter_context(held_by_first(run, ranks))
+        return train_in(run, args, settings, ranks, observers)
+
+
+def observers_of(args: argparse.Namespace, run: Path, ranks: Alone) -> list[AbstractContextManager[Observer]]:
+    """Who the options let look on."""
+    found = []
+    if args.view is not None and ranks.several:
+        raise InputError("--view shows a training of one process; leave it out with torchrun")
+    if args.tensorboard and ranks.is_first:
+        from splitnerf.training.tensorboard import TensorBoard
+
+        found.append(TensorBoard(args.tensorboard))
+    if args.view is not None:
+        from splitnerf.view.watched import watched
+
+        found.append(watched(run.resolve().name, args.view))
+    return found
 
 
 def settings_of(args: argparse.Namespace) -> dict[str, object]:
@@ -115,8 +148,10 @@ def settings_of(args: argparse.Namespace) -> dict[str, object]:
     return settings
 
 
-def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object], ranks: Alone) -> int:
-    """Trains in a folder that the first of the processes holds, and prints the outcome; returns the exit code."""
+def train_in(
+    run: Path, args: argparse.Namespace, settings: dict[str, object], ranks: Alone, observers: Sequence[Observer] = ()
+) -> int:
+    """Trains in a folder that the first of the processes holds, while observers look on, and prints the outcome; returns the exit code."""
     from splitnerf.devices import choose_device
     from splitnerf.evaluate.jobs import read_evaluation
     from splitnerf.training.ranks import one_gpu_each
@@ -130,8 +165,9 @@ def train_in(run: Path, args: argparse.Namespace, settings: dict[str, object], r
     device = choose_device(plan.device)
     one_gpu_each(device, ranks)
     trained, evaluation = reconstruct(
-        args.data, run, plan.config, downscale=args.downscale, device=device, resume=plan.resume, overwrite=plan.overwrite, ranks=ranks
-    )
+        args.data, run, plan.config, downscale=args.downscale, device=device, resume=plan.resume, overwrite=plan.overwrite, ranks=ranks,
+        observers=observers,
+    )  # fmt: skip
     if not ranks.is_first:
         return DONE
     if evaluation is None:

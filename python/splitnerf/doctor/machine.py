@@ -39,6 +39,7 @@ PACKAGES = (
     Package("imageio_ffmpeg", "imageio-ffmpeg", "video", "MP4 files, in relight"),
     Package("pxr", "usd-core", "usd", "USDZ files, in export"),
     Package("ray", "ray", "batch", "many scenes, in batch"),
+    Package("tensorboard", "tensorboard", "tensorboard", "TensorBoard's files, in train"),
     Package("lpips", "lpips", "lpips", "LPIPS scores, in evaluate"),
     Package("bpy", "bpy", "blender", "--renderer blender, in synth"),
 )

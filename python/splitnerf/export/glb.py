@@ -21,16 +21,34 @@ ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | None = None) -> None:
     """Writes one mesh with one metallic-roughness material, y up, textures as PNG inside, atomically.
 
-    Occlusion, roughness and metallic share one image, as glTF proposes. Without textures there are the factors alone.
-
     Args:
         path: The file, with the suffix .glb.
-        asset: The asset, with one material.
-        occlusion: [h, w] occlusion in [0, 1], 1 = open, with the size of the roughness-metallic texture; or None.
+        asset, occlusion: See :func:`glb_content`.
 
     Raises:
         RuntimeError: See :func:`splitnerf.export.maps.encode_maps`.
         OSError: The file cannot be written.
+    """
+    content = glb_content(asset, occlusion, path)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def glb_content(
+    asset: Asset, occlusion: np.ndarray | None = None, path: str | os.PathLike = "the asset", *, filtering: int | None = None
+) -> bytes:
+    """The bytes of a GLB with one mesh and one metallic-roughness material, y up, textures as PNG inside.
+
+    Occlusion, roughness and metallic share one image, as glTF proposes. Without textures there are the factors alone.
+
+    Args:
+        asset: The asset, with one material.
+        occlusion: [h, w] occlusion in [0, 1], 1 = open, with the size of the roughness-metallic texture; or None.
+        path: What messages call the file.
+        filtering: glTF's number of the textures' filter; None leaves it to who draws.
+
+    Raises:
+        RuntimeError: See :func:`splitnerf.export.maps.encode_maps`.
     """
     maps, material = encode_maps(path, asset, occlusion), asset.materials[0]
     images = [None if pixels is None else Image.fromarray(pixels) for pixels in (maps.albedo, maps.orm, maps.normal)]
@@ -52,16 +70,22 @@ def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | Non
     if asset.tangents is not None:
         tangents = np.column_stack([y_up(asset.tangents[:, :3]), asset.tangents[:, 3]])
         mesh.vertex_attributes["_TANGENT"] = tangents.astype(np.float32)
+    if asset.colors is not None:
+        mesh.vertex_attributes["_COLOR_0"] = asset.colors.astype(np.float32)
 
     def finish(tree: dict) -> None:
-        """Adds to the file what trimesh omits: exact factors, the name TANGENT, one image for two uses, buffer
-        targets."""
+        """Adds to the file what trimesh omits: exact factors, the names of attributes, one image for two uses, filters,
+        buffer targets."""
         tree["asset"]["generator"] = "SplitNeRF"
         primitive = tree["meshes"][0]["primitives"][0]
         attributes, pbr = primitive["attributes"], tree["materials"][0]["pbrMetallicRoughness"]
         pbr["baseColorFactor"] = [*map(float, material.albedo), 1.0]  # trimesh would round it to 8 bit
-        if "_TANGENT" in attributes:
-            attributes["TANGENT"] = attributes.pop("_TANGENT")
+        for name in ("_TANGENT", "_COLOR_0"):
+            if name in attributes:
+                attributes[name[1:]] = attributes.pop(name)
+        if filtering is not None:
+            tree["samplers"] = [{"minFilter": filtering, "magFilter": filtering}]
+            tree["textures"] = [texture | {"sampler": 0} for texture in tree["textures"]]
         if occlusion is not None:
             tree["materials"][0]["occlusionTexture"] = {"index": pbr["metallicRoughnessTexture"]["index"]}
         for accessor in (primitive["indices"], *attributes.values()):
@@ -70,6 +94,4 @@ def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | Non
 
     scene = trimesh.Scene()
     scene.add_geometry(mesh, node_name=asset.name, geom_name=asset.name)
-    content = export_glb(scene, include_normals=True, tree_postprocessor=finish)
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content)
+    return export_glb(scene, include_normals=True, tree_postprocessor=finish)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,11 +40,12 @@ from splitnerf.training.losses import SeenLight
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS, add_metrics, keep_metrics
 from splitnerf.training.numbers import PastStep, StepNumbers
+from splitnerf.training.observer import Observer, Observers, heed
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
 from splitnerf.training.ranks import ALONE, Alone
 from splitnerf.training.repeatable import same_bits
 from splitnerf.training.room import RoomyStep
-from splitnerf.training.schedule import light_moves, light_period, next_ray_count
+from splitnerf.training.schedule import light_moves, light_period, next_ray_count, progress_of
 from splitnerf.training.step import Step
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps are all logged
@@ -92,7 +94,7 @@ def train(
         OSError: The disk is full; the last checkpoint is kept.
     """
     check_repeatable(config, device)
-    training = Training(dataset, config, run, torch.device(device), ranks)
+    training = Training(dataset, config, run, torch.device(device), ranks=ranks)
     if resume:
         training.restore()
     return training.complete()
@@ -103,11 +105,15 @@ class Training:
 
     Args:
         dataset, config, run, device, ranks: See :func:`train`.
+        observers: Who looks on; with several processes, from the first one.
     """
 
-    def __init__(self, dataset: Dataset, config: Config, run: Path, device: torch.device, ranks: Alone = ALONE):
+    def __init__(
+        self, dataset: Dataset, config: Config, run: Path, device: torch.device, observers: Sequence[Observer] = (),
+        ranks: Alone = ALONE,
+    ):  # fmt: skip
         c = self.config = config
-        self.dataset, self.run, self.ranks = dataset, run, ranks
+        self.dataset, self.run, self.ranks, self.observers = dataset, run, ranks, Observers(observers)
         self.fingerprint = dataset_fingerprint(dataset)
         torch.manual_seed(c.run.seed)
         self.generator = torch.Generator(device).manual_seed(c.run.seed)
@@ -137,6 +143,7 @@ class Training:
         self.reads_late = 0 if device.type == "cpu" else 1  # steps; a GPU goes on while the host reads
         self.started, self.saved_at = time.monotonic(), 0.0  # a time of the clock, and seconds of the run
         self.first = True  # step of the run
+        self.stopped = False  # an observer asked to end before the schedule does
         self.resumed_at = 0
 
     def restore(self) -> None:
@@ -164,22 +171,27 @@ class Training:
         self.started, self.saved_at = time.monotonic() - self.seconds, self.seconds
 
     def complete(self) -> TrainedScene:
-        """Trains to the end of the schedule, or until a signal asks to stop."""
+        """Trains to the end of the schedule, or until a signal or an observer asks to stop."""
         c = self.config
         if self.ranks.is_first:
             keep_metrics(self.run / METRICS, self.step)
+        self.observers.began(self)
         with (
             Interrupt() as interrupt, Progress(self.progress) as bar, same_bits(c.run.deterministic),
             tensor_cores(c.run.tensor_cores), self.take_step.stream(),
         ):  # fmt: skip
             if self.step:
                 interrupt.attempt(self.preview_if_due)  # that an interruption left out
-            while self.progress < 1.0 and not (self.ranks.stops(interrupt.asked, self.started) and self.may_stop):
+            while not self.finished and not (self.ranks.stops(interrupt.asked, self.started) and self.may_stop):
                 self.refresh()
                 self.advance(bar)
                 interrupt.attempt(self.preview_if_due)
                 if self.seconds - self.saved_at > 60.0 * c.run.checkpoint_minutes and self.may_stop:
                     self.save()
+                if self.may_stop:
+                    paused = heed(self, interrupt)
+                    self.started += paused
+                    bar.skip(paused)
             self.finish()
         self.ranks.leave()
         return self.result()
@@ -208,9 +220,12 @@ class Training:
     @property
     def progress(self) -> float:
         """The progress of the schedule, in [0, 1]."""
-        c = self.config
-        by_time = self.seconds / (60.0 * c.training_minutes) if c.training_minutes > 0 else 0.0
-        return min(1.0, max(self.step / c.run.steps, by_time))
+        return progress_of(self.config, self.step, self.seconds)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run delivers what it has: at the end of the schedule, or as an observer asked."""
+        return self.stopped or self.progress >= 1.0
 
     @property
     def may_stop(self) -> bool:
@@ -274,8 +289,9 @@ class Training:
     def preview_if_due(self) -> None:
         """Writes a preview where the last one is old enough."""
         if self.ranks.is_first and self.progress - self.previewed_at >= self.config.run.preview_every:
-            write_preview(self.run, self.model, self.grid, self.dataset, self.step)
+            picture = write_preview(self.run, self.model, self.grid, self.dataset, self.step)
             self.previewed_at = self.progress
+            self.observers.previewed(picture, self.step)
 
     def settle(self, bar: Progress | None = None, left: int = 0) -> None:
         """Reads the numbers of all steps but the last ones, and does what follows from them.
@@ -306,7 +322,9 @@ class Training:
             if past.step % LOG_EVERY == 0 or past.step <= LOG_EVERY or is_last:
                 check_state(self.step, self.model, self.optimiser)
                 if self.ranks.is_first:
-                    add_metrics(self.run / METRICS, self.line(past, numbers))
+                    line = self.line(past, numbers)
+                    add_metrics(self.run / METRICS, line)
+                    self.observers.logged(line)
 
     def told(self, step: int, samples_per_ray: float) -> str:
         """What the bar tells of a step: its number, the batches' mean PSNR in dB and the samples per ray."""
@@ -333,19 +351,18 @@ class Training:
         self.settle()
         self.optimiser.zero_grad(set_to_none=True)
         check_state(self.step, self.model, self.optimiser)
-        finished = self.progress >= 1.0
-        self.mesh.poll(wait=finished)
-        if finished and self.config.occlusion.kind == "bits":
-            self.mesh.request(1.0)
+        self.mesh.poll(wait=self.finished)
+        if self.finished and self.config.occlusion.kind == "bits":
+            self.mesh.request(self.progress)
             self.mesh.poll(wait=True)
-        if finished:
+        if self.finished:
             self.update_grid()
         self.save()
 
     def result(self) -> TrainedScene:
         """The scene as the training leaves it in memory."""
         return TrainedScene(
-            self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.progress >= 1.0, self.step - self.resumed_at,
+            self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.finished, self.step - self.resumed_at,
             self.exposures.found,
         )  # fmt: skip
 

@@ -8,6 +8,12 @@ NEARLY = 0.1  # share of the sample budget within which the ray count stays
 RAY_UNITS = 16  # `cuda_graphs` uses this many ray counts between one power of 2 and the next
 
 
+def progress_of(config: Config, step: int, seconds: float) -> float:
+    """The progress of the schedule in [0, 1]: the larger of the share of steps done and the share of minutes used."""
+    by_time = seconds / (60.0 * config.training_minutes) if config.training_minutes > 0 else 0.0
+    return min(1.0, max(step / config.run.steps, by_time))
+
+
 def cosine_anneal(config: Config, progress: float) -> float:
     """The annealing of the cosine at this progress: 0 at the start, 1 from ``cos_anneal_by`` of the run on."""
     return min(1.0, progress / config.surface.cos_anneal_by) if config.surface.cos_anneal_by > 0 else 1.0

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from splitnerf.data.asset import Asset
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.layouts.frame import checked_pose
 from splitnerf.errors import InputError
@@ -89,7 +90,7 @@ class Tracer:
 
     def __init__(self, shown: Shown):
         self._shown = shown
-        self._renderers: dict[int, AssetRenderer] = {}
+        self._renderers: dict[int, tuple[Asset, AssetRenderer]] = {}  # of the newest asset of each number
         self._newest, self._counting, self._working = 0, threading.Lock(), threading.Lock()
 
     def pictures(self, camera: Camera, gone: Callable[[], bool]) -> Iterator[Picture]:
@@ -105,9 +106,9 @@ class Tracer:
             return self._newest != mine or gone()
 
         with self._working:
-            small = camera.scaled(FIRST_SIDE)
-            yield from self._refined(small, lights, PASSES[:1], ended)
-            yield from self._refined(camera, lights, PASSES, ended)
+            scenes = [(self._renderer(asset), light) for asset, light in enumerate(lights)]
+            yield from self._refined(camera.scaled(FIRST_SIDE), scenes, PASSES[:1], ended)
+            yield from self._refined(camera, scenes, PASSES, ended)
 
     def stop(self) -> None:
         """Ends the request that is worked at, and waits for its end: no thread is within the tracer when the program ends."""
@@ -127,25 +128,29 @@ class Tracer:
         return rotate_environment(light.radiance, turn)
 
     def _renderer(self, asset: int) -> AssetRenderer:
-        if asset not in self._renderers:
-            self._renderers[asset] = AssetRenderer(self._shown.sources[asset].asset)
-        return self._renderers[asset]
+        newest = self._shown.sources[asset].asset
+        if asset not in self._renderers or self._renderers[asset][0] is not newest:
+            self._renderers[asset] = newest, AssetRenderer(newest)
+        return self._renderers[asset][1]
 
-    def _refined(self, camera: Camera, lights: list[np.ndarray], passes: tuple[int, ...], ended: Callable[[], bool]) -> Iterator[Picture]:
-        """The mean of all passes so far, after each pass, for each asset."""
-        sums, total = [np.zeros((camera.height, camera.width, 4), np.float32) for _ in lights], 0
+    def _refined(
+        self, camera: Camera, scenes: list[tuple[AssetRenderer, np.ndarray]], passes: tuple[int, ...], ended: Callable[[], bool]
+    ) -> Iterator[Picture]:
+        """The mean of all passes so far, after each pass, for each asset with its light."""
+        sums, total = [np.zeros((camera.height, camera.width, 4), np.float32) for _ in scenes], 0
         for number, spp in enumerate(passes):
             total += spp
-            for asset, light in enumerate(lights):
-                if not self._add(sums[asset], asset, camera, light, spp, number, ended):
+            for asset, scene in enumerate(scenes):
+                if not self._add(sums[asset], scene, camera, spp, number, ended):
                     return
                 width, height, content = as_halves(sums[asset] / total)
                 yield Picture(asset, width, height, total, content)
 
     def _add(
-        self, total: np.ndarray, asset: int, camera: Camera, light: np.ndarray, spp: int, seed: int, ended: Callable[[], bool]
+        self, total: np.ndarray, scene: tuple[AssetRenderer, np.ndarray], camera: Camera, spp: int, seed: int, ended: Callable[[], bool]
     ) -> bool:
         """Adds spp paths a pixel, some rows at a time; False where it ended before."""
+        renderer, light = scene
         fx, fy, cx, cy = camera.intrinsics
         spp_a_call = min(spp, max(1, PATHS_A_CALL // camera.width))
         rows = max(1, PATHS_A_CALL // (camera.width * spp_a_call))
@@ -155,7 +160,7 @@ class Tracer:
                 if ended():
                     return False
                 paths = min(spp_a_call, spp - call * spp_a_call)
-                images = self._renderer(asset).render(
+                images = renderer.render(
                     light, camera.pose, (fx, fy, cx, cy - top), camera.width, len(strip), spp=paths, seed=_seed(seed, top, call),
                 )  # fmt: skip
                 strip[..., :3] += paths * images["radiance"]

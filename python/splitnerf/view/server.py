@@ -21,18 +21,24 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
 from importlib.resources import files
 from itertools import chain
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, urlsplit
 
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
 from splitnerf.report.browser import as_halves
 from splitnerf.view.final import Camera, Tracer
+from splitnerf.view.news import News
 from splitnerf.view.photos import Photos
 from splitnerf.view.shown import Shown, Source
+
+if TYPE_CHECKING:
+    from splitnerf.view.live import Live
 
 LARGEST_UPLOAD = 128 << 20  # bytes of a light
 LARGEST_QUESTION = 1 << 16  # bytes of a camera
 PICTURE = struct.Struct("<5I")  # asset, width, height, paths a pixel, bytes that follow
+WITHOUT_REST = ("", "scene.json", "final", "events")  # addresses that nothing follows
 PATIENCE = 60.0  # seconds that a connection may be silent
 SAFETY = {
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' blob: data:; "
@@ -60,9 +66,11 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
         photos: The photos whose cameras are shown, or None.
         host: The address to listen at.
         port: The port; 0 takes a free one.
+        live: The run that trains and is shown, or None.
 
     Attributes:
         url: The address of the page, token included.
+        news: What open pages are told.
 
     Raises:
         InputError: The address or the port cannot be used.
@@ -71,8 +79,11 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
     daemon_threads = True
     allow_reuse_address = True
 
-    def __init__(self, shown: Shown, photos: Photos | None = None, host: str = "127.0.0.1", port: int = 0):
-        self.shown, self.photos, self.host, self.tracer = shown, photos, host, Tracer(shown)
+    def __init__(
+        self, shown: Shown, photos: Photos | None = None, host: str = "127.0.0.1", port: int = 0, live: Live | None = None
+    ):
+        self.shown, self.photos, self.host, self.tracer, self.live = shown, photos, host, Tracer(shown), live
+        self.news = News() if live is None else live.news
         self.page = files("splitnerf.view").joinpath("viewer.html").read_bytes()
         self.uploading = threading.Lock()
         self._token = secrets.token_urlsafe(16)
@@ -103,7 +114,8 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
         return self.host in ("0.0.0.0", "::") and is_number(name)
 
     def server_close(self) -> None:
-        """Ends what is being traced, and listens no more."""
+        """Says so to the pages, ends what is being traced, and listens no more."""
+        self.news.end("splitnerf has ended; what is loaded stays here")
         self.tracer.stop()
         super().server_close()
 
@@ -133,11 +145,11 @@ class Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         self._answered({
             "": self._page, "scene.json": self._scene, "assets": self._asset, "lights": self._light, "deviations": self._deviations,
-            "photos": self._photo,
+            "photos": self._photo, "events": self._events, "curves": self._curves,
         })  # fmt: skip
 
     def do_POST(self) -> None:
-        self._answered({"lights": self._dropped, "final": self._final})
+        self._answered({"lights": self._dropped, "final": self._final, "control": self._control})
 
     def log_message(self, format: str, *args: object) -> None:
         """Nothing: the terminal is for errors."""
@@ -147,7 +159,7 @@ class Handler(BaseHTTPRequestHandler):
         try:
             inner = self._checked_path()
             name, _, rest = inner.partition("/")
-            if name not in answers or (rest and name in ("", "scene.json", "final")):
+            if name not in answers or (rest and name in WITHOUT_REST):
                 raise Refused(HTTPStatus.NOT_FOUND, "there is nothing at this address")
             answers[name](rest)
         except Refused as refused:
@@ -170,11 +182,35 @@ class Handler(BaseHTTPRequestHandler):
         self._send(self.server.page, "text/html; charset=utf-8")
 
     def _scene(self, _: str) -> None:
+        if self.server.live is not None:
+            self.server.live.load()
         cameras = [] if self.server.photos is None else self.server.photos.cameras()
-        self._send(json.dumps(self.server.shown.description() | {"cameras": cameras}).encode(), "application/json")
+        self._send(json.dumps(self.server.shown.description() | {"cameras": cameras, "training": self.server.live is not None}).encode(), "application/json")
 
     def _asset(self, rest: str) -> None:
-        self._send(self._source(rest).content, "model/gltf-binary")
+        source = self._source(rest)
+        self._send(source.content, "model/gltf-binary")
+        if self.server.live is not None:
+            self.server.live.taken(source)
+
+    def _events(self, _: str) -> None:
+        """A stream of the newest state, as server-sent events; it ends where the page closes it."""
+        self._send_head("text/event-stream")
+        for state in self.server.news.listen(self._is_gone):
+            self.wfile.write(b"data: " + json.dumps(state).encode() + b"\n\n")
+
+    def _curves(self, rest: str) -> None:
+        """The lines of the log from a number on."""
+        self._send(json.dumps(self._training().lines(self._number(rest))).encode(), "application/json")
+
+    def _control(self, rest: str) -> None:
+        self._training().ask(rest)
+        self._send(b"{}", "application/json")
+
+    def _training(self) -> Live:
+        if self.server.live is None:
+            raise Refused(HTTPStatus.NOT_FOUND, "no run is trained here")
+        return self.server.live
 
     def _light(self, rest: str) -> None:
         light = self.server.shown.light(self._number(rest))

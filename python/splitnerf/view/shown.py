@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import tempfile
 import threading
 from collections.abc import Callable
@@ -32,35 +33,43 @@ class Light:
     radiance: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass
 class Source:
     """One asset.
 
     Attributes:
         name: What the page calls it.
-        content: The bytes of its GLB.
-        asset: The same, read by the program; the path tracer draws it.
+        asset: The asset; the path tracer draws it.
+        encode: Makes the bytes of its GLB.
         light: The number of the run's own light, or None.
         deviations: [h, w, 4] float32, the run's `uncertainty.exr`, or None.
+        version: Counts an asset that grows; 0 where there is nothing to load yet.
     """
 
     name: str
-    content: bytes
     asset: Asset
-    light: int | None
-    deviations: np.ndarray | None
+    encode: Callable[[], bytes]
+    light: int | None = None
+    deviations: np.ndarray | None = None
+    version: int = 1
+
+    @functools.cached_property
+    def content(self) -> bytes:
+        """The bytes of its GLB."""
+        return self.encode()
 
 
 class Shown:
     """One or two assets and their lights. Lights that are dropped onto the page are added while it is shown.
 
     Args:
-        paths: Runs' folders or GLB files, at least one.
+        paths: Runs' folders or GLB files.
         light: An environment map that is shown first, or None.
 
     Attributes:
         sources: The assets.
         problems: One line for each file beside an asset that cannot be read.
+        frame: What the first camera has in view; None for the first asset.
 
     Raises:
         InputError: An asset or the light cannot be read.
@@ -68,17 +77,30 @@ class Shown:
 
     def __init__(self, paths: list[Path], light: Path | None = None):
         self.problems: list[str] = []
+        self.frame: Asset | None = None
         self._lights: dict[int, Light] = {}
         self._next, self._lock = 0, threading.Lock()
-        self._first = None if light is None else self._add(light_of(light, light.name))
-        self.sources = [self._source(path) for path in paths]
-        self._white = self._add(Light("white", np.ones((8, 16, 3), np.float32)))
-        self._kept = self._next  # lights up to here are never forgotten
+        self._first = None if light is None else self.add_light(light_of(light, light.name))
+        self.sources = [self.source_of(path) for path in paths]
+        self._white = self.add_light(Light("white", np.ones((8, 16, 3), np.float32)))
+        self.keep_lights()
 
     def light(self, number: int) -> Light | None:
         """A light by its number; None where there is none."""
         with self._lock:
             return self._lights.get(number)
+
+    def add_light(self, light: Light, number: int | None = None) -> int:
+        """Adds a light, or puts it in the place of the one with this number; returns its number."""
+        with self._lock:
+            if number is None:
+                number, self._next = self._next, self._next + 1
+            self._lights[number] = light
+            return number
+
+    def keep_lights(self) -> None:
+        """The lights so far are never forgotten."""
+        self._kept = self._next
 
     def drop(self, name: str, content: bytes) -> int:
         """Adds a light out of the bytes of an .exr or .hdr file; returns its number.
@@ -91,7 +113,7 @@ class Shown:
             path = Path(folder) / f"light{Path(name).suffix.lower()}"
             path.write_bytes(content)
             try:
-                number = self._add(light_of(path, name))
+                number = self.add_light(light_of(path, name))
             except InputError as error:
                 raise InputError(str(error).replace(str(path), name)) from None
         with self._lock:
@@ -101,28 +123,36 @@ class Shown:
 
     def description(self) -> dict:
         """What the page needs to know, for JSON. The camera is that of `splitnerf relight`; lengths are the data's, z is up."""
+        sources = list(self.sources)
+        framed = sources[0].asset if self.frame is None else self.frame
         with self._lock:
             lights = [{"number": number, "name": light.name} for number, light in self._lights.items()]
         return {
             "sources": [
-                {"name": source.name, "light": source.light, "uncertainty": source.deviations is not None} for source in self.sources
+                {
+                    "name": source.name, "light": source.light, "uncertainty": source.deviations is not None, "version": source.version,
+                }
+                for source in sources
             ],
             "lights": lights,
             "first_light": self._first,
             "white": self._white,
             "problems": self.problems,
-            "camera": camera_of(self.sources[0].asset),
+            "camera": camera_of(framed),
             "uncertainty": uncertainty_scale(),
         }
 
-    def _add(self, light: Light) -> int:
-        with self._lock:
-            self._lights[self._next] = light
-            self._next += 1
-            return self._next - 1
+    def source_of(self, path: Path, name: str | None = None, light: int | None = None) -> Source:
+        """The asset of a run's folder or a GLB; the light and the deviations beside a `mesh.glb` belong to it.
 
-    def _source(self, path: Path) -> Source:
-        """The asset of a run's folder or a GLB; the light and the deviations beside a `mesh.glb` belong to it."""
+        Args:
+            path: The folder or the GLB.
+            name: What the page calls it; None for the name of folder or file.
+            light: The number that its light takes over; None for a new one.
+
+        Raises:
+            InputError: It cannot be read.
+        """
         glb = path / "mesh.glb" if path.is_dir() else path
         if path.is_dir() and not glb.is_file():
             raise InputError(f"{path}: has no mesh.glb; finish its training, or give a .glb file")
@@ -130,12 +160,12 @@ class Shown:
         content = glb.read_bytes()
         if not content.startswith(b"glTF"):
             raise InputError(f"{glb}: is a .gltf, whose parts the page cannot load; export it as GLB")
-        light = deviations = None
+        name, own, deviations = name or run_name(glb), None, None
         if glb.name == "mesh.glb":
-            own = f"light of {run_name(glb)}"
-            light = self._beside(glb.with_name("environment.exr"), lambda beside: self._add(light_of(beside, own)))
+            beside = glb.with_name("environment.exr")
+            own = self._beside(beside, lambda path: self.add_light(light_of(path, f"light of {name}"), light))
             deviations = self._beside(glb.with_name("uncertainty.exr"), read_deviations)
-        return Source(run_name(glb), content, asset, light, deviations)
+        return Source(name, asset, lambda: content, own, deviations)
 
     def _beside(self, path: Path, read: Callable[[Path], Read]) -> Read | None:
         """What `read` makes of a file; None where there is none, or where it cannot be read, which becomes a line."""

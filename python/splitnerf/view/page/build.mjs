@@ -31,7 +31,7 @@ const script = await build({ ...scripts, entryPoints: ["src/main.js"] });
 const style = await build({ ...options, entryPoints: ["src/style.css"] });
 const insert = {
   HASH: hashOf([...tools, ...readdirSync(join(here, "src")).sort().map((name) => `src/${name}`)]),
-  LICENCES: licences(["three"]),
+  LICENCES: licences(["three", "uplot"]),
   STYLE: style.outputFiles[0].text,
   SCRIPT: embeddable(script.outputFiles[0].text),
 };

@@ -72,7 +72,8 @@ export class Final {
     const [across, up] = [Math.max(1, Math.round(scale * width)), Math.max(1, Math.round(scale * height))];
     const pose = this.viewer.camera.matrixWorld.clone().transpose().elements; // row by row
     const { turn, channel } = this.viewer.values;
-    return { pose, intrinsics: this.viewer.intrinsics(across, up), width: across, height: up, turn, lights: this.numbers(), channel };
+    const versions = this.viewer.views.map((view) => view.version); // a new asset is traced anew
+    return { pose, intrinsics: this.viewer.intrinsics(across, up), width: across, height: up, turn, lights: this.numbers(), channel, versions };
   }
 
   async ask(wanted) {

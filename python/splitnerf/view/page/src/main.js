@@ -1,9 +1,11 @@
 // The page of `splitnerf view`: reads what there is to show, and ties panel, keys and picture together.
 import { Cameras } from "./cameras.js";
+import { Connection } from "./connection.js";
 import { listenForFiles } from "./drop.js";
 import { Final } from "./final.js";
 import { Panel, showLegend } from "./panel.js";
-import { readAsset, readDeviations, readLight, readPhoto, readScene, sendLight } from "./server.js";
+import { Lost, readAsset, readDeviations, readLight, readPhoto, readScene, sendLight } from "./server.js";
+import { Training } from "./training.js";
 import { Viewer } from "./viewer.js";
 
 /** One line at the bottom of the picture; an empty one takes it away. */
@@ -24,64 +26,138 @@ class Lights {
   async choose(chosen) {
     if (chosen === this.chosen) return;
     this.chosen = chosen;
+    const mine = (this.asked = {});
     const { sources, white } = this.description;
     this.numbers = sources.map((source) => (chosen === "own" ? (source.light ?? white) : Number(chosen)));
-    const textures = await Promise.all(this.numbers.map(readLight));
-    if (chosen !== this.chosen) return;
-    this.viewer.views.forEach((view, i) => view.setLight(textures[i]));
-    this.viewer.draw();
+    try {
+      const textures = await Promise.all(this.numbers.map(readLight));
+      if (mine !== this.asked) return;
+      this.viewer.views.forEach((view, i) => view.setLight(textures[i]));
+      this.viewer.draw();
+    } catch (error) {
+      if (mine === this.asked) this.chosen = undefined; // so that it can be asked for again
+      throw error;
+    }
+  }
+
+  /** Reads the chosen light anew. */
+  async renew(description) {
+    this.description = description;
+    const { chosen } = this;
+    this.chosen = undefined;
+    if (chosen !== undefined) await this.choose(chosen);
   }
 }
 
-async function start() {
-  const description = await readScene();
-  const owners = description.sources.map((source) => source.light);
-  for (const light of description.lights) light.own = owners.includes(light.number);
-  document.title = `${description.sources.map((source) => source.name).join(" | ")} – splitnerf view`;
-  document.getElementById("names").replaceChildren(
-    ...description.sources.map((source) => Object.assign(document.createElement("span"), { textContent: source.name })),
-  );
+/** The page: what the server has to show, and what of it is shown. */
+class Page {
+  constructor(description) {
+    this.description = description;
+    this.state = {}; // that the server tells
+    this.viewer = new Viewer(document.getElementById("canvas"), description);
+    this.lights = new Lights(this.viewer, description);
+    this.final = new Final(this.viewer, () => this.lights.numbers, say, failed);
+    this.panel = new Panel(this.marked(description), (values) => this.set(values));
+    this.cameras = new Cameras(this.viewer, description.cameras); // made after the panel, which says at once what it shows
+    this.cameras.changed = (number) => this.panel.setThrough(number);
+    this.cameras.failed = (number) => readPhoto(number).catch(failed); // asks again, for the server's words
+    this.panel.listen(this.viewer);
+    this.training = description.training ? new Training(failed) : null;
+    document.title = `${description.sources.map((source) => source.name).join(" | ")} – splitnerf ${this.training ? "train" : "view"}`;
+    document.getElementById("names").replaceChildren(
+      ...description.sources.map((source) => Object.assign(document.createElement("span"), { textContent: source.name })),
+    );
+    document.getElementById("home").addEventListener("click", () => this.viewer.home());
+    listenForFiles((file) => this.opened(file));
+  }
 
-  const viewer = new Viewer(document.getElementById("canvas"), description);
-  const lights = new Lights(viewer, description);
-  const final = new Final(viewer, () => lights.numbers, say, failed);
-  let cameras; // made after the panel, which says at once what it shows
-  const panel = new Panel(description, (values) => {
-    viewer.set(values);
-    cameras?.show(values.cameras);
-    cameras?.look(values.through);
-    showLegend(description.uncertainty, values);
-    lights.choose(values.light).catch(failed);
-    final.set(values.final);
-  });
-  cameras = new Cameras(viewer, description.cameras);
-  cameras.changed = (number) => panel.setThrough(number);
-  cameras.failed = (number) => readPhoto(number).catch(failed); // asks again, for the server's words
-  panel.listen(viewer);
-  document.getElementById("home").addEventListener("click", () => viewer.home());
-  listenForFiles(async (file) => {
+  set(values) {
+    this.viewer.set(values);
+    this.cameras?.show(values.cameras);
+    this.cameras?.look(values.through);
+    showLegend(this.description.uncertainty, values);
+    this.lights.choose(values.light).catch(failed);
+    this.final.set(values.final);
+  }
+
+  /** The description, where each light says whether it is an asset's own. */
+  marked(description) {
+    const owners = description.sources.map((source) => source.light);
+    for (const light of description.lights) light.own = owners.includes(light.number);
+    return description;
+  }
+
+  async opened(file) {
     say(`reading ${file.name} …`);
     try {
       const number = await sendLight(file);
-      const now = await readScene();
-      for (const one of now.lights) one.own = owners.includes(one.number);
-      panel.setLights(now.lights, number);
-      panel.tell();
+      this.panel.setLights(this.marked(await readScene()).lights, number);
+      this.panel.tell();
       say("");
     } catch (error) {
       failed(error);
     }
-  });
+  }
 
+  /** What the server says of itself: a newer asset is loaded, and what could not be loaded before. */
+  async heard(state) {
+    this.training?.show(state);
+    this.state = state;
+    await this.loading;
+    await this.renew();
+    if (state.ended) this.connection.close(`The end: ${state.ended}.`);
+  }
+
+  /** Loads what is newer than what is shown; a page that nobody sees waits. */
+  async renew() {
+    const { version, ended } = this.state;
+    const stale = this.viewer.views.some((view, i) => view.version !== (version ?? this.description.sources[i].version));
+    if (this.loading || (document.hidden && !ended) || !(stale || this.lights.chosen === undefined)) return;
+    this.loading = this.load().finally(() => (this.loading = undefined));
+    await this.loading;
+  }
+
+  /** Loads assets and lights, as the server now describes them. */
+  async load() {
+    try {
+      const first = this.viewer.views.every((view) => view.version === 0);
+      const description = this.marked(await readScene());
+      await Promise.all(this.viewer.views.map((view, i) => this.loadInto(view, i, description.sources[i])));
+      this.description = description;
+      this.panel.setSources(description.sources);
+      this.panel.setLights(description.lights, this.panel.values.light);
+      this.viewer.start = description.camera;
+      if (first) this.viewer.home(); // later the camera stays where it is
+      if (!first || this.training) await this.lights.renew(description);
+      await this.training?.showLight(description.sources[0].light);
+      this.panel.tell();
+      const waits = description.sources.some((source) => source.version === 0);
+      say(waits ? "the surface is shown once the training begins" : description.problems.join("\n"), description.problems.length > 0);
+    } catch (error) {
+      failed(error);
+    }
+  }
+
+  async loadInto(view, number, source) {
+    if (view.version === source.version) return;
+    try {
+      const deviations = source.uncertainty ? await readDeviations(number) : null;
+      await view.setAsset(await readAsset(number));
+      view.setDeviations(deviations);
+      view.version = source.version;
+    } catch (error) {
+      if (!(error instanceof Lost)) view.version = source.version; // it would not load the next time either
+      throw error;
+    }
+  }
+}
+
+async function start() {
+  const page = new Page(await readScene());
   say("loading …");
-  await Promise.all(
-    viewer.views.map(async (view, i) => {
-      if (description.sources[i].uncertainty) view.uniforms.deviations.value = await readDeviations(i);
-      await view.setAsset(await readAsset(i));
-    }),
-  );
-  say(description.problems.join("\n"), description.problems.length > 0);
-  panel.tell();
+  await page.load();
+  page.connection = new Connection((state) => page.heard(state));
+  document.addEventListener("visibilitychange", () => page.renew());
 }
 
 start()

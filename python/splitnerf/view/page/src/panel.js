@@ -23,7 +23,8 @@ export class Panel {
   /** `changed` is called with the values after each change. */
   constructor(description, changed) {
     this.changed = changed;
-    this.fillChannels(description.sources.some((source) => source.uncertainty));
+    this.fillChannels();
+    this.setSources(description.sources);
     this.fill(field("quantity"), description.uncertainty.quantities.map((name, i) => [i, name]));
     this.setLights(description.lights, description.first_light ?? undefined);
     this.fill(field("through"), [[-1, "none"], ...description.cameras.map((camera, i) => [i, camera.name])]);
@@ -72,15 +73,20 @@ export class Panel {
     select.replaceChildren(...rows.map(([value, words]) => new Option(words, value)));
   }
 
-  fillChannels(uncertain) {
+  fillChannels() {
     for (const name of CHANNELS) {
       const label = document.createElement("label");
-      const off = name === "uncertainty" && !uncertain;
       label.innerHTML = `<input type="radio" name="channel" value="${name}"> <span>${name}</span>`;
-      Object.assign(label.firstChild, { checked: name === "shaded", disabled: off });
-      if (off) label.title = "only a run with uncertainty.exr has it";
+      label.firstChild.checked = name === "shaded";
       field("channels").append(label);
     }
+  }
+
+  /** Offers what these assets have. */
+  setSources(sources) {
+    const choice = document.querySelector("[name=channel][value=uncertainty]");
+    choice.disabled = !sources.some((source) => source.uncertainty);
+    choice.parentElement.title = choice.disabled ? "only a run with uncertainty.exr has it" : "";
   }
 
   tell() {

@@ -1,6 +1,9 @@
 // What the page asks its server. All addresses are relative: the token in the page's own address goes with them.
 import { asLight, halves } from "./halves.js";
 
+/** The server is not there, or went while it answered: what was asked may be asked again. */
+export class Lost extends Error {}
+
 /** The answer to a request; an Error with the server's one line where it refuses. */
 async function asked(address, options) {
   let answer;
@@ -8,16 +11,35 @@ async function asked(address, options) {
     answer = await fetch(address, options);
   } catch (error) {
     if (error.name === "AbortError") throw error;
-    throw new Error("the server does not answer; is splitnerf view still running?");
+    throw new Lost("splitnerf does not answer; is the command still running?");
   }
   if (answer.ok) return answer;
   const said = await answer.json().catch(() => ({}));
   throw new Error(said.error ?? `the server answers ${answer.status}`);
 }
 
-export const readScene = async () => (await asked("scene.json")).json();
-export const readAsset = async (number) => (await asked(`assets/${number}`)).arrayBuffer();
-export const readPhoto = async (number) => (await asked(`photos/${number}`)).blob();
+/** What `read` makes of the rest of an answer. */
+async function rest(read, signal) {
+  try {
+    return await read();
+  } catch (error) {
+    if (signal?.aborted) throw error;
+    throw new Lost("the connection broke off; what was missing is asked for again once splitnerf answers");
+  }
+}
+
+const bodyOf = async (address, kind) => {
+  const answer = await asked(address);
+  return rest(() => answer[kind]());
+};
+
+export const readScene = () => bodyOf("scene.json", "json");
+export const readAsset = (number) => bodyOf(`assets/${number}`, "arrayBuffer");
+export const readPhoto = (number) => bodyOf(`photos/${number}`, "blob");
+export const readCurves = (first) => bodyOf(`curves/${first}`, "json");
+
+/** Presses a button of the run that trains. */
+export const press = (button) => asked(`control/${button}`, { method: "POST" });
 
 export const readLight = async (number) => asLight(await readHalves(`lights/${number}`));
 
@@ -36,7 +58,7 @@ export async function streamPictures(camera, signal, arrived) {
   const reader = answer.body.getReader();
   let bytes = new Uint8Array(0);
   for (;;) {
-    const { value, done } = await reader.read();
+    const { value, done } = await rest(() => reader.read(), signal);
     if (done) return;
     bytes = joined(bytes, value);
     for (let picture; (picture = firstPicture(bytes)); bytes = picture.rest) arrived(picture);
@@ -65,5 +87,5 @@ function joined(first, second) {
 async function readHalves(address) {
   const answer = await asked(address);
   const [width, height] = answer.headers.get("Picture-Size").split("x").map(Number);
-  return halves(await answer.arrayBuffer(), width, height);
+  return halves(await rest(() => answer.arrayBuffer()), width, height);
 }

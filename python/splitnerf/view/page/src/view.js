@@ -14,16 +14,25 @@ export class View {
     this.scene.add(this.object);
     this.uniforms = channelUniforms(uncertainty);
     this.light = null;
+    this.version = 0; // of the asset that is shown
     this.plate = new Plate();
   }
 
+  /** Shows the asset of a GLB in place of the one before. */
   async setAsset(glb) {
     const { scene } = await new GLTFLoader().parseAsync(glb, "");
+    this.object.traverse((part) => part.isMesh && forget(part));
+    this.object.clear();
     scene.rotation.x = Z_UP;
     scene.traverse((part) => {
       if (part.isMesh) part.material = withChannels(part.material, this.uniforms);
     });
     this.object.add(scene);
+  }
+
+  setDeviations(texture) {
+    this.uniforms.deviations.value?.dispose();
+    this.uniforms.deviations.value = texture;
   }
 
   /** The light, an equirectangular texture that becomes this view's own. */
@@ -60,4 +69,11 @@ export class View {
     renderer.render(this.scene, camera);
     if (!this.object.visible) renderer.render(this.plate.mesh, camera);
   }
+}
+
+/** Frees what the graphics card holds of a mesh. */
+function forget({ geometry, material }) {
+  geometry.dispose();
+  for (const value of Object.values(material)) if (value?.isTexture) value.dispose();
+  material.dispose();
 }

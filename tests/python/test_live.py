@@ -1,0 +1,296 @@
+"""A run in the page while it trains: what the server tells and serves of it, and what its buttons do."""
+
+from __future__ import annotations
+
+import functools
+import json
+import socket
+import threading
+import time
+from contextlib import contextmanager
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+import torch
+from looking_at import serving
+from test_train import flat, same
+from test_view import ask, error_of, halves, triangle
+from tiny_runs import as_options, tiny
+
+from splitnerf.cli import BAD_INPUT, main
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import write_image
+from splitnerf.export.surface import surface_materials
+from splitnerf.outputs import surface_of
+from splitnerf.render.model import SceneModel
+from splitnerf.training.loop import Training
+from splitnerf.training.observer import Wish
+from splitnerf.view import live as live_module
+from splitnerf.view.grown import grown_asset, grown_glb
+from splitnerf.view.live import Live
+from splitnerf.view.news import News
+from splitnerf.view.server import ViewServer
+from splitnerf.view.shown import Shown
+from splitnerf.view.watched import watched
+
+CPU = torch.device("cpu")
+
+
+@pytest.fixture
+def eager(monkeypatch):
+    """States and surfaces without waits between them."""
+    for name in ("TOLD_EVERY", "GROWN_EVERY"):
+        monkeypatch.setattr(live_module, name, 0.0)
+    monkeypatch.setattr(live_module, "GROWN_SHARE", 1e9)
+    monkeypatch.setattr("splitnerf.view.live.grown_asset", functools.partial(grown_asset, resolution=16))
+
+
+class Stepped:
+    """A run whose steps the test makes, and its page's server."""
+
+    def __init__(self, data, run):
+        run.mkdir(exist_ok=True)
+        self.live = Live("mine")
+        self.server = ViewServer(self.live.shown, live=self.live)
+        self.training = Training(load_dataset(data), tiny(steps=1000), run, CPU, [self.live])
+        self.live.began(self.training)
+
+    def between(self):
+        return self.live.between_steps(self.training)
+
+    def button(self, name):
+        return ask(self.server, f"control/{name}", method="POST", body=b"")
+
+
+@pytest.fixture
+def stepped(data, tmp_path, eager):
+    stepped = Stepped(data, tmp_path / "mine")
+    with serving(stepped.server):
+        yield stepped
+
+
+@contextmanager
+def page_of(server):
+    """What an open page hears: a function that returns the next state."""
+    with socket.create_connection(server.server_address, timeout=20) as page, page.makefile("rb") as stream:
+        page.sendall(f"GET {urlsplit(server.url).path}events HTTP/1.1\r\nHost: {urlsplit(server.url).netloc}\r\n\r\n".encode())
+
+        def heard(wanted=lambda state: True):
+            while True:
+                line = stream.readline()
+                assert line, "the stream ended"
+                if line.startswith(b"data: ") and wanted(state := json.loads(line[6:])):
+                    return state
+
+        assert b"text/event-stream" in b"".join(iter(stream.readline, b"\r\n"))
+        yield heard
+
+
+def test_a_grown_asset_has_the_materials_of_the_fields(tmp_path):
+    torch.manual_seed(3)
+    model = SceneModel(tiny())
+    model.open_levels(1.0)
+    with torch.no_grad():  # else all materials are alike
+        for parameter in model.material.parameters():
+            parameter.add_(0.3 * torch.randn_like(parameter))
+    world_from_box = np.diag([2.0, 2.0, 2.0, 1.0])
+    world_from_box[:3, 3] = 1, 2, 3
+    (tmp_path / "grown.glb").write_bytes(grown_glb(grown_asset(model, world_from_box, 24)))
+    asset = read_asset(tmp_path / "grown.glb")
+    points = ((asset.vertices - [1, 2, 3]) / 2).astype(np.float32)
+    assert np.abs(surface_of(model).sdf(torch.from_numpy(points)).detach().numpy()).max() < 0.1  # cells are 0.13 wide
+    albedo, roughness, metallic, normals = surface_materials(surface_of(model), points)
+    assert np.ptp(roughness) > 0.2 and np.ptp(metallic) > 0.2 and np.ptp(albedo) > 0.2
+    assert asset.colors == pytest.approx(albedo, abs=1e-3)
+    assert (asset.normals * normals).sum(axis=1) == pytest.approx(1, abs=1e-3)
+    texture = asset.materials[0].roughness_metallic_texture * [asset.materials[0].roughness, asset.materials[0].metallic]
+    size = texture.shape[0]
+    across, down = (asset.uv * size - 0.5).T
+    left, top = np.int64(np.clip(np.floor([across, down]), 0, size - 2))
+    x, y = (across - left)[:, None], (down - top)[:, None]
+    read = (1 - y) * ((1 - x) * texture[top, left] + x * texture[top, left + 1])
+    read += y * ((1 - x) * texture[top + 1, left] + x * texture[top + 1, left + 1])
+    assert read == pytest.approx(np.column_stack([roughness, metallic]), abs=3e-3)
+
+
+def test_nothing_is_made_while_no_page_is_open(stepped):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(live_module, "grown_asset", lambda *_: pytest.fail("a surface was made"))
+        patch.setattr(stepped.live.news, "tell", lambda **_: pytest.fail("a state was told"))
+        assert [stepped.between() for _ in range(3)] == [None] * 3
+
+
+def test_an_open_page_gets_surface_light_and_numbers(stepped):
+    assert json.loads(ask(stepped.server, "scene.json")[2])["sources"] == [
+        {"name": "mine", "light": 1, "uncertainty": False, "version": 0}]  # fmt: skip
+    with page_of(stepped.server) as heard:
+        state = heard()
+        assert state["stage"] == "training" and state["version"] == 0 and not state["paused"]
+        stepped.between()
+        state = heard(lambda state: state["version"] == 1)
+        assert (state["step"], state["steps"], state["progress"], state["left"]) == (0, 1000, 0, None)
+        stepped.training.step += 1
+        stepped.between()
+        assert stepped.live.shown.sources[0].version == 1  # nobody has taken it: no newer one is made
+        scene = json.loads(ask(stepped.server, "scene.json")[2])
+        assert scene["sources"][0]["version"] == 1 and scene["training"]
+        assert ask(stepped.server, "assets/0")[2].startswith(b"glTF")
+        light = halves(ask(stepped.server, f"lights/{scene['sources'][0]['light']}"))
+        with torch.no_grad():
+            expected = stepped.training.model.light.panorama(live_module.LIGHT_HEIGHT).numpy()
+        assert light[..., :3] == pytest.approx(expected, rel=2e-3)
+        stepped.between()
+        assert heard(lambda state: state["version"] == 2)["step"] == 1
+        ask(stepped.server, "assets/0")
+        stepped.between()
+        assert stepped.live.shown.sources[0].version == 2  # the same step has the same surface
+    while stepped.live.news.listeners:  # until the server has seen that the page is gone
+        time.sleep(0.01)
+
+
+def test_curves_hold_the_lines_of_the_log(data, tmp_path):
+    live = Live("mine")
+    (tmp_path / "mine").mkdir()
+    Training(load_dataset(data), tiny(steps=24), tmp_path / "mine", CPU, [live]).complete()
+    written = [json.loads(line) for line in (tmp_path / "mine/metrics.jsonl").read_text().splitlines()]
+    lines = live.lines(0)
+    assert [line["step"] for line in lines] == [line["step"] for line in written]
+    assert [line["psnr"] for line in lines] == pytest.approx([line["psnr"] for line in written], rel=1e-4)
+    assert {name for name in written[0] if name.startswith("loss")} <= lines[0].keys()
+    assert live.lines(20) == lines[20:]
+    resumed = Live("mine")
+    resumed.began(Training(load_dataset(data), tiny(steps=24), tmp_path / "mine", CPU))
+    assert resumed.lines(0) == lines
+
+
+def test_buttons_steer_the_run(stepped, capsys):
+    assert stepped.button("pause")[0] == 200
+    assert [stepped.between(), stepped.between()] == [Wish.PAUSE] * 2 and stepped.live.news.state["paused"]
+    stepped.button("checkpoint")
+    assert [stepped.between(), stepped.between()] == [Wish.SAVE, Wish.PAUSE]
+    assert stepped.live.news.state["saved"] == stepped.training.step
+    stepped.button("resume")
+    assert stepped.between() is None and not stepped.live.news.state["paused"]
+    stepped.button("pause")
+    stepped.button("stop")
+    assert stepped.between() is Wish.STOP
+    assert "pauses until its page resumes it" in capsys.readouterr().err
+    stepped.live.delivering("export")
+    assert stepped.between() is None
+    assert error_of(stepped.button("pause")) == (422, "the run does not train now")
+    assert error_of(stepped.button("reboot")) == (422, "there is no such button")
+
+
+def test_buttons_are_for_the_page_alone(stepped):
+    assert ask(stepped.server, "control/stop")[0] == 404  # a GET, as a link or an image is
+    assert ask(stepped.server, "control/stop", method="POST", body=b"", token=False)[0] == 403
+    assert ask(stepped.server, "control/stop", method="POST", body=b"", Origin="http://evil.example")[0] == 403
+    assert ask(stepped.server, "events", token=False)[0] == ask(stepped.server, "curves/0", token=False)[0] == 403
+    assert ask(stepped.server, "curves/-1")[0] == ask(stepped.server, "events/x")[0] == 404
+    assert stepped.between() is None
+
+
+def test_the_delivered_asset_is_shown(stepped, tmp_path):
+    """Each time in the place of the one before, with its light; what is read, is read when a page asks."""
+    for version, (stage, folder) in enumerate((("last stage", tmp_path / "trained"), ("evaluation", tmp_path / "final")), start=1):
+        folder.mkdir()
+        content = triangle().write(folder / "mesh.glb").read_bytes()
+        write_image(folder / "environment.exr", np.full((4, 8, 3), version, np.float32))
+        stepped.live.delivering(stage, folder)
+        assert stepped.live.news.state["version"] == version and stepped.live.shown.sources[0].version == version - 1
+        (source,) = json.loads(ask(stepped.server, "scene.json")[2])["sources"]
+        assert source == {"name": "mine", "light": 1, "uncertainty": False, "version": version}
+        assert ask(stepped.server, "assets/0")[2] == content
+        assert (halves(ask(stepped.server, "lights/1"))[..., :3] == version).all()
+    (tmp_path / "final/mesh.glb").write_text("hello")
+    stepped.live.delivering("evaluation", tmp_path / "final")
+    scene = json.loads(ask(stepped.server, "scene.json")[2])
+    assert scene["sources"][0]["version"] == 2 and "mesh.glb: is neither" in scene["problems"][0]
+    assert stepped.live.news.state["version"] == 2  # pages wait for no other one
+
+
+def test_a_page_changes_no_bit_of_a_deterministic_run(data, tmp_path, eager):
+    """Not even one that takes each surface and saves a checkpoint."""
+
+    class Curious(Live):
+        buttons = ["checkpoint"]
+
+        def between_steps(self, training):
+            self.taken(self.shown.sources[0])
+            if training.step == 8 and self.buttons:
+                self.ask(self.buttons.pop())
+            return super().between_steps(training)
+
+    live = Curious("mine")
+    live.news.listeners = 1
+    config = tiny(steps=24, deterministic=True, mesh_every=0.2)
+    states = []
+    for name, observers in (("watched", [live]), ("alone", [])):
+        (tmp_path / name).mkdir()
+        Training(load_dataset(data), config, tmp_path / name, CPU, observers).complete()
+        states.append(torch.load(tmp_path / name / "checkpoint.pt", weights_only=True))
+    assert live.shown.sources[0].version >= 5 and live.news.state["saved"] == 8
+    for key in ("model", "optimiser", "generator", "torch_generator", "occupancy", "mesh_vertices"):
+        watched, alone = flat(states[0][key]), flat(states[1][key])
+        assert watched.keys() == alone.keys() and all(same(watched[name], alone[name]) for name in alone), key
+
+
+def test_pages_hear_the_end_and_it_waits_for_them_a_moment(monkeypatch):
+    news, heard = News(), []
+    gone = threading.Event()
+
+    def page():
+        for state in news.listen(gone.is_set):
+            heard.append(state["ended"])
+            if state["ended"]:
+                gone.set()
+
+    thread = threading.Thread(target=page)
+    thread.start()
+    while not news.listeners:
+        time.sleep(0.001)
+    news.end("over")
+    assert news.listeners == 0 and heard[-1] == "over"
+    news.end("again")
+    assert news.state["ended"] == "over"
+    thread.join()
+    monkeypatch.setattr("splitnerf.view.news.FAREWELL", 0.0)
+    stubborn = News()
+    listening = stubborn.listen(lambda: False)
+    next(listening)
+    stubborn.end("over")  # does not wait for ever
+    listening.close()
+
+
+def test_a_viewer_without_a_run_has_no_buttons(tmp_path):
+    with serving(ViewServer(Shown([triangle().write(tmp_path / "a.glb")]))) as server:
+        assert error_of(ask(server, "control/stop", method="POST", body=b"")) == (404, "no run is trained here")
+        assert ask(server, "curves/0")[0] == 404
+        with page_of(server) as heard:
+            assert heard() == {"ended": None}
+
+
+def test_the_command_prints_the_address_and_refuses_a_port_in_use(data, tmp_path, capsys):
+    small = as_options({"steps": 8})
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        assert main(["train", str(data), "--out", str(tmp_path / "mine"), "--view", port, *small]) == BAD_INPUT
+    assert "cannot be listened at" in capsys.readouterr().err and not (tmp_path / "mine").exists()
+    with pytest.raises(SystemExit) as refused:
+        main(["train", "--view", str(data)])
+    assert refused.value.code == BAD_INPUT and "give DATA before --view" in capsys.readouterr().err
+
+
+def test_a_failure_is_told(capsys):
+    with pytest.raises(RuntimeError), watched("mine", 0) as live:
+        raise RuntimeError
+    assert live.news.state["ended"].startswith("the command ended before the run was done")
+    with watched("mine", 0) as live:
+        live.delivering("evaluation")
+    assert live.news.state["ended"].startswith("the run is done")
+    with watched("mine", 0) as live:
+        pass
+    assert "--resume goes on" in live.news.state["ended"]
+    assert capsys.readouterr().out.count("http://127.0.0.1:") == 3

@@ -1,0 +1,149 @@
+"""Observers of a training: what they hear, and what the training does at their wish."""
+
+from __future__ import annotations
+
+import os
+import signal
+from types import SimpleNamespace
+
+import pytest
+import torch
+from tiny_runs import lines_of, tiny
+
+from splitnerf.cli import DONE, main
+from splitnerf.config import Config
+from splitnerf.data.dataset import load_dataset
+from splitnerf.errors import InputError
+from splitnerf.progress import Interrupt
+from splitnerf.training import observer as observer_module
+from splitnerf.training.checkpoint import load_checkpoint
+from splitnerf.training.loop import Training
+from splitnerf.training.observer import Observer, Observers, Wish, heed
+from splitnerf.training.schedule import light_period
+from splitnerf.workflow import load_run, reconstruct
+
+CPU = torch.device("cpu")
+
+
+@pytest.fixture(autouse=True)
+def no_true_mesh(monkeypatch):
+    """Distances to it took most of the time."""
+    monkeypatch.setattr("splitnerf.outputs.load_scene_truth", lambda *_: SimpleNamespace(light=None, mesh=None))
+
+
+class Asking(Observer):
+    """Wishes one thing after the other, from a step on; and writes down what it hears."""
+
+    def __init__(self, at: int = 0, *wishes: Wish | None):
+        self.at, self.wishes, self.heard = at, list(wishes), []
+
+    def began(self, training):
+        self.heard.append(("began", training.step))
+
+    def logged(self, line):
+        self.heard.append(("logged", line["step"]))
+
+    def previewed(self, picture, step):
+        self.heard.append(("previewed", step, picture.is_file()))
+
+    def between_steps(self, training):
+        self.heard.append(("between", training.step))
+        return self.wishes.pop(0) if training.step >= self.at and self.wishes else None
+
+    def delivering(self, stage, folder=None):
+        self.heard.append((stage, None if folder is None else (folder / "mesh.glb").is_file()))
+
+
+def trained(data, run, config: Config, *observers: Observer):
+    run.mkdir(exist_ok=True)
+    return Training(load_dataset(data), config, run, CPU, observers).complete()
+
+
+def test_observers_hear_of_all_that_happens(data, tmp_path):
+    asking = Asking()
+    config = tiny(steps=40, preview_every=0.5)
+    period = light_period(config)  # steps that share gradients of the light, and are not parted
+    reconstruct(data, tmp_path / "run", config, observers=[asking])
+    heard = asking.heard
+    assert heard[0] == ("began", 0) and [event for event in heard if event[0] == "between"] == [
+        ("between", n) for n in range(period, 41, period)
+    ]
+    assert [event[1] for event in heard if event[0] == "logged"] == [line["step"] for line in lines_of(tmp_path / "run")]
+    assert [event for event in heard if event[0] == "previewed"] == [("previewed", 20, True), ("previewed", 40, True)]
+    assert heard[-2:] == [("export", None), ("evaluation", True)]
+    resumed = Asking()
+    reconstruct(data, tmp_path / "run", config.replace({"steps": 41}), resume=True, observers=[resumed])
+    assert resumed.heard[0] == ("began", 40)
+
+
+def test_the_last_stage_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch):
+    def refused(source, *_, **__):
+        assert (source / "mesh.glb").is_file()
+        raise InputError("nothing to fit")
+
+    monkeypatch.setattr("splitnerf.delivery.refine_folder", refused)
+    asking = Asking()
+    reconstruct(data, tmp_path / "run", tiny(steps=30, refine=True), observers=[asking])
+    assert asking.heard[-3:] == [("export", None), ("last stage", True), ("evaluation", True)]
+
+
+def test_a_run_that_is_stopped_delivers_and_can_go_on(data, tmp_path):
+    config = tiny(steps=400)
+    scene, scores = reconstruct(data, tmp_path / "run", config, observers=[Asking(20, Wish.STOP)])
+    assert scene.finished and 20 <= scene.step < 30 and scores["scored"] == "fields"
+    assert {"mesh.glb", "environment.exr", "report.html"} <= {path.name for path in (tmp_path / "run").iterdir()}
+    assert main(["train", str(data), "--out", str(tmp_path / "run"), "--resume", "auto"]) == DONE  # is finished
+    asking = Asking(60, Wish.STOP)
+    again, _ = reconstruct(data, tmp_path / "run", config, resume=True, observers=[asking])
+    assert asking.heard[0] == ("began", scene.step) and 60 <= again.step < 70
+
+
+def test_a_checkpoint_shows_the_levels_that_were_open(data, tmp_path):
+    """Levels that were never trained hold noise."""
+    config = tiny(steps=400, start_levels=2, levels_open_by=1.0)
+    scene, _ = reconstruct(data, tmp_path / "run", config, observers=[Asking(20, Wish.STOP)])
+    assert load_run(tmp_path / "run")[0].sdf_field.grid.n_active == scene.model.sdf_field.grid.n_active == 2
+
+
+def test_a_checkpoint_is_saved_when_asked(data, tmp_path):
+    asking = Asking(8, Wish.SAVE, None, Wish.STOP)
+    steps = []
+    asking.logged = lambda line: steps.append(load_checkpoint(tmp_path / "checkpoint.pt")["step"]) if len(asking.wishes) == 1 else None
+    trained(data, tmp_path, tiny(steps=400), asking)
+    assert set(steps) == {8}
+
+
+def test_a_pause_is_no_time_of_training(data, tmp_path):
+    asking = Asking(8, *[Wish.PAUSE] * 3)
+    training = Training(load_dataset(data), tiny(steps=16), tmp_path, CPU, [asking])
+    started = training.started
+    assert training.complete().step == 16 and not asking.wishes
+    assert training.started - started >= 0.99 * 3 * observer_module.PAUSE
+
+
+def test_the_time_of_a_pause_is_told(monkeypatch):
+    clock = [0.0]
+    fake = SimpleNamespace(monotonic=lambda: clock[0], sleep=lambda seconds: clock.__setitem__(0, clock[0] + seconds))
+    monkeypatch.setattr(observer_module, "time", fake)
+    done = []
+    training = SimpleNamespace(
+        observers=Observers([Asking(0, Wish.PAUSE, Wish.PAUSE, Wish.SAVE, Wish.PAUSE)]), stopped=False, step=1,
+        settle=lambda: done.append("settle"), save=lambda: done.append("save"),
+    )  # fmt: skip
+    with Interrupt() as interrupt:
+        assert heed(training, interrupt) == pytest.approx(3 * observer_module.PAUSE)
+    assert done == ["settle", "settle", "settle", "save", "settle"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_paused_run(data, tmp_path, number):
+    class Pausing(Observer):
+        def between_steps(self, training):
+            if training.step < 8:
+                return None
+            os.kill(os.getpid(), number)
+            return Wish.PAUSE
+
+    scene = trained(data, tmp_path, tiny(steps=400), Pausing())
+    assert not scene.finished and scene.step < 20
+    assert load_checkpoint(tmp_path / "checkpoint.pt")["step"] == scene.step

@@ -1,0 +1,199 @@
+"""The page of a run in Chromium: while it trains, when the connection is cut, and with assets that are large or damaged.
+
+Skipped where Node, Chromium or the packages of the page's sources (`npm ci` there, or `make viewer`) are missing.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+import threading
+import time
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+import torch
+from looking_at import keys, look_at, needs_chromium, picture, serving, text, wait
+from test_view import triangle
+from test_view_page import pixels
+from tiny_runs import tiny
+
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.images import write_image
+from splitnerf.export.glb import write_glb
+from splitnerf.training.checkpoint import load_checkpoint
+from splitnerf.training.loop import Training
+from splitnerf.training.observer import Observer
+from splitnerf.view import live as live_module
+from splitnerf.view.grown import grown_asset
+from splitnerf.view.live import Live
+from splitnerf.view.server import Handler, ViewServer
+from splitnerf.view.shown import Shown
+
+pytestmark = needs_chromium
+RESTLESS = {"restless": True}
+PHASE, NUMBERS, LOST, SAID = (f"document.getElementById('{name}').textContent" for name in ("phase", "numbers", "lost", "said"))
+LOADED = "document.getElementById('said').textContent === ''"
+COLOURS = "new Set(document.querySelector('#chart canvas').getContext('2d').getImageData(0, 0, 200, 100).data).size > 20"
+
+
+def press(selector):
+    return {"do": "press", "selector": selector} | RESTLESS
+
+
+class Slowly(Observer):
+    """Leaves the machine to the browser."""
+
+    def between_steps(self, training):
+        time.sleep(0.1)
+
+
+@pytest.fixture(scope="module")
+def walk(data, tmp_path_factory):
+    """What the page said of a run and its pictures, and the run's folder."""
+    run = tmp_path_factory.mktemp("page") / "mine"
+    run.mkdir()
+    live = Live("mine")
+    versions = []
+    with ExitStack() as stack:
+        patch = stack.enter_context(pytest.MonkeyPatch.context())
+        patch.setattr("splitnerf.view.live.grown_asset", functools.partial(grown_asset, resolution=24))
+        patch.setattr(live_module, "GROWN_EVERY", 1.0)
+        server = stack.enter_context(serving(ViewServer(live.shown, live=live)))
+        training = Training(load_dataset(data), tiny(steps=100_000), run, torch.device("cpu"), [live, Slowly()])
+        done = []
+
+        def deliver():
+            done.append(training.complete())
+            live.delivering("export")
+            triangle().write(run / "mesh.glb")
+            write_image(run / "environment.exr", np.ones((4, 8, 3), np.float32))
+            live.delivering("evaluation", run)
+
+        thread = threading.Thread(target=deliver)
+        patch.setattr("splitnerf.progress.ending_signals", list)  # this thread has none
+        thread.start()
+        told = look_at(server.url, [
+            {"do": "size", "width": 820, "height": 560} | RESTLESS, {"do": "open"} | RESTLESS,
+            wait(f"{LOADED} && !!document.querySelector('#chart canvas')"), lambda: versions.append(live.shown.sources[0].version),
+            {"do": "focus", "selector": "#checkpoint"} | RESTLESS, keys("Enter")[0] | RESTLESS, wait(f"{NUMBERS}.includes('saved')"),
+            text("saved", NUMBERS, **RESTLESS),
+            press("#pause"), wait(f"{PHASE}.includes('paused')"), lambda: versions.append(live.shown.sources[0].version),
+            picture(run.parent / "paused.png", **RESTLESS), text("curve", COLOURS, **RESTLESS),
+            text("button", "document.getElementById('pause').textContent", **RESTLESS),
+            {"do": "size", "width": 380, "height": 700} | RESTLESS, picture(run.parent / "narrow.png", **RESTLESS),
+            text("overflow", "document.documentElement.scrollWidth - innerWidth", **RESTLESS),
+            text("panel", "document.getElementById('panel').scrollWidth - document.getElementById('panel').clientWidth", **RESTLESS),
+            press("#pause"), wait(f"!{PHASE}.includes('paused')"),
+            press("#stop"), wait(f"{PHASE}.includes('final') && {LOADED}"), text("buttons", "document.getElementById('buttons').hidden", **RESTLESS),
+            lambda: threading.Thread(target=live.news.end, args=("the run is done",)).start(),
+            wait(f"{LOST}.includes('The end')"), picture(run.parent / "ended.png", **RESTLESS), text("ended", LOST, **RESTLESS),
+        ])  # fmt: skip
+        thread.join()
+    return told["texts"], told["console"], versions, done[0], run
+
+
+def test_the_page_of_a_run(walk):
+    texts, console, versions, trained, run = walk
+    assert [line for line in console if not line.startswith("warning: ")] == []
+    assert versions[1] > versions[0] >= 1
+    assert texts["button"] == "Resume" and texts["curve"] is True
+    step = int(re.search(r"checkpoint of step ([\d,]+) saved", texts["saved"])[1].replace(",", ""))
+    assert 0 < step <= trained.step
+    assert trained.finished and trained.step < 100_000 and load_checkpoint(run / "checkpoint.pt")["step"] == trained.step
+    assert texts["buttons"] is True and texts["ended"] == "The end: the run is done."
+
+
+def test_the_page_of_a_run_in_a_narrow_window(walk):
+    texts, *_, run = walk
+    assert texts["overflow"] <= 0 and texts["panel"] <= 0
+    shown = pixels(run.parent / "narrow.png")
+    assert np.ptp(shown[:300].reshape(-1, 3), axis=0).max() > 0.1  # the object stands above the panel
+
+
+def test_a_cut_connection_is_said_and_mended(tmp_path, monkeypatch):
+    """The server ends without a word; it comes back at the same address, then at another one."""
+    folder, servers, cutting = tmp_path / "mine", ExitStack(), threading.Event()
+    folder.mkdir()
+    triangle().write(folder / "mesh.glb")
+    is_gone = Handler._is_gone
+    monkeypatch.setattr(Handler, "_is_gone", lambda handler: cutting.is_set() or is_gone(handler))
+    monkeypatch.setattr("splitnerf.view.news.HEARTBEAT", 0.2)
+    monkeypatch.setattr("splitnerf.view.news.News.end", lambda *_: None)
+
+    def start(token, port=0):
+        cutting.clear()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("splitnerf.view.server.secrets.token_urlsafe", lambda _: token)
+            return servers.enter_context(serving(ViewServer(Shown([folder]), port=port)))
+
+    def cut():
+        cutting.set()
+        servers.close()
+
+    first = start("token-of-this-test")
+    port = first.server_address[1]
+    with servers:
+        told = look_at(first.url, [
+            {"do": "size", "width": 500, "height": 400} | RESTLESS, {"do": "open"} | RESTLESS, wait(LOADED),
+            cut, wait(f"{LOST}.includes('lost')"), text("lost", LOST, **RESTLESS), picture(tmp_path / "lost.png", **RESTLESS),
+            lambda: start("token-of-this-test", port), wait(f"{LOST} === ''"),
+            cut, wait(f"{LOST}.includes('lost')"), lambda: start("another-token", port), wait(f"{LOST}.includes('token')"),
+            text("other", LOST, **RESTLESS),
+        ])["texts"]  # fmt: skip
+    assert told["lost"] == "The connection to splitnerf is lost; the page tries again. Does the command still run?"
+    assert told["other"] == "the token is missing or wrong; open the address that splitnerf printed"
+
+
+def test_an_asset_whose_connection_breaks_off_is_asked_for_again(tmp_path, monkeypatch):
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    content = triangle().write(folder / "mesh.glb").read_bytes()
+    whole, asked, read = Handler._asset, [], threading.Event()
+
+    def half(handler, rest):
+        asked.append(rest)
+        if len(asked) > 1:
+            read.wait(60)
+            return whole(handler, rest)
+        handler._send_head("model/gltf-binary", Content_Length=str(len(content)))
+        handler.wfile.write(content[: len(content) // 2])
+
+    monkeypatch.setattr(Handler, "_asset", half)
+    with serving(ViewServer(Shown([folder]))) as server:
+        told = look_at(server.url, [
+            {"do": "size", "width": 500, "height": 400} | RESTLESS, {"do": "open"} | RESTLESS, text("said", SAID, **RESTLESS), read.set, wait(LOADED),
+        ])["texts"]  # fmt: skip
+    assert told["said"] == "the connection broke off; what was missing is asked for again once splitnerf answers"
+    assert len(asked) == 2
+
+
+@pytest.mark.slow
+def test_a_glb_of_200_megabytes_loads(tmp_path):
+    """Of 3.4 million triangles; the time and the browser's memory are printed."""
+    n = 1310  # points along an edge of a bent sheet
+    u, v = np.meshgrid(np.linspace(-1, 1, n, dtype=np.float32), np.linspace(-1, 1, n, dtype=np.float32))
+    vertices = np.stack([u, v, 0.3 * np.sin(9 * u) * np.cos(9 * v)], axis=2).reshape(-1, 3)
+    corners = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
+    triangles = np.concatenate([corners[:, None] + [0, 1, n], corners[:, None] + [1, n + 1, n]]).astype(np.int32)
+    normals = np.broadcast_to(np.float32([0, 0, 1]), vertices.shape).copy()
+    noise = np.random.default_rng(0).random((6000, 6000, 3), np.float32)  # PNG cannot make it smaller
+    asset = Asset(
+        "large", vertices, triangles, normals, np.zeros(len(triangles), np.int32), [Material(albedo_texture=noise)],
+        uv=(0.5 + 0.5 * vertices[:, :2]).astype(np.float32),
+    )  # fmt: skip
+    write_glb(tmp_path / "large.glb", asset)
+    assert (tmp_path / "large.glb").stat().st_size > 200e6
+    clock = time.monotonic()
+    with serving(ViewServer(Shown([tmp_path / "large.glb"]))) as server:
+        read, clock = time.monotonic() - clock, time.monotonic()
+        told = look_at(server.url, [
+            {"do": "size", "width": 400, "height": 300} | RESTLESS, {"do": "open"} | RESTLESS, text("said", SAID, **RESTLESS),
+            lambda: print(f"read in {read:.1f} s, in the page after {time.monotonic() - clock:.1f} s"),
+            text("heap", "Math.round(performance.memory.usedJSHeapSize / 1e6)", **RESTLESS), picture(tmp_path / "large.png", **RESTLESS),
+        ])  # fmt: skip
+    print(f"the page's memory of scripts: {told['texts']['heap']} MB")
+    assert told["texts"]["said"] == ""
+    assert np.ptp(pixels(tmp_path / "large.png")[100:200, 30:100].reshape(-1, 3), axis=0).max() > 0.1
