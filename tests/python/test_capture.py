@@ -20,7 +20,7 @@ from splitnerf.capture.exposure import find_exposures
 from splitnerf.capture.job import PrepareSettings, _begin, _upright_copies, _without_camera
 from splitnerf.capture.masks import dots_of, given_masks
 from splitnerf.capture.photographs import find_photographs, read_upright, sharpness, write_png
-from splitnerf.capture.poses import FLIP, Lens, Reconstruction
+from splitnerf.capture.poses import Lens, Reconstruction
 from splitnerf.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
 from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignetting
 from splitnerf.capture.video import write_frames

@@ -191,7 +191,7 @@ print(type(again[0].function).__name__, again[0].args, code)
 
 def test_slurm_batch(run, data, tmp_path, monkeypatch):
     """Without Slurm: submitit runs the jobs here. A damaged scene stops no other."""
-    submitit = pytest.importorskip("submitit", reason="submitit is not installed: pip install submitit")
+    pytest.importorskip("submitit", reason="submitit is not installed: pip install submitit")
     (tmp_path / "bad").mkdir()
     (tmp_path / "bad/transforms_train.json").write_text("{")
     monkeypatch.setattr(sys, "exit", lambda code: codes.append(code))

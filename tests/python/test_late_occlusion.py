@@ -13,7 +13,6 @@ from tiny_runs import tiny
 from torch.nn import functional as F
 
 from splitnerf.config import Config
-from splitnerf.devices import start_fetching
 from splitnerf.ops import MeshScene
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays, find_samples, render_rays

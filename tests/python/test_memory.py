@@ -18,7 +18,6 @@ from splitnerf.data.images import read_image
 from splitnerf.data.pixels import Photos, PixelReader, decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
-from splitnerf.memory import give_back
 from splitnerf.ops import EdgeRuns, draw_rays
 from splitnerf.render.masks import pixel_list, reduced, runs_of, widened
 from splitnerf.training import loop

@@ -66,6 +66,6 @@ __all__ = [
     "neus_weights", "occlusion_factors", "pixel_losses", "place_samples", "prefilter_light", "probe_points",
     "quadratic_entropy", "query_direction", "read_pixels", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_field",
     "sdf_values", "sh_projection", "shade_sums", "sharpness", "sparse_product", "specular_share", "split_sum_shade",
-    "spread_samples", "srgb_to_linear", "step_numbers", "summed_correction", "summed_light", "surface_weights", "take_rows", "trace_visibility", "visibility_bits",
-    "wide_lobes", "zonal_factors",
+    "spread_samples", "srgb_to_linear", "step_numbers", "summed_correction", "summed_light", "surface_weights", "take_rows",
+    "totalled_gradient_losses", "totalled_material_losses", "trace_visibility", "visibility_bits", "wide_lobes", "zonal_factors",
 ]  # fmt: skip
