@@ -54,8 +54,8 @@ def late(request, monkeypatch) -> int:
     """Runs read the numbers of a step so many steps later, as those on a GPU do."""
     begin = trainer.Training.__init__
 
-    def reads_late(self, *arguments):
-        begin(self, *arguments)
+    def reads_late(self, *arguments, **named):
+        begin(self, *arguments, **named)
         self.reads_late = request.param
 
     monkeypatch.setattr(trainer.Training, "__init__", reads_late)
@@ -155,8 +155,8 @@ def test_numbers_that_are_read_late_are_those_of_their_step(data, tmp_path, monk
     written, begin = [], trainer.Training.__init__
     for late in (0, 1, 3):
 
-        def reads_late(self, *arguments, late=late):
-            begin(self, *arguments)
+        def reads_late(self, *arguments, late=late, **named):
+            begin(self, *arguments, **named)
             self.reads_late = late
 
         monkeypatch.setattr(trainer.Training, "__init__", reads_late)

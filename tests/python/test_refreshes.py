@@ -99,8 +99,8 @@ def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkey
     training = {}
     train_init = loop.Training.__init__
 
-    def noted(self, *args):
-        train_init(self, *args)
+    def noted(self, *args, **named):
+        train_init(self, *args, **named)
         training["it"] = self
         panorama = self.model.light.panorama
         self.model.light.panorama = lambda height: heights.append((at[0], height)) or panorama(height)

@@ -23,6 +23,7 @@ SILHOUETTE_SIZE = 100  # pixels, about, along the shorter edge of what the objec
 LEAST_COVERED = 0.25  # share of the undistorted image that the photo must cover
 CERTAIN = 0.999  # part of a pixel that must be known
 PEAK, BRIGHT = 0.9, 0.999  # a photo of floats is kept so that this share of its values lies below this one; 1 counts as clipped
+RINGING = 0.1  # of the brightest value; a filter leaves so much below 0 at an edge
 LEAST_ALPHA = 0.01
 STRIP = 1 << 20  # pixels that are averaged down at once
 
@@ -185,13 +186,15 @@ def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
 
 
 def _without_noise(pixels: np.ndarray, path: Path) -> np.ndarray:
-    """The values with negative ones set to 0, where these sum to at most a thousandth, as the noise of raw photos does.
+    """The values with negative ones set to 0: noise of raw photos, or what a filter leaves beside a lamp. Together they are at
+    most a thousandth of the sum, and none is further below 0 than a tenth of the brightest value is above.
 
     Raises:
         InputError: There are more, or NaN or infinite ones.
     """
     dark, total = -pixels.sum(where=pixels < 0, dtype=np.float64), pixels.sum(where=pixels > 0, dtype=np.float64)
-    if not (np.isfinite(pixels).all() and dark <= NEGATIVE_SHARE * total):
+    deepest = -RINGING * pixels.max()
+    if not (np.isfinite(pixels).all() and dark <= NEGATIVE_SHARE * total and pixels.min() >= deepest):
         raise InputError(f"{path}: has NaN, infinite or negative pixels; clean or re-export it")
     return np.maximum(pixels, 0)
 
