@@ -159,6 +159,8 @@ def train_in(
 
     plan = ranks.of_first(lambda: planned(run, args, settings))
     if plan.is_finished:
+        for observer in observers:
+            observer.delivering("evaluation", run)
         print(f"{run}: is finished")
         print_scores(read_evaluation(run))
         return DONE

@@ -129,6 +129,8 @@ def _check_content(content: dict) -> None:
             raise ValueError(f"{key} is {content[key]}")
     if type(content.get("psnr_mean")) not in (float, type(None)):  # older checkpoints have none
         raise ValueError("psnr_mean is of another type")
+    if type(content.get("stopped", False)) is not bool:  # older checkpoints have none
+        raise ValueError("stopped is of another type")
     if "exposures" in content:  # older checkpoints have none
         check_tensor("exposures", content["exposures"], (-1, 4), torch.float32)
     config = config_of(content)

@@ -21,6 +21,7 @@ from splitnerf.fields import EvaluatedLight
 from splitnerf.ops import MeshScene
 from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
+from splitnerf.refinement.job import STATE
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
@@ -105,7 +106,7 @@ class Training:
 
     Args:
         dataset, config, run, device, ranks: See :func:`train`.
-        observers: Who looks on; with several processes, from the first one.
+        observers: Who looks on, in the first process; with several processes their wishes are not asked.
     """
 
     def __init__(
@@ -161,6 +162,8 @@ class Training:
         for name in ("step", "seconds", "n_rays", "previewed_at"):
             setattr(self, name, content[name])
         self.psnr_mean = content.get("psnr_mean")
+        # A run that was stopped for its export goes on with the export's last stage; one that has it trains on.
+        self.stopped = content.get("stopped", False) and (self.run / STATE).is_file()
         if self.exposures.learned and "exposures" in content:
             self.exposures.restore(content["exposures"])
         self.model.open_levels(self.progress)
@@ -188,7 +191,7 @@ class Training:
                 interrupt.attempt(self.preview_if_due)
                 if self.seconds - self.saved_at > 60.0 * c.run.checkpoint_minutes and self.may_stop:
                     self.save()
-                if self.may_stop:
+                if self.may_stop and not self.ranks.several:  # a wish would reach one process alone
                     paused = heed(self, interrupt)
                     self.started += paused
                     bar.skip(paused)
@@ -206,7 +209,7 @@ class Training:
         save_checkpoint(
             self.run / "checkpoint.pt", config=self.config, fingerprint=self.fingerprint,
             state=dict(
-                step=self.step, seconds=self.seconds, n_rays=self.n_rays, previewed_at=self.previewed_at,
+                step=self.step, seconds=self.seconds, n_rays=self.n_rays, previewed_at=self.previewed_at, stopped=self.stopped,
                 psnr_mean=self.psnr_mean, exposures=self.exposures.sums, model=self.model.state_dict(),
                 optimiser={"state": self.optimiser.state_dict()["state"]},  # the rates are those of settings and step
                 device=self.generator.device.type, generator=self.generator.get_state(),

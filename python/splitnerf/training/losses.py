@@ -60,7 +60,8 @@ class Terms(dict[str, Term]):
         self, weights: dict[str, float | None], values: Tensor, totals: Sequence[float | Tensor] = ()
     ) -> None:
         """Adds the terms `values` [k], or [] for one, with their names and weights in that order. A term whose weight is None
-        is left out. `totals` are the sums of weights that the values are means over; without them, no rays weigh them."""
+        is left out. Each value is a weighted mean; `totals` holds the sum of its weights, by which several processes weigh their means. Without
+        it all processes count alike."""
         if any(weights.values()):
             self._roots.append((values, tuple(weight or 0.0 for weight in weights.values())))
             self._means.append((weights, values.detach().reshape(-1), totals or [1.0] * len(weights)))
@@ -256,18 +257,19 @@ class OcclusionPoints(NamedTuple):
 
 def occlusion_loss(
     ray: RenderedRays, scene: MeshScene, environment: Tensor, config: Config, generator: torch.Generator, seed: int
-) -> Tensor:
-    """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples.
+) -> tuple[Tensor, float | Tensor]:
+    """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples; and the
+    sum of the weights.
 
     Source: SplitNeRF Eq. (12)-(16).
     """
     random = torch.rand(len(ray.shaded), generator=generator, device=generator.device)
     chosen = (random < config.occlusion.share).nonzero().squeeze(1)
     if len(chosen) == 0:
-        return ray.shares.new_zeros(())
+        return ray.shares.new_zeros(()), 0.0
     truth = traced_factors(scene, occlusion_points(ray, chosen, config), environment, config, seed)
-    predicted = ray.points.occlusion_d[chosen], ray.points.occlusion_s[chosen]
-    return occlusion_error(predicted, truth, ray.shares[chosen], config)
+    predicted, shares = (ray.points.occlusion_d[chosen], ray.points.occlusion_s[chosen]), ray.shares[chosen]
+    return occlusion_error(predicted, truth, shares, config), shares.sum()
 
 
 @torch.no_grad()

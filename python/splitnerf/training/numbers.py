@@ -49,7 +49,7 @@ class PastStep:
         step: Its number, counted from 1.
         batch, ray, terms: Its rays, their rendering and the terms of its loss.
         room: The room of its results.
-        allowed: [] bool, whether its loss is a number, its gradient can be squared and its results had room.
+        allowed: [] bool, whether its loss is a number, its gradient can be squared, and the results of all processes had room.
         fetched: Its numbers on the CPU, and what waits until they are there.
         counted: The optimiser's counts of steps that this one has raised.
     """

@@ -142,7 +142,7 @@ ALONE = Alone()
 class Ranks(Alone):
     """The processes of one torchrun. Each draws the whole batch and takes every ``size``-th ray of it.
 
-    A step has two collectives: a few dozen numbers between the forward and the backward pass, by :meth:`agree`, and all gradients
+    Most steps have two collectives (learned exposures, a refresh of the grid and a new mesh have more): a few dozen numbers between the forward and the backward pass, by :meth:`agree`, and all gradients
     after it, by :meth:`sum_gradients`. Decisions that depend on time or on counts are taken from the former, so that they are equal
     everywhere.
 
@@ -207,7 +207,9 @@ class Ranks(Alone):
     @torch.no_grad()
     def sum_gradients(self, parameters: Iterable[Tensor]) -> None:
         parameters = list(parameters)
-        present = parameters[0].new_tensor([p.grad is not None for p in parameters])
+        device = parameters[0].device
+        here = torch.tensor([p.grad is not None for p in parameters], dtype=torch.float32)
+        present = pinned(here, device).to(device, non_blocking=True)  # else the host would wait for the backward pass
         parts = [torch.zeros_like(p) if p.grad is None else p.grad for p in parameters]
         flat = self.summed(torch.cat([*(part.reshape(-1) for part in parts), present]))
         *sums, present = flat.split([*(p.numel() for p in parameters), len(parameters)])
@@ -280,15 +282,17 @@ def lost_ranks() -> Iterator[None]:
     """Turns the error of a collective within the block into one that says what happened.
 
     Raises:
-        RankLost: Another process has ended.
+        RankLost: The collective failed.
     """
     try:
         yield
+    except torch.OutOfMemoryError:
+        raise
     except RuntimeError as error:  # gloo's and NCCL's
         ignore_signals()
         raise RankLost(
-            "another process of this training has ended, so all do; to go on from the last checkpoint, repeat the command with "
-            f"--resume ({str(error).partition(chr(10))[0]})"
+            "the processes of this training can no longer exchange numbers, most often because one has ended, so all end "
+            f"({str(error).partition(chr(10))[0]}); to go on, repeat the command with --resume auto"
         ) from error
 
 

@@ -182,8 +182,8 @@ def loss_terms(
         if seen is not None and w.seen_weight:
             terms.add({"seen_light": w.seen_weight * since}, seen.loss(light))
     if environment is not None and late is None:
-        found = losses.occlusion_loss(ray, scene, environment, c, own, step)
-        terms.add({"occlusion": w.occlusion_weight}, found)
+        error, weight = losses.occlusion_loss(ray, scene, environment, c, own, step)
+        terms.add({"occlusion": w.occlusion_weight}, error, [weight])
     elif environment is not None and (found := late.loss(ray, scene, environment, step)) is not None:
         terms.add({"occlusion": w.occlusion_weight}, found)
     elif environment is not None and own is not generator:  # other processes may have traced points

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from splitnerf.data.images import read_image
 from splitnerf.errors import InputError
 from splitnerf.files import reason
+from splitnerf.notes import note
 from splitnerf.training.observer import Observed, Observer
+
+if TYPE_CHECKING:
+    from torch.utils.tensorboard import SummaryWriter
 
 
 class TensorBoard(Observer):
@@ -47,14 +53,22 @@ class TensorBoard(Observer):
         self._writer = self._make(str(self._folder), purge_step=training.step + 1)
 
     def logged(self, line: dict[str, object]) -> None:
-        for name, value in line.items():
-            if name != "step" and value is not None:
-                self._writer.add_scalar(name, float(value), line["step"])
+        numbers = {name: float(value) for name, value in line.items() if name != "step" and value is not None}
+        self._write(lambda writer: [writer.add_scalar(name, value, line["step"]) for name, value in numbers.items()])
 
     def previewed(self, picture: Path, step: int) -> None:
         pixels = np.ascontiguousarray(read_image(picture)[..., :3])
-        self._writer.add_image("photo, render, albedo, normals", pixels, step, dataformats="HWC")
+        self._write(lambda writer: writer.add_image("photo, render, albedo, normals", pixels, step, dataformats="HWC"))
 
     def __exit__(self, *exception) -> None:
-        if self._writer is not None:
-            self._writer.close()
+        self._write(lambda writer: writer.close())
+
+    def _write(self, write: Callable[[SummaryWriter], object]) -> None:
+        """Writes, as long as that is possible: a full disk ends the curves, not the training."""
+        if self._writer is None:
+            return
+        try:
+            write(self._writer)
+        except OSError as error:
+            self._writer = None
+            note(f"{self._folder}: cannot be written ({reason(error)}); TensorBoard gets no more of this run")
