@@ -15,6 +15,7 @@ from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
 from splitnerf.progress import Interrupt
+from splitnerf.refinement.job import STATE
 from splitnerf.training import observer as observer_module
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training
@@ -103,6 +104,20 @@ def test_a_checkpoint_shows_the_levels_that_were_open(data, tmp_path):
     config = tiny(steps=400, start_levels=2, levels_open_by=1.0)
     scene, _ = reconstruct(data, tmp_path / "run", config, observers=[Asking(20, Wish.STOP)])
     assert load_run(tmp_path / "run")[0].sdf_field.grid.n_active == scene.model.sdf_field.grid.n_active == 2
+
+
+@pytest.mark.parametrize("stage_begun", [True, False])
+def test_a_stopped_run_goes_on_where_it_was(data, tmp_path, stage_begun):
+    """With its last stage, if that was interrupted; else with the training."""
+    config = tiny(steps=40)
+    stopped = trained(data, tmp_path, config, Asking(20, Wish.STOP))
+    assert stopped.finished and stopped.step == 20
+    if stage_begun:
+        (tmp_path / STATE).write_bytes(b"")
+    training = Training(load_dataset(data), config, tmp_path, CPU)
+    training.restore()
+    scene = training.complete()
+    assert scene.finished and (scene.step, scene.n_new) == ((20, 0) if stage_begun else (40, 20))
 
 
 def test_a_checkpoint_is_saved_when_asked(data, tmp_path):

@@ -174,7 +174,7 @@ def test_a_killed_process_ends_all_with_one_line(data, tmp_path, victim):
     os.kill(ours[victim], signal.SIGKILL)
     _, err = process.communicate(timeout=120)
     assert process.returncode == 1 and not any(Path(f"/proc/{pid}").exists() for pid in ours)
-    assert len(said(err)) == 1 and "another process of this training has ended" in said(err)[0], err
+    assert len(said(err)) == 1 and "most often because one has ended" in said(err)[0], err
 
 
 @pytest.mark.parametrize("asked", ["torchrun", "the second process"])
@@ -187,6 +187,32 @@ def test_a_request_to_stop_saves_a_checkpoint(data, tmp_path, asked):
     assert process.returncode == 1 and said(err) == [] and "--resume" in out, (out, err)
     step = load_checkpoint(run / "checkpoint.pt")["step"]
     assert step > 5 and step % 4 == 0 and len(lines_of(run)) >= 5
+
+
+def test_the_first_process_delivers(data, tmp_path):
+    """A run to its end, last stage included; then nothing is left to do."""
+    run = tmp_path / "run"
+    command = [*torchrun, "-m", "splitnerf.train", str(data), "--out", str(run), "--steps", "24", "--resume", "auto", *as_options(SMALL)]
+    command += ["--set", "refinement_sweeps=1"]
+    for _ in range(2):
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=300)
+        assert done.returncode == 0 and said(done.stderr) == [], done.stderr
+    assert "is finished" in done.stdout and len(lines_of(run)) == len({line["step"] for line in lines_of(run)})
+    for name in ("mesh.glb", "environment.exr", "report.html", "evaluation.json"):
+        assert (run / name).stat().st_size > 0
+
+
+def test_a_term_that_one_process_has_no_points_for_is_that_of_the_other():
+    """Its mean and its gradient count alone."""
+    x = torch.tensor([3.0], requires_grad=True)
+    sent = []
+    for total in (0.0, 0.5):
+        terms = Terms()
+        terms.add({"occlusion": 2.0}, x.sum() if total else torch.zeros(()), [total])
+        terms.share(lambda v: sent.append(v) or v, torch.zeros(1))
+    terms.share(lambda v: sum(sent), torch.zeros(1))
+    terms.backward()
+    assert float(terms["occlusion"].value) == 3.0 and x.grad.item() == 2.0
 
 
 def test_bad_input_is_said_once(data, tmp_path):

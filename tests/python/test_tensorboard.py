@@ -41,6 +41,21 @@ def test_scalars_and_previews_are_written(data, tmp_path):
     assert np.abs(shown.astype(int) - saved).max() <= 1
 
 
+def test_a_full_disk_ends_the_curves_and_not_the_run(data, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("tensorboard", reason="needs tensorboard")
+    from torch.utils.tensorboard import SummaryWriter
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(SummaryWriter, "add_scalar", full)
+    with TensorBoard(tmp_path / "board") as board:
+        training = Training(load_dataset(data), tiny(steps=4), tmp_path, torch.device("cpu"), [board])
+        assert training.complete().step == 4
+    said = [line for line in capsys.readouterr().err.splitlines() if "TensorBoard" in line]
+    assert len(said) == 1 and str(tmp_path / "board") in said[0] and "No space left" in said[0]
+
+
 def test_without_the_package_one_line_says_what_to_install(data, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     assert train(data, tmp_path / "run", "--tensorboard", str(tmp_path / "board")) == BAD_INPUT

@@ -61,10 +61,10 @@ class Operator:
 
 
     def handing_on(self, *arguments: object) -> tuple[tuple[Tensor, ...], tuple[Tensor, ...]]:
-        """The results, and once more the arguments that :func:`register` names with ``hands_on``, for who reads them next.
+        """The results, and once more the arguments that :func:`register` names with ``hands_on``, for their next reader.
 
-        Where several readers of a tensor follow one another so, each adds what the next one sends back to its own gradient, and
-        torch adds nothing.
+        When each reader of a tensor takes it from the reader before, each adds the next one's gradient to its own. Torch then needs no
+        addition of its own.
         """
         name = self._packet.__name__
         which = _HANDED_ON[name]
@@ -208,9 +208,9 @@ def is_dual(argument: object) -> bool:
 def register(name: str, *, fake, backward=None, setup_context=None, hands_on: tuple[int, ...] = ()) -> None:
     """Registers the fake implementation and the gradient of ``splitnerf::name``.
 
-    An operator without ``backward`` raises in a backward pass; it never returns a gradient of zeros. With ``hands_on``, positions of
-    arguments, ``backward`` takes `more`, what :meth:`Operator.handing_on` says: the gradients that other readers of these arguments
-    found, each None where there is none, to be added to its own.
+    An operator without ``backward`` raises in a backward pass; it never returns a gradient of zeros. ``hands_on`` are positions of
+    arguments that :meth:`Operator.handing_on` returns once more. ``backward`` then takes `more`: for each of them the gradient that its
+    next reader sent back, or None; it adds that to its own.
     """
     qualified = f"splitnerf::{name}"
     torch.library.register_fake(qualified, fake)

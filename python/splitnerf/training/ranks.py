@@ -111,7 +111,7 @@ class Alone:
         return function
 
     def align(self, device: torch.device) -> None:
-        """Gives torch's own random numbers on a device the state that they have in the first process."""
+        """Sets torch's default generator of a device to the state of the first process's."""
 
     def read(self, agreed: Agreed) -> None:
         """Takes in what the processes agreed on in a step, once it is known."""

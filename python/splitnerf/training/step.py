@@ -113,8 +113,8 @@ class Step:
         return ray, terms
 
     def settle(self, counts: Room, room: Room, s: float, elsewhere: bool = False) -> bool:
-        """Takes in the counts of a step with this room and its sharpness; returns whether its results may be used: not if those of
-        another process had too little room ``elsewhere``."""
+        """Takes in the counts of a step with this room and its sharpness. ``elsewhere``: another process had too little room.
+        Returns whether the results may be used: only if no process had too little."""
         return room.holds(counts) and not elsewhere
 
     def stream(self) -> AbstractContextManager[None]:
