@@ -25,7 +25,7 @@ def add_reading_options(parser: argparse.ArgumentParser, default: str = "as the 
     )  # fmt: skip
     parser.add_argument(
         "--max-memory", type=float, metavar="GB",
-        help="memory that the photos may take; more are read from a file in TMPDIR (default: half of what is available)",
+        help="memory for photos; more are read from a file in TMPDIR (default: half of what is available)",
     )  # fmt: skip
 
 

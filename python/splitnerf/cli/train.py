@@ -30,8 +30,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf train data --max-minutes 30", "splitnerf train data --preset fast --downscale 2 --out runs/fast",
             "splitnerf train data --resume auto --view",
             after="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient alone skips "
-            "its step. The message names where it came from, and the last checkpoint stands: --resume goes on from it. Several processes "
-            "train one scene by `torchrun --nproc-per-node N -m splitnerf.train data` (docs/ranks.md).",
+            "its step. The message names where it came from; --resume goes on from the last checkpoint. `torchrun --nproc-per-node N -m "
+            "splitnerf.train data` trains in N processes.",
         ),
     )  # fmt: skip
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images; masks help, else the object is looked for")
