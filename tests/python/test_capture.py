@@ -197,6 +197,15 @@ def test_missing_packages_are_named(monkeypatch, tmp_path, capsys):
     assert "splitnerf[photos]" in capsys.readouterr().err
 
 
+def test_an_interrupted_call_says_how_to_go_on(tmp_path, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(capture_job, "prepare", interrupted)
+    assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "data")]) == 130
+    assert "the same command goes on" in capsys.readouterr().err
+
+
 def test_other_files_are_not_written_over(tmp_path, capsys):
     (tmp_path / "transforms.json").write_text("{}")
     assert main(["prepare", str(tmp_path), "--out", str(tmp_path)]) == 2

@@ -55,7 +55,10 @@ def run(args: argparse.Namespace) -> int:
         def report(step: str, share: float) -> None:
             bar.show(overall(step, share, args.masks is not None), step)
 
-        result = prepare(args.photos, args.out, settings, report)
+        try:
+            result = prepare(args.photos, args.out, settings, report)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt("interrupted; the same command goes on: features and matches are kept") from None
     n, lost = len(result.world.scene.names), len(result.left_out)
     print(f"{n} of {n + lost} photos, reprojection error {result.world.scene.error:.2f} pixels: {args.out}")
     print(f"look at {args.out / 'prepare.html'}, then: splitnerf train {args.out}")
