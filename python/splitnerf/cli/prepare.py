@@ -47,10 +47,10 @@ def run(args: argparse.Namespace) -> int:
     if missing:
         raise InputError(f"prepare needs {' and '.join(missing)}; pip install 'splitnerf[photos]'")
     from splitnerf.capture.job import PrepareSettings, prepare
-    from splitnerf.progress import Progress
+    from splitnerf.progress import Progress, ended_by_signals
 
     settings = PrepareSettings(args.max_size, args.masks, args.frames, args.seed)
-    with Progress(0.0) as bar:
+    with ended_by_signals(), Progress(0.0) as bar:  # again: pycolmap, just imported, has taken SIGTERM
 
         def report(step: str, share: float) -> None:
             bar.show(overall(step, share, args.masks is not None), step)
