@@ -34,7 +34,7 @@ def set_light(path: str, degrees: float) -> None:
 
 
 def set_camera(path: str, frame: int, size: int) -> None:
-    """Takes pose, lens and size of a transforms.json, whose axes (OpenGL, z up) are Blender's. Pixels are square."""
+    """Takes pose, lens and size of a transforms.json, whose axes (OpenGL, z up) are Blender's."""
     cameras = json.loads(Path(path).read_text())
     lens, scene = cameras | cameras["frames"][frame], bpy.context.scene
     scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
@@ -42,10 +42,12 @@ def set_camera(path: str, frame: int, size: int) -> None:
     scene.camera.matrix_world = Matrix(lens["transform_matrix"])
     width, height, camera = int(lens.get("w", size)), int(lens.get("h", size)), scene.camera.data
     scene.render.resolution_x, scene.render.resolution_y = width, height
+    tall = lens["fl_x"] / lens["fl_y"] if "fl_y" in lens else 1  # a pixel's height over its width
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = max(1, 1 / tall), max(1, tall)  # no less
     camera.sensor_fit = "HORIZONTAL"
     camera.angle_x = lens.get("camera_angle_x") or 2 * math.atan(0.5 * width / lens["fl_x"])
     camera.shift_x = 0.5 - lens.get("cx", width / 2) / width  # of the width, both
-    camera.shift_y = (lens.get("cy", height / 2) - height / 2) / width
+    camera.shift_y = (lens.get("cy", height / 2) - height / 2) * tall / width
 
 
 def set_colours(exposure: float) -> None:

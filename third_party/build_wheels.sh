@@ -41,8 +41,9 @@ SELECT
   # shellcheck disable=SC2086  # a list of words
   PATH="$venv/bin:$PATH" $pip wheel --quiet --no-deps --no-build-isolation --no-cache-dir --wheel-dir "$work/built" "$work/source" \
     -C build-dir="$work/build/{wheel_tag}" -C cmake.define.SPLITNERF_TORCH="$torch" $options
+  # The build put Embree's tbb beside it (embree.cmake); a second copy is not needed.
   PATH="$venv/bin:$PATH" "$venv/bin/python" -m auditwheel repair --wheel-dir "$out" \
-    --exclude 'libtorch*.so' --exclude 'libc10*.so' "$work"/built/*.whl
+    --exclude 'libtorch*.so' --exclude 'libc10*.so' --exclude 'libtbb*.so*' "$work"/built/*.whl
 done
 for wheel in "$out"/*.whl; do
   echo "$(du -k "$wheel" | cut -f 1) KiB $(basename "$wheel")"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import fcntl
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -195,6 +197,24 @@ def test_missing_packages_are_named(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr("splitnerf.cli.prepare.find_spec", lambda name: None)
     assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "data")]) == 2
     assert "splitnerf[photos]" in capsys.readouterr().err
+
+
+def test_an_interrupted_call_says_how_to_go_on(tmp_path, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(capture_job, "prepare", interrupted)
+    assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "data")]) == 130
+    assert "the same command goes on" in capsys.readouterr().err
+
+
+def test_sigterm_ends_it_without_a_stack_trace(tmp_path):
+    """pycolmap catches the signal when it is imported, and would print one."""
+    raised = "import signal, sys, splitnerf.progress as p; from splitnerf.cli import main\n"
+    raised += "p.Progress.__enter__ = lambda bar: signal.raise_signal(signal.SIGTERM)\nsys.exit(main(sys.argv[1:]))"
+    words = ["prepare", str(tmp_path), "--out", str(tmp_path / "data")]
+    done = subprocess.run([sys.executable, "-c", raised, *words], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (130, "splitnerf: interrupted\n")
 
 
 def test_other_files_are_not_written_over(tmp_path, capsys):

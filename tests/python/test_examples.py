@@ -160,10 +160,10 @@ def run_blender(name: str, *arguments: str) -> str:
 
 
 def test_blender_shows_what_relight_shows(ball, tmp_path):
-    """Asset, light with a turn, camera with a shifted lens, exposure and colours: the same picture."""
+    """Asset, light with a turn, camera with a shifted lens and oblong pixels, exposure, colours: the same picture."""
     write_glb(tmp_path / "mesh.glb", orange(ball))
     write_image(tmp_path / "light.exr", lamps())
-    lens = {"fl_x": 150.0, "fl_y": 150.0, "cx": 70.0, "cy": 40.0, "w": 120, "h": 96}
+    lens = {"fl_x": 150.0, "fl_y": 165.0, "cx": 70.0, "cy": 40.0, "w": 120, "h": 96}
     cameras = tmp_path / "transforms.json"
     cameras.write_text(json.dumps(lens | {"frames": [{"transform_matrix": looking(0.4, 0.5, 5.0).tolist()}]}))
     out = tmp_path / "lit"

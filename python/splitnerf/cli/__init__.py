@@ -64,8 +64,8 @@ def execute(args: argparse.Namespace) -> tuple[int, str]:
         return code, ""
     except InputError as error:
         return BAD_INPUT, str(error)
-    except KeyboardInterrupt:
-        return INTERRUPTED, "interrupted"
+    except KeyboardInterrupt as interrupt:
+        return INTERRUPTED, str(interrupt) or "interrupted"
     except OSError as error:
         where = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
         return FAILED, f"{where}{reason(error)}"

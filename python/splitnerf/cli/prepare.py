@@ -47,15 +47,18 @@ def run(args: argparse.Namespace) -> int:
     if missing:
         raise InputError(f"prepare needs {' and '.join(missing)}; pip install 'splitnerf[photos]'")
     from splitnerf.capture.job import PrepareSettings, prepare
-    from splitnerf.progress import Progress
+    from splitnerf.progress import Progress, ended_by_signals
 
     settings = PrepareSettings(args.max_size, args.masks, args.frames, args.seed)
-    with Progress(0.0) as bar:
+    with ended_by_signals(), Progress(0.0) as bar:  # again: pycolmap, just imported, has taken SIGTERM
 
         def report(step: str, share: float) -> None:
             bar.show(overall(step, share, args.masks is not None), step)
 
-        result = prepare(args.photos, args.out, settings, report)
+        try:
+            result = prepare(args.photos, args.out, settings, report)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt("interrupted; the same command goes on: features and matches are kept") from None
     n, lost = len(result.world.scene.names), len(result.left_out)
     print(f"{n} of {n + lost} photos, reprojection error {result.world.scene.error:.2f} pixels: {args.out}")
     print(f"look at {args.out / 'prepare.html'}, then: splitnerf train {args.out}")
