@@ -31,7 +31,7 @@ def square() -> UnwrappedMesh:
 def test_strips_of_a_raster_make_the_whole(monkeypatch):
     uv, faces = np.float32([[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]]), np.int32([[0, 1, 2]])
     whole = rasterise(uv, faces, 64)
-    monkeypatch.setattr(bake, "RAY_ROWS", 64 * 7)
+    monkeypatch.setattr(bake, "BAND", 64 * 7)
     strips = rasterise(uv, faces, 64)
     assert np.array_equal(whole.index, strips.index) and np.array_equal(whole.weights, strips.weights)
 
