@@ -177,7 +177,7 @@ LIMITS = {
     "optimiser.light_step_every": "in [1, 64]", "refinement.share": "in [0, 1)",
     "separation.share": "in (0, 1)", "separation.steps": "in [1, 16777216]",
     "refinement.sweeps": "in [1, 16777216]", "export.resolution": "in [8, 4096]",
-    "export.texture_size": "in [8, 32768]", "export.environment_height": "in [1, 8192]",
+    "export.texture_size": "in [8, 8192]", "export.environment_height": "in [1, 8192]",
 }  # fmt: skip
 CHOICES = {
     "data.eval_mode": "auto, all, fraction, filename", "data.mask_kind": "auto, object, ignore",

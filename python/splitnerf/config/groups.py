@@ -335,6 +335,6 @@ class Export:
     )
     faces: int = setting(50000, "triangles of the textured mesh; 0: all", unit="triangles")
     texture_size: int = setting(
-        1024, "texels along the edge of a texture", unit="texels", at_least=MIN_EXPORT_SIZE, at_most=1 << 15
+        1024, "texels along the edge of a texture", unit="texels", at_least=MIN_EXPORT_SIZE, at_most=8192
     )
     environment_height: int = setting(128, "rows of the light's image", unit="texels", at_least=1, at_most=1 << 13)
