@@ -89,8 +89,8 @@ SETTINGS = {
     "sampling.grid_resolution": ("grid_resolution", 96, 128, PAPER),
     "sampling.grid_every": ("grid_every", 32, 16, PAPER),
     "sampling.hull_until": ("hull_until", 0.1, 0.0, PAPER),
-    "sampling.coarse_until": ("coarse_until", 0.5, 0.0, PAPER),
-    "sampling.coarse_edge": ("coarse_edge", 200, 200, OURS),
+    "sampling.coarse_until": ("coarse_until", 1.0, 0.0, PAPER),
+    "sampling.coarse_edge": ("coarse_edge", 400, 400, OURS),
     "sampling.foreground_share": ("foreground_share", 0.85, 0.0, PAPER),
     "losses.colour_weight": ("colour_weight", 10.0 / 3.0, 10.0, PAPER),  # the sum over channels, Eq. (3)
     "losses.light_weight": ("light_weight", 1.0, 10.0, PAPER),

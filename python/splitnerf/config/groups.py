@@ -240,10 +240,10 @@ class Sampling:
     grid_every: int = setting(32, "steps between refreshes of the occupancy grid", unit="steps", at_least=1)
     hull_until: float = setting(0.1, "time until which the masks' visual hull is sampled", unit="share of the run")
     coarse_until: float = setting(
-        0.5, "time until which large photos are averaged down for training; 0: never", unit="share of the run"
+        1.0, "time until which training draws from averages of large photos; 0: never", unit="share of the run"
     )
     coarse_edge: int = setting(
-        200, "least pixels of the averages' shorter edge", unit="pixels", at_least=8, at_most=1 << 14
+        400, "least pixels of the averages' shorter edge", unit="pixels", at_least=8, at_most=1 << 14
     )
     foreground_share: float = setting(0.85, "share of the rays that are drawn near the masks", unit="share of the rays")
 
