@@ -13,7 +13,7 @@ import trimesh
 
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.tangents import vertex_tangents
-from splitnerf.export import bake
+from splitnerf.export import bake, maps
 from splitnerf.export.bake import UnwrappedMesh, bake_occlusion, rasterise, to_tangent_space
 from splitnerf.export.glb import write_glb
 from splitnerf.export.maps import encode_maps
@@ -31,9 +31,36 @@ def square() -> UnwrappedMesh:
 def test_strips_of_a_raster_make_the_whole(monkeypatch):
     uv, faces = np.float32([[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]]), np.int32([[0, 1, 2]])
     whole = rasterise(uv, faces, 64)
-    monkeypatch.setattr(bake, "RAY_ROWS", 64 * 7)
+    monkeypatch.setattr(bake, "BAND", 64 * 7)
     strips = rasterise(uv, faces, 64)
     assert np.array_equal(whole.index, strips.index) and np.array_equal(whole.weights, strips.weights)
+
+
+def test_a_bake_in_bands_is_the_whole_one(monkeypatch):
+    """A field that differs from texel to texel, charts with a gap between them, and bands without a texel."""
+    uv = np.float32([[0.1, 0.1], [0.6, 0.15], [0.2, 0.4], [0.3, 0.7], [0.9, 0.75], [0.8, 0.95]])
+    vertices = np.column_stack([uv, np.zeros(6)]).astype(np.float32)
+    faces, normals = np.int32([[0, 1, 2], [3, 4, 5]]), np.float32([[0, 0, 1]] * 6)
+    mesh = UnwrappedMesh(vertices, faces, normals, vertex_tangents(vertices, faces, normals, uv), uv)
+
+    def materials(x):
+        return x.abs(), x[:, :1], x[:, 1:2], torch.nn.functional.normalize(torch.tensor([0.2, 0.1, 1.0]) + x, dim=1)
+
+    floor = Surface(lambda x: x[:, 2], lambda x: (x[:, 2], torch.tensor([[0.0, 0.0, 1.0]]).expand_as(x)), materials)
+    whole = bake.bake(mesh, floor, 64, reach=0.1, offset=0.01)
+    assert whole.roughness_metallic[-1, -1] == pytest.approx([0.8, 0.95], abs=0.06)  # of the nearest corner
+    monkeypatch.setattr(bake, "BAND", 64 * 7)
+    parts = bake.bake(mesh, floor, 64, reach=0.1, offset=0.01)
+    for name in ("albedo", "roughness_metallic", "occlusion", "normal"):
+        assert np.array_equal(getattr(whole, name), getattr(parts, name)), name
+
+
+def test_maps_encoded_in_bands_are_the_whole_ones(monkeypatch):
+    random = np.random.default_rng(0)
+    gloss, open_share = random.random((30, 20, 2), np.float32), random.random((30, 20), np.float32)
+    monkeypatch.setattr(maps, "BAND", 20 * 7)
+    pixels = maps.encoded(lambda *bands: np.dstack(bands), open_share, gloss)
+    assert np.array_equal(pixels, np.rint(np.dstack([open_share, gloss]) * 255).astype(np.uint8))
 
 
 def test_occlusion_baked_small_stands_where_it_belongs(monkeypatch):

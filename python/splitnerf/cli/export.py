@@ -9,7 +9,6 @@ from splitnerf.cli.exit_codes import DONE
 from splitnerf.cli.help import examples
 from splitnerf.errors import InputError
 
-MAX_TEXTURE_SIZE = 8192
 MIN_FACES = 100
 
 
@@ -38,7 +37,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.config import FIELDS, MIN_EXPORT_SIZE
+    from splitnerf.config import FIELDS
     from splitnerf.delivery import export_folder
     from splitnerf.outputs import FORMATS
     from splitnerf.workflow import export_run
@@ -49,11 +48,10 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--formats: unknown {unknown[0]!r}; there are {', '.join(FORMATS)}")
     if args.faces is not None and args.faces != 0 and args.faces < MIN_FACES:
         raise InputError(f"--faces must be 0 or at least {MIN_FACES}, got {args.faces}")
-    if args.texture_size is not None and not MIN_EXPORT_SIZE <= args.texture_size <= MAX_TEXTURE_SIZE:
-        raise InputError(f"--texture-size must be in [{MIN_EXPORT_SIZE}, {MAX_TEXTURE_SIZE}], got {args.texture_size}")
-    limits = FIELDS["export.resolution"].metadata["limits"]
-    if args.resolution is not None and not limits.allow(args.resolution):
-        raise InputError(f"--resolution must be {limits}, got {args.resolution}")
+    for option in ("texture_size", "resolution"):
+        value, limits = getattr(args, option), FIELDS[f"export.{option}"].metadata["limits"]
+        if value is not None and not limits.allow(value):
+            raise InputError(f"--{option.replace('_', '-')} must be {limits}, got {value}")
     out = args.out or export_folder(args.run)
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")

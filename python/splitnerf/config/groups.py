@@ -239,6 +239,12 @@ class Sampling:
     )
     grid_every: int = setting(32, "steps between refreshes of the occupancy grid", unit="steps", at_least=1)
     hull_until: float = setting(0.1, "time until which the masks' visual hull is sampled", unit="share of the run")
+    coarse_until: float = setting(
+        1.0, "time until which training draws from averages of large photos; 0: never", unit="share of the run"
+    )
+    coarse_edge: int = setting(
+        400, "least pixels of the averages' shorter edge", unit="pixels", at_least=8, at_most=1 << 14
+    )
     foreground_share: float = setting(0.85, "share of the rays that are drawn near the masks", unit="share of the rays")
 
 
@@ -335,6 +341,6 @@ class Export:
     )
     faces: int = setting(50000, "triangles of the textured mesh; 0: all", unit="triangles")
     texture_size: int = setting(
-        1024, "texels along the edge of a texture", unit="texels", at_least=MIN_EXPORT_SIZE, at_most=1 << 15
+        1024, "texels along the edge of a texture", unit="texels", at_least=MIN_EXPORT_SIZE, at_most=8192
     )
     environment_height: int = setting(128, "rows of the light's image", unit="texels", at_least=1, at_most=1 << 13)

@@ -13,12 +13,13 @@ import numpy as np
 
 from splitnerf.data.environment import read_surroundings
 from splitnerf.data.frames import read_frames
+from splitnerf.data.images import area_average
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.loading import Loader
 from splitnerf.data.normalisation import MasksContradict, box_of_views, estimate_box, transform_points
-from splitnerf.data.photos import Photo, silhouette_factor
-from splitnerf.data.pixels import Photos
+from splitnerf.data.photos import CERTAIN, Photo, averaged_codes, silhouette_factor
+from splitnerf.data.pixels import Photos, forget_pages, new_array, room_for_photos
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.notes import note_once
@@ -124,6 +125,33 @@ class Dataset:
         poses = self.world_poses
         poses[:, :3, 3] = transform_points(box_from_world, poses[:, :3, 3])
         return replace(self, poses=poses.astype(np.float32), box_from_world=box_from_world)
+
+    def averaged(self, factor: int, max_memory: float) -> Dataset:
+        """The split with photos averaged down by a whole factor, in 16 bits, as `downscale` does on reading.
+
+        Args:
+            factor: At least 2, at most the photos' shorter edge.
+            max_memory: GB for all photos, see :func:`splitnerf.data.pixels.room_for_photos`; what needs more goes to a file.
+        """
+        shape = (len(self), self.height // factor, self.width // factor)
+        in_file = 2 * 4 * int(np.prod(shape)) > room_for_photos(max_memory)
+        codes, known = new_array((*shape, 4), np.dtype(np.uint16), in_file), None
+        if self.known is not None:
+            known = np.stack([area_average(one.astype(np.float32), factor) > CERTAIN for one in self.known])
+        for i, photo in enumerate(self.images.codes):
+            codes[i] = averaged_codes(photo, factor)
+            if known is not None:
+                codes[i][~known[i]] = 0
+            forget_pages(self.images.codes)
+            forget_pages(codes)
+        return replace(
+            self,
+            downscale=self.downscale * factor,
+            images=Photos(codes, self.images.exposures),
+            intrinsics=self.intrinsics / np.float32(factor),
+            known=known,
+            whole=False,
+        )
 
     def select(self, views: Sequence[int]) -> Dataset:
         """The split reduced to these views, in this order."""

@@ -98,7 +98,7 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
         masked, whole, rgba[..., 3] = True, True, encoded(mask, rgba.dtype)
     factor = silhouette_factor(height, width)
     silhouette = area_average(decoded(rgba[..., 3]), factor) > 0.5
-    rgba = _averaged(rgba, downscale)
+    rgba = averaged_codes(rgba, downscale)
     whole &= downscale == 1  # averages are of the object's colours alone
     if known is None or known.all():
         return Photo(rgba, None, silhouette, None, (height, width), masked, whole, scale)
@@ -212,7 +212,7 @@ def _read_mask(path: Path) -> np.ndarray:
     return _read_pixels(path)[..., :1]
 
 
-def _averaged(rgba: np.ndarray, factor: int) -> np.ndarray:
+def averaged_codes(rgba: np.ndarray, factor: int) -> np.ndarray:
     """An image [H, W, 4] of whole numbers, averaged down to 16 bits by strips, so that few floats are there at a time."""
     if factor == 1:
         return rgba

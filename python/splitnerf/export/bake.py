@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from splitnerf import _core
 from splitnerf.ops import MeshScene, occlusion_factors
 from splitnerf.export.surface import Surface, surface_materials, to_level_set
 
-RAY_ROWS = 1 << 20  # texels traced at a time
+BAND = 1 << 20  # texels rasterised and evaluated at a time
 OCCLUSION_SHRINK = 4  # occlusion is baked at a quarter of the size
 OCCLUSION_RAYS = 64
 MIN_UP = 0.02  # least z of a tangent-space normal
@@ -43,14 +44,13 @@ class Textures:
 
     Attributes:
         albedo: [h, w, 3] linear.
-        roughness, metallic: [h, w] in [0, 1].
+        roughness_metallic: [h, w, 2] in [0, 1].
         occlusion: [h, w] in [0, 1], 1 = open.
         normal: [h, w, 3] unit, tangent space: x along the tangent, y along the bitangent (up in the texture).
     """
 
     albedo: np.ndarray
-    roughness: np.ndarray
-    metallic: np.ndarray
+    roughness_metallic: np.ndarray
     occlusion: np.ndarray
     normal: np.ndarray
 
@@ -77,23 +77,30 @@ class Texels:
 
 def rasterise(uv: np.ndarray, faces: np.ndarray, size: int) -> Texels:
     """Finds the triangle under each texel's centre by tracing straight down onto the mesh laid flat."""
+    parts = list(bands(uv, faces, size))
+    return Texels(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("index", "triangle", "weights")))
+
+
+def bands(uv: np.ndarray, faces: np.ndarray, size: int) -> Iterator[Texels]:
+    """The texels of :func:`rasterise`, some rows of the texture at a time."""
     flat = np.column_stack([uv * size, np.zeros(len(uv))]).astype(np.float32)
     scene = _core.Scene(flat, np.ascontiguousarray(faces, dtype=np.int32))
-    rows = max(1, RAY_ROWS // size)
-    found = []
+    rows = max(1, BAND // size)
     for start in range(0, size, rows):
         y, x = np.mgrid[start : min(start + rows, size), 0:size].reshape(2, -1)
         origins = np.column_stack([x + 0.5, y + 0.5, np.ones(len(x))]).astype(np.float32)
         down = np.broadcast_to(np.float32([0, 0, -1]), origins.shape).copy()
         _, triangle, u, v = scene.trace_closest(origins, down)
         hit = triangle >= 0
-        found.append((start * size + np.flatnonzero(hit), triangle[hit], np.column_stack([1 - u - v, u, v])[hit]))
-    index, triangle, weights = (np.concatenate(parts) for parts in zip(*found))
-    return Texels(index, triangle, weights)
+        weights = np.column_stack([1 - u - v, u, v])[hit]
+        yield Texels(start * size + np.flatnonzero(hit), triangle[hit], weights)
 
 
 def bake(mesh: UnwrappedMesh, surface: Surface, size: int, *, reach: float, offset: float) -> Textures:
     """Evaluates the fields at each texel's point, which is first moved onto the zero level set along the mesh's normal.
+
+    Beside the maps it takes about as much memory for a texture of 8192 x 8192 as for a small one: the texels are evaluated
+    in bands.
 
     Args:
         mesh: The mesh, in the frame of the surface.
@@ -108,20 +115,37 @@ def bake(mesh: UnwrappedMesh, surface: Surface, size: int, *, reach: float, offs
     Raises:
         RuntimeError: The texture is too small for the mesh, or the materials are not finite.
     """
-    texels = rasterise(mesh.uv, mesh.faces, size)
-    if len(texels.index) == 0:
+    albedo, roughness_metallic, normal = (np.zeros((size * size, width), np.float32) for width in (3, 2, 3))
+    covered = np.zeros(size * size, bool)
+    for texels in bands(mesh.uv, mesh.faces, size):
+        if len(texels.index) == 0:
+            continue
+        rows, normals = texels.index, texels.interpolate(mesh.normals, mesh.faces)
+        points = to_level_set(surface, texels.interpolate(mesh.vertices, mesh.faces), reach, _unit(normals))
+        albedo[rows], roughness, metallic, fine_normals = surface_materials(surface, points)
+        roughness_metallic[rows] = np.column_stack([roughness, metallic])
+        normal[rows] = to_tangent_space(fine_normals, normals, texels.interpolate(mesh.tangents, mesh.faces))
+        covered[rows] = True
+    if not covered.any():
         raise RuntimeError(f"no texel of {size} x {size} lies in a chart; give a larger texture size")
-    normals = texels.interpolate(mesh.normals, mesh.faces)
-    points = to_level_set(surface, texels.interpolate(mesh.vertices, mesh.faces), reach, _unit(normals))
-    albedo, roughness, metallic, fine_normals = surface_materials(surface, points)
-    spread = Spread(texels.index, size)
-    return Textures(
-        albedo=spread(albedo),
-        roughness=spread(roughness),
-        metallic=spread(metallic),
-        occlusion=bake_occlusion(mesh, size, offset),
-        normal=spread(to_tangent_space(fine_normals, normals, texels.interpolate(mesh.tangents, mesh.faces))),
-    )
+    maps = (albedo, roughness_metallic, normal)
+    fill_in(covered.reshape(size, size), maps)
+    albedo, roughness_metallic, normal = (values.reshape(size, size, -1) for values in maps)
+    return Textures(albedo, roughness_metallic, bake_occlusion(mesh, size, offset), normal)
+
+
+def fill_in(covered: np.ndarray, maps: tuple[np.ndarray, ...]) -> None:
+    """Gives the texels that are not covered [h, w] the value of the nearest covered one, in maps [h * w, c]."""
+    missing = np.flatnonzero(~covered)
+    row, column = nearest_texels(covered)
+    nearest = row.reshape(-1)[missing].astype(np.int64) * covered.shape[1] + column.reshape(-1)[missing]
+    for values in maps:
+        values[missing] = values[nearest]
+
+
+def nearest_texels(covered: np.ndarray) -> np.ndarray:
+    """[2, h, w] int32, row and column of the nearest covered texel [h, w]."""
+    return distance_transform_edt(~covered, return_distances=False, return_indices=True)
 
 
 def bake_occlusion(mesh: UnwrappedMesh, size: int, offset: float) -> np.ndarray:
@@ -178,9 +202,8 @@ class Spread:
     def __init__(self, index: np.ndarray, size: int):
         row_of = np.full(size * size, -1, np.int32)
         row_of[index] = np.arange(len(index), dtype=np.int32)
-        missing = (row_of < 0).reshape(size, size)
-        nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
-        self.rows = row_of.reshape(size, size)[tuple(nearest)]
+        row_of = row_of.reshape(size, size)
+        self.rows = row_of[tuple(nearest_texels(row_of >= 0))]
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """The map [size, size] or [size, size, c] float32 of values [k] or [k, c]."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.images import linear_to_srgb, to_uint8
+
+BAND = 1 << 20  # texels encoded at a time
 
 
 @dataclass(frozen=True)
@@ -46,20 +49,30 @@ def encode_maps(path: object, asset: Asset, occlusion: np.ndarray | None) -> Map
             raise RuntimeError(f"{path}: {name} must be finite [{n}, {width}], got {list(values.shape)}")
     if len(asset.triangles) == 0 or asset.triangles.min() < 0 or asset.triangles.max() >= n:
         raise RuntimeError(f"{path}: degenerate or empty mesh, nothing written")
-    textures = (material.albedo_texture, material.roughness_metallic_texture, material.normal_texture, occlusion)
-    for texture in textures:
+    albedo, roughness_metallic, normal = (
+        material.albedo_texture, material.roughness_metallic_texture, material.normal_texture,
+    )  # fmt: skip
+    for texture in (albedo, roughness_metallic, normal, occlusion):
         if texture is not None and (asset.uv is None or not np.isfinite(texture).all()):
             raise RuntimeError(f"{path}: textures must be finite and the mesh have texture coordinates")
-    albedo, roughness_metallic, normal, _ = textures
     orm = None
     if roughness_metallic is not None:
-        open_share = np.ones(roughness_metallic.shape[:2]) if occlusion is None else occlusion
-        orm = to_uint8(np.dstack([open_share, roughness_metallic]))
+        open_share = np.broadcast_to(np.float32(1), roughness_metallic.shape[:2]) if occlusion is None else occlusion
+        orm = encoded(lambda *bands: np.dstack(bands), open_share, roughness_metallic)
     return Maps(
-        albedo=None if albedo is None else to_uint8(linear_to_srgb(albedo)),
+        albedo=None if albedo is None else encoded(linear_to_srgb, albedo),
         orm=orm,
-        normal=None if normal is None else to_uint8(0.5 * normal + 0.5),
+        normal=None if normal is None else encoded(lambda band: 0.5 * band + 0.5, normal),
     )
+
+
+def encoded(encode: Callable[..., np.ndarray], *maps: np.ndarray) -> np.ndarray:
+    """[h, w, 3] uint8 of what `encode` makes of maps [h, w] or [h, w, c], given to it some rows at a time."""
+    height, width = maps[0].shape[:2]
+    pixels, rows = np.empty((height, width, 3), np.uint8), max(1, BAND // width)
+    for band in (slice(start, start + rows) for start in range(0, height, rows)):
+        pixels[band] = to_uint8(encode(*(values[band] for values in maps)))
+    return pixels
 
 
 def y_up(vectors: np.ndarray) -> np.ndarray:

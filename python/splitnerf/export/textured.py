@@ -72,7 +72,7 @@ def textured_asset(
         roughness=1.0,
         metallic=1.0,
         albedo_texture=maps.albedo,
-        roughness_metallic_texture=np.dstack([maps.roughness, maps.metallic]),
+        roughness_metallic_texture=maps.roughness_metallic,
         normal_texture=maps.normal,
     )
     asset = Asset(

@@ -57,13 +57,20 @@ def read_material(document: Document, index: int | None) -> TexturedMaterial:
     if source.get("alphaMode", "OPAQUE") != "OPAQUE":
         note(f"{document.path}: material '{name}' is transparent (alphaMode {source['alphaMode']}); drawn opaque")
     slots = _Slots(document, name)
-    color = slots.read(pbr.get("baseColorTexture"))
+    # Each texture takes its last form before the next one is read: a large one has several forms in memory at a time.
+    albedo, emission = (
+        None if pixels is None else srgb_to_linear(pixels)
+        for pixels in map(slots.read, (pbr.get("baseColorTexture"), source.get("emissiveTexture")))
+    )
     orm = slots.read(pbr.get("metallicRoughnessTexture"))
-    emission = slots.read(source.get("emissiveTexture"))
+    roughness_metallic = None if orm is None else np.ascontiguousarray(orm[..., 1:3])
+    del orm
     normal = slots.read(source.get("normalTexture"))
     if normal is not None:
         scale = _finite(document, name, source["normalTexture"].get("scale", 1.0), 1)[0]
-        normal = ((2 * normal - 1) * np.array([scale, scale, 1.0])).astype(np.float32)
+        normal *= 2
+        normal -= 1
+        normal[..., :2] *= scale
     emissive = _unit(document, name, source.get("emissiveFactor", (0.0, 0.0, 0.0)), 3)
     strength = source.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
     strength = max(0.0, _finite(document, name, strength, 1)[0])
@@ -73,10 +80,10 @@ def read_material(document: Document, index: int | None) -> TexturedMaterial:
         roughness=_unit(document, name, pbr.get("roughnessFactor", 1.0), 1)[0],
         metallic=_unit(document, name, pbr.get("metallicFactor", 1.0), 1)[0],
         emission=tuple(strength * channel for channel in emissive),
-        albedo_texture=None if color is None else srgb_to_linear(color),
-        roughness_metallic_texture=None if orm is None else np.ascontiguousarray(orm[..., 1:3]),
+        albedo_texture=albedo,
+        roughness_metallic_texture=roughness_metallic,
         normal_texture=normal,
-        emission_texture=None if emission is None else srgb_to_linear(emission),
+        emission_texture=emission,
     )
     return TexturedMaterial(material, slots.uv_set, slots.uv_transform)
 
