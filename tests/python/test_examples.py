@@ -199,6 +199,7 @@ def test_slurm_batch(run, data, tmp_path, monkeypatch):
     words = [str(data), str(tmp_path / "bad"), "--out", str(tmp_path / "out"), "--cluster", "local", "--"]
     out = run("slurm_batch.py", *words, "--steps", "4", *as_options(SMALL))
     assert codes == [1] and (tmp_path / "out/tiny/mesh.glb").is_file() and not (tmp_path / "out/bad").exists()
+    assert not (tmp_path / "out/jobs").exists()  # a scene may be called so
     assert out.splitlines()[0] == "tiny: done" and out.splitlines()[1].startswith("bad: failed (2), see ")
 
     warned = subprocess.run([sys.executable, "-c", WARNED, str(EXAMPLES / "slurm_batch.py")], capture_output=True, text=True, timeout=120)

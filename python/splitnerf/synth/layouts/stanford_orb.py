@@ -23,11 +23,6 @@ class StanfordOrbWriter(PhotoWriter):
     def __init__(self, out: Path, camera_angle_x: float):
         super().__init__(out, camera_angle_x)
         self._frames: dict[str, list[dict]] = {"train": [], "test": [], "novel": []}
-        self._lights: dict[str, np.ndarray] = {}
-
-    def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
-        self._lights[name or ""] = super().light(environment, name)
-        return self._lights[name or ""]
 
     def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
         self._frames[split].append(self._photo(self.root, split, index, pose, maps))
