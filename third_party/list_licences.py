@@ -23,8 +23,8 @@ MIT, BSD, THIRD_CLAUSE, FAR = "Permission is hereby granted, free of charge", "R
 HEAD = """# Licences
 
 SplitNeRF is under the MIT licence. A wheel carries Embree and oneTBB (Apache-2.0), and three.js and uPlot (MIT) in the page of
-`splitnerf view` and in the script of `report.html`; their licences lie beside them. What pip installs besides, with the licences that the packages' metadata state
-(`python third_party/list_licences.py`, {python}):
+`splitnerf view` and in the script of `report.html`; their licences lie beside them. What pip installs besides, with the licences
+that the packages' metadata state (`python third_party/list_licences.py`, {python}):
 
 | package | version | licence | needed by |
 |---|---|---|---|

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import copyreg
 import pickle
 
@@ -60,7 +61,7 @@ HOSTILE = {
     "a negative shape": (reconstructed((1, (-3, -4), F8, False, b"A" * 96)), "do not fit its shape"),
     "many axes": (reconstructed((1, (1,) * 40, F8, False, b"A" * 8)), "described amiss"),
     "bytes that are none": (reconstructed((1, (1,), F8, False, [7.0])), "described amiss"),
-    "a codec": (Called(__import__("_codecs").encode, "a" * 9, "rot13"), "written as 'rot13'"),
+    "a codec": (Called(codecs.encode, "a" * 9, "rot13"), "written as 'rot13'"),
     "a scalar": (np.float64(3), "asks for numpy._?core.*scalar"),
     "lists": ([[1.0, 2.0]] * 3, "something else than arrays"),
     "a function": (print, "asks for __builtin__.print"),

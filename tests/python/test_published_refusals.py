@@ -192,7 +192,8 @@ def dtu_truth(folder, **changes):
     for name in ("Points/stl", "ObsMask"):
         (folder / name).mkdir(parents=True)
     trimesh.PointCloud(10 * np.eye(3)).export(folder / "Points/stl/stl007_total.ply")
-    volume = {"BB": np.array([[-20.0] * 3, [20.0] * 3]), "Res": 0.5, "ObsMask": np.ones((90, 90, 90), np.uint8), "P": np.float64([0, 0, 1, 50])}
+    box, mask = np.array([[-20.0] * 3, [20.0] * 3]), np.ones((90, 90, 90), np.uint8)
+    volume = {"BB": box, "Res": 0.5, "ObsMask": mask, "P": np.float64([0, 0, 1, 50])}
     volume |= changes
     savemat(folder / "ObsMask/Plane7.mat", {"P": volume.pop("P")})
     savemat(folder / "ObsMask/ObsMask7_10.mat", volume)

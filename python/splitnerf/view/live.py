@@ -128,7 +128,8 @@ class Live(Observer):
         try:
             source = self.shown.source_of(folder, self.name, self._light)
         except (InputError, OSError, MemoryError) as error:
-            said = str(error) if isinstance(error, InputError) else f"{folder}: cannot be shown ({plain(f'{type(error).__name__}: {error}')})"
+            words = plain(f"{type(error).__name__}: {error}")
+            said = str(error) if isinstance(error, InputError) else f"{folder}: cannot be shown ({words})"
             self.shown.problems.append(said)
             self.news.tell(version=self.shown.sources[0].version)  # what is shown stays
             return
@@ -151,8 +152,8 @@ class Live(Observer):
             left = (training.seconds - seconds) * (1.0 - training.progress) / gained
         self._told_at = time.monotonic()
         self.news.tell(
-            step=training.step, steps=None if steps >= UNLIMITED else steps, progress=training.progress, left=left, psnr=_rounded(training.psnr_mean),
-            lines=len(self._lines), **changes,
+            step=training.step, steps=None if steps >= UNLIMITED else steps, progress=training.progress, left=left,
+            psnr=_rounded(training.psnr_mean), lines=len(self._lines), **changes,
         )  # fmt: skip
 
     def _show(self, training: Observed) -> None:
