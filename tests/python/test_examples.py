@@ -204,3 +204,10 @@ def test_slurm_batch(run, data, tmp_path, monkeypatch):
 
     warned = subprocess.run([sys.executable, "-c", WARNED, str(EXAMPLES / "slurm_batch.py")], capture_output=True, text=True, timeout=120)
     assert warned.stdout == f"Training ('a', 'b', ['c']) {-signal.SIGTERM}\n", warned.stderr
+
+
+def test_a_scene_called_as_the_folder_of_jobs_is_refused(tmp_path):
+    pytest.importorskip("submitit", reason="submitit is not installed: pip install submitit")
+    words = [sys.executable, str(EXAMPLES / "slurm_batch.py"), str(tmp_path / ".jobs"), "--out", str(tmp_path / "out"), "--cluster", "local"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2 and "a scene is called .jobs" in done.stderr and not (tmp_path / "out").exists()
