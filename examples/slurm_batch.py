@@ -49,7 +49,9 @@ def main() -> int:
     scenes = {scene.resolve().name: scene.resolve() for scene in args.scenes}
     if len(scenes) < len(args.scenes):
         parser.error("two scenes have the same name")
-    executor = submitit.AutoExecutor(args.out / "jobs", cluster=args.cluster)
+    if ".jobs" in scenes:
+        parser.error("a scene is called .jobs, as the folder of the jobs is; give it another name")
+    executor = submitit.AutoExecutor(args.out / ".jobs", cluster=args.cluster)
     executor.update_parameters(
         timeout_min=round(60 * args.hours), cpus_per_task=args.cores, mem_gb=args.memory, gpus_per_node=args.gpus,
         slurm_array_parallelism=args.at_once, slurm_partition=args.partition, slurm_job_name="splitnerf",

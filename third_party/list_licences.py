@@ -22,9 +22,9 @@ SHORT = 40  # characters of a licence's name; longer is its text
 MIT, BSD, THIRD_CLAUSE, FAR = "Permission is hereby granted, free of charge", "Redistribution and use in source", "Neither the name", 1500
 HEAD = """# Licences
 
-SplitNeRF is under the MIT licence. A wheel carries Embree and oneTBB (Apache-2.0) and the page of `splitnerf view` (three.js, MIT);
-their licences lie beside them. What pip installs besides, with the licences that the packages' metadata state
-(`python third_party/list_licences.py`, {python}):
+SplitNeRF is under the MIT licence. A wheel carries Embree and oneTBB (Apache-2.0), and three.js and uPlot (MIT) in the page of
+`splitnerf view` and in the script of `report.html`; their licences lie beside them. What pip installs besides, with the licences
+that the packages' metadata state (`python third_party/list_licences.py`, {python}):
 
 | package | version | licence | needed by |
 |---|---|---|---|

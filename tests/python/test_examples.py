@@ -199,7 +199,15 @@ def test_slurm_batch(run, data, tmp_path, monkeypatch):
     words = [str(data), str(tmp_path / "bad"), "--out", str(tmp_path / "out"), "--cluster", "local", "--"]
     out = run("slurm_batch.py", *words, "--steps", "4", *as_options(SMALL))
     assert codes == [1] and (tmp_path / "out/tiny/mesh.glb").is_file() and not (tmp_path / "out/bad").exists()
+    assert not (tmp_path / "out/jobs").exists()  # a scene may be called so
     assert out.splitlines()[0] == "tiny: done" and out.splitlines()[1].startswith("bad: failed (2), see ")
 
     warned = subprocess.run([sys.executable, "-c", WARNED, str(EXAMPLES / "slurm_batch.py")], capture_output=True, text=True, timeout=120)
     assert warned.stdout == f"Training ('a', 'b', ['c']) {-signal.SIGTERM}\n", warned.stderr
+
+
+def test_a_scene_called_as_the_folder_of_jobs_is_refused(tmp_path):
+    pytest.importorskip("submitit", reason="submitit is not installed: pip install submitit")
+    words = [sys.executable, str(EXAMPLES / "slurm_batch.py"), str(tmp_path / ".jobs"), "--out", str(tmp_path / "out"), "--cluster", "local"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2 and "a scene is called .jobs" in done.stderr and not (tmp_path / "out").exists()

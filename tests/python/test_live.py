@@ -294,3 +294,37 @@ def test_a_failure_is_told(capsys):
         pass
     assert "--resume goes on" in live.news.state["ended"]
     assert capsys.readouterr().out.count("http://127.0.0.1:") == 3
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+def test_what_is_not_finite_is_null(value, stepped):
+    """JSON has no word for it, and a page that cannot read a line never gets past it."""
+    stepped.live.logged({"step": 3, "psnr": 20.123456, "loss": value, "loss_colour": value})
+    content = ask(stepped.server, "curves/0")[2]
+    (line,) = json.loads(content, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    assert line == {"step": 3, "psnr": 20.123, "loss": None, "loss_colour": None}
+    stepped.training.psnr_mean = value
+    stepped.live.began(stepped.training)
+    assert stepped.live.news.state["psnr"] is None
+
+
+@pytest.mark.parametrize("error", [OSError(5, "Input/output error"), MemoryError()])
+def test_a_delivered_asset_that_cannot_be_read_is_said(error, stepped, tmp_path, monkeypatch):
+    triangle().write(tmp_path / "mesh.glb")
+    stepped.live.delivering("evaluation", tmp_path)
+
+    def read(*_):
+        raise error
+
+    monkeypatch.setattr(stepped.live.shown, "source_of", read)
+    status, _, content = ask(stepped.server, "scene.json")
+    assert status == 200 and f"{tmp_path}: cannot be shown ({type(error).__name__}" in json.loads(content)["problems"][0]
+    assert stepped.live.news.state["version"] == 0  # pages wait for no newer one
+
+
+def test_a_light_that_finds_no_memory_does_not_end_the_training(stepped, monkeypatch):
+    def panorama(*_):
+        raise torch.OutOfMemoryError("no memory")
+
+    monkeypatch.setattr(stepped.training.model.light, "panorama", panorama)
+    assert stepped.live._grow(stepped.training) == 0

@@ -37,7 +37,7 @@ GB = 1e9
         ("/a/chair", "chair"), ("/a/..", "scene"), ("/", "scene"), ("/a/-rf", "rf"), ("/a/.hidden", "hidden"),
         ("/a/two words", "two_words"), ("/a/\x1b]0;owned\x07\n", "_0_owned_"), ("/a/K\u00e4fer", "K_fer"),
         ("/a/\udcff", "_"), ("/a/$(reboot)", "_reboot_"), ("/a/logs", "logs-2"), ("/a/Batch.JSON", "Batch.JSON-2"),
-        ("/a/lock", "lock-2"), ("/a/" + 300 * "x", 80 * "x"),
+        ("/a/lock", "lock-2"), ("/a/Ray", "Ray-2"), ("/a/" + 300 * "x", 80 * "x"),
     ],
 )  # fmt: skip
 def test_a_name_is_that_of_the_folder_without_what_does_harm(folder, name):

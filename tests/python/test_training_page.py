@@ -197,3 +197,14 @@ def test_a_glb_of_200_megabytes_loads(tmp_path):
     print(f"the page's memory of scripts: {told['texts']['heap']} MB")
     assert told["texts"]["said"] == ""
     assert np.ptp(pixels(tmp_path / "large.png")[100:200, 30:100].reshape(-1, 3), axis=0).max() > 0.1
+
+
+def test_an_asset_without_a_light_is_shown(tmp_path):
+    triangle().write(tmp_path / "mesh.glb")
+    live = Live("mine")
+    live.delivering("export", tmp_path)
+    with serving(ViewServer(live.shown, live=live)) as server:
+        told = look_at(server.url, [
+            {"do": "size", "width": 500, "height": 400} | RESTLESS, {"do": "open"} | RESTLESS, text("said", SAID, **RESTLESS),
+        ])["texts"]  # fmt: skip
+    assert told["said"] == ""

@@ -56,7 +56,7 @@ def scene_name(data: str, taken: Iterable[str]) -> str:
     """A name for a scene's run: that of its folder, without what a file system, a shell or a terminal takes amiss, and
     with a number where it is taken. Case does not tell names apart."""
     plain = re.sub(r"[^\w.+=@-]+", "_", os.path.basename(data), flags=re.ASCII).lstrip(".-")[:MOST_LETTERS] or "scene"
-    own = {STATE, TABLE, LOGS, "lock"}
+    own = {STATE, TABLE, LOGS, "lock", "ray"}  # logs/ray.log is Ray's
     used = {name.lower() for name in (*taken, *own)}
     name, number = plain, 2
     while name.lower() in used:

@@ -47,7 +47,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--address", metavar="HOST:PORT", help="the Ray cluster to use (default: Ray is started here)")
     parser.add_argument("--cores-per-scene", type=float, metavar="N", help="default: all cores, divided among the scenes")
     parser.add_argument("--gpus-per-scene", type=float, metavar="N", help="default: .25 where there are GPUs; preset paper: 1")
-    parser.add_argument("--memory-per-scene", type=float, metavar="GB", help="default: 4, of which photos may take half")
+    parser.add_argument("--memory-per-scene", type=float, metavar="GB", help="default: 4; photos may take all but 2.15 of it")
     parser.add_argument("--retries", type=int, default=3, metavar="N", help="of a scene whose process was killed (default: 3)")
     parser.add_argument(
         "--retry-refused", action="store_true", help="try again what was refused and has not changed"

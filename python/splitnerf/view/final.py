@@ -107,8 +107,8 @@ class Tracer:
 
         with self._working:
             scenes = [(self._renderer(asset), light) for asset, light in enumerate(lights)]
-            yield from self._refined(camera.scaled(FIRST_SIDE), scenes, PASSES[:1], ended)
-            yield from self._refined(camera, scenes, PASSES, ended)
+        yield from self._refined(camera.scaled(FIRST_SIDE), scenes, PASSES[:1], ended)
+        yield from self._refined(camera, scenes, PASSES, ended)
 
     def stop(self) -> None:
         """Ends the request that is worked at, and waits for its end: no thread is within the tracer when the program ends."""
@@ -136,13 +136,14 @@ class Tracer:
     def _refined(
         self, camera: Camera, scenes: list[tuple[AssetRenderer, np.ndarray]], passes: tuple[int, ...], ended: Callable[[], bool]
     ) -> Iterator[Picture]:
-        """The mean of all passes so far, after each pass, for each asset with its light."""
+        """The mean of all passes so far, after each pass, for each asset with its light; who takes them slowly holds up nobody."""
         sums, total = [np.zeros((camera.height, camera.width, 4), np.float32) for _ in scenes], 0
         for number, spp in enumerate(passes):
             total += spp
             for asset, scene in enumerate(scenes):
-                if not self._add(sums[asset], scene, camera, spp, number, ended):
-                    return
+                with self._working:
+                    if not self._add(sums[asset], scene, camera, spp, number, ended):
+                        return
                 width, height, content = as_halves(sums[asset] / total)
                 yield Picture(asset, width, height, total, content)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
@@ -13,7 +14,7 @@ import numpy as np
 from splitnerf.config.settings import UNLIMITED
 from splitnerf.data.asset import Asset
 from splitnerf.data.normalisation import transform_points
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, plain
 from splitnerf.training.metrics import METRICS, read_metrics
 from splitnerf.training.observer import Observed, Observer, Wish
 from splitnerf.view.grown import grown_asset, grown_glb
@@ -126,8 +127,10 @@ class Live(Observer):
             return
         try:
             source = self.shown.source_of(folder, self.name, self._light)
-        except InputError as error:
-            self.shown.problems.append(str(error))
+        except (InputError, OSError, MemoryError) as error:
+            words = plain(f"{type(error).__name__}: {error}")
+            said = str(error) if isinstance(error, InputError) else f"{folder}: cannot be shown ({words})"
+            self.shown.problems.append(said)
             self.news.tell(version=self.shown.sources[0].version)  # what is shown stays
             return
         self.shown.frame = source.asset
@@ -149,8 +152,8 @@ class Live(Observer):
             left = (training.seconds - seconds) * (1.0 - training.progress) / gained
         self._told_at = time.monotonic()
         self.news.tell(
-            step=training.step, steps=None if steps >= UNLIMITED else steps, progress=training.progress, left=left, psnr=training.psnr_mean,
-            lines=len(self._lines), **changes,
+            step=training.step, steps=None if steps >= UNLIMITED else steps, progress=training.progress, left=left,
+            psnr=_rounded(training.psnr_mean), lines=len(self._lines), **changes,
         )  # fmt: skip
 
     def _show(self, training: Observed) -> None:
@@ -169,8 +172,8 @@ class Live(Observer):
     def _grow(self, training: Observed) -> int:
         """Takes over surface and light as they are now; returns the asset's version."""
         old, self._grown_step = self.shown.sources[0], training.step
-        light = training.model.light.panorama(LIGHT_HEIGHT).detach().cpu().numpy()
         try:
+            light = training.model.light.panorama(LIGHT_HEIGHT).detach().cpu().numpy()
             asset = grown_asset(training.model, self._world_from_box)
         except RuntimeError:  # no surface yet, or one that the training itself refuses
             return old.version
@@ -188,6 +191,10 @@ class Live(Observer):
 
 
 def _curves_of(line: dict[str, object]) -> dict[str, object]:
-    """What the page draws of a line of metrics.jsonl, in few digits."""
+    """What the page draws of a line of metrics.jsonl, in few digits; None for what is not finite, which JSON has no word for."""
     drawn = {name: value for name, value in line.items() if name in CURVES or name.startswith("loss_")}
-    return {name: float(f"{value:.5g}") if isinstance(value, float) else value for name, value in drawn.items()}
+    return {name: _rounded(value) if isinstance(value, float) else value for name, value in drawn.items()}
+
+
+def _rounded(value: float | None) -> float | None:
+    return float(f"{value:.5g}") if value is not None and math.isfinite(value) else None

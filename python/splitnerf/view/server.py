@@ -39,7 +39,8 @@ LARGEST_UPLOAD = 128 << 20  # bytes of a light
 LARGEST_QUESTION = 1 << 16  # bytes of a camera
 PICTURE = struct.Struct("<5I")  # asset, width, height, paths a pixel, bytes that follow
 WITHOUT_REST = ("", "scene.json", "final", "events")  # addresses that nothing follows
-PATIENCE = 60.0  # seconds that a connection may be silent
+FIRST_PATIENCE, PATIENCE = 5.0, 60.0  # seconds that a connection may be silent: before its token is known, and then
+MOST_OPEN = 64  # connections at a time: the run that is shown needs files too
 SAFETY = {
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' blob: data:; "
     "connect-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
@@ -78,6 +79,7 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
 
     daemon_threads = True
     allow_reuse_address = True
+    request_queue_size = MOST_OPEN  # connections that wait; more would try again after a second
 
     def __init__(
         self, shown: Shown, photos: Photos | None = None, host: str = "127.0.0.1", port: int = 0, live: Live | None = None
@@ -87,6 +89,7 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
         self.page = files("splitnerf.view").joinpath("viewer.html").read_bytes()
         self.uploading = threading.Lock()
         self._token = secrets.token_urlsafe(16)
+        self._open, self._counting = 0, threading.Lock()
         self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:
             super().__init__((host, port), Handler)
@@ -112,6 +115,28 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
         if name in ("localhost", "127.0.0.1", "::1", self.host.lower(), urlsplit(self.url).hostname):
             return True
         return self.host in ("0.0.0.0", "::") and is_number(name)
+
+    def verify_request(self, request, client_address) -> bool:
+        """Whether one connection more may be open; else it is closed at once."""
+        return self._open < MOST_OPEN
+
+    def process_request(self, request, client_address) -> None:
+        self._count(1)
+        try:
+            super().process_request(request, client_address)
+        except BaseException:  # no thread could be started
+            self._count(-1)
+            raise
+
+    def process_request_thread(self, request, client_address) -> None:
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._count(-1)
+
+    def _count(self, change: int) -> None:
+        with self._counting:
+            self._open += change
 
     def server_close(self) -> None:
         """Says so to the pages, ends what is being traced, and listens no more."""
@@ -139,7 +164,7 @@ class Handler(BaseHTTPRequestHandler):
     """Answers one request."""
 
     server: ViewServer
-    timeout = PATIENCE
+    timeout = FIRST_PATIENCE
     server_version, sys_version = "splitnerf", ""
 
     def do_GET(self) -> None:
@@ -176,6 +201,7 @@ class Handler(BaseHTTPRequestHandler):
         inner = self.server.inner_path(urlsplit(self.path).path)
         if inner is None:
             raise Refused(HTTPStatus.FORBIDDEN, "the token is missing or wrong; open the address that splitnerf printed")
+        self.connection.settimeout(PATIENCE)
         return inner
 
     def _page(self, _: str) -> None:
@@ -246,7 +272,12 @@ class Handler(BaseHTTPRequestHandler):
 
     def _is_gone(self) -> bool:
         """Whether the page has closed this connection."""
-        readable, _, _ = select.select([self.connection], [], [], 0)
+        if hasattr(select, "poll"):  # select() refuses numbers of files above 1023
+            asked = select.poll()
+            asked.register(self.connection, select.POLLIN)
+            readable = asked.poll(0)
+        else:
+            readable, _, _ = select.select([self.connection], [], [], 0)
         return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
 
     def _dropped(self, rest: str) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.json_files import need, read_json
-from splitnerf.data.layouts.frame import Frame, listed_image, pose_of_motion
+from splitnerf.data.layouts.frame import Frame, folder_name, listed_image, pose_of_motion
 from splitnerf.data.lens import read_lens
 from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
@@ -85,9 +85,7 @@ def model_name(root: Path) -> str:
     path = root / METADATA
     names = need(read_json(path, "model_name"), "model_name", path)
     name = names[0] if isinstance(names, list) and names else names
-    if not isinstance(name, str) or Path(name).name != name:
-        raise InputError(f"{path}: 'model_name' names no folder; repair it")
-    return name
+    return folder_name(name, f"{path}: 'model_name'")
 
 
 def _number(given: object, name: str, path: Path, where: str) -> float:

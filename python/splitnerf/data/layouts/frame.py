@@ -95,6 +95,17 @@ def pinhole_numbers(matrix: object, name: str) -> dict[str, float]:
     return {"fl_x": float(k[0, 0]), "fl_y": float(k[1, 1]), "cx": float(k[0, 2]), "cy": float(k[1, 2])}
 
 
+def folder_name(name: object, what: str) -> str:
+    """A name of one folder that a file gives, called `what` in messages.
+
+    Raises:
+        InputError: It is none, or leads elsewhere.
+    """
+    if not isinstance(name, str) or name in ("", ".", "..") or set(name) & set("/\\\0"):
+        raise InputError(f"{what} is no folder's name: {str(name)[:40]!r}; repair it")
+    return name
+
+
 def listed_file(folder: Path, name: str, source: Path) -> Path:
     """The path of a file that `source` lists relative to `folder`; notes once where it leads out of the folder."""
     path = folder / name

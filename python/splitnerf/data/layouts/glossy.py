@@ -10,24 +10,22 @@ NeRO's Glossy Real is read as COLMAP's layout. It has no masks.
 
 from __future__ import annotations
 
-import io
-import pickle
+import re
 from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.images import read_image
+from splitnerf.data.images import read_header, read_image
 from splitnerf.data.layouts.frame import Frame, pinhole_numbers, pose_of_motion
 from splitnerf.data.lens import read_lens
 from splitnerf.data.paths import is_file
+from splitnerf.data.pickled import unpickled_arrays
 from splitnerf.errors import InputError
 
 CAMERA, DEPTH = "-camera.pkl", "-depth.png"
 DEEPEST, BACKGROUND = 15.0, 14.5
 LARGEST_FILE = 1 << 16
-ALLOWED = {("numpy", "ndarray"), ("numpy", "dtype"), ("_codecs", "encode")} | {
-    (f"numpy.{core}.multiarray", name) for core in ("core", "_core") for name in ("_reconstruct", "scalar")
-}
+NUMBERED = re.compile(r"(0|[1-9][0-9]{0,8})-camera\.pkl")
 
 
 def present(root: Path) -> bool:
@@ -46,7 +44,7 @@ def read(root: Path, split: None = None) -> list[Frame]:
     Raises:
         InputError: A file is missing or cannot be used.
     """
-    numbers = sorted(int(path.name.removesuffix(CAMERA)) for path in root.glob(f"*{CAMERA}") if path.name[0].isdigit())
+    numbers = sorted(int(match[1]) for path in root.iterdir() if (match := NUMBERED.fullmatch(path.name)))
     frames = []
     for number in numbers:
         path, image = root / f"{number}{CAMERA}", root / f"{number}.png"
@@ -62,19 +60,13 @@ def read_depth(frame: Frame) -> np.ndarray:
     """[H, W] depth along the camera's axis, infinite where no object is.
 
     Raises:
-        InputError: The file is missing or unreadable.
+        InputError: The file is missing or unreadable, or has another size than the photo.
     """
-    depth = read_image(frame.image_path.with_name(f"{frame.name}{DEPTH}"))[..., 0] * DEEPEST
+    path = frame.image_path.with_name(f"{frame.name}{DEPTH}")
+    depth, photo = read_image(path)[..., 0] * DEEPEST, read_header(frame.image_path)
+    if depth.shape != (photo.height, photo.width):
+        raise InputError(f"{path}: has another size than {frame.image_path.name}; make them the same size")
     return np.where(depth < BACKGROUND, depth, np.inf)
-
-
-class _Arrays(pickle.Unpickler):
-    """Reads arrays of numbers, and refuses whatever else a file asks for."""
-
-    def find_class(self, module: str, name: str) -> object:
-        if (module, name) not in ALLOWED:
-            raise pickle.UnpicklingError(f"it asks for {module}.{name}")
-        return super().find_class(module, name)
 
 
 def _read_camera(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +74,7 @@ def _read_camera(path: Path) -> tuple[np.ndarray, np.ndarray]:
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise ValueError("too large")
-        pose, k = (np.asarray(part, np.float64) for part in _Arrays(io.BytesIO(path.read_bytes())).load())
+        pose, k = (part.astype(np.float64) for part in unpickled_arrays(path.read_bytes()))
     except Exception as error:  # pickle and NumPy raise whatever they meet
         raise InputError(f"{path}: cannot be read as arrays of a camera ({str(error)[:80]}); replace it") from None
     if pose.shape != (3, 4):

@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from pathlib import Path
 
@@ -101,7 +102,7 @@ def _file(root: Path, split: str) -> Path:
 
 
 def _illuminations(root: Path) -> list[str]:
-    names = sorted(path.name for path in (root / LIGHTS).iterdir() if path.name.isdigit() and path.is_dir())
+    names = sorted(path.name for path in (root / LIGHTS).iterdir() if re.fullmatch("[0-9]+", path.name) and path.is_dir())
     if not names:
         raise InputError(f"{root / LIGHTS}: has no folder 000 or 001; add the photos")
     return names

@@ -17,13 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.json_files import need, read_json
-from splitnerf.data.layouts.frame import Frame, checked_pose, listed_image
+from splitnerf.data.layouts.frame import Frame, checked_pose, folder_name, listed_image
 from splitnerf.data.layouts.lit import LitView, map_in_world
 from splitnerf.data.lens import read_lens
 from splitnerf.errors import InputError
 
 SPLITS = ("train", "test")
 NOVEL = "transforms_novel.json"
+HDR = "blender_HDR"  # the folder of the captures with linear photos
 MAP_FROM_CAMERA = np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]])  # x towards the centre, y to the left, z up
 
 
@@ -47,20 +48,19 @@ def read(root: Path, split: str | None) -> list[Frame]:
     return [frame for name in names for frame in (_frame(root, *entry) for entry in _entries(_file(root, name)))]
 
 
-def relit(root: Path, maps: dict[str, Path]) -> list[LitView]:
-    """The photos of `transforms_novel.json` with their lights; `maps` is not needed.
+def relit(root: Path, maps: dict[str, Path], truth: Path | None = None) -> list[LitView]:
+    """The photos of `transforms_novel.json` with their lights; `maps` is not needed, `truth` is the folder `ground_truth` where it
+    lies elsewhere.
 
     Raises:
         InputError: A file is missing or cannot be used.
     """
     path, views = root / NOVEL, []
     for entry, meta, index, _ in _entries(path):
-        scene = need(entry, "scene_name", path, f" in frame {index}")
-        if not isinstance(scene, str) or Path(scene).name != scene:
-            raise InputError(f"{path}: 'scene_name' of frame {index} is no folder's name: {str(scene)[:40]!r}; repair it")
+        scene = folder_name(need(entry, "scene_name", path, f" in frame {index}"), f"{path}: 'scene_name' of frame {index}")
         frame = _frame(root.absolute().parent / scene, entry, meta, index, path)
         turn = MAP_FROM_CAMERA @ frame.pose[:3, :3].T
-        light = ground_truth(root, scene) / "env_map" / f"{frame.image_path.stem}.exr"
+        light = (ground_truth(root, scene) if truth is None else truth / scene) / "env_map" / f"{frame.image_path.stem}.exr"
         views.append(LitView(frame, scene, map_in_world(light, turn)))
     return views
 

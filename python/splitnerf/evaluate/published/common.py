@@ -93,7 +93,10 @@ class Delivered:
 
     def with_albedo(self, scale: np.ndarray) -> Delivered:
         """The same with albedo times a factor per channel, clipped to 1."""
-        asset = replace(self.asset, materials=[_scaled(material, scale) for material in self.asset.materials])
+        if self.asset.colors is not None:  # these and the materials' factors are multiplied, and no factor is above 1
+            asset = replace(self.asset, colors=(self.asset.colors * scale).clip(0, 1).astype(np.float32))
+        else:
+            asset = replace(self.asset, materials=[_scaled(material, scale) for material in self.asset.materials])
         return Delivered(asset, self.environment, self.origin, self.spp)
 
     @property

@@ -46,14 +46,24 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
     path = options.truth / "Points" / "stl" / f"stl{scan:03d}_total.ply"
     if not path.is_file():
         raise InputError(f"{path}: no such file; give --truth the folder with DTU's Points")
-    points = np.asarray(trimesh.load(path).vertices, np.float64)
+    try:
+        points = np.asarray(trimesh.load(path).vertices, np.float64)
+    except Exception as error:  # trimesh's loaders raise whatever their parser meets
+        raise InputError(f"{path}: cannot be read as points ({str(error)[:80]}); replace it") from None
     try:
         box, step, mask, normal = observed["BB"], float(observed["Res"].item()), observed["ObsMask"], plane["P"].ravel()
+        if box.shape != (2, 3) or mask.ndim != 3 or normal.shape != (4,) or not step > 0:
+            raise ValueError
     except (KeyError, ValueError, AttributeError):
-        raise InputError(f"{options.truth / 'ObsMask'}: scan {scan}'s files lack BB, Res, ObsMask or P; replace them") from None
+        raise InputError(
+            f"{options.truth / 'ObsMask'}: scan {scan}'s files need BB [2, 3], Res, ObsMask of 3 axes and P [4]; replace them"
+        ) from None
     mesh = trimesh.Trimesh(delivered.vertices, delivered.asset.triangles, process=False)
+    notes = []
+    if DENSITY * mesh.area / SPACING**2 > MOST_POINTS:
+        notes.append(f"the mesh is so large that its {MOST_POINTS} points lie further apart than {SPACING} mm")
     accuracy, completeness = distances(thinned(surface_points(mesh)), points, box, step, mask > 0, normal)
-    return Scores({"chamfer": (accuracy + completeness) / 2, "accuracy": accuracy, "completeness": completeness})
+    return Scores({"chamfer": (accuracy + completeness) / 2, "accuracy": accuracy, "completeness": completeness}, notes=notes)
 
 
 def distances(

@@ -12,6 +12,8 @@ import numpy as np
 from splitnerf.data.frames import spread_views
 from splitnerf.data.images import over_background, read_image
 from splitnerf.data.layouts import transforms as layout
+from splitnerf.data.layouts.frame import Frame
+from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr, ssim
 from splitnerf.evaluate.published.common import Column, Delivered, Options, Scores, angles_deg, mean_of, srgb_on_white, unit
 from splitnerf.progress import tracked
@@ -23,13 +25,19 @@ COLUMNS: tuple[Column, ...] = (
 
 
 def score(delivered: Delivered, root: Path, options: Options) -> Scores:
-    """Scores the test views."""
+    """Scores the test views.
+
+    Raises:
+        InputError: The data list no test views, or are of another form than the set's.
+    """
+    if "test" not in (layout.splits(root) or ()):
+        raise InputError(f"{root}: lists no test views; give a folder with transforms_test.json")
     images, notes, frames = [], [], layout.read(root, "test")
     if options.views is not None:
         notes.append(f"{options.views} of {len(frames)} test views")
         frames = spread_views(frames, options.views)
     for frame in tracked(frames, "views, image"):
-        rgba, maps = read_image(frame.image_path), delivered.render(frame, delivered.environment)
+        rgba, maps = _rgba(frame), delivered.render(frame, delivered.environment)
         result = {"name": frame.name}
         if delivered.environment is not None:
             image, truth = srgb_on_white(maps), over_background(rgba[..., :3], rgba[..., 3])
@@ -40,6 +48,16 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
             result["normals"] = weighted_angle(unit(maps["normal"]), truth, maps["alpha"] * rgba[..., 3])
         images.append(result)
     return Scores({key: mean_of(images, key) for key, _, _ in COLUMNS}, images, notes)
+
+
+def _rgba(frame: Frame) -> np.ndarray:
+    """[H, W, 4] the photo of a pinhole, its alpha the object's."""
+    if frame.distortion is not None or frame.mask_path is not None or frame.exposure != 1 or frame.gamma:
+        raise InputError(f"{frame.image_path}: the frame has distortion, a mask or a curve, which the set has not; leave it out")
+    rgba = read_image(frame.image_path)
+    if rgba.shape[2] != 4:
+        raise InputError(f"{frame.image_path}: has no alpha, which the set's photos have; give photos with it")
+    return rgba
 
 
 def weighted_angle(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray) -> float | None:

@@ -6,16 +6,18 @@ orb/utils/metrics.py, test.py and eval_mesh.py.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from scipy.ndimage import binary_erosion
 
-from splitnerf.data.images import area_average, linear_to_srgb, read_header
+from splitnerf.data.images import HDR_SUFFIXES, area_average, linear_to_srgb, read_header
 from splitnerf.data.layouts import stanford_orb as layout
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lit_photos import read_lit_photo
+from splitnerf.data.paths import is_file
 from splitnerf.data.truth import read_mesh
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import lsq_scale, psnr
@@ -35,24 +37,41 @@ SAMPLES = 30_000  # of the surface
 
 def score(delivered: Delivered, root: Path, options: Options) -> Scores:
     """Scores the photos of `transforms_novel.json` and `transforms_test.json`, the normals of the latter, and the mesh."""
-    images = []
-    views = layout.relit(root, {}) if (root / layout.NOVEL).is_file() else []
+    images, notes = [], []
+    views = layout.relit(root, {}, options.truth) if (root / layout.NOVEL).is_file() else []
     for view in tracked(views, "relit, image"):
-        maps, photo, mask = _pair(delivered, view.frame, view.radiance())
+        frame = with_radiance(view.frame)
+        maps, photo, mask = _pair(delivered, frame, view.radiance())
         high, low = image_psnr(maps["radiance"], photo, mask, scaled=True)
-        images.append({"name": f"{view.light}/{view.frame.name}", "psnr_h": high, "psnr_l": low})
-    for frame in tracked(layout.read(root, "test"), "novel, image"):
+        images.append({"name": f"{view.light}/{frame.name}", "psnr_h": high if _is_hdr(frame) else None, "psnr_l": low})
+    for frame in tracked([with_radiance(frame) for frame in layout.read(root, "test")], "novel, image"):
         maps, photo, mask = _pair(delivered, frame, delivered.environment)
         result = {"name": f"{root.name}/{frame.name}", "normals": _normals(maps, frame, mask, root, options)}
         if delivered.environment is not None:
-            result["view_psnr_h"], result["view_psnr_l"] = image_psnr(maps["radiance"], photo, mask, scaled=False)
+            high, result["view_psnr_l"] = image_psnr(maps["radiance"], photo, mask, scaled=False)
+            result["view_psnr_h"] = high if _is_hdr(frame) else None
+        if not _is_hdr(frame) and not notes:
+            notes.append(f"no PSNR-H: {layout.HDR} with the photos' EXR files is not beside the data's folder")
         images.append(result)
     means = {key: mean_of(images, key) for key, _, _ in COLUMNS} | {"chamfer": _chamfer(delivered, root, options)}
-    return Scores(means, images)
+    return Scores(means, images, notes)
 
 
-def image_psnr(prediction: np.ndarray, truth: np.ndarray, mask: np.ndarray, *, scaled: bool) -> tuple[float, float]:
-    """PSNR-H and PSNR-L in dB.
+def with_radiance(frame: Frame) -> Frame:
+    """The frame with the photo of `blender_HDR` where it has that of `blender_LDR`, whose values are clipped, and the former exists."""
+    photo = frame.image_path.absolute()
+    path = photo.parents[2].with_name(layout.HDR) / photo.parents[1].name / photo.parent.name / f"{photo.stem}.exr"
+    return replace(frame, image_path=path) if not _is_hdr(frame) and is_file(path) else frame
+
+
+def _is_hdr(frame: Frame) -> bool:
+    return frame.image_path.suffix.lower() in HDR_SUFFIXES
+
+
+def image_psnr(
+    prediction: np.ndarray, truth: np.ndarray, mask: np.ndarray, *, scaled: bool
+) -> tuple[float, float] | tuple[None, None]:
+    """PSNR-H and PSNR-L in dB; None where nothing is inside of the eroded mask.
 
     Both images are black outside of the mask, eroded by 5 x 5, and the error is the mean over the whole frame. With
     `scaled` each channel of the prediction has the factor that least squares give in linear light. PSNR-H: both images times
@@ -66,6 +85,8 @@ def image_psnr(prediction: np.ndarray, truth: np.ndarray, mask: np.ndarray, *, s
         scaled: Whether the prediction is known up to a factor per channel.
     """
     inside = eroded(mask)
+    if not inside.any():
+        return None, None
     x, y = (np.asarray(image, np.float64) * inside[..., None] for image in (prediction, np.maximum(truth, 0)))
     low = y.clip(0, 1)
     brighten = linear_to_srgb(low).mean() / low.mean() if low.mean() > 1e-8 else 1.0
@@ -83,10 +104,10 @@ def eroded(mask: np.ndarray) -> np.ndarray:
     return binary_erosion(mask > 0.5, EROSION, border_value=1)
 
 
-def normal_distance(prediction: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float:
-    """The mean of 1 - cos of the angle between normals [H, W, 3] of any length, over the eroded mask."""
+def normal_distance(prediction: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float | None:
+    """The mean of 1 - cos of the angle between normals [H, W, 3] of any length, over the eroded mask; None where that is empty."""
     inside = eroded(mask)
-    return float((1 - (unit(prediction) * unit(truth)).sum(axis=-1))[inside].mean()) if inside.any() else 0.0
+    return float((1 - (unit(prediction) * unit(truth)).sum(axis=-1))[inside].mean()) if inside.any() else None
 
 
 def chamfer(mesh: trimesh.Trimesh, truth: np.ndarray) -> float:

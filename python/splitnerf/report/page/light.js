@@ -1,5 +1,6 @@
 // The lights, with an exposure, and the radiance under the pointer.
 import { DataUtils } from "three";
+import { encoded } from "../../view/page/src/halves.js";
 import { element, placeIn, range, short, tabs, unpacked } from "./elements.js";
 
 export async function lights(section, { lights: given }) {
@@ -72,10 +73,4 @@ class Light {
     this.cross.hidden = u === null;
     if (u !== null) Object.assign(this.cross.style, { left: `${100 * u}%`, top: `${100 * v}%` });
   }
-}
-
-/** The sRGB curve of linear light, clipped to [0, 1] (IEC 61966-2-1). */
-function encoded(linear) {
-  const clipped = Math.min(Math.max(linear, 0), 1);
-  return clipped <= 0.0031308 ? 12.92 * clipped : 1.055 * clipped ** (1 / 2.4) - 0.055;
 }

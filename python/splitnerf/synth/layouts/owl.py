@@ -22,12 +22,7 @@ class OwlWriter(PhotoWriter):
 
     def __init__(self, out: Path, camera_angle_x: float):
         super().__init__(out, camera_angle_x)
-        self._lights: dict[str, np.ndarray] = {}
         self._compared = 0
-
-    def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
-        self._lights[name or ""] = super().light(environment, name)
-        return self._lights[name or ""]
 
     def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
         if split == "train":

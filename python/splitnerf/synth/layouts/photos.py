@@ -32,13 +32,16 @@ class PhotoWriter:
     def __init__(self, out: Path, camera_angle_x: float):
         self.out, self.camera_angle_x = Path(out), camera_angle_x
         self.root = self.out / self.folder
+        self._lights: dict[str, np.ndarray] = {}  # that photos are rendered with, by name, "" for that of the training
 
     def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
-        """Takes a light and returns it as it will be stored, to render with; see `SceneWriter.light`."""
-        if name is not None:
-            return environment
-        write_image(self.root / "light.hdr", environment)
-        return read_hdr(self.root / "light.hdr")
+        """Takes a light and returns the one to render with: that of the training as `light.hdr` stores it; one of a name as it is,
+        which the set's own file may round."""
+        if name is None:
+            write_image(self.root / "light.hdr", environment)
+            environment = read_hdr(self.root / "light.hdr")
+        self._lights[name or ""] = environment
+        return environment
 
     def mesh(self, vertices: np.ndarray, triangles: np.ndarray) -> None:
         """Writes the true mesh, see `SceneWriter.mesh`."""

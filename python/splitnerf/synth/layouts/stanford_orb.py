@@ -9,27 +9,20 @@ import numpy as np
 from splitnerf.data.environment import turn_environment
 from splitnerf.data.images import write_image
 from splitnerf.data.json_files import write_json
-from splitnerf.data.layouts.stanford_orb import MAP_FROM_CAMERA, NOVEL, ground_truth
+from splitnerf.data.layouts.stanford_orb import HDR, MAP_FROM_CAMERA, NOVEL, ground_truth
 from splitnerf.synth.layouts.photos import OBJECT, PhotoWriter, mask_of
 from splitnerf.synth.writer import Maps
-
-FORM = "blender_HDR"
 
 
 class StanfordOrbWriter(PhotoWriter):
     """A writer; the training photos are those of the first capture."""
 
     relights = True
-    folder = f"{FORM}/{OBJECT}_scene001"
+    folder = f"{HDR}/{OBJECT}_scene001"
 
     def __init__(self, out: Path, camera_angle_x: float):
         super().__init__(out, camera_angle_x)
         self._frames: dict[str, list[dict]] = {"train": [], "test": [], "novel": []}
-        self._lights: dict[str, np.ndarray] = {}
-
-    def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
-        self._lights[name or ""] = super().light(environment, name)
-        return self._lights[name or ""]
 
     def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
         self._frames[split].append(self._photo(self.root, split, index, pose, maps))

@@ -129,7 +129,8 @@ class Page {
       this.viewer.start = description.camera;
       if (first) this.viewer.home(); // later the camera stays where it is
       if (!first || this.training) await this.lights.renew(description);
-      await this.training?.showLight(description.sources[0].light);
+      const own = description.sources[0].light;
+      if (own !== null) await this.training?.showLight(own);
       this.panel.tell();
       const waits = description.sources.some((source) => source.version === 0);
       say(waits ? "the surface is shown once the training begins" : description.problems.join("\n"), description.problems.length > 0);

@@ -1,6 +1,7 @@
 // The panel's part for a run that trains: how far it is, its curves, its light, and its buttons.
 import { DataUtils } from "three";
 import { Chart } from "./chart.js";
+import { encoded } from "./halves.js";
 import { press, readCurves, readLight } from "./server.js";
 
 const STAGES = {
@@ -71,14 +72,11 @@ export class Training {
     const values = Float32Array.from(data, DataUtils.fromHalfFloat);
     const mean = values.reduce((sum, value, i) => (i % 4 === 3 ? sum : sum + value), 0) / (3 * width * height);
     const picture = new ImageData(width, height);
-    values.forEach((value, i) => (picture.data[i] = i % 4 === 3 ? 255 : 255 * curveOf((0.18 * value) / Math.max(mean, 1e-9))));
+    values.forEach((value, i) => (picture.data[i] = i % 4 === 3 ? 255 : 255 * encoded((0.18 * value) / Math.max(mean, 1e-9))));
     Object.assign(field("recovered"), { width, height });
     field("recovered").getContext("2d").putImageData(picture, 0, 0);
   }
 }
-
-/** The sRGB curve, for numbers of 0 and more. */
-const curveOf = (value) => (value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055);
 
 /** "1:02:03" or "2:03". */
 function timeOf(seconds) {

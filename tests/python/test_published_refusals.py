@@ -1,0 +1,229 @@
+"""The protocols of published sets on data that are not the set's: empty masks, other forms, truth that lies elsewhere."""
+
+from __future__ import annotations
+
+import json
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.io import savemat
+
+from splitnerf.data.asset import Asset, Material
+from splitnerf.data.images import linear_to_srgb, write_image
+from splitnerf.data.layouts import dtc as dtc_layout
+from splitnerf.data.layouts import glossy as glossy_layout
+from splitnerf.data.layouts import openillumination as openillumination_layout
+from splitnerf.data.layouts import stanford_orb as orb_layout
+from splitnerf.data.layouts.frame import Frame, folder_name
+from splitnerf.data.layouts.lit import LitView
+from splitnerf.errors import InputError
+from splitnerf.evaluate.published import dtu, openillumination, shiny, stanford_orb
+from splitnerf.evaluate.published.common import Delivered, Options
+
+SIDE = 16
+LIGHT = np.ones((4, 8, 3), np.float32)
+
+
+class Painted:
+    """An asset whose pictures are given by the test."""
+
+    environment = LIGHT
+    asset = Asset("a", np.eye(3, dtype=np.float32), np.int32([[0, 1, 2]]), np.eye(3, dtype=np.float32), np.zeros(1, np.int32))
+    vertices = 10 * np.eye(3)
+
+    def __init__(self, image: np.ndarray):
+        self.image, self.lights = image, []
+
+    def render(self, frame: Frame, light: np.ndarray, factor: int = 1) -> dict:
+        self.lights.append(light)
+        return {"radiance": self.image, "alpha": np.ones(self.image.shape[:2]), "normal": self.image}
+
+
+def picture(seed: int = 0, most: float = 0.9) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(0.05, most, (SIDE, SIDE, 3)).astype(np.float32)
+
+
+def capture(folder, suffix: str, photo: np.ndarray, novel: str | None = None):
+    """A capture of Stanford-ORB with one test photo, and perhaps one in another capture's light."""
+    frame = {"file_path": "test/0000", "transform_matrix": np.eye(4).tolist()}
+    for split in ("train", "test"):
+        write_image(folder / split / f"0000{suffix}", photo)
+        write_image(folder / f"{split}_mask" / "0000.png", np.ones((SIDE, SIDE)))
+        (folder / f"transforms_{split}.json").write_text(json.dumps({"camera_angle_x": 0.7, "frames": [frame]}))
+    if novel:
+        entry = frame | {"scene_name": novel, "camera_angle_x": 0.7}
+        (folder / "transforms_novel.json").write_text(json.dumps({"frames": [entry]}))
+    return folder
+
+
+# ---- Stanford-ORB ----
+
+
+def test_orb_reads_lights_where_the_truth_lies(tmp_path):
+    root = capture(tmp_path / "blender_HDR/a_scene001", ".exr", picture(), "a_scene002")
+    capture(tmp_path / "blender_HDR/a_scene002", ".exr", picture())
+    write_image(tmp_path / "elsewhere/a_scene002/env_map/0000.exr", 3 * LIGHT)
+    painted = Painted(picture())
+    stanford_orb.score(painted, root, Options(truth=tmp_path / "elsewhere"))
+    assert painted.lights[0] == pytest.approx(3 * LIGHT, rel=1e-3)
+
+
+def test_orb_takes_linear_photos_for_captures_in_8_bits(tmp_path):
+    """A photo of radiances up to 3 is clipped in blender_LDR; a perfect asset is perfect all the same."""
+    photo = picture(most=3.0)
+    root = capture(tmp_path / "blender_LDR/a_scene001", ".png", linear_to_srgb(photo.clip(0, 1)))
+    scores = stanford_orb.score(Painted(photo), root, Options())
+    assert scores.means["view_psnr_h"] is None and scores.means["view_psnr_l"] > 25
+    assert scores.notes == ["no PSNR-H: blender_HDR with the photos' EXR files is not beside the data's folder"]
+    capture(tmp_path / "blender_HDR/a_scene001", ".exr", photo)
+    scores = stanford_orb.score(Painted(photo), root, Options())
+    assert scores.means["view_psnr_h"] > 50 and scores.notes == []
+
+
+def test_orb_has_no_score_of_an_empty_mask():
+    thin = np.zeros((SIDE, SIDE))
+    thin[4:6] = 1  # nothing is left of it
+    assert stanford_orb.image_psnr(picture(), picture(1), thin, scaled=True) == (None, None)
+    assert stanford_orb.normal_distance(picture(), picture(1), thin) is None
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "a/b", "/a", "a\\b", "a\0", 7, None])
+def test_names_of_folders_lead_nowhere_else(name, tmp_path):
+    assert folder_name("..a b", "it") == "..a b"
+    root = capture(tmp_path / "a_scene001", ".exr", picture(), "x")
+    entry = {"scene_name": name, "file_path": "test/0000", "transform_matrix": np.eye(4).tolist()}
+    (root / "transforms_novel.json").write_text(json.dumps({"frames": [entry]}))
+    with pytest.raises(InputError, match="'scene_name' of frame 0 is no folder's name"):
+        orb_layout.relit(root, {})
+    (root / "metadata.json").write_text(json.dumps({"model_name": name}))
+    with pytest.raises(InputError, match="'model_name' is no folder's name"):
+        dtc_layout.model_name(root)
+
+
+# ---- OpenIllumination ----
+
+
+def lit_views(folder, monkeypatch, masks: list[np.ndarray]) -> list[np.ndarray]:
+    """Photos of the set, one for each mask."""
+    photos = [picture(seed, 0.5) for seed in range(len(masks))]
+    views = []
+    for i, (photo, mask) in enumerate(zip(photos, masks)):
+        write_image(folder / f"{i}.exr", photo)
+        write_image(folder / f"{i}.png", mask)
+        frame = Frame(str(i), folder / f"{i}.exr", np.eye(4), {}, mask_path=folder / f"{i}.png")
+        views.append(LitView(frame, "001", lambda: LIGHT))
+    monkeypatch.setattr(openillumination_layout, "relit", lambda *_: views)
+    return photos
+
+
+def test_an_empty_mask_has_no_score(tmp_path, monkeypatch):
+    photos = lit_views(tmp_path, monkeypatch, [np.ones((SIDE, SIDE)), np.zeros((SIDE, SIDE))])
+    scores = openillumination.score(Painted(photos[0] * 0.5), tmp_path, Options())
+    assert [image["psnr"] for image in scores.images][1] is None and scores.means["psnr"] > 50
+    json.dumps(scores.means, allow_nan=False)
+
+
+def test_one_factor_brings_all_pictures_nearest(tmp_path, monkeypatch):
+    photos = lit_views(tmp_path, monkeypatch, [np.ones((SIDE, SIDE))] * 3)
+    painted, pictures = Painted(photos[0]), iter(photos)
+    painted.render = lambda *_: {"radiance": next(pictures) * [0.5, 2.0, 1.0]}
+    scores = openillumination.score(painted, tmp_path, Options())
+    assert min(image["psnr"] for image in scores.images) > 50
+    painted.render = lambda *_: {"radiance": photos[0] * 1e6}  # more than a half holds
+    assert all(np.isfinite(image["psnr"]) for image in openillumination.score(painted, tmp_path, Options()).images)
+
+
+def test_pictures_are_not_kept_in_memory(tmp_path, monkeypatch):
+    peaks = []
+    for count in (4, 4, 40):
+        photos = lit_views(tmp_path, monkeypatch, [np.ones((SIDE, SIDE))] * count)
+        tracemalloc.start()
+        openillumination.score(Painted(photos[0]), tmp_path, Options())
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[2] - peaks[1] < 36 * photos[0].nbytes / 2, peaks
+
+
+def test_illuminations_have_plain_numbers(tmp_path):
+    for name in ("013", "²", "x"):
+        (tmp_path / "Lights" / name).mkdir(parents=True)
+    assert openillumination_layout._illuminations(tmp_path) == ["013"]
+
+
+# ---- Shiny Blender ----
+
+
+def transforms(folder, names: dict[str, list], **changes):
+    for file, images in names.items():
+        frames = [{"file_path": name, "transform_matrix": np.eye(4).tolist()} | changes for name in images]
+        (folder / file).write_text(json.dumps({"camera_angle_x": 0.7, "frames": frames}))
+
+
+def test_photos_of_the_training_are_not_held_out(tmp_path):
+    write_image(tmp_path / "a.png", np.dstack([picture(), np.ones((SIDE, SIDE))]))
+    transforms(tmp_path, {"transforms.json": ["a.png"]})
+    with pytest.raises(InputError, match="lists no test views; give a folder with transforms_test.json"):
+        shiny.score(Painted(picture()), tmp_path, Options())
+
+
+@pytest.mark.parametrize("changes", [{"k1": 0.1}, {"mask_path": "a.png"}, {"exposure": 2.0}, None])
+def test_photos_of_another_form_are_refused(changes, tmp_path):
+    photo = picture() if changes is None else np.dstack([picture(), np.ones((SIDE, SIDE))])
+    write_image(tmp_path / "a.png", photo)
+    transforms(tmp_path, {"transforms_train.json": ["a.png"], "transforms_test.json": ["a.png"]}, **(changes or {}))
+    with pytest.raises(InputError, match="has no alpha" if changes is None else "distortion, a mask or a curve"):
+        shiny.score(Painted(picture()), tmp_path, Options())
+
+
+# ---- the others ----
+
+
+def test_a_depth_image_has_the_size_of_its_photo(tmp_path):
+    write_image(tmp_path / "0.png", picture())
+    write_image(tmp_path / "0-depth.png", np.ones((SIDE, SIDE + 1)))
+    with pytest.raises(InputError, match="0-depth.png: has another size than 0.png"):
+        glossy_layout.read_depth(Frame("0", tmp_path / "0.png", np.eye(4), {}))
+
+
+def dtu_truth(folder, **changes):
+    for name in ("Points/stl", "ObsMask"):
+        (folder / name).mkdir(parents=True)
+    trimesh.PointCloud(10 * np.eye(3)).export(folder / "Points/stl/stl007_total.ply")
+    box, mask = np.array([[-20.0] * 3, [20.0] * 3]), np.ones((90, 90, 90), np.uint8)
+    volume = {"BB": box, "Res": 0.5, "ObsMask": mask, "P": np.float64([0, 0, 1, 50])}
+    volume |= changes
+    savemat(folder / "ObsMask/Plane7.mat", {"P": volume.pop("P")})
+    savemat(folder / "ObsMask/ObsMask7_10.mat", volume)
+    return Options(truth=folder)
+
+
+@pytest.mark.parametrize("changes", [
+    {"BB": np.zeros((2, 2))}, {"ObsMask": np.ones((9, 9), np.uint8)}, {"P": np.ones(3)}, {"Res": 0.0},
+])  # fmt: skip
+def test_truth_of_another_shape_is_refused(changes, tmp_path):
+    with pytest.raises(InputError, match="need BB .2, 3., Res, ObsMask of 3 axes and P .4."):
+        dtu.score(Painted(picture()), tmp_path / "scan7", dtu_truth(tmp_path, **changes))
+
+
+def test_points_that_cannot_be_read_are_refused(tmp_path):
+    options = dtu_truth(tmp_path)
+    (tmp_path / "Points/stl/stl007_total.ply").write_bytes(b"ply\nformat")
+    with pytest.raises(InputError, match="stl007_total.ply: cannot be read as points"):
+        dtu.score(Painted(picture()), tmp_path / "scan7", options)
+
+
+def test_a_mesh_with_fewer_points_than_it_needs_is_noted(tmp_path, monkeypatch):
+    options = dtu_truth(tmp_path)
+    assert dtu.score(Painted(picture()), tmp_path / "scan7", options).notes == []
+    monkeypatch.setattr(dtu, "MOST_POINTS", 100)
+    assert "100 points lie further apart than 0.2 mm" in dtu.score(Painted(picture()), tmp_path / "scan7", options).notes[0]
+
+
+def test_colours_of_vertices_take_the_factor():
+    """Materials cannot: their factors end at 1."""
+    asset = replace(Painted.asset, colors=np.float32([[0.2, 0.4, 0.8]] * 3), materials=[Material()])
+    scaled = Delivered(asset, None, np.zeros(3), 1).with_albedo(np.array([1.5, 2.0, 0.5])).asset
+    assert scaled.colors[0] == pytest.approx([0.3, 0.8, 0.4]) and scaled.materials == asset.materials
