@@ -83,7 +83,9 @@ def test_every_option_of_train_is_one_of_batch_but_where_to_write():
         name: {o for a in build_parser()._subparsers._group_actions[0].choices[name]._actions for o in a.option_strings}
         for name in ("train", "batch")
     }
-    assert options["train"] - options["batch"] == {"--output-dir", "--resume", "--overwrite", "--downscale-factor"}
+    assert options["train"] - options["batch"] == {
+        "--output-dir", "--resume", "--overwrite", "--downscale-factor", "--view", "--tensorboard",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
