@@ -44,20 +44,9 @@ for package in "$packages"/*.deb; do dpkg -x "$package" "$packages/unpacked"; do
 rm -rf "$packages/unpacked/usr/share" "$packages/unpacked/usr/bin"
 (cd "$packages/unpacked" && XZ_OPT=-9 tar cJf "$out/embree.tar.xz" usr)
 
-# Needs only torch's headers, which are those of this machine's torch for any Python: a package of that name leads to them.
 build_wheel() {
-  "$wheel_python" -m venv "$packages/venv"
-  "$packages/venv/bin/python" -m pip --disable-pip-version-check install --quiet scikit-build-core pybind11
-  mkdir "$packages/torch" "$packages/source" # without libraries that an editable install left among the sources
-  (cd "$root" && tar cf - --exclude='*.so*' --exclude=__pycache__ cpp python third_party CMakeLists.txt pyproject.toml README.md LICENSE) |
-    tar xf - -C "$packages/source"
-  python3 -c 'import pathlib, sys, torch
-here, there = pathlib.Path(torch.__file__).parent, pathlib.Path(sys.argv[1])
-for name in ("include", "lib"): (there / name).symlink_to(here / name)
-(there / "__init__.py").write_text(f"__version__ = {str(torch.__version__)!r}\n")' "$packages/torch"
-  PYTHONPATH="$packages" "$packages/venv/bin/python" -m pip --disable-pip-version-check wheel --quiet --no-deps --no-build-isolation \
-    --no-cache-dir --wheel-dir "$out/built" "$packages/source" -C build-dir="$packages/build" -C cmake.define.SPLITNERF_CUDA=ON \
-    -C cmake.define.CMAKE_CUDA_ARCHITECTURES="${CUDA_ARCHITECTURES:-90-real}"
+  CMAKE_OPTIONS="SPLITNERF_CUDA=ON CMAKE_CUDA_ARCHITECTURES=${CUDA_ARCHITECTURES:-90-real}" \
+    sh "$root/third_party/build_wheels.sh" "$out/built" "$wheel_python"
   "$root/tests/bench/gpu_sources.sh" >"$out/built/sources"
 }
 wheel_python=$(command -v "${WHEEL_PYTHON:-python$python_version}") || wheel_python=

@@ -17,6 +17,7 @@ import shutil
 import statistics
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import torch
@@ -32,6 +33,7 @@ from splitnerf.ops import monte_carlo as monte_carlo_module
 from splitnerf.ops import rays as rays_module
 from splitnerf.ops import shading as shading_module
 from splitnerf.ops import visibility as visibility_module
+from splitnerf.ops._library import HANDED_ON
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training import loop as training
@@ -76,11 +78,26 @@ def spread_samples(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_
 # ---- both runs ----
 
 
+class Replacement:
+    """A function in the place of an operator. Arguments that the operator would hand on are returned as they are: torch adds up
+    their gradients."""
+
+    def __init__(self, name: str, function: Callable):
+        self.function, self.handed_on = function, HANDED_ON.get(name, ())
+
+    def __call__(self, *arguments):
+        return self.function(*arguments)
+
+    def handing_on(self, *arguments):
+        found = self.function(*arguments)
+        return found if isinstance(found, tuple) else (found,), tuple(arguments[i] for i in self.handed_on)
+
+
 class Plain:
     """The operator library with these functions in the place of some operators."""
 
     def __init__(self, library, **replaced):
-        self.__dict__.update(replaced)
+        self.__dict__.update({name: Replacement(name, function) for name, function in replaced.items()})
         self.library = library
 
     def __getattr__(self, name: str):

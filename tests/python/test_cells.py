@@ -230,7 +230,7 @@ def test_a_correction_counts_by_the_weight_of_its_surface(monkeypatch):
     for corrected in (False, True):
         monkeypatch.setattr(
             model, "quadrature_correction",
-            lambda light, x, n, views, points, candidates, *_: (candidates, added[corrected] * torch.ones(len(candidates), 3)),
+            lambda light, views, points, candidates, *_: (candidates, added[corrected] * torch.ones(len(candidates), 3)),
         )  # fmt: skip
         ray = render_rays(model, model.evaluate_light(), found)
         means.append(ray.mean)

@@ -54,7 +54,7 @@ def gradients(name: str, hands_on: bool, reads_on: bool = True) -> list[torch.Te
     if hands_on:
         results, handed = operator.handing_on(*arguments)
     else:
-        results, handed = as_tuple(operator(*arguments)), [arguments[i] for i in _library._HANDED_ON[name]]
+        results, handed = as_tuple(operator(*arguments)), [arguments[i] for i in _library.HANDED_ON[name]]
     total = weighted(results, 30) + (weighted(tuple(x**3 for x in handed), 50) if reads_on else 0.0)
     with Additions() as additions:
         found = torch.autograd.grad(total, leaves, allow_unused=True)
@@ -79,7 +79,7 @@ def test_a_result_that_nobody_reads_counts_as_0(name):
     """Only what is handed on has a gradient."""
     arguments, _ = leaves_of(name)
     _, handed = getattr(_library.lib, name).handing_on(*arguments)
-    given = [arguments[i] for i in _library._HANDED_ON[name]]
+    given = [arguments[i] for i in _library.HANDED_ON[name]]
     truth = torch.autograd.grad(weighted(tuple(x**2 for x in given), 70), given)
     for found, x in zip(torch.autograd.grad(weighted(tuple(y**2 for y in handed), 70), given), truth, strict=True):
         assert torch.equal(found, x) and found.abs().sum() > 0
@@ -89,11 +89,11 @@ def test_a_result_that_nobody_reads_counts_as_0(name):
 def test_without_gradients_the_arguments_themselves_are_handed_on(name):
     arguments = list(CASES[name][0]())
     _, handed = getattr(_library.lib, name).handing_on(*arguments)
-    assert all(x is arguments[i] for x, i in zip(handed, _library._HANDED_ON[name], strict=True))
+    assert all(x is arguments[i] for x, i in zip(handed, _library.HANDED_ON[name], strict=True))
     with torch.no_grad():
         arguments, _ = leaves_of(name)
         _, handed = getattr(_library.lib, name).handing_on(*arguments)
-    assert all(x is arguments[i] for x, i in zip(handed, _library._HANDED_ON[name], strict=True))
+    assert all(x is arguments[i] for x, i in zip(handed, _library.HANDED_ON[name], strict=True))
 
 
 @pytest.mark.parametrize("name", [name for name in CASES if name != "surface_weights"])  # some of whose numbers are at a bend

@@ -59,7 +59,6 @@ class Operator:
         with below_autograd():
             return self._operator(*arguments)
 
-
     def handing_on(self, *arguments: object) -> tuple[tuple[Tensor, ...], tuple[Tensor, ...]]:
         """The results, and once more the arguments that :func:`register` names with ``hands_on``, for their next reader.
 
@@ -67,7 +66,7 @@ class Operator:
         addition of its own.
         """
         name = self._packet.__name__
-        which = _HANDED_ON[name]
+        which = HANDED_ON[name]
         if is_transformed() or not (torch.is_grad_enabled() and torch._C._any_requires_grad(*arguments)):
             found = self(*arguments)
             return found if isinstance(found, tuple) else (found,), tuple(arguments[i] for i in which)
@@ -96,7 +95,7 @@ lib = Operators()
 below_autograd = torch._C._AutoDispatchBelowAutograd
 _NODES: dict[str, Callable] = {}
 _HANDING_NODES: dict[str, Callable] = {}
-_HANDED_ON: dict[str, tuple[int, ...]] = {}
+HANDED_ON: dict[str, tuple[int, ...]] = {}
 
 
 def is_transformed() -> bool:
@@ -222,7 +221,7 @@ def register(name: str, *, fake, backward=None, setup_context=None, hands_on: tu
     if backward:
         _NODES[name] = node_of(name, backward, setup_context)
     if hands_on:
-        _HANDED_ON[name] = hands_on
+        HANDED_ON[name] = hands_on
         _HANDING_NODES[name] = handing_node_of(name, backward, setup_context, hands_on)
 
 
