@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-import splitnerf.view
+import splitnerf
 
-SOURCES = Path(splitnerf.view.__file__).parent / "page"
+SOURCES = Path(splitnerf.__file__).parent / "pages"
 LOOK = Path(__file__).parents[1] / "viewer/look.mjs"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 needs_chromium = pytest.mark.skipif(

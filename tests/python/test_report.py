@@ -29,7 +29,7 @@ from splitnerf.report.curves import curve_data, line_chart
 from splitnerf.report.pictures import data_uri
 
 REPORT = Path(splitnerf.report.__file__).parent
-PAGE = REPORT.parent / "view/page"
+PAGE = REPORT.parent / "pages"
 
 VOID = {"meta", "img", "br", "link", "line", "circle", "polyline"}
 HOSTILE = "</script><script>alert(1)</script><!--"
@@ -282,7 +282,7 @@ def test_the_script_was_built_from_the_sources():
     sources = sources_of_the_script(bundle)
     assert f"sources {hash_of(sources)}: " in bundle
     names = {path.name for path in sources}
-    assert names >= {path.name for path in (REPORT / "page").iterdir()} | {"viewer.js", "channels.js", "halves.js"}
+    assert names >= {path.name for path in (PAGE / "report").iterdir()} | {"viewer.js", "channels.js", "halves.js"}
     assert all(len(path.read_text().splitlines()) < 500 for path in sources if path.name != "package-lock.json")
 
 

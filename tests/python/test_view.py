@@ -37,6 +37,7 @@ from splitnerf.view.server import ViewServer
 from splitnerf.view.shown import MOST_DROPPED, Shown
 
 PAGE = Path(splitnerf.view.__file__).parent
+SOURCES = PAGE.parent / "pages"
 
 
 def sky(height=8):
@@ -455,7 +456,7 @@ def test_a_signal_ends_it_in_peace(run, number):
 
 
 def sources_of_the_page(folder: Path) -> list[Path]:
-    return [folder / n for n in ("build.mjs", "package-lock.json", "package.json")] + sorted((folder / "src").iterdir())
+    return [folder / n for n in ("build.mjs", "package-lock.json", "package.json")] + sorted((folder / "view").iterdir())
 
 
 def hash_of_the_sources(folder: Path) -> str:
@@ -469,9 +470,9 @@ def hash_of_the_sources(folder: Path) -> str:
 def test_the_page_was_built_from_the_sources(tmp_path):
     """Where this fails: `make viewer`."""
     page = (PAGE / "viewer.html").read_text(encoding="utf-8")
-    assert f"sources {hash_of_the_sources(PAGE / 'page')}" in page
-    shutil.copytree(PAGE / "page", tmp_path / "page", ignore=shutil.ignore_patterns("node_modules"))
-    with open(tmp_path / "page/src/style.css", "a") as file:
+    assert f"sources {hash_of_the_sources(SOURCES)}" in page
+    shutil.copytree(SOURCES, tmp_path / "page", ignore=shutil.ignore_patterns("node_modules"))
+    with open(tmp_path / "page/view/style.css", "a") as file:
         file.write("\n")
     assert hash_of_the_sources(tmp_path / "page") not in page
 
@@ -482,5 +483,5 @@ def test_the_page_names_the_licence_and_loads_nothing():
         assert "three.js authors" in text and "Leon Sorokin" in text and text.count("Permission is hereby granted") == 2
     assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=\"(?!data:)", page)
     assert not re.search(r"\{\{\w+\}\}", page[:5000])
-    for path in sources_of_the_page(PAGE / "page"):
+    for path in sources_of_the_page(SOURCES):
         assert path.name == "package-lock.json" or len(path.read_text().splitlines()) < 500

@@ -1,4 +1,4 @@
-/* sources 1ea28af78cbe9814bcd9ae59c66ae9beeab1717b6e40a61ae8c69b1b7bf849b8: ../../report/page/compare.js ../../report/page/curves.js ../../report/page/differences.js ../../report/page/elements.js ../../report/page/light.js ../../report/page/main.js ../../report/page/object.js ../../report/page/style.css src/cameras.js src/channels.js src/final.js src/halves.js src/server.js src/view.js src/viewer.js
+/* sources 7dfc064d70a7be79bea43a915883e40f52143e3c0abdfca21afe62ba1779d74b: report/compare.js report/curves.js report/differences.js report/elements.js report/light.js report/main.js report/object.js report/style.css view/cameras.js view/channels.js view/final.js view/halves.js view/server.js view/view.js view/viewer.js
 contains three:
 
 The MIT License

@@ -1,6 +1,6 @@
 // The lights, with an exposure, and the radiance under the pointer.
 import { DataUtils } from "three";
-import { encoded } from "../../view/page/src/halves.js";
+import { encoded } from "../view/halves.js";
 import { element, placeIn, range, short, tabs, unpacked } from "./elements.js";
 
 export async function lights(section, { lights: given }) {

@@ -1,7 +1,7 @@
 // The delivered asset in three dimensions, with the modules of the viewer's page.
-import { CHANNELS } from "../../view/page/src/channels.js";
-import { asLight, halves } from "../../view/page/src/halves.js";
-import { Viewer } from "../../view/page/src/viewer.js";
+import { CHANNELS } from "../view/channels.js";
+import { asLight, halves } from "../view/halves.js";
+import { Viewer } from "../view/viewer.js";
 import { element, range, tabs, unpacked } from "./elements.js";
 
 const SHOWN = CHANNELS.filter((name) => name !== "uncertainty");
