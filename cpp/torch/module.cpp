@@ -6,6 +6,7 @@
 
 #include "bindings_light.h"
 #include "bindings_mesh.h"
+#include "bindings_photos.h"
 #include "bindings_scene.h"
 #include "splitnerf/environment.h"
 #include "splitnerf/gather_rate.h"
@@ -114,5 +115,6 @@ PYBIND11_MODULE(_core, m) {
 
   bind_light(m);
   bind_mesh(m);
+  bind_photos(m);
   bind_scene(m);
 }

@@ -6,7 +6,9 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
+from splitnerf import _core
 from splitnerf.data import images
+from splitnerf.data.photos import averaged_codes
 from splitnerf.errors import InputError
 
 
@@ -57,6 +59,30 @@ def test_downscale_averages_premultiplied_linear_light():
     result = images.downscale_rgba(rgba, 2)
     assert result.shape == (1, 1, 4)
     assert result[0, 0] == pytest.approx([0.7353570] * 3 + [0.5], abs=1e-5)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("factor", [2, 3])
+def test_photos_are_averaged_as_floats_are(dtype, factor):
+    """To a step of 16 bits, with colours that weigh by alpha; and with all alike, what the photo shows there."""
+    values = np.random.default_rng(4).random((13, 11, 4))
+    values[:6, :6, 3], values[6:9, :, 3] = 0, 1
+    codes = values.astype(dtype) if dtype == np.float32 else np.rint(values * np.iinfo(dtype).max).astype(dtype)
+    floats = codes / (1 if dtype == np.float32 else np.iinfo(dtype).max)
+    weighed, alike = (averaged_codes(codes, factor, object_alone=alone) for alone in (True, False))
+    linear = images.area_average(images.srgb_to_linear(floats[..., :3]), factor)
+    np.testing.assert_allclose(weighed / 65535, images.downscale_rgba(floats, factor), atol=1.6e-5)
+    np.testing.assert_allclose(alike[..., :3] / 65535, images.linear_to_srgb(linear), atol=1.6e-5)
+    assert np.array_equal(weighed[..., 3], alike[..., 3]) and weighed[0, 0].tolist() == [0] * 4
+    assert averaged_codes(codes, 1) is codes
+
+
+def test_a_photo_that_cannot_be_averaged_is_refused():
+    for factor in (0, 5, -1):
+        with pytest.raises(ValueError, match="factor must be from 1"):
+            _core.average_photo(np.zeros((4, 9, 4), np.uint8), factor, True)
+    with pytest.raises(ValueError, match="codes must be"):
+        _core.average_photo(np.zeros((4, 9, 3), np.uint8), 2, True)
 
 
 def test_downscale_crops_what_fills_no_block():

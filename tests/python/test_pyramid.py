@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from layout_scenes import write_transforms
-from test_known_pixels import OBJECT, ignoring_scene
+from test_known_pixels import ignoring_scene
+from test_edges import scene
 from tiny_runs import tiny
 
 from splitnerf.data import pixels
 from splitnerf.data.dataset import load_dataset
+from splitnerf.data.images import area_average, linear_to_srgb, srgb_to_linear
 from splitnerf.render.pyramid import PhotoPyramid
 from splitnerf.render.rays import PixelSource
 from splitnerf.training import loop
@@ -84,12 +85,44 @@ def test_small_photos_and_the_setting_0_draw_as_without_averages(settings, data)
     assert all(torch.equal(a, b) for a, b in zip(pyramid.source.draw(100), plain.draw(100)))
 
 
-def test_edges_come_with_the_photos(tmp_path):
-    """Colours at a mask's edge are compared whole in the photos, not in averages, whose colours are the object's alone."""
-    dataset = load_dataset(write_transforms(tmp_path, masks=True), reading=OBJECT)
-    pyramid = PhotoPyramid(dataset, tiny(coarse_until=0.5, coarse_edge=16), seeded())
-    assert dataset.whole and pyramid.factor > 1 and pyramid.source.edges is None
-    assert pyramid.at(1.0).edges is not None
+def wall(brightness: float, object_colour: float = 0.9) -> np.ndarray:
+    """[120, 180, 4] a photo of a square of 61 pixels before a wall, and its mask; blocks of 3 x 3 have edges of thirds."""
+    alpha = np.zeros((120, 180), np.float32)
+    alpha[31:91, 61:122] = 1.0
+    shade = np.where(alpha > 0, object_colour, brightness).astype(np.float32)
+    return np.rint(255 * np.dstack([shade, shade, shade, alpha])).astype(np.uint8)
+
+
+def test_edges_of_averages_are_compared_whole(tmp_path):
+    """A pixel at the edge has the mean of the object and of the wall, which is found behind it; one within has the object's."""
+    photo = wall(0.2)
+    dataset = scene(tmp_path, np.stack([photo, photo]))
+    source = PhotoPyramid(dataset, tiny(coarse_until=0.5, coarse_edge=40), seeded()).source
+    assert (source.height, source.width) == (40, 60)
+    everywhere = torch.arange(40 * 60)
+    pixels, _, behind, whole = source.pixels.read(
+        everywhere, 0 * everywhere, torch.ones(2, 3), torch.rand(2400, 3), source.edges.runs
+    )
+    pixels, behind, whole = (x.unflatten(0, (40, 60)) for x in (pixels, behind, whole))
+    blocks = area_average(srgb_to_linear(photo[..., :3] / np.float32(255)), 3)
+    expected = linear_to_srgb(blocks)
+    cut = (pixels[..., 3] > 0.01) & (pixels[..., 3] < 0.99)
+    assert cut.sum() > 40 and whole[cut].all() and whole.sum() > 3 * cut.sum()
+    torch.testing.assert_close(pixels[..., :3], torch.from_numpy(expected), rtol=0, atol=1e-4)
+    torch.testing.assert_close(behind[whole], torch.full((int(whole.sum()), 3), 51 / 255))
+
+
+@pytest.mark.parametrize("brightness, edge_pixels", [(1.0, 2), (0.2, 0)])
+def test_where_a_mask_has_to_say_the_edge_averages_are_of_the_object_alone(tmp_path, brightness, edge_pixels):
+    """Before a wall that is too bright for the photo, or where edges are not compared."""
+    codes = wall(brightness, object_colour=0.4)
+    dataset = scene(tmp_path, np.stack([codes, codes]))
+    config = tiny(coarse_until=0.5, coarse_edge=40, edge_pixels=edge_pixels)
+    source = PhotoPyramid(dataset, config, seeded()).source
+    average = source.pixels.codes.view(2, 40, 60, 4)[0].int() & 0xFFFF
+    partly = (average[..., 3] > 0) & (average[..., 3] < 65535)
+    assert source.edges is None and partly.sum() > 40
+    assert (average[partly][:, :3] - round(0.4 * 255) * 257).abs().max() <= 1
 
 
 @pytest.mark.parametrize("stop", [8, 16])

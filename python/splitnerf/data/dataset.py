@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -28,6 +28,7 @@ SURROUNDINGS = "surroundings.exr"
 JPEG = (".jpg", ".jpeg")
 HULL_VIEWS = 40
 MEAN_EDGE = 1000  # pixels along the shorter edge of a photo, about, from which a fingerprint takes every other one, or fewer
+Average = Callable[[np.ndarray, int, "np.ndarray | None"], np.ndarray]  # see `Dataset.averaged`
 NEARLY_ALL, NEARLY_ALL_EDGE = 0.6, 0.5  # medians of what a mask keeps, and of the image's edge, if it is no object's
 
 
@@ -126,12 +127,14 @@ class Dataset:
         poses[:, :3, 3] = transform_points(box_from_world, poses[:, :3, 3])
         return replace(self, poses=poses.astype(np.float32), box_from_world=box_from_world)
 
-    def averaged(self, factor: int, max_memory: float) -> Dataset:
-        """The split with photos averaged down by a whole factor, in 16 bits, as `downscale` does on reading.
+    def averaged(self, factor: int, max_memory: float, average: Average | None = None) -> Dataset:
+        """The split with photos averaged down by a whole factor, in 16 bits.
 
         Args:
             factor: At least 2, at most the photos' shorter edge.
             max_memory: GB for all photos, see :func:`splitnerf.data.pixels.room_for_photos`; what needs more goes to a file.
+            average: Gives the average [h, w, 4] uint16 of a photo's codes [H, W, 4], by the factor and the average's known
+                pixels [h, w] (None: all), where colours are whole, see the attribute; else averages are those of `downscale`.
         """
         shape = (len(self), self.height // factor, self.width // factor)
         in_file = 2 * 4 * int(np.prod(shape)) > room_for_photos(max_memory)
@@ -139,9 +142,11 @@ class Dataset:
         if self.known is not None:
             known = np.stack([area_average(one.astype(np.float32), factor) > CERTAIN for one in self.known])
         for i, photo in enumerate(self.images.codes):
-            codes[i] = averaged_codes(photo, factor)
-            if known is not None:
-                codes[i][~known[i]] = 0
+            known_here = None if known is None else known[i]
+            self.images.ask_for(i)
+            codes[i] = averaged_codes(photo, factor) if average is None else average(photo, factor, known_here)
+            if known_here is not None:
+                codes[i][~known_here] = 0
             forget_pages(self.images.codes)
             forget_pages(codes)
         return replace(
@@ -150,7 +155,7 @@ class Dataset:
             images=Photos(codes, self.images.exposures),
             intrinsics=self.intrinsics / np.float32(factor),
             known=known,
-            whole=False,
+            whole=average is not None,
         )
 
     def select(self, views: Sequence[int]) -> Dataset:

@@ -10,9 +10,10 @@ import numpy as np
 import torch
 from torch.nn.functional import interpolate
 
+from splitnerf import _core
 from splitnerf.data.environment import NEGATIVE_SHARE
 from splitnerf.data.images import (
-    HDR_SUFFIXES, LDR_SUFFIXES, area_average, downscale_rgba, linear_to_srgb, read_codes, read_header, read_image,
+    HDR_SUFFIXES, LDR_SUFFIXES, area_average, linear_to_srgb, read_codes, read_header, read_image,
 )  # fmt: skip
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics, undistort
@@ -25,7 +26,6 @@ CERTAIN = 0.999  # part of a pixel that must be known
 PEAK, BRIGHT = 0.9, 0.999  # a photo of floats is kept so that this share of its values lies below this one; 1 counts as clipped
 RINGING = 0.1  # of the brightest value; a filter leaves so much below 0 at an edge
 LEAST_ALPHA = 0.01
-STRIP = 1 << 20  # pixels that are averaged down at once
 
 
 @dataclass
@@ -212,16 +212,20 @@ def _read_mask(path: Path) -> np.ndarray:
     return _read_pixels(path)[..., :1]
 
 
-def averaged_codes(rgba: np.ndarray, factor: int) -> np.ndarray:
-    """An image [H, W, 4] of whole numbers, averaged down to 16 bits by strips, so that few floats are there at a time."""
+def averaged_codes(rgba: np.ndarray, factor: int, *, object_alone: bool = True) -> np.ndarray:
+    """A photo averaged down in linear light, block by block; incomplete blocks at the bottom and right are cropped.
+
+    Args:
+        rgba: [H, W, 4] sRGB, straight alpha: whole numbers, or floats in [0, 1].
+        factor: The edge of a block in pixels; 1 returns the photo itself.
+        object_alone: Whether colours weigh by alpha, and are 0 where it is 0; else they are the means of all.
+
+    Returns:
+        [H // factor, W // factor, 4] uint16.
+    """
     if factor == 1:
         return rgba
-    height, width = rgba.shape[0] // factor, rgba.shape[1] // factor
-    result, rows = np.empty((height, width, 4), np.uint16), max(1, STRIP // (factor * rgba.shape[1]))
-    for start in range(0, height, rows):
-        strip = rgba[start * factor : min(start + rows, height) * factor]
-        result[start : start + rows] = encoded(downscale_rgba(decoded(strip), factor), np.uint16)
-    return result
+    return _core.average_photo(rgba if rgba.dtype.kind != "f" else encoded(rgba, np.uint16), factor, object_alone)
 
 
 def _undistort(

@@ -63,9 +63,8 @@ class Photos:
 
     def __getitem__(self, index: object) -> np.ndarray:
         first = index[0] if isinstance(index, tuple) else index
-        if self.file is not None and isinstance(first, (int, np.integer)):
-            size = self.codes.itemsize * int(np.prod(self.shape[1:]))
-            _ask_for(self.file, range(len(self))[first] * size, size)
+        if isinstance(first, (int, np.integer)):
+            self.ask_for(int(first))
         values = decoded(self.codes[index])
         forget_pages(self.codes)
         if self.exposures is None:
@@ -74,6 +73,12 @@ class Photos:
         of_each[:, 0, 0, :3] = self.exposures
         factor = np.broadcast_to(of_each, self.shape)[index]
         return at_unit_exposure(*(torch.from_numpy(np.array(x, order="C")) for x in (values, factor))).numpy()
+
+    def ask_for(self, i: int) -> None:
+        """Has the system begin to read photo i, where it is kept in a file."""
+        if self.file is not None:
+            size = self.codes.itemsize * int(np.prod(self.shape[1:]))
+            _ask_for(self.file, range(len(self))[i] * size, size)
 
     def __array__(self, dtype: object = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self[:], dtype)

@@ -7,6 +7,8 @@ import itertools
 import numpy as np
 import torch
 
+from splitnerf.data.photos import averaged_codes
+from splitnerf.data.pixels import decoded
 from splitnerf.ops import EdgeRuns
 from splitnerf.render.masks import joined, runs_of, widened
 
@@ -53,6 +55,14 @@ def edge_of(
         known: [H, W] bool, the pixels that say something; None for all.
         width: The pixels on each side of an edge.
     """
+    near, behind = edge_mask(colours, alpha, known, width)
+    return runs_of(torch.from_numpy(near)), behind
+
+
+def edge_mask(
+    colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The pixels [H, W] bool and the colours [k, 3] of :func:`edge_of`, which says what the arguments are."""
     near, outside = band(alpha, width)
     if known is not None:
         near, outside = near & known, outside & known
@@ -62,7 +72,27 @@ def edge_of(
     certain = behind.max(axis=1) < BRIGHTEST
     near = np.zeros_like(near)
     near.reshape(-1)[place[certain]] = True
-    return runs_of(torch.from_numpy(near)), behind[certain]
+    return near, behind[certain]
+
+
+def average_with_edges(photo: np.ndarray, factor: int, known: np.ndarray | None, width: int) -> np.ndarray:
+    """A photo averaged down, whose colours are whole where pixels along the mask's edges are compared whole, and outside; a
+    pixel that the object covers in part, and whose edge the mask has to say, keeps the object's colour alone.
+
+    Args:
+        photo: [H, W, 4] sRGB of a whole photo, and its mask.
+        factor: The edge of a block in pixels, at least 2.
+        known: [H // factor, W // factor] bool, the averages that say something; None for all.
+        width: The pixels of the average on each side of an edge.
+
+    Returns:
+        [H // factor, W // factor, 4] uint16.
+    """
+    result, whole = (averaged_codes(photo, factor, object_alone=alone) for alone in (True, False))
+    whole, alpha = whole[..., :3], decoded(result[..., 3])
+    shown = edge_mask(whole, alpha, known, width)[0] | (alpha <= PARTLY[0])
+    result[shown, :3] = whole[shown]
+    return result
 
 
 def band(alpha: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
