@@ -89,8 +89,7 @@ SETTINGS = {
     "sampling.grid_resolution": ("grid_resolution", 96, 128, PAPER),
     "sampling.grid_every": ("grid_every", 32, 16, PAPER),
     "sampling.hull_until": ("hull_until", 0.1, 0.0, PAPER),
-    "sampling.coarse_until": ("coarse_until", 1.0, 0.0, PAPER),
-    "sampling.coarse_edge": ("coarse_edge", 400, 400, OURS),
+    "sampling.pixel_cells": ("pixel_cells", 0.6, 0.0, PAPER),
     "sampling.foreground_share": ("foreground_share", 0.85, 0.0, PAPER),
     "losses.colour_weight": ("colour_weight", 10.0 / 3.0, 10.0, PAPER),  # the sum over channels, Eq. (3)
     "losses.light_weight": ("light_weight", 1.0, 10.0, PAPER),
@@ -147,7 +146,7 @@ FAST = {
     "run.preset": "fast", "run.steps": 20000, "run.cuda_graphs": True, "surface.n_levels": 16, "surface.growth": 1.3195079,
     "surface.log2_table_size": 19, "surface.table_dtype": "float16", "mesh.resolution": 192, "mesh.background": True,
     "sampling.initial_rays": 4096, "sampling.max_rays": 16384, "sampling.target_samples": 32768,
-    "sampling.grid_resolution": 128, "sampling.coarse_until": 0.0, "losses.eikonal_points": 2048, "losses.smoothness_points": 4096,
+    "sampling.grid_resolution": 128, "losses.eikonal_points": 2048, "losses.smoothness_points": 4096,
     "losses.neutral_queries": 1024, "losses.entropy_points": 1024, "optimiser.sparse_steps": True,
     "optimiser.warmup_steps": 200, "export.texture_size": 2048,
 }  # fmt: skip
@@ -164,7 +163,7 @@ LIMITS = {
     "occlusion.channels": "one of 1, 3", "occlusion.width": "in [1, 1024]", "occlusion.layers": "in [1, 16]",
     "occlusion.environment_height": "in [1, 8192]", "occlusion.directions": "a multiple of 32 in [64, 1024]",
     "occlusion.indirect_every": "in [1, 16777216]", "mesh.resolution": "in [8, 2048]",
-    "sampling.coarse_edge": "in [8, 16384]", "sampling.initial_rays": "in [1, 1048576]", "sampling.max_rays": "in [1, 1048576]",
+    "sampling.pixel_cells": "in [0, 1024]", "sampling.initial_rays": "in [1, 1048576]", "sampling.max_rays": "in [1, 1048576]",
     "surface.box": "in (0, 1024]", "surface.sphere_radius": "in [0, 1024]", "occlusion.offset": "in [0, 1024]",
     "sampling.min_step": "in (0, 1024]", "sampling.max_step": "in [0, 1024]", "sampling.min_transmittance": "in [0, 1)",
     "occlusion.rays": "in [1, 16777216]", "sampling.target_samples": "in [1, 16777216]",
@@ -198,7 +197,6 @@ UNITS = {
     "steps": "run.steps occlusion.indirect_every sampling.grid_every losses.light_every optimiser.light_step_every "
     "optimiser.warmup_steps separation.steps refinement.sweeps",
     "share of the run": "run.preview_every surface.levels_open_by surface.cos_anneal_by mesh.every sampling.hull_until "
-    "sampling.coarse_until "
     "losses.priors_from separation.share refinement.share",
     "minutes": "run.max_minutes run.checkpoint_minutes",
     "scene units": "surface.box surface.sphere_radius occlusion.offset sampling.min_step sampling.max_step "
@@ -210,7 +208,7 @@ UNITS = {
     "rays": "occlusion.rays sampling.initial_rays sampling.max_rays",
     "samples": "sampling.target_samples sampling.max_samples_per_ray sampling.shades_per_ray",
     "points": "losses.entropy_points losses.smoothness_points losses.eikonal_points",
-    "normals": "losses.neutral_queries", "pixels": "losses.edge_pixels sampling.coarse_edge",
+    "normals": "losses.neutral_queries", "pixels": "losses.edge_pixels",
     "directions": "occlusion.directions losses.light_samples losses.light_queries losses.light_lobe_samples",
     "share of the samples": "occlusion.share",
     "share of the directions": "occlusion.open_below",

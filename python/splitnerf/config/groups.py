@@ -239,12 +239,10 @@ class Sampling:
     )
     grid_every: int = setting(32, "steps between refreshes of the occupancy grid", unit="steps", at_least=1)
     hull_until: float = setting(0.1, "time until which the masks' visual hull is sampled", unit="share of the run")
-    coarse_until: float = setting(
-        1.0, "time until which training draws from averages of large photos; 0: never", unit="share of the run"
-    )
-    coarse_edge: int = setting(
-        400, "least pixels of the averages' shorter edge", unit="pixels", at_least=8, at_most=1 << 14
-    )
+    pixel_cells: float = setting(
+        0.6, "largest width of a pixel, in cells of the hash grid's finest level, down to which large photos are averaged for "
+        "training; 0: no averages", at_most=1024,
+    )  # fmt: skip
     foreground_share: float = setting(0.85, "share of the rays that are drawn near the masks", unit="share of the rays")
 
 

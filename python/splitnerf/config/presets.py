@@ -32,7 +32,7 @@ PAPER = dict(
     sampling=dict(
         initial_rays=256, target_samples=262144, step_scale=0.0, min_step=3**0.5 * 3 / 1024, min_transmittance=0.0,
         min_weight=0.0, shades_per_ray=0, occupancy="average", grid_resolution=128, grid_every=16, hull_until=0.0,
-        coarse_until=0.0, foreground_share=0.0,
+        pixel_cells=0.0, foreground_share=0.0,
     ),
     losses=dict(
         colour_weight=10.0, eikonal_weight=0.1, light_weight=10.0, occlusion_weight=0.01, metal_weight=0.001, mask_weight=0.0,
@@ -52,7 +52,7 @@ FAST = dict(
     run=dict(preset="fast", steps=20000, cuda_graphs=True),
     surface=dict(n_levels=16, growth=1.3195079, log2_table_size=19, table_dtype="float16"),  # 16 to 1024 cells
     mesh=dict(resolution=192, background=True),
-    sampling=dict(initial_rays=4096, max_rays=16384, target_samples=32768, grid_resolution=128, coarse_until=0.0),
+    sampling=dict(initial_rays=4096, max_rays=16384, target_samples=32768, grid_resolution=128),
     losses=dict(eikonal_points=2048, smoothness_points=4096, neutral_queries=1024, entropy_points=1024),
     optimiser=dict(sparse_steps=True, warmup_steps=200),
     export=dict(texture_size=2048),

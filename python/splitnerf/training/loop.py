@@ -22,9 +22,10 @@ from splitnerf.ops import MeshScene
 from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.refinement.job import STATE
+from splitnerf.render.averages import training_photos
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
-from splitnerf.render.pyramid import PhotoPyramid
+from splitnerf.render.rays import PixelSource
 from splitnerf.training.batches import draw_batch
 from splitnerf.training.checkpoint import (
     load_checkpoint,
@@ -118,8 +119,8 @@ class Training:
         self.fingerprint = dataset_fingerprint(dataset)
         torch.manual_seed(c.run.seed)
         self.generator = torch.Generator(device).manual_seed(c.run.seed)
-        self.photos = PhotoPyramid(dataset, c, self.generator)
-        self.source = source = self.photos.source
+        photos = training_photos(dataset, c)
+        self.source = source = PixelSource(photos, c.sampling.foreground_share, self.generator, c.losses.edge_pixels)
         self.exposures = PhotoExposures(dataset, c, device)
         self.model = SceneModel(c).to(device)
         self.optimiser = make_optimiser(self.model, c)
@@ -238,7 +239,6 @@ class Training:
         """Updates what steps share: open levels, learning rates, occupied cells, the mesh, and the light on the
         mesh."""
         c, model, step, progress = self.config, self.model, self.step, self.progress
-        self.source = self.photos.at(progress)
         model.open_levels(progress)
         set_learning_rate(self.optimiser, c, step, progress)
         if self.first or step % c.sampling.grid_every == 0:

@@ -1,6 +1,8 @@
-"""Large photos from coarse to fine: what the averages are, when they end, and that small photos know nothing of them."""
+"""Averages of large photos: what they are, how wide their pixels are, and that small photos know nothing of them."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
@@ -9,19 +11,38 @@ from test_known_pixels import ignoring_scene
 from test_edges import scene
 from tiny_runs import tiny
 
+from splitnerf.config import Config
 from splitnerf.data import pixels
-from splitnerf.data.dataset import load_dataset
+from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import area_average, linear_to_srgb, srgb_to_linear
-from splitnerf.render.pyramid import PhotoPyramid
+from splitnerf.render.averages import averaging_factor, training_photos
 from splitnerf.render.rays import PixelSource
 from splitnerf.training import loop
 
-COARSE = {"coarse_until": 0.5, "coarse_edge": 12}  # of photos of 24 pixels: blocks of 2 x 2
 PLAIN = {"occlusion": "off", "shading": "split", "preview_every": 2.0, "deterministic": True}
 
 
 def seeded() -> torch.Generator:
     return torch.Generator().manual_seed(3)
+
+
+def averaging(dataset: Dataset, factor: float, **settings) -> Config:
+    """Settings by which photos are averaged down by a factor, which is rounded down."""
+    config = tiny(**settings)
+    s, distance = config.surface, np.linalg.norm(dataset.poses[0, :3, 3])
+    cell = 2 * s.box / (s.base_resolution * s.growth ** (s.n_levels - 1))
+    return config.replace({"pixel_cells": float(factor * 1.0001 * distance / dataset.intrinsics[0, 0] / cell)})
+
+
+def far(dataset: Dataset) -> Dataset:
+    """The cameras at a distance of 3 from the scene's middle."""
+    dataset.poses[:, 2, 3] = 3.0
+    return dataset
+
+
+def source_of(dataset: Dataset, config: Config) -> PixelSource:
+    photos = training_photos(dataset, config)
+    return PixelSource(photos, config.sampling.foreground_share, seeded(), config.losses.edge_pixels)
 
 
 def weights(trained: loop.TrainedScene) -> torch.Tensor:
@@ -56,7 +77,7 @@ def test_exposures_stay_with_the_photos(data):
 def test_a_ray_of_an_average_meets_the_middle_of_its_block(data):
     """The origin and direction are those through the block's centre, and the colour is the block's mean."""
     dataset = load_dataset(data)
-    source = PhotoPyramid(dataset, tiny(**COARSE), seeded()).source
+    source = source_of(dataset, averaging(dataset, 2))
     drawn = source.draw(200)
     local = torch.einsum("nij,ni->nj", source.poses[drawn.view, :3, :3], drawn.rays_d)
     lens = torch.from_numpy(dataset.intrinsics)[drawn.view]
@@ -68,21 +89,26 @@ def test_a_ray_of_an_average_meets_the_middle_of_its_block(data):
     assert np.abs(drawn.pixels[:, 3].numpy() - alpha).max() < 1e-4 and 0.2 < np.mean(alpha) < 0.98
 
 
-def test_photos_follow_their_averages_at_the_time_that_is_set(data):
+@pytest.mark.parametrize("wanted, factor", [(0.9, 1), (1.1, 1), (1.9, 1), (2.1, 2), (3.1, 3), (9.0, 3)])
+def test_a_pixel_is_at_most_as_wide_as_the_setting_says(wanted, factor, data):
+    """By the cells of the finest level, and so that 8 pixels are left along the shorter edge of 24."""
     dataset = load_dataset(data)
-    pyramid = PhotoPyramid(dataset, tiny(**COARSE), seeded())
-    assert pyramid.factor == 2 and pyramid.at(0.0) is pyramid.at(0.49) and pyramid.source.height == 12
-    fine = pyramid.at(0.5)
-    assert fine is pyramid.at(1.0) is pyramid.source and (fine.height, fine.width) == (24, 24)
+    config = averaging(dataset, wanted)
+    photos = training_photos(dataset, config)
+    assert averaging_factor(dataset, config) == factor and photos.height == 24 // factor
+    s = config.surface
+    cells = math.floor(s.base_resolution * s.growth ** (s.n_levels - 1))
+    distance = np.linalg.norm(dataset.poses[0, :3, 3])
+    width = distance / photos.intrinsics[0, 0] / (2 * s.box / cells)
+    assert factor == 1 or width <= config.sampling.pixel_cells
+    finer = config.replace({"growth": s.growth * 2 ** (1 / (s.n_levels - 1))})
+    assert averaging_factor(dataset, finer) == max(1, factor // 2) or wanted == 9.0
 
 
-@pytest.mark.parametrize("settings", [COARSE | {"coarse_edge": 13}, COARSE | {"coarse_until": 0.0}])
-def test_small_photos_and_the_setting_0_draw_as_without_averages(settings, data):
-    dataset, config = load_dataset(data), tiny(**settings)
-    pyramid = PhotoPyramid(dataset, config, seeded())
-    plain = PixelSource(dataset, config.sampling.foreground_share, seeded(), config.losses.edge_pixels)
-    assert pyramid.factor == 1 and pyramid.at(0.0) is pyramid.at(1.0)
-    assert all(torch.equal(a, b) for a, b in zip(pyramid.source.draw(100), plain.draw(100)))
+@pytest.mark.parametrize("wanted", [0.0, 1.5])
+def test_small_photos_and_the_setting_0_are_as_they_were(wanted, data):
+    dataset = load_dataset(data)
+    assert training_photos(dataset, averaging(dataset, wanted)) is dataset
 
 
 def wall(brightness: float, object_colour: float = 0.9) -> np.ndarray:
@@ -96,8 +122,8 @@ def wall(brightness: float, object_colour: float = 0.9) -> np.ndarray:
 def test_edges_of_averages_are_compared_whole(tmp_path):
     """A pixel at the edge has the mean of the object and of the wall, which is found behind it; one within has the object's."""
     photo = wall(0.2)
-    dataset = scene(tmp_path, np.stack([photo, photo]))
-    source = PhotoPyramid(dataset, tiny(coarse_until=0.5, coarse_edge=40), seeded()).source
+    dataset = far(scene(tmp_path, np.stack([photo, photo])))
+    source = source_of(dataset, averaging(dataset, 3))
     assert (source.height, source.width) == (40, 60)
     everywhere = torch.arange(40 * 60)
     pixels, _, behind, whole = source.pixels.read(
@@ -116,33 +142,30 @@ def test_edges_of_averages_are_compared_whole(tmp_path):
 def test_where_a_mask_has_to_say_the_edge_averages_are_of_the_object_alone(tmp_path, brightness, edge_pixels):
     """Before a wall that is too bright for the photo, or where edges are not compared."""
     codes = wall(brightness, object_colour=0.4)
-    dataset = scene(tmp_path, np.stack([codes, codes]))
-    config = tiny(coarse_until=0.5, coarse_edge=40, edge_pixels=edge_pixels)
-    source = PhotoPyramid(dataset, config, seeded()).source
+    dataset = far(scene(tmp_path, np.stack([codes, codes])))
+    source = source_of(dataset, averaging(dataset, 3, edge_pixels=edge_pixels))
     average = source.pixels.codes.view(2, 40, 60, 4)[0].int() & 0xFFFF
     partly = (average[..., 3] > 0) & (average[..., 3] < 65535)
     assert source.edges is None and partly.sum() > 40
     assert (average[partly][:, :3] - round(0.4 * 255) * 257).abs().max() <= 1
 
 
-@pytest.mark.parametrize("stop", [8, 16])
-def test_a_resumed_run_draws_the_same_rays(stop, data, tmp_path):
-    """From averages and from photos, stopped before and after the one follows the other, bit by bit."""
-    dataset, config = load_dataset(data), tiny(steps=20, **PLAIN, **COARSE)
+def test_a_resumed_run_draws_the_same_rays(data, tmp_path):
+    """From averages, bit by bit, and others than from the photos."""
+    dataset = load_dataset(data)
+    config = averaging(dataset, 2, steps=20, **PLAIN)
     runs = [tmp_path / name for name in ("whole", "stopped")]
     for run in runs:
         run.mkdir()
     whole = loop.train(dataset, config, runs[0])
     stopped = loop.Training(dataset, config, runs[1], torch.device("cpu"))
-    heights = []
     with loop.same_bits(True):
-        while stopped.step < stop:
+        while stopped.step < 8:
             stopped.refresh()
-            heights.append(stopped.source.height)
             stopped.advance(None)
         stopped.save()
-    assert heights == [12] * min(10, stop) + [24] * max(0, stop - 10)
+    assert stopped.source.height == 12
     resumed = loop.train(dataset, config, runs[1], resume=True)
     assert torch.equal(weights(whole), weights(resumed))
-    off = loop.train(dataset, config.replace({"coarse_until": 0.0}), tmp_path)
+    off = loop.train(dataset, config.replace({"pixel_cells": 0.0}), tmp_path)
     assert not torch.equal(weights(whole), weights(off))
