@@ -177,12 +177,12 @@ def test_a_killed_process_ends_all_with_one_line(data, tmp_path, victim):
     assert len(said(err)) == 1 and "most often because one has ended" in said(err)[0], err
 
 
-@pytest.mark.parametrize("asked", ["torchrun", "the second process"])
-def test_a_request_to_stop_saves_a_checkpoint(data, tmp_path, asked):
-    """After a step on which all agree, whoever is asked."""
+@pytest.mark.parametrize("asked, by", [("torchrun", "SIGTERM"), ("torchrun", "SIGINT"), ("the second process", "SIGTERM")])
+def test_a_request_to_stop_saves_a_checkpoint(data, tmp_path, asked, by):
+    """After a step on which all agree, whoever is asked; Ctrl-C asks torchrun alone, whose processes have groups of their own."""
     run = tmp_path / "run"
     process = started(data, run, "--steps", "100000")
-    os.kill(process.pid if asked == "torchrun" else workers(process)[1], signal.SIGTERM)
+    os.kill(process.pid if asked == "torchrun" else workers(process)[1], signal.Signals[by])
     out, err = process.communicate(timeout=120)
     assert process.returncode == 1 and said(err) == [] and "--resume" in out, (out, err)
     step = load_checkpoint(run / "checkpoint.pt")["step"]
