@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 import trimesh
 from painted_ball import heights, photos, sky, textured
 from tiny_runs import tiny
+from viewer_server import numbered_sky, serving, triangle
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.data.images import write_image
 from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.refinement.texels import AssetTexels
 from splitnerf.training.loop import train
@@ -63,3 +66,21 @@ def painted(ball) -> tuple[Asset, Dataset]:
     values[:, 3:4] = torch.where(height > 0, 0.35, 0.7)
     asset = texels.asset_with(texels.maps(values))
     return asset, photos(asset, sky())
+
+
+@pytest.fixture
+def shown_run(tmp_path):
+    """A run's folder for the viewer: an asset, its light, and what the photos leave open."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    triangle().write(folder / "mesh.glb")
+    write_image(folder / "environment.exr", numbered_sky())
+    write_image(folder / "uncertainty.exr", np.linspace(0, 0.5, 4 * 4 * 4, dtype=np.float32).reshape(4, 4, 4))
+    return folder
+
+
+@pytest.fixture
+def served(shown_run):
+    """A server that shows it."""
+    with serving(shown_run) as server:
+        yield server
