@@ -27,9 +27,10 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Protocol, score_asset
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
-from splitnerf.refinement import job
+from splitnerf.refinement import fit, job
 from splitnerf.refinement.fit import Refinement, RefinementSettings, Stage
 from splitnerf.refinement.job import OtherState, refine_folder
+from splitnerf.refinement.pixels import covered_pixels
 from splitnerf.report.last_stage import KNOWN_COLOURS, UNKNOWN_COLOURS, coloured, last_stage_section
 
 REFINED = ("--set", "refine=true", "--set", "refinement_sweeps=2")
@@ -208,6 +209,11 @@ def folder(painted, tmp_path) -> Path:
 QUICK = RefinementSettings(sweeps=4, sweep_share=0.1, pixels=256)
 
 
+def n_pixels(painted) -> int:
+    """The pixels that show the ball."""
+    return len(covered_pixels(painted[1]))
+
+
 def test_a_stage_goes_on_from_each_of_its_states(painted, folder, monkeypatch):
     """Interrupted after every sweep, it ends with the bits of the whole; the time of all parts counts."""
     whole = refine_folder(folder, painted[1], folder / "whole", QUICK)
@@ -315,13 +321,70 @@ def test_refine_can_be_interrupted_and_goes_on(run, scene, tmp_path, monkeypatch
 
 def test_time_ends_a_stage_by_its_minutes(painted):
     stage = Stage(painted[1], painted[0], sky(), dataclasses.replace(QUICK, minutes=1e-6, outline=False))
-    assert stage.progress == 0.0  # a first sweep is always made
+    assert not stage.finished and stage.progress < 1.0  # a first sweep is always made
     stage.advance()
-    assert stage.progress == 1.0
+    assert stage.finished and stage.progress == 1.0
     stage.settings = dataclasses.replace(QUICK, minutes=1e6)
-    assert stage.progress == 0.25
+    assert not stage.finished and stage.progress == 0.25
     stage.settings, stage.started = dataclasses.replace(QUICK, minutes=2.0), stage.started - 60.0
     assert 0.5 < stage.progress < 0.6
+
+
+class Clock:
+    """A clock that goes on by a second with each batch, and by what is asked with each round of the outline."""
+
+    def __init__(self, monkeypatch, of_batch: float, of_round: float = 0.0):
+        self.now, self.rounds = 0.0, []
+        monkeypatch.setattr(fit.time, "monotonic", lambda: self.now)
+        gather = Refinement.gather
+
+        def slow_batch(refinement, surface):
+            self.now += of_batch
+            return gather(refinement, surface)
+
+        def slow_outline(dataset, asset, seed, begins):
+            while begins(len(self.rounds)):
+                self.rounds.append(self.now)
+                self.now += of_round
+            return asset, []
+
+        monkeypatch.setattr(Refinement, "gather", slow_batch)
+        monkeypatch.setattr(fit, "fit_outline", slow_outline)
+
+
+def test_a_slow_machine_keeps_to_the_minutes_by_smaller_sweeps(painted, monkeypatch):
+    """Sweeps of 50 batches of a second each, in two minutes: four sweeps of 30 batches."""
+    settings = dataclasses.replace(QUICK, minutes=2.0, sweeps=1000, pixels=64, sweep_share=50 * 64 / n_pixels(painted), outline=False)
+    clock = Clock(monkeypatch, of_batch=1.0)
+    stage = Stage(painted[1], painted[0], sky(), settings)
+    sizes = []
+    while not stage.finished:
+        before = clock.now
+        stage.advance()
+        sizes.append(clock.now - before)
+    assert sizes == [30.0] * 4 and clock.now == 120.0
+    # the time of a sweep's own step counts, and a last sweep takes what is left, if that is half of one
+    for taken, more in ((70.0, [30.0, 20.0]), (80.0, [30.0]), (110.0, [])):
+        stage = Stage(painted[1], painted[0], sky(), settings)
+        stage.advance()
+        stage.started, sizes = clock.now - taken, []
+        while not stage.finished:
+            before = clock.now
+            stage.advance()
+            sizes.append(clock.now - before)
+        assert sizes == more, taken
+
+
+def test_a_slow_outline_leaves_time_for_the_sweeps(painted, monkeypatch):
+    """A further round begins only if it ends in the first half of the minutes; the first one always does."""
+    for of_round, rounds in ((10.0, 3), (25.0, 2), (31.0, 1), (500.0, 1)):
+        with monkeypatch.context() as patch:
+            clock = Clock(patch, of_batch=1.0, of_round=of_round)
+            patch.setattr(Refinement, "make_lamp_compact", lambda *_: pytest.fail("a lamp") if of_round > 60 else None)
+            begins = Stage._begins
+            patch.setattr(Stage, "_begins", lambda stage, turn: turn < 3 and begins(stage, turn))
+            stage = Stage(painted[1], painted[0], sky(), dataclasses.replace(QUICK, minutes=2.0))
+            assert len(clock.rounds) == rounds and not stage.finished
 
 
 # ---- what it says ----
