@@ -304,6 +304,9 @@ def test_a_grazing_light_of_denormal_cosine_has_finite_gradients():
 
 # ---- by hypothesis -----------------------------------------------------------------------------
 
+# A call may take long on a busy machine.
+UNTIMED = hypothesis.settings(deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow])
+
 FLOATS = strategies.floats(width=32, allow_nan=False, allow_infinity=False)
 SHARES = strategies.floats(0, 1, width=32)
 COMPONENTS = strategies.tuples(*[strategies.floats(-1, 1, width=32)] * 3).filter(lambda v: math.hypot(*v) > 1e-3)
@@ -316,26 +319,31 @@ def holds(name: str, given: dict) -> None:
     assert errors.forward.item() <= entry.bound and errors.gradient.item() <= entry.gradient_bound
 
 
+@UNTIMED
 @hypothesis.given(FLOATS.filter(lambda x: x < 1e38))
 def test_srgb_by_hypothesis(x):
     holds("linear_to_srgb", {"linear": x})
 
 
+@UNTIMED
 @hypothesis.given(strategies.tuples(FLOATS, FLOATS, FLOATS))
 def test_hash_encode_by_hypothesis(position):
     holds("hash_encode", {"positions": position})
 
 
+@UNTIMED
 @hypothesis.given(COMPONENTS, COMPONENTS, SHARES)
 def test_query_direction_by_hypothesis(normal, view, roughness):
     holds("query_direction", {"normals": normal, "view_dirs": view, "roughness": (roughness,)})
 
 
+@UNTIMED
 @hypothesis.given(strategies.lists(strategies.floats(-1e6, 1e6, width=32), min_size=9, max_size=9))
 def test_neus_weights_by_hypothesis(values):
     holds("neus_weights", {"f_prev": values[:-1], "f_next": values[1:]})
 
 
+@UNTIMED
 @hypothesis.given(COMPONENTS, COMPONENTS, SHARES, SHARES, strategies.tuples(SHARES, SHARES, SHARES))
 def test_split_sum_by_hypothesis(normal, view, roughness, metallic, albedo):
     ones = (1.0, 1.0, 1.0)
