@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +22,10 @@ from splitnerf.training.loop import train
 
 
 def tiny_dataset(folder: Path, n_train: int) -> Path:
-    """The demo's scene in few pixels, with a ball for its true mesh: a run of a few steps is still one, and distances between
-    surfaces that are far apart took nine tenths of the time of such a run."""
+    """The demo's scene in few pixels, without its true mesh: to measure distances to it takes longer than a run of a few steps
+    does else, see `data_with_mesh`."""
     write_demo_dataset(folder, size=24, n_train=n_train, n_test=2, spp=4)
-    trimesh.creation.icosphere(subdivisions=2, radius=0.67).export(folder / "mesh.ply")
+    (folder / "mesh.ply").unlink()
     return folder
 
 
@@ -38,6 +39,14 @@ def data(tmp_path_factory) -> Path:
 def other_data(tmp_path_factory) -> Path:
     """Another one, of fewer views."""
     return tiny_dataset(tmp_path_factory.mktemp("data") / "other", n_train=5)
+
+
+@pytest.fixture(scope="session")
+def data_with_mesh(data, tmp_path_factory) -> Path:
+    """The data with a true mesh: a ball, as a run of a few steps is still one."""
+    folder = shutil.copytree(data, tmp_path_factory.mktemp("data") / "meshed")
+    trimesh.creation.icosphere(subdivisions=2, radius=0.67).export(folder / "mesh.ply")
+    return folder
 
 
 @pytest.fixture

@@ -38,18 +38,10 @@ DELIVERED = ("mesh.glb", "environment.exr", "environment.hdr", "uncertainty.exr"
 
 
 @pytest.fixture(scope="module")
-def scene(data, tmp_path_factory) -> Path:
-    """The tiny data without a true mesh, from which distances would take most of the time."""
-    copy = shutil.copytree(data, tmp_path_factory.mktemp("last_stage") / "data")
-    (copy / "mesh.ply").unlink()
-    return copy
-
-
-@pytest.fixture(scope="module")
-def run(scene, tmp_path_factory) -> Path:
+def run(data, tmp_path_factory) -> Path:
     """A run with a last stage."""
     folder = tmp_path_factory.mktemp("refined") / "run"
-    assert train(scene, folder, "--steps", "25", "--deterministic", *REFINED) == DONE
+    assert train(data, folder, "--steps", "25", "--deterministic", *REFINED) == DONE
     return folder
 
 
@@ -71,51 +63,51 @@ def test_a_run_delivers_what_was_fitted_and_keeps_what_was_trained(run):
     assert deviations.shape == (64, 64, 4) and deviations.min() > 0 and deviations[..., :3].max() < 0.29
 
 
-def test_what_is_delivered_is_what_is_scored(run, scene):
+def test_what_is_delivered_is_what_is_scored(run, data):
     """By path tracing, the light with it; a later evaluation says the same."""
     scores = json.loads((run / "evaluation.json").read_text())
     assert scores["scored"] == "asset" and scores["spp"] == Protocol.spp
     from splitnerf.data.dataset import load_dataset
 
     own = score_asset(
-        read_asset(run / "mesh.glb"), read_image(run / "environment.exr"), load_dataset(scene, "test"), {}, Protocol.spp
+        read_asset(run / "mesh.glb"), read_image(run / "environment.exr"), load_dataset(data, "test"), {}, Protocol.spp
     ).scores
     for key in ("novel_view", "albedo", "roughness_mae", "light_psnr"):
         assert scores[key] == own[key], key
     record = json.loads((run / "refinement.json").read_text())
     assert scores["seconds"] > record["seconds"] > 0 and len(record["sweeps"]) == 2
     before = (run / "evaluation.json").read_bytes()
-    assert main(["evaluate", str(run), "--data", str(scene)]) == DONE
+    assert main(["evaluate", str(run), "--data", str(data)]) == DONE
     again = json.loads((run / "evaluation.json").read_text())
     assert again == json.loads(before)
 
 
-def test_without_a_last_stage_the_fields_are_scored(scene, tmp_path):
+def test_without_a_last_stage_the_fields_are_scored(data, tmp_path):
     run = tmp_path / "run"
-    assert train(scene, run, "--steps", "12", "--set", "refine=true", "--no-refine") == DONE
+    assert train(data, run, "--steps", "12", "--set", "refine=true", "--no-refine") == DONE
     assert json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
     assert not (run / "trained").exists() and not any((run / name).exists() for name in DELIVERED[3:])
     assert "The last stage" not in (run / "report.html").read_text()
 
 
-def test_another_run_in_the_folder_leaves_nothing_of_the_last_stage(run, scene, tmp_path):
+def test_another_run_in_the_folder_leaves_nothing_of_the_last_stage(run, data, tmp_path):
     again = shutil.copytree(run, tmp_path / "run")
-    assert train(scene, again, "--steps", "12", "--overwrite") == DONE
+    assert train(data, again, "--steps", "12", "--overwrite") == DONE
     assert not (again / "trained").exists() and not any((again / name).exists() for name in DELIVERED[3:])
     # And so does a run that goes on without.
     again = shutil.copytree(run, tmp_path / "on")
-    assert main(["train", str(scene), "--out", str(again), "--resume", "--no-refine"]) == DONE
+    assert main(["train", str(data), "--out", str(again), "--resume", "--no-refine"]) == DONE
     assert not (again / "trained").exists() and not (again / "refinement.json").exists()
     assert bytes_of(again, "mesh.glb") == bytes_of(run / "trained", "mesh.glb")
 
 
-def test_photos_that_cannot_be_fitted_leave_the_trained_asset(scene, tmp_path, capsys, monkeypatch):
+def test_photos_that_cannot_be_fitted_leave_the_trained_asset(data, tmp_path, capsys, monkeypatch):
     def refuses(*args, **kwargs):
         raise InputError("no pixel of the photos shows the asset")
 
     monkeypatch.setattr(delivery, "refine_folder", refuses)
     run = tmp_path / "run"
-    assert train(scene, run, "--steps", "12", *REFINED) == DONE
+    assert train(data, run, "--steps", "12", *REFINED) == DONE
     assert "without a last stage, as no pixel" in capsys.readouterr().err
     assert (run / "mesh.glb").is_file() and json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
 
@@ -131,10 +123,10 @@ def test_an_export_does_not_replace_what_the_last_stage_fitted(run, tmp_path, ca
     assert read_asset(run / "trained" / "mesh.glb").materials[0].albedo_texture.shape == (32, 32, 3)
 
 
-def test_refine_starts_from_what_was_trained(run, scene, tmp_path):
+def test_refine_starts_from_what_was_trained(run, data, tmp_path):
     """The same command again on a refined run does what the last stage did."""
     run = shutil.copytree(run, tmp_path / "run")
-    assert main(["refine", str(run), "--data", str(scene), "--sweeps", "2"]) == DONE
+    assert main(["refine", str(run), "--data", str(data), "--sweeps", "2"]) == DONE
     assert bytes_of(run / "refined", "mesh.glb", "environment.exr") == bytes_of(run, "mesh.glb", "environment.exr")
 
 
@@ -154,15 +146,15 @@ def stop_after(monkeypatch, sweeps: int) -> None:
     monkeypatch.setattr(Stage, "advance", counted)
 
 
-def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_another(run, scene, tmp_path, capsys, monkeypatch):
+def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_another(run, data, tmp_path, capsys, monkeypatch):
     halves = tmp_path / "halves"
     with monkeypatch.context() as patch:
         stop_after(patch, 1)
-        assert train(scene, halves, "--steps", "25", "--deterministic", *REFINED) == INTERRUPTED
+        assert train(data, halves, "--steps", "25", "--deterministic", *REFINED) == INTERRUPTED
     assert "in the last stage" in capsys.readouterr().out
     assert (halves / "refinement.pt").is_file() and not (halves / "mesh.glb").exists()
     trained = (halves / "trained" / "mesh.glb").stat().st_mtime_ns
-    assert main(["train", str(scene), "--out", str(halves), "--resume"]) == DONE
+    assert main(["train", str(data), "--out", str(halves), "--resume"]) == DONE
     assert (halves / "trained" / "mesh.glb").stat().st_mtime_ns == trained and not (halves / "refinement.pt").exists()
     assert bytes_of(halves, *DELIVERED[:4]) == bytes_of(run, *DELIVERED[:4])
 
@@ -170,7 +162,7 @@ def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_anot
 @pytest.mark.parametrize("minutes", [0.0, 2.0])
 @pytest.mark.parametrize("place", ["refinement.job.write_environment", "delivery.score_run", "delivery.forget_state"])
 def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_another(
-    run, scene, tmp_path, monkeypatch, place, minutes
+    run, data, tmp_path, monkeypatch, place, minutes
 ):
     """With a state of the last stage and without."""
     killed, minutes = tmp_path / "run", ("--set", f"checkpoint_minutes={minutes}")
@@ -180,20 +172,20 @@ def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_
 
     with monkeypatch.context() as patch:
         patch.setattr(f"splitnerf.{place}", fails)
-        assert train(scene, killed, "--steps", "25", "--deterministic", *REFINED, *minutes) == FAILED
+        assert train(data, killed, "--steps", "25", "--deterministic", *REFINED, *minutes) == FAILED
     assert (killed / "mesh.glb").exists()
-    assert main(["train", str(scene), "--out", str(killed), "--resume"]) == DONE
+    assert main(["train", str(data), "--out", str(killed), "--resume"]) == DONE
     names = (*DELIVERED[:4], *(f"trained/{name}" for name in ("mesh.glb", "environment.exr")))
     assert bytes_of(killed, *names) == bytes_of(run, *names) and not (killed / "refinement.pt").exists()
 
 
-def test_more_steps_make_the_state_void(scene, tmp_path, monkeypatch):
+def test_more_steps_make_the_state_void(data, tmp_path, monkeypatch):
     run = tmp_path / "run"
     with monkeypatch.context() as patch:
         stop_after(patch, 1)
-        assert train(scene, run, "--steps", "12", *REFINED) == INTERRUPTED
+        assert train(data, run, "--steps", "12", *REFINED) == INTERRUPTED
     before = bytes_of(run / "trained", "mesh.glb")
-    assert main(["train", str(scene), "--out", str(run), "--resume", "--steps", "20"]) == DONE
+    assert main(["train", str(data), "--out", str(run), "--resume", "--steps", "20"]) == DONE
     assert bytes_of(run / "trained", "mesh.glb") != before
     assert len(json.loads((run / "refinement.json").read_text())["sweeps"]) == 2
 
@@ -308,9 +300,9 @@ def test_another_state_is_refused(painted, folder, monkeypatch):
     refused("another asset")
 
 
-def test_refine_can_be_interrupted_and_goes_on(run, scene, tmp_path, monkeypatch, capsys):
+def test_refine_can_be_interrupted_and_goes_on(run, data, tmp_path, monkeypatch, capsys):
     run = shutil.copytree(run, tmp_path / "run")
-    command = ["refine", str(run), "--data", str(scene), "--sweeps", "2"]
+    command = ["refine", str(run), "--data", str(data), "--sweeps", "2"]
     with monkeypatch.context() as patch:
         stop_after(patch, 1)
         assert main(command) == INTERRUPTED

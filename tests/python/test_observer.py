@@ -26,12 +26,6 @@ from splitnerf.workflow import load_run, reconstruct
 CPU = torch.device("cpu")
 
 
-@pytest.fixture(autouse=True)
-def no_true_mesh(monkeypatch):
-    """Distances to it took most of the time."""
-    monkeypatch.setattr("splitnerf.outputs.load_scene_truth", lambda *_: SimpleNamespace(light=None, mesh=None))
-
-
 class Asking(Observer):
     """Wishes one thing after the other, from a step on; and writes down what it hears."""
 
