@@ -63,6 +63,11 @@ def test_a_run_delivers_what_was_fitted_and_keeps_what_was_trained(run):
     assert deviations.shape == (64, 64, 4) and deviations.min() > 0 and deviations[..., :3].max() < 0.29
 
 
+def test_the_export_is_said_at_once(run, tmp_path, capsys):
+    assert main(["export", str(run), "--out", str(tmp_path), "--formats", "glb"]) == DONE
+    assert "  0% 00:00<? export, surface on a grid of 32^3\n" in capsys.readouterr().err
+
+
 def test_what_is_delivered_is_what_is_scored(run, data):
     """By path tracing, the light with it; a later evaluation says the same."""
     scores = json.loads((run / "evaluation.json").read_text())
@@ -384,7 +389,9 @@ def test_a_slow_outline_leaves_time_for_the_sweeps(painted, monkeypatch):
 
 def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     refine_folder(folder, painted[1], folder, QUICK)
-    assert re.search(r"100% .* last stage, step 4, photos [1-4]\d\.\d\d dB", capsys.readouterr().err)
+    printed = capsys.readouterr().err
+    assert printed.startswith("  0% 00:00<? last stage, outline, round 1 of 3\n")
+    assert re.search(r"100% .* last stage, step 4, photos [1-4]\d\.\d\d dB", printed)
     summary = delivery.last_stage_summary(folder)
     before, after = summary["photos_psnr"]
     assert after > before and summary["steps"] == 4
