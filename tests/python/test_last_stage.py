@@ -351,7 +351,8 @@ class Clock:
 
 def test_a_slow_machine_keeps_to_the_minutes_by_smaller_sweeps(painted, monkeypatch):
     """Sweeps of 50 batches of a second each, in two minutes: four sweeps of 30 batches."""
-    settings = dataclasses.replace(QUICK, minutes=2.0, sweeps=1000, pixels=64, sweep_share=50 * 64 / n_pixels(painted), outline=False)
+    share = 50 * 64 / n_pixels(painted)
+    settings = dataclasses.replace(QUICK, minutes=2.0, sweeps=1000, pixels=64, sweep_share=share, outline=False)
     clock = Clock(monkeypatch, of_batch=1.0)
     stage = Stage(painted[1], painted[0], sky(), settings)
     sizes = []

@@ -75,8 +75,8 @@ def test_a_published_protocol_has_it_or_says_why_not(tmp_path, monkeypatch, caps
     monkeypatch.setattr("published_scenes.SPP", 4)
     root = write_set(tmp_path, "shiny", False).root
     asset, light = next(tmp_path.rglob("asset.glb")), root / "light.hdr"
-    command = ["evaluate", str(asset), "--data", str(root), "--env", str(light), "--protocol", "shiny", "--spp", "2", "--views", "1"]
-    command += ["--out", str(tmp_path / "scores.json")]
+    command = ["evaluate", str(asset), "--data", str(root), "--env", str(light), "--protocol", "shiny"]
+    command += ["--spp", "2", "--views", "1", "--out", str(tmp_path / "scores.json")]
     monkeypatch.setattr("splitnerf.evaluate.published.job.find_distance", lambda: (lambda image, truth: 0.125, ""))
     assert main(command) == DONE
     printed = capsys.readouterr().out

@@ -28,7 +28,7 @@ def numbers_of_steps(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     s = draw.logarithmic(1.0, 1e4, n).float()
     squares = gradients.double().square().sum(1)
     norm = torch.where(squares > LARGEST_FLOAT, math.inf, squares.sqrt())
-    true = torch.cat([terms.double(), norm[:, None], counts.double(), evaluated.sum(1, keepdim=True).double(), s[:, None].double()], 1)
+    true = torch.cat([terms, norm[:, None], counts, evaluated.sum(1, keepdim=True), s[:, None]], 1).double()
     near = true.abs().float()
     near = torch.where(draw.chance(0.1, *true.shape), near, torch.nextafter(near, torch.tensor(math.inf)) * 2)
     limits = torch.where(draw.chance(0.2, *true.shape), math.inf, near)

@@ -35,7 +35,8 @@ def find_distance() -> tuple[Distance | None, str]:
     except ModuleNotFoundError as error:
         return None, f"the package {error.name} is not installed (pip install 'splitnerf[lpips]')"
     except Exception as error:  # torchvision's own, where it was built for another torch
-        return None, f"the package lpips cannot be imported ({plain(str(error))[:80]}); install the torchvision of torch {torch.__version__}"
+        why = plain(str(error))[:80]
+        return None, f"the package lpips cannot be imported ({why}); install the torchvision of torch {torch.__version__}"
     weights = Path(torch.hub.get_dir()) / "checkpoints" / BACKBONE_WEIGHTS
     if not weights.is_file():
         return None, f"{weights} is missing; it is {SOURCE}"

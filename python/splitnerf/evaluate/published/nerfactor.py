@@ -33,8 +33,8 @@ from splitnerf.progress import tracked
 LAYOUT = layout
 COLUMNS: tuple[Column, ...] = (
     ("psnr", "relit, PSNR", "{:.2f}"), ("ssim", "relit, SSIM", "{:.3f}"), ("lpips", "relit, LPIPS", "{:.3f}"),
-    ("albedo_psnr", "albedo, PSNR", "{:.2f}"), ("albedo_ssim", "albedo, SSIM", "{:.3f}"), ("albedo_lpips", "albedo, LPIPS", "{:.3f}"),
-    ("view_psnr", "novel, PSNR", "{:.2f}"), ("normals", "normals, degrees", "{:.2f}"),
+    ("albedo_psnr", "albedo, PSNR", "{:.2f}"), ("albedo_ssim", "albedo, SSIM", "{:.3f}"),
+    ("albedo_lpips", "albedo, LPIPS", "{:.3f}"), ("view_psnr", "novel, PSNR", "{:.2f}"), ("normals", "normals, degrees", "{:.2f}"),
 )  # fmt: skip
 VALIDATION, TEST = range(8), (49, 99, 149, 199)
 OPAQUE = 0.9
