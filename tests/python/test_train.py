@@ -363,7 +363,8 @@ def test_the_paper_preset_takes_steps(data, tmp_path):
         grid_resolution=32, log2_table_size=14, mesh_every=0.3, preview_every=1.0, export_texture_size=64, export_faces=500,
         export_environment_height=16,
     )  # fmt: skip
-    assert main(["train", str(data), "--out", str(run), "--preset", "paper", "--steps", "6", *as_options(settings)]) == DONE
+    command = ["train", str(data), "--out", str(run), "--preset", "paper", "--steps", "6", "--downscale", "2"]
+    assert main([*command, *as_options(settings)]) == DONE
     assert (run / "evaluation.json").stat().st_size > 0 and list((run / "previews").iterdir())
     assert Config.read(run / "config.toml").shading.fresnel == "paper"
 
