@@ -26,8 +26,8 @@ from splitnerf.evaluate.lpips import load_distance
 from splitnerf.export.meshing import EmptyMesh
 from splitnerf.notes import note
 from splitnerf.outputs import evaluate_scene, light_panels, write_assets
-from splitnerf.refinement.fit import RefinementSettings
-from splitnerf.refinement.job import RECORD, STATE, TRAINED, OtherState, decibels, forget_state, refine_folder
+from splitnerf.refinement.fit import RefinementSettings, decibels
+from splitnerf.refinement.job import RECORD, STATE, TRAINED, OtherState, forget_state, refine_folder
 from splitnerf.refinement.uncertainty import painted_with
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid

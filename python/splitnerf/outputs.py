@@ -29,7 +29,7 @@ from splitnerf.export.surface import Surface, surface_materials
 from splitnerf.export.textured import textured_asset
 from splitnerf.export.usdz import require_usd, write_usdz
 from splitnerf.ops import fibonacci_directions, prefilter_light
-from splitnerf.progress import tracked
+from splitnerf.progress import Progress, tracked
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import render_view
@@ -109,26 +109,29 @@ def write_assets(
     if "usdz" in formats:
         require_usd()
     surface = surface_of(model)
-    vertices, faces, n_dropped = drop_floaters_and_cavities(*extract_mesh(surface.sdf, c.surface.box, resolution))
-    world_from_box = np.linalg.inv(box_from_world)
-    mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
-    exported = Exported(mesh, len(faces), is_closed(faces), n_dropped)
-    if "ply" in formats:
-        write_mesh_ply(out / "mesh.ply", mesh.vertices, faces, surface_materials(surface, vertices)[0])
-    if set(formats) - {"ply"}:
-        textured = textured_asset(
-            "object", vertices, faces, surface, n_faces=n_faces, texture_size=texture_size or c.export.texture_size,
-            spacing=2.0 * c.surface.box / (resolution - 1), occlusion_offset=c.occlusion.offset,
-        )  # fmt: skip
-        asset = dataclasses.replace(textured.asset, vertices=transform_points(world_from_box, textured.asset.vertices))
-        if "glb" in formats:
-            write_glb(out / "mesh.glb", asset, textured.occlusion)
-        if "obj" in formats:
-            write_obj(out / "mesh.obj", asset)
-        if "usdz" in formats:
-            write_usdz(out / "mesh.usdz", asset, textured.occlusion)
-        exported = Exported(mesh, len(asset.triangles), textured.watertight, n_dropped)
-    write_environment(out, model.light.panorama(c.export.environment_height).cpu().numpy())
+    with Progress(0.0, leave=False, at_once=True) as bar:
+        bar.show(0.0, f"export, surface on a grid of {resolution}^3")
+        vertices, faces, n_dropped = drop_floaters_and_cavities(*extract_mesh(surface.sdf, c.surface.box, resolution))
+        world_from_box = np.linalg.inv(box_from_world)
+        mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
+        exported = Exported(mesh, len(faces), is_closed(faces), n_dropped)
+        if "ply" in formats:
+            write_mesh_ply(out / "mesh.ply", mesh.vertices, faces, surface_materials(surface, vertices)[0])
+        if set(formats) - {"ply"}:
+            textured = textured_asset(
+                "object", vertices, faces, surface, n_faces=n_faces, texture_size=texture_size or c.export.texture_size,
+                spacing=2.0 * c.surface.box / (resolution - 1), occlusion_offset=c.occlusion.offset,
+            )  # fmt: skip
+            bar.show(0.9, "export, files")
+            asset = dataclasses.replace(textured.asset, vertices=transform_points(world_from_box, textured.asset.vertices))
+            if "glb" in formats:
+                write_glb(out / "mesh.glb", asset, textured.occlusion)
+            if "obj" in formats:
+                write_obj(out / "mesh.obj", asset)
+            if "usdz" in formats:
+                write_usdz(out / "mesh.usdz", asset, textured.occlusion)
+            exported = Exported(mesh, len(asset.triangles), textured.watertight, n_dropped)
+        write_environment(out, model.light.panorama(c.export.environment_height).cpu().numpy())
     return exported
 
 

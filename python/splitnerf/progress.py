@@ -76,16 +76,22 @@ class _Abandoned(BaseException):
 
 
 class Progress:
-    """Shows the share done, the time left and a text: as a bar on a terminal, elsewhere as a line every ten seconds."""
+    """Shows the share done, the time left and a text: as a bar on a terminal, elsewhere as a line every ten seconds.
 
-    def __init__(self, start: float, leave: bool = True):
+    Args:
+        start: The share that is done already.
+        leave: Whether a terminal keeps the bar at its end.
+        at_once: Whether the first text is a line at once, also where the output is not a terminal.
+    """
+
+    def __init__(self, start: float, leave: bool = True, at_once: bool = False):
         self._stream = sys.stderr
         self._is_terminal = self._stream.isatty()
         self._bar = tqdm(
             total=100.0, initial=100.0 * start, file=self._stream, disable=not self._is_terminal, leave=leave,
             bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining}{postfix}",
         )  # fmt: skip
-        self._start, self._started, self._told = start, time.monotonic(), 0.0
+        self._start, self._started, self._told = start, time.monotonic(), -LINE_EVERY if at_once else 0.0
 
     def __enter__(self) -> Progress:
         return self

@@ -1,6 +1,6 @@
 """Training's shading with true geometry, materials and light against the path tracer.
 
-    python tests/bench/shading_truth.py SCENE ... [--views 2] [--size 100] [--spp 256]
+    python tests/bench/shading_truth.py SCENE ... [--views 2] [--size 100] [--spp 256] [--spacing 0.032]
 
 A SCENE is a folder with asset.glb, light.hdr and test views, or `spheres:LIGHT.hdr`: a grid of spheres over a plane,
 roughness by rows and metallic by columns, or `spheres:sun`. The first hits of camera rays are shaded as in a training
@@ -125,7 +125,7 @@ class TrueMaterials(torch.nn.Module):
 class TrueScene(SceneModel):
     """The model with true materials, light and mesh; every point lies on the surface."""
 
-    def __init__(self, asset: Asset, environment: np.ndarray):
+    def __init__(self, asset: Asset, environment: np.ndarray, spacing: float):
         super().__init__(Config())
         self.material = TrueMaterials(asset)
         texels = np.log(octahedral_texels(environment, self.light.resolution).clip(math.exp(-LOG_LIMIT), None))
@@ -133,7 +133,7 @@ class TrueScene(SceneModel):
             self.light.texels.zero_()[-len(texels) :] = torch.from_numpy(texels).float()
         mesh = trimesh.Trimesh(asset.vertices, asset.triangles, process=False)
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
-        mesh = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, SPACING, 20), process=True)
+        mesh = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, spacing, 20), process=True)
         vertices, triangles = torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces).int()
         self.occlusion.aim(self.evaluate_light())
         self.use_mesh(self.occlusion.trace(MeshScene(vertices.numpy(), triangles.numpy()), vertices, triangles))
@@ -241,12 +241,13 @@ def main() -> None:
     parser.add_argument("--views", type=int, default=2)
     parser.add_argument("--size", type=int, default=100)
     parser.add_argument("--spp", type=int, default=256)
+    parser.add_argument("--spacing", type=float, default=SPACING, help="longest edge of the mesh that caches visibility")
     args = parser.parse_args()
     heads = " ".join(f"<{high:4.2f} " for high in BINS[1:])
     print(f"{'sRGB PSNR, dB':24} {'all':6} | dielectric, roughness: {heads} | metal: {heads}")
     for argument in args.scenes:
         name, asset, environment, views = scene_of(argument, args.size, args.views)
-        compare(name, TrueScene(asset, environment), AssetRenderer(asset), environment, views, args.spp)
+        compare(name, TrueScene(asset, environment, args.spacing), AssetRenderer(asset), environment, views, args.spp)
 
 
 if __name__ == "__main__":

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 import trimesh
 from painted_ball import heights, photos, sky, textured
 from tiny_runs import tiny
+from viewer_server import numbered_sky, serving, triangle
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.data.images import write_image
 from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.refinement.texels import AssetTexels
 from splitnerf.training.loop import train
 
 
 def tiny_dataset(folder: Path, n_train: int) -> Path:
-    """The demo's scene in few pixels, with a ball for its true mesh: a run of a few steps is still one, and distances between
-    surfaces that are far apart took nine tenths of the time of such a run."""
+    """The demo's scene in few pixels, without its true mesh: to measure distances to it takes longer than a run of a few steps
+    does else, see `data_with_mesh`."""
     write_demo_dataset(folder, size=24, n_train=n_train, n_test=2, spp=4)
-    trimesh.creation.icosphere(subdivisions=2, radius=0.67).export(folder / "mesh.ply")
+    (folder / "mesh.ply").unlink()
     return folder
 
 
@@ -35,6 +39,14 @@ def data(tmp_path_factory) -> Path:
 def other_data(tmp_path_factory) -> Path:
     """Another one, of fewer views."""
     return tiny_dataset(tmp_path_factory.mktemp("data") / "other", n_train=5)
+
+
+@pytest.fixture(scope="session")
+def data_with_mesh(data, tmp_path_factory) -> Path:
+    """The data with a true mesh: a ball, as a run of a few steps is still one."""
+    folder = shutil.copytree(data, tmp_path_factory.mktemp("data") / "meshed")
+    trimesh.creation.icosphere(subdivisions=2, radius=0.67).export(folder / "mesh.ply")
+    return folder
 
 
 @pytest.fixture
@@ -63,3 +75,21 @@ def painted(ball) -> tuple[Asset, Dataset]:
     values[:, 3:4] = torch.where(height > 0, 0.35, 0.7)
     asset = texels.asset_with(texels.maps(values))
     return asset, photos(asset, sky())
+
+
+@pytest.fixture
+def shown_run(tmp_path):
+    """A run's folder for the viewer: an asset, its light, and what the photos leave open."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    triangle().write(folder / "mesh.glb")
+    write_image(folder / "environment.exr", numbered_sky())
+    write_image(folder / "uncertainty.exr", np.linspace(0, 0.5, 4 * 4 * 4, dtype=np.float32).reshape(4, 4, 4))
+    return folder
+
+
+@pytest.fixture
+def served(shown_run):
+    """A server that shows it."""
+    with serving(shown_run) as server:
+        yield server

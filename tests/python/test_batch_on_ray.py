@@ -142,9 +142,9 @@ LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "0000000000000000000
 
 
 def scenes_of(data: Path, folder: Path, *names: str) -> list[Path]:
-    """Copies of a data set, without the true mesh, whose distances take longer than all else."""
+    """Copies of a data set."""
     for name in names:
-        shutil.copytree(data, folder / name, ignore=shutil.ignore_patterns("mesh.ply"))
+        shutil.copytree(data, folder / name)
     return [folder / name for name in names]
 
 

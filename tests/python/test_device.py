@@ -76,10 +76,10 @@ def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeyp
     monkeypatch.setattr(step, "find_samples", counted)
     with pretend_gpu(monkeypatch) as gpu:
         settings = {"min_step": 0.03} if name == "paper" else {"target_samples": 4608}  # so that samples have room
-        trained = trainer.train(load_dataset(data), tiny(name, steps=50, **settings), tmp_path, device="cuda")
+        trained = trainer.train(load_dataset(data), tiny(name, steps=32, **settings), tmp_path, device="cuda")
         assert trained.finished and trained.model.device == GPU and trained.grid.cells.device == GPU
     assert all(isinstance(p, GpuTensor) for p in trained.model.parameters())
-    each = statistics.median(b - a for a, b in itertools.pairwise(waits[-20:]))
+    each = statistics.median(b - a for a, b in itertools.pairwise(waits[-12:]))
     assert each <= {"cpu": 0, "fast": 0, "paper": 2}[name]
 
 

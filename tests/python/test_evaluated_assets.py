@@ -105,8 +105,9 @@ def test_truth_that_is_missing_is_named_before_anything_is_rendered(views):
     assert not renderer.asked
 
 
-def test_an_asset_is_scored_by_the_test_views_with_the_light_beside_it(data, tmp_path):
+def test_an_asset_is_scored_by_the_test_views_with_the_light_beside_it(data_with_mesh, tmp_path):
     """The demo's true ball: where it is, and by what light; the train views are others."""
+    data = data_with_mesh
     mesh = trimesh.load(data / "mesh.ply", process=False)
     n = len(mesh.vertices)
     asset = Asset(

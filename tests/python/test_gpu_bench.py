@@ -14,8 +14,6 @@ import torch
 from bench import gpu_limits, gpu_ops, gpu_smoke, gpu_table
 from op_cases import CASES
 
-from splitnerf.demo.scene import write_demo_dataset
-
 BENCH = Path(__file__).parents[1] / "bench"
 SMALL = dict(target_samples=256, max_rays=64, grid_resolution=16, mesh_resolution=24, light_resolution=16)
 
@@ -50,11 +48,6 @@ def test_a_line_that_takes_too_long_fails_alone(tmp_path):
     arguments = ("--out", tmp_path, "--device", "cpu", "--tiny", "--only", "prefilter_light", *seconds)
     assert "1 of 1 lines, 1 failed" in run("gpu_ops.py", *arguments, code=1)
     assert "failed: took too long" in (tmp_path / "ops.md").read_text()
-
-
-@pytest.fixture(scope="module")
-def data(tmp_path_factory):
-    return write_demo_dataset(tmp_path_factory.mktemp("gpu") / "data", size=24, n_train=6, n_test=2, spp=4)
 
 
 def test_a_profile_names_what_takes_the_time(data, tmp_path):

@@ -31,18 +31,18 @@ def recording(monkeypatch):
 
 
 @pytest.mark.parametrize("settings", [
-    {}, {"sparse_steps": True, "table_dtype": "float16"}, {"table_dtype": "bfloat16", "seed": 3},
+    {}, {"sparse_steps": True, "table_dtype": "bfloat16", "seed": 3},
     {"table_dtype": "float16", "sample_above": 0.0, "grid_every": 3, "target_samples": 16384},
 ])  # fmt: skip
 def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, recording, settings):
     """While the light moves, levels open, meshes come, priors begin and the anneal goes on. Both have the same capacity."""
-    settings = {"target_samples": 4608, "open_below": 0.0, "indirect_every": 50, "start_levels": 1} | settings
-    config = tiny("cpu", steps=240, cuda_graphs=True, **settings)
+    settings = {"target_samples": 4608, "open_below": 0.0, "indirect_every": 25, "start_levels": 1} | settings
+    config = tiny("cpu", steps=120, cuda_graphs=True, **settings)
     for name in ("recorded", "called"):
         (tmp_path / name).mkdir()
     monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
     trainer.train(load_dataset(data), config, tmp_path / "recorded")
-    assert recording["replayed"] > 150 and recording["recorded"] < 60
+    assert recording["replayed"] > 60 and recording["recorded"] < 60
     called = []
 
     def call(function, pool, generator):

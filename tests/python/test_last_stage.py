@@ -27,9 +27,10 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Protocol, score_asset
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
-from splitnerf.refinement import job
+from splitnerf.refinement import fit, job
 from splitnerf.refinement.fit import Refinement, RefinementSettings, Stage
 from splitnerf.refinement.job import OtherState, refine_folder
+from splitnerf.refinement.pixels import covered_pixels
 from splitnerf.report.last_stage import KNOWN_COLOURS, UNKNOWN_COLOURS, coloured, last_stage_section
 
 REFINED = ("--set", "refine=true", "--set", "refinement_sweeps=2")
@@ -37,18 +38,10 @@ DELIVERED = ("mesh.glb", "environment.exr", "environment.hdr", "uncertainty.exr"
 
 
 @pytest.fixture(scope="module")
-def scene(data, tmp_path_factory) -> Path:
-    """The tiny data without a true mesh, from which distances would take most of the time."""
-    copy = shutil.copytree(data, tmp_path_factory.mktemp("last_stage") / "data")
-    (copy / "mesh.ply").unlink()
-    return copy
-
-
-@pytest.fixture(scope="module")
-def run(scene, tmp_path_factory) -> Path:
+def run(data, tmp_path_factory) -> Path:
     """A run with a last stage."""
     folder = tmp_path_factory.mktemp("refined") / "run"
-    assert train(scene, folder, "--steps", "25", "--deterministic", *REFINED) == DONE
+    assert train(data, folder, "--steps", "25", "--deterministic", *REFINED) == DONE
     return folder
 
 
@@ -70,51 +63,56 @@ def test_a_run_delivers_what_was_fitted_and_keeps_what_was_trained(run):
     assert deviations.shape == (64, 64, 4) and deviations.min() > 0 and deviations[..., :3].max() < 0.29
 
 
-def test_what_is_delivered_is_what_is_scored(run, scene):
+def test_the_export_is_said_at_once(run, tmp_path, capsys):
+    assert main(["export", str(run), "--out", str(tmp_path), "--formats", "glb"]) == DONE
+    assert "  0% 00:00<? export, surface on a grid of 32^3\n" in capsys.readouterr().err
+
+
+def test_what_is_delivered_is_what_is_scored(run, data):
     """By path tracing, the light with it; a later evaluation says the same."""
     scores = json.loads((run / "evaluation.json").read_text())
     assert scores["scored"] == "asset" and scores["spp"] == Protocol.spp
     from splitnerf.data.dataset import load_dataset
 
     own = score_asset(
-        read_asset(run / "mesh.glb"), read_image(run / "environment.exr"), load_dataset(scene, "test"), {}, Protocol.spp
+        read_asset(run / "mesh.glb"), read_image(run / "environment.exr"), load_dataset(data, "test"), {}, Protocol.spp
     ).scores
     for key in ("novel_view", "albedo", "roughness_mae", "light_psnr"):
         assert scores[key] == own[key], key
     record = json.loads((run / "refinement.json").read_text())
     assert scores["seconds"] > record["seconds"] > 0 and len(record["sweeps"]) == 2
     before = (run / "evaluation.json").read_bytes()
-    assert main(["evaluate", str(run), "--data", str(scene)]) == DONE
+    assert main(["evaluate", str(run), "--data", str(data)]) == DONE
     again = json.loads((run / "evaluation.json").read_text())
     assert again == json.loads(before)
 
 
-def test_without_a_last_stage_the_fields_are_scored(scene, tmp_path):
+def test_without_a_last_stage_the_fields_are_scored(data, tmp_path):
     run = tmp_path / "run"
-    assert train(scene, run, "--steps", "12", "--set", "refine=true", "--no-refine") == DONE
+    assert train(data, run, "--steps", "12", "--set", "refine=true", "--no-refine") == DONE
     assert json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
     assert not (run / "trained").exists() and not any((run / name).exists() for name in DELIVERED[3:])
     assert "The last stage" not in (run / "report.html").read_text()
 
 
-def test_another_run_in_the_folder_leaves_nothing_of_the_last_stage(run, scene, tmp_path):
+def test_another_run_in_the_folder_leaves_nothing_of_the_last_stage(run, data, tmp_path):
     again = shutil.copytree(run, tmp_path / "run")
-    assert train(scene, again, "--steps", "12", "--overwrite") == DONE
+    assert train(data, again, "--steps", "12", "--overwrite") == DONE
     assert not (again / "trained").exists() and not any((again / name).exists() for name in DELIVERED[3:])
     # And so does a run that goes on without.
     again = shutil.copytree(run, tmp_path / "on")
-    assert main(["train", str(scene), "--out", str(again), "--resume", "--no-refine"]) == DONE
+    assert main(["train", str(data), "--out", str(again), "--resume", "--no-refine"]) == DONE
     assert not (again / "trained").exists() and not (again / "refinement.json").exists()
     assert bytes_of(again, "mesh.glb") == bytes_of(run / "trained", "mesh.glb")
 
 
-def test_photos_that_cannot_be_fitted_leave_the_trained_asset(scene, tmp_path, capsys, monkeypatch):
+def test_photos_that_cannot_be_fitted_leave_the_trained_asset(data, tmp_path, capsys, monkeypatch):
     def refuses(*args, **kwargs):
         raise InputError("no pixel of the photos shows the asset")
 
     monkeypatch.setattr(delivery, "refine_folder", refuses)
     run = tmp_path / "run"
-    assert train(scene, run, "--steps", "12", *REFINED) == DONE
+    assert train(data, run, "--steps", "12", *REFINED) == DONE
     assert "without a last stage, as no pixel" in capsys.readouterr().err
     assert (run / "mesh.glb").is_file() and json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
 
@@ -130,10 +128,10 @@ def test_an_export_does_not_replace_what_the_last_stage_fitted(run, tmp_path, ca
     assert read_asset(run / "trained" / "mesh.glb").materials[0].albedo_texture.shape == (32, 32, 3)
 
 
-def test_refine_starts_from_what_was_trained(run, scene, tmp_path):
+def test_refine_starts_from_what_was_trained(run, data, tmp_path):
     """The same command again on a refined run does what the last stage did."""
     run = shutil.copytree(run, tmp_path / "run")
-    assert main(["refine", str(run), "--data", str(scene), "--sweeps", "2"]) == DONE
+    assert main(["refine", str(run), "--data", str(data), "--sweeps", "2"]) == DONE
     assert bytes_of(run / "refined", "mesh.glb", "environment.exr") == bytes_of(run, "mesh.glb", "environment.exr")
 
 
@@ -153,15 +151,15 @@ def stop_after(monkeypatch, sweeps: int) -> None:
     monkeypatch.setattr(Stage, "advance", counted)
 
 
-def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_another(run, scene, tmp_path, capsys, monkeypatch):
+def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_another(run, data, tmp_path, capsys, monkeypatch):
     halves = tmp_path / "halves"
     with monkeypatch.context() as patch:
         stop_after(patch, 1)
-        assert train(scene, halves, "--steps", "25", "--deterministic", *REFINED) == INTERRUPTED
+        assert train(data, halves, "--steps", "25", "--deterministic", *REFINED) == INTERRUPTED
     assert "in the last stage" in capsys.readouterr().out
     assert (halves / "refinement.pt").is_file() and not (halves / "mesh.glb").exists()
     trained = (halves / "trained" / "mesh.glb").stat().st_mtime_ns
-    assert main(["train", str(scene), "--out", str(halves), "--resume"]) == DONE
+    assert main(["train", str(data), "--out", str(halves), "--resume"]) == DONE
     assert (halves / "trained" / "mesh.glb").stat().st_mtime_ns == trained and not (halves / "refinement.pt").exists()
     assert bytes_of(halves, *DELIVERED[:4]) == bytes_of(run, *DELIVERED[:4])
 
@@ -169,7 +167,7 @@ def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_anot
 @pytest.mark.parametrize("minutes", [0.0, 2.0])
 @pytest.mark.parametrize("place", ["refinement.job.write_environment", "delivery.score_run", "delivery.forget_state"])
 def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_another(
-    run, scene, tmp_path, monkeypatch, place, minutes
+    run, data, tmp_path, monkeypatch, place, minutes
 ):
     """With a state of the last stage and without."""
     killed, minutes = tmp_path / "run", ("--set", f"checkpoint_minutes={minutes}")
@@ -179,20 +177,20 @@ def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_
 
     with monkeypatch.context() as patch:
         patch.setattr(f"splitnerf.{place}", fails)
-        assert train(scene, killed, "--steps", "25", "--deterministic", *REFINED, *minutes) == FAILED
+        assert train(data, killed, "--steps", "25", "--deterministic", *REFINED, *minutes) == FAILED
     assert (killed / "mesh.glb").exists()
-    assert main(["train", str(scene), "--out", str(killed), "--resume"]) == DONE
+    assert main(["train", str(data), "--out", str(killed), "--resume"]) == DONE
     names = (*DELIVERED[:4], *(f"trained/{name}" for name in ("mesh.glb", "environment.exr")))
     assert bytes_of(killed, *names) == bytes_of(run, *names) and not (killed / "refinement.pt").exists()
 
 
-def test_more_steps_make_the_state_void(scene, tmp_path, monkeypatch):
+def test_more_steps_make_the_state_void(data, tmp_path, monkeypatch):
     run = tmp_path / "run"
     with monkeypatch.context() as patch:
         stop_after(patch, 1)
-        assert train(scene, run, "--steps", "12", *REFINED) == INTERRUPTED
+        assert train(data, run, "--steps", "12", *REFINED) == INTERRUPTED
     before = bytes_of(run / "trained", "mesh.glb")
-    assert main(["train", str(scene), "--out", str(run), "--resume", "--steps", "20"]) == DONE
+    assert main(["train", str(data), "--out", str(run), "--resume", "--steps", "20"]) == DONE
     assert bytes_of(run / "trained", "mesh.glb") != before
     assert len(json.loads((run / "refinement.json").read_text())["sweeps"]) == 2
 
@@ -206,6 +204,11 @@ def folder(painted, tmp_path) -> Path:
 
 
 QUICK = RefinementSettings(sweeps=4, sweep_share=0.1, pixels=256)
+
+
+def n_pixels(painted) -> int:
+    """The pixels that show the ball."""
+    return len(covered_pixels(painted[1]))
 
 
 def test_a_stage_goes_on_from_each_of_its_states(painted, folder, monkeypatch):
@@ -302,9 +305,9 @@ def test_another_state_is_refused(painted, folder, monkeypatch):
     refused("another asset")
 
 
-def test_refine_can_be_interrupted_and_goes_on(run, scene, tmp_path, monkeypatch, capsys):
+def test_refine_can_be_interrupted_and_goes_on(run, data, tmp_path, monkeypatch, capsys):
     run = shutil.copytree(run, tmp_path / "run")
-    command = ["refine", str(run), "--data", str(scene), "--sweeps", "2"]
+    command = ["refine", str(run), "--data", str(data), "--sweeps", "2"]
     with monkeypatch.context() as patch:
         stop_after(patch, 1)
         assert main(command) == INTERRUPTED
@@ -315,13 +318,71 @@ def test_refine_can_be_interrupted_and_goes_on(run, scene, tmp_path, monkeypatch
 
 def test_time_ends_a_stage_by_its_minutes(painted):
     stage = Stage(painted[1], painted[0], sky(), dataclasses.replace(QUICK, minutes=1e-6, outline=False))
-    assert stage.progress == 0.0  # a first sweep is always made
+    assert not stage.finished and stage.progress < 1.0  # a first sweep is always made
     stage.advance()
-    assert stage.progress == 1.0
+    assert stage.finished and stage.progress == 1.0
     stage.settings = dataclasses.replace(QUICK, minutes=1e6)
-    assert stage.progress == 0.25
+    assert not stage.finished and stage.progress == 0.25
     stage.settings, stage.started = dataclasses.replace(QUICK, minutes=2.0), stage.started - 60.0
     assert 0.5 < stage.progress < 0.6
+
+
+class Clock:
+    """A clock that goes on by a second with each batch, and by what is asked with each round of the outline."""
+
+    def __init__(self, monkeypatch, of_batch: float, of_round: float = 0.0):
+        self.now, self.rounds = 0.0, []
+        monkeypatch.setattr(fit.time, "monotonic", lambda: self.now)
+        gather = Refinement.gather
+
+        def slow_batch(refinement, surface):
+            self.now += of_batch
+            return gather(refinement, surface)
+
+        def slow_outline(dataset, asset, seed, begins):
+            while begins(len(self.rounds)):
+                self.rounds.append(self.now)
+                self.now += of_round
+            return asset, []
+
+        monkeypatch.setattr(Refinement, "gather", slow_batch)
+        monkeypatch.setattr(fit, "fit_outline", slow_outline)
+
+
+def test_a_slow_machine_keeps_to_the_minutes_by_smaller_sweeps(painted, monkeypatch):
+    """Sweeps of 50 batches of a second each, in two minutes: four sweeps of 30 batches."""
+    share = 50 * 64 / n_pixels(painted)
+    settings = dataclasses.replace(QUICK, minutes=2.0, sweeps=1000, pixels=64, sweep_share=share, outline=False)
+    clock = Clock(monkeypatch, of_batch=1.0)
+    stage = Stage(painted[1], painted[0], sky(), settings)
+    sizes = []
+    while not stage.finished:
+        before = clock.now
+        stage.advance()
+        sizes.append(clock.now - before)
+    assert sizes == [30.0] * 4 and clock.now == 120.0
+    # the time of a sweep's own step counts, and a last sweep takes what is left, if that is half of one
+    for taken, more in ((70.0, [30.0, 20.0]), (80.0, [30.0]), (110.0, [])):
+        stage = Stage(painted[1], painted[0], sky(), settings)
+        stage.advance()
+        stage.started, sizes = clock.now - taken, []
+        while not stage.finished:
+            before = clock.now
+            stage.advance()
+            sizes.append(clock.now - before)
+        assert sizes == more, taken
+
+
+def test_a_slow_outline_leaves_time_for_the_sweeps(painted, monkeypatch):
+    """A further round begins only if it ends in the first half of the minutes; the first one always does."""
+    for of_round, rounds in ((10.0, 3), (25.0, 2), (31.0, 1), (500.0, 1)):
+        with monkeypatch.context() as patch:
+            clock = Clock(patch, of_batch=1.0, of_round=of_round)
+            patch.setattr(Refinement, "make_lamp_compact", lambda *_: pytest.fail("a lamp") if of_round > 60 else None)
+            begins = Stage._begins
+            patch.setattr(Stage, "_begins", lambda stage, turn: turn < 3 and begins(stage, turn))
+            stage = Stage(painted[1], painted[0], sky(), dataclasses.replace(QUICK, minutes=2.0))
+            assert len(clock.rounds) == rounds and not stage.finished
 
 
 # ---- what it says ----
@@ -329,7 +390,9 @@ def test_time_ends_a_stage_by_its_minutes(painted):
 
 def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     refine_folder(folder, painted[1], folder, QUICK)
-    assert re.search(r"100% .* last stage, step 4, photos [1-4]\d\.\d\d dB", capsys.readouterr().err)
+    printed = capsys.readouterr().err
+    assert printed.startswith("  0% 00:00<? last stage, outline, round 1 of 3\n")
+    assert re.search(r"100% .* last stage, step 4, photos [1-4]\d\.\d\d dB", printed)
     summary = delivery.last_stage_summary(folder)
     before, after = summary["photos_psnr"]
     assert after > before and summary["steps"] == 4

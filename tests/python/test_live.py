@@ -15,8 +15,8 @@ import pytest
 import torch
 from looking_at import serving
 from test_train import flat, same
-from test_view import ask, error_of, halves, triangle
 from tiny_runs import as_options, tiny
+from viewer_server import ask, error_of, halves, triangle
 
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset

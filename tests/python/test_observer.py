@@ -26,12 +26,6 @@ from splitnerf.workflow import load_run, reconstruct
 CPU = torch.device("cpu")
 
 
-@pytest.fixture(autouse=True)
-def no_true_mesh(monkeypatch):
-    """Distances to it took most of the time."""
-    monkeypatch.setattr("splitnerf.outputs.load_scene_truth", lambda *_: SimpleNamespace(light=None, mesh=None))
-
-
 class Asking(Observer):
     """Wishes one thing after the other, from a step on; and writes down what it hears."""
 
@@ -97,6 +91,29 @@ def test_a_run_that_is_stopped_delivers_and_can_go_on(data, tmp_path):
     asking = Asking(60, Wish.STOP)
     again, _ = reconstruct(data, tmp_path / "run", config, resume=True, observers=[asking])
     assert asking.heard[0] == ("began", scene.step) and 60 <= again.step < 70
+
+
+@pytest.mark.parametrize("ends", [Wish.STOP, signal.SIGINT, signal.SIGTERM])
+def test_the_last_step_of_a_stopped_run_is_logged(data, tmp_path, ends):
+    """Also between two of the steps that are logged by their number; and once, where the run goes on from there."""
+
+    class Ending(Observer):
+        def between_steps(self, training):
+            if training.step < 24:
+                return None
+            if ends is Wish.STOP:
+                return ends
+            os.kill(os.getpid(), ends)
+            return None
+
+    config = tiny(steps=40)
+    scene = trained(data, tmp_path, config, Ending())
+    assert scene.step == 24 and [line["step"] for line in lines_of(tmp_path)] == [*range(1, 21), 24]
+    training = Training(load_dataset(data), config, tmp_path, CPU)
+    training.restore()
+    training.stopped = False
+    training.complete()
+    assert [line["step"] for line in lines_of(tmp_path)] == [*range(1, 21), 24, 40]
 
 
 def test_a_checkpoint_shows_the_levels_that_were_open(data, tmp_path):

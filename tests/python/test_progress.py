@@ -52,6 +52,13 @@ def test_a_terminal_shows_a_bar(monkeypatch):
     assert " 75%|" in shown.split("\r")[-1] and "step 8" in shown and shown.endswith("\n")
 
 
+def test_a_part_that_may_take_long_is_said_at_once(clock, capsys):
+    with Progress(0.0, at_once=True) as bar:
+        bar.show(0.0, "first")
+        bar.show(0.5, "second")
+    assert capsys.readouterr().err == "  0% 00:00<? first\n"
+
+
 def test_no_time_is_foretold_before_the_first_step(clock, capsys):
     with Progress(0.2) as bar:
         clock[0] += 10

@@ -15,6 +15,7 @@ from stability import cases, fields, light, losses, properties, rays, search, sh
 from stability.__main__ import BAD_INPUT, BROKEN, DONE, main
 from stability.entry import Entry
 from stability.measure import cast, evaluate, measure
+from torch.utils._python_dispatch import TorchDispatchMode
 
 from splitnerf import ops
 
@@ -38,7 +39,7 @@ def test_errors_stay_within_the_promise(name):
     )
 
 
-@pytest.mark.parametrize("claim", properties.PROPERTIES, ids=lambda claim: claim.name)
+@pytest.mark.parametrize("claim", table.PROPERTIES, ids=lambda claim: claim.name)
 def test_properties_hold(claim):
     found = properties.verify(claim, CASES // 5)
     assert found.holds, f"{table.verdict_line(found)}\n{table.input_text(found.worst)}"
@@ -49,11 +50,40 @@ def test_every_operator_is_asked():
     made_once = {
         "brdf_lut", "fibonacci_directions", "growth_for", "light_averages", "light_filters", "light_sum_of_levels",
         "sh_projection", "zonal_factors", "cached_visibility", "sample_rays", "summed_correction", "take_rows",
-        "clear_unless", "step_numbers", "totalled_gradient_losses", "totalled_material_losses",
+        "totalled_gradient_losses", "totalled_material_losses",
     }  # fmt: skip
     functions = {name for name in ops.__all__ if name.islower()}
     asked = {item.name.split(",")[0] for item in table.chosen([])}
     assert functions - made_once == asked
+
+
+class Called(TorchDispatchMode):
+    """Writes down which operators of the library run within the block."""
+
+    def __enter__(self):
+        self.names = set()
+        return super().__enter__()
+
+    def __torch_dispatch__(self, function, types, args=(), kwargs=None):
+        if function.namespace == "splitnerf":
+            self.names.add(function._schema.name.partition("::")[2])
+        return function(*args, **kwargs or {})
+
+
+def test_every_registered_operator_is_asked():
+    """What the entries and the properties call, forward and backward, against all that the library registers."""
+    copies = {"put_rows", "take_rows"}
+    of_several = {"adamw_steps_", "sample_rays"}  # the formulas of adamw_step_ and of the operators that sample_rays joins
+    adjoints = {  # linear but for the network's, whose ReLU has another slope where float32 and float64 differ in a sign
+        "add_corrections_backward", "interpolate_backward", "light_queries_backward", "material_network_backward",
+    }  # fmt: skip
+    with Called() as called:
+        for entry in table.ENTRIES:
+            evaluate(entry, cast(entry.draw(cases.Draw(0), 4), torch.float32), torch.float32)
+        for claim in table.PROPERTIES:
+            properties.verify(claim, 4 * claim.size)
+    registered = {name.partition("::")[2] for name in torch._C._dispatch_get_all_op_names() if name.startswith("splitnerf::")}
+    assert registered - called.names == copies | of_several | adjoints
 
 
 # ---- the harness -------------------------------------------------------------------------------
@@ -274,6 +304,9 @@ def test_a_grazing_light_of_denormal_cosine_has_finite_gradients():
 
 # ---- by hypothesis -----------------------------------------------------------------------------
 
+# A call may take long on a busy machine.
+UNTIMED = hypothesis.settings(deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow])
+
 FLOATS = strategies.floats(width=32, allow_nan=False, allow_infinity=False)
 SHARES = strategies.floats(0, 1, width=32)
 COMPONENTS = strategies.tuples(*[strategies.floats(-1, 1, width=32)] * 3).filter(lambda v: math.hypot(*v) > 1e-3)
@@ -286,26 +319,31 @@ def holds(name: str, given: dict) -> None:
     assert errors.forward.item() <= entry.bound and errors.gradient.item() <= entry.gradient_bound
 
 
+@UNTIMED
 @hypothesis.given(FLOATS.filter(lambda x: x < 1e38))
 def test_srgb_by_hypothesis(x):
     holds("linear_to_srgb", {"linear": x})
 
 
+@UNTIMED
 @hypothesis.given(strategies.tuples(FLOATS, FLOATS, FLOATS))
 def test_hash_encode_by_hypothesis(position):
     holds("hash_encode", {"positions": position})
 
 
+@UNTIMED
 @hypothesis.given(COMPONENTS, COMPONENTS, SHARES)
 def test_query_direction_by_hypothesis(normal, view, roughness):
     holds("query_direction", {"normals": normal, "view_dirs": view, "roughness": (roughness,)})
 
 
+@UNTIMED
 @hypothesis.given(strategies.lists(strategies.floats(-1e6, 1e6, width=32), min_size=9, max_size=9))
 def test_neus_weights_by_hypothesis(values):
     holds("neus_weights", {"f_prev": values[:-1], "f_next": values[1:]})
 
 
+@UNTIMED
 @hypothesis.given(COMPONENTS, COMPONENTS, SHARES, SHARES, strategies.tuples(SHARES, SHARES, SHARES))
 def test_split_sum_by_hypothesis(normal, view, roughness, metallic, albedo):
     ones = (1.0, 1.0, 1.0)

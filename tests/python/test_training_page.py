@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 import torch
 from looking_at import keys, look_at, needs_chromium, picture, serving, text, wait
-from test_view import triangle
 from test_view_page import pixels
 from tiny_runs import tiny
+from viewer_server import triangle
 
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import load_dataset

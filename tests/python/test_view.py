@@ -12,14 +12,12 @@ import socket
 import subprocess
 import sys
 import threading
-from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
 import numpy as np
 import pytest
-from gltf_builder import Gltf
-from painted_ball import looking
+from viewer_server import ask, camera_of, error_of, halves, numbered_sky, serving, triangle
 
 import splitnerf.view
 from splitnerf.cli import BAD_INPUT, DONE, main
@@ -40,91 +38,25 @@ PAGE = Path(splitnerf.view.__file__).parent
 SOURCES = PAGE.parent / "pages"
 
 
-def sky(height=8):
-    """Every texel has its own radiance."""
-    return np.arange(1, height * 2 * height * 3 + 1, dtype=np.float32).reshape(height, 2 * height, 3) / 64
-
-
-def triangle():
-    """A document of one grey triangle."""
-    document = Gltf()
-    grey = document.material(pbrMetallicRoughness={"baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0})
-    document.node(mesh=document.mesh(document.primitive(material=grey)))
-    return document
-
-
-@pytest.fixture
-def run(tmp_path):
-    """A run's folder: an asset, its light, and what the photos leave open."""
-    folder = tmp_path / "mine"
-    folder.mkdir()
-    triangle().write(folder / "mesh.glb")
-    write_image(folder / "environment.exr", sky())
-    write_image(folder / "uncertainty.exr", np.linspace(0, 0.5, 4 * 4 * 4, dtype=np.float32).reshape(4, 4, 4))
-    return folder
-
-
-@contextmanager
-def serving(*paths, light=None, photos=None, host="127.0.0.1"):
-    with ViewServer(Shown(list(paths), light), photos, host) as server:
-        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
-        thread.start()
-        try:
-            yield server
-        finally:
-            server.shutdown()
-            thread.join()
-
-
-@pytest.fixture
-def served(run):
-    with serving(run) as server:
-        yield server
-
-
-def ask(server, path, *, method="GET", body=None, token=True, **headers):
-    """(status, headers, body) of one request; header names have _ for -."""
-    connection = http.client.HTTPConnection("127.0.0.1", server.server_address[1], timeout=20)
-    connection.putrequest(method, (urlsplit(server.url).path if token else "/") + path, skip_host="Host" in headers)
-    if body is not None and "Content_Length" not in headers:
-        headers["Content_Length"] = str(len(body))
-    for name, value in headers.items():
-        connection.putheader(name.replace("_", "-"), value)
-    connection.endheaders(body)
-    answer = connection.getresponse()
-    content = answer.read()
-    connection.close()
-    return answer.status, answer.headers, content
-
-
-def error_of(answer):
-    return answer[0], json.loads(answer[2])["error"]
-
-
-def halves(answer):
-    width, height = map(int, answer[1]["Picture-Size"].split("x"))
-    return np.frombuffer(answer[2], "<f2").reshape(height, width, 4)
-
-
 # ---- what is served ----
 
 
-def test_what_is_served_is_what_is_on_the_disk(run, served):
+def test_what_is_served_is_what_is_on_the_disk(shown_run, served):
     assert ask(served, "")[2] == (PAGE / "viewer.html").read_bytes()
-    assert ask(served, "assets/0")[2] == (run / "mesh.glb").read_bytes()
+    assert ask(served, "assets/0")[2] == (shown_run / "mesh.glb").read_bytes()
     scene = json.loads(ask(served, "scene.json")[2])
     assert scene["sources"] == [{"name": "mine", "light": 0, "uncertainty": True, "version": 1}] and scene["problems"] == []
     assert [light["name"] for light in scene["lights"]] == ["light of mine", "white"]
     light = halves(ask(served, "lights/0"))
-    assert np.array_equal(light[..., :3], sky().astype(np.float16)) and (light[..., 3] == 1).all()
-    assert np.array_equal(halves(ask(served, "deviations/0")), read_image(run / "uncertainty.exr").astype(np.float16))
+    assert np.array_equal(light[..., :3], numbered_sky().astype(np.float16)) and (light[..., 3] == 1).all()
+    assert np.array_equal(halves(ask(served, "deviations/0")), read_image(shown_run / "uncertainty.exr").astype(np.float16))
     assert (halves(ask(served, "lights/1")) == 1).all()
 
 
-def test_two_assets_and_a_given_light(run, tmp_path):
+def test_two_assets_and_a_given_light(shown_run, tmp_path):
     other = triangle().write(tmp_path / "other.glb")
     write_image(tmp_path / "studio.hdr", np.full((4, 8, 3), 2, np.float32))
-    with serving(run, other, light=tmp_path / "studio.hdr") as server:
+    with serving(shown_run, other, light=tmp_path / "studio.hdr") as server:
         scene = json.loads(ask(server, "scene.json")[2])
         assert [source["name"] for source in scene["sources"]] == ["mine", "other.glb"]
         assert scene["first_light"] == 0 and scene["lights"][0]["name"] == "studio.hdr"
@@ -133,12 +65,12 @@ def test_two_assets_and_a_given_light(run, tmp_path):
         assert ask(server, "deviations/1")[0] == ask(server, "assets/2")[0] == 404
 
 
-def test_what_is_damaged_beside_the_asset_becomes_a_line(run, capsys):
-    (run / "environment.exr").write_bytes((run / "environment.exr").read_bytes()[:200])
-    write_image(run / "uncertainty.exr", np.ones((4, 4, 3), np.float32))
-    with serving(run) as server:
+def test_what_is_damaged_beside_the_asset_becomes_a_line(shown_run, capsys):
+    (shown_run / "environment.exr").write_bytes((shown_run / "environment.exr").read_bytes()[:200])
+    write_image(shown_run / "uncertainty.exr", np.ones((4, 4, 3), np.float32))
+    with serving(shown_run) as server:
         scene = json.loads(ask(server, "scene.json")[2])
-    assert [line.split(": ")[0] for line in scene["problems"]] == [str(run / n) for n in ("environment.exr", "uncertainty.exr")]
+    assert [line.split(": ")[0] for line in scene["problems"]] == [str(shown_run / n) for n in ("environment.exr", "uncertainty.exr")]
     assert scene["sources"] == [{"name": "mine", "light": None, "uncertainty": False, "version": 1}]
     assert capsys.readouterr().err.count("note: ") == 2
 
@@ -171,8 +103,8 @@ def test_other_hosts_and_origins_are_refused(served):
         assert ask(served, "lights?name=a.exr", method="POST", body=b"x", Origin=origin)[0] == 403, origin
 
 
-def test_a_server_for_all_machines_answers_to_addresses_alone(run):
-    with serving(run, host="0.0.0.0") as server:
+def test_a_server_for_all_machines_answers_to_addresses_alone(shown_run):
+    with serving(shown_run, host="0.0.0.0") as server:
         port = server.server_address[1]
         assert ask(server, "scene.json", Host=f"192.168.1.20:{port}")[0] == 200
         assert ask(server, "scene.json", Host=f"{socket.gethostname()}:{port}")[0] == 200
@@ -180,8 +112,8 @@ def test_a_server_for_all_machines_answers_to_addresses_alone(run):
         assert ask(server, "scene.json", token=False)[0] == 403
 
 
-def test_no_other_file_is_served(run, served):
-    (run / "secret.txt").write_text("secret")
+def test_no_other_file_is_served(shown_run, served):
+    (shown_run / "secret.txt").write_text("secret")
     paths = ("secret.txt", "../secret.txt", "assets/../../secret.txt", "assets/%2e%2e/secret.txt", "assets//etc/passwd", "assets/-1",
              "assets/0/x", "assets/", "assets/1e0", "assets/٠", "lights/99999999999999", "page/package.json", "scene.json/x")  # fmt: skip
     for path in paths:
@@ -205,15 +137,15 @@ def drop(server, name, content, **headers):
 
 @pytest.mark.parametrize("suffix", [".hdr", ".exr"])
 def test_a_dropped_light_is_read_and_served(served, suffix):
-    status, _, content = drop(served, f"C:\\lights\\studio{suffix}", encode_image(sky(), suffix, "light"))
+    status, _, content = drop(served, f"C:\\lights\\studio{suffix}", encode_image(numbered_sky(), suffix, "light"))
     assert status == 200
     number = json.loads(content)["number"]
-    assert halves(ask(served, f"lights/{number}"))[..., :3] == pytest.approx(sky(), rel=0.02, abs=0.02)
+    assert halves(ask(served, f"lights/{number}"))[..., :3] == pytest.approx(numbered_sky(), rel=0.02, abs=0.02)
     assert {"number": number, "name": f"studio{suffix}"} in json.loads(ask(served, "scene.json")[2])["lights"]
 
 
 def test_damaged_lights_are_refused_in_one_line(served, tmp_path):
-    good = encode_image(sky(), ".exr", "light")
+    good = encode_image(numbered_sky(), ".exr", "light")
     cases = {
         "cut.exr": good[:200], "text.hdr": b"hello", "empty.hdr": b"", "../../x\n.exr": good[:99], "photo.png": good, "none": good,
         "square.exr": encode_image(np.ones((8, 8, 3), np.float32), ".exr", "light"),
@@ -231,7 +163,7 @@ def test_uploads_have_limits(served, monkeypatch):
         413, "the file is larger than 1 MB; make it smaller")  # fmt: skip
     for length in ("", "-1", "1e3", "9" * 40):
         assert drop(served, "a.exr", b"", Content_Length=length)[0] == 411, length
-    good = encode_image(sky(), ".exr", "light")
+    good = encode_image(numbered_sky(), ".exr", "light")
     first = json.loads(drop(served, "0.exr", good)[2])["number"]
     for i in range(MOST_DROPPED):
         drop(served, f"{i + 1}.exr", good)
@@ -239,19 +171,19 @@ def test_uploads_have_limits(served, monkeypatch):
     assert ask(served, f"lights/{first + 1}")[0] == ask(served, "lights/0")[0] == 200
 
 
-def test_a_light_of_many_rows_is_made_smaller(run, tmp_path, monkeypatch):
+def test_a_light_of_many_rows_is_made_smaller(shown_run, tmp_path, monkeypatch):
     monkeypatch.setattr("splitnerf.view.shown.MOST_ROWS", 4)
-    with serving(run) as server:
+    with serving(shown_run) as server:
         light = halves(ask(server, "lights/0"))
-    blocks = sky().reshape(4, 2, 8, 2, 3).mean(axis=(1, 3))
+    blocks = numbered_sky().reshape(4, 2, 8, 2, 3).mean(axis=(1, 3))
     assert light[..., :3] == pytest.approx(blocks, rel=1e-3)
 
 
 # ---- photos ----
 
 
-def test_photos_are_served_with_their_cameras(run, data):
-    with serving(run, photos=Photos(data)) as server:
+def test_photos_are_served_with_their_cameras(shown_run, data):
+    with serving(shown_run, photos=Photos(data)) as server:
         cameras = json.loads(ask(server, "scene.json")[2])["cameras"]
         frames = read_frames(data, "train", Reading(eval_mode="all"))[0]
         assert len(frames) == 8
@@ -264,9 +196,9 @@ def test_photos_are_served_with_their_cameras(run, data):
         assert ask(server, f"photos/{len(frames)}")[0] == 404
 
 
-def test_large_photos_are_averaged_down_and_masks_hide_nothing(run, data, tmp_path, monkeypatch):
+def test_large_photos_are_averaged_down_and_masks_hide_nothing(shown_run, data, tmp_path, monkeypatch):
     monkeypatch.setattr("splitnerf.view.photos.LARGEST", 10)
-    with serving(run, photos=Photos(data)) as server:
+    with serving(shown_run, photos=Photos(data)) as server:
         assert decode_image(ask(server, "photos/0")[2], "photo").shape == (8, 8, 4)
     shutil.copytree(data, tmp_path / "data")
     for path in (tmp_path / "data").rglob("transforms*.json"):
@@ -278,29 +210,22 @@ def test_large_photos_are_averaged_down_and_masks_hide_nothing(run, data, tmp_pa
     photo = read_frames(tmp_path / "data", "train")[0][0].image_path
     write_image(photo, np.full((24, 24, 3), 0.5, np.float32))
     monkeypatch.undo()
-    with serving(run, photos=Photos(tmp_path / "data")) as server:
+    with serving(shown_run, photos=Photos(tmp_path / "data")) as server:
         assert (decode_image(ask(server, "photos/0")[2], "photo")[..., 3] == 1).all()
 
 
-def test_a_photo_that_is_gone_is_said(run, data, tmp_path):
+def test_a_photo_that_is_gone_is_said(shown_run, data, tmp_path):
     shutil.copytree(data, tmp_path / "data")
     photos = Photos(tmp_path / "data")
-    with serving(run, photos=photos) as server:
+    with serving(shown_run, photos=photos) as server:
         shutil.rmtree(tmp_path / "data")
         status, line = error_of(ask(server, "photos/0"))
         assert status == 422 and "r_000.png: cannot be read (No such file" in line
-    with serving(run) as server:
+    with serving(shown_run) as server:
         assert json.loads(ask(server, "scene.json")[2])["cameras"] == [] and ask(server, "photos/0")[0] == 404
 
 
 # ---- path tracing ----
-
-
-def camera_of(width, height, **changes):
-    """A camera 3 above the triangle's plane that sees all of it, for JSON."""
-    pose = looking(-np.pi / 2, 0.0) + np.array([[0, 0, 0, 0.4], [0, 0, 0, 0], [0, 0, 0, 0.4], [0, 0, 0, 0]])
-    lens = [1.5 * width, 1.5 * width, width / 2, height / 2]
-    return {"pose": pose.ravel().tolist(), "intrinsics": lens, "width": width, "height": height, "turn": 0, "lights": [0]} | changes
 
 
 def streamed(server, **camera):
@@ -316,20 +241,20 @@ def streamed(server, **camera):
     return pictures
 
 
-def test_pictures_are_those_of_the_path_tracer(run, monkeypatch):
+def test_pictures_are_those_of_the_path_tracer(shown_run, monkeypatch):
     """Strips of a picture and passes add up to what one call of the tracer says, also with the light turned."""
     monkeypatch.setattr(final, "PASSES", (1, 1, 62))
     monkeypatch.setattr(final, "FIRST_SIDE", 20)
     monkeypatch.setattr(final, "PATHS_A_CALL", 500)
-    asset = Shown([run]).sources[0].asset
-    with serving(run) as server:
+    asset = Shown([shown_run]).sources[0].asset
+    with serving(shown_run) as server:
         for turn in (0, 90):
             camera = camera_of(60, 40, turn=turn)
             pictures = streamed(server, **camera)
             assert [(asset, spp, picture.shape) for asset, spp, picture in pictures] == [
                 (0, 1, (13, 20, 4)), (0, 1, (40, 60, 4)), (0, 2, (40, 60, 4)), (0, 64, (40, 60, 4))]  # fmt: skip
             expected = AssetRenderer(asset).render(
-                rotate_environment(sky(), turn), np.reshape(camera["pose"], (4, 4)), camera["intrinsics"], 60, 40, spp=256
+                rotate_environment(numbered_sky(), turn), np.reshape(camera["pose"], (4, 4)), camera["intrinsics"], 60, 40, spp=256
             )  # fmt: skip
             small, first, _, best = (picture.astype(np.float32) for _, _, picture in pictures)
             assert 0.1 < expected["alpha"].mean() < 0.9
@@ -343,16 +268,16 @@ def test_pictures_are_those_of_the_path_tracer(run, monkeypatch):
             assert np.abs(small[..., 3] - thirds).mean() < 0.1  # the same view in fewer pixels
 
 
-def test_two_assets_are_traced_in_turns(run, tmp_path, monkeypatch):
+def test_two_assets_are_traced_in_turns(shown_run, tmp_path, monkeypatch):
     monkeypatch.setattr(final, "PASSES", (1, 1))
-    with serving(run, triangle().write(tmp_path / "other.glb")) as server:
+    with serving(shown_run, triangle().write(tmp_path / "other.glb")) as server:
         pictures = streamed(server, **camera_of(16, 16, lights=[0, 1]))
     assert [(asset, spp) for asset, spp, _ in pictures] == [(0, 1), (1, 1), (0, 1), (1, 1), (0, 2), (1, 2)]
 
 
-def test_a_newer_request_ends_the_one_before(run, monkeypatch):
+def test_a_newer_request_ends_the_one_before(shown_run, monkeypatch):
     monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
-    tracer = Tracer(Shown([run]))
+    tracer = Tracer(Shown([shown_run]))
     camera = Camera.of(camera_of(16, 16), 1)
     first = tracer.pictures(camera, lambda: False)
     assert next(first).spp == 1
@@ -366,7 +291,7 @@ def test_a_newer_request_ends_the_one_before(run, monkeypatch):
     assert list(third) == []
 
 
-def test_cameras_beyond_reason_are_refused(run, served):
+def test_cameras_beyond_reason_are_refused(shown_run, served):
     good = camera_of(16, 16)
     for changes in (
         {"width": 0}, {"width": 1 << 20}, {"width": 4000, "height": 4000}, {"intrinsics": [1, 1, 8]}, {"intrinsics": [0, 1, 8, 8]},
@@ -389,22 +314,22 @@ def refused(capsys, *words):
     return line
 
 
-def test_what_cannot_be_shown_is_refused_before_anything_is_served(run, tmp_path, capsys, monkeypatch):
+def test_what_cannot_be_shown_is_refused_before_anything_is_served(shown_run, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("splitnerf.view.server.ViewServer.__init__", lambda *_: pytest.fail("served"))
-    content = (run / "mesh.glb").read_bytes()
+    content = (shown_run / "mesh.glb").read_bytes()
     (tmp_path / "cut.glb").write_bytes(content[: len(content) // 2])
     (tmp_path / "text.glb").write_text("hello")
     (tmp_path / "parts.gltf").write_bytes(json.dumps(gltf_in_parts(tmp_path)).encode())
     (tmp_path / "bad.hdr").write_text("hello")
     (tmp_path / "empty").mkdir()
     assert "cut.glb: truncated GLB" in refused(capsys, tmp_path / "cut.glb")
-    assert "text.glb: is neither" in refused(capsys, run, tmp_path / "text.glb")
+    assert "text.glb: is neither" in refused(capsys, shown_run, tmp_path / "text.glb")
     assert "parts.gltf: is a .gltf" in refused(capsys, tmp_path / "parts.gltf")
     assert "empty: has no mesh.glb" in refused(capsys, tmp_path / "empty")
     assert "absent.glb: no such file" in refused(capsys, tmp_path / "absent.glb")
-    assert "bad.hdr: " in refused(capsys, run, "--light", tmp_path / "bad.hdr")
-    assert "absent: no such folder" in refused(capsys, run, "--data", tmp_path / "absent")
-    assert "--port must lie between 0 and 65535" in refused(capsys, run, "--port", 70000)
+    assert "bad.hdr: " in refused(capsys, shown_run, "--light", tmp_path / "bad.hdr")
+    assert "absent: no such folder" in refused(capsys, shown_run, "--data", tmp_path / "absent")
+    assert "--port must lie between 0 and 65535" in refused(capsys, shown_run, "--port", 70000)
 
 
 def gltf_in_parts(folder):
@@ -415,32 +340,32 @@ def gltf_in_parts(folder):
     }
 
 
-def test_a_port_in_use_and_a_foreign_address_are_refused(run, capsys):
+def test_a_port_in_use_and_a_foreign_address_are_refused(shown_run, capsys):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        line = refused(capsys, run, "--port", port)
+        line = refused(capsys, shown_run, "--port", port)
         assert line == f"splitnerf: 127.0.0.1, port {port}: cannot be listened at (Address already in use); give another --host or --port"
-    assert "give another --host" in refused(capsys, run, "--host", "192.0.2.1")
-    assert "give another --host" in refused(capsys, run, "--host", "no.such.host.invalid")
+    assert "give another --host" in refused(capsys, shown_run, "--host", "192.0.2.1")
+    assert "give another --host" in refused(capsys, shown_run, "--host", "no.such.host.invalid")
 
 
-def test_another_host_is_said(run, capsys, monkeypatch):
+def test_another_host_is_said(shown_run, capsys, monkeypatch):
     def interrupted(_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(ViewServer, "serve_forever", interrupted)
-    assert main(["view", "--no-browser", str(run)]) == DONE
+    assert main(["view", "--no-browser", str(shown_run)]) == DONE
     said = capsys.readouterr()
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{20,}/\n", said.out) and "note" not in said.err
-    assert main(["view", "--no-browser", str(run), "--host", "0.0.0.0"]) == DONE
+    assert main(["view", "--no-browser", str(shown_run), "--host", "0.0.0.0"]) == DONE
     said = capsys.readouterr()
     assert "listens at 0.0.0.0" in said.err and re.fullmatch(r"http://\S+:\d+/[\w-]{20,}/\n", said.out)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_in_peace(run, number):
+def test_a_signal_ends_it_in_peace(shown_run, number):
     """Also while the path tracer works."""
-    words = [sys.executable, "-m", "splitnerf", "view", str(run), "--no-browser"]
+    words = [sys.executable, "-m", "splitnerf", "view", str(shown_run), "--no-browser"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         url = urlsplit(process.stdout.readline().strip())
         assert url.hostname == "127.0.0.1"

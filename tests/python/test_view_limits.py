@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager
 from urllib.parse import urlsplit
 
 import pytest
-from test_view import ask, camera_of, run, served, serving  # noqa: F401
+from viewer_server import ask, camera_of, serving
 
 from splitnerf.view import final
 from splitnerf.view import server as server_module
@@ -57,45 +57,45 @@ def test_silent_connections_leave_files_for_the_run(served, monkeypatch):
     assert ask(served, "scene.json")[0] == 200
 
 
-def test_a_connection_without_a_token_is_closed_soon(run, monkeypatch):
+def test_a_connection_without_a_token_is_closed_soon(shown_run, monkeypatch):
     assert server_module.Handler.timeout < server_module.PATIENCE
     monkeypatch.setattr(server_module.Handler, "timeout", 0.05)
-    with serving(run) as server, silent(server) as page:
+    with serving(shown_run) as server, silent(server) as page:
         page.sendall(b"GET /")
         assert page.recv(1) == b""
         wait_until(lambda: server._open == 0)
 
 
-def test_one_with_a_token_may_be_silent_for_longer(run, monkeypatch):
+def test_one_with_a_token_may_be_silent_for_longer(shown_run, monkeypatch):
     patience = []
     monkeypatch.setattr(server_module.Handler, "_page", lambda handler, _: patience.append(handler.connection.gettimeout()))
-    with serving(run) as server, silent(server) as page:
+    with serving(shown_run) as server, silent(server) as page:
         page.sendall(f"GET {urlsplit(server.url).path} HTTP/1.1\r\nHost: {urlsplit(server.url).netloc}\r\n\r\n".encode())
         assert page.recv(1) == b""
     assert patience == [server_module.PATIENCE]
 
 
-def test_a_page_that_goes_ends_its_request(run, monkeypatch):
+def test_a_page_that_goes_ends_its_request(shown_run, monkeypatch):
     monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
-    with serving(run) as server:
+    with serving(shown_run) as server:
         with asking_for_pictures(server, **camera_of(16, 16)):
             assert server._open == 1
         wait_until(lambda: server._open == 0)  # else it would not end
 
 
 @pytest.mark.skipif(not hasattr(select, "poll"), reason="this system has no poll()")
-def test_a_page_is_seen_to_go_whatever_its_files_number(run, monkeypatch):
+def test_a_page_is_seen_to_go_whatever_its_files_number(shown_run, monkeypatch):
     monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
     monkeypatch.setattr(select, "select", lambda *_: pytest.fail("select() was called"))
-    with serving(run) as server:
+    with serving(shown_run) as server:
         with asking_for_pictures(server, **camera_of(16, 16)):
             pass
         wait_until(lambda: server._open == 0)
 
 
-def test_who_reads_no_pictures_holds_nothing_up(run, monkeypatch):
+def test_who_reads_no_pictures_holds_nothing_up(shown_run, monkeypatch):
     monkeypatch.setattr(final, "PASSES", (1, 1))
-    tracer = Tracer(Shown([run]))
+    tracer = Tracer(Shown([shown_run]))
     pictures = tracer.pictures(Camera.of(camera_of(16, 16), 1), lambda: False)
     next(pictures)
     assert not tracer._working.locked()

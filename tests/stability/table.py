@@ -8,7 +8,7 @@ from pathlib import Path
 from splitnerf.bench.charts import table as table_lines
 from splitnerf.bench.charts import write_csv
 from splitnerf.bench.provenance import header, provenance
-from stability import fields, light, losses, optimiser, properties, rays, shading
+from stability import fields, light, losses, optimiser, properties, rays, shading, step
 from stability.entry import Entry, Rows
 from stability.properties import Property, Verdict, verify
 from stability.search import Result, run
@@ -17,7 +17,7 @@ from splitnerf.errors import InputError
 ENTRIES: tuple[Entry, ...] = (
     shading.ENTRIES + light.ENTRIES + rays.ENTRIES + fields.ENTRIES + losses.ENTRIES + optimiser.ENTRIES
 )
-PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
+PROPERTIES: tuple[Property, ...] = properties.PROPERTIES + step.PROPERTIES
 NAME = "stability"
 SOURCES = ("cpp", "python/splitnerf/ops")
 COLUMNS = (

@@ -10,6 +10,7 @@ ends with a step of each.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -30,7 +31,7 @@ from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.like_texels import usual_gloss
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
-from splitnerf.refinement.outline import fit_outline
+from splitnerf.refinement.outline import ROUNDS, fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.texels import AssetTexels, SurfaceSamples, check_form, materials_of
 from splitnerf.refinement.uncertainty import PATCH_PIXELS, Information, Uncertainty, patch_width, uncertainty_of
@@ -49,6 +50,9 @@ from splitnerf.refinement.unknowns import (
 CLAMP_INDIRECT = 10.0
 SWEEPS_OF_LARGE_STEPS = 4  # after as many the light's steps are half as large: they average over the noise of sweeps
 SWEEP_PIXELS = 1 << 18  # of a sweep, at most: beyond, more steps are worth more than more pixels
+LEAST_SWEEPS = 4  # that there is room for in the minutes of a stage: where one would take longer, it gathers fewer pixels
+LEAST_BATCHES = 8  # of a sweep, however short the time
+OUTLINE_SHARE = 0.5  # of the minutes, after which no further round of the outline begins, nor the search for a lamp
 MIN_TONE = 0.02  # linear value below which errors weigh as at this one
 
 
@@ -58,8 +62,8 @@ class RefinementSettings:
 
     Attributes:
         sweeps: Gauss-Newton steps.
-        minutes: Time after which no further sweep begins, the first one aside; 0 does not limit.
-        sweep_share: Pixels of a sweep as a share of all, at most SWEEP_PIXELS.
+        minutes: Time that the outline and the sweeps keep to, see :class:`Stage`; 0 does not limit.
+        sweep_share: Pixels of a sweep as a share of all, at most SWEEP_PIXELS, and fewer where the minutes are short.
         pixels: Pixels of a batch.
         directions: Directions of a ray's point.
         bounces: Scattering events of the light that the asset sends to itself.
@@ -188,6 +192,7 @@ class Refinement:
         self.equations = NormalEquations(self.unknowns, prior, s.keep)
         self.information = Information(self.texels, width, round(len(self.pixels) / self.pixels.share))
         self.n_batches = self.n_sweeps = 0
+        self.step_seconds = 0.0  # that the last sweep took after its batches
 
     def make_lamp_compact(self) -> CompactLamp | None:
         """Brings the brightest glow of the light together where the albedo shows the edge of its shadow; None where not."""
@@ -295,11 +300,27 @@ class Refinement:
         self.n_batches += 1
         return float(squared.mean())
 
-    def sweep(self) -> tuple[float, list[float]]:
-        """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step; returns the error and the step's size by unknown."""
-        s, surface = self.settings, self.surface()
+    def sweep(
+        self, seconds: float = math.inf, report: Callable[[], None] = lambda: None
+    ) -> tuple[float, list[float]]:
+        """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step.
+
+        Args:
+            seconds: After which no further batch is gathered, LEAST_BATCHES aside; the step counts as long as the last one.
+            report: Called after each batch.
+
+        Returns:
+            The error, and the step's size by unknown.
+        """
+        s, surface, started = self.settings, self.surface(), time.monotonic()
         n_batches = max(1, round(min(s.sweep_share * len(self.pixels), SWEEP_PIXELS) / s.pixels))
-        error = float(np.mean([self.gather(surface) for _ in range(n_batches)]))
+        errors: list[float] = []
+        while len(errors) < n_batches and (
+            len(errors) < LEAST_BATCHES or time.monotonic() - started + self.step_seconds < seconds
+        ):  # fmt: skip
+            errors.append(self.gather(surface))
+            report()
+        gathered, error = time.monotonic(), float(np.mean(errors))
         if not np.isfinite(error):
             raise RuntimeError(f"refinement: the error of the photos is {error}; nothing was written")
         if s.light_step > 0:
@@ -315,7 +336,13 @@ class Refinement:
         self.unknowns = wanted
         self.n_sweeps += 1
         self.equations.move(step)
+        self.step_seconds = time.monotonic() - gathered
         return error, step.square().mean(0).sqrt().tolist()
+
+
+def decibels(error: float) -> float:
+    """The PSNR of a mean squared error, which may come out as 0 or less where it is estimated."""
+    return -10.0 * math.log10(max(error, 1e-8))
 
 
 def srgb_slope(linear: Tensor) -> Tensor:
@@ -326,9 +353,13 @@ def srgb_slope(linear: Tensor) -> Tensor:
 class Stage:
     """A refinement sweep by sweep: what it has said so far, and the state by which it can go on elsewhere.
 
+    Minutes limit it so: after OUTLINE_SHARE of them no further round of the outline begins, the first one aside, and no lamp
+    is looked for. A sweep takes a LEAST_SWEEPS-th of them at most, and the last one what is left. One sweep is always made.
+
     Args:
         dataset, asset, environment, settings: See :class:`Refinement`.
         state: What :meth:`state` gave of a stage with the same other arguments, `sweeps` and `minutes` aside; None begins.
+        show: Called with the share done and what is being done, often.
 
     Attributes:
         outline, sweeps, lamp: See :class:`Refined`.
@@ -339,24 +370,32 @@ class Stage:
     """
 
     def __init__(
-        self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings, state: dict | None = None
-    ):
+        self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings, state: dict | None = None,
+        show: Callable[[float, str], None] = lambda share, told: None,
+    ):  # fmt: skip
         check_form(asset)
-        self.settings, self.outline, self.sweeps = settings, [], []
-        self.started = time.monotonic()
+        self.settings, self.show, self.outline, self.sweeps = settings, show, [], []
+        self.started, self.last_seconds = time.monotonic(), 0.0  # of the last sweep made here
         if state is not None:
             check_tensor("vertices", state["vertices"], asset.vertices.shape, torch.float32)
             asset = replace(asset, vertices=state["vertices"].numpy())
             self.outline, self.sweeps = list(map(float, state["outline"])), [Sweep(*sweep) for sweep in state["sweeps"]]
             self.started -= float(state["seconds"])
         elif settings.outline:
-            asset, self.outline = fit_outline(dataset, asset, settings.seed)
+            asset, self.outline = fit_outline(dataset, asset, settings.seed, self._begins)
+        show(self.progress, "last stage, the texels' pixels")
         self.fit, self.lamp = Refinement(dataset, asset, environment, settings), None
         if state is not None:
             self.fit.restore(state["fit"])
             self.lamp = None if state["lamp"] is None else CompactLamp(*state["lamp"])
-        elif settings.light_step > 0:
+        elif settings.light_step > 0 and self.seconds < OUTLINE_SHARE * self.limit:
+            show(self.progress, "last stage, looking for a lamp")
             self.lamp = self.fit.make_lamp_compact()
+
+    def _begins(self, turn: int) -> bool:
+        """Whether a round of the outline has time, if it takes as long as those before; the first one always has."""
+        self.show(self.progress, f"last stage, outline, round {turn + 1} of {ROUNDS}")
+        return turn == 0 or self.seconds * (turn + 1) / turn <= OUTLINE_SHARE * self.limit
 
     @property
     def seconds(self) -> float:
@@ -364,16 +403,39 @@ class Stage:
         return time.monotonic() - self.started
 
     @property
+    def limit(self) -> float:
+        """The seconds that it may take."""
+        return 60.0 * self.settings.minutes if self.settings.minutes > 0 else math.inf
+
+    @property
+    def finished(self) -> bool:
+        """Whether all sweeps are made, or what is left of the minutes is less than half of a sweep like the last one."""
+        if len(self.sweeps) >= self.settings.sweeps:
+            return True
+        return bool(self.sweeps) and self.limit - self.seconds <= 0.5 * self.last_seconds
+
+    @property
     def progress(self) -> float:
-        """The share done, in [0, 1]: of the sweeps, or of the minutes where those are further; a first sweep is always made."""
-        by_time = self.seconds / (60 * self.settings.minutes) if self.settings.minutes > 0 and self.sweeps else 0.0
-        return min(1.0, max(len(self.sweeps) / self.settings.sweeps, by_time))
+        """The share done, in [0, 1]: of the sweeps, or of the minutes where those are further; 1 at the end alone."""
+        if self.finished:
+            return 1.0
+        return min(0.99, max(len(self.sweeps) / self.settings.sweeps, self.seconds / self.limit))
 
     def advance(self) -> Sweep:
         """Makes one sweep. Raises RuntimeError where numbers are no longer finite."""
-        error, moved = self.fit.sweep()
+        started = self.seconds
+        seconds = self.limit / LEAST_SWEEPS
+        if self.sweeps:
+            seconds = min(seconds, self.limit - started)
+        told = self.told(len(self.sweeps) + 1)
+        error, moved = self.fit.sweep(seconds, lambda: self.show(self.progress, told))
+        self.last_seconds = self.seconds - started
         self.sweeps.append(Sweep(len(self.sweeps) + 1, self.seconds, error, moved))
         return self.sweeps[-1]
+
+    def told(self, step: int) -> str:
+        """What is shown of a step: the photos' error before the last whole one."""
+        return f"last stage, step {step}" + (f", photos {decibels(self.sweeps[-1].error):.2f} dB" if self.sweeps else "")
 
     def state(self) -> dict[str, object]:
         """What goes on from here, as tensors and plain values."""
@@ -410,6 +472,6 @@ def refine(
         RuntimeError: Numbers are no longer finite.
     """
     stage = Stage(dataset, asset, environment, settings)
-    while stage.progress < 1.0:
+    while not stage.finished:
         report(stage.advance())
     return stage.result()

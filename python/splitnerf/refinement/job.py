@@ -7,6 +7,7 @@ import dataclasses
 import hashlib
 import math
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -154,21 +155,23 @@ def refine_folder(
     asset, light = read_source(source)
     out.mkdir(parents=True, exist_ok=True)
     kept = StateFile(out, origin_of(source, dataset, settings), save_minutes)
-    stage = begin(dataset, asset, light, settings, kept.load() if resume else None, kept.path)
+    with Progress(0.0, leave=False, at_once=True) as bar:
+        stage = begin(dataset, asset, light, settings, kept.load() if resume else None, kept.path, bar.show)
     with Interrupt() as interrupt:
         complete = True
         kept.take(stage)
         with Progress(stage.progress) as bar:
-            while stage.progress < 1.0 and not interrupt.asked:
+            stage.show = bar.show
+            while not stage.finished and not interrupt.asked:
                 n_sweeps = len(stage.sweeps)
                 interrupt.attempt(stage.advance)
                 complete = len(stage.sweeps) > n_sweeps
                 if complete:
                     kept.take(stage)
                     kept.save_if_due()
-                    bar.show(stage.progress, told(stage))
+                    bar.show(stage.progress, stage.told(len(stage.sweeps)))
         kept.save()  # also where all is done: what follows may be interrupted, too
-        if not complete or stage.progress < 1.0:
+        if not complete or not stage.finished:
             return None
     refined = stage.result()
     write_glb(out / "mesh.glb", refined.asset, occlusion_texture(refined.asset))
@@ -192,25 +195,16 @@ def read_source(source: Path) -> tuple[Asset, np.ndarray]:
 
 
 def begin(
-    dataset: Dataset, asset: Asset, light: np.ndarray, settings: RefinementSettings, state: dict | None, path: Path
-) -> Stage:
+    dataset: Dataset, asset: Asset, light: np.ndarray, settings: RefinementSettings, state: dict | None, path: Path,
+    show: Callable[[float, str], None],
+) -> Stage:  # fmt: skip
     """A stage that begins, or goes on from the state in the file `path`. Raises InputError where it cannot."""
     try:
-        return Stage(dataset, asset, light, settings, state)
+        return Stage(dataset, asset, light, settings, state, show)
     except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
         if state is None:
             raise
         raise OtherState(f"{path}: not the state of this refinement ({error}); delete it to begin anew") from error
-
-
-def told(stage: Stage) -> str:
-    """What the bar tells: the sweeps and the photos' error before the last one."""
-    return f"last stage, step {len(stage.sweeps)}, photos {decibels(stage.sweeps[-1].error):.2f} dB"
-
-
-def decibels(error: float) -> float:
-    """The PSNR of a mean squared error, which may come out as 0 or less where it is estimated."""
-    return -10.0 * math.log10(max(error, 1e-8))
 
 
 def record_of(refined: Refined, seconds: float) -> dict:

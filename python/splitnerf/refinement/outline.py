@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -87,7 +88,9 @@ def smoothness(faces: np.ndarray, n_vertices: int) -> csr_matrix:
     return diags(np.asarray(joined.sum(1)).ravel()) - joined
 
 
-def fit_outline(dataset: Dataset, asset: Asset, seed: int = 0) -> tuple[Asset, list[float]]:
+def fit_outline(
+    dataset: Dataset, asset: Asset, seed: int = 0, begins: Callable[[int], bool] = lambda turn: True
+) -> tuple[Asset, list[float]]:
     """Moves vertices so that the asset covers the pixels as the masks do; the moves are a smooth field on the mesh.
 
     Normals, tangents and texture coordinates stay: a texture goes where its triangles go.
@@ -96,6 +99,7 @@ def fit_outline(dataset: Dataset, asset: Asset, seed: int = 0) -> tuple[Asset, l
         dataset: The photos, whose alpha is the mask.
         asset: A closed asset in the photos' world frame.
         seed: The seed of the rays.
+        begins: Asked before each round, whose number it is given, from 0 to ROUNDS - 1, whether the round is made.
 
     Returns:
         The moved asset, or the given one where moving it did not lower the error, and the mean squared error of the
@@ -117,7 +121,7 @@ def fit_outline(dataset: Dataset, asset: Asset, seed: int = 0) -> tuple[Asset, l
         mesh = Mesh(start + moved.reshape(-1, 3), faces, edges)
         rest = mask - coverage(mesh.scene, pixels, random)
         errors.append(float((rest**2).mean()))
-        if turn == ROUNDS:
+        if turn == ROUNDS or not begins(turn):
             break
         jacobian = slopes(mesh, pixels, dataset.images.shape[1:3])
         curvature = (jacobian.T @ jacobian).tocsr()

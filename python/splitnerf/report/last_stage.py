@@ -39,7 +39,8 @@ def last_stage_section(page: Mapping) -> dict:
     rows.append(("these views: coverage, mean squared error", *(f"{value:.2g}" for value in coverage)))
     if summary["outline_error"]:
         rows.append(("all photos: coverage at the outline, mean squared error", *(f"{v:.2g}" for v in summary["outline_error"])))
-    rows.append(("all photos: colours inside, PSNR before the first and the last step", *(f"{v:.2f} dB" for v in summary["photos_psnr"])))
+    name = "all photos: colours inside the outline, PSNR before the first step and before the last one"
+    rows.append((name, *(f"{v:.2f} dB" for v in summary["photos_psnr"])))
     return {
         "pictures": PICTURES,
         "pairs": [comparison(*pair, "colour") | {"name": " | ".join(pair), "sides": pair} for pair in PAIRS],

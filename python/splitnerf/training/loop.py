@@ -50,7 +50,7 @@ from splitnerf.training.room import RoomyStep
 from splitnerf.training.schedule import light_moves, light_period, next_ray_count, progress_of
 from splitnerf.training.step import Step
 
-LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps are all logged
+LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps and the last one are all logged
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion
 
 
@@ -141,6 +141,7 @@ class Training:
         self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.sampling.initial_rays, 0.0
         self.psnr_mean: float | None = None
         self.unread: deque[PastStep] = deque()
+        self.unlogged: dict[str, object] | None = None  # the line of the last step read, while metrics.jsonl lacks it
         self.reads_late = 0 if device.type == "cpu" else 1  # steps; a GPU goes on while the host reads
         self.started, self.saved_at = time.monotonic(), 0.0  # a time of the clock, and seconds of the run
         self.first = True  # step of the run
@@ -321,13 +322,19 @@ class Training:
             self.seconds = self.ranks.seconds(self.started)
             if bar is not None:
                 bar.show(self.progress, self.told(past.step, agreed.evaluated / n_rays))
-            is_last = self.progress >= 1.0 and not self.unread
-            if past.step % LOG_EVERY == 0 or past.step <= LOG_EVERY or is_last:
-                check_state(self.step, self.model, self.optimiser)
-                if self.ranks.is_first:
-                    line = self.line(past, numbers)
-                    add_metrics(self.run / METRICS, line)
-                    self.observers.logged(line)
+            self.unlogged = self.line(past, numbers)
+            if past.step % LOG_EVERY == 0 or past.step <= LOG_EVERY:
+                self.log()
+
+    def log(self) -> None:
+        """Adds the line of the last step read to metrics.jsonl, if it is not there yet."""
+        if self.unlogged is None:
+            return
+        check_state(self.step, self.model, self.optimiser)
+        if self.ranks.is_first:
+            add_metrics(self.run / METRICS, self.unlogged)
+            self.observers.logged(self.unlogged)
+        self.unlogged = None
 
     def told(self, step: int, samples_per_ray: float) -> str:
         """What the bar tells of a step: its number, the batches' mean PSNR in dB and the samples per ray."""
@@ -349,11 +356,12 @@ class Training:
         }  # fmt: skip
 
     def finish(self) -> None:
-        """Updates grid and mesh to the final surface, unless the run was interrupted, and writes the last
-        checkpoint."""
+        """Logs the last step, updates grid and mesh to the final surface, unless the run was interrupted, and writes the
+        last checkpoint."""
         self.settle()
         self.optimiser.zero_grad(set_to_none=True)
         check_state(self.step, self.model, self.optimiser)
+        self.log()
         self.mesh.poll(wait=self.finished)
         if self.finished and self.config.occlusion.kind == "bits":
             self.mesh.request(self.progress)

@@ -14,7 +14,9 @@ from splitnerf.data.images import linear_to_srgb, read_header
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.errors import InputError
+from splitnerf.evaluate.lpips import Distance
 from splitnerf.evaluate.relight import FIRST_SEED
+from splitnerf.evaluate.similarity import image_scores
 from splitnerf.render.path_traced import MOST_SPP, MOST_VIEWS, AssetRenderer
 
 Column = tuple[str, str, str]  # key, title, format
@@ -29,12 +31,14 @@ class Options:
         maps: A folder of lights, for sets whose data do not hold them; or None.
         truth: The folder of the truth, for sets that keep it elsewhere; or None.
         views: Test views, evenly spread, for protocols that take all; None for all.
+        distance: The LPIPS distance; None leaves LPIPS out.
     """
 
     spp: int = 128
     maps: Path | None = None
     truth: Path | None = None
     views: int | None = None
+    distance: Distance | None = None
 
     def __post_init__(self) -> None:
         for name, value, most in (("spp", self.spp, MOST_SPP), ("views", self.views, MOST_VIEWS)):
@@ -118,6 +122,11 @@ def srgb_on_white(maps: dict[str, np.ndarray]) -> np.ndarray:
     alpha = maps["alpha"][..., None]
     straight = linear_to_srgb(np.clip(maps["radiance"] / np.maximum(alpha, 1e-8), 0, 1))
     return straight * alpha + 1 - alpha
+
+
+def compared(image: np.ndarray, truth: np.ndarray, options: Options, prefix: str = "") -> dict[str, float | None]:
+    """PSNR, SSIM and LPIPS of sRGB images [H, W, 3] in [0, 1], by keys with a prefix."""
+    return {f"{prefix}{key}": value for key, value in image_scores(image, truth, options.distance).items()}
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from splitnerf.data.environment import read_environment
@@ -12,6 +13,7 @@ from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.evaluate.asset import environment_beside
 from splitnerf.evaluate.jobs import is_asset
+from splitnerf.evaluate.lpips import find_distance
 from splitnerf.evaluate.published.common import Delivered, Options
 from splitnerf.evaluate.published.table import PROTOCOLS, published
 
@@ -42,7 +44,13 @@ def score_published(target: Path, data: Path, name: str, options: Options, env: 
     env = environment_beside(path) if env is None else env
     _, origin = read_frames(data, "train", Reading("all"))
     delivered = Delivered(read_asset(path), None if env is None else read_environment(env), origin, options.spp)
+    missing = ""
+    if any("lpips" in key for key, _, _ in protocol.COLUMNS):
+        distance, missing = find_distance()
+        options = replace(options, distance=distance)
     scores = protocol.score(delivered, data, options)
+    if missing:
+        scores.notes.append(f"LPIPS was not computed: {missing}")
     return {
         "protocol": name, "scores": scores.means, "images": scores.images, "notes": scores.notes, "published": published(name),
         "spp": options.spp,

@@ -15,15 +15,26 @@ from splitnerf.data.frames import spread_views
 from splitnerf.data.layouts import view_folders as layout
 from splitnerf.data.layouts.lit import LitView
 from splitnerf.errors import InputError
-from splitnerf.evaluate.metrics import lsq_scale, psnr, ssim
-from splitnerf.evaluate.published.common import Column, Delivered, Options, Scores, angles_deg, mean_of, srgb_on_white, unit
+from splitnerf.evaluate.metrics import lsq_scale, psnr
+from splitnerf.evaluate.published.common import (
+    Column,
+    Delivered,
+    Options,
+    Scores,
+    angles_deg,
+    compared,
+    mean_of,
+    srgb_on_white,
+    unit,
+)
 from splitnerf.evaluate.published.folders import albedo_on_white, lights_of, read_truth
 from splitnerf.progress import tracked
 
 LAYOUT = layout
 COLUMNS: tuple[Column, ...] = (
-    ("psnr", "relit, PSNR", "{:.2f}"), ("ssim", "relit, SSIM", "{:.3f}"), ("albedo_psnr", "albedo, PSNR", "{:.2f}"),
-    ("albedo_ssim", "albedo, SSIM", "{:.3f}"), ("view_psnr", "novel, PSNR", "{:.2f}"), ("normals", "normals, degrees", "{:.2f}"),
+    ("psnr", "relit, PSNR", "{:.2f}"), ("ssim", "relit, SSIM", "{:.3f}"), ("lpips", "relit, LPIPS", "{:.3f}"),
+    ("albedo_psnr", "albedo, PSNR", "{:.2f}"), ("albedo_ssim", "albedo, SSIM", "{:.3f}"),
+    ("albedo_lpips", "albedo, LPIPS", "{:.3f}"), ("view_psnr", "novel, PSNR", "{:.2f}"), ("normals", "normals, degrees", "{:.2f}"),
 )  # fmt: skip
 VALIDATION, TEST = range(8), (49, 99, 149, 199)
 OPAQUE = 0.9
@@ -45,7 +56,7 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
             result["view_psnr"] = psnr(srgb_on_white(maps), truth.image)
         if truth.albedo is not None:
             ours, theirs = albedo_on_white(maps["albedo"], maps["alpha"], scale), albedo_on_white(truth.albedo, truth.alpha)
-            result |= {"albedo_psnr": psnr(ours, theirs), "albedo_ssim": ssim(ours, theirs)}
+            result |= compared(ours, theirs, options, "albedo_")
         solid = (truth.alpha > OPAQUE) & (maps["alpha"] > OPAQUE)
         if truth.normal is not None and solid.any():
             result["normals"] = float(angles_deg(unit(maps["normal"]), truth.normal)[solid].mean())
@@ -55,7 +66,7 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
     for view in tracked(chosen(layout.relit(root, maps), root) if maps else [], "relit, image"):
         image, truth = srgb_on_white(scaled.render(view.frame, view.radiance())), read_truth(view.frame)
         name = f"{view.frame.name}/{view.light}"
-        images.append({"name": name, "psnr": psnr(image, truth.image), "ssim": ssim(image, truth.image)})
+        images.append({"name": name} | compared(image, truth.image, options))
     if not maps:
         notes.append("no lights: give --maps the folder of the set's test lights for relit views")
     return Scores({key: mean_of(images, key) for key, _, _ in COLUMNS}, images, notes)

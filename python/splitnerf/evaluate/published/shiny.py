@@ -14,13 +14,23 @@ from splitnerf.data.images import over_background, read_image
 from splitnerf.data.layouts import transforms as layout
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.errors import InputError
-from splitnerf.evaluate.metrics import psnr, ssim
-from splitnerf.evaluate.published.common import Column, Delivered, Options, Scores, angles_deg, mean_of, srgb_on_white, unit
+from splitnerf.evaluate.published.common import (
+    Column,
+    Delivered,
+    Options,
+    Scores,
+    angles_deg,
+    compared,
+    mean_of,
+    srgb_on_white,
+    unit,
+)
 from splitnerf.progress import tracked
 
 LAYOUT = layout
 COLUMNS: tuple[Column, ...] = (
-    ("view_psnr", "novel, PSNR", "{:.2f}"), ("view_ssim", "novel, SSIM", "{:.3f}"), ("normals", "normals, degrees", "{:.2f}"),
+    ("view_psnr", "novel, PSNR", "{:.2f}"), ("view_ssim", "novel, SSIM", "{:.3f}"), ("view_lpips", "novel, LPIPS", "{:.3f}"),
+    ("normals", "normals, degrees", "{:.2f}"),
 )  # fmt: skip
 
 
@@ -40,8 +50,7 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
         rgba, maps = _rgba(frame), delivered.render(frame, delivered.environment)
         result = {"name": frame.name}
         if delivered.environment is not None:
-            image, truth = srgb_on_white(maps), over_background(rgba[..., :3], rgba[..., 3])
-            result |= {"view_psnr": psnr(image, truth), "view_ssim": ssim(image, truth)}
+            result |= compared(srgb_on_white(maps), over_background(rgba[..., :3], rgba[..., 3]), options, "view_")
         path = frame.image_path.with_name(f"{frame.image_path.stem}_normal.png")
         if path.is_file():
             truth = unit(2 * read_image(path)[..., :3] - 1)

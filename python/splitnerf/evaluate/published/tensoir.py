@@ -15,15 +15,26 @@ import numpy as np
 from splitnerf.data.frames import spread_views
 from splitnerf.data.images import over_background
 from splitnerf.data.layouts import view_folders as layout
-from splitnerf.evaluate.metrics import median_scale, psnr, ssim
-from splitnerf.evaluate.published.common import Column, Delivered, Options, Scores, angles_deg, mean_of, srgb_on_white, unit
+from splitnerf.evaluate.metrics import median_scale
+from splitnerf.evaluate.published.common import (
+    Column,
+    Delivered,
+    Options,
+    Scores,
+    angles_deg,
+    compared,
+    mean_of,
+    srgb_on_white,
+    unit,
+)
 from splitnerf.evaluate.published.folders import FolderTruth, lights_of, read_truth
 from splitnerf.progress import tracked
 
 LAYOUT = layout
 COLUMNS: tuple[Column, ...] = (
-    ("psnr", "relit, PSNR", "{:.2f}"), ("ssim", "relit, SSIM", "{:.3f}"), ("albedo_psnr", "albedo, PSNR", "{:.2f}"),
-    ("view_psnr", "novel, PSNR", "{:.2f}"), ("view_ssim", "novel, SSIM", "{:.3f}"), ("normals", "normals, degrees", "{:.2f}"),
+    ("psnr", "relit, PSNR", "{:.2f}"), ("ssim", "relit, SSIM", "{:.3f}"), ("lpips", "relit, LPIPS", "{:.3f}"),
+    ("albedo_psnr", "albedo, PSNR", "{:.2f}"), ("view_psnr", "novel, PSNR", "{:.2f}"), ("view_ssim", "novel, SSIM", "{:.3f}"),
+    ("view_lpips", "novel, LPIPS", "{:.3f}"), ("normals", "normals, degrees", "{:.2f}"),
 )  # fmt: skip
 LIGHTS = ("bridge", "city", "fireplace", "forest", "night")
 SCALE_VIEWS = 20
@@ -44,8 +55,7 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
         truth, maps = read_truth(frame), delivered.render(frame, delivered.environment)
         result = {"name": frame.name}
         if delivered.environment is not None:
-            image = srgb_on_white(maps)
-            result |= {"view_psnr": psnr(image, truth.image), "view_ssim": ssim(image, truth.image)}
+            result |= compared(srgb_on_white(maps), truth.image, options, "view_")
         if truth.albedo is not None:
             errors.append(albedo_error(maps, truth, scale))
         if truth.normal is not None:
@@ -63,7 +73,7 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
     for view in tracked(views, "relit, image"):
         image, truth = srgb_on_white(scaled.render(view.frame, view.radiance())), read_truth(view.frame)
         name = f"{view.frame.name}/{view.light}"
-        images.append({"name": name, "psnr": psnr(image, truth.image), "ssim": ssim(image, truth.image)})
+        images.append({"name": name} | compared(image, truth.image, options))
     means = {key: mean_of(images, key) for key, _, _ in COLUMNS}
     means["albedo_psnr"] = float(-10 * np.log10(max(np.mean(errors), 1e-10))) if errors else None
     return Scores(means, images, notes)
