@@ -29,7 +29,8 @@ DISTANCE = 3.0
 ELEVATIONS = 0.2, 0.5, 0.9, 1.2  # radians
 FIRST, STEPS = 20, 220  # steps that are not timed, and the last one
 PATIENCE = 3600.0  # seconds to the first step
-SOURCES = ("tests/bench/large_inputs.py", "python/splitnerf/data", "python/splitnerf/render/rays.py", "python/splitnerf/training")
+SOURCES = ("tests/bench/large_inputs.py", "python/splitnerf/data", "python/splitnerf/render/averages.py", "python/splitnerf/render/rays.py",
+           "python/splitnerf/training")  # fmt: skip
 INTRODUCTION = """# Large inputs
 
 Photos of 4000 x 3000 pixels: the time from the command to the first step, the largest resident memory of the process until
@@ -146,6 +147,8 @@ def main() -> int:
     args = parser.parse_args()
     table = ["| photos | --max-memory | to the first step | memory | file | step |", "|---|---|---|---|---|---|"]
     print("\n".join(table), flush=True)
+    if args.folder is not None:
+        args.folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=args.folder) as folder:
         for n in args.photos:
             data = Path(folder) / f"photos_{n}"
