@@ -13,9 +13,9 @@ namespace {
 
 template <class Code> using Codes = py::array_t<Code, py::array::c_style>;
 
-template <class Code>
-py::array_t<uint16_t> average_photo(const Codes<Code>& codes, int64_t factor, bool object_alone) {
-  if (codes.ndim() != 3 || codes.shape(2) != 4) throw py::value_error("average_photo: codes must be [height, width, 4]");
+template <class Code> py::array_t<uint16_t> average_photo(const Codes<Code>& codes, int64_t factor, bool object_alone) {
+  if (codes.ndim() != 3 || codes.shape(2) != 4)
+    throw py::value_error("average_photo: codes must be [height, width, 4]");
   const py::ssize_t height = codes.shape(0), width = codes.shape(1);
   if (factor < 1 || factor > height || factor > width)
     throw py::value_error("average_photo: factor must be from 1 to the photo's shorter edge");

@@ -121,6 +121,7 @@ def write_assets(
             textured = textured_asset(
                 "object", vertices, faces, surface, n_faces=n_faces, texture_size=texture_size or c.export.texture_size,
                 spacing=2.0 * c.surface.box / (resolution - 1), occlusion_offset=c.occlusion.offset,
+                tell=lambda share, part: bar.show(0.1 + 0.8 * share, f"export, {part}"),
             )  # fmt: skip
             bar.show(0.9, "export, files")
             asset = dataclasses.replace(textured.asset, vertices=transform_points(world_from_box, textured.asset.vertices))

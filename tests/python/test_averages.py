@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from tiny_runs import tiny
 from splitnerf.config import Config
 from splitnerf.data import pixels
 from splitnerf.data.dataset import Dataset, load_dataset
+from splitnerf.data.pixels import Photos
 from splitnerf.data.images import area_average, linear_to_srgb, srgb_to_linear
 from splitnerf.render.averages import averaging_factor, training_photos
 from splitnerf.render.rays import PixelSource
@@ -30,7 +32,7 @@ def averaging(dataset: Dataset, factor: float, **settings) -> Config:
     """Settings by which photos are averaged down by a factor, which is rounded down."""
     config = tiny(**settings)
     s, distance = config.surface, np.linalg.norm(dataset.poses[0, :3, 3])
-    cell = 2 * s.box / (s.base_resolution * s.growth ** (s.n_levels - 1))
+    cell = 2 * s.box / s.finest_cells
     return config.replace({"pixel_cells": float(factor * 1.0001 * distance / dataset.intrinsics[0, 0] / cell)})
 
 
@@ -85,8 +87,11 @@ def test_a_ray_of_an_average_meets_the_middle_of_its_block(data):
     row = lens[:, 3] + lens[:, 1] * local[:, 1] / local[:, 2]
     assert (column / 2 % 1 - 0.5).abs().max() < 1e-3 and (row / 2 % 1 - 0.5).abs().max() < 1e-3
     views, tops, lefts = drawn.view.numpy(), (row - 1).round().int().numpy(), (column - 1).round().int().numpy()
-    alpha = [dataset.images[v, y : y + 2, x : x + 2, 3].mean() for v, y, x in zip(views, tops, lefts)]
+    blocks = np.stack([dataset.images[v, y : y + 2, x : x + 2] for v, y, x in zip(views, tops, lefts)])
+    alpha = blocks[..., 3].mean((1, 2))
     assert np.abs(drawn.pixels[:, 3].numpy() - alpha).max() < 1e-4 and 0.2 < np.mean(alpha) < 0.98
+    linear = (srgb_to_linear(blocks[..., :3]) * blocks[..., 3:]).mean((1, 2)) / np.maximum(alpha, 1e-6)[:, None]
+    assert np.abs(drawn.pixels[:, :3].numpy() - linear_to_srgb(linear)).max() < 1e-4
 
 
 @pytest.mark.parametrize("wanted, factor", [(0.9, 1), (1.1, 1), (1.9, 1), (2.1, 2), (3.1, 3), (9.0, 3)])
@@ -109,6 +114,38 @@ def test_a_pixel_is_at_most_as_wide_as_the_setting_says(wanted, factor, data):
 def test_small_photos_and_the_setting_0_are_as_they_were(wanted, data):
     dataset = load_dataset(data)
     assert training_photos(dataset, averaging(dataset, wanted)) is dataset
+
+
+@pytest.mark.parametrize("shown, factor", [(0.6, 2), (0.0, 1)])
+def test_cameras_at_the_middle_see_pixels_as_those_at_the_edge_of_the_box(data, shown, factor):
+    """At a distance of 0 a pixel has no width."""
+    dataset = load_dataset(data)
+    config = tiny(pixel_cells=shown)
+    s = config.surface
+    dataset.intrinsics[:, 0] = s.box / (shown / factor * 2 * s.box / s.finest_cells) if shown else 1.0
+    for distance in (s.box, 0.1, 0.0):
+        dataset.poses[:, :3, 3] = [0, 0, distance * 1.0001]
+        assert averaging_factor(dataset, config) == (factor if distance < s.box else max(1, factor - 1))
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])
+def test_averages_keep_edges_of_known_pixels_at_each_exposure(tmp_path, kind):
+    """The band is the same in photos of all kinds; what is not known has no edge, and exposures change no code."""
+    values = wall(0.2) / np.float32(255)
+    codes = values if kind == np.float32 else np.rint(values * np.iinfo(kind).max).astype(kind)
+    known = np.ones((2, 120, 180), bool)
+    known[1, :, 90:] = False
+    plain = far(scene(tmp_path, np.stack([codes, codes]), known=known))
+    exposed = replace(plain, images=Photos(plain.images.codes, np.array([0.5, 2.0])))
+    averages = [training_photos(dataset, averaging(dataset, 3)) for dataset in (plain, exposed)]
+    assert np.array_equal(*(photos.images.codes for photos in averages)) and averages[0].whole
+    assert (averages[0].images.codes[1, :, 30:] == 0).all() and not averages[0].known[1, :, 30:].any()
+    starts, ends = (x.numpy() for x in (source_of(plain, averaging(plain, 3)).edges.runs[:2]))
+    marked = np.zeros((2, 40, 60), bool)
+    for start, end in zip(starts, ends):
+        marked.reshape(-1)[start:end] = True
+    assert marked[0].sum() > 200 and not marked[1, :, 30:].any()
+    assert np.array_equal(marked[1, :, :24], marked[0, :, :24])
 
 
 def wall(brightness: float, object_colour: float = 0.9) -> np.ndarray:

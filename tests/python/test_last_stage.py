@@ -17,7 +17,7 @@ import torch
 from painted_ball import sky, with_textures
 from tiny_runs import train
 
-from splitnerf import delivery
+from splitnerf import delivery, progress
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
 from splitnerf.cli.summary import print_last_stage
 from splitnerf.data.gltf import read_asset
@@ -63,9 +63,11 @@ def test_a_run_delivers_what_was_fitted_and_keeps_what_was_trained(run):
     assert deviations.shape == (64, 64, 4) and deviations.min() > 0 and deviations[..., :3].max() < 0.29
 
 
-def test_the_export_is_said_at_once(run, tmp_path, capsys):
+def test_the_export_says_at_once_what_it_does(run, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(progress, "LINE_EVERY", 0.0)
     assert main(["export", str(run), "--out", str(tmp_path), "--formats", "glb"]) == DONE
-    assert "  0% 00:00<? export, surface on a grid of 32^3\n" in capsys.readouterr().err
+    said = [line.split("export, ")[1] for line in capsys.readouterr().err.splitlines() if "export, " in line]
+    assert said == ["surface on a grid of 32^3", "fewer faces", "texture coordinates", "textures", "files"]
 
 
 def test_what_is_delivered_is_what_is_scored(run, data):
@@ -353,14 +355,15 @@ def test_a_slow_machine_keeps_to_the_minutes_by_smaller_sweeps(painted, monkeypa
     """Sweeps of 50 batches of a second each, in two minutes: four sweeps of 30 batches."""
     share = 50 * 64 / n_pixels(painted)
     settings = dataclasses.replace(QUICK, minutes=2.0, sweeps=1000, pixels=64, sweep_share=share, outline=False)
-    clock = Clock(monkeypatch, of_batch=1.0)
-    stage = Stage(painted[1], painted[0], sky(), settings)
+    clock, shares = Clock(monkeypatch, of_batch=1.0), []
+    stage = Stage(painted[1], painted[0], sky(), settings, show=lambda share, told: shares.append(share))
     sizes = []
     while not stage.finished:
         before = clock.now
         stage.advance()
         sizes.append(clock.now - before)
     assert sizes == [30.0] * 4 and clock.now == 120.0
+    assert sorted(shares) == shares and shares[-1] == 0.99 and len(shares) > 120 and stage.progress == 1.0
     # the time of a sweep's own step counts, and a last sweep takes what is left, if that is half of one
     for taken, more in ((70.0, [30.0, 20.0]), (80.0, [30.0]), (110.0, [])):
         stage = Stage(painted[1], painted[0], sky(), settings)

@@ -19,7 +19,7 @@ SPECIAL = (math.nan, math.inf, -math.inf, -0.0, 1e-45, 3e38)
 
 def numbers_of_steps(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     """Terms, counts and sharpness are handed on, the norm is that of float64, to a rounding; and a step is allowed if each
-    number is nearer to 0 than its limit: also one step of a float away, at infinite limits, and with what is no number. The
+    number is nearer to 0 than its limit: also at the limit itself, at infinite limits, and with what is no number. The
     squares are floats: below 1e-21 the norm may be 0, and where they overflow it is infinite and nothing is allowed."""
     gradients = draw.signs(n, NUMBERS) * draw.mixed((0.0, 1e-18, 1e12), draw.logarithmic(1e-12, 1e12, n, NUMBERS))
     gradients = (gradients * draw.pick((1e-20, 1e-3, 1.0, 1e12), n, 1)).float()
@@ -30,7 +30,7 @@ def numbers_of_steps(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     norm = torch.where(squares > LARGEST_FLOAT, math.inf, squares.sqrt())
     true = torch.cat([terms, norm[:, None], counts, evaluated.sum(1, keepdim=True), s[:, None]], 1).double()
     near = true.abs().float()
-    near = torch.where(draw.chance(0.1, *true.shape), near, torch.nextafter(near, torch.tensor(math.inf)) * 2)
+    near = torch.where(draw.chance(0.1, *true.shape), near, 2 * near.clamp(min=1e-20))
     limits = torch.where(draw.chance(0.2, *true.shape), math.inf, near)
     violation = torch.zeros(n, dtype=torch.float64)
     for i in range(n):

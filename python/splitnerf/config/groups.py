@@ -105,6 +105,11 @@ class Surface:
         0.4, "time at which alphas follow the true slope of the distance", unit="share of the run"
     )
 
+    @property
+    def finest_cells(self) -> float:
+        """The cells along an edge of the finest level, which the grid rounds down."""
+        return self.base_resolution * self.growth ** (self.n_levels - 1)
+
 
 @dataclass(frozen=True)
 class Materials:
@@ -240,8 +245,8 @@ class Sampling:
     grid_every: int = setting(32, "steps between refreshes of the occupancy grid", unit="steps", at_least=1)
     hull_until: float = setting(0.1, "time until which the masks' visual hull is sampled", unit="share of the run")
     pixel_cells: float = setting(
-        0.6, "largest width of a pixel, in cells of the hash grid's finest level, down to which large photos are averaged for "
-        "training; 0: no averages", at_most=1024,
+        0.6, "width up to which training averages the pixels of large photos, in cells of the finest level; 0: no averages",
+        at_most=1024,
     )  # fmt: skip
     foreground_share: float = setting(0.85, "share of the rays that are drawn near the masks", unit="share of the rays")
 
@@ -260,7 +265,7 @@ class Losses:
     dark_metal_weight: float = setting(0.002, "weight of metals that reflect less than any does")
     mask_weight: float = setting(1.0, "weight of the masks")
     edge_pixels: int = setting(
-        2, "pixels on each side of a mask's edge that are compared whole, with what lies behind the object; 0: the mask is "
+        2, "pixels (of averages, where training draws from these) on each side of a mask's edge that are compared whole, with what lies behind the object; 0: the mask is "
         "exact. Of photos whose masks are files of their own", unit="pixels", at_least=0, at_most=8,
     )  # fmt: skip
     neutral_weight: float = setting(0.03, "weight of the diffuse light's log chroma")

@@ -182,7 +182,7 @@ RULES = (
         "exposure.refine = yes needs shading.compositing = linear; set exposure.refine=no",
     ),
     (
-        lambda c: c.surface.base_resolution * c.surface.growth ** (c.surface.n_levels - 1) >= MOST_CELLS,
+        lambda c: c.surface.finest_cells >= MOST_CELLS,
         f"a level of the hash grid needs fewer than {MOST_CELLS} cells along an edge; lower surface.growth",
     ),
     (

@@ -23,6 +23,7 @@ from splitnerf.data.pixels import Photos, forget_pages, new_array, room_for_phot
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.notes import note_once
+from splitnerf.progress import tracked
 
 SURROUNDINGS = "surroundings.exr"
 JPEG = (".jpg", ".jpeg")
@@ -133,15 +134,16 @@ class Dataset:
         Args:
             factor: At least 2, at most the photos' shorter edge.
             max_memory: GB for all photos, see :func:`splitnerf.data.pixels.room_for_photos`; what needs more goes to a file.
-            average: Gives the average [h, w, 4] uint16 of a photo's codes [H, W, 4], by the factor and the average's known
-                pixels [h, w] (None: all), where colours are whole, see the attribute; else averages are those of `downscale`.
+            average: Takes a photo's codes [H, W, 4], the factor, and the known pixels [h, w] of the average (None: all); gives
+                the average [h, w, 4] uint16, with whole colours, see the attribute. By default averages are those of `downscale`.
         """
         shape = (len(self), self.height // factor, self.width // factor)
         in_file = 2 * 4 * int(np.prod(shape)) > room_for_photos(max_memory)
         codes, known = new_array((*shape, 4), np.dtype(np.uint16), in_file), None
         if self.known is not None:
             known = np.stack([area_average(one.astype(np.float32), factor) > CERTAIN for one in self.known])
-        for i, photo in enumerate(self.images.codes):
+        for i in tracked(range(len(self)), "averages, photo"):
+            photo = self.images.codes[i]
             known_here = None if known is None else known[i]
             self.images.ask_for(i)
             codes[i] = averaged_codes(photo, factor) if average is None else average(photo, factor, known_here)

@@ -50,7 +50,7 @@ from splitnerf.refinement.unknowns import (
 CLAMP_INDIRECT = 10.0
 SWEEPS_OF_LARGE_STEPS = 4  # after as many the light's steps are half as large: they average over the noise of sweeps
 SWEEP_PIXELS = 1 << 18  # of a sweep, at most: beyond, more steps are worth more than more pixels
-LEAST_SWEEPS = 4  # that there is room for in the minutes of a stage: where one would take longer, it gathers fewer pixels
+LEAST_SWEEPS = 4  # that the minutes of a stage have room for: a sweep that would take longer gathers fewer pixels
 LEAST_BATCHES = 8  # of a sweep, however short the time
 OUTLINE_SHARE = 0.5  # of the minutes, after which no further round of the outline begins, nor the search for a lamp
 MIN_TONE = 0.02  # linear value below which errors weigh as at this one
@@ -428,7 +428,7 @@ class Stage:
         if self.sweeps:
             seconds = min(seconds, self.limit - started)
         told = self.told(len(self.sweeps) + 1)
-        error, moved = self.fit.sweep(seconds, lambda: self.show(self.progress, told))
+        error, moved = self.fit.sweep(seconds, lambda: self.show(min(0.99, self.progress), told))
         self.last_seconds = self.seconds - started
         self.sweeps.append(Sweep(len(self.sweeps) + 1, self.seconds, error, moved))
         return self.sweeps[-1]

@@ -14,11 +14,11 @@ LEAST_EDGE = 8  # pixels along the shorter edge of an average
 
 
 def training_photos(dataset: Dataset, config: Config) -> Dataset:
-    """The photos themselves, or averages whose pixels are as wide as `sampling.pixel_cells` says, or a little less.
+    """The photos themselves, or averages by the largest whole factor that `sampling.pixel_cells` allows.
 
     A pixel of an average is the mean of its block in linear light: what a smaller photo would show, also along the masks'
-    edges. What is finer than the fields' cells is noise to them: its mean says more than one pixel does, at the same cost of a
-    step.
+    edges. Detail finer than the fields' cells is noise to them. The mean of a block has less of it than one pixel has, and a
+    step costs the same.
 
     Args:
         dataset: The train split.
@@ -35,10 +35,11 @@ def training_photos(dataset: Dataset, config: Config) -> Dataset:
 def averaging_factor(dataset: Dataset, config: Config) -> int:
     """The whole factor by which photos are averaged down for training; 1: not at all.
 
-    The width of a pixel is that at the middle of the scene's box, as a median over the photos.
+    The width of a pixel is that at the middle of the scene's box, or where the box ends for cameras within it, as a median over
+    the photos.
     """
-    s = config.surface
-    cell = 2 * s.box / (s.base_resolution * s.growth ** (s.n_levels - 1))
-    pixel = np.median(np.linalg.norm(dataset.poses[:, :3, 3], axis=1) / dataset.intrinsics[:, 0])
-    most = min(dataset.height, dataset.width) // LEAST_EDGE
-    return int(np.clip(config.sampling.pixel_cells * cell / pixel, 1, max(1, most)))
+    surface, most = config.surface, max(1, min(dataset.height, dataset.width) // LEAST_EDGE)
+    distance = np.maximum(np.linalg.norm(dataset.poses[:, :3, 3], axis=1), surface.box)
+    pixel = np.median(distance / dataset.intrinsics[:, 0])
+    cell = 2 * surface.box / surface.finest_cells
+    return int(np.clip(config.sampling.pixel_cells * cell / pixel, 1, most))

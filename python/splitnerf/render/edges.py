@@ -76,8 +76,10 @@ def edge_mask(
 
 
 def average_with_edges(photo: np.ndarray, factor: int, known: np.ndarray | None, width: int) -> np.ndarray:
-    """A photo averaged down, whose colours are whole where pixels along the mask's edges are compared whole, and outside; a
-    pixel that the object covers in part, and whose edge the mask has to say, keeps the object's colour alone.
+    """Averages a photo down as :class:`EdgePixels` compares it.
+
+    Along the mask's edges and outside of the mask, a pixel is the mean of all that the photo shows there. The other pixels that
+    the object covers in part are means of the object alone: there the mask has to say where the edge is.
 
     Args:
         photo: [H, W, 4] sRGB of a whole photo, and its mask.

@@ -360,7 +360,6 @@ class Training:
         last checkpoint."""
         self.settle()
         self.optimiser.zero_grad(set_to_none=True)
-        check_state(self.step, self.model, self.optimiser)
         self.log()
         self.mesh.poll(wait=self.finished)
         if self.finished and self.config.occlusion.kind == "bits":
