@@ -44,6 +44,9 @@ SELECT
   # The build put Embree's tbb beside it (embree.cmake); a second copy is not needed.
   PATH="$venv/bin:$PATH" "$venv/bin/python" -m auditwheel repair --wheel-dir "$out" \
     --exclude 'libtorch*.so' --exclude 'libc10*.so' --exclude 'libtbb*.so*' "$work"/built/*.whl
+  # What was built here says nothing of this machine's folders.
+  rm -rf "$work/unpacked" && "$venv/bin/python" -m zipfile -e "$work"/built/*.whl "$work/unpacked"
+  ! grep -rlaF -e "$work" -e "$torch" "$work/unpacked" || { echo "these files name folders of this machine" >&2; exit 1; }
 done
 for wheel in "$out"/*.whl; do
   echo "$(du -k "$wheel" | cut -f 1) KiB $(basename "$wheel")"
