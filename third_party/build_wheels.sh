@@ -13,7 +13,7 @@ torch=$("${TORCH_PYTHON:-python3}" -c 'import os, torch; print(os.path.dirname(t
   ! command -v "python3.$minor" >/dev/null || set -- "$@" "python3.$minor"
 done
 [ $# -gt 0 ] || { echo "no Python from 3.10 to 3.13 was found; name one" >&2; exit 2; }
-options=""
+options="-C cmake.define.SPLITNERF_CUDA_LINES=OFF"
 for option in ${CMAKE_OPTIONS:-SPLITNERF_CUDA=OFF}; do options="$options -C cmake.define.$option"; done
 [ -z "${BUILD_TAG:-}" ] || options="$options -C wheel.build-tag=$BUILD_TAG"
 

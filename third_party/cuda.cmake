@@ -4,6 +4,7 @@
 # SPLITNERF_CUDA_RELEASE builds what a wheel carries, and CMAKE_CUDA_ARCHITECTURES says otherwise.
 set(SPLITNERF_CUDA AUTO CACHE STRING "Build the operators for the GPU: ON, OFF or AUTO (where a CUDA compiler is found)")
 set_property(CACHE SPLITNERF_CUDA PROPERTY STRINGS ON OFF AUTO)
+option(SPLITNERF_CUDA_LINES "Lines of the sources in the GPU code, for profilers: they name the folder of the sources" ON)
 option(SPLITNERF_CUDA_RELEASE "GPU code for sm_80, sm_90 and, as PTX, what comes after" OFF)
 set(SPLITNERF_WITH_CUDA OFF)
 if(SPLITNERF_CUDA STREQUAL "AUTO" OR SPLITNERF_CUDA)

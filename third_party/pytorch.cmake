@@ -25,6 +25,7 @@ message(STATUS "PyTorch ${torch_version}")
 
 add_library(torch_stable INTERFACE)
 target_include_directories(torch_stable SYSTEM INTERFACE ${torch_dir}/include)
-# torch's headers name their files in messages: without the folder of the machine that built.
-target_compile_options(torch_stable INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fmacro-prefix-map=${torch_dir}/=torch/>)
+# torch's macros and headers name their files in messages: without the folders of the machine that built.
+target_compile_options(torch_stable INTERFACE
+  $<$<COMPILE_LANGUAGE:CXX>:-fmacro-prefix-map=${torch_dir}/=torch/;-fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=>)
 target_link_libraries(torch_stable INTERFACE ${torch_dir}/lib/libtorch.so ${torch_dir}/lib/libtorch_cpu.so ${torch_dir}/lib/libc10.so)
