@@ -101,7 +101,8 @@ def work(args: argparse.Namespace) -> None:
     with joined() as ranks, tempfile.TemporaryDirectory() as folder:
         fixed = {"steps": 2000, "background_meshes": False, "cuda_graphs": False, "levels_open_by": 0.0}
         config = preset(args.preset).replace(fixed | dict(parse_setting(text) for text in args.settings))
-        training = Training(load_dataset(args.data, downscale=args.downscale), config, Path(folder), torch.device("cpu"), ranks)
+        dataset = load_dataset(args.data, downscale=args.downscale)
+        training = Training(dataset, config, Path(folder), torch.device("cpu"), ranks=ranks)
         found: dict[str, list[float]] = {name: [] for name in (
             "sparse ms", "sparse cpu ms", "dense ms", "dense cpu ms", "dense bytes", "sparse bytes", "rows", "entries",
         )}  # fmt: skip
