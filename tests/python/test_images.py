@@ -8,7 +8,7 @@ import pytest
 
 from splitnerf import _core
 from splitnerf.data import images
-from splitnerf.data.photos import averaged_codes
+from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.errors import InputError
 
 
@@ -53,26 +53,29 @@ def test_the_srgb_curve_keeps_shape_and_dtype():
         assert images.srgb_to_linear(coded) == pytest.approx(values, abs=1e-6)
 
 
-def test_downscale_averages_premultiplied_linear_light():
+def test_photos_are_averaged_by_premultiplied_linear_light():
     # One opaque white, one opaque black pixel above two transparent red ones: linear 0.5 at coverage 0.5.
     rgba = np.array([[[1, 1, 1, 1], [0, 0, 0, 1]], [[1, 0, 0, 0], [1, 0, 0, 0]]], dtype=np.float32)
-    result = images.downscale_rgba(rgba, 2)
+    result = decoded(averaged_codes(rgba, 2))
     assert result.shape == (1, 1, 4)
     assert result[0, 0] == pytest.approx([0.7353570] * 3 + [0.5], abs=1e-5)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
 @pytest.mark.parametrize("factor", [2, 3])
-def test_photos_are_averaged_as_floats_are(dtype, factor):
-    """To a step of 16 bits, with colours that weigh by alpha; and with all alike, what the photo shows there."""
+def test_photos_are_averaged_to_a_step_of_16_bits(dtype, factor):
+    """With colours that weigh by alpha; and with all alike, what the photo shows there."""
     values = np.random.default_rng(4).random((13, 11, 4))
     values[:6, :6, 3], values[6:9, :, 3] = 0, 1
     codes = values.astype(dtype) if dtype == np.float32 else np.rint(values * np.iinfo(dtype).max).astype(dtype)
     floats = codes / (1 if dtype == np.float32 else np.iinfo(dtype).max)
     weighed, alike = (averaged_codes(codes, factor, object_alone=alone) for alone in (True, False))
-    linear = images.area_average(images.srgb_to_linear(floats[..., :3]), factor)
-    np.testing.assert_allclose(weighed / 65535, images.downscale_rgba(floats, factor), atol=1.6e-5)
-    np.testing.assert_allclose(alike[..., :3] / 65535, images.linear_to_srgb(linear), atol=1.6e-5)
+    linear, alpha = images.srgb_to_linear(floats[..., :3]), floats[..., 3:]
+    coverage = images.area_average(alpha, factor)
+    of_object = images.area_average(linear * alpha, factor) / np.maximum(coverage, 1e-8)
+    np.testing.assert_allclose(weighed[..., :3] / 65535, images.linear_to_srgb(of_object), atol=1.6e-5)
+    np.testing.assert_allclose(weighed[..., 3:] / 65535, coverage, atol=1.6e-5)
+    np.testing.assert_allclose(alike[..., :3] / 65535, images.linear_to_srgb(images.area_average(linear, factor)), atol=1.6e-5)
     assert np.array_equal(weighed[..., 3], alike[..., 3]) and weighed[0, 0].tolist() == [0] * 4
     assert averaged_codes(codes, 1) is codes
 
@@ -85,8 +88,8 @@ def test_a_photo_that_cannot_be_averaged_is_refused():
         _core.average_photo(np.zeros((4, 9, 3), np.uint8), 2, True)
 
 
-def test_downscale_crops_what_fills_no_block():
-    assert images.downscale_rgba(np.ones((7, 5, 4), np.float32), 2).shape == (3, 2, 4)
+def test_an_average_leaves_out_what_fills_no_block():
+    assert averaged_codes(np.ones((7, 5, 4), np.float32), 2).shape == (3, 2, 4)
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".exr", ".hdr"])

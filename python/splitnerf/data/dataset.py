@@ -18,8 +18,8 @@ from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.loading import Loader
 from splitnerf.data.normalisation import MasksContradict, box_of_views, estimate_box, transform_points
-from splitnerf.data.photos import CERTAIN, Photo, averaged_codes, silhouette_factor
-from splitnerf.data.pixels import Photos, forget_pages, new_array, room_for_photos
+from splitnerf.data.photos import CERTAIN, Photo, silhouette_factor
+from splitnerf.data.pixels import Photos, averaged_codes, forget_pages, new_array, room_for_photos
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.notes import note_once

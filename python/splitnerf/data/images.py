@@ -205,24 +205,6 @@ def area_average(pixels: np.ndarray, factor: int) -> np.ndarray:
     return blocks.mean(axis=(1, 3), dtype=np.float32).astype(pixels.dtype)
 
 
-def downscale_rgba(rgba: np.ndarray, factor: int) -> np.ndarray:
-    """Downscales an sRGB image with straight alpha by averaging premultiplied linear light.
-
-    Args:
-        rgba: [H, W, 4] float32, sRGB colour in [0, 1], straight alpha.
-        factor: Integer factor, 1 returns the input unchanged.
-
-    Returns:
-        [H // factor, W // factor, 4] float32; colour is 0 where alpha is 0.
-    """
-    if factor == 1:
-        return rgba
-    alpha = rgba[..., 3:]
-    averaged = area_average(np.concatenate([srgb_to_linear(rgba[..., :3]) * alpha, alpha], axis=-1), factor)
-    linear = averaged[..., :3] / np.maximum(averaged[..., 3:], 1e-8)
-    return np.concatenate([linear_to_srgb(linear), averaged[..., 3:]], axis=-1)
-
-
 def over_background(srgb: np.ndarray, alpha: np.ndarray, background: float = 1.0) -> np.ndarray:
     """Composites a straight-alpha image over a grey background, in sRGB values as the protocol demands.
 

@@ -175,3 +175,19 @@ def sample_cubic(photo: Tensor, places: Tensor) -> Tensor:
     whole = places.floor()
     t = places - whole
     return (2.0 * sampled(places, "bicubic") + sampled(whole + t * t * (3.0 - 2.0 * t), "bilinear")) / 3.0
+
+
+def pixel_width(poses: np.ndarray, intrinsics: np.ndarray, middle: np.ndarray, *, nearest: float = 0.0) -> float:
+    """The width of a pixel at a point, as a median over the photos.
+
+    Args:
+        poses: [n, 4, 4] camera to world.
+        intrinsics: [n, 4] focal lengths and principal point in pixels.
+        middle: [3] the point, in the unit of the poses.
+        nearest: A distance; cameras that are nearer to the point count as that far from it.
+
+    Returns:
+        The width in the unit of the poses.
+    """
+    distance = np.maximum(np.linalg.norm(poses[:, :3, 3] - middle, axis=1), nearest)
+    return float(np.median(distance / intrinsics[:, 0]))

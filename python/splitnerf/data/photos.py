@@ -10,14 +10,13 @@ import numpy as np
 import torch
 from torch.nn.functional import interpolate
 
-from splitnerf import _core
 from splitnerf.data.environment import NEGATIVE_SHARE
 from splitnerf.data.images import (
     HDR_SUFFIXES, LDR_SUFFIXES, area_average, linear_to_srgb, read_codes, read_header, read_image,
 )  # fmt: skip
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics, undistort
-from splitnerf.data.pixels import decoded, encoded
+from splitnerf.data.pixels import averaged_codes, decoded, encoded
 from splitnerf.errors import InputError
 
 SILHOUETTE_SIZE = 100  # pixels, about, along the shorter edge of what the object is found from
@@ -210,22 +209,6 @@ def _read_pixels(path: Path) -> np.ndarray:
 def _read_mask(path: Path) -> np.ndarray:
     """[H, W, 1] as it is stored."""
     return _read_pixels(path)[..., :1]
-
-
-def averaged_codes(rgba: np.ndarray, factor: int, *, object_alone: bool = True) -> np.ndarray:
-    """A photo averaged down in linear light, block by block; incomplete blocks at the bottom and right are cropped.
-
-    Args:
-        rgba: [H, W, 4] sRGB, straight alpha: whole numbers, or floats in [0, 1].
-        factor: The edge of a block in pixels; 1 returns the photo itself.
-        object_alone: Whether colours weigh by alpha, and are 0 where it is 0; else they are the means of all.
-
-    Returns:
-        [H // factor, W // factor, 4] uint16.
-    """
-    if factor == 1:
-        return rgba
-    return _core.average_photo(rgba if rgba.dtype.kind != "f" else encoded(rgba, np.uint16), factor, object_alone)
 
 
 def _undistort(

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from splitnerf import ops
+from splitnerf import _core, ops
 from splitnerf.errors import InputError
 from splitnerf.memory import SHARE_OF_PHOTOS, memory_bytes
 
@@ -37,6 +37,22 @@ def encoded(values: np.ndarray, dtype: np.dtype) -> np.ndarray:
     if values.dtype == np.uint8:
         return values.astype(np.uint16) * np.uint16(257)
     return np.rint(values * np.float32(np.iinfo(dtype).max)).astype(dtype)
+
+
+def averaged_codes(rgba: np.ndarray, factor: int, *, object_alone: bool = True) -> np.ndarray:
+    """A photo averaged down in linear light, block by block; incomplete blocks at the bottom and right are cropped.
+
+    Args:
+        rgba: [H, W, 4] sRGB, straight alpha: whole numbers, or floats in [0, 1].
+        factor: The edge of a block in pixels; 1 returns the photo itself.
+        object_alone: Whether colours weigh by alpha, and are 0 where it is 0; else they are the means of all.
+
+    Returns:
+        [H // factor, W // factor, 4] uint16.
+    """
+    if factor == 1:
+        return rgba
+    return _core.average_photo(rgba if rgba.dtype.kind != "f" else encoded(rgba, np.uint16), factor, object_alone)
 
 
 class Photos:

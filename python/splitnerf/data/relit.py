@@ -12,7 +12,8 @@ import numpy as np
 
 from splitnerf.data.layouts import view_folders
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import HDR_SUFFIXES, downscale_rgba
+from splitnerf.data.images import HDR_SUFFIXES
+from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.data.truth import read_map
 from splitnerf.errors import InputError
 
@@ -45,7 +46,7 @@ def read_relit(dataset: Dataset, index: int, name: str) -> np.ndarray:
     pixels = read_map(dataset.image_paths[index], path, 4, dataset)
     if pixels is None:
         raise InputError(f"{path}: no such image, the truth of {dataset.frame_names[index]} under {name}; add it")
-    return downscale_rgba(pixels[..., :4], dataset.downscale)
+    return decoded(averaged_codes(pixels[..., :4], dataset.downscale))
 
 
 def map_files(folder: Path, *, prefixed: bool = False) -> dict[str, Path]:

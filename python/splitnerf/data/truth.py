@@ -21,7 +21,8 @@ import trimesh
 
 from splitnerf.data.layouts import view_folders
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import area_average, downscale_rgba, read_hdr, read_image, srgb_to_linear
+from splitnerf.data.images import area_average, read_hdr, read_image, srgb_to_linear
+from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.errors import InputError
 
 OPAQUE = 0.9
@@ -174,7 +175,7 @@ def _load_view(image_path: Path, dataset: Dataset) -> ViewTruth:
         averaged = area_average(np.concatenate([albedo[..., :3] * albedo[..., 3:4], albedo[..., 3:4]], axis=-1), factor)
         truth.albedo = averaged[..., :3] / np.maximum(averaged[..., 3:], 1e-8)
     elif albedo is not None:
-        truth.albedo = srgb_to_linear(downscale_rgba(albedo, factor)[..., :3])
+        truth.albedo = srgb_to_linear(decoded(averaged_codes(albedo, factor))[..., :3])
 
     orm = read("orm.png", 4)
     if orm is not None:

@@ -12,9 +12,10 @@ from scipy.sparse.linalg import cg
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.lens import pixel_width
 from splitnerf.ops import MeshScene
 from splitnerf.refinement.contours import Mesh, coverage_slopes, edges_of, outline_pieces
-from splitnerf.refinement.pixels import PixelFilter, Pixels, pixel_size, pixels_of
+from splitnerf.refinement.pixels import PixelFilter, Pixels, pixels_of
 
 ROUNDS = 3
 RAYS = 32  # of a pixel
@@ -115,7 +116,8 @@ def fit_outline(
     start = np.zeros((m, 3))
     start[place] = asset.vertices
     smooth = kron(SMOOTH * smoothness(faces, m) + ANCHOR * identity(m), identity(3)).tocsr()
-    largest, random = LARGEST * pixel_size(dataset, asset.vertices), np.random.default_rng(seed)
+    pixel = pixel_width(dataset.world_poses, dataset.intrinsics, asset.vertices.mean(0))
+    largest, random = LARGEST * pixel, np.random.default_rng(seed)
     errors, moved = [], np.zeros(3 * m)
     for turn in range(ROUNDS + 1):
         mesh = Mesh(start + moved.reshape(-1, 3), faces, edges)

@@ -72,12 +72,6 @@ class Pixels:
         return np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
 
 
-def pixel_size(dataset: Dataset, vertices: np.ndarray) -> float:
-    """The width of a pixel at the middle of vertices [n, 3], in world units, as a mean over the photos."""
-    distance = np.linalg.norm(dataset.world_poses[:, :3, 3] - vertices.mean(0), axis=1).mean()
-    return float(distance / dataset.intrinsics[:, 0].mean())
-
-
 def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int, seed: int = 0) -> Pixels:
     """Pixels of a split, photo by photo.
 

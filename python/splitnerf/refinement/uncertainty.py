@@ -16,7 +16,7 @@ from torch import Tensor
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
-from splitnerf.refinement.pixels import pixel_size
+from splitnerf.data.lens import pixel_width
 from splitnerf.refinement.texels import AssetTexels
 from splitnerf.refinement.unknowns import MAX_TILT, N_UNKNOWNS, per_unknown
 
@@ -117,7 +117,7 @@ def patch_width(dataset: Dataset, texels: AssetTexels) -> int:
     asset = texels.asset
     a, b, c = (asset.vertices[asset.triangles[:, i]].astype(np.float64) for i in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-    pixel = pixel_size(dataset, asset.vertices)
+    pixel = pixel_width(dataset.world_poses, dataset.intrinsics, asset.vertices.mean(0))
     return max(1, round(PATCH_PIXELS * pixel / np.sqrt(area / max(len(texels.index), 1))))
 
 

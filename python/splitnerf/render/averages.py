@@ -8,6 +8,7 @@ import numpy as np
 
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.lens import pixel_width
 from splitnerf.render.edges import average_with_edges
 
 LEAST_EDGE = 8  # pixels along the shorter edge of an average
@@ -39,7 +40,6 @@ def averaging_factor(dataset: Dataset, config: Config) -> int:
     the photos.
     """
     surface, most = config.surface, max(1, min(dataset.height, dataset.width) // LEAST_EDGE)
-    distance = np.maximum(np.linalg.norm(dataset.poses[:, :3, 3], axis=1), surface.box)
-    pixel = np.median(distance / dataset.intrinsics[:, 0])
+    pixel = pixel_width(dataset.poses, dataset.intrinsics, np.zeros(3), nearest=surface.box)
     cell = 2 * surface.box / surface.finest_cells
     return int(np.clip(config.sampling.pixel_cells * cell / pixel, 1, most))

@@ -7,8 +7,7 @@ import itertools
 import numpy as np
 import torch
 
-from splitnerf.data.photos import averaged_codes
-from splitnerf.data.pixels import decoded
+from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.ops import EdgeRuns
 from splitnerf.render.masks import joined, runs_of, widened
 
