@@ -2,11 +2,10 @@
 
 Training's light is smooth. A sun comes out as a glow of tens of degrees, whose shadows have no edges, and the albedo takes the
 edges of the sun's shadow. Nothing pulls them out again: light and albedo together explain the photos. But albedo knows nothing
-of shadows. Of two points close together, one in the shadow of the glow's middle and one beside it, the albedo is the same on
+of shadows. Of two points close together, one in the shadow of a part of the glow and one beside it, the albedo is the same on
 average over many pairs. If the glow stands for a compact lamp, the albedo beside the shadow is instead as much brighter as the
-lamp adds there. So pairs close together tell the lamp's direction (where they differ most) and its width (whose contrasts they
-have). Pairs farther apart, at which training's blur ends, tell its share of the power. The light of the glow is then brought
-together; the power of all light stays.
+lamp adds there. So the lamp's direction, width and power are those that leave the least contrasts between such points. The
+light of the glow is then brought together; the power of all light stays.
 """
 
 from __future__ import annotations
@@ -18,26 +17,29 @@ import torch
 
 from splitnerf.data.environment import directions_of_texels
 from splitnerf.export.bake import rasterise
-from splitnerf.ops import MeshScene, trace_visibility
+from splitnerf.ops import MeshScene, visibility_bits
 from splitnerf.refinement.texels import AssetTexels, materials_of, neighbours
 
 REACH = 30.0  # degrees from a glow's middle to its end
 RING = 15.0  # width in degrees of the ring around it whose median is the light behind it
-N_PAIRS = 200_000  # pairs among which those at the shadow's edge are sought
-N_EDGE = 4_000  # pairs at the edge of which contrasts are computed
+APART = 6  # widths of a patch between the points of a pair: with 2, training's blur makes suns of 1 degree into lamps of 8
+N_PAIRS = 50_000  # pairs among which those at shadows' edges are sought
+N_EDGE = 4_000  # pairs at the edges of shadows of which contrasts are computed
 FEWEST = 100
-MIN_COSINE = 0.2  # of a pair's normals and the lamp
+LEAST_PART = 0.1  # of the glow's middle that one point of such a pair sees and the other does not
 MIN_ALIKE = 0.8  # cosine of the normals of a pair
 MAX_METALLIC = 0.5  # a metal's albedo scales what it mirrors, not its irradiance
-MIN_ALBEDO = 0.05  # of the brighter of the pairs that tell the power; darker dielectrics mirror more than they scatter
+MIN_ALBEDO = 0.05  # of the brighter one of a pair; darker dielectrics mirror more than they scatter
 LARGEST_CONTRAST = 1.5  # of log albedo; beyond it, it is the texture's
-FARTHER = 4  # times as far apart are the pairs that tell the power
-SEARCH = ((2.0, 3), (0.7, 3), (0.25, 3))  # steps in degrees and steps to either side
-RADII = (5.0, 3.0)  # degrees; fits of lamps narrower than two texels of the light are noisy
-POINT = 0.5  # radius in degrees of a lamp whose shadow ends within a pair
-FACTORS = np.arange(1.0, 3.01, 0.1)  # of the lamp's power
 NEAR = 0.15  # contrasts that differ by more count less and less
-N_BEHIND, N_GLOW, N_LAMP = 512, 256, 32  # directions of the three parts of the light
+MIDDLES = 12.0  # degrees from the glow's middle to the farthest one of a lamp that is tried
+N_MIDDLES, N_FINER, FINER = 448, 64, 1.0  # directions that are tried; then those within some degrees of the best
+RADII = (1.0, 3.0, 5.0, 8.0, 12.0)  # degrees
+LEAST_RADIUS = 3.0  # of the lamp in the light: fits of lamps narrower than two texels of it are noisy
+FACTORS = np.arange(1.0, 3.01, 0.1)  # of the lamp's power; every COARSE-th is tried first
+COARSE = 4
+N_MIDDLE, N_TABLE = 32, 1792  # directions of the glow's middle, and of all light that a lamp may have; multiples of 32
+N_BEHIND, N_GLOW = 512, 256  # directions that stand for the other light and for the glow; multiples of 32
 MIN_SIGMAS = 5.0  # by which a compact lamp must explain the pairs better
 DARK = 0.02  # share of the mean light that counts as none
 
@@ -63,7 +65,7 @@ class CompactLamp(NamedTuple):
         direction: [3] unit, a list.
         radius: Degrees.
         factor: The lamp's power beside the glow's, where the rest of the light stays.
-        pairs: The number of pairs at the shadow's edge that told direction and width.
+        pairs: The number of pairs that told it.
     """
 
     direction: list[float]
@@ -99,79 +101,6 @@ def unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-20)
 
 
-class Pairs:
-    """Pairs of texels' points that are close together and face the same way, and what light they see.
-
-    Args:
-        texels: The asset's texels.
-        apart: Texels between the two of a pair.
-        least: Albedo that one of a pair must have.
-        seed: Of the choice of pairs.
-    """
-
-    def __init__(self, texels: AssetTexels, apart: int, least: float, seed: int):
-        asset, covered = texels.asset, rasterise(texels.asset.uv, texels.asset.triangles, texels.size)
-        pairs = neighbours(covered, texels.chart, texels.size, apart)
-        chosen = np.random.default_rng(seed).permutation(len(pairs))[:N_PAIRS]
-        texel = pairs[chosen].reshape(-1)
-        triangle, (_, u, v) = covered.triangle[texel], covered.weights[texel].T
-        outside = covered.interpolate(asset.normals, asset.triangles)[texel]
-        samples = texels.sample(triangle, u, v, outside)
-        values = texels.start[texel]
-        normals = materials_of(values, samples).normals.numpy()
-        offset = 2e-3 * float(np.ptp(asset.vertices, axis=0).max())
-        dielectric = values[:, 4].reshape(-1, 2).amax(1) < MAX_METALLIC
-        scatters = dielectric & (values[:, :3].mean(1).reshape(-1, 2).amax(1) > least)
-        alike = (normals[0::2] * normals[1::2]).sum(axis=1) > MIN_ALIKE
-        use = np.repeat(alike & scatters.numpy(), 2)
-        self.scene = MeshScene(asset.vertices, asset.triangles)
-        self.normals, self.geometric = normals[use], samples.geometric.numpy()[use]
-        self.origins = samples.positions.numpy()[use] + offset * self.geometric
-        self.albedo = np.log(np.maximum(values[:, :3].numpy()[use], 1e-3)).mean(axis=1)
-
-    def seen(self, direction: np.ndarray, which: np.ndarray) -> np.ndarray:
-        """[k] bool, whether points `which` [k] see a direction."""
-        towards = np.broadcast_to(direction.astype(np.float32), (len(which), 3)).copy()
-        origins = np.ascontiguousarray(self.origins[which], np.float32)
-        return trace_visibility(self.scene, torch.from_numpy(origins), torch.from_numpy(towards)).numpy()
-
-    def edge(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The numbers [k] of the pairs of which one sees a direction, and by how much its log albedo is larger [k]."""
-        cosines = (self.normals @ direction).reshape(-1, 2)
-        facing = np.flatnonzero(cosines.min(axis=1) > MIN_COSINE)
-        lit = self.seen(direction, (2 * facing[:, None] + [0, 1]).reshape(-1)).reshape(-1, 2)
-        mixed = lit[:, 0] != lit[:, 1]
-        at = facing[mixed]
-        contrast = self.albedo[2 * at] - self.albedo[2 * at + 1]
-        sign = np.where(lit[mixed, 0], 1.0, -1.0)
-        return at, np.clip(contrast * sign, -LARGEST_CONTRAST, LARGEST_CONTRAST)
-
-    def irradiance(self, which: np.ndarray, directions: np.ndarray, powers: np.ndarray) -> np.ndarray:
-        """[k] irradiance, as a mean over the channels, of points `which` [k] by lamps at directions [n, 3] of powers [n, 3]."""
-        total = np.zeros(len(which))
-        for direction, power in zip(directions, powers.mean(axis=1)):
-            cosine = self.normals[which] @ direction
-            faces = np.flatnonzero((cosine > 0) & (self.geometric[which] @ direction > 0))
-            total[faces] += power * cosine[faces] * self.seen(direction, which[faces])
-        return total
-
-
-def sharpest_direction(pairs: Pairs, start: np.ndarray) -> np.ndarray:
-    """The direction [3] around `start` at the edge of whose shadow the albedo differs most."""
-
-    def difference(direction: np.ndarray) -> float:
-        contrast = pairs.edge(direction)[1]
-        return float(contrast.sum() / np.sqrt(max(len(contrast), 1)))
-
-    best = start
-    for step, n in SEARCH:
-        side = unit(np.cross(best, np.eye(3)[np.abs(best).argmin()]))
-        up, around = np.cross(best, side), np.radians(step) * np.arange(-n, n + 1)
-        tried = [unit(best + x * side + y * up) for x in around for y in around]
-        best = tried[int(np.argmax([difference(direction) for direction in tried]))]
-    return best
-
-
 def parts_of_light(light: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Directions [n, 3] and powers [n, 3] that stand for a map [h, 2 h, 3], each of the same power."""
     directions, areas = directions_of_texels(light.shape[0])
@@ -190,89 +119,163 @@ def disc(direction: np.ndarray, radius: float, n: int) -> np.ndarray:
     return unit(direction + (away * np.cos(turn))[:, None] * side + (away * np.sin(turn))[:, None] * up)
 
 
-class Edge:
-    """Pairs at the edge of the shadow of a glow's middle: the contrast of their albedo, and that of the light on them.
-
-    Args:
-        pairs: The pairs among which they are.
-        direction: [3] the middle.
-        light: [h, 2 h, 3] linear radiance.
-        glow: The glow in it.
-        seed: Of the choice of at most N_EDGE pairs.
+class Points(NamedTuple):
+    """Points of an asset's surface, two by two: those of a pair are close together and face the same way.
 
     Attributes:
-        contrast: [k] log albedo of the lit point less that of the other.
+        scene: The mesh.
+        origins, normals, geometric: [2 k, 3] where rays start, unit shading normals and normals of the triangles.
+        albedo: [2 k] its logarithm, as a mean over the channels.
     """
 
-    def __init__(self, pairs: Pairs, direction: np.ndarray, light: np.ndarray, glow: Glow, seed: int):
-        at, contrast = pairs.edge(direction)
-        chosen = np.random.default_rng(seed).permutation(len(at))[:N_EDGE]
-        self.contrast = contrast[chosen]
-        self._pairs, self._direction, self._power = pairs, direction, glow.power
-        points = (2 * at[chosen][:, None] + [0, 1]).reshape(-1)
-        lit = pairs.seen(direction, points[0::2])
-        self._points = np.where(lit[:, None], points.reshape(-1, 2), points.reshape(-1, 2)[:, ::-1]).reshape(-1)
-        self._behind = pairs.irradiance(self._points, *parts_of_light(light - glow.radiance, N_BEHIND))
-        self._before = self._behind + pairs.irradiance(self._points, *parts_of_light(glow.radiance, N_GLOW))
+    scene: MeshScene
+    origins: np.ndarray
+    normals: np.ndarray
+    geometric: np.ndarray
+    albedo: np.ndarray
 
-    def __len__(self) -> int:
-        return len(self.contrast)
+    def chosen(self, pairs: np.ndarray) -> Points:
+        """The points of pairs, by their numbers [m] or by [k] bool."""
+        of_points = (x.reshape(-1, 2, *x.shape[1:])[pairs].reshape(-1, *x.shape[1:]) for x in self[1:])
+        return Points(self.scene, *of_points)
 
-    def lamp(self, radius: float) -> np.ndarray:
-        """[2 k] the irradiance of the points by a lamp of a radius in degrees in the place of the glow."""
-        powers = np.broadcast_to(self._power / N_LAMP, (N_LAMP, 3))
-        return self._pairs.irradiance(self._points, disc(self._direction, radius, N_LAMP), powers)
-
-    def left(self, lamp: np.ndarray) -> np.ndarray:
-        """[k] the contrasts that the albedo keeps where a lamp with an irradiance [2 k] takes the place of the glow."""
-        least = DARK * self._before.mean()
-        change = np.log(np.maximum(self._behind + lamp, least) / np.maximum(self._before, least)).reshape(-1, 2)
-        return self.contrast - np.clip(change[:, 0] - change[:, 1], -LARGEST_CONTRAST, LARGEST_CONTRAST)
+    def cosines(self, directions: np.ndarray) -> np.ndarray:
+        """[2 k, n] what the points receive of lamps of power 1 at directions [n, 3], n a multiple of 32: the cosine where they see them."""
+        tensors = (torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (self.origins, self.geometric, directions))
+        bits = visibility_bits(self.scene, *tensors, offset=0.0)[0][:, 0].contiguous().numpy()
+        seen = np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little")
+        return seen * np.clip(self.normals @ directions.T, 0, None).astype(np.float32)
 
 
-def compact_lamp(texels: AssetTexels, light: np.ndarray, apart: int, seed: int) -> tuple[np.ndarray, CompactLamp | None]:
+def pairs_of(texels: AssetTexels, apart: int, seed: int) -> Points:
+    """At most N_PAIRS pairs of texels' points, some texels apart; none of a metal, and none where both are black."""
+    asset, covered = texels.asset, rasterise(texels.asset.uv, texels.asset.triangles, texels.size)
+    pairs = neighbours(covered, texels.chart, texels.size, apart)
+    texel = pairs[np.random.default_rng(seed).permutation(len(pairs))[:N_PAIRS]].reshape(-1)
+    triangle, (_, u, v) = covered.triangle[texel], covered.weights[texel].T
+    samples = texels.sample(triangle, u, v, covered.interpolate(asset.normals, asset.triangles)[texel])
+    values = texels.start[texel]
+    normals, geometric = materials_of(values, samples).normals.numpy(), samples.geometric.numpy()
+    albedo, metallic = values[:, :3].numpy(), values[:, 4].numpy()
+    offset = 2e-3 * float(np.ptp(asset.vertices, axis=0).max())
+    points = Points(
+        MeshScene(asset.vertices, asset.triangles), samples.positions.numpy() + offset * geometric, normals, geometric,
+        np.log(np.maximum(albedo, 1e-3)).mean(axis=1),
+    )  # fmt: skip
+    alike = (normals[0::2] * normals[1::2]).sum(axis=1) > MIN_ALIKE
+    dielectric = metallic.reshape(-1, 2).max(axis=1) < MAX_METALLIC
+    return points.chosen(alike & dielectric & (albedo.mean(axis=1).reshape(-1, 2).max(axis=1) > MIN_ALBEDO))
+
+
+def at_edges(points: Points, glow: Glow, seed: int) -> Points:
+    """At most N_EDGE of the pairs whose points see different parts of a glow's middle."""
+    middle = points.cosines(disc(glow.direction, MIDDLES, N_MIDDLE))
+    part = np.abs(middle[0::2] - middle[1::2]).mean(axis=1)
+    return points.chosen(np.random.default_rng(seed).permutation(np.flatnonzero(part > LEAST_PART))[:N_EDGE])
+
+
+class Contrasts:
+    """The contrasts of pairs' log albedo, and what lamps in the place of a glow leave of them.
+
+    Args:
+        points: The pairs.
+        light: [h, 2 h, 3] linear radiance.
+        glow: The glow in it.
+
+    Attributes:
+        costs: [k] of the contrasts as they are.
+    """
+
+    def __init__(self, points: Points, light: np.ndarray, glow: Glow):
+        self._contrast = np.clip(points.albedo[0::2] - points.albedo[1::2], -LARGEST_CONTRAST, LARGEST_CONTRAST)
+        self.costs = robust(self._contrast)
+        self._power = float(glow.power.mean())
+        self._directions = disc(glow.direction, MIDDLES + max(RADII), N_TABLE)
+        self._table = points.cosines(self._directions)
+        arriving = [
+            points.cosines(directions) @ powers.mean(axis=1)
+            for directions, powers in (parts_of_light(light - glow.radiance, N_BEHIND), parts_of_light(glow.radiance, N_GLOW))
+        ]  # fmt: skip
+        self._behind, self._before = arriving[0], arriving[0] + arriving[1]
+        self._least = DARK * self._before.mean()
+
+    def lamps(self, middles: np.ndarray, radius: float) -> np.ndarray:
+        """[2 k, n] irradiance of the points by lamps of the glow's power around middles [n, 3], of a radius in degrees."""
+        spacing = (MIDDLES + max(RADII)) * np.sqrt(np.pi / N_TABLE)
+        away = np.degrees(np.arccos(np.clip(self._directions @ middles.T, -1, 1)))
+        shares = np.clip((radius - away) / spacing + 0.5, 0, 1)
+        return self._power * (self._table @ (shares / shares.sum(axis=0)).astype(np.float32))
+
+    def costs_left(self, lamps: np.ndarray, factor: float) -> np.ndarray:
+        """[k, n] of what is left of the contrasts where lamps of an irradiance [2 k, n] times a factor take the glow's place."""
+        after = np.maximum(self._behind[:, None] + factor * lamps, self._least)
+        change = np.log(after / np.maximum(self._before, self._least)[:, None])
+        change = np.clip(change[0::2] - change[1::2], -LARGEST_CONTRAST, LARGEST_CONTRAST)
+        return robust(self._contrast[:, None] - change)
+
+
+def robust(contrast: np.ndarray) -> np.ndarray:
+    """The cost of contrasts, which are the texture's where they are large."""
+    return np.log1p(np.square(contrast / NEAR))
+
+
+class Trial(NamedTuple):
+    """A lamp that was tried: its mean cost, direction [3], radius in degrees and factor."""
+
+    cost: float
+    direction: np.ndarray
+    radius: float
+    factor: float
+
+
+def best_lamp(contrasts: Contrasts, middles: np.ndarray, radii: tuple[float, ...], factors: np.ndarray) -> Trial:
+    """The lamp that leaves the least contrasts, of all with middles [n, 3], radii in degrees and factors."""
+    trials = []
+    for radius in radii:
+        lamps = contrasts.lamps(middles, radius)
+        for factor in factors:
+            costs = contrasts.costs_left(lamps, factor).mean(axis=0)
+            best = int(np.argmin(costs))
+            trials.append(Trial(float(costs[best]), middles[best], radius, float(factor)))
+    return min(trials, key=lambda trial: trial.cost)
+
+
+def compact_lamp(texels: AssetTexels, light: np.ndarray, patch: int, seed: int) -> tuple[np.ndarray, CompactLamp | None]:
     """The light with its brightest glow brought together, where the albedo says that it is a compact lamp.
 
     Args:
         texels: The asset that was trained with the light.
         light: [h, 2 h, 3] linear radiance.
-        apart: The width of two pixels of the photos in texels.
+        patch: The width of two pixels of the photos in texels.
         seed: Of the choice of pairs.
 
     Returns:
-        The light, and what was found: None where the glow stays as it is.
+        The light, and what was found: None where the glow stays as it is. So it does where the best lamp is the broadest or the
+        farthest from its middle of all that are tried: there may be a better one beyond.
     """
     glow = brightest_glow(light)
     if not glow.radiance.any():
         return light, None
-    pairs = Pairs(texels, max(2, apart), 0.0, seed)
-    direction = sharpest_direction(pairs, glow.direction)
-    edge = Edge(pairs, direction, light, glow, seed)
-    if len(edge) < FEWEST:
+    points = at_edges(pairs_of(texels, APART * patch, seed), glow, seed)
+    n_pairs = len(points.albedo) // 2
+    if n_pairs < FEWEST:
         return light, None
-    kept, radius = min(((edge.left(edge.lamp(r)), r) for r in RADII), key=lambda pair: np.square(pair[0]).mean())
-    gain = np.square(edge.contrast) - np.square(kept)
-    if gain.mean() < MIN_SIGMAS * gain.std() / np.sqrt(len(gain)):
+    contrasts = Contrasts(points, light, glow)
+    rough = best_lamp(contrasts, disc(glow.direction, MIDDLES, N_MIDDLES), RADII, FACTORS[::COARSE])
+    best = best_lamp(contrasts, disc(rough.direction, FINER, N_FINER), (rough.radius,), FACTORS)
+    gain = contrasts.costs - contrasts.costs_left(contrasts.lamps(best.direction[None], best.radius), best.factor)[:, 0]
+    at_rim = best.radius == max(RADII) or degrees_from(best.direction, glow.direction) > MIDDLES - FINER
+    if at_rim or gain.mean() < MIN_SIGMAS * gain.std() / np.sqrt(n_pairs):
         return light, None
-    far = Edge(Pairs(texels, FARTHER * max(2, apart), MIN_ALBEDO, seed), direction, light, glow, seed)
-    found = CompactLamp(direction.tolist(), radius, power_factor(far), len(edge))
+    found = CompactLamp(best.direction.tolist(), best.radius, best.factor, n_pairs)
     return with_lamp(light, glow, found), found
-
-
-def power_factor(edge: Edge) -> float:
-    """The factor of the glow's power by which a lamp leaves the least contrasts; 1 where pairs are too few to tell."""
-    if len(edge) < FEWEST:
-        return 1.0
-    lamp = edge.lamp(POINT)
-    costs = [np.log1p(np.square(edge.left(factor * lamp) / NEAR)).mean() for factor in FACTORS]
-    return float(FACTORS[int(np.argmin(costs))])
 
 
 def with_lamp(light: np.ndarray, glow: Glow, lamp: CompactLamp) -> np.ndarray:
     """A map [h, 2 h, 3] with a lamp, at least one texel wide, in the place of a glow, and of the same power in all."""
     directions, areas = directions_of_texels(light.shape[0])
     away = degrees_from(directions, np.array(lamp.direction))
-    inside = away <= max(lamp.radius, away.min())
+    inside = away <= max(lamp.radius, LEAST_RADIUS, away.min())
     changed = light - glow.radiance
     changed[inside] += lamp.factor * glow.power / areas[inside].sum()
     power_of = lambda map_: (map_.mean(axis=2) * areas).sum()  # noqa: E731
