@@ -104,14 +104,14 @@ def compare_sums(training: Training, found: dict[str, list[float]]) -> None:
     """Lets each step sum its gradients in three ways, checks that they agree, and notes times and bytes."""
     ranks, table = training.ranks, training.model.sdf_field.grid.table
     summed: Callable[[Iterable[Tensor]], None] = ranks.sum_gradients
-    by_torch: list[ByTorch] = []
+    by_torch: dict[int, ByTorch] = {}  # by the number of parameters: the light's are not among them in each step
 
     def all_ways(parameters: Iterable[Tensor]) -> None:
         parameters = list(parameters)
-        if not by_torch:
-            by_torch.append(ByTorch(parameters))
+        if len(parameters) not in by_torch:
+            by_torch[len(parameters)] = ByTorch(parameters)
         gradients = [torch.zeros_like(p) if p.grad is None else p.grad.clone() for p in parameters]
-        means, wall, cpu = by_torch[0].sum(gradients)
+        means, wall, cpu = by_torch[len(parameters)].sum(gradients)
         found["torch ms"].append(wall)
         found["torch cpu ms"].append(cpu)
         own = table.grad.detach().clone().view(-1, training.config.surface.n_features)

@@ -27,6 +27,7 @@ from splitnerf.training.finite import UNEXPLAINED, Diverged
 from splitnerf.training.losses import Terms
 
 PATIENCE = timedelta(days=1)  # the first process may look for the object, or mesh, while the others wait
+LARGE = 1 << 17  # numbers of a gradient that is summed by itself; smaller ones are summed together
 Made = TypeVar("Made")
 
 
@@ -142,9 +143,9 @@ ALONE = Alone()
 class Ranks(Alone):
     """The processes of one torchrun. Each draws the whole batch and takes every ``size``-th ray of it.
 
-    Most steps have two collectives (learned exposures, a refresh of the grid and a new mesh have more): a few dozen numbers between the forward and the backward pass, by :meth:`agree`, and all gradients
-    after it, by :meth:`sum_gradients`. Decisions that depend on time or on counts are taken from the former, so that they are equal
-    everywhere.
+    Most steps exchange two things (learned exposures, a refresh of the grid and a new mesh need more): a few dozen numbers between the
+    forward and the backward pass, by :meth:`agree`, and all gradients after it, by :meth:`sum_gradients`. Decisions that depend on
+    time or on counts are taken from the former, so that they are equal everywhere.
 
     Args:
         rank, size: The number of this process, and of all.
@@ -211,9 +212,13 @@ class Ranks(Alone):
         here = torch.tensor([p.grad is not None for p in parameters], dtype=torch.float32)
         present = pinned(here, device).to(device, non_blocking=True)  # else the host would wait for the backward pass
         parts = [torch.zeros_like(p) if p.grad is None else p.grad for p in parameters]
-        flat = self.summed(torch.cat([*(part.reshape(-1) for part in parts), present]))
-        *sums, present = flat.split([*(p.numel() for p in parameters), len(parameters)])
-        torch._foreach_copy_(parts, [x.view_as(part) for x, part in zip(sums, parts)])
+        small = [part for part in parts if part.numel() < LARGE]
+        flat = self.summed(torch.cat([*(part.reshape(-1) for part in small), present]))
+        *sums, present = flat.split([*(part.numel() for part in small), len(parameters)])
+        torch._foreach_copy_(small, [x.view_as(part) for x, part in zip(sums, small)])
+        for part in parts:
+            if part.numel() >= LARGE:  # the table's: summed where it lies
+                self.summed(part)
         for i, (parameter, part) in enumerate(zip(parameters, parts)):
             if parameter.grad is None and present[i] > 0:  # only another process has one
                 parameter.grad = part
