@@ -140,7 +140,7 @@ class Points(NamedTuple):
         return Points(self.scene, *of_points)
 
     def cosines(self, directions: np.ndarray) -> np.ndarray:
-        """[2 k, n] what the points receive of lamps of power 1 at directions [n, 3], n a multiple of 32: the cosine where they see them."""
+        """[2 k, n] irradiance by lamps of power 1 at directions [n, 3], n a multiple of 32: the cosine, 0 where they are hidden."""
         tensors = (torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (self.origins, self.geometric, directions))
         bits = visibility_bits(self.scene, *tensors, offset=0.0)[0][:, 0].contiguous().numpy()
         seen = np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little")
@@ -207,7 +207,7 @@ class Contrasts:
         return self._power * (self._table @ (shares / shares.sum(axis=0)).astype(np.float32))
 
     def costs_left(self, lamps: np.ndarray, factor: float) -> np.ndarray:
-        """[k, n] of what is left of the contrasts where lamps of an irradiance [2 k, n] times a factor take the glow's place."""
+        """[k, n] of what lamps of an irradiance [2 k, n] times a factor leave of the contrasts in the glow's place."""
         after = np.maximum(self._behind[:, None] + factor * lamps, self._least)
         change = np.log(after / np.maximum(self._before, self._least)[:, None])
         change = np.clip(change[0::2] - change[1::2], -LARGEST_CONTRAST, LARGEST_CONTRAST)
