@@ -1,7 +1,8 @@
-"""Devices of tensors."""
+"""Devices of tensors, and processors."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 
@@ -27,6 +28,17 @@ def choose_device(name: str) -> torch.device:
     if not torch.cuda.is_available():
         raise InputError(f"--device {name}: torch finds no GPU; install a torch built for CUDA and its driver")
     return torch.device("cuda", torch.cuda.current_device())
+
+
+def refuse_one_processor() -> None:
+    """Refuses a machine with one processor: there xatlas 0.0.11, which makes texture coordinates, writes beyond its memory, as it
+    has room for the threads that the processors run at a time and uses one more.
+
+    Raises:
+        InputError: The machine has one processor.
+    """
+    if os.cpu_count() == 1:
+        raise InputError("this machine has one processor, where xatlas 0.0.11 (texture coordinates) crashes; use one with two or more")
 
 
 @contextmanager

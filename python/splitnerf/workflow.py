@@ -20,6 +20,7 @@ from splitnerf.data.json_files import write_json
 from splitnerf.data.reading import SEPARATED, Reading, is_separated
 from splitnerf.data.truth import read_mesh
 from splitnerf.delivery import LAST_STAGE_FILES, discard_last_stage, finish, is_refined, score_run, write_run_report
+from splitnerf.devices import refuse_one_processor
 from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Evaluated, Protocol, choose_views, evaluation_path
 from splitnerf.files import atomic_path, held
@@ -64,11 +65,12 @@ def load_splits(
 
 
 def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
-    """Checks what stands where a run is to be.
+    """Checks that a run can be made here, and what stands where it is to be.
 
     Raises:
-        InputError: The folder holds a run or a data set, or the path is not a folder.
+        InputError: The folder holds a run or a data set, the path is not a folder, or the machine has one processor.
     """
+    refuse_one_processor()
     if run.exists() and not run.is_dir():
         raise InputError(f"{run}: is a file; give --out a folder")
     refuse_data(run)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
 import shutil
 import sys
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import torch
 from op_checks import has_cuda_kernel
@@ -14,11 +16,13 @@ from pretend_gpu import pretend_gpu
 
 from splitnerf import _core, memory
 from splitnerf.cli import main
-from splitnerf.cli.exit_codes import DONE, FAILED
+from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED
 from splitnerf.cli.train import device_for
 from splitnerf.doctor import machine, self_test
 from splitnerf.doctor.choice import fit_device
 from splitnerf.doctor.table import CHECKS
+from splitnerf.errors import InputError
+from splitnerf.export.unwrap import unwrap
 from splitnerf.ops._library import lib
 
 OPERATORS = sorted(
@@ -108,7 +112,7 @@ def test_all_is_well_here(capsys, command):
     assert main([command]) == DONE
     said = capsys.readouterr().out
     assert f"{len(OPERATORS)} operators, all as they should be" in said
-    for name in ("splitnerf", "Python", "torch", "kernels", "CUDA", "ray tracing", "memory", "disk"):
+    for name in ("splitnerf", "Python", "torch", "kernels", "CUDA", "ray tracing", "texture coordinates", "memory", "disk"):
         assert f"\n{name} " in f"\n{said}"
     lines = [line for line in said.splitlines() if "->" not in line]
     assert all(line[23] == " " and line[24] != " " for line in lines)  # values stand below each other
@@ -219,6 +223,17 @@ def test_without_embree(monkeypatch):
     assert not machine.ray_tracing().failed and "libembree-dev" in machine.ray_tracing().advice
     monkeypatch.setattr(machine, "find_spec", lambda name: None)
     assert machine.ray_tracing().failed and machine.ray_tracing().advice == "pip install embreex"
+
+
+def test_one_processor(monkeypatch, tmp_path, capsys):
+    """xatlas crashes there: a training is refused before it begins, and an export before its work is lost."""
+    assert not machine.texture_coordinates().failed
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    assert machine.texture_coordinates().failed and "two or more" in machine.texture_coordinates().advice
+    assert main(["train", str(tmp_path), "--out", str(tmp_path / "run")]) == BAD_INPUT
+    assert "has one processor" in capsys.readouterr().err and not (tmp_path / "run").exists()
+    with pytest.raises(InputError, match="has one processor"):
+        unwrap(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), 64)
 
 
 def test_little_memory_and_disk(monkeypatch, tmp_path):

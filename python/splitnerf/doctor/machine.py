@@ -14,6 +14,8 @@ import torch
 
 import splitnerf
 from splitnerf import _core
+from splitnerf.devices import refuse_one_processor
+from splitnerf.errors import InputError
 from splitnerf.memory import SHARE_OF_PHOTOS, control_group, memory_bytes
 
 INSTALL = "pip install --no-build-isolation ."
@@ -66,7 +68,7 @@ def findings(folder: Path) -> list[Finding]:
     system = f"{platform.python_version()}, {platform.system()} {platform.machine()}"
     return [
         Finding("splitnerf", splitnerf.__version__), Finding("Python", system), threads(), kernels(), cuda(),
-        ray_tracing(), memory(), disk(folder), *map(optional, PACKAGES),
+        ray_tracing(), texture_coordinates(), memory(), disk(folder), *map(optional, PACKAGES),
     ]  # fmt: skip
 
 
@@ -150,6 +152,14 @@ def ray_tracing() -> Finding:
     if find_spec("embreex") is None:
         return Finding("ray tracing", f"{value}; not installed", "pip install embreex", failed=True)
     return Finding("ray tracing", value, f"for faster rays: apt-get install libembree-dev, then {INSTALL}")
+
+
+def texture_coordinates() -> Finding:
+    try:
+        refuse_one_processor()
+    except InputError as error:
+        return Finding("texture coordinates", "xatlas", str(error), failed=True)
+    return Finding("texture coordinates", "xatlas")
 
 
 def memory() -> Finding:

@@ -6,6 +6,8 @@ import numpy as np
 import trimesh
 import xatlas
 
+from splitnerf.devices import refuse_one_processor
+
 PADDING = 4  # texels between charts
 CHARTS = 64  # no chart has more than 1 / CHARTS of the surface: its time rises with the square of its faces
 
@@ -21,7 +23,11 @@ def unwrap(vertices: np.ndarray, faces: np.ndarray, texture_size: int) -> tuple[
     Returns:
         origins [k] int64, the vertex that each new one is a copy of; faces [m, 3] int32 of the new vertices; and
         uv [k, 2] float32 in [0, 1], (0, 0) the top left corner.
+
+    Raises:
+        InputError: The machine has one processor.
     """
+    refuse_one_processor()
     atlas = xatlas.Atlas()
     atlas.add_mesh(vertices, faces.astype(np.uint32))
     options = xatlas.PackOptions()
