@@ -18,7 +18,7 @@ done
 options="-C cmake.define.SPLITNERF_CUDA_LINES=OFF"
 for option in ${CMAKE_OPTIONS:-SPLITNERF_CUDA=OFF}; do options="$options -C cmake.define.$option"; done
 [ -z "${BUILD_TAG:-}" ] || options="$options -C wheel.build-tag=$BUILD_TAG"
-# The headers of the Python that builds serve: the types of C have the same sizes on both machines.
+# The headers of the Python that builds serve (not Debian's, which are per processor): C's types have the same sizes on both.
 [ -z "${CROSS:-}" ] || for option in SYSTEM_NAME=Linux SYSTEM_PROCESSOR=aarch64 CXX_COMPILER=aarch64-linux-gnu-g++ \
   FIND_ROOT_PATH="$CROSS" SHARED_LINKER_FLAGS="-Wl,-rpath-link,$CROSS/usr/lib/aarch64-linux-gnu"; do
   options="$options -C cmake.define.CMAKE_$option"

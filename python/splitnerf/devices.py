@@ -31,14 +31,16 @@ def choose_device(name: str) -> torch.device:
 
 
 def refuse_one_processor() -> None:
-    """Refuses a machine with one processor: there xatlas 0.0.11, which makes texture coordinates, writes beyond its memory, as it
-    has room for the threads that the processors run at a time and uses one more.
+    """Refuses a machine with one processor, where xatlas 0.0.11 (texture coordinates) crashes: it has room for one thread and
+    runs two.
 
     Raises:
         InputError: The machine has one processor.
     """
     if os.cpu_count() == 1:
-        raise InputError("this machine has one processor, where xatlas 0.0.11 (texture coordinates) crashes; use one with two or more")
+        raise InputError(
+            "this machine has one processor, where xatlas 0.0.11 (texture coordinates) crashes; use one with two or more"
+        )
 
 
 @contextmanager

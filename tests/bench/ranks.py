@@ -67,10 +67,11 @@ class ByTorch:
 
     def __init__(self, parameters: list[Tensor]):
         self.alone, inner = Product(parameters), Product(parameters)
-        self.modules = {self.alone: self.alone, torch.nn.parallel.DistributedDataParallel(inner, gradient_as_bucket_view=True): inner}
+        divided = torch.nn.parallel.DistributedDataParallel(inner, gradient_as_bucket_view=True)
+        self.modules = {self.alone: self.alone, divided: inner}
 
     def sum(self, gradients: list[Tensor]) -> tuple[list[Tensor], float, float]:
-        """The means of gradients over the processes, and what they add to a backward pass: ms on the wall and of the processor."""
+        """The means of gradients over the processes, and the ms that they add to a backward pass: on the wall, of the processor."""
         took = []
         for module, inner in self.modules.items():
             torch._foreach_copy_(inner.factors, gradients)
@@ -132,7 +133,8 @@ def compare_sums(training: Training, found: dict[str, list[float]]) -> None:
         found["entries"].append(float(len(own)))
         error = (sparse.view_as(table) - table.grad).abs().max() / table.grad.abs().max()
         largest = max(float(p.grad.abs().max()) for p in parameters if p.grad is not None)
-        of_torch = max(float((ranks.size * mean - p.grad).abs().max()) for mean, p in zip(means, parameters) if p.grad is not None)
+        apart = [(ranks.size * mean - p.grad).abs().max() for mean, p in zip(means, parameters) if p.grad is not None]
+        of_torch = float(max(apart))
         if not max(float(error), of_torch / largest) < 1e-5:
             raise SystemExit(f"the sums are {error:.1e} and {of_torch / largest:.1e} apart")
 
@@ -217,8 +219,8 @@ def main() -> None:
             print(f"  {n} processes: {', '.join(f'{name} {value:.2f}' for name, value in numbers.items())}", flush=True)
     for name, values in zip(("wall, medians of steps", "processor, means of steps"), zip(*rounds)):
         print(f"speed-up by {name}: {statistics.median(values):.2f} ({', '.join(f'{x:.2f}' for x in values)})")
-    both = measured(args, args.ranks, True)
-    print(f"three sums in each step: {', '.join(f'{name} {value:.2f}' for name, value in both.items())}")
+    compared = measured(args, args.ranks, True)
+    print(f"three sums in each step: {', '.join(f'{name} {value:.2f}' for name, value in compared.items())}")
 
 
 if __name__ == "__main__":

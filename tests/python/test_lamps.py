@@ -12,8 +12,8 @@ from painted_ball import photos, textured, with_textures
 
 from splitnerf.data.environment import directions_of_texels
 from splitnerf.export.bake import rasterise
-from splitnerf.refinement.fit import RefinementSettings, Stage
 from splitnerf.ops import MeshScene
+from splitnerf.refinement.fit import RefinementSettings, Stage
 from splitnerf.refinement.lamps import Points, brightest_glow, compact_lamp, degrees_from, disc, parts_of_light, unit
 from splitnerf.refinement.texels import AssetTexels
 

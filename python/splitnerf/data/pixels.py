@@ -48,7 +48,7 @@ def averaged_codes(rgba: np.ndarray, factor: int, *, object_alone: bool = True) 
         object_alone: Whether colours weigh by alpha, and are 0 where it is 0; else they are the means of all.
 
     Returns:
-        [H // factor, W // factor, 4] uint16.
+        [H // factor, W // factor, 4] uint16; with a factor of 1 the photo itself, of its own type.
     """
     if factor == 1:
         return rgba

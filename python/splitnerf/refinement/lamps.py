@@ -25,20 +25,20 @@ RING = 15.0  # width in degrees of the ring around it whose median is the light 
 APART = 6  # widths of a patch between the points of a pair: with 2, training's blur makes suns of 1 degree into lamps of 8
 N_PAIRS = 50_000  # pairs among which those at shadows' edges are sought
 N_EDGE = 4_000  # pairs at the edges of shadows of which contrasts are computed
-FEWEST = 100
-LEAST_PART = 0.1  # of the glow's middle that one point of such a pair sees and the other does not
+FEWEST = 100  # such pairs; with fewer the glow stays
+LEAST_PART = 0.1  # by which a glow's middle shines on them unequally, 1 for all of it on one point that faces it
 MIN_ALIKE = 0.8  # cosine of the normals of a pair
 MAX_METALLIC = 0.5  # a metal's albedo scales what it mirrors, not its irradiance
 MIN_ALBEDO = 0.05  # of the brighter one of a pair; darker dielectrics mirror more than they scatter
 LARGEST_CONTRAST = 1.5  # of log albedo; beyond it, it is the texture's
 NEAR = 0.15  # contrasts that differ by more count less and less
-MIDDLES = 12.0  # degrees from the glow's middle to the farthest one of a lamp that is tried
-N_MIDDLES, N_FINER, FINER = 448, 64, 1.0  # directions that are tried; then those within some degrees of the best
+FARTHEST = 12.0  # degrees from the glow's direction to the farthest lamp that is tried
+N_TRIED, N_FINER, FINER = 448, 64, 1.0  # directions that are tried; then those within some degrees of the best
 RADII = (1.0, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 12.0)  # degrees
-LEAST_RADIUS = 3.0  # of the lamp in the light: fits of lamps narrower than two texels of it are noisy
+LEAST_RADIUS = 3.0  # degrees, of the lamp in the light: fits of lamps narrower than two of its texels are noisy
 FACTORS = np.arange(1.0, 3.01, 0.1)  # of the lamp's power; every COARSE-th is tried first
 COARSE = 4
-N_MIDDLE, N_TABLE = 32, 1792  # directions of the glow's middle, and of all light that a lamp may have; multiples of 32
+N_CENTRAL, N_TABLE = 32, 1792  # directions of the disc of FARTHEST degrees, and of all that lamps may fill; multiples of 32
 N_BEHIND, N_GLOW = 512, 256  # directions that stand for the other light and for the glow; multiples of 32
 MIN_SIGMAS = 5.0  # by which a compact lamp must explain the pairs better
 DARK = 0.02  # share of the mean light that counts as none
@@ -63,7 +63,7 @@ class CompactLamp(NamedTuple):
 
     Attributes:
         direction: [3] unit, a list.
-        radius: Degrees.
+        radius: Degrees, as the pairs say; in the light it is at least LEAST_RADIUS.
         factor: The lamp's power beside the glow's, where the rest of the light stays.
         pairs: The number of pairs that told it.
     """
@@ -140,7 +140,7 @@ class Points(NamedTuple):
         return Points(self.scene, *of_points)
 
     def cosines(self, directions: np.ndarray) -> np.ndarray:
-        """[2 k, n] irradiance by lamps of power 1 at directions [n, 3], n a multiple of 32: the cosine, 0 where they are hidden."""
+        """[2 k, n] irradiance by lamps of power 1 at directions [n, 3], n a multiple of 32: the cosine, 0 where hidden."""
         tensors = (torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (self.origins, self.geometric, directions))
         bits = visibility_bits(self.scene, *tensors, offset=0.0)[0][:, 0].contiguous().numpy()
         seen = np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little")
@@ -168,9 +168,9 @@ def pairs_of(texels: AssetTexels, apart: int, seed: int) -> Points:
 
 
 def at_edges(points: Points, glow: Glow, seed: int) -> Points:
-    """At most N_EDGE of the pairs whose points see different parts of a glow's middle."""
-    middle = points.cosines(disc(glow.direction, MIDDLES, N_MIDDLE))
-    part = np.abs(middle[0::2] - middle[1::2]).mean(axis=1)
+    """At most N_EDGE of the pairs on which a glow's middle shines unequally: it is partly hidden from one, or one faces it more."""
+    central = points.cosines(disc(glow.direction, FARTHEST, N_CENTRAL))
+    part = np.abs(central[0::2] - central[1::2]).mean(axis=1)
     return points.chosen(np.random.default_rng(seed).permutation(np.flatnonzero(part > LEAST_PART))[:N_EDGE])
 
 
@@ -190,18 +190,18 @@ class Contrasts:
         self._contrast = np.clip(points.albedo[0::2] - points.albedo[1::2], -LARGEST_CONTRAST, LARGEST_CONTRAST)
         self.costs = robust(self._contrast)
         self._power = float(glow.power.mean())
-        self._directions = disc(glow.direction, MIDDLES + max(RADII), N_TABLE)
+        self._directions = disc(glow.direction, FARTHEST + max(RADII), N_TABLE)
         self._table = points.cosines(self._directions)
         arriving = [
             points.cosines(directions) @ powers.mean(axis=1)
             for directions, powers in (parts_of_light(light - glow.radiance, N_BEHIND), parts_of_light(glow.radiance, N_GLOW))
         ]  # fmt: skip
         self._behind, self._before = arriving[0], arriving[0] + arriving[1]
-        self._least = DARK * self._before.mean()
+        self._least = max(DARK * float(self._before.mean()), 1e-20)
 
     def lamps(self, middles: np.ndarray, radius: float) -> np.ndarray:
         """[2 k, n] irradiance of the points by lamps of the glow's power around middles [n, 3], of a radius in degrees."""
-        spacing = (MIDDLES + max(RADII)) * np.sqrt(np.pi / N_TABLE)
+        spacing = (FARTHEST + max(RADII)) * np.sqrt(np.pi / N_TABLE)
         away = np.degrees(np.arccos(np.clip(self._directions @ middles.T, -1, 1)))
         shares = np.clip((radius - away) / spacing + 0.5, 0, 1)
         return self._power * (self._table @ (shares / shares.sum(axis=0)).astype(np.float32))
@@ -245,13 +245,13 @@ def compact_lamp(texels: AssetTexels, light: np.ndarray, patch: int, seed: int) 
 
     Args:
         texels: The asset that was trained with the light.
-        light: [h, 2 h, 3] linear radiance.
+        light: [h, 2 h, 3] linear radiance, h at least 8.
         patch: The width of two pixels of the photos in texels.
         seed: Of the choice of pairs.
 
     Returns:
-        The light, and what was found: None where the glow stays as it is. So it does where the best lamp is the broadest or the
-        farthest from its middle of all that are tried: there may be a better one beyond.
+        The light, and what was found: None where the glow stays as it is. So it does where the best lamp is the broadest that is
+        tried, or within FINER of the farthest: there may be a better one beyond. The largest power is taken.
     """
     glow = brightest_glow(light)
     if not glow.radiance.any():
@@ -261,18 +261,18 @@ def compact_lamp(texels: AssetTexels, light: np.ndarray, patch: int, seed: int) 
     if n_pairs < FEWEST:
         return light, None
     contrasts = Contrasts(points, light, glow)
-    rough = best_lamp(contrasts, disc(glow.direction, MIDDLES, N_MIDDLES), RADII, FACTORS[::COARSE])
+    rough = best_lamp(contrasts, disc(glow.direction, FARTHEST, N_TRIED), RADII, FACTORS[::COARSE])
     best = best_lamp(contrasts, disc(rough.direction, FINER, N_FINER), (rough.radius,), FACTORS)
     gain = contrasts.costs - contrasts.costs_left(contrasts.lamps(best.direction[None], best.radius), best.factor)[:, 0]
-    at_rim = best.radius == max(RADII) or degrees_from(best.direction, glow.direction) > MIDDLES - FINER
-    if at_rim or gain.mean() < MIN_SIGMAS * gain.std() / np.sqrt(n_pairs):
+    at_rim = best.radius == max(RADII) or degrees_from(best.direction, glow.direction) > FARTHEST - FINER
+    if at_rim or not gain.mean() > MIN_SIGMAS * gain.std() / np.sqrt(n_pairs):
         return light, None
     found = CompactLamp(best.direction.tolist(), best.radius, best.factor, n_pairs)
     return with_lamp(light, glow, found), found
 
 
 def with_lamp(light: np.ndarray, glow: Glow, lamp: CompactLamp) -> np.ndarray:
-    """A map [h, 2 h, 3] with a lamp, at least one texel wide, in the place of a glow, and of the same power in all."""
+    """A map [h, 2 h, 3] of the same power with a lamp, at least LEAST_RADIUS and one texel wide, in the place of a glow."""
     directions, areas = directions_of_texels(light.shape[0])
     away = degrees_from(directions, np.array(lamp.direction))
     inside = away <= max(lamp.radius, LEAST_RADIUS, away.min())

@@ -217,7 +217,7 @@ class Ranks(Alone):
         *sums, present = flat.split([*(part.numel() for part in small), len(parameters)])
         torch._foreach_copy_(small, [x.view_as(part) for x, part in zip(sums, small)])
         for part in parts:
-            if part.numel() >= LARGE:  # the table's: summed where it lies
+            if part.numel() >= LARGE:  # most often the table's alone: summed where it lies
                 self.summed(part)
         for i, (parameter, part) in enumerate(zip(parameters, parts)):
             if parameter.grad is None and present[i] > 0:  # only another process has one
