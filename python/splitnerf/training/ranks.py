@@ -27,7 +27,7 @@ from splitnerf.training.finite import UNEXPLAINED, Diverged
 from splitnerf.training.losses import Terms
 
 PATIENCE = timedelta(days=1)  # the first process may look for the object, or mesh, while the others wait
-LARGE = 1 << 21  # numbers of a gradient that is summed where it lies; to copy smaller ones together costs less than one more exchange
+LARGE = 1 << 21  # numbers of a gradient that is summed where it lies; to copy fewer costs less than one more exchange
 Made = TypeVar("Made")
 
 
