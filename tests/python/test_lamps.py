@@ -132,6 +132,13 @@ def test_a_broad_lamp_stays_as_it_is(ball_over_plate):
         assert lamp is None and new is light
 
 
+def test_a_lamp_at_the_rim_of_those_tried_is_none(ball_over_plate):
+    """The sun is 13 degrees beside the glow: the nearest that is tried explains the shadow in part, and is not it."""
+    aside = unit(np.cross(SUN, [0.0, 0.0, 1.0]))
+    light = glowing_sky(12.0, unit(SUN + np.tan(np.radians(13.0)) * aside))
+    assert found(ball_over_plate, shaded_albedo(ball_over_plate, 0.3, light), light) == (light, None)
+
+
 def test_a_light_without_a_lamp_stays_as_it_is(ball_over_plate):
     light = np.full((16, 32, 3), 0.7, np.float32)
     assert compact_lamp(AssetTexels(ball_over_plate), light, 3, 0) == (light, None)
