@@ -107,8 +107,10 @@ template <class T> SPLITNERF_HD int64_t sum_count(const SdfLayer<T>& layer) {
 template <class T> struct WeightSums {
   const SdfLayer<T>& layer;
   bool keeps;
-  T* memory;  // [sum_count], zeros where squares are added to it
+  T* sums;  // [blocks, sum_count], zeros where squares are added to it
   Square<T> kept = {};
+
+  __device__ T* memory() const { return sums + blockIdx.x * sum_count(layer); }  // not kept: registers are scarce
 
   static SPLITNERF_HD bool can_keep(const SdfLayer<T>& layer, const Sizes& sizes) {
     return layer.width_columns <= kUnits &&
@@ -134,7 +136,7 @@ template <class T> struct WeightSums {
       for (int c = 0; c < kSide; ++c) {
         const int column = unit + i % kUnitGroups + c * kUnitGroups;
         if (column >= layer.width_columns) continue;
-        T& to = memory[row * layer.width_columns + column];
+        T& to = memory()[row * layer.width_columns + column];
         to = keeps ? kept.row[r][c] : to + kept.row[r][c];
       }
     }
@@ -200,7 +202,7 @@ __global__ void __launch_bounds__(kMostThreads, sizeof(T) == 4 ? 2 : 1)
   const Matrix<T> given = tile.take_rows(tile.inputs + tile.outputs);
   const Matrix<T> results = tile.take_rows(2 * tile.inputs);  // steepness, and the gradient to x
   T* const bias_sums = tile.take(tile.outputs);
-  WeightSums<T> weight_sums{layer, WeightSums<T>::can_keep(layer, tile), sums + blockIdx.x * sum_count(layer)};
+  WeightSums<T> weight_sums{layer, WeightSums<T>::can_keep(layer, tile), sums};
   const int columns = tile.n_features, groups = tile.points / kSide, input_groups = tile.inputs / kSide;
   tile.each(tile.outputs, [&](int m) { bias_sums[m] = T(0); });
   for (int64_t tile_number = blockIdx.x; tile_number * tile.points < n; tile_number += gridDim.x) {
@@ -248,7 +250,7 @@ __global__ void __launch_bounds__(kMostThreads, sizeof(T) == 4 ? 2 : 1)
   if (weight_sums.keeps && static_cast<int>(threadIdx.x) < tile.row_groups() * kUnitGroups)
     weight_sums.write(tile, 0, threadIdx.x);
   tile.each(tile.n_outputs,
-            [&](int m) { weight_sums.memory[weight_rows(layer) * layer.width_columns + m] = bias_sums[m]; });
+            [&](int m) { weight_sums.memory()[weight_rows(layer) * layer.width_columns + m] = bias_sums[m]; });
 }
 
 // totals [count] = the blocks' sums, added in order: each warp adds every kSlices-th of them, the first one the warps' sums.
