@@ -1,18 +1,20 @@
 """CUDA graphs that are none: work of the CPU, recorded operator by operator and repeated on the same memory.
 
 As on a GPU nothing is done while it is recorded, numbers of the host are frozen, what waits for a result is refused, and
-what is written to is always the same memory.
+what is written to is always the same memory. Of a graph that is dropped all numbers become NaN. A pool of memory cannot be
+recorded into again once all its graphs are gone, see :class:`Pools`.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Any
 
 import torch
 from torch import Tensor
-from torch.utils._python_dispatch import TorchDispatchMode
+from torch.utils._python_dispatch import TorchDispatchMode, _disable_current_modes
 from torch.utils._pytree import tree_iter
 
 from splitnerf.training import graphs, loop
@@ -37,12 +39,36 @@ def memory(x: Tensor) -> int:
     return x.untyped_storage().data_ptr()
 
 
+class Pools:
+    """Counts the graphs of each pool as torch's allocator does (c10/cuda/CUDACachingAllocator.cpp, `create_or_incref_pool`).
+
+    A handle is a number. The first recording with it makes the pool; each graph counts as one use, and its end takes the use
+    back. A pool without uses is not made anew while blocks of its memory are still in use: the next recording with
+    its handle fails. Here some block always is.
+    """
+
+    def __init__(self) -> None:
+        self.n_handles, self.uses = 0, Counter()
+
+    def handle(self) -> int:
+        """As :func:`torch.cuda.graph_pool_handle`."""
+        self.n_handles += 1
+        return self.n_handles
+
+    def begin(self, pool: int | None) -> None:
+        """A recording begins."""
+        if pool in self.uses and self.uses[pool] == 0:
+            raise RuntimeError("it->second->use_count > 0 INTERNAL ASSERT FAILED")
+        self.uses[pool] += 1
+
+
 class PretendGraph(TorchDispatchMode):
     """Records within its block."""
 
-    def __init__(self, generator: torch.Generator) -> None:
+    def __init__(self, generator: torch.Generator, pools: Pools | None = None, pool: int | None = None) -> None:
         super().__init__()
         self.generator, self.calls = generator, []
+        self.pools, self.pool = pools, pool
         self.before: dict[int, tuple[Tensor, Tensor]] = {}  # what is written to, and what it held
         self.made: set[int] = set()  # memory of the recording itself
 
@@ -81,6 +107,17 @@ class PretendGraph(TorchDispatchMode):
                 x.copy_(held)
 
     @torch.no_grad()
+    def __del__(self) -> None:
+        """On a GPU other work may now take the memory, but for what tensors still hold."""
+        if self.pools is not None:
+            self.pools.uses[self.pool] -= 1
+        with _disable_current_modes():
+            for *_, fresh in self.calls:
+                for x in fresh:
+                    if x is not None and x.is_floating_point():
+                        x.fill_(torch.nan)
+
+    @torch.no_grad()
     def replay(self) -> None:
         for func, args, kwargs, fresh in self.calls:
             for old, new in zip(fresh, tensors(func(*args, **kwargs)), strict=True):
@@ -89,9 +126,13 @@ class PretendGraph(TorchDispatchMode):
                     old.copy_(new)
 
 
-def record(function: Callable[[], Any], pool: object, generator: torch.Generator) -> tuple[PretendGraph, Any]:
-    """As :func:`splitnerf.training.graphs.record`."""
-    graph = PretendGraph(generator)
+def record(
+    function: Callable[[], Any], pool: int | None, generator: torch.Generator, pools: Pools | None = None
+) -> tuple[PretendGraph, Any]:
+    """As :func:`splitnerf.training.graphs.record`; without pools a pool is never refused."""
+    if pools is not None:
+        pools.begin(pool)
+    graph = PretendGraph(generator, pools, pool)
     with graph:
         outputs = function()
     return graph, outputs
@@ -108,23 +149,30 @@ class NoStream:
 
 
 def graphs_on_the_cpu(monkeypatch) -> dict[str, int]:
-    """Trainings on the CPU take graphed steps from now on; returns how often they recorded and replayed, as it goes on."""
-    used = {"recorded": 0, "replayed": 0}
-    replay_calls = PretendGraph.replay
+    """Trainings on the CPU take graphed steps from now on; returns how many they recorded, replayed, and took without a graph
+    (`called`), as it goes on."""
+    used = {"recorded": 0, "replayed": 0, "called": 0}
+    differentiate, replay, pools = graphs.GraphedStep.differentiate, PretendGraph.replay, Pools()
 
     def counted_record(*arguments):
         used["recorded"] += 1
-        return record(*arguments)
+        used["called"] -= 1
+        return record(*arguments, pools)
 
     def counted_replay(self):
         used["replayed"] += 1
-        replay_calls(self)
+        replay(self)
+
+    def counted_differentiate(*arguments):
+        used["called"] += 1
+        return differentiate(*arguments)
 
     monkeypatch.setattr(PretendGraph, "replay", counted_replay)
+    monkeypatch.setattr(graphs.GraphedStep, "differentiate", counted_differentiate)
     monkeypatch.setattr(graphs, "record", counted_record)
     monkeypatch.setattr(loop, "Step", graphs.GraphedStep)
     monkeypatch.setattr(torch.cuda, "Stream", NoStream)
-    monkeypatch.setattr(torch.cuda, "graph_pool_handle", lambda: None)
+    monkeypatch.setattr(torch.cuda, "graph_pool_handle", pools.handle)
     monkeypatch.setattr(torch.cuda, "current_stream", lambda device: NoStream())
     monkeypatch.setattr(torch.cuda, "stream", lambda stream: nullcontext())
     return used

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -83,9 +84,10 @@ class Fake(GraphedStep):
 
 @pytest.fixture
 def step(monkeypatch) -> Fake:
-    monkeypatch.setattr(graphs, "record", pretend_graphs.record)
+    pools = pretend_graphs.Pools()
+    monkeypatch.setattr(graphs, "record", functools.partial(pretend_graphs.record, pools=pools))
     monkeypatch.setattr(torch.cuda, "Stream", NoStream)
-    monkeypatch.setattr(torch.cuda, "graph_pool_handle", lambda: None)
+    monkeypatch.setattr(torch.cuda, "graph_pool_handle", pools.handle)
     torch.manual_seed(0)
     config = tiny(
         target_samples=1000, light_step_every=LIGHT_PERIOD, priors_from=PRIORS_FROM, shading="summed",
@@ -118,14 +120,14 @@ def test_without_counts_of_a_step_before_none_is_recorded(step):
 
 
 def test_samples_without_room_are_not_complete_and_the_next_step_has_no_limit(step):
-    """Until the samples of a step fit again."""
+    """Until the samples of a step fit again, into the graph that there was."""
     ways(step, 3)
     step.n_found = PADDED + 1
     cut = step.taken()
-    assert cut.how == "repeated" and cut.complete is False and step.n_discarded == 1 and not step._graphs
+    assert cut.how == "repeated" and cut.complete is False and step.n_discarded == 1
     assert ways(step, 3) == ["called"] * 3 and step.calls[-3:] == [None] * 3 and step.n_discarded == 1
     step.n_found = PADDED
-    assert ways(step, 3) == ["called", "recorded", "repeated"] and step.calls[-2:] == [None, ROOM]
+    assert ways(step, 3) == ["called", "repeated", "repeated"] and step.calls[-1] is None
 
 
 def decide(step: Fake, what: str) -> dict:
@@ -173,20 +175,32 @@ def test_a_graph_with_too_little_room_is_recorded_anew_before_it_fails(step):
         ways(step, 1, counts=COUNTS)
 
 
-def test_what_exceeds_its_room_is_not_complete_and_all_graphs_are_dropped(step):
+@pytest.mark.parametrize("counts", [(1281.0, 512.0), (1280.0, 513.0)])
+def test_what_exceeds_its_room_is_not_complete_and_one_graph_is_recorded_anew(step, counts):
+    """With more room: that of the key, although no other is left. Others stay as they are."""
     assert step.taken(counts=(1e9, 1e9)).complete  # the first step has no limit
     step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
-    for counts in ((1281.0, 512.0), (1280.0, 513.0)):
-        step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
-        ways(step, 2)
-        n = step.n_discarded
-        assert step.taken(counts=(1280.0, 512.0)).complete is True and step.n_discarded == n
-        step._graphs.clear()
-        step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
-        assert ways(step, 1) == ["recorded"] and step.calls[-1] == ROOM
-        assert step.taken(counts=counts).complete is False and step.n_discarded == n + 1
-        assert not step._graphs
-        assert step.taken().how == "recorded"
+    ways(step, 2)
+    assert step.taken(counts=(1280.0, 512.0)).complete is True and step.n_discarded == 0
+    step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
+    assert ways(step, 2, n_rays=6) == ["called", "recorded"]
+    assert step.taken(counts=counts).complete is False and step.n_discarded == 1 and len(step._graphs) == 2
+    step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
+    assert ways(step, 2) == ["repeated"] * 2 and ways(step, 1, n_rays=6) == ["repeated"]
+    assert step.taken(counts=counts).complete is False and step.n_discarded == 2
+    again = step.taken()
+    assert again.how == "recorded" and again.complete and step.calls[-1] == tuple(round_up(1.25 * n) for n in counts)
+    assert ways(step, 1, n_rays=6) == ["repeated"]
+
+
+def test_a_pool_whose_graphs_are_all_gone_is_not_recorded_into(step):
+    """As torch would refuse it."""
+    ways(step, 3)
+    first = step._pool
+    assert ways(step, 3, n_rays=6) == ["called", "recorded", "repeated"] and step._pool == first
+    step._graphs.clear()
+    assert ways(step, 1) == ["recorded"] and step._pool != first
+    assert step.taken(counts=(1164.0, 300.0)).complete and ways(step, 2) == ["recorded", "repeated"]  # the only one, anew
 
 
 def test_four_graphs_are_kept_and_the_oldest_makes_room(step):

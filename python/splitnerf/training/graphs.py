@@ -65,7 +65,6 @@ class GraphedStep(RoomyStep):
         self._seen: set[Hashable] = set()
         self._graphs: dict[Hashable, Recorded] = {}
         self._stream = torch.cuda.Stream(model.device)
-        self._pool = torch.cuda.graph_pool_handle()
 
     @contextmanager
     def stream(self) -> Iterator[None]:
@@ -96,6 +95,8 @@ class GraphedStep(RoomyStep):
         if key not in self._graphs:
             while len(self._graphs) >= MOST_GRAPHS:
                 del self._graphs[next(iter(self._graphs))]
+            if not self._graphs:  # torch records nothing more into a pool whose graphs are all gone
+                self._pool = torch.cuda.graph_pool_handle()
             self._graphs[key] = self._recorded(differentiate, batch, found, light)
         return self._replayed(self._graphs[key], batch, found, light)
 
@@ -144,13 +145,6 @@ class GraphedStep(RoomyStep):
             if theirs.grad is not None:
                 ours.grad = theirs.grad.clone() if ours.grad is None else ours.grad.add_(theirs.grad)
         return recorded.outputs
-
-    def settle(self, counts: Room, room: Room, s: float, elsewhere: bool = False) -> bool:
-        """As :meth:`RoomyStep.settle`; graphs are dropped where a step had too little room."""
-        complete = super().settle(counts, room, s, elsewhere)
-        if not complete:
-            self._graphs.clear()
-        return complete
 
 
 def record(function: Callable[[], Any], pool: Any, generator: torch.Generator) -> tuple[Graph, Any]:

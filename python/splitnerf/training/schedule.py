@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from splitnerf.config import Config
 
-NEARLY = 0.1  # share of the sample budget within which the ray count stays
+FEWEST, MOST = 0.9, 1.05  # shares of the sample budget between which the ray count stays; a step has room for 1.15
 RAY_UNITS = 16  # `cuda_graphs` uses this many ray counts between one power of 2 and the next
 
 
@@ -31,9 +31,9 @@ def light_moves(config: Config, step: int) -> bool:
 
 def next_ray_count(n_rays: int, n_samples: float, config: Config) -> int:
     """The number of rays that fills the sample budget. It changes by a factor in [0.8, 1.25] a step. With
-    ``cuda_graphs`` it does not change while the samples are within 10 % of the budget, so that sizes repeat."""
+    ``cuda_graphs`` it does not change while the samples nearly fill the budget, so that sizes repeat."""
     wanted = n_rays * config.sampling.target_samples / max(1, n_samples)
-    if config.run.cuda_graphs and abs(wanted / n_rays - 1.0) < NEARLY:
+    if config.run.cuda_graphs and FEWEST < n_samples / config.sampling.target_samples < MOST:
         return n_rays
     n = int(min(config.sampling.max_rays, max(64, min(1.25 * n_rays, max(0.8 * n_rays, wanted)))))
     unit = max(1, 2 ** (n.bit_length() - 1) // RAY_UNITS) if config.run.cuda_graphs else 1
