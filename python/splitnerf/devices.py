@@ -58,6 +58,28 @@ def tensor_cores(on: bool) -> Iterator[None]:
         products.fp32_precision = before
 
 
+def let_segments_grow() -> None:
+    """Lets torch's allocator extend the segments of a GPU's memory, so that tensors of ever new sizes leave fewer gaps. A value
+    of the user's own in PYTORCH_ALLOC_CONF or PYTORCH_CUDA_ALLOC_CONF stays."""
+    if not {"PYTORCH_ALLOC_CONF", "PYTORCH_CUDA_ALLOC_CONF"} & os.environ.keys():
+        torch._C._accelerator_setAllocatorSettings("expandable_segments:True")  # the variables are read but once
+
+
+@contextmanager
+def spare_processors(device: torch.device) -> Iterator[None]:
+    """Leaves two processors without torch's threads within the block, where the device is a GPU: one for the thread that feeds it,
+    one for what else runs. The rays that another thread traces use torch's threads."""
+    if device.type == "cpu":
+        yield
+        return
+    before, allowed = torch.get_num_threads(), len(os.sched_getaffinity(0))
+    torch.set_num_threads(min(before, max(1, allowed - 2)))
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
 def start_fetching(x: Tensor) -> tuple[Tensor, Callable[[], None]]:
     """Starts to copy a tensor to the CPU, in the order of its device's work.
 

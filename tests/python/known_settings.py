@@ -74,7 +74,7 @@ SETTINGS = {
     "occlusion.indirect_every": ("indirect_every", 200, 200, OURS),
     "mesh.every": ("mesh_every", 0.1, 0.1, PAPER),  # 2000 of 20,000 steps
     "mesh.resolution": ("mesh_resolution", 96, 512, PAPER),
-    "mesh.background": ("background_meshes", False, False, OURS),
+    "mesh.background": ("background_meshes", False, True, OURS),
     "sampling.initial_rays": ("initial_rays", 1024, 256, PAPER),
     "sampling.max_rays": ("max_rays", 8192, 8192, PAPER),
     "sampling.target_samples": ("target_samples", 4608, 262144, PAPER),

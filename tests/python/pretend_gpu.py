@@ -2,14 +2,16 @@
 
 It finds what a machine without a GPU otherwise cannot: tensors of two devices in one call, factories that forget the
 device, generators of another device, ``numpy()`` of what is not on the CPU; and it counts what would wait for the GPU.
-What happens inside a backward pass, or in another thread, is not looked at.
+What happens inside a backward pass is not looked at; a thread that works in a stream of its own has such a GPU too, and its waits
+are its own.
 """
 
 from __future__ import annotations
 
+import threading
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 import torch
 from torch import Tensor
@@ -19,7 +21,11 @@ from torch.utils._pytree import tree_iter, tree_map
 GPU = torch.device("cuda", 0)
 CPU = torch.device("cpu")
 ON_CPU_BY_CONTRACT = {"splitnerf.light_lookup": (4, 5), "splitnerf::light_lookup": (4, 5)}  # resolutions and nodes
-WAITS = {"item", "tolist", "nonzero", "unique", "__bool__", "__int__", "__float__", "__index__", "masked_select", "cpu"}
+WAITS = {
+    "item", "tolist", "nonzero", "argwhere", "unique", "unique_consecutive", "masked_select", "bincount", "repeat_interleave",
+    "equal", "allclose", "is_nonzero", "__bool__", "__int__", "__float__", "__index__", "__contains__", "cpu",
+}  # fmt: skip
+FROM_LISTS = {"tensor", "as_tensor", "new_tensor"}
 ACROSS = {"_has_compatible_shallow_copy_type", "__set__", "copy_"}  # one tensor takes the place of another
 
 
@@ -111,7 +117,7 @@ class PretendGpu(TorchFunctionMode):
             return on_gpu == ("is_cuda" in name)
         if last == "numpy" and on_gpu:
             raise TypeError(f"{name}: the tensor is on the GPU")
-        if last in WAITS and on_gpu or masks(func, args):
+        if last in WAITS and on_gpu or masks(func, args) or comes_from_cpu(func, args):
             self.waits[last] += 1
         if last in ("to", "cuda", "cpu"):
             return self.moved(func, last, args, kwargs)
@@ -121,9 +127,9 @@ class PretendGpu(TorchFunctionMode):
             self.check(name, generator.device.type == (asked.type if asked else "cuda" if on_gpu else "cpu"), given)
         if asked is not None:
             kwargs["device"], on_gpu = CPU, asked.type == "cuda"
-            if on_gpu and last in ("tensor", "as_tensor"):  # copied from memory that the GPU does not reach by itself
-                self.waits[last] += 1
-        elif on_gpu and last not in ACROSS:
+        if on_gpu and last in FROM_LISTS:  # copied from memory that the GPU does not reach by itself
+            self.waits[last] += 1
+        if asked is None and on_gpu and last not in ACROSS:
             allowed = [args[i] for i in ON_CPU_BY_CONTRACT.get(name.removesuffix(".default"), ())]
             same = all(isinstance(x, GpuTensor) or x.dim() == 0 or any(x is y for y in allowed) for x in given)
             self.check(name, same, given)
@@ -154,11 +160,24 @@ class PretendGpu(TorchFunctionMode):
 
 
 def masks(func, args: tuple) -> bool:
-    """Whether this is indexing by a mask, whose result has as many rows as the mask has ones."""
-    if getattr(func, "__name__", "") != "__getitem__" or not isinstance(args[0], GpuTensor):
+    """Whether this is indexing by a mask, which has as many rows as it has ones; or by a list, which is copied. To fill by a mask
+    with a number waits for nothing."""
+    name = getattr(func, "__name__", "")
+    if name not in ("__getitem__", "__setitem__") or not isinstance(args[0], GpuTensor):
         return False
     index = args[1] if isinstance(args[1], tuple) else (args[1],)
-    return any(isinstance(part, Tensor) and part.dtype in (torch.bool, torch.uint8) for part in index)
+    by_mask = any(isinstance(part, Tensor) and part.dtype in (torch.bool, torch.uint8) for part in index)
+    return any(isinstance(part, list) for part in index) or by_mask and (name == "__getitem__" or isinstance(args[2], Tensor))
+
+
+def comes_from_cpu(func, args: tuple) -> bool:
+    """Whether this overwrites a tensor with one of another device, for which the host waits."""
+    return getattr(func, "__name__", "") == "copy_" and isinstance(args[0], GpuTensor) != isinstance(args[1], GpuTensor)
+
+
+def within(stream: Stream) -> AbstractContextManager[object]:
+    """A stream's context."""
+    return nullcontext() if threading.current_thread() is threading.main_thread() else PretendGpu()
 
 
 @contextmanager
@@ -169,7 +188,7 @@ def pretend_gpu(monkeypatch) -> Iterator[PretendGpu]:
     monkeypatch.setattr(torch.cuda, "Event", Event)
     monkeypatch.setattr(torch.cuda, "Stream", Stream)
     monkeypatch.setattr(torch.cuda, "current_stream", lambda device=None: Stream())
-    monkeypatch.setattr(torch.cuda, "stream", lambda stream: nullcontext())
+    monkeypatch.setattr(torch.cuda, "stream", within)
     monkeypatch.setattr(Tensor, "pin_memory", lambda x: x)
     before = torch.__future__.get_overwrite_module_params_on_conversion()
     torch.__future__.set_overwrite_module_params_on_conversion(True)

@@ -4,21 +4,28 @@ from __future__ import annotations
 
 import itertools
 import json
-import statistics
+import os
 
 import pytest
 import torch
 from pretend_gpu import GPU, GpuTensor, pretend_gpu
 from tiny_runs import tiny
 
+from splitnerf.training import losses, numbers
 from splitnerf.training import loop as trainer
-from splitnerf.training import step
+from splitnerf.training.background import in_background
 from splitnerf.training.checkpoint import load_checkpoint
+from splitnerf.training.meshes import SurfaceMesh
+from splitnerf.training.room import RoomyStep
+from splitnerf.training.step import Room
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
-from splitnerf.render import model, renderer
-from splitnerf.render.renderer import find_samples
+from splitnerf.fields import visibility
+from splitnerf.ops import CELL_OCCUPIED
+from splitnerf.render import model, occupancy, renderer
+from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ, OccupancyGrid
 from splitnerf.workflow import reconstruct
 
 
@@ -50,10 +57,19 @@ def test_modules_and_gradients_stay_there(monkeypatch):
         assert layer.weight.grad.device == GPU and optimiser.state[layer.weight]["exp_avg"].device == GPU
 
 
+# In 200 steps with 10 lines of metrics.jsonl, 6 updates of the grid (paper: 13) and one mesh. Parameters are checked before the
+# mesh is made. Preset paper finds all samples of its rays and shades each, so that its steps wait for two counts anyway; each update of
+# its grid draws among the occupied cells, and from the mesh on a panorama of its light is painted every 16 steps.
+WAITS = {
+    "cpu": {"item": 1}, "fast": {"item": 1},
+    "paper": {"item": 1, "march_rays": 200, "spread_samples": 200, "nonzero": 13, "unique": 13, "__float__": 13, "to": 9},
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("name", ["cpu", "fast", "paper"])
-def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeypatch, name):
+def test_steps_stay_on_the_gpu_and_all_waits_for_it_are_known(data, tmp_path, monkeypatch, name):
     """Operators that must know how many samples there are wait within, unless they are told what to have room for."""
-    waits = []
+    seen, advance, poll = {}, trainer.Training.advance, SurfaceMesh.poll
 
     def waiting(module, name, is_told):
         operator = getattr(module, name)
@@ -69,18 +85,109 @@ def test_a_step_stays_on_the_gpu_and_seldom_waits_for_it(data, tmp_path, monkeyp
     waiting(renderer, "spread_samples", lambda *args: args[5] is not None)
     waiting(model, "wide_lobes", lambda *args: args[4] is not None)
 
-    def counted(*args, **kwargs):
-        waits.append(gpu.waits.total())
-        return find_samples(*args, **kwargs)
+    def watched(training, bar):
+        seen[training.step] = gpu.waits.copy(), training.mesh.made_at
+        advance(training, bar)
 
-    monkeypatch.setattr(step, "find_samples", counted)
+    for cached in (losses._stored_seed, numbers._limits):
+        cached.cache_clear()
+    monkeypatch.setattr(occupancy, "ALL_CELLS_UNTIL", 20)
+    monkeypatch.setattr(trainer.Training, "advance", watched)
+    monkeypatch.setattr(SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True))  # takes its mesh at once
+    settings = {"min_step": 0.03} if name == "paper" else {"target_samples": 4608}  # so that samples have room
+    config = tiny(name, steps=250, mesh_every=0.5, preview_every=1.0, background_meshes=True, indirect_every=50, **settings)
     with pretend_gpu(monkeypatch) as gpu:
-        settings = {"min_step": 0.03} if name == "paper" else {"target_samples": 4608}  # so that samples have room
-        trained = trainer.train(load_dataset(data), tiny(name, steps=32, **settings), tmp_path, device="cuda")
+        trained = trainer.train(load_dataset(data), config, tmp_path, device="cuda")
         assert trained.finished and trained.model.device == GPU and trained.grid.cells.device == GPU
     assert all(isinstance(p, GpuTensor) for p in trained.model.parameters())
-    each = statistics.median(b - a for a, b in itertools.pairwise(waits[-12:]))
-    assert each <= {"cpu": 0, "fast": 0, "paper": 2}[name]
+    (before, no_mesh), (after, made_at) = seen[40], seen[240]
+    assert dict(after - before) == WAITS[name] and no_mesh == 0.0 and made_at == 0.5
+
+
+def test_the_grid_of_a_gpu_waits_for_no_count(monkeypatch):
+    """Each update evaluates all cells near the surface of the update before, also while the density gets wider, and a tenth of the
+    others."""
+    with pretend_gpu(monkeypatch) as gpu:
+        grid, s = OccupancyGrid(24, 1.5, device="cuda"), 100.0
+        radius = grid.centres().norm(dim=1)
+        grid.update(lambda x: x.norm(dim=1) - 0.5, s)
+        gpu.waits.clear()
+        for i in range(1, 9):
+            before, s = grid.values.clone(), 0.95 * s
+            grid.update(lambda x, i=i: x.norm(dim=1) - 0.5 - 0.02 * i, s, first=False)
+            assert not gpu.waits
+            bound = LIPSCHITZ * grid.half_diagonal + DENSITY_CUTOFF / s
+            near, new = before.abs() < 2.0 * bound, (grid.values - (radius - 0.5 - 0.02 * i)).abs() < 1e-5
+            assert 500 < near.sum() < 4000 and new[near].all() and 0.05 < new[~near].float().mean() < 0.15
+            gpu.waits.clear()
+        assert torch.equal((grid.values.abs() <= bound).view_as(grid.cells), grid.cells == CELL_OCCUPIED)
+
+
+@pytest.mark.parametrize("device", ["cpu", "cuda"])
+def test_a_gpu_shades_a_million_senders_at_a_time(monkeypatch, device):
+    """Where each part costs the host its launches; the CPU takes parts that stay in its caches."""
+    parts, shade = [], model.split_sum_shade
+    monkeypatch.setattr(visibility, "SHADED_CHUNK", visibility.SHADED_CHUNK | {"cpu": 50})
+    monkeypatch.setattr(model, "split_sum_shade", lambda *args: parts.append(len(args[0])) or shade(*args))
+    torch.manual_seed(0)
+    with pretend_gpu(monkeypatch):
+        scene = SceneModel(tiny(open_below=0.0)).to(device)
+        scene.sdf_field.grid.table.data.normal_(0.0, 0.3)
+        scene.sdf_field.hidden_direction.data[:, 3:].normal_(0.0, 0.05)  # dents, that rays from the surface hit
+        SurfaceMesh(scene).request(0.1)
+        n = len(scene.occlusion.senders.vertices)
+        parts.clear()
+        scene.refresh_indirect(scene.evaluate_light())
+    assert n > 100 and parts == ([n] if device == "cuda" else [50] * (n // 50) + [n % 50] * (n % 50 > 0))
+
+
+@pytest.mark.parametrize(("name", "pads"), [("fast", True), ("paper", False)])
+def test_padding_is_computed_only_where_it_saves_a_wait(data, tmp_path, monkeypatch, name, pads):
+    asked, differentiate = [], RoomyStep.differentiate
+
+    def watched(taken, batch, found, light, environment, step, progress, capacity):
+        asked.append((len(found.directions) > found.n_found.item(), capacity is not None, taken.room == Room()))
+        return differentiate(taken, batch, found, light, environment, step, progress, capacity)
+
+    monkeypatch.setattr(RoomyStep, "differentiate", watched)
+    with pretend_gpu(monkeypatch):
+        trainer.train(load_dataset(data), tiny(name, steps=12, target_samples=4608, min_step=0.03), tmp_path, device="cuda")
+    assert asked[0] == (False, False, True) and set(asked[4:]) == {(pads, pads, not pads)}
+
+
+@pytest.mark.parametrize("own", [None, "PYTORCH_ALLOC_CONF", "PYTORCH_CUDA_ALLOC_CONF"])
+@pytest.mark.parametrize(("name", "device"), [("paper", "cuda"), ("paper", "cpu"), ("fast", "cuda")])
+def test_segments_grow_where_sizes_never_repeat(data, tmp_path, monkeypatch, name, device, own):
+    """Unless the user has a value of his own."""
+    asked = []
+    monkeypatch.setattr(torch._C, "_accelerator_setAllocatorSettings", asked.append)
+    for variable in ("PYTORCH_ALLOC_CONF", "PYTORCH_CUDA_ALLOC_CONF"):
+        monkeypatch.delenv(variable, raising=False)
+    if own:
+        monkeypatch.setenv(own, "max_split_size_mb:512")
+    with pretend_gpu(monkeypatch):
+        trainer.Training(load_dataset(data), tiny(name), tmp_path, torch.device(device))
+    assert asked == ["expandable_segments:True"] * (name == "paper" and device == "cuda" and own is None)
+
+
+@pytest.mark.parametrize(("device", "processors", "threads"), [("cuda", 6, 4), ("cuda", 16, 8), ("cuda", 1, 1), ("cpu", 6, 8)])
+def test_two_processors_are_left_to_the_thread_that_feeds_a_gpu(data, tmp_path, monkeypatch, device, processors, threads):
+    """By all threads that work beside it, and until the last step is made."""
+    seen, advance, before = set(), trainer.Training.advance, torch.get_num_threads()
+
+    def watched(training, bar):
+        seen.update((torch.get_num_threads(), in_background(torch.get_num_threads).result()))
+        advance(training, bar)
+
+    monkeypatch.setattr(trainer.Training, "advance", watched)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(processors))
+    try:
+        torch.set_num_threads(8)
+        with pretend_gpu(monkeypatch):
+            trainer.train(load_dataset(data), tiny(steps=2), tmp_path, device=device)
+        assert seen == {threads} and torch.get_num_threads() == 8
+    finally:
+        torch.set_num_threads(before)
 
 
 @pytest.mark.parametrize("settings", [{}, {"sparse_steps": True, "table_dtype": "float16"}])

@@ -270,7 +270,7 @@ def test_light_that_was_kept_before_rays_were_aimed():
 def test_each_sender_sends_what_it_reflects(monkeypatch, chunk):
     """The materials of its vertex under the light there, towards the ray that sees it, in parts; again in the same
     memory, after the first was read. Its mirror shows the sky, blurred by a cell, or what another sender sent before."""
-    monkeypatch.setattr(visibility, "SHADED_CHUNK", chunk)
+    monkeypatch.setattr(visibility, "SHADED_CHUNK", {"cpu": chunk})
     bits, light, asked, seen, before = bits_on(dented()), EvaluatedLight(Hazy()), [], [], []
     bits.set_light(light)
     cache, senders = bits.cache, bits.senders

@@ -28,7 +28,7 @@ PAPER = dict(
     occlusion=dict(
         kind="mlp", channels=1, directional=False, width=256, rays=64, environment_height=128, indirect=False
     ),
-    mesh=dict(resolution=512),
+    mesh=dict(resolution=512, background=True),
     sampling=dict(
         initial_rays=256, target_samples=262144, step_scale=0.0, min_step=3**0.5 * 3 / 1024, min_transmittance=0.0,
         min_weight=0.0, shades_per_ray=0, occupancy="average", grid_resolution=128, grid_every=16, hull_until=0.0,

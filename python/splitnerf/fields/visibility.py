@@ -38,7 +38,7 @@ from splitnerf.ops import (
 TEXELS_PER_CELL = 8  # fewest texels per direction of a light without texels of its own
 LOBE_DIRECTIONS = 15  # fewest directions within a lobe that a sum over the directions resolves
 DIM = 1e-12  # power of a cell, W / m^2, below which its direction is that of its centre
-SHADED_CHUNK = 1 << 15  # vertices shaded at a time
+SHADED_CHUNK = {"cpu": 1 << 15, "cuda": 1 << 20}  # vertices or senders shaded at a time
 
 
 class Cells(NamedTuple):
@@ -74,7 +74,7 @@ def senders_of(cache: VisibilityCache) -> tuple[Tensor, Senders]:
     view_dirs, normals = -cache.directions[directions], cache.normals[vertices]
     cosine = (normals * view_dirs).sum(1, keepdim=True)
     mirror = 2.0 * cosine * normals - view_dirs
-    nearest = torch.cat([(part @ cache.directions.T).argmax(1) for part in mirror.split(SHADED_CHUNK)] or [directions])
+    nearest = torch.cat([(part @ cache.directions.T).argmax(1) for part in mirror.split(SHADED_CHUNK["cpu"])] or [directions])
     return rows, Senders(vertices, directions, rows[vertices, nearest].long(), cosine > 0)
 
 
@@ -223,14 +223,14 @@ class VisibilityBits(OcclusionModel):
         """
         if self.senders is None or self.is_unoccluded:
             return
-        x, n = self.cache.vertices, self.cache.normals
-        at_vertices = [torch.cat(parts) for parts in zip(*map(materials, x.split(SHADED_CHUNK)))]
+        x, n, chunk = self.cache.vertices, self.cache.normals, SHADED_CHUNK[self.light.device.type]
+        at_vertices = [torch.cat(parts) for parts in zip(*map(materials, x.split(chunk)))]
         o_d, _, i_d, _ = cached_occlusion(self.cache, x, n, n, at_vertices[1], self.light, self.radiance)
         diffuse = o_d * light(n, torch.ones_like(n[:, :1])) + (0.0 if i_d is None else i_d)
         before = x.new_zeros(1, 3) if self.radiance is None else F.pad(self.radiance, (0, 0, 0, 1))
         blur = lobe_roughness(4.0 * math.pi / len(self.centres)) ** 4  # a ray stands for all of its cell
         parts = []
-        for vertices, directions, mirrored, facing in zip(*(part.split(SHADED_CHUNK) for part in self.senders)):
+        for vertices, directions, mirrored, facing in zip(*(part.split(chunk) for part in self.senders)):
             here, views = [part[vertices] for part in at_vertices], -self.directions[directions]
             sky = light(query_direction(n[vertices], views, here[1]), (here[1] ** 4 + blur).sqrt().sqrt())
             seen = before[mirrored.clamp(max=len(before) - 1)]

@@ -10,12 +10,14 @@ from torch import Tensor
 from torch.nn.functional import logsigmoid
 
 from splitnerf.config import Config
+from splitnerf.devices import start_fetching
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
 from splitnerf.render.masks import widened
 
 DENSITY_CUTOFF = 7.0  # where |f| > cutoff / s, the NeuS density is below e^-7 of its peak
 LIPSCHITZ = 1.25  # bound on |grad f|; the eikonal loss keeps it in practice
 REFRESHED_SHARE = 0.1  # share of the cells far from the surface that an update evaluates
+ROOM_FOR_NEAR = 1.1  # by how much the bound may grow from one update to the next on a GPU, as the sharpness falls
 WRONG_MASKS = 0.03  # share of the views that may miss a cell of the visual hull
 DECAY, MIN_CELL_OPACITY, ALL_CELLS_UNTIL = 0.95, 1e-3, 256
 
@@ -44,6 +46,7 @@ class OccupancyGrid:
         self.half_diagonal = math.sqrt(3.0) * box / resolution
         self.values = torch.zeros(resolution**3, device=device)
         self.cells = torch.full((resolution,) * 3, CELL_OCCUPIED, dtype=torch.uint8, device=device)
+        self._n_near: tuple[Tensor, Callable[[], None]] | None = None  # room for those near the surface, on its way from a GPU
 
     def centres(self) -> Tensor:
         """[r^3, 3] cell centres, scene units."""
@@ -67,13 +70,24 @@ class OccupancyGrid:
         if first:
             due = torch.arange(len(self.values), device=self.device)
         else:
-            near = self.values.abs() < 2.0 * bound
-            due = (near | (torch.rand_like(self.values) < REFRESHED_SHARE)).nonzero().squeeze(1)
+            due = self._due(self.values.abs() < 2.0 * bound)
         self.values[due] = evaluate(sdf, self.centres()[due])
+        if self.values.device.type == "cuda":
+            self._n_near = start_fetching((self.values.abs() < 2.0 * ROOM_FOR_NEAR * bound).sum())
         cells = torch.full_like(self.values, CELL_OCCUPIED, dtype=torch.uint8)
         cells[self.values > bound] = CELL_EMPTY
         cells[self.values < -bound] = CELL_OPAQUE
         self._set(cells, use_hull)
+
+    def _due(self, near: Tensor) -> Tensor:
+        """The cells of a mask, and a random tenth of all. On a GPU the host waits for no count: the update before has
+        counted, with a wider bound, and the first cell fills up what is left."""
+        if self._n_near is None:
+            return (near | (torch.rand_like(self.values) < REFRESHED_SHARE)).nonzero().squeeze(1)
+        count, wait = self._n_near
+        wait()
+        anywhere = torch.randint(len(near), (int(REFRESHED_SHARE * len(near)),), device=near.device)
+        return torch.cat([torch.nonzero_static(near, size=int(count))[:, 0].clamp(min=0), anywhere])
 
     def _set(self, cells: Tensor, use_hull: bool) -> None:
         if use_hull and self.hull is not None:
@@ -127,7 +141,8 @@ def make_grid(config: Config, hull: Tensor | None = None, device: torch.device |
 
 def evaluate(sdf: Callable[[Tensor], Tensor], points: Tensor) -> Tensor:
     """The field's values [n] at points [n, 3], evaluated in chunks."""
-    return torch.cat([sdf(chunk) for chunk in points.split(1 << 16)]) if len(points) else points[:, 0]
+    chunk = 1 << (16 if points.device.type == "cpu" else 20)
+    return torch.cat([sdf(part) for part in points.split(chunk)]) if len(points) else points[:, 0]
 
 
 def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intrinsics: Tensor) -> Tensor:

@@ -29,8 +29,8 @@ class Diverged(RuntimeError):
         - A gradient that is not finite, or too large to be squared, skips the step: parameters and optimiser do not
           change. A message on stderr tells so, and metrics.jsonl counts such steps as ``skipped``. The tenth in a row
           stops the run.
-        - Parameters are checked with every line of metrics.jsonl, before a mesh is made from them and before they are
-          saved. Where one is not finite the run stops and no checkpoint is written.
+        - Parameters are checked before a mesh is made from them and before they are saved; on the CPU, where nobody waits
+          for it, with every line of metrics.jsonl as well. Where one is not finite the run stops and no checkpoint is written.
         - A checkpoint whose numbers are not finite is refused when it is read.
     """
 

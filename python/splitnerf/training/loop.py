@@ -15,7 +15,7 @@ from torch import Tensor
 
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
-from splitnerf.devices import tensor_cores
+from splitnerf.devices import let_segments_grow, spare_processors, tensor_cores
 from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight
 from splitnerf.ops import MeshScene
@@ -115,6 +115,8 @@ class Training:
         ranks: Alone = ALONE,
     ):  # fmt: skip
         c = self.config = config
+        if device.type == "cuda" and c.sampling.min_weight == 0 and not c.run.cuda_graphs:  # each step has tensors of new sizes
+            let_segments_grow()
         self.dataset, self.run, self.ranks, self.observers = dataset, run, ranks, Observers(observers)
         self.fingerprint = dataset_fingerprint(dataset)
         torch.manual_seed(c.run.seed)
@@ -182,7 +184,7 @@ class Training:
         self.observers.began(self)
         with (
             Interrupt() as interrupt, Progress(self.progress) as bar, same_bits(c.run.deterministic),
-            tensor_cores(c.run.tensor_cores), self.take_step.stream(),
+            tensor_cores(c.run.tensor_cores), spare_processors(self.model.device), self.take_step.stream(),
         ):  # fmt: skip
             if self.step:
                 interrupt.attempt(self.preview_if_due)  # that an interruption left out
@@ -243,7 +245,8 @@ class Training:
         model.open_levels(progress)
         set_learning_rate(self.optimiser, c, step, progress)
         if self.first or step % c.sampling.grid_every == 0:
-            self.update_grid(first=self.first, step=step, use_hull=progress < c.sampling.hull_until)
+            use_hull = progress < c.sampling.hull_until
+            self.update_grid(self.take_step.s, first=self.first, step=step, use_hull=use_hull)
         if model.occlusion.needs_mesh and progress - self.mesh.asked_at >= c.mesh.every:
             check_state(step, model, self.optimiser)
             self.mesh.request(progress)
@@ -260,10 +263,11 @@ class Training:
         if c.occlusion.indirect and step % c.occlusion.indirect_every == 0:
             model.refresh_indirect(self.light)
 
-    def update_grid(self, **how: int | bool) -> None:
-        """Classes the grid's cells again, see :meth:`splitnerf.render.occupancy.OccupancyGrid.update`."""
+    def update_grid(self, s: float | None = None, **how: int | bool) -> None:
+        """Classes the grid's cells again, see :meth:`splitnerf.render.occupancy.OccupancyGrid.update`; without `s` for the
+        model's own sharpness."""
         self.ranks.align(self.model.device)
-        self.grid.update(self.ranks.divided(self.model.sdf_field.sdf), self.model.s_value, **how)
+        self.grid.update(self.ranks.divided(self.model.sdf_field.sdf), self.model.s_value if s is None else s, **how)
 
     def advance(self, bar: Progress) -> None:
         """Makes one step: draws rays, takes gradients, moves parameters; and reads the numbers of a step, on a GPU of the one
@@ -330,7 +334,8 @@ class Training:
         """Adds the line of the last step read to metrics.jsonl, if it is not there yet."""
         if self.unlogged is None:
             return
-        check_state(self.step, self.model, self.optimiser)
+        if not self.reads_late:
+            check_state(self.step, self.model, self.optimiser)
         if self.ranks.is_first:
             add_metrics(self.run / METRICS, self.unlogged)
             self.observers.logged(self.unlogged)

@@ -14,6 +14,7 @@ from torch.nn import functional as F
 
 from splitnerf.config import Config
 from splitnerf.data.environment import seen_at
+from splitnerf.devices import pinned
 from splitnerf.fields import EvaluatedLight, Light, LightPyramid
 from splitnerf.ops import (
     MeshScene,
@@ -103,7 +104,7 @@ class Terms(dict[str, Term]):
 @functools.lru_cache(maxsize=1024)
 def _stored_seed(weights: tuple[float, ...], shape: torch.Size, device: torch.device) -> Tensor:
     with torch.inference_mode(False):
-        return torch.tensor(weights, device=device).reshape(shape)
+        return pinned(torch.tensor(weights).reshape(shape), device).to(device, non_blocking=True)
 
 
 def _seed(weights: tuple[float, ...], values: Tensor) -> Tensor:

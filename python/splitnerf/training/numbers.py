@@ -11,7 +11,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from splitnerf.devices import start_fetching
+from splitnerf.devices import pinned, start_fetching
 from splitnerf.ops import step_numbers
 from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.batches import Batch
@@ -98,4 +98,5 @@ def _limits(n_terms: int, room: Room, device: torch.device) -> Tensor:
     """What each of a step's numbers must stay below."""
     counts = room.samples + 0.5, room.shaded + 0.5, math.inf, room.segments + 0.5
     with torch.inference_mode(False):
-        return torch.tensor([math.inf] * n_terms + [LARGEST, *counts, math.inf, math.inf], device=device)
+        limits = torch.tensor([math.inf] * n_terms + [LARGEST, *counts, math.inf, math.inf])
+        return pinned(limits, device).to(device, non_blocking=True)

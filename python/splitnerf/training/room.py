@@ -22,7 +22,8 @@ class RoomyStep(Step):
     """A step whose room follows from the counts of steps before; see :class:`splitnerf.training.step.Step`.
 
     The first step has no limits, and neither has one after a step whose samples were too many. What exceeds its room has no
-    meaning and moves nothing.
+    meaning and moves nothing. Where ``sampling.min_weight`` is 0 no step has limits, unless it is to be recorded: the search for
+    samples waits for their number anyway.
     """
 
     def __init__(self, model: SceneModel, *parts: object):
@@ -33,7 +34,9 @@ class RoomyStep(Step):
     def __call__(
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
     ) -> tuple[RenderedRays, Terms]:
-        known = self._counts is not None and self._counts.samples <= self.sample_room
+        c = self.model.config
+        pads = c.sampling.min_weight > 0 or c.run.cuda_graphs
+        known = pads and self._counts is not None and self._counts.samples <= self.sample_room
         found = self.find(batch, progress, self.sample_room if known else 0)
         self.room = self._wanted(len(found.directions)) if known else Room()
         return self._rendered(batch, found, light, environment, step, progress)
