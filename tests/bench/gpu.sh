@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Builds with CUDA, tests, times and trains on a machine with one GPU and no network, in two commands of nine minutes each.
-#   tests/bench/gpu.sh first OUT [BUNDLE]    operators and one step against the CPU, profiles, sanitizer, tests
-#   tests/bench/gpu.sh second OUT [BUNDLE]   whole runs of the presets, the costliest kernels against the card's limits
-# OUT receives table.md, log.txt and the parts' own pages; gpu_table.py writes its table into docs/cuda.md. BUNDLE is what
-# gpu_bundle.sh made; without it everything is expected to be installed. A part that fails or takes too long is a line of the
+# Tests, times and trains on a machine with one GPU and no network, in two commands of ten minutes at most. Nothing is built there.
+#   tests/bench/gpu.sh first OUT [BUNDLE]    operators and one step against the CPU, the steady state, preset paper, a run of fast
+#   tests/bench/gpu.sh second OUT [BUNDLE]   other schedules of fast, the costliest kernels against the card's limits, sanitizers, tests
+# OUT receives eight files at most: table.md, log.txt, the parts' own pages, and what gpu_table.py writes into docs/cuda.md. BUNDLE is
+# what gpu_bundle.sh made; without it the package is expected to be installed. A part that fails or takes too long is a line of the
 # table, and the next one begins.
 #   PYTHON=python3           has torch
-#   GPU_WORK=DIR             environment, build, data and runs, kept for the second command (default: in /tmp)
-#   GPU_SECONDS=540          of a command; parts that find no time left are left out
-#   GPU_PARTS="step fast"    only these parts, beside setup, wheel, build and data (default: all)
+#   GPU_WORK=DIR             environment, data and runs, kept for the second command (default: in /tmp)
+#   GPU_SECONDS=570          of a command; parts that find no time left are left out
+#   GPU_PARTS="step fast"    only these parts, beside setup, wheel and data (default: all)
 #   SPLITNERF_DATA=DIR       a data set to train on, or a folder of some (default: the demo scene, 200 x 200)
 #   GPU_DRY=1                the same on the CPU with small sizes: tries the script, measures nothing
 set -u
@@ -20,24 +20,21 @@ bundle=${2:+$(cd "$2" && pwd)} || exit 2
 python=$(command -v "${PYTHON:-python3}") dry=${GPU_DRY:-} work=${GPU_WORK:-${TMPDIR:-/tmp}/splitnerf-gpu${GPU_DRY:+-dry}}
 mkdir -p "$work" && work=$(cd "$work" && pwd) || exit 2
 export PATH="$work/venv/bin:$PATH:/usr/local/cuda/bin" PYTHONPYCACHEPREFIX="$work/pycache" PYTHONUNBUFFERED=1
-export LD_LIBRARY_PATH="$work/embree/usr/lib/$(uname -m)-linux-gnu${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 run_python=$work/venv/bin/python
 
-device=cuda cuda=ON profile_steps=300 short_steps=2000 long_steps=20000 paper_steps=2000 paper_minutes=1.2 slower=1
-picture="size=200" ops="--seconds .1 --minutes 1.4" steps_before=30 all_tests=yes small=()
-paper=(--set export_resolution=256 --set preview_every=1.0 --set target_samples=32768 --set light_samples=2048
-  --set light_queries=2048 --set mesh_resolution=192)
-short=(--set export_resolution=128 --set preview_every=1.0)
+# Parts with their seconds; the last one gets all that is left.
+first="setup 25 wheel 30 data 15 smoke 50 step 65 steady 60 operators 100 paper 75 fast 150"
+second="setup 25 wheel 30 data 15 fast_10000_32k 70 fast_10000_16k 60 fast_5000_131k 80 limits 75 memcheck 60 racecheck 60 tests 95"
+device=cuda slower=1 picture="size=200" ops="--seconds .1 --minutes 1.5" steps_before=12 all_tests=yes jobs=8 small=()
+steps=(20000 10000 5000) until=1500 until_paper=300 profiled=10
 if [ -n "$dry" ]; then
-  device=cpu cuda=OFF profile_steps=60 short_steps=60 long_steps=60 paper_steps=20 slower=10
-  picture="size=24, n_train=6, n_test=2, spp=4" ops="--tiny --seconds .002 --minutes 9" steps_before=6 all_tests=
-  small=(--set target_samples=256 --set max_rays=64 --set log2_table_size=10 --set grid_resolution=16 --set mesh_resolution=24
-    --set export_resolution=32 --set export_texture_size=64 --set export_faces=500 --set light_resolution=16)
-  paper=("${small[@]}" --set preview_every=1.0 --set initial_rays=64 --set light_samples=64 --set light_queries=64
-    --set environment_height=16 --set occlusion_rays=4)
-  short=("${small[@]}")
+  device=cpu slower=4 picture="size=24, n_train=6, n_test=2, spp=4" ops="--tiny --seconds .002 --minutes 5" steps_before=6 all_tests= jobs=1
+  steps=(60 40 20) until=60 until_paper=12 profiled=2
+  small=(--set max_rays=64 --set log2_table_size=10 --set grid_resolution=16 --set mesh_resolution=24 --set light_resolution=16
+    --set target_samples=256 --set initial_rays=64 --set light_samples=64 --set light_queries=64 --set environment_height=16
+    --set occlusion_rays=4 --set surface.levels_open_by=0)
 fi
-deadline=$((${GPU_SECONDS:-540} * slower)) # SECONDS counts from the start of this shell
+deadline=$((${GPU_SECONDS:-570} * slower)) # SECONDS counts from the start of this shell
 failures=0 rows=$out/$command.tsv
 : >"$out/log.txt"
 
@@ -49,35 +46,38 @@ row() { # part, result, seconds, what it says
   table >"$out/table.md"
 }
 
-said() { # log, exit code: its last line, but of a compiler that failed the first error
-  if [ "$2" != 0 ] && [ "$1" = "$work/build.log" ] && grep -m 1 -E 'CMake Error|error:' "$1"; then return; fi
-  tr '\r' '\n' <"$1" | grep -v '^ *$' | tail -n 1
-}
-
-wanted() { case " setup wheel build data ${GPU_PARTS:-$1} " in *" $1 "*) ;; *) return 1 ;; esac }
+wanted() { case " setup wheel data ${GPU_PARTS:-$1} " in *" $1 "*) ;; *) return 1 ;; esac }
 
 left() { echo $((deadline - SECONDS)); }
 
-# Runs a command under a time limit, keeps its log, and adds the last line of that to the table.
-part() { # name, seconds, command
-  local name=$1 limit=$(($2 * slower)) log=$work/$1.log begin=$SECONDS result=done code
+limit_of() { # part: its seconds, or what is left
+  local seconds
+  seconds=$(echo " ${!command} " | sed -n "s/.* $1 \([0-9]*\) .*/\1/p")
+  case " ${!command}" in *" $1 $seconds") seconds= ;; esac
+  seconds=$((${seconds:-100000} * slower))
+  echo $((seconds < $(left) ? seconds : $(left)))
+}
+
+# Runs a command under its part's time limit, keeps its log, and adds the last line of that to the table.
+part() { # name, command
+  local name=$1 limit log=$work/$1.log begin=$SECONDS result=done code
   wanted "$name" || return 1
-  shift 2
-  if [ "$(left)" -lt 5 ]; then row "$name" "left out" 0 "no time left"; return 1; fi
-  [ "$limit" -le "$(left)" ] || limit=$(left)
+  shift
+  limit=$(limit_of "$name")
+  if [ "$limit" -lt 5 ]; then row "$name" "left out" 0 "no time left"; return 1; fi
   echo "== $name" >&2
-  (export -f setup wheel data relight gpu_tests; timeout --kill-after=10 "$limit" "$@") >"$log" 2>&1 </dev/null
+  (export -f setup wheel data gpu_tests; timeout --kill-after=10 "$limit" "$@") >"$log" 2>&1 </dev/null
   code=$?
   [ "$code" = 0 ] || result="failed ($code)"
   [ "$code" = 0 ] || [ $((SECONDS - begin)) -lt "$limit" ] || result="stopped at $limit s"
   { echo "==== $name: $result, $((SECONDS - begin)) s"; tr '\r' '\n' <"$log" | tail -c 300000; } >>"$out/log.txt"
-  row "$name" "$result" "$((SECONDS - begin))" "$(said "$log" "$code" | cut -c 1-240)"
+  row "$name" "$result" "$((SECONDS - begin))" "$(tr '\r' '\n' <"$log" | grep -v '^ *$' | tail -n 1 | cut -c 1-400)"
   [ "$code" = 0 ]
 }
 
-tool_part() { # name, seconds, command whose first word may be missing on the machine
-  wanted "$1" || return 1
-  if command -v "$TOOL" >/dev/null; then part "$@"; else row "$1" "left out" 0 "no $TOOL on this machine"; fi
+tool_part() { # tool, name, command
+  wanted "$2" || return 1
+  if command -v "$1" >/dev/null; then part "${@:2}"; else row "$2" "left out" 0 "no $1 on this machine"; fi
 }
 
 facts() { # of the machine, before all parts
@@ -100,43 +100,25 @@ setup() { # an environment in which that of $python stays visible, be it a virtu
   "$python" -c 'import sys
 for path in sys.path:
     if path.endswith(("site-packages", "dist-packages")): print(f"import site; site.addsitedir({path!r})")' >"$site/shared.pth"
-  if [ -n "$bundle" ]; then
-    "$run_python" "$(echo "$bundle"/wheels/pip-*.whl)/pip" --disable-pip-version-check install --quiet --no-index --no-deps --no-compile --ignore-installed "$bundle"/wheels/*.whl
-    [ -d "$work/embree" ] || "$run_python" -m tarfile -e "$bundle/embree.tar.xz" "$work/embree"
-  fi
-  "$run_python" -c 'import importlib.util, os, platform, shutil, sysconfig, torch
-needed = "numpy scipy PIL OpenImageIO trimesh xatlas fast_simplification tqdm jinja2 tomli_w pytest scikit_build_core pybind11".split()
+  [ -z "$bundle" ] || "$run_python" "$(echo "$bundle"/wheels/pip-*.whl)/pip" --disable-pip-version-check install --quiet --no-index --no-deps --no-compile --ignore-installed "$bundle"/wheels/*.whl
+  "$run_python" -c 'import importlib.util, platform, torch
+needed = "numpy scipy PIL OpenImageIO trimesh xatlas fast_simplification tqdm jinja2 tomli_w pytest".split()
 missing = [name for name in needed if importlib.util.find_spec(name) is None]
-missing += [name for name in ("c++", "cmake", "ninja", "nvcc") if shutil.which(name) is None]
-missing += [] if os.path.exists(os.path.join(sysconfig.get_paths()["include"], "Python.h")) else ["Python.h"]
 versions = f"python {platform.python_version()}, torch {torch.__version__}, CUDA {torch.version.cuda}, {torch.cuda.device_count()} GPU"
 print(versions + "; missing: " * bool(missing) + ", ".join(missing))'
 }
 
-wheel() { # the bundle's own build, where it is of these sources and its operators are right on this machine
+wheel() { # of these sources, and its operators are right on this machine
   set -e
-  [ "$(cat "$bundle/built/sources")" = "$(tests/bench/gpu_sources.sh)" ] || { echo "the wheel is of other sources"; exit 1; }
-  "$run_python" -m pip --disable-pip-version-check install --quiet --no-index --no-deps --force-reinstall "$bundle"/built/*.whl
-  splitnerf doctor
+  if [ -n "$bundle" ]; then
+    [ "$(cat "$bundle/built/sources")" = "$(tests/bench/gpu_sources.sh)" ] || { echo "the wheel is of other sources"; exit 1; }
+    "$run_python" -m pip --disable-pip-version-check install --quiet --no-index --no-deps --force-reinstall "$bundle"/built/*.whl
+  fi
+  "$run_python" -m splitnerf doctor
   "$run_python" -c 'import sys
 from splitnerf.doctor.machine import devices
 print("operators for", ", ".join(devices()))
 sys.exit(sys.argv[1] not in devices())' $device
-}
-
-install() { # the wheel, else a build; kept for the second command while the sources are the same
-  local sources
-  sources=$("$root/tests/bench/gpu_sources.sh")
-  [ "$(cat "$work/installed" 2>/dev/null)" != "$sources" ] || return 0
-  rm -f "$work/installed" "$work/tested"
-  part setup 90 bash -c setup
-  if ! { [ -d "$bundle/built" ] && part wheel 60 bash -c wheel; }; then
-    CMAKE_PREFIX_PATH="$work/embree/usr" part build 200 "$run_python" -m pip --disable-pip-version-check install --no-index \
-      --no-deps --no-build-isolation --no-cache-dir --force-reinstall "$root" -C build-dir="$work/build" \
-      -C cmake.define.SPLITNERF_CUDA=$cuda -v
-  fi
-  # shellcheck disable=SC2015  # both
-  splitnerf info --settings >/dev/null && echo "$sources" >"$work/installed"
 }
 
 data() { # prints the folder of a data set, last
@@ -150,82 +132,66 @@ write_demo_dataset(Path('$work/writing'), $picture)" && mv "$work/writing" "$wor
 }
 
 gpu_tests() { # each file in a process of its own: a kernel that takes the device down fails one file alone
-  mkdir -p "$work/tests"
+  rm -rf "$work/tests" && mkdir "$work/tests"
   grep -lE 'DEVICES|devices\(|"cuda"' tests/python/test_*.py | if [ -n "$all_tests" ]; then cat; else head -n 2; fi |
-    xargs -P 5 -I{} bash -c 'CUDA_LAUNCH_BLOCKING=1 "$run_python" -m pytest {} -q -k cuda -p no:cacheprovider -o faulthandler_timeout=60 -r fE >"$work/tests/$(basename {}).log" 2>&1 || [ $? = 5 ]'
+    xargs -P $jobs -I{} bash -c 'CUDA_LAUNCH_BLOCKING=1 "$run_python" -m pytest {} -q -k cuda -p no:cacheprovider -o faulthandler_timeout=60 -r fE >"$work/tests/$(basename {}).log" 2>&1 || [ $? = 5 ]'
   code=$?
   grep -hE '^(FAILED|ERROR|E  )' "$work"/tests/*.log
-  for log in "$work"/tests/*.log; do echo "$(basename "$log" .py.log): $(tail -n 1 "$log")"; done | tee "$work/tests/summary"
-  sed -n 's/.*: //p' "$work/tests/summary" | awk '{ for (i = 2; i <= NF; i++) n[$i] += $(i - 1) } END { printf "%d passed, %d failed, %d errors\n", n["passed"] + n["passed,"], n["failed"] + n["failed,"], n["error"] + n["errors"] + n["error,"] + n["errors,"] }'
+  for log in "$work"/tests/*.log; do echo "$(basename "$log" .py.log): $(tail -n 1 "$log")"; done | tee "$work/summary"
+  sed -n 's/.*: //p' "$work/summary" | awk '{ for (i = 2; i <= NF; i++) n[$i] += $(i - 1) } END { printf "%d passed, %d failed, %d errors\n", n["passed"] + n["passed,"], n["failed"] + n["failed,"], n["error"] + n["errors"] + n["error,"] + n["errors,"] }'
   return "$code"
 }
+export python run_python work bundle picture device all_tests jobs SPLITNERF_DATA="${SPLITNERF_DATA:-}"
 
-relight() { # of the run, where the data have lights to compare with
-  splitnerf evaluate "$work/runs/fast" --data "$1" --views 4 --spp 32 &&
-    "$run_python" -c 'import json, sys; print("relit views %.2f dB" % json.load(open(sys.argv[1]))["relight"]["psnr"])' "$work/runs/fast/evaluation.json"
-}
-export python run_python work bundle picture device all_tests SPLITNERF_DATA="${SPLITNERF_DATA:-}"
-
-train() { # name, seconds, preset, options of the training
-  local name=$1 seconds=$2 preset=$3
-  shift 3
-  part "$name" "$seconds" "$run_python" tests/bench/gpu_train.py "$scene" --out "$work/runs/$name" --preset "$preset" --device $device \
-    --no-refine "$@"
+train() { # name, preset, options
+  part "$1" "$run_python" tests/bench/gpu_train.py "$scene" --out "$work/runs/$1" --device $device --preset "$2" "${small[@]}" "${@:3}"
 }
 
-sanitize() { # memcheck or racecheck, on the families that have kernels with shared memory
-  TOOL=compute-sanitizer tool_part "$1" 80 "$run_python" tests/bench/gpu_smoke.py --device $device --seconds $((75 * slower)) \
-    --only fields --only gradients --only light --only losses --only rays --only shading --under compute-sanitizer --tool "$1" --error-exitcode 9
+steady() { # also says which kernels the second command looks at
+  train steady fast --steps 20000 --until $until --page "$out/steady.md" --set surface.levels_open_by=0 --set mesh.every=0.02 &&
+    cp "$out/steady.md" "$work"
 }
 
-profile_eager() { # also says which kernels the second command looks at
-  train profile_eager 45 fast --steps $profile_steps --profile "$out/profile_eager.md" --set cuda_graphs=false "${short[@]}"
+to_the_end() { # name, steps, options: a schedule that gives way to the time, less some for the start and the scores
+  train "$1" fast --steps "$2" --set run.max_minutes="$(awk "BEGIN { print ($(limit_of "$1") - 25 * $slower) / 60 }")" "${@:3}"
 }
 
-tests_once() { # in the command that has the time
-  [ -e "$work/tested" ] || { part tests 130 bash -c gpu_tests && touch "$work/tested"; }
+samples() { [ -n "$dry" ] || echo "--set sampling.target_samples=$1 --set sampling.initial_rays=$(($1 / 8)) --set sampling.max_rays=$(($1 / 2))"; }
+
+sanitize() { # memcheck or racecheck, on the families that have kernels with shared memory: families to leave out
+  tool_part compute-sanitizer "$1" "$run_python" tests/bench/gpu_smoke.py --device $device --seconds $(($(limit_of "$1") - 5)) --jobs $jobs \
+    "${@:2}" --under compute-sanitizer --tool "$1" --error-exitcode 9
 }
 
-first() {
-  part smoke 90 "$run_python" tests/bench/gpu_smoke.py --device $device --seconds $((60 * slower))
-  part data 60 bash -c data || return
-  scene=$(tail -n 1 "$work/data.log")
-  part step 80 "$run_python" tests/bench/gpu_step.py "$scene" --device $device --steps $steps_before --out "$out" "${small[@]}"
-  profile_eager
-  train profile_graphs 45 fast --steps $profile_steps --profile "$out/profile_graphs.md" "${short[@]}"
-  train eager 75 fast --steps $short_steps --set cuda_graphs=false "${short[@]}"
-  train graphs 60 fast --steps $short_steps "${short[@]}"
+run_first() {
+  part smoke "$run_python" tests/bench/gpu_smoke.py --device $device --seconds $((45 * slower)) --jobs $jobs
+  part step "$run_python" tests/bench/gpu_step.py "$scene" --device $device --steps $steps_before --out "$out" "${small[@]}"
+  steady
   # shellcheck disable=SC2086  # words
-  part operators 100 "$run_python" tests/bench/gpu_ops.py --out "$out" --device $device $ops
-  sanitize memcheck
-  sanitize racecheck
-  tests_once
-  wanted short_fast || return
-  if [ "$(left)" -ge 80 ]; then # loading, export and scores take about 40 s
-    train short_fast "$(left)" fast --steps $long_steps --max-minutes "$(awk "BEGIN { print ($(left) - 45) / 60 / $slower }")" "${small[@]}"
-  else row short_fast "left out" 0 "the second command trains longer"; fi
+  part operators "$run_python" tests/bench/gpu_ops.py --out "$out" --device $device $ops
+  train paper paper --steps 20000 --until $until_paper --profiled $profiled --page "$out/paper.md" --set mesh.every=1.0
+  to_the_end fast "${steps[0]}"
 }
 
-second() {
-  part data 60 bash -c data || return
-  scene=$(tail -n 1 "$work/data.log")
-  train fast 330 fast --steps $long_steps "${small[@]}"
-  PYTORCH_CUDA_ALLOC_CONF=expandable_segments:True train paper 120 paper --steps $paper_steps --max-minutes $paper_minutes "${paper[@]}"
-  [ -z "$(find "$scene" -maxdepth 1 -name 'relight_*.hdr' 2>/dev/null)" ] || part relight 60 bash -c 'relight "$1"' - "$scene"
-  [ -e "$out/profile_eager.md" ] || profile_eager
-  TOOL=ncu tool_part limits 90 "$run_python" tests/bench/gpu_limits.py "$out/profile_eager.md" --out "$out" -- \
-    "$run_python" tests/bench/gpu_train.py "$scene" --out "$work/runs/limits" --preset fast --device $device --no-refine --steps 100 \
-    --set cuda_graphs=false "${short[@]}"
-  tests_once
+# shellcheck disable=SC2046  # words
+run_second() {
+  to_the_end fast_10000_32k "${steps[1]}"
+  to_the_end fast_10000_16k "${steps[1]}" $(samples 16384)
+  to_the_end fast_5000_131k "${steps[2]}" $(samples 131072)
+  [ -e "$work/steady.md" ] || steady
+  tool_part ncu limits "$run_python" tests/bench/gpu_limits.py "$work/steady.md" --out "$out" -- "$run_python" tests/bench/gpu_train.py \
+    "$scene" --out "$work/runs/limits" --device $device --preset fast --steps 100 --set run.cuda_graphs=false "${small[@]}"
+  sanitize memcheck --only fields --only gradients --only rays
+  sanitize racecheck --only light --only shading
+  part tests bash -c gpu_tests
 }
 
 cd "$root" || exit 2
 facts
-install
-if [ -e "$work/installed" ]; then
-  $command
-  [ ! -d "$work/runs" ] || (cd "$work" && find runs \( -name '*.json*' -o -name config.toml -o -name report.html \) -print0 |
-    tar czf "$out/runs.tar.gz" --null -T -)
+if part setup bash -c setup && part wheel bash -c wheel && part data bash -c data; then
+  scene=$(tail -n 1 "$work/data.log")
+  "run_$command"
+  [ ! -d "$work/runs" ] || (cd "$work" && find runs \( -name '*.json*' -o -name '*.png' \) -print0 | tar czf "$out/runs.tar.gz" --null -T -)
 fi
 awk -F '\t' '$1 == "part" && $3 != "done" && $3 != "left out" { print $2 }' "$rows" | while read -r name; do
   echo "---- $name" # the end of what failed, also where the reader sees no file

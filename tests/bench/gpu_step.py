@@ -7,7 +7,8 @@ random draws are recorded and given to the others. So only roundings differ. Thr
 float32, and on the CPU in float64, the truth. An error is the root mean square of a difference over that of the truth; those of
 the table and of the light's texels are taken for each level. The device may be :data:`FACTOR` times as far from the truth as the
 CPU's float32 is, and :data:`FLOOR` more. On a GPU the step is also taken with the matrix products that training takes (TF32, with
-limits of their own), and as a CUDA graph, which is held against the eager step with the same capacity. With --device cpu the
+limits of their own), and as a CUDA graph, which is held against the eager step with the same capacity: also one that is recorded after all graphs were dropped,
+after a step without room, and after another mesh. With --device cpu the
 program tries itself. Prints the worst, writes step.md; exit code 1: something is beyond its limit.
 """
 
@@ -36,6 +37,7 @@ from splitnerf.fields import LightPyramid
 from splitnerf.render.renderer import FoundSamples
 from splitnerf.training.batches import Batch, draw_batch
 from splitnerf.training.loop import Training
+from splitnerf.training.numbers import PastStep
 from splitnerf.training.room import SAMPLE_SLACK, round_up
 from splitnerf.training.schedule import light_moves
 from splitnerf.training.step import Room
@@ -262,30 +264,64 @@ def same_choice(ours: Training, truth: Training, there: Training) -> tuple[Work,
     raise RuntimeError(f"other samples are shaded in each of {BATCHES} batches")
 
 
-def graphed(training: Training, work: Work) -> tuple[Answer, Answer]:
-    """The step without a graph but with its room, and the replay of its graph, both with the same seed.
+class Graphed:
+    """Takes one step again and again as a training on a GPU does, with the same seed.
 
-    Raises:
-        RuntimeError: No graph was made, or it has too little room.
+    Args:
+        training: On its device.
+        work: The rays; the step finds their samples itself.
     """
-    batch = on(training.model.device, work.batch)
-    training.take_step.sample_room = round_up(SAMPLE_SLACK * len(work.found.directions))
-    answers = []
-    with training.take_step.stream():
-        for _ in range(5):  # two without a graph, one that records and replays, two that replay
-            training.generator.manual_seed(1)
-            training.optimiser.zero_grad(set_to_none=True)
-            light = training.model.evaluate_light()
-            ray, terms = training.take_step(batch, light, None, work.step, PROGRESS)
-            light.backward()
-            n_shaded, _, n_segments = ray.sizes.tolist()
-            counts, room = Room(int(ray.n_found), n_shaded, n_segments), training.take_step.room
-            if not training.take_step.settle(counts, room, training.model.s_value):
-                raise RuntimeError("the graph's room is too small for the batch that it was made for")
-            answers.append(collected(training, ray, terms))
-    if not training.take_step._graphs:
-        raise RuntimeError("no graph was recorded")
-    return answers[1], answers[-1]
+
+    def __init__(self, training: Training, work: Work):
+        self.training, self.work, self.step = training, work, training.take_step
+        self.batch = on(training.model.device, work.batch)
+        self.step.sample_room = round_up(SAMPLE_SLACK * len(work.found.directions))
+
+    def taken(self, batch: Batch | None = None, fits: bool = True) -> Answer:
+        """One step. Raises RuntimeError where its results have room and should not, or the other way round."""
+        training, step = self.training, self.step
+        training.generator.manual_seed(1)
+        training.optimiser.zero_grad(set_to_none=True)
+        light = training.model.evaluate_light()
+        ray, terms = step(batch or self.batch, light, None, self.work.step, PROGRESS)
+        light.backward()
+        n_shaded, _, n_segments = ray.sizes.tolist()
+        counts, room = Room(int(ray.n_found), n_shaded, n_segments), step.room
+        past = PastStep.of(1, batch or self.batch, ray, terms, room, training.watch.gradients())
+        if not bool(past.allowed) == fits == step.settle(counts, room, training.model.s_value):
+            raise RuntimeError(f"{counts} and {room}: the device says {bool(past.allowed)}, and it should be {fits}")
+        return collected(training, ray, terms)
+
+    def replayed(self, n: int) -> Answer:
+        """The last of `n` steps, which was the replay of a graph."""
+        *_, last = (self.taken() for _ in range(n))
+        if not self.step._graphs:
+            raise RuntimeError("no graph was recorded")
+        return last
+
+    def crowded(self) -> Batch:
+        """As many rays, all of them the one with the most samples."""
+        most, n = int(self.work.found.packed.offsets.diff()[: len(self.batch.target)].argmax()), len(self.batch.target)
+        of_rays = {name: x for name, x in self.batch._asdict().items() if isinstance(x, Tensor) and len(x) == n}
+        return self.batch._replace(**{name: x[most].expand_as(x).contiguous() for name, x in of_rays.items()})
+
+    def swapped(self) -> None:
+        """Makes a mesh in the place of the present one."""
+        self.training.mesh.request(PROGRESS)
+        self.training.mesh.poll(wait=True)
+
+    def answers(self) -> Iterator[tuple[str, Answer, Answer]]:
+        """What graphs may do wrong: its name, the step without a graph, and the replay."""
+        with self.step.stream():
+            self.taken()  # without room
+            eager = self.taken()
+            yield "graph against eager", eager, self.replayed(3)
+            self.step._graphs.clear()
+            yield "recorded again after all graphs were dropped", eager, self.replayed(2)
+            self.taken(self.crowded(), fits=False)
+            yield "after a step without room", eager, self.replayed(4)  # the first of which has no limits
+            self.swapped()
+            yield "after a mesh was swapped", self.taken(), self.replayed(3)
 
 
 def page(sections: dict[str, list[Row]]) -> str:
@@ -311,8 +347,9 @@ def sections_of(dataset: Dataset, config: Config, run: Path, device: str, steps:
     if device == "cuda":
         yield "cuda in TF32 against the CPU", compared(there, true, on_cpu, answer(there, work, draws, True), TF32)
         if config.run.cuda_graphs:
-            eager, replayed = graphed(there, work)
-            yield "graph against eager", against_eager(there, eager, replayed, compared(there, true, on_cpu, found))
+            rows = compared(there, true, on_cpu, found)
+            for name, eager, replayed in Graphed(there, work).answers():
+                yield name, against_eager(there, eager, replayed, rows)
 
 
 def against_eager(training: Training, eager: Answer, replayed: Answer, rows: list[Row]) -> list[Row]:

@@ -1,88 +1,189 @@
-"""Trains and says what it took, or profiles some steps of a training.
+"""Trains and scores without an export, or looks at a training's steady state: where the time of host and device goes.
 
-    python tests/bench/gpu_train.py DATA --out RUN --preset fast --device cuda [--steps N] [--max-minutes M] [--set KEY=VALUE]
-    python tests/bench/gpu_train.py DATA --out RUN --preset fast --device cuda --steps 600 --profile profile.md
+    python tests/bench/gpu_train.py DATA --out RUN --preset fast --steps 20000 [--set KEY=VALUE] [--views 8]
+    python tests/bench/gpu_train.py DATA --out RUN --preset fast --steps 20000 --until 1500 --page steady.md [--profiled 20]
 
-The first is `splitnerf train` with the same options; its last line says steps, seconds, steps a second of the second half of
-the run, the largest memory that torch's allocator gave out, and the main scores, and RUN/training.json holds all of them. The second
-profiles 20 steps from two thirds of the steps on, ends there, and writes which kernels took the time, and how much of it
-the device stood still.
+The first trains with the schedule of so many steps and scores some test views; its last line says steps, seconds, memory and the main
+scores, and RUN/training.json holds all of them. The second ends at a step. Over the last two thirds of the steps before it says
+how long a step took, and how long the host was in each part of one: drawing rays, finding samples, copying into a graph, replaying it,
+and so on. Then it profiles some steps, and by itself each thing that steps share: an update of the occupied cells, the light on the
+mesh, a mesh.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import signal
+import statistics
 import sys
 import time
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import torch
 from torch.autograd import DeviceType
-from torch.optim.optimizer import register_optimizer_step_post_hook
 from torch.profiler import ProfilerActivity, profile
 
 from splitnerf.bench.provenance import header, provenance
-from splitnerf.cli import main as splitnerf
+from splitnerf.config import parse_setting, preset
+from splitnerf.data.dataset import load_dataset, spread
+from splitnerf.devices import choose_device
+from splitnerf.outputs import evaluate_scene
+from splitnerf.training import graphs, loop
+from splitnerf.training.loop import TrainedScene, Training
+from splitnerf.training.metrics import METRICS
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("cpp", "python/splitnerf")
-PROFILED = 20  # steps
 SHOWN = 60  # kernels
 
 
 class Enough(BaseException):
-    """Ends a training that was only to be profiled; no error, so that the command line lets it pass."""
+    """Ends a training that was only looked at."""
 
 
-class StepProfiler:
-    """Profiles `PROFILED` optimiser steps after the first so many.
+class Phases:
+    """The host's time within functions, each without that of those it calls, and their calls; only while `on`."""
 
-    Args:
-        device: "cuda" or "cpu".
-        first: Steps before.
-    """
+    def __init__(self) -> None:
+        self.on, self.seconds, self.calls = False, Counter(), Counter()
+        self._inner: list[float] = []  # of each function that runs, the time in those that it has called
 
-    def __init__(self, device: str, first: int):
-        activities = [ProfilerActivity.CPU] + [ProfilerActivity.CUDA] * (device == "cuda")
-        self.device, self.first, self.steps = device, first, 0
-        self.profile, self.started, self.seconds = profile(activities=activities), 0.0, 0.0
+    def watch(self, owner: object, name: str, phase: str) -> None:
+        """Counts a function, an attribute of `owner`, from now on; one that is not there is left out."""
+        function = getattr(owner, name, None)
+        if function is not None:
+            setattr(owner, name, self.timed(function, phase))
 
-    def __call__(self, *_: object) -> None:
-        self.steps += 1
-        if self.steps not in (self.first, self.first + PROFILED):
-            return
-        if self.device == "cuda":
-            torch.cuda.synchronize()
-        if self.steps == self.first:
-            self.profile.start()
-            self.started = time.perf_counter()
-        else:
-            self.seconds = time.perf_counter() - self.started
-            self.profile.stop()
+    def timed(self, function: Callable, phase: str) -> Callable:
+        def within(*args: object, **kwargs: object) -> object:
+            begin = time.perf_counter()
+            self._inner.append(0.0)
+            try:
+                return function(*args, **kwargs)
+            finally:
+                took, inner = time.perf_counter() - begin, self._inner.pop()
+                if self._inner:
+                    self._inner[-1] += took
+                if self.on:
+                    self.seconds[phase] += took - inner
+                    self.calls[phase] += 1
+
+        return within
+
+    def table(self, n_steps: int) -> list[str]:
+        """Milliseconds and calls a step."""
+        lines = [f"| {name} | {1e3 * t / n_steps:.3f} | {self.calls[name] / n_steps:.2f} |" for name, t in self.seconds.most_common()]
+        return ["| part of a step | the host's ms a step | calls a step |", "|---|---|---|", *lines]
+
+
+class Look:
+    """Stops a training, which has not begun, behind a step, and says what the steps before and `profiled` more took."""
+
+    def __init__(self, training: Training, until: int, profiled: int):
+        self.training, self.first, self.until, self.profiled = training, until // 3, until, profiled
+        self.on_device = training.model.device.type == "cuda"
+        self.phases, self.ends = Phases(), []
+        self.pages: list[str] = []
+        step = training.take_step
+        for owner, name, phase in (
+            (training, "refresh", "refresh: levels, cells, meshes, light"), (loop, "draw_batch", "draws"), (step, "find", "find samples"),
+            (step, "_replayed", "copies to and from a graph"), (torch.cuda.CUDAGraph, "replay", "replay"), (graphs, "record", "recording"),
+            (step, "differentiate", "render and differentiate, eager or recorded"), (loop.PastStep, "of", "numbers"),
+            (training.optimiser, "step", "optimiser"), (training, "settle", "read the numbers of the step before"),
+        ):  # fmt: skip
+            self.phases.watch(owner, name, phase)
+        self.advance, training.advance = self.phases.timed(training.advance, "the rest"), self.watched
+
+    def watched(self, bar: object) -> None:
+        """A step of the training, which calls this in the place of its own."""
+        self.advance(bar)
+        if self.training.step == self.first:
+            if self.training.model.occlusion.needs_mesh and self.training.mesh.scene is None:
+                self.mesh()  # without which a step does less
+            self.wait()
+            self.phases.on = True
+        if self.phases.on:
+            self.ends.append(time.perf_counter())
+        if self.training.step == self.until:
+            self.wait()
+            self.phases.on = False
+            self.of_steps()
+            self.profiler = self.started()
+        if self.training.step == self.until + self.profiled:
+            self.of_profile(*self.stopped(*self.profiler))
+            self.each_by_itself()
             raise Enough
 
-    def markdown(self) -> str:
-        """Kernels (on the CPU: operators) by their own time, in milliseconds a step."""
-        on_device = self.device == "cuda"
+    def wait(self) -> None:
+        if self.on_device:
+            torch.cuda.synchronize()
+
+    def of_steps(self) -> None:
+        """Steps without the profiler."""
+        n, step = self.until - self.first, self.training.take_step
+        seconds = time.perf_counter() - self.ends[0]
+        each = sorted(1e3 * (b - a) for a, b in zip(self.ends, self.ends[1:]))
+        eager = self.phases.calls["render and differentiate, eager or recorded"] - self.phases.calls["recording"]
+        self.sentence = (
+            f"steps {self.first} to {self.until}: {1e3 * seconds / n:.3f} ms a step, median {statistics.median(each):.3f}, "
+            f"longest {each[-1]:.1f}; {self.phases.calls['replay']} replays, {self.phases.calls['recording']} recordings, {eager} eager "
+            f"steps, {step.n_discarded} without room"
+        )
+        if self.on_device:
+            self.sentence += f"; {torch.cuda.max_memory_allocated() >> 20} MiB at most ({torch.cuda.max_memory_reserved() >> 20} reserved)"
+        self.pages += [self.sentence + ".", "", *self.phases.table(n), ""]
+
+    def started(self) -> tuple[profile, float]:
+        self.wait()
+        profiler = profile(activities=[ProfilerActivity.CPU] + [ProfilerActivity.CUDA] * self.on_device)
+        profiler.start()
+        return profiler, time.perf_counter()
+
+    def stopped(self, profiler: profile, begin: float) -> tuple[float, dict[str, tuple[float, int]]]:
+        """Milliseconds, and of each kernel (on the CPU: operator) its own milliseconds and its calls."""
+        self.wait()
+        ms = 1e3 * (time.perf_counter() - begin)
+        profiler.stop()
         events = [
-            x for x in self.profile.key_averages()
-            if (x.device_type == DeviceType.CUDA) == on_device and not getattr(x, "is_user_annotation", False)
+            x for x in profiler.key_averages()
+            if (x.device_type == DeviceType.CUDA) == self.on_device and not getattr(x, "is_user_annotation", False)
         ]  # fmt: skip
-        times = {x.key: (x.self_device_time_total if on_device else x.self_cpu_time_total) for x in events}
-        counts, busy = {x.key: x.count for x in events}, sum(times.values()) / 1e3 / PROFILED
-        wall = 1e3 * self.seconds / PROFILED
-        lines = [
-            f"{PROFILED} steps after {self.first}: {wall:.3f} ms a step under the profiler, of which {busy:.3f} ms in "
-            f"{sum(counts.values()) / PROFILED:.0f} {'kernels and copies' if on_device else 'operators'} a step.", "",
-            "| ms a step | share | calls a step | us a call | name |", "|---|---|---|---|---|",
-        ]  # fmt: skip
-        for name in sorted(times, key=times.__getitem__, reverse=True)[:SHOWN]:
-            own, calls = times[name] / 1e3 / PROFILED, counts[name] / PROFILED
-            share = own / busy if busy else 0.0
-            lines.append(f"| {own:.4f} | {share:.1%} | {calls:.1f} | {1e3 * own / calls:.1f} | `{short(name)}` |")
-        return "\n".join([*lines, "", header(provenance(SOURCES, root=ROOT))]) + "\n"
+        own = {x.key: x.self_device_time_total if self.on_device else x.self_cpu_time_total for x in events}
+        return ms, {x.key: (own[x.key] / 1e3, x.count) for x in events}
+
+    def of_profile(self, ms: float, kernels: dict[str, tuple[float, int]]) -> None:
+        """Kernels by their own time, in milliseconds a step."""
+        busy, count = (sum(x) / self.profiled for x in zip(*kernels.values()))
+        said = f"{ms / self.profiled:.3f} ms a step under the profiler, of which {busy:.3f} ms in {count:.0f} kernels and copies"
+        self.sentence += f"; {said}"
+        self.pages += [f"{self.profiled} steps: {said}.", "", "| ms a step | share | calls a step | us a call | name |", 5 * "|---" + "|"]
+        for name in sorted(kernels, key=kernels.__getitem__, reverse=True)[:SHOWN]:
+            own, calls = (x / self.profiled for x in kernels[name])
+            self.pages.append(f"| {own:.4f} | {own / busy:.1%} | {calls:.1f} | {1e3 * own / calls:.1f} | `{short(name)}` |")
+        self.pages.append("")
+
+    def each_by_itself(self) -> None:
+        """What steps share, once each."""
+        training, model = self.training, self.training.model
+        parts: dict[str, Callable[[], object]] = {"occupied cells": lambda: training.update_grid(first=False, step=training.step)}
+        if model.occlusion.needs_mesh:
+            parts["a mesh, and its caches filled"] = self.mesh
+        if training.config.occlusion.indirect and training.mesh.scene is not None:
+            parts["light on the mesh"] = lambda: model.refresh_indirect(model.evaluate_light())
+        self.pages += ["| by itself | ms | of which the device works | kernels and copies |", "|---|---|---|---|"]
+        for name, part in parts.items():
+            profiler = self.started()
+            part()
+            ms, kernels = self.stopped(*profiler)
+            busy, count = (sum(x) for x in zip(*kernels.values()))
+            self.pages.append(f"| {name} | {ms:.1f} | {busy:.1f} | {count} |")
+
+    def mesh(self) -> None:
+        self.training.mesh.poll(wait=True)
+        self.training.mesh.request(self.training.progress)
+        self.training.mesh.poll(wait=True)
 
 
 def short(name: str) -> str:
@@ -92,85 +193,55 @@ def short(name: str) -> str:
     return name.replace("|", "/").replace("`", "'")[:110]
 
 
-def rate_of(run: Path) -> dict[str, float]:
-    """Steps, seconds, and steps a second over the second half of the steps."""
-    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
-    last = lines[-1]
-    half = next((x for x in lines if x["step"] >= last["step"] / 2), last)
-    seconds = last["seconds"] - half["seconds"]
-    rate = (last["step"] - half["step"]) / seconds if seconds > 0 else last["step"] / max(last["seconds"], 1e-9)
-    return {"steps": last["step"], "train_seconds": last["seconds"], "steps_a_second": round(rate, 2)}
-
-
-def leaves(scores: dict, prefix: str = "") -> dict[str, float]:
-    """The numbers of evaluation.json, by their path."""
-    found: dict[str, float] = {}
-    for name, value in scores.items():
-        if isinstance(value, dict):
-            found |= leaves(value, f"{prefix}{name}.")
-        elif isinstance(value, (int, float)) and not isinstance(value, bool):
-            found[prefix + name] = value
-    return found
-
-
-def sentence(result: dict) -> str:
-    """What a table says of a run."""
-    parts = ["{steps} steps in {train_seconds:.0f} s, {steps_a_second} a second at the end".format(**result)]
-    if "peak_allocated_MiB" in result:
-        parts.append("{peak_allocated_MiB} MiB at most ({peak_reserved_MiB} reserved)".format(**result))
-    scores = result.get("scores", {})
-    shown = {"novel_view.psnr": "novel views", "albedo.psnr": "albedo", "relight.psnr": "relit", "light_psnr": "light"}
-    parts += [f"{name} {scores[key]:.2f} dB" for key, name in shown.items() if key in scores]
-    return ", ".join(parts)
-
-
-def tell(run: Path, device: str, seconds: float) -> None:
-    """Writes training.json and prints its sentence, as far as the run came."""
-    if not (run / "metrics.jsonl").is_file() or not (run / "metrics.jsonl").stat().st_size:
-        return
-    result: dict[str, object] = {**rate_of(run), "whole_seconds": seconds}
-    if device == "cuda":
-        result["peak_allocated_MiB"] = torch.cuda.max_memory_allocated() >> 20
-        result["peak_reserved_MiB"] = torch.cuda.max_memory_reserved() >> 20
-    if (run / "evaluation.json").is_file():
-        result["scores"] = leaves(json.loads((run / "evaluation.json").read_text()))
-    (run / "training.json").write_text(json.dumps(result, indent=1) + "\n")
-    print(sentence(result), flush=True)
+def told(run: Path, trained: TrainedScene, data: Path, views: int) -> str:
+    """Writes training.json, and says in a sentence what a run took and scores."""
+    steps = [json.loads(line) for line in (run / METRICS).read_text().splitlines()]
+    half = next(x for x in steps if x["step"] >= trained.step / 2)
+    rate = (trained.step - half["step"]) / max(trained.seconds - half["seconds"], 1e-9)
+    result: dict[str, object] = {"steps": trained.step, "seconds": trained.seconds, "steps_a_second": rate}
+    said = [f"{trained.step} steps in {trained.seconds:.0f} s, {rate:.1f} a second at the end, {steps[-1]['skipped']} skipped"]
+    if trained.model.device.type == "cuda":
+        result["MiB"] = torch.cuda.max_memory_allocated() >> 20, torch.cuda.max_memory_reserved() >> 20
+        said.append("{} MiB at most ({} reserved)".format(*result["MiB"]))
+    test = load_dataset(data, "test")
+    test = test.select(spread(range(len(test)), views))
+    scores = evaluate_scene(trained.model, trained.grid, test, None, trained.seconds)[0]
+    shown = {"novel views {:.2f} dB": scores["novel_view"]["psnr"], "albedo {:.2f} dB": (scores["albedo"] or {}).get("psnr"),
+             "light {:.2f} dB": scores["light_psnr"], "normals {:.2f} degrees": scores["normal_mae_deg"]}  # fmt: skip
+    said += [text.format(score) for text, score in shown.items() if score is not None]
+    (run / "training.json").write_text(json.dumps(result | {"scores": scores}, indent=1) + "\n")
+    return ", ".join(said)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--device", default="cuda")
-    parser.add_argument("--steps", type=int)
-    parser.add_argument("--profile", type=Path, metavar="FILE", help="a page; needs --steps")
-    args, rest = parser.parse_known_args()
-    command = ["train", str(args.data), "--out", str(args.out), "--overwrite", "--device", args.device, *rest]
-    if args.steps is not None:
-        command += ["--steps", str(args.steps)]
-    if args.profile is not None:
-        if args.steps is None or args.steps < 2 * PROFILED:
-            parser.error(f"--profile needs --steps, at least {2 * PROFILED}")
-        profiler = StepProfiler(args.device, min(2 * args.steps // 3, args.steps - PROFILED - 1))
-        register_optimizer_step_post_hook(profiler)
-        try:
-            code = splitnerf(command)
-        except Enough:
-            args.profile.write_text(profiler.markdown())
-            print(args.profile.read_text().splitlines()[0])
-            return 0
-        print(
-            f"the training ended with {code} after {profiler.steps} optimiser steps, before the profile did",
-            file=sys.stderr,
-        )
-        return code or 1
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # what is known of the run by then is told all the same
-    started = time.monotonic()
+    parser.add_argument("--out", type=Path, required=True, metavar="RUN")
+    parser.add_argument("--preset", default="fast")
+    parser.add_argument("--device", choices=["cuda", "cpu"], default="cuda")
+    parser.add_argument("--steps", type=int, required=True, help="of the schedule")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings")
+    parser.add_argument("--views", type=int, default=8, help="test views that are scored (default: 8)")
+    parser.add_argument("--until", type=int, metavar="STEP", help="look at the steps before this one, and end")
+    parser.add_argument("--page", type=Path, help="where what is seen is written")
+    parser.add_argument("--profiled", type=int, default=20, help="steps (default: 20)")
+    args = parser.parse_args()
+    config = preset(args.preset).replace({"run.preview_every": 1.0} | dict(map(parse_setting, args.settings)) | {"run.steps": args.steps})
+    args.out.mkdir(parents=True, exist_ok=True)
+    (args.out / METRICS).write_text("")
+    training = Training(load_dataset(args.data), config, args.out, choose_device(args.device))
+    if args.until is None:
+        print(told(args.out, training.complete(), args.data, args.views))
+        return 0
+    look = Look(training, args.until, args.profiled)
     try:
-        return splitnerf(command)
-    finally:
-        tell(args.out, args.device, round(time.monotonic() - started, 1))
+        training.complete()
+    except Enough:
+        args.page.write_text("\n".join([f"# {args.preset}", "", *look.pages, "", header(provenance(SOURCES, root=ROOT))]) + "\n")
+        print(look.sentence)
+        return 0
+    print(f"the training ended at step {training.step}, before it was looked at", file=sys.stderr)
+    return 1
 
 
 if __name__ == "__main__":

@@ -14,16 +14,8 @@ from torch.nn import functional as F
 
 from splitnerf.fields.light_pyramid import pyramid_filters
 from splitnerf.fields.sdf import SdfField
-from splitnerf.ops import (
-    CELL_EMPTY,
-    CELL_OCCUPIED,
-    CELL_OPAQUE,
-    HashGridSpec,
-    MeshScene,
-    VisibilityCache,
-    brdf_lut,
-    fibonacci_directions,
-)
+from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec, MeshScene, VisibilityCache, brdf_lut
+from splitnerf.ops import fibonacci_directions
 
 lib = torch.ops.splitnerf
 BOX, RADIUS, SHELL = 1.5, 0.7, 0.3  # the surface is a ball, and its samples lie in a shell about it
@@ -46,9 +38,6 @@ class Sizes:
     width: int = 64
     outputs: int = 13
     queries: int = 8192
-    lights: int = 8192
-    traced: int = 2048  # points with directions of their own
-    own: int = 16  # such directions
     directions: int = 256  # of the bits
     light_resolution: int = 128
     subdivisions: int = 5  # of the mesh, 2 x 10242 vertices
@@ -83,8 +72,8 @@ class Sizes:
 
 
 TINY = Sizes(
-    rays=24, per_ray=8, beside=9, points=40, segments=30, levels=3, log2_table=8, width=16, outputs=5, queries=20, lights=64,
-    traced=10, own=4, directions=64, light_resolution=16, subdivisions=1, entropy=12, smooth=14, cells=12,
+    rays=24, per_ray=8, beside=9, points=40, segments=30, levels=3, log2_table=8, width=16, outputs=5, queries=20,
+    directions=64, light_resolution=16, subdivisions=1, entropy=12, smooth=14, cells=12,
 )  # fmt: skip
 
 
@@ -150,18 +139,6 @@ class World:
         """Where the field is asked for: at the rays' samples, and anywhere."""
         return torch.cat([self.rays.positions, (2 * self.rand(self.sizes.beside, 3, seed=62) - 1) * BOX])
 
-    def grid(self, scattered: bool = False) -> tuple:
-        """Arguments of the hash grid, where the field is asked for or anywhere."""
-        at = self.rand(self.sizes.field_points, 3, seed=6) if scattered else self.positions / (2 * BOX) + 0.5
-        table = self.randn(self.sizes.spec.n_entries, 2, seed=7)
-        return at, table, *self.sizes.spec.arguments(self.sizes.levels)
-
-    def grid_gradients(self, first: int, jacobian: bool, scattered: bool = False) -> tuple:
-        at, table, *numbers = self.grid(scattered)
-        n, c = self.sizes.field_points, self.sizes.features
-        grads = (self.randn(n, c, seed=8), self.randn(n, 3, c, seed=9))[: 1 + jacobian]
-        return *(at, table)[:first], *grads, *numbers
-
     def field(self) -> tuple:
         table, hidden, hidden_bias, out, out_bias, *numbers = self.network
         lengths = [weights.norm(dim=1, keepdim=True) for weights in (hidden, out)]
@@ -211,9 +188,6 @@ class World:
         indices = torch.arange(self.sizes.rays).repeat_interleave(self.sizes.per_ray)
         probes = self.rand(m, 3, seed=65), self.rand(m, seed=66), self.rand(m, 3, seed=67)
         return r.origins, r.directions, indices, r.t, r.t + SHELL / self.sizes.per_ray, r.offsets, *probes, self.sizes.samples
-
-    def marching(self) -> tuple:
-        return *self.rays[:3], self.cells, BOX, self.rays.step, 1024
 
     def sampling(self) -> tuple:
         rules = (SEARCH * self.rays.step, 1024, S, ANNEAL, 1e-3, MIN_TRANSMITTANCE, 0.1, 1.25, 0)
@@ -267,17 +241,6 @@ class World:
         normals, views, _, roughness, _ = self.shading()
         return normals, views, roughness, brdf_lut(), True
 
-    def prefiltering(self) -> tuple:
-        s = self.sizes
-        roughness = 0.2 + 0.8 * self.rand(s.queries, 1, seed=31)
-        lights = fibonacci_directions(s.lights, self.generator(32))
-        return unit(self.randn(s.queries, 3, seed=30)), roughness, lights, self.rand(s.lights, 3, seed=33)
-
-    def prefiltering_backward(self) -> tuple:
-        queries, roughness, lights, light = self.prefiltering()
-        total = lib.prefilter_light(queries, roughness, lights, light)[1]
-        return queries, roughness, total, self.randn(self.sizes.queries, 3, seed=34), lights
-
     def pyramid(self) -> tuple:
         """Lobes of the shaded points, then their normals for all of the light."""
         maps = pyramid_filters(self.sizes.light_resolution)
@@ -290,19 +253,6 @@ class World:
     def averaging(self) -> tuple:
         matrix = pyramid_filters(self.sizes.light_resolution).averages
         return *matrix, self.rand(len(matrix.transposed_offsets) - 1, 3, seed=37)
-
-    def shares(self) -> Tensor:
-        """Of the directions of :meth:`own_directions`, those of visible normals."""
-        return torch.full((self.sizes.traced, 1), 0.5)
-
-    def own_directions(self) -> tuple:
-        """Normals, views, roughness, directions, densities, radiance."""
-        t, j = self.sizes.traced, self.sizes.own
-        normals = unit(self.randn(t, 3, seed=38))
-        views = unit(normals + 0.7 * unit(self.randn(t, 3, seed=39)))
-        roughness = 0.2 + 0.7 * self.rand(t, 1, seed=40)
-        drawn = lib.sample_bsdf(normals, views, roughness, self.shares(), j, 3)
-        return normals, views, roughness, *drawn, self.rand(t, j, 3, seed=41)
 
     def shared_directions(self) -> tuple:
         p, k = self.sizes.segments, self.sizes.directions

@@ -34,7 +34,7 @@ NUMBERS = {  # columns of the table, and where the compiler says them
 
 
 class Kernel(NamedTuple):
-    """A line of the table: the source's name, the kernel's or that of the body it runs, and the columns of `NUMBERS`."""
+    """A line of the table: the names of the source and of the kernel, or of the body that it runs; the columns of `NUMBERS`."""
 
     source: str
     name: str
@@ -131,8 +131,7 @@ def defined() -> set[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", action="store_true", help="into the table beside the tests of the kernels")
-    arguments = parser.parse_args()
-    version = compiler()
+    arguments, version = parser.parse_args(), compiler()
     if version is None:
         sys.exit("nvcc was not found")
     text = "\n".join([head(version), "\t".join(["source", "kernel", *NUMBERS]), *map(str, compiled())]) + "\n"

@@ -122,11 +122,12 @@ def test_a_graph_is_held_against_the_eager_step(prepared, monkeypatch):
     dataset, config, run, _, work, _, _ = prepared
     used = graphs_on_the_cpu(monkeypatch)
     there = gpu_step.restored(dataset, config, run, "cpu")
-    eager, replayed = gpu_step.graphed(there, work)
-    assert used == {"recorded": 1, "replayed": 3}
-    rows = [Row(name, 0.0, 0.0, 1e-5) for name in names_of(there, eager)]
-    found = gpu_step.against_eager(there, eager, replayed, rows)
-    assert len(found) > 25 and all(row.error == 0.0 and row.limit == 1e-5 for row in found)
+    answers = list(gpu_step.Graphed(there, work).answers())
+    assert used["recorded"] >= 3 and used["replayed"] >= 10 and there.take_step.n_discarded == 1
+    for name, eager, replayed in answers:
+        rows = [Row(x, 0.0, 0.0, 1e-5) for x in names_of(there, eager)]
+        found = gpu_step.against_eager(there, eager, replayed, rows)
+        assert len(found) > 25 and all(row.error == 0.0 and row.limit == 1e-5 for row in found), name
     replayed.terms["mask"].mul_(1.01)
     replayed.gradients["variance"].mul_(1.01)
     wrong = {row.name for row in gpu_step.against_eager(there, eager, replayed, rows) if not row.holds}
