@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import statistics
+from collections import Counter
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import pretend_graphs
 import pytest
 import torch
+from bench.launches import Launches
+from pretend_gpu import pretend_gpu
 from tiny_runs import lines_of, tiny
 
 from splitnerf.ops import AdamW
@@ -17,6 +22,7 @@ from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
+from splitnerf.fields import VisibilityBits
 from splitnerf.training.graphs import GraphedStep
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.render.model import SceneModel
@@ -53,6 +59,92 @@ def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, rec
     monkeypatch.setattr(graphs, "record", call)
     trainer.train(load_dataset(data), config, tmp_path / "called")
     assert len(called) == recording["recorded"]
+    for ours, theirs in zip(lines_of(tmp_path / "recorded"), lines_of(tmp_path / "called"), strict=True):
+        assert ours | {"seconds": 0} == theirs | {"seconds": 0}
+
+
+class Taken(NamedTuple):
+    """How a step was taken, how many launches it made outside of recordings and replays, its rays, and what there was after it: kinds
+    of steps, steps without room, and the progress at the mesh in use."""
+
+    how: str
+    launches: int
+    n_rays: int
+    n_kinds: int
+    n_discarded: int
+    made_at: float
+
+
+def schedule_of_a_gpu(data, run, monkeypatch, used) -> tuple[trainer.TrainedScene, list[Taken]]:
+    """The schedule of preset fast in 160 steps on a pretended GPU. Before step 57 the surface becomes so blurred that rays find a half
+    more samples. Memory that a mesh leaves when the next comes is overwritten."""
+    advance, poll, use = trainer.Training.advance, SurfaceMesh.poll, VisibilityBits.use
+    launches, inside, steps = Launches(), Counter(), []
+
+    def apart(function):
+        def counted(*arguments):
+            before = launches.launches.total()
+            result = function(*arguments)
+            inside["launches"] += launches.launches.total() - before
+            return result
+
+        return counted
+
+    def watched(training, bar):
+        if training.step == 57:
+            training.model.variance.data.sub_(0.1)
+        before, outside = used.copy(), launches.launches.total() - inside["launches"]
+        advance(training, bar)
+        outside, taken = launches.launches.total() - inside["launches"] - outside, training.take_step
+        how = next(way for way in ("recorded", "called", "replayed") if used[way] > before[way])
+        n_rays = len(training.unread[-1].batch.target)
+        steps.append(Taken(how, outside, n_rays, len(taken._seen), taken.n_discarded, training.mesh.made_at))
+
+    def leaving(bits, traced):
+        old = bits.cache
+        use(bits, traced)
+        for x in () if old is None else (old.vertices, old.normals):
+            x.fill_(torch.nan)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(graphs, "record", apart(graphs.record))
+        patch.setattr(pretend_graphs.PretendGraph, "replay", apart(pretend_graphs.PretendGraph.replay))
+        patch.setattr(trainer.Training, "advance", watched)
+        patch.setattr(SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True))  # which step takes it is no chance
+        patch.setattr(VisibilityBits, "use", leaving)
+        config = tiny(
+            "fast", steps=160, cuda_graphs=True, target_samples=4608, open_below=0.0, start_levels=1, indirect_every=25,
+            preview_every=1.0,
+        )  # fmt: skip
+        run.mkdir()
+        with pretend_gpu(patch), launches:
+            return trainer.train(load_dataset(data), config, run, device="cuda"), steps
+
+
+def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeypatch, recording):
+    """Numbers are read a step late; levels open, meshes are swapped, priors begin, the light moves. Twice, when the surface blurs and
+    when the grid follows, a step and the one on its way find more samples than they have room for. Called in place of
+    recorded it gives the same bits."""
+    trained, steps = schedule_of_a_gpu(data, tmp_path / "recorded", monkeypatch, recording)
+    assert trained.finished and all(p.isfinite().all() for p in trained.model.parameters())
+    assert [step.how for step in steps[57:62]] == ["replayed"] * 4 + ["called"]  # numbers 59 and 60 have no room
+    assert [steps[i].n_discarded for i in (57, 59, 60, 61, 62, 159)] == [0, 0, 1, 2, 2, 4]
+    assert len({step.made_at for step in steps}) == 10 and len(steps) == 160
+    replayed = [step.launches for step in steps if step.how == "replayed"]
+    rays = [step.n_rays for step in steps]
+    assert not any(a == c != b for a, b, c in zip(rays, rays[1:], rays[2:])) and len(set(rays[80:])) == 1  # none goes to and fro
+    # A kind of steps is called, then recorded, and recorded anew where the graph has too little room.
+    assert recording["recorded"] <= steps[-1].n_kinds and recording["called"] <= steps[-1].n_kinds + 15
+    assert len(replayed) > 70 and max(replayed) <= 50 and statistics.median(replayed) <= 30
+
+    def called(function, pool, generator):
+        outputs = [None, None]
+        return SimpleNamespace(replay=lambda: outputs.__setitem__(slice(None), function())), outputs
+
+    monkeypatch.setattr(graphs, "record", called)
+    other, _ = schedule_of_a_gpu(data, tmp_path / "called", monkeypatch, recording)
+    for a, b in zip(trained.model.parameters(), other.model.parameters(), strict=True):
+        assert torch.equal(a, b)
     for ours, theirs in zip(lines_of(tmp_path / "recorded"), lines_of(tmp_path / "called"), strict=True):
         assert ours | {"seconds": 0} == theirs | {"seconds": 0}
 

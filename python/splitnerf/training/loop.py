@@ -322,7 +322,8 @@ class Training:
                 psnr = -10.0 * math.log10(max(numbers.values["colour"], 1e-10))
                 self.psnr_mean = psnr if self.psnr_mean is None else 0.95 * self.psnr_mean + 0.05 * psnr
             n_rays = self.ranks.size * len(past.batch.target)
-            self.n_rays = next_ray_count(n_rays, agreed.samples, self.config)
+            if n_rays == self.ranks.divisible(self.n_rays):  # else the newest count was chosen while this step was on its way
+                self.n_rays = next_ray_count(n_rays, agreed.samples, self.config)
             self.seconds = self.ranks.seconds(self.started)
             if bar is not None:
                 bar.show(self.progress, self.told(past.step, agreed.evaluated / n_rays))
