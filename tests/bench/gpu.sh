@@ -23,8 +23,8 @@ export PATH="$work/venv/bin:$PATH:/usr/local/cuda/bin" PYTHONPYCACHEPREFIX="$wor
 run_python=$work/venv/bin/python
 
 # Parts with their seconds; the last one gets all that is left.
-first="setup 25 wheel 30 data 15 smoke 50 step 65 steady 60 operators 100 paper 75 fast 150"
-second="setup 25 wheel 30 data 15 fast_10000_32k 70 fast_10000_16k 60 fast_5000_131k 80 limits 75 memcheck 60 racecheck 60 tests 95"
+first="setup 25 wheel 30 data 25 smoke 50 step 65 steady 60 operators 100 paper 75 fast 140"
+second="setup 25 wheel 30 data 25 fast_10000_32k 70 fast_10000_16k 60 fast_5000_131k 80 limits 75 memcheck 60 racecheck 60 tests 85"
 device=cuda slower=1 picture="size=200" ops="--seconds .1 --minutes 1.5" steps_before=12 all_tests=yes jobs=8 small=()
 steps=(20000 10000 5000) until=1500 until_paper=300 profiled=10
 if [ -n "$dry" ]; then
@@ -84,8 +84,7 @@ facts() { # of the machine, before all parts
   local gpu nvcc commit
   gpu=$(nvidia-smi --query-gpu=name,driver_version --format=csv,noheader 2>/dev/null | head -n 1)
   nvcc=$(nvcc --version 2>/dev/null | sed -n 's/.*release \([0-9.]*\).*/\1/p')
-  commit=$(git -C "$root" rev-parse --short HEAD 2>/dev/null) || commit=unknown
-  [ -z "$(git -C "$root" status --porcelain --untracked-files=no 2>/dev/null)" ] || commit=$commit+
+  commit=$(git -C "$root" describe --always --exclude '*' --dirty=+ 2>/dev/null || cat "$bundle/built/commit" 2>/dev/null) || commit=unknown
   printf 'fact\t%s\t%s\n' card "${gpu%%,*}" driver "${gpu##*, }" nvcc "${nvcc:-none}" commit "$commit" date "$(date -u +%F)" \
     rehearsal "${dry:+on the CPU}" >"$rows"
   "$python" -c 'import platform, torch

@@ -34,4 +34,5 @@ sources=$("$root/tests/bench/gpu_sources.sh") # before the build: what changes m
 CMAKE_OPTIONS=${CMAKE_OPTIONS:-SPLITNERF_CUDA=ON CMAKE_CUDA_ARCHITECTURES=90-real} \
   sh "$root/third_party/build_wheels.sh" "$out/built" "${WHEEL_PYTHON:-python$python_version}"
 echo "$sources" >"$out/built/sources"
+git -C "$root" describe --always --exclude '*' --dirty=+ >"$out/built/commit"
 du -sm "$out" | sed 's|\t.*| MB in all, without torch|'

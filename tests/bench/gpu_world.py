@@ -136,8 +136,12 @@ class World:
 
     @functools.cached_property
     def positions(self) -> Tensor:
-        """Where the field is asked for: at the rays' samples, and anywhere."""
-        return torch.cat([self.rays.positions, (2 * self.rand(self.sizes.beside, 3, seed=62) - 1) * BOX])
+        """Where the field is asked for: at the rays' samples, and anywhere, but off the cells' faces, where roundings choose a cell."""
+        x = torch.cat([self.rays.positions, (2 * self.rand(self.sizes.beside, 3, seed=62) - 1) * BOX])
+        resolutions = torch.tensor([level[0] for level in self.sizes.spec.levels()])
+        at = (x.double() / (2 * BOX) + 0.5)[:, None] * resolutions[:, None]
+        off = ((at - at.round()).abs() > 1e-6 * resolutions[:, None]).all(2).all(1)
+        return torch.where(off[:, None], x, x[off][0])
 
     def field(self) -> tuple:
         table, hidden, hidden_bias, out, out_bias, *numbers = self.network
