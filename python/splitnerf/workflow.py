@@ -31,7 +31,7 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.separation.job import SHEET, discard_separated, separate
 from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_model, restored_grid
-from splitnerf.training.loop import TrainedScene, Training, check_repeatable, check_same_scene
+from splitnerf.training.loop import TrainedScene, begin_training, check_repeatable, check_same_scene
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS
 from splitnerf.training.observer import Observer
@@ -133,9 +133,9 @@ def reconstruct(
     check_repeatable(config, device)
     with held_by_first(run, ranks):
         config, dataset, test = load_in_turn(data, run, config, downscale, resume, overwrite, ranks)
-        training = Training(dataset, config, run, torch.device(device), observers, ranks)
-        if resume:
-            training.restore()
+        training = begin_training(
+            dataset, config, run, torch.device(device), resume=resume, observers=observers, ranks=ranks
+        )
         if ranks.is_first:
             begin_run(run, config, dataset, overwrite)
         trained = training.complete()

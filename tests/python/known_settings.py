@@ -37,6 +37,7 @@ SETTINGS = {
     "surface.levels_open_by": ("levels_open_by", 0.4, 0.6, PAPER),  # 12 levels, one each 1000 of 20,000 steps
     "surface.width": ("sdf_width", 64, 64, PAPER),
     "surface.outputs": ("sdf_outputs", 13, 13, PAPER),
+    "surface.start": ("start", "stereo", "sphere", PAPER),
     "surface.sphere_radius": ("sphere_radius", 0.7, 0.5, PAPER),
     "surface.normals": ("normals", "analytic", "finite_difference", PAPER),
     "surface.initial_variance": ("initial_variance", 0.3, 0.3, PAPER),
@@ -94,7 +95,7 @@ SETTINGS = {
     "losses.colour_weight": ("colour_weight", 10.0 / 3.0, 10.0, PAPER),  # the sum over channels, Eq. (3)
     "losses.light_weight": ("light_weight", 1.0, 10.0, PAPER),
     "losses.occlusion_weight": ("occlusion_weight", 0.1, 0.01, PAPER),
-    "losses.eikonal_weight": ("eikonal_weight", 3.0, 0.1, PAPER),
+    "losses.eikonal_weight": ("eikonal_weight", 0.3, 0.1, PAPER),
     "losses.metal_weight": ("metal_weight", 1e-4, 1e-3, PAPER),
     "losses.metal_regulariser": ("metal_regulariser", True, True, PAPER),
     "losses.edge_pixels": ("edge_pixels", 2, 0, OURS),
@@ -183,7 +184,7 @@ LIMITS = {
 CHOICES = {
     "data.eval_mode": "auto, all, fraction, filename", "data.mask_kind": "auto, object, ignore",
     "exposure.refine": "auto, yes, no", "surface.table_dtype": "float32, float16, bfloat16",
-    "surface.normals": "analytic, finite_difference", "materials.inputs": "outputs, grid", "light.kind": "mlp, pyramid",
+    "surface.start": "stereo, sphere", "surface.normals": "analytic, finite_difference", "materials.inputs": "outputs, grid", "light.kind": "mlp, pyramid",
     "light.activation": "softplus, exp", "shading.method": "split, summed", "shading.fresnel": "exact, paper, code",
     "shading.query": "mean, reflection", "shading.compositing": "linear, srgb", "occlusion.kind": "mlp, bits, off",
     "occlusion.ray_start": "normal, ray", "sampling.occupancy": "distance, average",

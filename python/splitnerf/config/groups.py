@@ -93,8 +93,12 @@ class Surface:
     levels_open_by: float = setting(0.4, "time at which the finest level opens", unit="share of the run")
     width: int = setting(64, "neurons of the hidden layer", at_least=1, at_most=1024)
     outputs: int = setting(13, "outputs of the network, the distance among them", at_least=1, at_most=1024)
+    start: str = setting(
+        "stereo", "shape that training starts from; stereo: what the photos' depths leave of their visual hull; sphere: the paper",
+        choices=("stereo", "sphere"),
+    )  # fmt: skip
     sphere_radius: float = setting(
-        0.7, "radius of the sphere that training starts from", unit="scene units", at_most=FARTHEST
+        0.7, "radius of the sphere that networks start as", unit="scene units", at_most=FARTHEST
     )
     normals: str = setting(
         "analytic", "how the normals are derived from the distance; finite_difference: the paper",
@@ -258,7 +262,7 @@ class Losses:
     colour_weight: float = setting(10.0 / 3.0, "weight of the squared error of colours, summed over channels")
     light_weight: float = setting(1.0, "weight of the light's consistency (of the MLP)")
     occlusion_weight: float = setting(0.1, "weight of the traced occlusion factors (of the MLP)")
-    eikonal_weight: float = setting(3.0, "weight of |gradient of the distance| = 1")
+    eikonal_weight: float = setting(0.3, "weight of |gradient of the distance| = 1")
     metal_weight: float = setting(0.0001, "weight of metallic squared")
     metal_regulariser: bool = setting(True, "whether that term is used")
     binary_metal_weight: float = setting(0.003, "weight of metallic between 0 and 1, from priors_from")

@@ -18,7 +18,7 @@ PAPER = dict(
     run=dict(preset="paper", steps=20000),
     surface=dict(
         n_levels=16, base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4, levels_open_by=0.6,
-        sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0,
+        start="sphere", sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0,
     ),
     materials=dict(width=256, initial_roughness=0.5, min_roughness=0.0, inputs="outputs"),
     light=dict(

@@ -92,6 +92,7 @@ class RenderedRays:
             `shading.method = summed`, `mean` also contains the quadrature correction at each ray's heaviest sample, by the
             share of the weight that the sample's segment carries.
         gradients: [n + k + m, 3] d sdf / d position at all samples and probes.
+        anywhere: [k] signed distances at the probes that belong to no sample, scene units.
         beside: [m] int64, the samples whose neighbours the last m gradients belong to.
         shaded: [n_shaded] int64, indices of the shaded samples.
         sizes: [3] int64, the numbers of shaded samples, of rays with samples and of ray segments.
@@ -112,6 +113,7 @@ class RenderedRays:
     weights: Tensor
     values: Tensor
     gradients: Tensor
+    anywhere: Tensor
     beside: Tensor
     shaded: Tensor
     sizes: Tensor
@@ -217,6 +219,7 @@ def render_rays(
         hand_on=True,
     )
 
+    outputs_of_all = outputs
     spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP, capacity, step)
     shaded = spread.shaded
     of_samples = [found.positions, found.directions, normals, outputs, field.features]
@@ -241,7 +244,7 @@ def render_rays(
         )
     return RenderedRays(
         mean, c.shading.compositing == "linear", opacity, s, samples, found.evaluated, found.n_found, weights, values, gradient,
-        found.beside,
+        outputs_of_all[n : len(found.positions) - len(found.beside), 0], found.beside,
         shaded, spread.sizes, shares, positions, normals, sdf, points,
     )  # fmt: skip
 

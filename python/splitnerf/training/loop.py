@@ -18,6 +18,7 @@ from splitnerf.data.dataset import Dataset, dataset_fingerprint
 from splitnerf.devices import let_segments_grow, spare_processors, tensor_cores
 from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight
+from splitnerf.notes import note_once
 from splitnerf.ops import MeshScene
 from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
@@ -48,6 +49,7 @@ from splitnerf.training.ranks import ALONE, Alone
 from splitnerf.training.repeatable import same_bits
 from splitnerf.training.room import RoomyStep
 from splitnerf.training.schedule import light_moves, light_period, next_ray_count, progress_of
+from splitnerf.training.start import SIDES_UNTIL, StartShape, fit_to, start_shape
 from splitnerf.training.step import Step
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps and the last one are all logged
@@ -96,10 +98,22 @@ def train(
         OSError: The disk is full; the last checkpoint is kept.
     """
     check_repeatable(config, device)
-    training = Training(dataset, config, run, torch.device(device), ranks=ranks)
+    return begin_training(dataset, config, run, torch.device(device), resume=resume, ranks=ranks).complete()
+
+
+def begin_training(
+    dataset: Dataset, config: Config, run: Path, device: torch.device, *, resume: bool = False,
+    observers: Sequence[Observer] = (), ranks: Alone = ALONE,
+) -> Training:  # fmt: skip
+    """A training that goes on from the run's checkpoint or begins; the arguments are those of :func:`train` and
+    :class:`Training`."""
+    training = Training(dataset, config, run, device, observers, ranks)
     if resume:
         training.restore()
-    return training.complete()
+    elif config.surface.start == "stereo" and not ranks.several:
+        note_once("the photos are compared to find a first shape")
+        training.start_from_photos()
+    return training
 
 
 class Training:
@@ -121,16 +135,16 @@ class Training:
         self.fingerprint = dataset_fingerprint(dataset)
         torch.manual_seed(c.run.seed)
         self.generator = torch.Generator(device).manual_seed(c.run.seed)
-        photos = training_photos(dataset, c)
-        self.source = source = PixelSource(photos, c.sampling.foreground_share, self.generator, c.losses.edge_pixels)
+        self.photos = training_photos(dataset, c)
+        self.source = source = PixelSource(self.photos, c.sampling.foreground_share, self.generator, c.losses.edge_pixels)
         self.exposures = PhotoExposures(dataset, c, device)
         self.model = SceneModel(c).to(device)
         self.optimiser = make_optimiser(self.model, c)
-        hull = None
-        if c.sampling.hull_until > 0:
+        self.hull = None
+        if c.sampling.hull_until > 0 or c.surface.start == "stereo":
             lenses = source.intrinsics / source.hull_factor
-            hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.possible, source.poses, lenses)
-        self.grid = make_grid(c, hull, device)
+            self.hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.possible, source.poses, lenses)
+        self.grid = make_grid(c, self.hull, device)
         self.mesh = SurfaceMesh(self.model, background=c.mesh.background, ranks=ranks)
         graphs = c.run.cuda_graphs and not ranks.several  # a graph holds no collective
         step = Step if device.type == "cpu" else GraphedStep if graphs else RoomyStep
@@ -169,12 +183,23 @@ class Training:
         self.stopped = content.get("stopped", False) and (self.run / STATE).is_file()
         if self.exposures.learned and "exposures" in content:
             self.exposures.restore(content["exposures"])
+        if content["start"] is not None:
+            tensors = {name: x.to(self.grid.device) for name, x in content["start"].items()}
+            self.take_step.start = StartShape(box=self.config.surface.box, **tensors)
         self.model.open_levels(self.progress)
         self.mesh.restore(content)
         if content["occlusion_light"]:
             self.model.occlusion.restore_light(content["occlusion_light"])
         self.first, self.resumed_at = self.step == 0, self.step
         self.started, self.saved_at = time.monotonic() - self.seconds, self.seconds
+
+    def start_from_photos(self) -> None:
+        """Fits the surface to the shape that stereo finds, near which it is held at first."""
+        with same_bits(self.config.run.deterministic):
+            self.model.open_levels(0.0)
+            self.take_step.start = start = start_shape(self.photos, self.hull, self.config)
+            if start is not None:
+                fit_to(self.model.sdf_field, start, self.generator, self.config)
 
     def complete(self) -> TrainedScene:
         """Trains to the end of the schedule, or until a signal or an observer asks to stop."""
@@ -219,9 +244,16 @@ class Training:
                 torch_generator=torch.get_rng_state(), occupancy=self.grid.values, cells=self.grid.cells,
                 environment=self.environment, light_noise=self.model.light.loss_samples.state(),
                 occlusion_light=self.model.occlusion.cached_light(),
-                box_from_world=torch.from_numpy(self.dataset.box_from_world), **self.mesh.state(),
+                box_from_world=torch.from_numpy(self.dataset.box_from_world), start=self.start_state(), **self.mesh.state(),
             ),
         )  # fmt: skip
+
+    def start_state(self) -> dict[str, Tensor] | None:
+        """The run's start, as long as the surface is held near it."""
+        start = self.take_step.start
+        if start is None or self.progress >= SIDES_UNTIL:
+            return None
+        return {"distance": start.distance, "points": start.points, "towards": start.towards}
 
     @property
     def progress(self) -> float:
@@ -341,6 +373,7 @@ class Training:
             add_metrics(self.run / METRICS, self.unlogged)
             self.observers.logged(self.unlogged)
         self.unlogged = None
+
 
     def told(self, step: int, samples_per_ray: float) -> str:
         """What the bar tells of a step: its number, the batches' mean PSNR in dB and the samples per ray."""

@@ -21,6 +21,7 @@ from splitnerf.training.losses import Terms
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.ranks import ALONE, Alone
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
+from splitnerf.training.start import POINTS_WEIGHT, SHAPE_WEIGHT, SIDES_UNTIL, StartShape, side_loss
 
 CHANNELS = 3
 
@@ -53,11 +54,13 @@ class Step:
 
     Attributes:
         room: The room of the last step.
+        start: The shape that the run began with, near which the surface is held at first; None: a sphere, which holds nothing.
         agreed: What the processes agreed on in the last step, see :meth:`splitnerf.training.ranks.Alone.agree`.
         n_discarded: The number of steps whose results had too little room.
     """
 
     room, n_discarded = Room(), 0
+    start: StartShape | None = None
     s: float | None = None  # the sharpness as far as it is known without waiting
 
     def __init__(
@@ -91,8 +94,11 @@ class Step:
     def find(self, batch: Batch, progress: float, capacity: int = 0) -> FoundSamples:
         """The samples of a batch, see :func:`splitnerf.render.renderer.find_samples`."""
         anneal = cosine_anneal(self.model.config, progress)
+        probes = batch.probes
+        if self.start is not None and progress < SIDES_UNTIL:
+            probes = probes._replace(anywhere=torch.cat([probes.anywhere, self.start.drawn(self.generator)]))
         return find_samples(
-            self.model, self.grid.cells, *batch.rays, anneal, batch.probes, capacity, batch.phase, self.s
+            self.model, self.grid.cells, *batch.rays, anneal, probes, capacity, batch.phase, self.s
         )
 
     def differentiate(
@@ -107,10 +113,20 @@ class Step:
         terms = loss_terms(
             self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen, self.late, own
         )
+        self.hold(terms, ray, progress)
         self.agreed = self.ranks.agree(terms, ray, self.room)
         self.model.zero_grad(set_to_none=True)
         terms.backward()
         return ray, terms
+
+    def hold(self, terms: Terms, ray: RenderedRays, progress: float) -> None:
+        """Adds the terms that hold the surface near the run's start."""
+        if self.start is not None and progress < self.start.held_until:
+            error, weight = self.start.shape_loss(ray)
+            terms.add({"start": SHAPE_WEIGHT}, error, [weight])
+        n_drawn = len(ray.anywhere) - self.model.config.losses.eikonal_points
+        if n_drawn > 0:
+            terms.add({"sides": POINTS_WEIGHT}, side_loss(ray.anywhere[-n_drawn:]), [float(n_drawn)])
 
     def settle(self, counts: Room, room: Room, s: float, elsewhere: bool = False) -> bool:
         """Takes in the counts of a step with this room and its sharpness. ``elsewhere``: another process had too little room.
