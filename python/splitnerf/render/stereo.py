@@ -225,7 +225,7 @@ def _behind(photos: GreyPhotos, depths: Tensor, known: Tensor, j: int, points: T
 
 
 @torch.no_grad()
-def solid_cells(photos: GreyPhotos, depths: Tensor, known: Tensor, hull: Tensor, box: float, hidden: float) -> Tensor:
+def solid_cells(photos: GreyPhotos, depths: Tensor, known: Tensor, hull: Tensor, box: float) -> Tensor:
     """[r, r, r] bool: the cells of the hull that the depths do not show to be empty. What no photo sees stays solid.
 
     A cell is solid where the mean of its truncated distances to the photos' surfaces is negative.
@@ -234,8 +234,6 @@ def solid_cells(photos: GreyPhotos, depths: Tensor, known: Tensor, hull: Tensor,
         photos, depths: The photos that have depths, and these.
         hull, box: See :func:`depth_maps`.
         known: [n, h, w] bool, the depths that count.
-        hidden: The weight, in [0, 1], of photos whose surface hides the cell. It protects the inside of a body against wrong
-            depths, and cavities that few photos look into from being opened.
 
     Source: Curless and Levoy 1996, for the mean of truncated distances.
     """
@@ -246,7 +244,7 @@ def solid_cells(photos: GreyPhotos, depths: Tensor, known: Tensor, hull: Tensor,
     total, weight = torch.zeros(2, len(points), device=hull.device)
     for j in range(len(depths)):
         behind, seen = _behind(photos, depths, known, j, points)
-        share = torch.where(behind > -TRUNCATION, 1.0, hidden) * seen
+        share = ((behind > -TRUNCATION) & seen).float()
         total += share * behind.clamp(-TRUNCATION, TRUNCATION)
         weight += share
     solid = torch.zeros_like(hull)

@@ -14,7 +14,7 @@ from splitnerf.fields import SdfField
 from splitnerf.render.renderer import RenderedRays
 from splitnerf.render.stereo import depth_maps, grey_photos, signed_distance, solid_cells, supporting_views, surface_points
 
-HELD_UNTIL, TRUSTED_UNTIL = 0.1, 0.3  # shares of the run until which the surface is held near the start: glossy objects, others
+HELD_UNTIL = 0.3  # share of the run until which the surface is held near the start
 SIDES_UNTIL = 0.5  # share of the run until which it is held between points on both of its sides
 SHAPE_WEIGHT, POINTS_WEIGHT = 15.0, 30.0  # of the distances from the shape, and of the sides of the surface
 FREE_CELLS = 1.0  # distance from the shape that costs nothing, in cells
@@ -24,7 +24,6 @@ FARTHEST = 0.1  # scene units; an error beyond it pulls no more
 NEAR_VIEWS, WIDE_VIEWS = 1, 3  # photos that agree with a depth
 ALIKE = 0.5  # correlation above which windows are alike
 TRUSTED_SHARE = 0.75  # of the depths of windows that are alike, on which photos agree
-HIDDEN = 0.05  # weight of photos whose surface hides a cell, on glossy objects
 FIT_STEPS, FIT_POINTS, FIT_RATE = 200, 8192, 0.01
 NEAR_CELLS = 4.0  # half the points of a fit lie within so many cells of the surface
 FIT_EIKONAL = 0.1
@@ -36,7 +35,7 @@ class StartShape(NamedTuple):
     Attributes:
         distance: [r, r, r] signed distances at the cells' centres over [x, y, z], scene units, negative inside.
         box: Half size of the cube that the cells cover, scene units.
-        points: [m, 3] points of the surface by depths on which photos agree, scene units; none on glossy objects.
+        points: [m, 3] points of the surface by depths on which photos agree, scene units.
         towards: [m, 3] unit directions from the points to the cameras that see them.
     """
 
@@ -44,11 +43,6 @@ class StartShape(NamedTuple):
     box: float
     points: Tensor
     towards: Tensor
-
-    @property
-    def held_until(self) -> float:
-        """The share of the run until which the surface is held near the shape."""
-        return TRUSTED_UNTIL if len(self.points) else HELD_UNTIL
 
     @property
     def cell(self) -> float:
@@ -63,9 +57,7 @@ class StartShape(NamedTuple):
 
     def drawn(self, generator: torch.Generator) -> Tensor:
         """[POINTS, 3] random places on the rays of random points: the first third behind the surface, the others in
-        front of it; none where there are no points."""
-        if len(self.points) == 0:
-            return self.points
+        front of it."""
         draw = {"generator": generator, "device": self.points.device}
         chosen, random = torch.randint(len(self.points), (POINTS,), **draw), torch.rand(POINTS, **draw)
         along = BESIDE[0] + (BESIDE[1] - BESIDE[0]) * random
@@ -88,12 +80,11 @@ def side_loss(sdf: Tensor) -> Tensor:
 
 
 def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | None:
-    """The shape that photos suggest, inside of their visual hull; None where that is empty.
+    """The shape that photos suggest, inside of their visual hull; None where they do not agree.
 
     Where most photos agree on the depths of windows that are alike, the mean of all depths counts: those of dark surfaces and of
     such without texture are noisy, but not biased, and their mean opens cavities down to the floor. On glossy objects photos
-    do not agree, as reflections look like surfaces behind the object. There only the depths count on which photos from far
-    agree, and photos that see something in front of a cell speak against its being empty.
+    do not agree, as reflections look like surfaces behind the object.
 
     Args:
         photos: The photos of the training.
@@ -106,14 +97,16 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
     depths, scores = depth_maps(grey, hull, box)
     grey, found = grey.spread(), depths > 0
     near, wide = supporting_views(grey, depths, found & (scores > 0))
-    agreed, alike = (near >= NEAR_VIEWS) & (wide >= WIDE_VIEWS), found & (scores > ALIKE)
-    sure, trusted = agreed & alike, bool((agreed & alike).sum() > TRUSTED_SHARE * alike.sum())
-    known = found & (scores > 0) if trusted else agreed
-    solid = solid_cells(grey, depths, known, hull, box, 0.0 if trusted else HIDDEN)
+    without = near.amax((1, 2), keepdim=True) == 0  # photos that have no neighbour so near
+    agreed, alike = ((near >= NEAR_VIEWS) | without) & (wide >= WIDE_VIEWS), found & (scores > ALIKE)
+    sure = agreed & alike
+    if sure.sum() <= TRUSTED_SHARE * alike.sum():
+        return None
+    solid = solid_cells(grey, depths, found & (scores > 0), hull, box)
     if not solid.any():
         solid = hull
     wide_by = box / hull.shape[0]  # half a cell: those of the hull reach beyond the masks
-    points, towards = surface_points(grey, depths, sure & trusted)
+    points, towards = surface_points(grey, depths, sure)
     return StartShape(signed_distance(solid, box) + wide_by, box, points, towards)
 
 

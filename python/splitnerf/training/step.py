@@ -21,7 +21,7 @@ from splitnerf.training.losses import Terms
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.ranks import ALONE, Alone
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
-from splitnerf.training.start import POINTS_WEIGHT, SHAPE_WEIGHT, SIDES_UNTIL, StartShape, side_loss
+from splitnerf.training.start import HELD_UNTIL, POINTS_WEIGHT, SHAPE_WEIGHT, SIDES_UNTIL, StartShape, side_loss
 
 CHANNELS = 3
 
@@ -121,7 +121,7 @@ class Step:
 
     def hold(self, terms: Terms, ray: RenderedRays, progress: float) -> None:
         """Adds the terms that hold the surface near the run's start."""
-        if self.start is not None and progress < self.start.held_until:
+        if self.start is not None and progress < HELD_UNTIL:
             error, weight = self.start.shape_loss(ray)
             terms.add({"start": SHAPE_WEIGHT}, error, [weight])
         n_drawn = len(ray.anywhere) - self.model.config.losses.eikonal_points
