@@ -134,10 +134,12 @@ def _check_content(content: dict) -> None:
     if "exposures" in content:  # older checkpoints have none
         check_tensor("exposures", content["exposures"], (-1, 4), torch.float32)
     config = config_of(content)
-    if content["start"] is not None:
-        check_tensor("start's distance", content["start"]["distance"], (config.sampling.grid_resolution,) * 3, torch.float32)
+    if (start := content.get("start")) is not None:
+        if not isinstance(start, dict):
+            raise ValueError("start is of another type")
+        check_tensor("start's distance", start.get("distance"), (config.sampling.grid_resolution,) * 3, torch.float32)
         for name in ("points", "towards"):
-            check_tensor(f"start's {name}", content["start"][name], (-1, 3), torch.float32)
+            check_tensor(f"start's {name}", start.get(name), (-1, 3), torch.float32)
     if not 1 <= content["n_rays"] <= max(config.sampling.initial_rays, config.sampling.max_rays):
         raise ValueError(f"n_rays is {content['n_rays']}")
     for name, parameter in content["model"].items():

@@ -183,7 +183,7 @@ class Training:
         self.stopped = content.get("stopped", False) and (self.run / STATE).is_file()
         if self.exposures.learned and "exposures" in content:
             self.exposures.restore(content["exposures"])
-        if content["start"] is not None:
+        if content.get("start") is not None:
             tensors = {name: x.to(self.grid.device) for name, x in content["start"].items()}
             self.take_step.start = StartShape(box=self.config.surface.box, **tensors)
         self.model.open_levels(self.progress)
