@@ -1,12 +1,18 @@
-"""Built-in shapes: closed, of known topology, volume and walls, open where they should be."""
+"""Built-in shapes: closed, of known topology, volume and walls, open where they should be, and data made of them."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from splitnerf.cli import BAD_INPUT, DONE, build_parser, main
+from splitnerf.cli import synth as command
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import write_image
+from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.evaluate.jobs import asset_mesh
-from splitnerf.synth.shapes import SHAPES, pattern, shape_asset
+from splitnerf.synth.shapes import MATERIALS, SHAPES, pattern, shape_asset
 
 TUNNELS = {"mug": 1, "rings": 1, "mask": 2}  # through the body; the others have none
 WALLS = {"bowl": 0.08, "mug": 0.08, "box": 0.08, "vase": 0.07, "shell": 0.06, "mask": 0.07}
@@ -102,3 +108,49 @@ def test_the_pattern_has_contrast_at_every_scale_and_no_jumps():
     differences = {d: np.abs(pattern(p + (d, 0, 0)) - colours).mean() for d in (0.002, 0.08, 0.3)}
     assert differences[0.002] < 0.005 and 0.04 < differences[0.08] < differences[0.3]
     assert np.abs(pattern(p + (0.002, 0, 0)) - colours).max() < 0.05
+
+
+@pytest.fixture(scope="module")
+def light(tmp_path_factory):
+    path = tmp_path_factory.mktemp("light") / "light.exr"
+    write_image(path, np.full((8, 16, 3), 0.7, np.float32))
+    return path
+
+
+def test_the_command_renders_a_shape_with_its_truth(light, tmp_path):
+    words = f"synth --shape mug --material glossy --light {light} --out {tmp_path / 'data'}"
+    assert main([*words.split(), *"--size 24 --train 2 --test 1 --spp 16".split()]) == DONE
+    truth = load_view_truths(load_dataset(tmp_path / "data", "test"))[0]
+    solid = truth.normal_mask
+    assert truth.roughness[solid] == pytest.approx(0.25, abs=0.003) and (truth.metallic[solid] == 0).all()
+    assert truth.albedo[solid].min() > 0.09 and truth.albedo[solid].max() < 0.81 and truth.albedo[solid].std() > 0.05
+    mesh, asset = load_scene_truth(tmp_path / "data").mesh, read_asset(tmp_path / "data/asset.glb")
+    assert mesh.euler_number == 0 and np.linalg.norm(mesh.vertices, axis=1).max() == pytest.approx(1, abs=1e-5)
+    assert asset.vertices == pytest.approx(np.asarray(mesh.vertices), abs=1e-5)
+    original = shape_asset("mug", "glossy")
+    assert asset.colors == pytest.approx(original.colors, abs=1e-6)
+    assert asset.materials[0].roughness == 0.25 and asset.materials[0].metallic == 0
+
+
+def test_the_command_names_what_there_is():
+    assert command.SHAPES == tuple(SHAPES) and command.MATERIALS == tuple(MATERIALS)
+
+
+@pytest.mark.parametrize(
+    ("words", "listed"),
+    [
+        ("--shape cup", SHAPES), ("--shape mug --material wood", MATERIALS), ("", ["ASSET.glb", "--shape"]),
+        ("a.glb --shape mug", ["ASSET.glb", "--shape"]),
+    ],
+)  # fmt: skip
+def test_wrong_names_are_refused_in_a_line_that_lists_the_right_ones(words, listed, capsys):
+    with pytest.raises(SystemExit) as ended:
+        build_parser().parse_args(f"synth {words} --light l.hdr --out o".split())
+    assert ended.value.code == BAD_INPUT
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert all(name in line for name in listed)
+
+
+def test_a_material_needs_a_shape(tmp_path, capsys):
+    words = f"synth a.glb --material metal --light l.hdr --out {tmp_path / 'o'}"
+    assert main(words.split()) == BAD_INPUT and "give --shape" in capsys.readouterr().err

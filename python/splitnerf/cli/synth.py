@@ -3,27 +3,37 @@
 from __future__ import annotations
 
 import argparse
+import tempfile
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE
 from splitnerf.cli.help import examples
+from splitnerf.errors import InputError
 
 LAYOUTS = (
     "blender", "nerfactor", "tensoir", "shiny", "stanford-orb", "owl", "openillumination", "dtc", "glossy", "glossy-real", "neus",
 )  # fmt: skip
+SHAPES = ("bowl", "mug", "box", "vase", "shell", "rings", "plinth", "mask")
+MATERIALS = ("matte", "glossy", "metal")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "synth", help="render a dataset with full truth from a GLB file",
-        description="Renders ASSET, brought to the unit sphere, from cameras around it under the light MAP, with true albedo, "
-        "roughness, metallic, normals and relit views, in a layout that train and evaluate read.",
+        "synth", help="render a dataset with full truth from a GLB file or a built-in shape",
+        description="Renders ASSET or a built-in shape, brought to the unit sphere, from cameras around it under the light MAP, "
+        "with true albedo, roughness, metallic, normals and relit views, in a layout that train and evaluate read.",
         epilog=examples(
             "splitnerf synth chair.glb --light studio.hdr --out data",
             "splitnerf synth chair.glb --light studio.hdr --relight field.hdr city.hdr --size 400 --out data",
+            "splitnerf synth --shape mug --material glossy --light studio.hdr --out data",
         ),
     )  # fmt: skip
-    parser.add_argument("asset", type=Path, metavar="ASSET.glb")
+    rendered = parser.add_mutually_exclusive_group(required=True)
+    rendered.add_argument("asset", type=Path, nargs="?", metavar="ASSET.glb")
+    rendered.add_argument(
+        "--shape", choices=SHAPES, metavar="NAME", help=f"a built-in shape, hollow, pierced or touching: {', '.join(SHAPES)}"
+    )
+    parser.add_argument("--material", choices=MATERIALS, help="of the shape, under a painted pattern (default: matte)")
     parser.add_argument(
         "--light", type=Path, required=True, metavar="MAP", help="environment map of the photos, .hdr or .exr"
     )
@@ -52,9 +62,18 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from splitnerf.export.glb import write_glb
     from splitnerf.synth.jobs import SynthSettings, synthesise
+    from splitnerf.synth.shapes import shape_asset
 
+    if args.material and not args.shape:
+        raise InputError("--material is that of a built-in shape; give --shape, or leave it out")
     settings = SynthSettings(args.size, args.train, args.test, args.spp, args.layout, args.renderer, args.seed)
-    out = synthesise(args.asset, args.light, args.relight, args.out, settings)
+    with tempfile.TemporaryDirectory() as folder:
+        asset = args.asset
+        if args.shape:
+            asset = Path(folder) / f"{args.shape}.glb"
+            write_glb(asset, shape_asset(args.shape, args.material or MATERIALS[0]))
+        out = synthesise(asset, args.light, args.relight, args.out, settings)
     print(f"{args.train} train and {args.test} test views under {1 + len(args.relight)} lights: {out}")
     return DONE
