@@ -39,7 +39,7 @@ def ended_by_signals() -> Iterator[None]:
 
 
 class Interrupt:
-    """Turns the first signal to end into a request; a second one acts as it did before. What is ignored at the end stays ignored."""
+    """Turns the first signal to end into a request; a second one acts as it did before."""
 
     def __enter__(self) -> Interrupt:
         self.asked = self._may_raise = False
@@ -68,8 +68,7 @@ class Interrupt:
 
     def __exit__(self, *exception) -> None:
         for number, handler in self._previous.items():
-            if signal.getsignal(number) is not signal.SIG_IGN:
-                signal.signal(number, handler)
+            signal.signal(number, handler)
 
 
 class _Abandoned(BaseException):

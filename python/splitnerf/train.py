@@ -1,4 +1,4 @@
-"""``python -m splitnerf.train DATA [OPTIONS]``: the same as ``splitnerf train``; torchrun starts several of it."""
+"""``python -m splitnerf.train DATA [OPTIONS]``: the same as ``splitnerf train``."""
 
 import sys
 

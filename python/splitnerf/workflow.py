@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,7 +35,6 @@ from splitnerf.training.loop import TrainedScene, begin_training, check_repeatab
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS
 from splitnerf.training.observer import Observer
-from splitnerf.training.ranks import ALONE, Alone
 from splitnerf.training.schedule import progress_of
 
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
@@ -118,52 +117,29 @@ def reconstruct(
     device: torch.device | str = "cpu",
     resume: bool = False,
     overwrite: bool = False,
-    ranks: Alone = ALONE,
     observers: Sequence[Observer] = (),
 ) -> tuple[TrainedScene, dict | None]:
     """Trains on a dataset and fills the run's folder, while observers look on. Returns the scene and, when finished, its
     evaluation.
-
-    Of several processes, each of which calls this, the first one alone writes; the others return no evaluation.
 
     Raises:
         InputError: The data, the settings or the run's folder cannot be used; nothing was written or deleted.
         Diverged, EmptyMesh, OSError: See :func:`splitnerf.training.loop.train`.
     """
     check_repeatable(config, device)
-    with held_by_first(run, ranks):
-        config, dataset, test = load_in_turn(data, run, config, downscale, resume, overwrite, ranks)
-        training = begin_training(
-            dataset, config, run, torch.device(device), resume=resume, observers=observers, ranks=ranks
-        )
-        if ranks.is_first:
-            begin_run(run, config, dataset, overwrite)
+    with held(run):
+        check_run(run, resume=resume, overwrite=overwrite)
+        config, dataset, test = load_with_masks(data, run, config, downscale, overwrite)
+        training = begin_training(dataset, config, run, torch.device(device), resume=resume, observers=observers)
+        begin_run(run, config, dataset, overwrite)
         trained = training.complete()
-        if not (trained.finished and ranks.is_first):
+        if not trained.finished:
             return trained, None
         (run / EXPOSURES).unlink(missing_ok=True)
         if trained.exposures is not None:
             dataset = dataset.exposed(trained.exposures)
             write_exposures(run, dataset)
         return trained, finish(trained, dataset, test, run, resume=resume, observers=training.observers)
-
-
-def held_by_first(run: Path, ranks: Alone) -> AbstractContextManager[None]:
-    """See :func:`splitnerf.files.held`: the first process holds the folder for all."""
-    return held(run) if ranks.is_first else nullcontext()
-
-
-def load_in_turn(
-    data: Path, run: Path, config: Config, downscale: int, resume: bool, overwrite: bool, ranks: Alone
-) -> tuple[Config, Dataset, Dataset | None]:
-    """The result of :func:`load_with_masks` in all processes. The first one checks the folder and finds missing masks, the
-    others then read what it found."""
-    loaded = None
-    if ranks.is_first:
-        check_run(run, resume=resume, overwrite=overwrite)
-        loaded = load_with_masks(data, run, config, downscale, overwrite)
-    config = ranks.of_first(lambda: loaded[0])
-    return loaded or (config, *load_with_masks(data, run, config, downscale, overwrite=False)[1:])
 
 
 def begin_run(run: Path, config: Config, dataset: Dataset, overwrite: bool) -> None:

@@ -48,7 +48,7 @@ class Scene(SimpleNamespace):
         return render_rays(self.model, self.model.evaluate_light(), found)
 
     def at_once(self, ray: RenderedRays, seed: int) -> torch.Tensor:
-        return losses.occlusion_loss(ray, self.mesh, self.environment, self.config, generator(), seed)[0]
+        return losses.occlusion_loss(ray, self.mesh, self.environment, self.config, generator(), seed)
 
     def gradients(self, loss: torch.Tensor) -> dict[str, torch.Tensor]:
         parameters = {k: p for k, p in self.model.named_parameters() if k.startswith(("occlusion", "sdf_field"))}

@@ -179,7 +179,7 @@ def test_occlusion_is_traced_for_its_share_as_it_is_set(monkeypatch, channels):
     config = tiny(
         occlusion_share=0.2, occlusion_channels=channels, occlusion_offset=0.037, occlusion_rays=5, occlusion_loss_form="square"
     )
-    loss, _ = losses.occlusion_loss(ray, None, None, config, generator(), 9)
+    loss = losses.occlusion_loss(ray, None, None, config, generator(), 9)
     assert loss.item() == pytest.approx(0.1, rel=1e-4) and asked.pop("n") == pytest.approx(0.2 * n, rel=0.15)
     assert asked == dict(
         n_diffuse_rays=5, n_specular_rays=5, offset=0.037, along_ray=False, seed=9, n_channels=channels
@@ -214,7 +214,7 @@ def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch, form, facto
     found = []
     for seed in range(2):
         torch.manual_seed(seed)
-        found.append(losses.occlusion_loss(occlusion_rays(200), None, None, config, generator(), 0)[0].item())
+        found.append(losses.occlusion_loss(occlusion_rays(200), None, None, config, generator(), 0).item())
     positions, normals, lobes, number = asked[0]
     assert 30 < len(number) < 90 and number.unique().equal(number)
     for part, own in ((positions, [0.0, 0.0, 0.0]), (normals, [0.0, 0.5, 0.0]), (lobes, [0.0, 0.0, 0.5])):
@@ -230,8 +230,8 @@ def test_rays_that_meet_nothing_cost_nothing():
     ray.points.albedo, ray.points.metallic = torch.zeros(0, 3), torch.zeros(0, 1)
     for loss in (
         losses.material_entropy_loss(ray, tiny(), generator()),
-        losses.occlusion_loss(ray, None, None, tiny(), generator(), 0)[0],
-        losses.occlusion_loss(occlusion_rays(9), None, None, tiny(occlusion_share=0.0), generator(), 0)[0],
+        losses.occlusion_loss(ray, None, None, tiny(), generator(), 0),
+        losses.occlusion_loss(occlusion_rays(9), None, None, tiny(occlusion_share=0.0), generator(), 0),
     ):
         assert loss.shape == () and loss.item() == 0.0
 
@@ -299,7 +299,7 @@ def test_factors_are_drawn_to_the_traced_ones_and_diffuse_light_to_grey(monkeypa
     ray = occlusion_rays(4)
     factors = [x.requires_grad_() for x in (ray.points.occlusion_d, ray.points.occlusion_s)]
     config = tiny(occlusion_share=1.1, occlusion_channels=1, occlusion_loss_form="square")
-    losses.occlusion_loss(ray, None, None, config, generator(), 0)[0].backward()
+    losses.occlusion_loss(ray, None, None, config, generator(), 0).backward()
     for factor in factors:
         expected = 2 * ray.shares * (factor[:, 0].detach() - 0.5) / ray.shares.sum()
         torch.testing.assert_close(factor.grad[:, 0], expected)

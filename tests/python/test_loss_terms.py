@@ -135,8 +135,6 @@ def every_term(rendered, monkeypatch):
     for name in FIXED:
         function = {"light": "light_loss", "neutral": "neutral_light_loss", "entropy": "material_entropy_loss"}.get(name, f"{name}_loss")
         monkeypatch.setattr(losses, function, fixed(name))
-    occlusion = losses.occlusion_loss  # returns the sum of its weights as well
-    monkeypatch.setattr(losses, "occlusion_loss", lambda *args: (occlusion(*args), 1.0))
 
     def terms(step: int = 8, progress: float = 0.5, **settings):
         asked.clear()

@@ -167,22 +167,6 @@ def test_the_time_of_a_pause_is_told(monkeypatch):
     assert done == ["settle", "settle", "settle", "save", "settle"]
 
 
-def test_a_signal_that_is_ignored_meanwhile_stays_so():
-    """What loses the other processes ignores the launcher's signal, which may come after the steps' block has ended."""
-    before = signal.getsignal(signal.SIGTERM)
-    try:
-        with pytest.raises(RuntimeError), Interrupt():
-            signal.signal(signal.SIGTERM, signal.SIG_IGN)
-            raise RuntimeError
-        assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
-        signal.signal(signal.SIGTERM, before)
-        with Interrupt():
-            pass
-        assert signal.getsignal(signal.SIGTERM) is before
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_paused_run(data, tmp_path, number):
     class Pausing(Observer):

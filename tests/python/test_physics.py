@@ -36,7 +36,7 @@ def test_occlusion_loss_is_the_weighted_square_of_what_is_off(monkeypatch):
     )
     ray.points.lobe_dirs, ray.points.roughness = F.one_hot(torch.tensor([0, 1]), 3).float(), torch.ones(2, 1)
     ray.points.occlusion_d, ray.points.occlusion_s = torch.tensor([[0.6], [0.3]]), torch.tensor([[0.5], [1.0]])
-    loss, _ = losses.occlusion_loss(ray, None, None, config, torch.Generator().manual_seed(0), 0)
+    loss = losses.occlusion_loss(ray, None, None, config, torch.Generator().manual_seed(0), 0)
     assert loss.item() == pytest.approx(0.75 * 0.1 + 0.25 * 0.04)
     torch.testing.assert_close(asked["args"][1], torch.tensor([[1.0, 1.0, 0.9], [1.0, 1.0, 1.0]]))  # onto the surface
     assert torch.equal(asked["args"][3], ray.points.lobe_dirs) and not asked["along_ray"]

@@ -22,7 +22,6 @@ from splitnerf.render.occupancy import OccupancyGrid, visual_hull
 from splitnerf.training import loop, meshes
 from splitnerf.training.finite import Diverged
 from splitnerf.training.losses import Term
-from splitnerf.training.ranks import Agreed
 from splitnerf.training.schedule import next_ray_count
 from splitnerf.training.step import Room
 
@@ -168,7 +167,7 @@ def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(data, tmp_path):
     """Of 50 rays: 600 points looked at, 300 composited, 120 shaded; steps that were skipped, by either reason."""
     training = loop.Training(load_dataset(data), tiny(), tmp_path, torch.device("cpu"))
     training.watch.skipped, training.take_step.n_discarded = 2, 3
-    numbers = loop.StepNumbers({"colour": 0.25}, 0.5, 1.0, Room(300, 120, 40), 20.0, Agreed(300, 120, 45, 40, 600))
+    numbers = loop.StepNumbers({"colour": 0.25}, 0.5, 1.0, Room(300, 120, 40), 20.0, 600)
     batch = SimpleNamespace(target=torch.zeros(50, 4))
     line = training.line(SimpleNamespace(step=7, batch=batch, terms={"colour": Term(2.0, torch.tensor(0.0))}), numbers)
     counts = {"rays": 50, "samples_per_ray": 12.0, "kept": 0.5, "shaded": 0.2, "skipped": 5, "step": 7, "s": 20.0}

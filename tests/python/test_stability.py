@@ -50,7 +50,6 @@ def test_every_operator_is_asked():
     made_once = {
         "brdf_lut", "fibonacci_directions", "growth_for", "light_averages", "light_filters", "light_sum_of_levels",
         "sh_projection", "zonal_factors", "cached_visibility", "sample_rays", "summed_correction", "take_rows",
-        "totalled_gradient_losses", "totalled_material_losses",
     }  # fmt: skip
     functions = {name for name in ops.__all__ if name.islower()}
     asked = {item.name.split(",")[0] for item in table.chosen([])}

@@ -16,7 +16,6 @@ from splitnerf.errors import InputError
 
 if TYPE_CHECKING:
     from splitnerf.config import Config
-    from splitnerf.training.ranks import Alone
     from splitnerf.training.observer import Observer
 
 
@@ -30,8 +29,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf train data --max-minutes 30", "splitnerf train data --preset fast --downscale 2 --out runs/fast",
             "splitnerf train data --resume auto --view",
             after="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient alone skips "
-            "its step. The message names where it came from; --resume goes on from the last checkpoint. `torchrun --nproc-per-node N -m "
-            "splitnerf.train data` trains in N processes.",
+            "its step. The message names where it came from; --resume goes on from the last checkpoint.",
         ),
     )  # fmt: skip
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images; masks help, else the object is looked for")
@@ -103,24 +101,21 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.training.ranks import joined
-    from splitnerf.workflow import held_by_first
+    from splitnerf.files import held
 
     if args.resume and args.overwrite:
         raise InputError("--resume and --overwrite exclude each other")
     run, settings = args.out or Path("runs") / args.data.resolve().name, settings_of(args)
-    with joined() as ranks, ExitStack() as stack:
-        observers = list(map(stack.enter_context, observers_of(args, run, ranks)))
-        stack.enter_context(held_by_first(run, ranks))
-        return train_in(run, args, settings, ranks, observers)
+    with ExitStack() as stack:
+        observers = list(map(stack.enter_context, observers_of(args, run)))
+        stack.enter_context(held(run))
+        return train_in(run, args, settings, observers)
 
 
-def observers_of(args: argparse.Namespace, run: Path, ranks: Alone) -> list[AbstractContextManager[Observer]]:
+def observers_of(args: argparse.Namespace, run: Path) -> list[AbstractContextManager[Observer]]:
     """Who the options let look on."""
     found = []
-    if args.view is not None and ranks.several:
-        raise InputError("--view shows a training of one process; leave it out with torchrun")
-    if args.tensorboard and ranks.is_first:
+    if args.tensorboard:
         from splitnerf.training.tensorboard import TensorBoard
 
         found.append(TensorBoard(args.tensorboard))
@@ -149,15 +144,14 @@ def settings_of(args: argparse.Namespace) -> dict[str, object]:
 
 
 def train_in(
-    run: Path, args: argparse.Namespace, settings: dict[str, object], ranks: Alone, observers: Sequence[Observer] = ()
+    run: Path, args: argparse.Namespace, settings: dict[str, object], observers: Sequence[Observer] = ()
 ) -> int:
-    """Trains in a folder that the first of the processes holds, while observers look on, and prints the outcome; returns the exit code."""
+    """Trains in a folder that this process holds, while observers look on, and prints the outcome; returns the exit code."""
     from splitnerf.devices import choose_device
     from splitnerf.evaluate.jobs import read_evaluation
-    from splitnerf.training.ranks import one_gpu_each
     from splitnerf.workflow import reconstruct
 
-    plan = ranks.of_first(lambda: planned(run, args, settings))
+    plan = planned(run, args, settings)
     if plan.is_finished:
         for observer in observers:
             observer.delivering("evaluation", run)
@@ -165,13 +159,10 @@ def train_in(
         print_scores(read_evaluation(run))
         return DONE
     device = choose_device(plan.device)
-    one_gpu_each(device, ranks)
     trained, evaluation = reconstruct(
-        args.data, run, plan.config, downscale=args.downscale, device=device, resume=plan.resume, overwrite=plan.overwrite, ranks=ranks,
+        args.data, run, plan.config, downscale=args.downscale, device=device, resume=plan.resume, overwrite=plan.overwrite,
         observers=observers,
     )  # fmt: skip
-    if not ranks.is_first:
-        return DONE
     if evaluation is None:
         where = "in the last stage" if trained.finished else f"at step {trained.step}"
         print(f"stopped {where}; the state is in {run}. To go on, repeat the command with --resume.")

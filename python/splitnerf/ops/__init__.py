@@ -21,8 +21,6 @@ from splitnerf.ops.losses import (
     material_losses,
     pixel_losses,
     quadratic_entropy,
-    totalled_gradient_losses,
-    totalled_material_losses,
 )
 from splitnerf.ops.materials import material_network
 from splitnerf.ops.monte_carlo import (
@@ -67,5 +65,5 @@ __all__ = [
     "quadratic_entropy", "query_direction", "read_pixels", "sample_bsdf", "sample_ggx_lobe", "sample_rays", "sdf_field",
     "sdf_values", "sh_projection", "shade_sums", "sharpness", "sparse_product", "specular_share", "split_sum_shade",
     "spread_samples", "srgb_to_linear", "step_numbers", "summed_correction", "summed_light", "surface_weights", "take_rows",
-    "totalled_gradient_losses", "totalled_material_losses", "trace_visibility", "visibility_bits", "wide_lobes", "zonal_factors",
+    "trace_visibility", "visibility_bits", "wide_lobes", "zonal_factors",
 ]  # fmt: skip

@@ -66,12 +66,7 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> Tenso
 
     Source: Gropp et al. 2020 (eikonal).
     """
-    return totalled_gradient_losses(gradients, weights, beside)[0]
-
-
-def totalled_gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple[Tensor, Tensor]:
-    """As :func:`gradient_losses`, and the sum [] of the weights over which smoothness is a mean."""
-    return lib.gradient_losses(gradients, weights, beside)
+    return lib.gradient_losses(gradients, weights, beside)[0]
 
 
 def material_losses(
@@ -95,14 +90,7 @@ def material_losses(
     Source: SplitNeRF Eq. (18), over all samples instead of a tenth. A dark metal and a black dielectric with F0 = .04
     look nearly alike, but no dark metals exist (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
     """
-    return totalled_material_losses(albedo, metallic, shares, smooth_l1=smooth_l1)[0]
-
-
-def totalled_material_losses(
-    albedo: Tensor, metallic: Tensor, shares: Tensor, *, smooth_l1: bool = False
-) -> tuple[Tensor, Tensor]:
-    """As :func:`material_losses`, and the sum [] of the shares."""
-    return lib.material_losses(albedo, metallic, shares, smooth_l1)
+    return lib.material_losses(albedo, metallic, shares, smooth_l1)[0]
 
 
 def quadratic_entropy(x: Tensor) -> Tensor:

@@ -45,7 +45,6 @@ from splitnerf.training.metrics import METRICS, add_metrics, keep_metrics
 from splitnerf.training.numbers import PastStep, StepNumbers
 from splitnerf.training.observer import Observer, Observers, heed
 from splitnerf.training.optimiser import make_optimiser, set_learning_rate
-from splitnerf.training.ranks import ALONE, Alone
 from splitnerf.training.repeatable import same_bits
 from splitnerf.training.room import RoomyStep
 from splitnerf.training.schedule import light_moves, light_period, next_ray_count, progress_of
@@ -72,9 +71,8 @@ class TrainedScene:
 
 
 def train(
-    dataset: Dataset, config: Config, run: Path, *, device: torch.device | str = "cpu", resume: bool = False,
-    ranks: Alone = ALONE,
-) -> TrainedScene:  # fmt: skip
+    dataset: Dataset, config: Config, run: Path, *, device: torch.device | str = "cpu", resume: bool = False
+) -> TrainedScene:
     """Trains a scene and keeps a checkpoint, a log and previews in the run's folder.
 
     The schedule (learning rate, levels, annealing, meshes) follows the progress in [0, 1]: the larger of the share of
@@ -86,31 +84,29 @@ def train(
         config: The run's settings; with ``resume`` pass those of the checkpoint.
         run: The run's folder; it must exist.
         device: The device of images, fields and samples; meshes are extracted and traced on the CPU.
-        resume: Whether to continue from ``run/checkpoint.pt``, which any device, and any number of processes, may have written.
-        ranks: The processes that train together, each of which calls this; the first one writes the files.
+        resume: Whether to continue from ``run/checkpoint.pt``, which any device may have written.
 
     Raises:
         InputError: The checkpoint belongs to another scene or cannot be read, or the settings ask for equal bits on a
             device that cannot repeat them.
         splitnerf.training.finite.Diverged: Numbers are no longer finite, by the rule in that class; the last checkpoint
             is kept.
-        splitnerf.training.ranks.RankLost: Another process has ended; the last checkpoint is kept.
         OSError: The disk is full; the last checkpoint is kept.
     """
     check_repeatable(config, device)
-    return begin_training(dataset, config, run, torch.device(device), resume=resume, ranks=ranks).complete()
+    return begin_training(dataset, config, run, torch.device(device), resume=resume).complete()
 
 
 def begin_training(
     dataset: Dataset, config: Config, run: Path, device: torch.device, *, resume: bool = False,
-    observers: Sequence[Observer] = (), ranks: Alone = ALONE,
+    observers: Sequence[Observer] = (),
 ) -> Training:  # fmt: skip
     """A training that goes on from the run's checkpoint or begins; the arguments are those of :func:`train` and
     :class:`Training`."""
-    training = Training(dataset, config, run, device, observers, ranks)
+    training = Training(dataset, config, run, device, observers)
     if resume:
         training.restore()
-    elif config.surface.start == "stereo" and not ranks.several:
+    elif config.surface.start == "stereo":
         note_once("the photos are compared to find a first shape")
         training.start_from_photos()
     return training
@@ -120,18 +116,17 @@ class Training:
     """A training: its scene, optimiser and schedule, with the state that a checkpoint stores.
 
     Args:
-        dataset, config, run, device, ranks: See :func:`train`.
-        observers: Who looks on, in the first process; with several processes their wishes are not asked.
+        dataset, config, run, device: See :func:`train`.
+        observers: Who looks on.
     """
 
     def __init__(
-        self, dataset: Dataset, config: Config, run: Path, device: torch.device, observers: Sequence[Observer] = (),
-        ranks: Alone = ALONE,
-    ):  # fmt: skip
+        self, dataset: Dataset, config: Config, run: Path, device: torch.device, observers: Sequence[Observer] = ()
+    ):
         c = self.config = config
         if device.type == "cuda" and c.sampling.min_weight == 0 and not c.run.cuda_graphs:  # each step has tensors of new sizes
             let_segments_grow()
-        self.dataset, self.run, self.ranks, self.observers = dataset, run, ranks, Observers(observers)
+        self.dataset, self.run, self.observers = dataset, run, Observers(observers)
         self.fingerprint = dataset_fingerprint(dataset)
         torch.manual_seed(c.run.seed)
         self.generator = torch.Generator(device).manual_seed(c.run.seed)
@@ -145,13 +140,11 @@ class Training:
             lenses = source.intrinsics / source.hull_factor
             self.hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.possible, source.poses, lenses)
         self.grid = make_grid(c, self.hull, device)
-        self.mesh = SurfaceMesh(self.model, background=c.mesh.background, ranks=ranks)
-        graphs = c.run.cuda_graphs and not ranks.several  # a graph holds no collective
-        step = Step if device.type == "cpu" else GraphedStep if graphs else RoomyStep
+        self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
+        step = Step if device.type == "cpu" else GraphedStep if c.run.cuda_graphs else RoomyStep
         seen = None if dataset.surroundings is None else SeenLight(dataset.surroundings, self.generator.device)
-        self.take_step = step(self.model, self.grid, self.mesh, self.generator, seen, ranks)
+        self.take_step = step(self.model, self.grid, self.mesh, self.generator, seen)
         self.watch = GradientWatch(self.model.parameters())
-        self.of_light = set(self.model.light.parameters())
         self.light: EvaluatedLight | None = None  # evaluated; None after its parameters moved
         self.environment: Tensor | None = None  # the light that weighs traced occlusion
         self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.sampling.initial_rays, 0.0
@@ -204,8 +197,7 @@ class Training:
     def complete(self) -> TrainedScene:
         """Trains to the end of the schedule, or until a signal or an observer asks to stop."""
         c = self.config
-        if self.ranks.is_first:
-            keep_metrics(self.run / METRICS, self.step)
+        keep_metrics(self.run / METRICS, self.step)
         self.observers.began(self)
         with (
             Interrupt() as interrupt, Progress(self.progress) as bar, same_bits(c.run.deterministic),
@@ -213,18 +205,17 @@ class Training:
         ):  # fmt: skip
             if self.step:
                 interrupt.attempt(self.preview_if_due)  # that an interruption left out
-            while not self.finished and not (self.ranks.stops(interrupt.asked, self.started) and self.may_stop):
+            while not self.finished and not (interrupt.asked and self.may_stop):
                 self.refresh()
                 self.advance(bar)
                 interrupt.attempt(self.preview_if_due)
                 if self.seconds - self.saved_at > 60.0 * c.run.checkpoint_minutes and self.may_stop:
                     self.save()
-                if self.may_stop and not self.ranks.several:  # a wish would reach one process alone
+                if self.may_stop:
                     paused = heed(self, interrupt)
                     self.started += paused
                     bar.skip(paused)
             self.finish()
-        self.ranks.leave()
         return self.result()
 
     def save(self) -> None:
@@ -232,8 +223,6 @@ class Training:
         self.settle()
         check_state(self.step, self.model, self.optimiser)
         self.saved_at = self.seconds
-        if not self.ranks.is_first:
-            return
         save_checkpoint(
             self.run / "checkpoint.pt", config=self.config, fingerprint=self.fingerprint,
             state=dict(
@@ -298,37 +287,31 @@ class Training:
     def update_grid(self, s: float | None = None, **how: int | bool) -> None:
         """Classes the grid's cells again, see :meth:`splitnerf.render.occupancy.OccupancyGrid.update`; without `s` for the
         model's own sharpness."""
-        self.ranks.align(self.model.device)
-        self.grid.update(self.ranks.divided(self.model.sdf_field.sdf), self.model.s_value if s is None else s, **how)
+        self.grid.update(self.model.sdf_field.sdf, self.model.s_value if s is None else s, **how)
 
     def advance(self, bar: Progress) -> None:
         """Makes one step: draws rays, takes gradients, moves parameters; and reads the numbers of a step, on a GPU of the one
         before."""
         c, light = self.config, self.light
-        drawn = draw_batch(self.source, self.ranks.divisible(self.n_rays), c, self.exposures.factors)
-        batch = self.ranks.part(drawn)
+        batch = draw_batch(self.source, self.n_rays, c, self.exposures.factors)
         ray, terms = self.take_step(batch, light, self.environment, self.step, self.progress)
         if light_moves(c, self.step):
             light.backward()
             self.light = None
-        self.ranks.sum_gradients(p for p in self.watch.parameters if self.light is None or p not in self.of_light)
-        past = PastStep.of(
-            self.step + 1, batch, ray, terms, self.take_step.room, self.watch.gradients(), self.take_step.agreed
-        )
+        past = PastStep.of(self.step + 1, batch, ray, terms, self.take_step.room, self.watch.gradients())
         if self.reads_late:  # else gradients of results without room would stay in the light
             light.keep_grad(past.allowed)
         self.optimiser.step(allowed=past.allowed)
         past.counted = self.optimiser.counted
         if self.exposures.learned and self.progress > BEGIN:
-            mean, opacity = self.ranks.whole(ray.mean), self.ranks.whole(ray.opacity)
-            self.exposures.learn(drawn.view, drawn.target, mean, opacity, past.allowed)
+            self.exposures.learn(batch.view, batch.target, ray.mean, ray.opacity, past.allowed)
         self.unread.append(past)
         self.step, self.first = self.step + 1, False
         self.settle(bar, self.reads_late)
 
     def preview_if_due(self) -> None:
         """Writes a preview where the last one is old enough."""
-        if self.ranks.is_first and self.progress - self.previewed_at >= self.config.run.preview_every:
+        if self.progress - self.previewed_at >= self.config.run.preview_every:
             picture = write_preview(self.run, self.model, self.grid, self.dataset, self.step)
             self.previewed_at = self.progress
             self.observers.previewed(picture, self.step)
@@ -342,23 +325,20 @@ class Training:
         while len(self.unread) > left:
             past = self.unread.popleft()
             numbers = past.read()
-            self.ranks.read(agreed := numbers.agreed)
-            complete = self.take_step.settle(numbers.counts, past.room, numbers.s, agreed.without_room > 0)
+            complete = self.take_step.settle(numbers.counts, past.room, numbers.s)
             if complete and not math.isfinite(numbers.loss):
-                raise self.ranks.clearest(
-                    explain_loss(past.step - 1, numbers.values, self.dataset, past.batch, self.model, past.ray)
-                )
+                raise explain_loss(past.step - 1, numbers.values, self.dataset, past.batch, self.model, past.ray)
             if not complete or not self.watch.allows(past.step - 1, numbers.gradient_norm):
                 self.optimiser.take_back(past.counted)
             if complete:
                 psnr = -10.0 * math.log10(max(numbers.values["colour"], 1e-10))
                 self.psnr_mean = psnr if self.psnr_mean is None else 0.95 * self.psnr_mean + 0.05 * psnr
-            n_rays = self.ranks.size * len(past.batch.target)
-            if n_rays == self.ranks.divisible(self.n_rays):  # else the newest count was chosen while this step was on its way
-                self.n_rays = next_ray_count(n_rays, agreed.samples, self.config)
-            self.seconds = self.ranks.seconds(self.started)
+            n_rays = len(past.batch.target)
+            if n_rays == self.n_rays:  # else the newest count was chosen while this step was on its way
+                self.n_rays = next_ray_count(n_rays, numbers.counts.samples, self.config)
+            self.seconds = time.monotonic() - self.started
             if bar is not None:
-                bar.show(self.progress, self.told(past.step, agreed.evaluated / n_rays))
+                bar.show(self.progress, self.told(past.step, numbers.evaluated / n_rays))
             self.unlogged = self.line(past, numbers)
             if past.step % LOG_EVERY == 0 or past.step <= LOG_EVERY:
                 self.log()
@@ -369,11 +349,9 @@ class Training:
             return
         if not self.reads_late:
             check_state(self.step, self.model, self.optimiser)
-        if self.ranks.is_first:
-            add_metrics(self.run / METRICS, self.unlogged)
-            self.observers.logged(self.unlogged)
+        add_metrics(self.run / METRICS, self.unlogged)
+        self.observers.logged(self.unlogged)
         self.unlogged = None
-
 
     def told(self, step: int, samples_per_ray: float) -> str:
         """What the bar tells of a step: its number, the batches' mean PSNR in dB and the samples per ray."""
@@ -382,14 +360,13 @@ class Training:
 
     def line(self, past: PastStep, numbers: StepNumbers) -> dict[str, object]:
         """The values of one line of metrics.jsonl, by name."""
-        agreed, n_rays = numbers.agreed, self.ranks.size * len(past.batch.target)
-        evaluated = max(1, agreed.evaluated)
+        n_rays, evaluated = len(past.batch.target), max(1, numbers.evaluated)
         return {
             "step": past.step, "seconds": round(self.seconds, 3), "progress": self.progress, "loss": numbers.loss,
             **{f"loss_{name}": term.weight * numbers.values[name] for name, term in past.terms.items()},
             "psnr": self.psnr_mean,
-            "rays": n_rays, "samples_per_ray": agreed.evaluated / n_rays,
-            "kept": agreed.samples / evaluated, "shaded": agreed.shaded / evaluated,
+            "rays": n_rays, "samples_per_ray": numbers.evaluated / n_rays,
+            "kept": numbers.counts.samples / evaluated, "shaded": numbers.counts.shaded / evaluated,
             "s": numbers.s, "is_unoccluded": self.model.occlusion.is_unoccluded,
             "skipped": self.watch.skipped + self.take_step.n_discarded,
         }  # fmt: skip

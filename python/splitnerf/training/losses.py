@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +31,6 @@ TAILS = 3.0  # degrees of freedom
 SEEN_TEXELS = 1024  # directions in which the light is compared with what photos show, at least
 SEEN_DEVIATION = 0.2  # of the log radiance
 RADIANCE_FLOOR = 1e-3  # radiance below it counts as dark
-LEAST_TOTAL = 1e-20  # sums of weights below it count as none
 ALBEDO_FLOOR = 0.01  # albedos below it count as the same black
 
 
@@ -54,50 +52,19 @@ class Terms(dict[str, Term]):
     def __init__(self) -> None:
         super().__init__()
         self._roots: list[tuple[Tensor, tuple[float, ...]]] = []
-        self._shares: list[Tensor] = []  # of each root's values
-        self._means: list[tuple[dict[str, float | None], Tensor, Sequence[float | Tensor]]] = []
 
-    def add(
-        self, weights: dict[str, float | None], values: Tensor, totals: Sequence[float | Tensor] = ()
-    ) -> None:
+    def add(self, weights: dict[str, float | None], values: Tensor) -> None:
         """Adds the terms `values` [k], or [] for one, with their names and weights in that order. A term whose weight is None
-        is left out. Each value is a weighted mean; `totals` holds the sum of its weights, by which several processes weigh their means. Without
-        it all processes count alike."""
+        is left out."""
         if any(weights.values()):
             self._roots.append((values, tuple(weight or 0.0 for weight in weights.values())))
-            self._means.append((weights, values.detach().reshape(-1), totals or [1.0] * len(weights)))
         flat = values.detach().reshape(-1)
         self.update((name, Term(weight, flat[i])) for i, (name, weight) in enumerate(weights.items()) if weight is not None)
-
-    def share(self, summed: Callable[[Tensor], Tensor], others: Tensor) -> Tensor:
-        """Makes the terms those over the rays of several processes, each of which calls this with as many terms: the weighted mean
-        of their means. :meth:`backward` then takes this process's part of the gradients, whose sum is the gradient of that.
-
-        Args:
-            summed: The sum of a vector over the processes.
-            others: [m] numbers.
-
-        Returns:
-            The sum of the other numbers.
-        """
-        parts, device = [values for _, values, _ in self._means], others.device
-        totals = torch.cat([_vector(x, device) for _, _, over in self._means for x in over])
-        sums = summed(torch.cat([torch.cat(parts) * totals, totals, others]))
-        weighted, over, others = sums.split([len(totals), len(totals), len(others)])
-        over = over.clamp(min=LEAST_TOTAL)
-        sizes = [len(part) for part in parts]
-        self._shares = list((totals / over).split(sizes))
-        for (weights, _, _), values in zip(self._means, (weighted / over).split(sizes)):
-            self.update((name, Term(weights[name], value)) for name, value in zip(weights, values) if name in self)
-        return others
 
     def backward(self) -> None:
         """Takes the gradients of the weighted sum. The weights seed the backward pass, so that the sum itself is never
         computed."""
-        seeds = [_seed(weights, values) for values, weights in self._roots]
-        if self._shares:
-            seeds = [seed * share.view_as(seed) for seed, share in zip(seeds, self._shares)]
-        roots = [(values, seed) for (values, _), seed in zip(self._roots, seeds) if values.requires_grad]
+        roots = [(values, _seed(weights, values)) for values, weights in self._roots if values.requires_grad]
         torch.autograd.backward(*map(list, zip(*roots)))
 
 
@@ -109,11 +76,6 @@ def _stored_seed(weights: tuple[float, ...], shape: torch.Size, device: torch.de
 
 def _seed(weights: tuple[float, ...], values: Tensor) -> Tensor:
     return _stored_seed(weights, values.shape, values.device)
-
-
-def _vector(x: float | Tensor, device: torch.device) -> Tensor:
-    """One number as a vector [1] on a device."""
-    return x.reshape(1) if isinstance(x, Tensor) else _stored_seed((float(x),), torch.Size([1]), device)
 
 
 def penalty(error: Tensor, form: str) -> Tensor:
@@ -258,19 +220,18 @@ class OcclusionPoints(NamedTuple):
 
 def occlusion_loss(
     ray: RenderedRays, scene: MeshScene, environment: Tensor, config: Config, generator: torch.Generator, seed: int
-) -> tuple[Tensor, float | Tensor]:
-    """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples; and the
-    sum of the weights.
+) -> Tensor:
+    """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples.
 
     Source: SplitNeRF Eq. (12)-(16).
     """
     random = torch.rand(len(ray.shaded), generator=generator, device=generator.device)
     chosen = (random < config.occlusion.share).nonzero().squeeze(1)
     if len(chosen) == 0:
-        return ray.shares.new_zeros(()), 0.0
+        return ray.shares.new_zeros(())
     truth = traced_factors(scene, occlusion_points(ray, chosen, config), environment, config, seed)
-    predicted, shares = (ray.points.occlusion_d[chosen], ray.points.occlusion_s[chosen]), ray.shares[chosen]
-    return occlusion_error(predicted, truth, shares, config), shares.sum()
+    predicted = ray.points.occlusion_d[chosen], ray.points.occlusion_s[chosen]
+    return occlusion_error(predicted, truth, ray.shares[chosen], config)
 
 
 @torch.no_grad()

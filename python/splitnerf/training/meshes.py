@@ -15,7 +15,6 @@ from splitnerf.fields.visibility import TracedBits
 from splitnerf.ops import MeshScene, SdfNetwork, sdf_values
 from splitnerf.render.model import SceneModel
 from splitnerf.training.background import in_background
-from splitnerf.training.ranks import ALONE, Alone
 
 
 class TracedMesh(NamedTuple):
@@ -41,7 +40,6 @@ class SurfaceMesh:
         background: Whether a thread makes the meshes while the caller continues. The thread reads a copy of the field,
             in a CUDA stream of its own, traces on the CPU, and brings the bits to the model's device; :meth:`poll`
             takes over the mesh. The thread ends with the program.
-        ranks: The processes of the training: the first one makes the meshes of all, which call each method in the same order.
 
     Attributes:
         current: The mesh in use; None before the first.
@@ -49,11 +47,10 @@ class SurfaceMesh:
         asked_at: The training's progress in [0, 1] at the newest request.
     """
 
-    def __init__(self, model: SceneModel, *, background: bool = False, ranks: Alone = ALONE):
-        self.model, self.background, self.ranks, self.current = model, background, ranks, None
+    def __init__(self, model: SceneModel, *, background: bool = False):
+        self.model, self.background, self.current = model, background, None
         self.made_at = self.asked_at = 0.0
         self._made: Future[TracedMesh | None] | None = None
-        self._n_used = 0  # of those made beside the training
         self._side = SideStream(model.device)
 
     @property
@@ -74,10 +71,7 @@ class SurfaceMesh:
         with torch.no_grad():
             self.model.occlusion.aim(self.model.evaluate_light())
         if not self.background:
-            self._use(self._of_first(lambda: make_mesh(self.model, network)))
-            return
-        if not self.ranks.is_first:
-            self._made = Future()
+            self._use(make_mesh(self.model, network))
             return
         network = network.snapshot()
         self._side.follow()
@@ -89,9 +83,9 @@ class SurfaceMesh:
         Raises:
             RuntimeError: The field was not finite.
         """
-        if self._made is not None and (wait or self.ranks.is_made(self._made, self._n_used)):
-            made, self._made, self._n_used = self._made, None, self._n_used + 1
-            mesh = self._of_first(made.result)
+        if self._made is not None and (wait or self._made.done()):
+            made, self._made = self._made, None
+            mesh = made.result()
             self._side.join()
             self._use(mesh)
 
@@ -106,17 +100,6 @@ class SurfaceMesh:
         """The part of the state that a checkpoint stores."""
         _, vertices, faces, _ = self.current or (None,) * 4
         return {"mesh_vertices": vertices, "mesh_faces": faces, "meshed_at": self.made_at}
-
-    def _of_first(self, make: Callable[[], TracedMesh | None]) -> TracedMesh | None:
-        """The mesh that ``make`` returns in the first process."""
-        if not self.ranks.several:
-            return make()
-        mesh = make() if self.ranks.is_first else None
-        sent = self.ranks.of_first(lambda: mesh and (mesh.vertices, mesh.faces, mesh.bits and mesh.bits.to("cpu")))
-        if mesh is None and sent is not None:
-            vertices, faces, bits = sent
-            mesh = TracedMesh(MeshScene(vertices.numpy(), faces.numpy()), vertices, faces, bits)
-        return mesh
 
     def _use(self, mesh: TracedMesh | None) -> None:
         self.made_at = self.asked_at

@@ -17,7 +17,6 @@ from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.batches import Batch
 from splitnerf.training.finite import LARGEST
 from splitnerf.training.losses import Terms
-from splitnerf.training.ranks import Agreed
 from splitnerf.training.step import Room
 
 
@@ -30,7 +29,7 @@ class StepNumbers(NamedTuple):
         gradient_norm: The Euclidean norm of all gradients.
         counts: The samples found, and those shaded and their segments.
         s: The sharpness of the density.
-        agreed: The counts of all processes of the training, and what else they agreed on.
+        evaluated: The points evaluated to find the samples.
     """
 
     values: dict[str, float]
@@ -38,7 +37,7 @@ class StepNumbers(NamedTuple):
     gradient_norm: float
     counts: Room
     s: float
-    agreed: Agreed
+    evaluated: float
 
 
 @dataclass
@@ -49,7 +48,7 @@ class PastStep:
         step: Its number, counted from 1.
         batch, ray, terms: Its rays, their rendering and the terms of its loss.
         room: The room of its results.
-        allowed: [] bool, whether its loss is a number, its gradient can be squared, and the results of all processes had room.
+        allowed: [] bool, whether its loss is a number, its gradient can be squared, and its results had room.
         fetched: Its numbers on the CPU, and what waits until they are there.
         counted: The optimiser's counts of steps that this one has raised.
     """
@@ -65,32 +64,22 @@ class PastStep:
 
     @classmethod
     def of(
-        cls, step: int, batch: Batch, ray: RenderedRays, terms: Terms, room: Room, gradients: list[Tensor],
-        agreed: Tensor | None = None,
-    ) -> PastStep:  # fmt: skip
-        """Starts to fetch the numbers of a step with these gradients from its device; ``agreed`` is what the processes of the
-        training agreed on, if there are several."""
+        cls, step: int, batch: Batch, ray: RenderedRays, terms: Terms, room: Room, gradients: list[Tensor]
+    ) -> PastStep:
+        """Starts to fetch the numbers of a step with these gradients from its device."""
         values, counts = [term.value for term in terms.values()], [ray.n_found, ray.sizes]
         limits = _limits(len(terms), room, ray.mean.device)
         numbers, allowed = step_numbers(gradients, values, counts, ray.evaluated, ray.s.detach(), limits)
-        if agreed is not None:
-            allowed = allowed & (agreed[Agreed._fields.index("without_room")] < 0.5)
-            numbers = torch.cat([numbers, agreed])
         return cls(step, batch, ray, terms, room, allowed, start_fetching(numbers))
 
     def read(self) -> StepNumbers:
         """The numbers; waits until they are there."""
         numbers, wait = self.fetched
         wait()
-        values, (norm, *counts, s) = (part.tolist() for part in numbers[: self.n_own].tensor_split([len(self.terms)]))
+        values, of_step = (part.tolist() for part in numbers.tensor_split([len(self.terms)]))
+        norm, samples, shaded, _, segments, evaluated, s = of_step
         loss = sum(term.weight * value for term, value in zip(self.terms.values(), values))
-        own, agreed = Agreed(*counts), Agreed(*(numbers[self.n_own :].tolist() or counts))
-        return StepNumbers(dict(zip(self.terms, values)), loss, norm, Room(own.samples, own.shaded, own.segments), s, agreed)
-
-    @property
-    def n_own(self) -> int:
-        """How many of the numbers are of this process alone: terms, norm, five counts, sharpness."""
-        return len(self.terms) + 7
+        return StepNumbers(dict(zip(self.terms, values)), loss, norm, Room(samples, shaded, segments), s, evaluated)
 
 
 @functools.lru_cache(maxsize=256)

@@ -28,7 +28,7 @@ class RoomyStep(Step):
 
     def __init__(self, model: SceneModel, *parts: object):
         super().__init__(model, *parts)
-        self.sample_room = round_up(SAMPLE_SLACK * model.config.sampling.target_samples / self.ranks.size)
+        self.sample_room = round_up(SAMPLE_SLACK * model.config.sampling.target_samples)
         self._counts: Room | None = None  # of the last step whose counts are known
 
     def __call__(
@@ -51,10 +51,10 @@ class RoomyStep(Step):
         shaded, segments = (round_up(SHADING_SLACK * n) for n in self._counts[1:])
         return Room(n_samples, shaded, segments)
 
-    def settle(self, counts: Room, room: Room, s: float, elsewhere: bool = False) -> bool:
+    def settle(self, counts: Room, room: Room, s: float) -> bool:
         """As :meth:`Step.settle`; counts the steps whose results may not be used."""
         self._counts, self.s = counts, s
-        complete = super().settle(counts, room, s, elsewhere)
+        complete = super().settle(counts, room, s)
         self.n_discarded += not complete
         return complete
 

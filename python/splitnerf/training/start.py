@@ -65,12 +65,11 @@ class StartShape(NamedTuple):
         along[-BEHIND:] = BESIDE[1] + (FREE - BESIDE[1]) * random[-BEHIND:]
         return self.points[chosen] + along[:, None] * self.towards[chosen]
 
-    def shape_loss(self, ray: RenderedRays) -> tuple[Tensor, Tensor]:
+    def shape_loss(self, ray: RenderedRays) -> Tensor:
         """How far the rays' surface has left the shape, beyond :data:`FREE_CELLS`: the mean over the shaded samples by their
-        weights, scene units; and the sum of the weights."""
+        weights, scene units."""
         away = ((ray.sdf - self.at(ray.positions.detach())).abs() - FREE_CELLS * self.cell).clamp(min=0)
-        total = ray.shares.sum()
-        return (ray.shares @ away) / total.clamp(min=1e-8), total
+        return (ray.shares @ away) / ray.shares.sum().clamp(min=1e-8)
 
 
 def side_loss(sdf: Tensor) -> Tensor:

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from splitnerf.fields import EvaluatedLight
-from splitnerf.ops import MeshScene, pixel_losses, totalled_gradient_losses, totalled_material_losses
+from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
@@ -19,7 +19,6 @@ from splitnerf.training.batches import Batch
 from splitnerf.training.late_occlusion import LateOcclusion
 from splitnerf.training.losses import Terms
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.ranks import ALONE, Alone
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
 from splitnerf.training.start import HELD_UNTIL, POINTS_WEIGHT, SHAPE_WEIGHT, SIDES_UNTIL, StartShape, side_loss
 
@@ -50,12 +49,10 @@ class Step:
         model, grid, mesh: The scene, its occupancy grid and its newest mesh.
         generator: Random numbers for the losses' subsets.
         seen: The light that photos show around the object; None where they show none.
-        ranks: The processes of the training.
 
     Attributes:
         room: The room of the last step.
         start: The shape that the run began with, near which the surface is held at first; None: a sphere, which holds nothing.
-        agreed: What the processes agreed on in the last step, see :meth:`splitnerf.training.ranks.Alone.agree`.
         n_discarded: The number of steps whose results had too little room.
     """
 
@@ -65,14 +62,13 @@ class Step:
 
     def __init__(
         self, model: SceneModel, grid: OccupancyGrid, mesh: SurfaceMesh, generator: torch.Generator,
-        seen: losses.SeenLight | None = None, ranks: Alone = ALONE,
+        seen: losses.SeenLight | None = None,
     ):  # fmt: skip
         self.model, self.grid, self.mesh, self.generator, self.seen = model, grid, mesh, generator, seen
-        self.ranks, self.agreed = ranks, None
         on_cpu, self.late = model.device.type == "cpu", None  # whose threads would only share the time
         if not on_cpu and model.config.occlusion.kind == "mlp":
             # How often it draws depends on the CPU's speed: the training's own numbers must not.
-            own = torch.Generator(generator.device).manual_seed(model.config.run.seed + ranks.rank)
+            own = torch.Generator(generator.device).manual_seed(model.config.run.seed)
             self.late = LateOcclusion(model, own)
 
     def __call__(
@@ -109,12 +105,10 @@ class Step:
         :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
         ray = render_rays(self.model, light, found, shades_per_ray=c.sampling.shades_per_ray, capacity=capacity)
-        own = self.ranks.own(self.generator, c.run.seed, step)
         terms = loss_terms(
-            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen, self.late, own
+            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen, self.late
         )
         self.hold(terms, ray, progress)
-        self.agreed = self.ranks.agree(terms, ray, self.room)
         self.model.zero_grad(set_to_none=True)
         terms.backward()
         return ray, terms
@@ -122,16 +116,14 @@ class Step:
     def hold(self, terms: Terms, ray: RenderedRays, progress: float) -> None:
         """Adds the terms that hold the surface near the run's start."""
         if self.start is not None and progress < HELD_UNTIL:
-            error, weight = self.start.shape_loss(ray)
-            terms.add({"start": SHAPE_WEIGHT}, error, [weight])
+            terms.add({"start": SHAPE_WEIGHT}, self.start.shape_loss(ray))
         n_drawn = len(ray.anywhere) - self.model.config.losses.eikonal_points
         if n_drawn > 0:
-            terms.add({"sides": POINTS_WEIGHT}, side_loss(ray.anywhere[-n_drawn:]), [float(n_drawn)])
+            terms.add({"sides": POINTS_WEIGHT}, side_loss(ray.anywhere[-n_drawn:]))
 
-    def settle(self, counts: Room, room: Room, s: float, elsewhere: bool = False) -> bool:
-        """Takes in the counts of a step with this room and its sharpness. ``elsewhere``: another process had too little room.
-        Returns whether the results may be used: only if no process had too little."""
-        return room.holds(counts) and not elsewhere
+    def settle(self, counts: Room, room: Room, s: float) -> bool:
+        """Takes in the counts of a step with this room and its sharpness. Returns whether the results may be used."""
+        return room.holds(counts)
 
     def stream(self) -> AbstractContextManager[None]:
         """The context in which steps run."""
@@ -141,7 +133,7 @@ class Step:
 def loss_terms(
     model: SceneModel, light: EvaluatedLight, batch: Batch, ray: RenderedRays, scene: MeshScene | None,
     environment: Tensor | None, generator: torch.Generator, step: int, progress: float,
-    seen: losses.SeenLight | None = None, late: LateOcclusion | None = None, own: torch.Generator | None = None,
+    seen: losses.SeenLight | None = None, late: LateOcclusion | None = None,
 ) -> Terms:  # fmt: skip
     """The terms of the loss by name; the colour's term comes first.
 
@@ -150,16 +142,14 @@ def loss_terms(
         batch, ray: The rays, and their rendering.
         scene: The surface as a mesh; None before the first mesh.
         environment: [h, 2h, 3] linear radiance that weighs the traced occlusion; None: no occlusion is traced.
-        generator: Random numbers, the same in all processes of a training.
+        generator: Random numbers for the losses' subsets.
         step, progress: The number of the step, and the training's progress in [0, 1].
         seen: The light that photos show around the object; None where they show none.
         late: Traces occlusion beside the training; None: the step traces its own points.
-        own: Random numbers for the losses' subsets of this process's points; None: `generator`.
 
     Source: SplitNeRF Eq. (3), (11), (18) and the losses named in :mod:`splitnerf.training.losses`.
     """
     c, w, terms = model.config, model.config.losses, Terms()
-    n_rays, own = len(batch.target), generator if own is None else own
     has_priors = progress >= w.priors_from
     # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
     terms.add(
@@ -167,14 +157,10 @@ def loss_terms(
         pixel_losses(
             ray.mean, ray.opacity, batch.target, batch.background, batch.whole, batch.exposure, linear=ray.linear
         ),
-        [n_rays, n_rays],
     )
-    bends, weight = totalled_gradient_losses(ray.gradients, ray.weights.detach(), ray.beside)
     terms.add(
-        {"eikonal": w.eikonal_weight, "smoothness": w.smoothness_weight or None}, bends, [len(ray.gradients), weight]
-    )
-    metals, weight = totalled_material_losses(
-        ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=w.metal_form == "smooth_l1"
+        {"eikonal": w.eikonal_weight, "smoothness": w.smoothness_weight or None},
+        gradient_losses(ray.gradients, ray.weights.detach(), ray.beside),
     )
     terms.add(
         {
@@ -182,13 +168,14 @@ def loss_terms(
             "binary_metal": (has_priors and w.binary_metal_weight) or None,
             "dark_metal": w.dark_metal_weight or None,
         },
-        metals,
-        [weight] * 3,
+        material_losses(
+            ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=w.metal_form == "smooth_l1"
+        ),
     )
     if has_priors and w.entropy_weight:
-        terms.add({"entropy": w.entropy_weight}, losses.material_entropy_loss(ray, c, own))
+        terms.add({"entropy": w.entropy_weight}, losses.material_entropy_loss(ray, c, generator))
     if model.light.needs_consistency_loss and w.light_weight and step % w.light_every == 0:
-        terms.add({"light": w.light_weight}, losses.light_loss(model.light, c, own, step))
+        terms.add({"light": w.light_weight}, losses.light_loss(model.light, c, generator, step))
     if light_moves(c, step):  # once for all steps since the light last moved
         since = step % light_period(c) + 1
         if w.neutral_weight:
@@ -198,10 +185,7 @@ def loss_terms(
         if seen is not None and w.seen_weight:
             terms.add({"seen_light": w.seen_weight * since}, seen.loss(light))
     if environment is not None and late is None:
-        error, weight = losses.occlusion_loss(ray, scene, environment, c, own, step)
-        terms.add({"occlusion": w.occlusion_weight}, error, [weight])
+        terms.add({"occlusion": w.occlusion_weight}, losses.occlusion_loss(ray, scene, environment, c, generator, step))
     elif environment is not None and (found := late.loss(ray, scene, environment, step)) is not None:
         terms.add({"occlusion": w.occlusion_weight}, found)
-    elif environment is not None and own is not generator:  # other processes may have traced points
-        terms.add({"occlusion": w.occlusion_weight}, environment.new_zeros(()), [0.0])
     return terms
