@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 
 import numpy as np
 import pytest
@@ -15,9 +14,7 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import directions_of_texels, turn_environment
 from splitnerf.data.frames import layout_of, read_frames
 from splitnerf.data.images import read_hdr, write_image
-from splitnerf.data.layouts import (
-    colmap, dtc, glossy, neus, openillumination, owl, stanford_orb, transforms, view_folders,
-)  # fmt: skip
+from splitnerf.data.layouts import neus, stanford_orb, transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.lit_photos import read_lit_photo
@@ -29,11 +26,9 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
 
 SETS = {  # the module that reads it, and whether it has photos in other lights
-    "stanford-orb": (stanford_orb, True), "owl": (owl, True), "openillumination": (openillumination, True), "dtc": (dtc, False),
-    "nerfactor": (view_folders, True), "tensoir": (view_folders, True), "shiny": (transforms, False),
-    "glossy": (glossy, False), "glossy-real": (colmap, False), "neus": (neus, False),
+    "stanford-orb": (stanford_orb, True), "nerfactor": (view_folders, True), "tensoir": (view_folders, True),
+    "shiny": (transforms, False), "neus": (neus, False),
 }  # fmt: skip
-LEAST = {"openillumination": 32.0}  # dB: JPEG
 RANDOM = np.random.default_rng(11)
 QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
@@ -55,7 +50,7 @@ def test_it_is_recognised_and_the_cameras_are_those_that_were_written(written):
     layout, _ = SETS[name]
     assert layout_of(scene.root) is layout
     frames = read_frames(scene.root, "train", Reading("all"))[0]
-    expected = [*scene.train, *scene.test] if name != "owl" else [*scene.train]
+    expected = [*scene.train, *scene.test]
     assert len(frames) == len(expected)
     for frame, pose in zip(frames, expected):
         assert frame.pose == pytest.approx(pose, abs=1e-9)
@@ -66,7 +61,7 @@ def test_it_is_recognised_and_the_cameras_are_those_that_were_written(written):
 def test_the_truth_from_each_camera_looks_like_the_photo(written):
     """And not like it from a camera with other axes, with its motion the other way round, or seen in a mirror."""
     name, scene = written
-    light, worst = read_hdr(scene.root / "light.hdr"), LEAST.get(name, 34)
+    light, worst = read_hdr(scene.root / "light.hdr"), 34
     frames = read_frames(scene.root, "train", Reading("all"))[0]
     for frame in frames[1:4:2]:
         right = scene.render(light, frame.pose)
@@ -85,10 +80,9 @@ def test_the_light_of_each_relit_photo_makes_it(written):
         return
     maps = map_files(scene.root, prefixed=True) if layout is view_folders else {}
     views = layout.relit(scene.root, maps)
-    same = TEST if name == "owl" else 0
-    assert len(views) == same + TEST * len(RELIT)
+    assert len(views) == TEST * len(RELIT)
     poses = np.repeat(scene.test, len(RELIT), axis=0) if maps else np.tile(scene.test, (3, 1, 1))
-    worst = LEAST.get(name, 33)
+    worst = 33
     for view, pose in list(zip(views, poses))[:: 3 if len(views) > 4 else 1]:
         light = view.radiance()
         assert view.frame.pose == pytest.approx(pose, abs=1e-9)
@@ -99,11 +93,10 @@ def test_the_light_of_each_relit_photo_makes_it(written):
 
 def test_a_trainer_reads_it(written):
     name, scene = written
-    data = load_dataset(scene.root, "train", masked=name != "glossy-real")
+    data = load_dataset(scene.root, "train")
     seen = TRAIN + TEST - 1 if SETS[name][0].splits(scene.root) is None else TRAIN
     assert len(data) == seen and data.height == SIZE
-    if name != "glossy-real":
-        assert 0.1 < (data.images[..., 3] > 0.5).mean() < 0.6
+    assert 0.1 < (data.images[..., 3] > 0.5).mean() < 0.6
     if name == "stanford-orb":  # radiance above 1 is kept
         assert (data.exposures < 1).any() and (data.images[..., :3].max() > 1.05)
 
@@ -123,59 +116,6 @@ def test_albedo_and_normals_of_those_that_have_them(written):
 
 
 # ---- what the sets' documents say, without any constant or function that writer and reader share ----
-
-
-def seen_by(pose: np.ndarray, point: np.ndarray, f: float, c: float) -> np.ndarray:
-    """The pixel in which a camera with this pose, OpenGL axes, sees a point: x to the right, y up, -z ahead."""
-    x, y, z = pose[:3, :3].T @ (point - pose[:3, 3])
-    return np.array([c + f * x / -z, c - f * y / -z])
-
-
-POINT = np.array([0.3, -0.2, 0.45])
-
-
-def test_owl_projects_by_k_r_t_and_has_its_own_curve(tmp_path):
-    (tmp_path / "inputs").mkdir()
-    k, r, t = np.diag([50.0, 50, 1]), Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), np.array([0.1, 0.2, 4.0])
-    k[:2, 2] = 8
-    rows = [*k, *r, t, (16, 16, 3)]
-    (tmp_path / "inputs/camera_0000.txt").write_text("\n".join(" ".join(map(str, map(float, row))) for row in rows))
-    (tmp_path / "inputs/exposure.txt").write_text("-1.5")
-    write_image(tmp_path / "inputs/image_0000.png", np.full((16, 16, 3), 128 / 255))
-    write_image(tmp_path / "inputs/mask_0000.png", np.ones((16, 16)))
-    frame = owl.read(tmp_path, "train")[0]
-    x = k @ (r @ POINT + t)
-    assert seen_by(frame.pose, POINT, 50, 8) == pytest.approx(x[:2] / x[2])
-    linear, _ = read_lit_photo(frame)
-    assert linear[0, 0] == pytest.approx(np.full(3, (128 / 255) ** 2.2 / 2**-1.5), rel=1e-5)
-
-
-def test_dtc_and_glossy_project_with_opencv_axes(tmp_path):
-    motion = np.eye(4)
-    motion[:3, :3], motion[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 4.0)
-    x, y, z = (motion @ [*POINT, 1])[:3]
-    for name in ("png/a.png", "0.png"):
-        write_image(tmp_path / name, np.ones((16, 16, 3)))
-    camera = {"image": "a.png", "T_camera_world": motion.tolist(), "intrinsic": {"fx": 50, "fy": 50, "cx": 7.5, "cy": 7.5}}
-    (tmp_path / "camera_poses.json").write_text(json.dumps({"cameras": [camera]}))
-    k = np.array([[50.0, 0, 8], [0, 50, 8], [0, 0, 1]])
-    (tmp_path / "0-camera.pkl").write_bytes(pickle.dumps((motion[:3].astype(np.float32), k)))
-    for frame in (dtc.read(tmp_path)[0], glossy.read(tmp_path)[0]):
-        assert lens_intrinsics(frame.lens, (16, 16)) == pytest.approx([50, 50, 8, 8])
-        assert seen_by(frame.pose, POINT, 50, 8) == pytest.approx([8 + 50 * x / z, 8 + 50 * y / z], abs=1e-4)
-
-
-def test_a_camera_of_openillumination_looks_along_its_z(tmp_path):
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 0.3)
-    frame = {"file_path": "./images/C3", "transform_matrix": pose.tolist(), "camera_angle_x": 0.5, "calib_imgw": 16}
-    (tmp_path / "output").mkdir()
-    (tmp_path / "output/transforms_train.json").write_text(json.dumps({"frames": {"C3": frame}}))
-    write_image(tmp_path / "Lights/013/raw_undistorted/C3.JPG", np.ones((16, 16, 3)))
-    found = openillumination.read(tmp_path, "train")[0]
-    point = pose[:3] @ [0.1, 0.2, 1.0, 1]  # to the right of the axis and below it
-    f = 8 / np.tan(0.25)
-    assert seen_by(found.pose, point, f, 8) == pytest.approx([8 + 0.1 * f, 8 + 0.2 * f])
 
 
 @pytest.mark.parametrize(
@@ -218,10 +158,6 @@ def damaged(scene: Written, name: str) -> tuple:
     """A file of the set and what to write into it."""
     return {
         "stanford-orb": ("transforms_train.json", b'{"frames": [7]}', "list of objects"),
-        "owl": ("inputs/camera_0000.txt", b"1 0 0\n0 1 nan\n", "must hold 24 finite numbers"),
-        "openillumination": ("output/transforms_train.json", b'{"frames": []}', "object of objects"),
-        "dtc": ("camera_poses.json", b'{"cameras": [{"image": "0000.png"}]}', "missing key 'T_camera_world'"),
-        "glossy": ("0-camera.pkl", pickle.dumps(print), "asks for builtins.print"),
         "nerfactor": ("train_000/metadata.json", b"{}", "missing key"),
     }.get(name)
 
@@ -255,5 +191,5 @@ def test_a_layout_without_other_lights_refuses_them(tmp_path, capsys):
     write_image(tmp_path / "a.exr", patches())
     map_path = str(tmp_path / "a.exr")
     arguments = [str(write_object(tmp_path)), "--light", map_path, "--relight", map_path, "--out", str(tmp_path / "out")]
-    assert main(["synth", *arguments, "--layout", "dtc"]) == BAD_INPUT
-    assert "the layout dtc has no images in other lights" in capsys.readouterr().err and not (tmp_path / "out").exists()
+    assert main(["synth", *arguments, "--layout", "neus"]) == BAD_INPUT
+    assert "the layout neus has no images in other lights" in capsys.readouterr().err and not (tmp_path / "out").exists()

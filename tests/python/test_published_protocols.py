@@ -14,7 +14,7 @@ from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.layouts.lit import LitView
 from splitnerf.errors import InputError
-from splitnerf.evaluate.published import dtu, glossy, nerfactor, openillumination, owl, shiny, stanford_orb, tensoir
+from splitnerf.evaluate.published import nerfactor, shiny, stanford_orb, tensoir
 from splitnerf.evaluate.published.common import Delivered
 from splitnerf.evaluate.published.folders import FolderTruth
 from splitnerf.evaluate.published.table import PROTOCOLS, published, table
@@ -88,53 +88,7 @@ def test_orb_normals_and_chamfer():
     assert stanford_orb.chamfer(flat, points) == pytest.approx(2e3 * 0.01, rel=0.01)
 
 
-# ---- Objects With Lighting ----
-
-
-@pytest.mark.parametrize(("stops", "gains"), [(-3.0, (1, 1, 1)), (4.0, (1, 1.2, 0.8)), (0.0, (0.6, 1, 1.8))])
-def test_owl_finds_exposure_and_gains(stops, gains):
-    photo, mask = picture(), box(2, 20) > 0
-    linear = photo**2.2 / 2.0**stops / np.array(gains)
-    image = owl.tone_mapped(linear, photo, mask)
-    assert np.abs(image - photo)[mask].max() < 2e-3
-
-
-def test_owl_keeps_gains_within_their_bounds():
-    photo, mask = np.full((SIDE, SIDE, 3), 0.5), np.ones((SIDE, SIDE), bool)
-    image = owl.tone_mapped(photo**2.2 * [1, 1, 1e-3], photo, mask)
-    assert np.abs(image[..., :2] - 0.5).max() < 2e-3
-    assert image[0, 0, 2] == pytest.approx(0.5 * (1e-3 * 2) ** (1 / 2.2), rel=0.01)
-
-
-def test_owl_fits_on_what_the_photo_does_not_clip_and_inside_the_mask():
-    photo, mask = picture(0.7), box(0, 12) > 0
-    linear = photo**2.2 * 0.25
-    photo[:9], linear[:9] = 1.0, 0.01  # clipped, as most of the mask is
-    linear[12:] = 50.0
-    image = owl.tone_mapped(linear, photo, mask)
-    assert np.abs(image - photo)[9:12, :12].max() < 2e-3
-    assert not (owl.tone_mapped(np.zeros_like(linear), photo, mask)).any()
-
-
-def test_owl_ssim_counts_inside_the_mask():
-    photo, mask = np.float32(picture()), box(0, 12) > 0
-    other = photo.copy()
-    other[12:] = 0
-    assert owl.masked_ssim(other, photo, mask) == pytest.approx(1)
-    flat = np.full((SIDE, SIDE, 3), 0.8, np.float32)  # without variance: (2 a b + c) / (a^2 + b^2 + c) in whole windows
-    expected = (2 * 0.8 * 0.4 + 1e-4) / (0.8**2 + 0.4**2 + 1e-4)
-    assert owl.masked_ssim(flat / 2, flat, np.ones_like(mask)) == pytest.approx(expected, abs=1e-6)
-    assert owl.masked_ssim(flat / 2, flat, mask) < expected + 1e-6
-
-
 # ---- the others ----
-
-
-def test_pixels_in_srgb():
-    pixels = np.full((7, 3), 0.25)
-    expected = -20 * np.log10(linear_to_srgb(np.float64(0.25)) - linear_to_srgb(np.float64(0.16)))
-    assert openillumination.srgb_psnr(pixels * 0.64, pixels) == pytest.approx(expected, abs=1e-6)
-    assert openillumination.srgb_psnr(pixels + 5, pixels + 1) == PERFECT
 
 
 def test_nerfactor_scale_is_of_least_squares_on_opaque_pixels():
@@ -188,32 +142,6 @@ def test_albedo_is_scaled_before_relighting():
     plain, textured = Delivered(asset, None, np.zeros(3), 1).with_albedo(np.array([2.0, 0.5, 3.0])).asset.materials
     assert plain.albedo == pytest.approx((0.4, 0.2, 1.0))
     assert textured.albedo == (1, 1, 1) and textured.albedo_texture[0, 0] == pytest.approx([0.4, 0.2, 1.0])
-
-
-def test_glossy_distance_of_two_planes():
-    x, y = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, 300), np.linspace(0, 1, 300)))
-    plane = np.stack([x, y, 0 * x], axis=1)
-    assert glossy.chamfer(plane + [0, 0, 0.05], plane) == pytest.approx(0.05, rel=0.02)
-    assert glossy.thinned(np.array([[0, 0, 0], [0.002, 0, 0], [1, 1, 1]])) == pytest.approx(np.array([[0.001, 0, 0], [1, 1, 1]]))
-
-
-def test_dtu_counts_the_observed_and_what_is_above_the_plane():
-    scan = np.stack(np.meshgrid(np.arange(0, 30, 0.5), np.arange(0, 30, 0.5), [0.0]), axis=-1).reshape(-1, 3)
-    below = scan + [0, 0, -15]
-    ours = scan + [0, 0, 0.75]
-    far = np.array([[10.0, 10, 15], [10, 10, 25]])  # one of them more than 20 mm away
-    volume = np.array([[0.0, 0, 0], [30, 30, 30]])
-    observed, plane = np.ones((31, 31, 31), bool), np.array([0, 0, 1.0, 10])
-    got = dtu.distances(ours, np.concatenate([scan, below]), volume, 1.0, observed, plane)
-    assert got == pytest.approx((0.75, 0.75))
-    accuracy, _ = dtu.distances(np.concatenate([ours, far]), scan, volume, 1.0, observed, plane)
-    assert accuracy == pytest.approx((0.75 * len(ours) + 15) / (len(ours) + 1))
-    observed[:, :, 10:] = False
-    accuracy, _ = dtu.distances(np.concatenate([ours, far]), scan, volume, 1.0, observed, plane)
-    assert accuracy == pytest.approx(0.75)
-    kept = dtu.thinned(RANDOM.uniform(0, 3, (4000, 3)))
-    apart = np.linalg.norm(kept[:, None] - kept[None], axis=-1) + np.eye(len(kept))
-    assert apart.min() > dtu.SPACING and len(kept) > 500
 
 
 def test_the_command_line_knows_all_protocols_and_layouts():

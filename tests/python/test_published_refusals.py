@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import json
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
-from scipy.io import savemat
 
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.images import linear_to_srgb, write_image
-from splitnerf.data.layouts import dtc as dtc_layout
-from splitnerf.data.layouts import glossy as glossy_layout
-from splitnerf.data.layouts import openillumination as openillumination_layout
 from splitnerf.data.layouts import stanford_orb as orb_layout
 from splitnerf.data.layouts.frame import Frame, folder_name
-from splitnerf.data.layouts.lit import LitView
 from splitnerf.errors import InputError
-from splitnerf.evaluate.published import dtu, openillumination, shiny, stanford_orb
+from splitnerf.evaluate.published import shiny, stanford_orb
 from splitnerf.evaluate.published.common import Delivered, Options
 
 SIDE = 16
@@ -98,59 +91,6 @@ def test_names_of_folders_lead_nowhere_else(name, tmp_path):
     (root / "transforms_novel.json").write_text(json.dumps({"frames": [entry]}))
     with pytest.raises(InputError, match="'scene_name' of frame 0 is no folder's name"):
         orb_layout.relit(root, {})
-    (root / "metadata.json").write_text(json.dumps({"model_name": name}))
-    with pytest.raises(InputError, match="'model_name' is no folder's name"):
-        dtc_layout.model_name(root)
-
-
-# ---- OpenIllumination ----
-
-
-def lit_views(folder, monkeypatch, masks: list[np.ndarray]) -> list[np.ndarray]:
-    """Photos of the set, one for each mask."""
-    photos = [picture(seed, 0.5) for seed in range(len(masks))]
-    views = []
-    for i, (photo, mask) in enumerate(zip(photos, masks)):
-        write_image(folder / f"{i}.exr", photo)
-        write_image(folder / f"{i}.png", mask)
-        frame = Frame(str(i), folder / f"{i}.exr", np.eye(4), {}, mask_path=folder / f"{i}.png")
-        views.append(LitView(frame, "001", lambda: LIGHT))
-    monkeypatch.setattr(openillumination_layout, "relit", lambda *_: views)
-    return photos
-
-
-def test_an_empty_mask_has_no_score(tmp_path, monkeypatch):
-    photos = lit_views(tmp_path, monkeypatch, [np.ones((SIDE, SIDE)), np.zeros((SIDE, SIDE))])
-    scores = openillumination.score(Painted(photos[0] * 0.5), tmp_path, Options())
-    assert [image["psnr"] for image in scores.images][1] is None and scores.means["psnr"] > 50
-    json.dumps(scores.means, allow_nan=False)
-
-
-def test_one_factor_brings_all_pictures_nearest(tmp_path, monkeypatch):
-    photos = lit_views(tmp_path, monkeypatch, [np.ones((SIDE, SIDE))] * 3)
-    painted, pictures = Painted(photos[0]), iter(photos)
-    painted.render = lambda *_: {"radiance": next(pictures) * [0.5, 2.0, 1.0]}
-    scores = openillumination.score(painted, tmp_path, Options())
-    assert min(image["psnr"] for image in scores.images) > 50
-    painted.render = lambda *_: {"radiance": photos[0] * 1e6}  # more than a half holds
-    assert all(np.isfinite(image["psnr"]) for image in openillumination.score(painted, tmp_path, Options()).images)
-
-
-def test_pictures_are_not_kept_in_memory(tmp_path, monkeypatch):
-    peaks = []
-    for count in (4, 4, 40):
-        photos = lit_views(tmp_path, monkeypatch, [np.ones((SIDE, SIDE))] * count)
-        tracemalloc.start()
-        openillumination.score(Painted(photos[0]), tmp_path, Options())
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-    assert peaks[2] - peaks[1] < 36 * photos[0].nbytes / 2, peaks
-
-
-def test_illuminations_have_plain_numbers(tmp_path):
-    for name in ("013", "²", "x"):
-        (tmp_path / "Lights" / name).mkdir(parents=True)
-    assert openillumination_layout._illuminations(tmp_path) == ["013"]
 
 
 # ---- Shiny Blender ----
@@ -176,50 +116,6 @@ def test_photos_of_another_form_are_refused(changes, tmp_path):
     transforms(tmp_path, {"transforms_train.json": ["a.png"], "transforms_test.json": ["a.png"]}, **(changes or {}))
     with pytest.raises(InputError, match="has no alpha" if changes is None else "distortion, a mask or a curve"):
         shiny.score(Painted(picture()), tmp_path, Options())
-
-
-# ---- the others ----
-
-
-def test_a_depth_image_has_the_size_of_its_photo(tmp_path):
-    write_image(tmp_path / "0.png", picture())
-    write_image(tmp_path / "0-depth.png", np.ones((SIDE, SIDE + 1)))
-    with pytest.raises(InputError, match="0-depth.png: has another size than 0.png"):
-        glossy_layout.read_depth(Frame("0", tmp_path / "0.png", np.eye(4), {}))
-
-
-def dtu_truth(folder, **changes):
-    for name in ("Points/stl", "ObsMask"):
-        (folder / name).mkdir(parents=True)
-    trimesh.PointCloud(10 * np.eye(3)).export(folder / "Points/stl/stl007_total.ply")
-    box, mask = np.array([[-20.0] * 3, [20.0] * 3]), np.ones((90, 90, 90), np.uint8)
-    volume = {"BB": box, "Res": 0.5, "ObsMask": mask, "P": np.float64([0, 0, 1, 50])}
-    volume |= changes
-    savemat(folder / "ObsMask/Plane7.mat", {"P": volume.pop("P")})
-    savemat(folder / "ObsMask/ObsMask7_10.mat", volume)
-    return Options(truth=folder)
-
-
-@pytest.mark.parametrize("changes", [
-    {"BB": np.zeros((2, 2))}, {"ObsMask": np.ones((9, 9), np.uint8)}, {"P": np.ones(3)}, {"Res": 0.0},
-])  # fmt: skip
-def test_truth_of_another_shape_is_refused(changes, tmp_path):
-    with pytest.raises(InputError, match="need BB .2, 3., Res, ObsMask of 3 axes and P .4."):
-        dtu.score(Painted(picture()), tmp_path / "scan7", dtu_truth(tmp_path, **changes))
-
-
-def test_points_that_cannot_be_read_are_refused(tmp_path):
-    options = dtu_truth(tmp_path)
-    (tmp_path / "Points/stl/stl007_total.ply").write_bytes(b"ply\nformat")
-    with pytest.raises(InputError, match="stl007_total.ply: cannot be read as points"):
-        dtu.score(Painted(picture()), tmp_path / "scan7", options)
-
-
-def test_a_mesh_with_fewer_points_than_it_needs_is_noted(tmp_path, monkeypatch):
-    options = dtu_truth(tmp_path)
-    assert dtu.score(Painted(picture()), tmp_path / "scan7", options).notes == []
-    monkeypatch.setattr(dtu, "MOST_POINTS", 100)
-    assert "100 points lie further apart than 0.2 mm" in dtu.score(Painted(picture()), tmp_path / "scan7", options).notes[0]
 
 
 def test_colours_of_vertices_take_the_factor():

@@ -13,7 +13,7 @@ from splitnerf.errors import InputError
 
 NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env", "protocol", "truth")
 OWN_RULES = ("sheet", "lights", "table", "eval_mode", "mask_kind")  # options of this project's protocol
-SETS = ("stanford-orb", "owl", "openillumination", "dtc", "nerfactor", "tensoir", "shiny", "glossy", "dtu")
+SETS = ("stanford-orb", "nerfactor", "tensoir", "shiny")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -26,7 +26,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         epilog=examples(
             "splitnerf evaluate runs/a --data data",
             "splitnerf evaluate runs/a runs/b --table table.md",
-            "splitnerf evaluate runs/a --data car/test --protocol owl",
+            "splitnerf evaluate runs/a --data hotdog --protocol nerfactor --maps lights",
         ),
     )  # fmt: skip
     parser.add_argument("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
@@ -58,7 +58,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--truth", type=Path, metavar="FOLDER",
-        help="for --protocol: DTU's Points and ObsMask, DTC's models, or Stanford-ORB's ground_truth if it is elsewhere",
+        help="for --protocol stanford-orb: the set's ground_truth, if it is elsewhere",
     )  # fmt: skip
     parser.add_argument(
         "--maps",

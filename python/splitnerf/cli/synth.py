@@ -10,9 +10,7 @@ from splitnerf.cli.exit_codes import DONE
 from splitnerf.cli.help import examples
 from splitnerf.errors import InputError
 
-LAYOUTS = (
-    "blender", "nerfactor", "tensoir", "shiny", "stanford-orb", "owl", "openillumination", "dtc", "glossy", "glossy-real", "neus",
-)  # fmt: skip
+LAYOUTS = ("blender", "nerfactor", "tensoir", "shiny", "stanford-orb", "neus")
 SHAPES = ("bowl", "mug", "box", "vase", "shell", "rings", "plinth", "mask")
 MATERIALS = ("matte", "glossy", "metal")
 
@@ -49,7 +47,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--layout",
         choices=LAYOUTS, metavar="SET", default="blender",
         help=f"whose files the data look like (default: blender): {', '.join(LAYOUTS)}; the first three hold full truth, and "
-        "only these, stanford-orb, owl and openillumination take --relight",
+        "only these and stanford-orb take --relight",
     )  # fmt: skip
     parser.add_argument(
         "--renderer",

@@ -8,14 +8,12 @@ from types import ModuleType
 
 import numpy as np
 
-from splitnerf.data.layouts import (
-    colmap, dtc, glossy, neus, openillumination, owl, stanford_orb, transforms, view_folders,
-)  # fmt: skip
+from splitnerf.data.layouts import colmap, neus, stanford_orb, transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 
-LAYOUTS = (stanford_orb, transforms, view_folders, owl, openillumination, dtc, glossy, neus, colmap)
+LAYOUTS = (stanford_orb, transforms, view_folders, neus, colmap)
 """The first that a folder has counts."""
 TEST_STRIDE = 8
 WORDS = {"train": r"(?<![a-z])train", "test": r"(?<![a-z])(test|eval)"}  # in the path of a split's image
@@ -42,7 +40,7 @@ def read_frames(root: Path, split: str, reading: Reading = Reading()) -> tuple[l
     if layout is None:
         raise InputError(
             f"{root}: has neither transforms_{split}.json nor transforms.json, nor view folders like train_000, nor "
-            f"{neus.CAMERAS}, nor a COLMAP model in sparse/0, nor the files of a published set; give the folder that holds one"
+            f"{neus.CAMERAS}, nor a COLMAP model in sparse/0; give the folder that holds one"
         )
     if reading.eval_mode == "auto" and layout.splits(root) is not None:
         frames = layout.read(root, split)

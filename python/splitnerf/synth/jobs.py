@@ -72,8 +72,6 @@ class SynthSettings:
         for name, known in (("layout", LAYOUTS), ("renderer", RENDERERS)):
             if getattr(self, name) not in known:
                 raise InputError(f"--{name} must be one of {', '.join(known)}, got {getattr(self, name)}")
-        if (self.layout, self.renderer) == ("glossy", "blender"):
-            raise InputError("--layout glossy needs depths, which --renderer blender does not give; leave --renderer out")
 
 
 def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, settings: SynthSettings) -> Path:

@@ -70,31 +70,6 @@ def checked_pose(matrix: object, name: str) -> np.ndarray:
     return pose
 
 
-def pose_of_motion(world_to_camera: np.ndarray, name: str) -> np.ndarray:
-    """The camera-to-world pose, OpenGL axes, of a motion [4, 4] from the world to a camera with OpenCV's axes.
-
-    Raises:
-        InputError: It is not a rigid motion of finite numbers.
-    """
-    motion = checked_pose(world_to_camera, name)
-    pose = np.eye(4)
-    pose[:3, :3] = motion[:3, :3].T
-    pose[:3, 3] = -motion[:3, :3].T @ motion[:3, 3]
-    return pose @ OPENCV_AXES
-
-
-def pinhole_numbers(matrix: object, name: str) -> dict[str, float]:
-    """fl_x, fl_y, cx and cy of a camera matrix K [3, 3].
-
-    Raises:
-        InputError: It is none of a pinhole with rectangular pixels.
-    """
-    k = np.asarray(matrix, np.float64)
-    if k.shape != (3, 3) or not np.isfinite(k).all() or abs(k[0, 1]) > 1e-6 * abs(k[0, 0]) or not (k[2] == (0, 0, 1)).all():
-        raise InputError(f"{name} is no matrix K of a pinhole without skew; repair it")
-    return {"fl_x": float(k[0, 0]), "fl_y": float(k[1, 1]), "cx": float(k[0, 2]), "cy": float(k[1, 2])}
-
-
 def folder_name(name: object, what: str) -> str:
     """A name of one folder that a file gives, called `what` in messages.
 

@@ -6,12 +6,11 @@ import json
 from pathlib import Path
 from types import ModuleType
 
-from splitnerf.evaluate.published import dtc, dtu, glossy, nerfactor, openillumination, owl, shiny, stanford_orb, tensoir
+from splitnerf.evaluate.published import nerfactor, shiny, stanford_orb, tensoir
 from splitnerf.evaluate.published.common import Column
 
 PROTOCOLS: dict[str, ModuleType] = {
-    "stanford-orb": stanford_orb, "owl": owl, "openillumination": openillumination, "dtc": dtc, "nerfactor": nerfactor,
-    "tensoir": tensoir, "shiny": shiny, "glossy": glossy, "dtu": dtu,
+    "stanford-orb": stanford_orb, "nerfactor": nerfactor, "tensoir": tensoir, "shiny": shiny,
 }  # fmt: skip
 NUMBERS = Path(__file__).with_name("numbers.json")
 
