@@ -11,12 +11,11 @@ import numpy as np
 import trimesh
 
 from splitnerf.config import Config
-from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, spread
 from splitnerf.data.environment import read_environment
 from splitnerf.data.exposures import EXPOSURES
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.images import over_background, read_image
+from splitnerf.data.images import over_background
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.errors import InputError
@@ -28,7 +27,6 @@ from splitnerf.notes import note
 from splitnerf.outputs import evaluate_scene, light_panels, write_assets
 from splitnerf.refinement.fit import RefinementSettings, decibels
 from splitnerf.refinement.job import RECORD, STATE, TRAINED, OtherState, forget_state, refine_folder
-from splitnerf.refinement.uncertainty import painted_with
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.path_traced import AssetRenderer
@@ -39,10 +37,9 @@ from splitnerf.training.observer import Observer
 from splitnerf.training.repeatable import same_bits
 
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
-LAST_STAGE_FILES = (RECORD, STATE, "uncertainty.exr", *(f"{TRAINED}/{name}" for name in ASSET_FILES))
+LAST_STAGE_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
 REPORT_VIEWS = 4
 VIEW_BUDGET = 1 << 20  # pixels of the test views that a run scores by path tracing at its end, REPORT_VIEWS views aside
-UNCERTAIN_SPP = 16
 
 
 def is_refined(run: Path) -> bool:
@@ -189,7 +186,7 @@ def last_stage_summary(run: Path) -> dict:
         "steps": len(sweeps), "seconds": record["seconds"],
         "photos_psnr": [decibels(sweeps[i]["error"]) for i in (0, -1)],
         "outline_error": [outline[0], outline[-1]] if outline else None,
-        "saturated": record["saturated"], "deviation": record["noise"] ** 0.5,
+        "saturated": record["saturated"],
     }  # fmt: skip
 
 
@@ -227,27 +224,19 @@ def last_stage_page(run: Path, views: Dataset, predictions: list[dict], shown: l
     """What the report shows of the last stage, see :func:`splitnerf.report.write_report`; None where a file
     that it shows is gone."""
     source = run / TRAINED
-    needed = [run / "uncertainty.exr", *(folder / name for folder in (source, run) for name in ASSET_FILES[:2])]
-    if not all(path.is_file() for path in needed):
+    if not all((folder / name).is_file() for folder in (source, run) for name in ASSET_FILES[:2]):
         return None
     chosen = views.select(shown)
     lights = [read_environment(folder / "environment.exr") for folder in (source, run)]
     before = asset_predictions(AssetRenderer(read_asset(source / "mesh.glb")), chosen, lights[0], scores["spp"])
-    uncertain = uncertain_maps(read_asset(run / "mesh.glb"), read_image(run / "uncertainty.exr"), chosen)
     pages = []
     for k, i in enumerate(shown):
         photo, coverage = views.images[i, ..., :3], views.images[i, ..., 3]
         pictures = [over_background(photo, coverage)]
         pictures += [over_background(p["rgb"], p["alpha"]) for p in (before[k], predictions[i])]
         errors = [float(np.square(p["alpha"] - coverage).mean()) for p in (before[k], predictions[i])]
-        pages.append({"name": views.frame_names[i], "pictures": pictures, "coverage": errors, "uncertain": uncertain[k]})
+        pages.append({"name": views.frame_names[i], "pictures": pictures, "coverage": errors})
     return {"views": pages, "summary": scores["last_stage"], "lights": lights}
-
-
-def uncertain_maps(asset: Asset, deviations: np.ndarray, views: Dataset) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Per view the deviations [H, W, 4] at the points seen, and the coverage [H, W]."""
-    maps = asset_predictions(AssetRenderer(painted_with(asset, deviations)), views, None, UNCERTAIN_SPP)
-    return [(np.dstack([m["albedo"], m["roughness"][..., None]]), m["alpha"]) for m in maps]
 
 
 def headline(evaluation: dict) -> dict[str, float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 import trimesh
@@ -79,12 +78,11 @@ def painted(ball) -> tuple[Asset, Dataset]:
 
 @pytest.fixture
 def shown_run(tmp_path):
-    """A run's folder for the viewer: an asset, its light, and what the photos leave open."""
+    """A run's folder for the viewer: an asset and its light."""
     folder = tmp_path / "mine"
     folder.mkdir()
     triangle().write(folder / "mesh.glb")
     write_image(folder / "environment.exr", numbered_sky())
-    write_image(folder / "uncertainty.exr", np.linspace(0, 0.5, 4 * 4 * 4, dtype=np.float32).reshape(4, 4, 4))
     return folder
 
 

@@ -31,10 +31,10 @@ from splitnerf.refinement import fit, job
 from splitnerf.refinement.fit import Refinement, RefinementSettings, Stage
 from splitnerf.refinement.job import OtherState, refine_folder
 from splitnerf.refinement.pixels import covered_pixels
-from splitnerf.report.last_stage import KNOWN_COLOURS, UNKNOWN_COLOURS, coloured, last_stage_section
+from splitnerf.report.last_stage import last_stage_section
 
 REFINED = ("--set", "refine=true", "--set", "refinement_sweeps=2")
-DELIVERED = ("mesh.glb", "environment.exr", "environment.hdr", "uncertainty.exr", "refinement.json")
+DELIVERED = ("mesh.glb", "environment.exr", "environment.hdr", "refinement.json")
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +59,6 @@ def test_a_run_delivers_what_was_fitted_and_keeps_what_was_trained(run):
     fitted, trained = read_asset(run / "mesh.glb"), read_asset(run / "trained" / "mesh.glb")
     assert np.array_equal(fitted.triangles, trained.triangles) and not np.allclose(fitted.vertices, trained.vertices, atol=1e-5)
     assert not np.array_equal(*(read_image(folder / "environment.exr") for folder in (run, run / "trained")))
-    deviations = read_image(run / "uncertainty.exr")
-    assert deviations.shape == (64, 64, 4) and deviations.min() > 0 and deviations[..., :3].max() < 0.29
 
 
 def test_the_export_says_at_once_what_it_does(run, tmp_path, capsys, monkeypatch):
@@ -163,7 +161,7 @@ def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_anot
     trained = (halves / "trained" / "mesh.glb").stat().st_mtime_ns
     assert main(["train", str(data), "--out", str(halves), "--resume"]) == DONE
     assert (halves / "trained" / "mesh.glb").stat().st_mtime_ns == trained and not (halves / "refinement.pt").exists()
-    assert bytes_of(halves, *DELIVERED[:4]) == bytes_of(run, *DELIVERED[:4])
+    assert bytes_of(halves, *DELIVERED[:3]) == bytes_of(run, *DELIVERED[:3])
 
 
 @pytest.mark.parametrize("minutes", [0.0, 2.0])
@@ -182,7 +180,7 @@ def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_
         assert train(data, killed, "--steps", "25", "--deterministic", *REFINED, *minutes) == FAILED
     assert (killed / "mesh.glb").exists()
     assert main(["train", str(data), "--out", str(killed), "--resume"]) == DONE
-    names = (*DELIVERED[:4], *(f"trained/{name}" for name in ("mesh.glb", "environment.exr")))
+    names = (*DELIVERED[:3], *(f"trained/{name}" for name in ("mesh.glb", "environment.exr")))
     assert bytes_of(killed, *names) == bytes_of(run, *names) and not (killed / "refinement.pt").exists()
 
 
@@ -226,7 +224,7 @@ def test_a_stage_goes_on_from_each_of_its_states(painted, folder, monkeypatch):
     parts = refine_folder(folder, painted[1], folder / "parts", QUICK, resume=True)
     assert parts.sweeps[-1].seconds > seconds > parts.sweeps[0].seconds and parts.outline == whole.outline
     assert [s.error for s in parts.sweeps] == [s.error for s in whole.sweeps]
-    assert bytes_of(folder / "parts", *DELIVERED[:4]) == bytes_of(folder / "whole", *DELIVERED[:4])
+    assert bytes_of(folder / "parts", *DELIVERED[:3]) == bytes_of(folder / "whole", *DELIVERED[:3])
 
 
 def within(sweep: int) -> Callable:
@@ -253,7 +251,7 @@ def test_a_signal_ends_a_sweep(painted, folder, monkeypatch):
         assert len(read_tensors(folder / "parts" / "refinement.pt")["sweeps"]) == n
     parts = refine_folder(folder, painted[1], folder / "parts", QUICK, resume=True)
     assert [s.error for s in parts.sweeps] == [s.error for s in whole.sweeps]
-    assert bytes_of(folder / "parts", *DELIVERED[:4]) == bytes_of(folder / "whole", *DELIVERED[:4])
+    assert bytes_of(folder / "parts", *DELIVERED[:3]) == bytes_of(folder / "whole", *DELIVERED[:3])
 
 
 def test_a_signal_ends_the_preparations(painted, folder, monkeypatch):
@@ -415,38 +413,24 @@ class Pictures(HTMLParser):
             self.found.append(dict(attributes)["alt"])
 
 
-def test_the_report_shows_before_and_after_and_what_is_open(run):
+def test_the_report_shows_before_and_after(run):
     page = (run / "report.html").read_text()
     pictures = Pictures()
     pictures.feed(page)
     for name in ("photo", "before", "after"):
         assert sum(alt.endswith(f", {name}") for alt in pictures.found) == 2, name  # test views
-    assert sum(alt.startswith("deviation of") for alt in pictures.found) == 8
-    for text in ("one factor per colour channel", "are saturated in the photos", "The last stage", "What the photos leave open"):
+    for text in ("one factor per colour channel", "are saturated in the photos", "The last stage"):
         assert text in page
 
 
 def test_the_reports_numbers_are_those_of_its_pictures():
     photo = np.full((8, 8, 3), 0.5)
-    uncertain = np.zeros((8, 8, 4))
-    uncertain[:2, :, 1] = 1.0
     page = {
-        "views": [{"name": "a", "pictures": [photo, photo + 0.1, photo + 0.01], "coverage": [0.2, 0.1],
-                   "uncertain": (uncertain, np.ones((8, 8)))}],
-        "summary": {"steps": 3, "seconds": 9.0, "photos_psnr": [20.0, 30.0], "outline_error": None, "saturated": 0.125, "deviation": 0.02},
+        "views": [{"name": "a", "pictures": [photo, photo + 0.1, photo + 0.01], "coverage": [0.2, 0.1]}],
+        "summary": {"steps": 3, "seconds": 9.0, "photos_psnr": [20.0, 30.0], "outline_error": None, "saturated": 0.125},
         "lights": [np.ones((4, 8, 3))] * 2,
     }  # fmt: skip
     section = last_stage_section(page)
     assert section["rows"][0][1:] == ("20.00 dB", "40.00 dB") and section["rows"][2][1:] == ("0.2", "0.1")
-    assert [q["unknown"] for q in section["quantities"]] == ["0 %", "25 %", "0 %", "0 %"]
     assert section["saturated"] == "12.5 %" and len(section["views"][0]["cells"]) == 3
     assert section["views"][0]["score"] == "20.00 → 40.00 dB"
-
-
-def test_what_is_unknown_is_striped_and_the_rest_on_a_scale():
-    values = np.zeros((12, 12, 4))
-    values[:6] = 1.0
-    picture = coloured((values, np.ones((12, 12))), 1)
-    assert {tuple(c) for c in picture[:6].reshape(-1, 3)} == {tuple(c) for c in UNKNOWN_COLOURS}
-    assert np.allclose(picture[6:], KNOWN_COLOURS[0])
-    assert np.allclose(coloured((values, np.zeros((12, 12))), 1), 1.0)

@@ -124,7 +124,7 @@ def test_nothing_is_made_while_no_page_is_open(stepped):
 
 def test_an_open_page_gets_surface_light_and_numbers(stepped):
     assert json.loads(ask(stepped.server, "scene.json")[2])["sources"] == [
-        {"name": "mine", "light": 1, "uncertainty": False, "version": 0}]  # fmt: skip
+        {"name": "mine", "light": 1, "version": 0}]  # fmt: skip
     with page_of(stepped.server) as heard:
         state = heard()
         assert state["stage"] == "training" and state["version"] == 0 and not state["paused"]
@@ -201,7 +201,7 @@ def test_the_delivered_asset_is_shown(stepped, tmp_path):
         stepped.live.delivering(stage, folder)
         assert stepped.live.news.state["version"] == version and stepped.live.shown.sources[0].version == version - 1
         (source,) = json.loads(ask(stepped.server, "scene.json")[2])["sources"]
-        assert source == {"name": "mine", "light": 1, "uncertainty": False, "version": version}
+        assert source == {"name": "mine", "light": 1, "version": version}
         assert ask(stepped.server, "assets/0")[2] == content
         assert (halves(ask(stepped.server, "lights/1"))[..., :3] == version).all()
     (tmp_path / "final/mesh.glb").write_text("hello")

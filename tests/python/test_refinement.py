@@ -23,7 +23,7 @@ from splitnerf.refinement.fit import Refinement, RefinementSettings, refine, srg
 from splitnerf.refinement.job import fitting_height
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, brightest_around, covered_pixels
-from splitnerf.refinement.texels import AssetTexels, materials_of
+from splitnerf.refinement.texels import AssetTexels, materials_of, patch_width
 from splitnerf.refinement.unknowns import N_UNKNOWNS, into_range, to_unknowns, to_values
 from splitnerf.render.path_traced import AssetRenderer
 
@@ -285,3 +285,11 @@ def test_a_sweep_has_no_more_pixels_than_it_may(painted, monkeypatch):
     monkeypatch.setattr(fit_module, "SWEEP_PIXELS", 300)
     fit.sweep()
     assert fit.n_batches == 3
+
+
+def test_a_patch_is_two_pixels_wide(painted):
+    """Texels share the ball's area of 4 pi; a pixel is 3.4 / 60 wide at its middle."""
+    mesh = trimesh.creation.icosphere(subdivisions=3)
+    texels = AssetTexels(textured(mesh.vertices, mesh.faces, 256))
+    edge = np.sqrt(4 * np.pi / len(texels.index))
+    assert patch_width(painted[1], texels) == pytest.approx(2 * 3.4 / 60 / edge, abs=0.55)

@@ -422,7 +422,7 @@ def test_a_run_of_many_parts_is_that_of_one(data, tmp_path, monkeypatch):
     assert logs[0] == logs[1]
 
 
-FITTED = ("mesh.glb", "mesh.ply", "environment.exr", "environment.hdr", "uncertainty.exr", "trained/mesh.glb")
+FITTED = ("mesh.glb", "mesh.ply", "environment.exr", "environment.hdr", "trained/mesh.glb")
 
 
 def run_command(*words: str) -> None:

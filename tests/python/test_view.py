@@ -45,11 +45,10 @@ def test_what_is_served_is_what_is_on_the_disk(shown_run, served):
     assert ask(served, "")[2] == (PAGE / "viewer.html").read_bytes()
     assert ask(served, "assets/0")[2] == (shown_run / "mesh.glb").read_bytes()
     scene = json.loads(ask(served, "scene.json")[2])
-    assert scene["sources"] == [{"name": "mine", "light": 0, "uncertainty": True, "version": 1}] and scene["problems"] == []
+    assert scene["sources"] == [{"name": "mine", "light": 0, "version": 1}] and scene["problems"] == []
     assert [light["name"] for light in scene["lights"]] == ["light of mine", "white"]
     light = halves(ask(served, "lights/0"))
     assert np.array_equal(light[..., :3], numbered_sky().astype(np.float16)) and (light[..., 3] == 1).all()
-    assert np.array_equal(halves(ask(served, "deviations/0")), read_image(shown_run / "uncertainty.exr").astype(np.float16))
     assert (halves(ask(served, "lights/1")) == 1).all()
 
 
@@ -60,19 +59,18 @@ def test_two_assets_and_a_given_light(shown_run, tmp_path):
         scene = json.loads(ask(server, "scene.json")[2])
         assert [source["name"] for source in scene["sources"]] == ["mine", "other.glb"]
         assert scene["first_light"] == 0 and scene["lights"][0]["name"] == "studio.hdr"
-        assert scene["sources"][1] == {"name": "other.glb", "light": None, "uncertainty": False, "version": 1}
+        assert scene["sources"][1] == {"name": "other.glb", "light": None, "version": 1}
         assert ask(server, "assets/1")[2] == other.read_bytes()
-        assert ask(server, "deviations/1")[0] == ask(server, "assets/2")[0] == 404
+        assert ask(server, "assets/2")[0] == 404
 
 
 def test_what_is_damaged_beside_the_asset_becomes_a_line(shown_run, capsys):
     (shown_run / "environment.exr").write_bytes((shown_run / "environment.exr").read_bytes()[:200])
-    write_image(shown_run / "uncertainty.exr", np.ones((4, 4, 3), np.float32))
     with serving(shown_run) as server:
         scene = json.loads(ask(server, "scene.json")[2])
-    assert [line.split(": ")[0] for line in scene["problems"]] == [str(shown_run / n) for n in ("environment.exr", "uncertainty.exr")]
-    assert scene["sources"] == [{"name": "mine", "light": None, "uncertainty": False, "version": 1}]
-    assert capsys.readouterr().err.count("note: ") == 2
+    assert [line.split(": ")[0] for line in scene["problems"]] == [str(shown_run / "environment.exr")]
+    assert scene["sources"] == [{"name": "mine", "light": None, "version": 1}]
+    assert capsys.readouterr().err.count("note: ") == 1
 
 
 def test_a_sun_brighter_than_halves_stays_finite():

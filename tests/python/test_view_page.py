@@ -49,7 +49,6 @@ def run(ball, tmp_path_factory):
     materials = np.full((64, 64, 2), (0.4, 0.0), np.float32)
     write_glb(folder / "mesh.glb", with_textures(ball, roughness_metallic_texture=materials))
     write_image(folder / "environment.exr", lamps())
-    write_image(folder / "uncertainty.exr", np.full((8, 8, 4), (0.05, 9, 0.1, 0.1), np.float32))
     return folder
 
 
@@ -64,14 +63,14 @@ def seen(run):
         return picture_at(folder / f"{name}.png")
 
     said = {"do": "text", "script": "document.getElementById('said').textContent"}
-    names = ("albedo", "roughness", "metallic", "normals", "uncertainty")
+    names = ("albedo", "roughness", "metallic", "normals")
     steps = [
         {"do": "size", "width": 700, "height": 440}, {"do": "open"}, picture("whole"), said | {"name": "start"},
         {"do": "style", "content": BARE}, {"do": "size", "width": SIZE, "height": SIZE}, *keys("h", "b"), picture("shaded"),
         {"do": "set", "selector": "#turn", "value": TURN}, picture("turned"),
         {"do": "set", "selector": "#turn", "value": 0},
         *(step for i, name in enumerate(names) for step in (*keys(str(i + 2)), picture(name))),
-        {"do": "set", "selector": "#quantity", "value": 1}, picture("unknown"), *keys("1"),
+        *keys("1"),
         *keys("."), picture("brighter"), *keys(",", "t"), picture("aces"), *keys("t"),
         *keys("ArrowLeft", "ArrowUp", "-"), picture("moved"),
         {"do": "text", "name": "home", "script": "document.getElementById('home').click()"}, picture("home"),
@@ -203,18 +202,6 @@ def test_maps_show_their_numbers(seen):
     # The middle of the ball looks at the camera: from the front (-y), from 20 degrees above.
     towards = np.array([0, -np.cos(np.radians(20)), np.sin(np.radians(20))])
     assert middle(pictures["normals"]) == pytest.approx(0.5 * towards + 0.5, abs=0.02)
-
-
-def test_uncertainty_has_the_colours_of_the_report(seen):
-    from splitnerf.refinement.uncertainty import UNKNOWN
-    from splitnerf.report.last_stage import UNKNOWN_COLOURS, coloured
-
-    _, pictures = seen
-    assert 0.05 < float(UNKNOWN[0])
-    expected = coloured((np.full((1, 1, 4), 0.05), np.ones((1, 1))), 0)[0, 0]
-    assert middle(pictures["uncertainty"]) == pytest.approx(expected, abs=0.01)
-    stripes = np.unique((255 * pictures["unknown"][70:90, 70:90]).round().reshape(-1, 3), axis=0)
-    assert stripes == pytest.approx(np.sort(255 * UNKNOWN_COLOURS, axis=0).round(), abs=1.01)
 
 
 def test_keys_and_the_pointer_move_what_they_say(seen):

@@ -17,7 +17,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Starts from RUN/trained, where a last stage kept what training exported, else from RUN. Moves the "
         "vertices of mesh.glb until its outline is that of the masks, then fits its textures (albedo, roughness, metallic, "
         "normals) and the light of environment.exr to the photos through the path tracer's own model, interreflection "
-        "included. Writes mesh.glb, environment.exr and .hdr, uncertainty.exr and refinement.json into RUN/refined. Ctrl-C "
+        "included. Writes mesh.glb, environment.exr and .hdr, and refinement.json into RUN/refined. Ctrl-C "
         "keeps the state there; --resume goes on.",
         epilog=examples("splitnerf refine runs/data --data data --minutes 10"),
     )  # fmt: skip

@@ -23,7 +23,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "train", help="reconstruct an object from posed images",
         description="Trains on DATA (transforms files, COLMAP's, NeuS's and other layouts, see docs/data.md), fits the exported asset and its light "
-        "to the photos in a last stage, and writes mesh.glb, mesh.ply, environment.exr/.hdr, uncertainty.exr, evaluation.json and "
+        "to the photos in a last stage, and writes mesh.glb, mesh.ply, environment.exr/.hdr, evaluation.json and "
         "report.html into the run's folder.",
         epilog=examples(
             "splitnerf train data --max-minutes 30", "splitnerf train data --preset fast --downscale 2 --out runs/fast",

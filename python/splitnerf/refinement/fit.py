@@ -33,8 +33,7 @@ from splitnerf.refinement.like_texels import usual_gloss
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.outline import ROUNDS, fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
-from splitnerf.refinement.texels import AssetTexels, SurfaceSamples, check_form, materials_of
-from splitnerf.refinement.uncertainty import PATCH_PIXELS, Information, Uncertainty, patch_width, uncertainty_of
+from splitnerf.refinement.texels import PATCH_PIXELS, AssetTexels, SurfaceSamples, check_form, materials_of, patch_width
 from splitnerf.refinement.unknowns import (
     GROUPS,
     METALLIC,
@@ -109,7 +108,7 @@ class Refined:
         outline: Mean squared errors of the coverage at the outline, before each round and at the end; empty where the
             shape was kept.
         sweeps: What each sweep says.
-        uncertainty: What the photos leave open.
+        saturated: The share of the covered pixels' values that the photos clip.
         lamp: The lamp that was made compact at the start, or None.
     """
 
@@ -117,7 +116,7 @@ class Refined:
     light: np.ndarray
     outline: list[float]
     sweeps: list[Sweep]
-    uncertainty: Uncertainty
+    saturated: float
     lamp: CompactLamp | None
 
 
@@ -190,7 +189,6 @@ class Refinement:
             flat=per_unknown(0.0, s.flat_gloss, s.flat_normal), groups=GROUPS, anchor=per_unknown(*[s.anchor] * 3), like=like,
         )  # fmt: skip
         self.equations = NormalEquations(self.unknowns, prior, s.keep)
-        self.information = Information(self.texels, width, round(len(self.pixels) / self.pixels.share))
         self.n_batches = self.n_sweeps = 0
         self.step_seconds = 0.0  # that the last sweep took after its batches
 
@@ -205,8 +203,7 @@ class Refinement:
         """All that further sweeps depend on beside the arguments, as tensors and plain values."""
         return {
             "unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient,
-            "light": self.light.levels, "information": self.information.sums, "n_seen": self.information.n_seen,
-            "errors": self.information.errors,
+            "light": self.light.levels,
             "random": self.random.bit_generator.state, "n_batches": self.n_batches, "n_sweeps": self.n_sweeps,
         }  # fmt: skip
 
@@ -216,21 +213,16 @@ class Refinement:
         Raises:
             ValueError, KeyError, TypeError: It is another fit's.
         """
-        sums = {"unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient,
-                "information": self.information.sums, "errors": self.information.errors}  # fmt: skip
+        sums = {"unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient}
         for name, tensor in sums.items():
             check_tensor(name, state[name], tuple(tensor.shape), torch.float32)
-        self.unknowns, self.information.sums, self.information.errors = (
-            state[name] for name in ("unknowns", "information", "errors")
-        )
+        self.unknowns = state["unknowns"]
         self.equations.curvature, self.equations.gradient = state["curvature"], state["gradient"]
         for level, stored in zip(self.light.levels, state["light"], strict=True):
             check_tensor("a level of the light", stored, tuple(level.shape), torch.float32)
         self.light.levels = list(state["light"])
         self.random.bit_generator.state = state["random"]
-        self.n_batches, self.n_sweeps, self.information.n_seen = (
-            int(state[name]) for name in ("n_batches", "n_sweeps", "n_seen")
-        )
+        self.n_batches, self.n_sweeps = (int(state[name]) for name in ("n_batches", "n_sweeps"))
 
     def maps(self) -> tuple[Tensor, Tensor, Tensor]:
         """The textures as they are now: albedo [h, w, 3], roughness and metallic [h, w, 2], normals [h, w, 3]."""
@@ -296,7 +288,6 @@ class Refinement:
         )
         self.equations.add(texels, shares, jacobian, weights_of_rays, of_other)
         squared = (weights * errors[:, 0] * errors[:, 1]).mean(1)
-        self.information.add(texels, shares, jacobian, weights_of_rays, squared)
         self.n_batches += 1
         return float(squared.mean())
 
@@ -448,10 +439,8 @@ class Stage:
     def result(self) -> Refined:
         """What the stage leaves."""
         fit = self.fit
-        left_over = max(self.sweeps[-1].error, 0.0)
-        uncertainty = uncertainty_of(fit.information, fit.texels, left_over, float(fit.pixels.saturated.mean()))
-        light = fit.light.radiance().detach().numpy()
-        return Refined(fit.texels.asset_with(fit.maps()), light, self.outline, self.sweeps, uncertainty, self.lamp)
+        light, saturated = fit.light.radiance().detach().numpy(), float(fit.pixels.saturated.mean())
+        return Refined(fit.texels.asset_with(fit.maps()), light, self.outline, self.sweeps, saturated, self.lamp)
 
 
 def refine(

@@ -18,7 +18,7 @@ from splitnerf.data.exposures import with_exposures
 from splitnerf.data.environment import read_environment
 from splitnerf.data.frames import refuse_data
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.images import area_average, write_image
+from splitnerf.data.images import area_average
 from splitnerf.data.json_files import write_json
 from splitnerf.data.reading import Reading
 from splitnerf.data.tensor_files import read_tensors, write_tensors
@@ -138,7 +138,7 @@ def refine_folder(
     Args:
         source: The folder of mesh.glb and environment.exr.
         dataset: The photos.
-        out: The folder of the results: mesh.glb, environment.exr and .hdr, uncertainty.exr and refinement.json. The state of
+        out: The folder of the results: mesh.glb, environment.exr and .hdr, and refinement.json. The state of
             an unfinished refinement stands there; the caller deletes it (:func:`forget_state`) once all is done.
         settings: What the fit does.
         resume: Whether to go on from that state, if there is one.
@@ -176,7 +176,6 @@ def refine_folder(
     refined = stage.result()
     write_glb(out / "mesh.glb", refined.asset, occlusion_texture(refined.asset))
     write_environment(out, refined.light)
-    write_image(out / "uncertainty.exr", refined.uncertainty.map, half=True)
     write_json(out / RECORD, record_of(refined, stage.seconds))
     return refined
 
@@ -209,9 +208,8 @@ def begin(
 
 def record_of(refined: Refined, seconds: float) -> dict:
     """The contents of refinement.json."""
-    u = refined.uncertainty
     lamp = None if refined.lamp is None else refined.lamp._asdict()
-    return {"seconds": round(seconds, 1), "outline": refined.outline, "lamp": lamp, "saturated": u.saturated, "noise": u.noise,
+    return {"seconds": round(seconds, 1), "outline": refined.outline, "lamp": lamp, "saturated": refined.saturated,
             "sweeps": [sweep._asdict() for sweep in refined.sweeps]}  # fmt: skip
 
 

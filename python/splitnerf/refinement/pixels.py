@@ -33,7 +33,6 @@ class Pixels:
         saturated: [n, 3] bool, whether the photo gives a lower bound alone.
         poses: [views, 3, 4] float32 camera-to-world, OpenGL axes, the data's world frame.
         intrinsics: [views, 4] float32 fx, fy, cx, cy in pixels.
-        share: The share of the photos' pixels that these are, drawn at random.
     """
 
     view: np.ndarray
@@ -43,7 +42,6 @@ class Pixels:
     saturated: np.ndarray
     poses: np.ndarray
     intrinsics: np.ndarray
-    share: float = 1.0
 
     def __len__(self) -> int:
         return len(self.view)
@@ -104,7 +102,7 @@ def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int, 
     kinds = (np.int64, np.float32, np.float32, np.float32, bool)
     arrays = [np.concatenate([np.zeros(shape, kind), *(part[k] for part in parts)], dtype=kind)
               for k, (shape, kind) in enumerate(zip(shapes, kinds))]  # fmt: skip
-    return Pixels(*arrays, dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics, share)
+    return Pixels(*arrays, dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics)
 
 
 def brightest_around(photo: np.ndarray) -> np.ndarray:

@@ -13,8 +13,11 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.data.asset import Asset
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.lens import pixel_width
 from splitnerf.export.bake import Spread, Texels, rasterise
 
+PATCH_PIXELS = 2.0  # width of a patch, in pixels of the photos
 MIN_COSINE = 1e-3  # of a shading normal and the direction to the viewer
 N_CHANNELS = 8  # albedo 3, roughness, metallic, tangent-space normal 3
 
@@ -185,3 +188,12 @@ def neighbours(covered: Texels, chart: np.ndarray, size: int, apart: int = 1) ->
         same = (chart_map[a] == chart_map[b]) & (chart_map[a] >= 0)
         pairs.append(np.stack([number[a][same], number[b][same]], axis=1))
     return np.concatenate(pairs)
+
+
+def patch_width(dataset: Dataset, texels: AssetTexels) -> int:
+    """The edge in texels of a patch that is PATCH_PIXELS pixels of the photos wide."""
+    asset = texels.asset
+    a, b, c = (asset.vertices[asset.triangles[:, i]].astype(np.float64) for i in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+    pixel = pixel_width(dataset.world_poses, dataset.intrinsics, asset.vertices.mean(0))
+    return max(1, round(PATCH_PIXELS * pixel / np.sqrt(area / max(len(texels.index), 1))))

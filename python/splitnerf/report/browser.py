@@ -13,9 +13,7 @@ from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup
 
 from splitnerf.data.asset import Asset
-from splitnerf.refinement.uncertainty import UNKNOWN
 from splitnerf.relight.cameras import HALF_FIELD, bounding_sphere, turntable
-from splitnerf.report.last_stage import KNOWN_COLOURS, QUANTITIES, UNKNOWN_COLOURS
 
 BRIGHTEST_HALF = float(np.finfo(np.float16).max)
 
@@ -43,14 +41,6 @@ def camera_of(asset: Asset) -> dict:
     centre, radius = bounding_sphere(asset)
     front = turntable(asset, 1, size=None)[0]
     return {"position": front.pose[:3, 3].tolist(), "target": centre.tolist(), "radius": radius, "half_field": float(HALF_FIELD)}
-
-
-def uncertainty_scale() -> dict:
-    """The quantities of `uncertainty.exr`, from where each counts as unknown, and the colours of both."""
-    return {
-        "quantities": QUANTITIES, "unknown": UNKNOWN.tolist(), "known_colours": KNOWN_COLOURS.tolist(),
-        "unknown_colours": UNKNOWN_COLOURS.tolist(),
-    }  # fmt: skip
 
 
 def _finite(content: object) -> object:

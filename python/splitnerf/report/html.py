@@ -12,7 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from splitnerf.report.asset import asset_section
-from splitnerf.report.browser import script_json, uncertainty_scale
+from splitnerf.report.browser import script_json
 from splitnerf.report.curves import PALETTE, curve_data, line_chart
 from splitnerf.report.last_stage import last_stage_section
 from splitnerf.report.light import embedded_light, panels_section
@@ -87,7 +87,6 @@ def write_report(
                 "charts": [curve_data(title, series, log=log) for title, series, log in charts],
                 "colours": PALETTE,
                 "camera": glb and glb["camera"],
-                "uncertainty": uncertainty_scale(),
             }
         ),
         script=Markup(files("splitnerf.report").joinpath("report.js").read_text(encoding="utf-8")),

@@ -169,7 +169,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         self._answered({
-            "": self._page, "scene.json": self._scene, "assets": self._asset, "lights": self._light, "deviations": self._deviations,
+            "": self._page, "scene.json": self._scene, "assets": self._asset, "lights": self._light,
             "photos": self._photo, "events": self._events, "curves": self._curves,
         })  # fmt: skip
 
@@ -243,12 +243,6 @@ class Handler(BaseHTTPRequestHandler):
         if light is None:
             raise Refused(HTTPStatus.NOT_FOUND, "this light is no longer kept; drop it again")
         self._send_halves(as_halves(light.radiance))
-
-    def _deviations(self, rest: str) -> None:
-        deviations = self._source(rest).deviations
-        if deviations is None:
-            raise Refused(HTTPStatus.NOT_FOUND, "this asset has no uncertainty.exr")
-        self._send_halves(as_halves(deviations))
 
     def _photo(self, rest: str) -> None:
         number = self._number(rest)

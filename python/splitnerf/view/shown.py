@@ -15,10 +15,9 @@ import numpy as np
 from splitnerf.data.asset import Asset
 from splitnerf.data.environment import read_environment, resize_environment
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.images import read_image
 from splitnerf.errors import InputError, plain
 from splitnerf.notes import note
-from splitnerf.report.browser import camera_of, uncertainty_scale
+from splitnerf.report.browser import camera_of
 
 MOST_ROWS = 1024  # of a light that is kept
 MOST_DROPPED = 8  # lights that were dropped onto the page; an older one is forgotten
@@ -42,7 +41,6 @@ class Source:
         asset: The asset; the path tracer draws it.
         encode: Makes the bytes of its GLB.
         light: The number of the run's own light, or None.
-        deviations: [h, w, 4] float32, the run's `uncertainty.exr`, or None.
         version: Counts an asset that grows; 0 where there is nothing to load yet.
     """
 
@@ -50,7 +48,6 @@ class Source:
     asset: Asset
     encode: Callable[[], bytes]
     light: int | None = None
-    deviations: np.ndarray | None = None
     version: int = 1
 
     @functools.cached_property
@@ -129,21 +126,17 @@ class Shown:
             lights = [{"number": number, "name": light.name} for number, light in self._lights.items()]
         return {
             "sources": [
-                {
-                    "name": source.name, "light": source.light, "uncertainty": source.deviations is not None, "version": source.version,
-                }
-                for source in sources
+                {"name": source.name, "light": source.light, "version": source.version} for source in sources
             ],
             "lights": lights,
             "first_light": self._first,
             "white": self._white,
             "problems": self.problems,
             "camera": camera_of(framed),
-            "uncertainty": uncertainty_scale(),
         }
 
     def source_of(self, path: Path, name: str | None = None, light: int | None = None) -> Source:
-        """The asset of a run's folder or a GLB; the light and the deviations beside a `mesh.glb` belong to it.
+        """The asset of a run's folder or a GLB; the light beside a `mesh.glb` belongs to it.
 
         Args:
             path: The folder or the GLB.
@@ -160,12 +153,11 @@ class Shown:
         content = glb.read_bytes()
         if not content.startswith(b"glTF"):
             raise InputError(f"{glb}: is a .gltf, whose parts the page cannot load; export it as GLB")
-        name, own, deviations = name or run_name(glb), None, None
+        name, own = name or run_name(glb), None
         if glb.name == "mesh.glb":
             beside = glb.with_name("environment.exr")
             own = self._beside(beside, lambda path: self.add_light(light_of(path, f"light of {name}"), light))
-            deviations = self._beside(glb.with_name("uncertainty.exr"), read_deviations)
-        return Source(name, asset, lambda: content, own, deviations)
+        return Source(name, asset, lambda: content, own)
 
     def _beside(self, path: Path, read: Callable[[Path], Read]) -> Read | None:
         """What `read` makes of a file; None where there is none, or where it cannot be read, which becomes a line."""
@@ -193,15 +185,3 @@ def light_of(path: Path, name: str) -> Light:
     radiance = read_environment(path)
     height = min(radiance.shape[0], MOST_ROWS)
     return Light(name, resize_environment(radiance, height, 2 * height))
-
-
-def read_deviations(path: Path) -> np.ndarray:
-    """[h, w, 4] float32 of an `uncertainty.exr`.
-
-    Raises:
-        InputError: It is none.
-    """
-    pixels = read_image(path)
-    if pixels.shape[2] != 4 or not np.isfinite(pixels).all() or pixels.min() < 0:
-        raise InputError(f"{path}: is no map of four deviations; run splitnerf refine again")
-    return pixels

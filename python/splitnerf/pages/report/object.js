@@ -4,14 +4,13 @@ import { asLight, halves } from "../view/halves.js";
 import { Viewer } from "../view/viewer.js";
 import { element, range, tabs, unpacked } from "./elements.js";
 
-const SHOWN = CHANNELS.filter((name) => name !== "uncertainty");
 const STEP = Math.PI / 36; // radians of the camera a key
 const KEYS = {
   ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, STEP], ArrowDown: [0, -STEP],
   "+": [0, 0, 0.9], "=": [0, 0, 0.9], "-": [0, 0, 1 / 0.9],
 };
 
-export async function object(section, { camera, lights, uncertainty }) {
+export async function object(section, { camera, lights }) {
   const glb = document.getElementById("glb");
   if (!glb) return false;
   if (!document.createElement("canvas").getContext("webgl2")) {
@@ -22,9 +21,9 @@ export async function object(section, { camera, lights, uncertainty }) {
   const panel = element("div", { class: "toolbar" });
   section.append(element("div", { class: "card widget object" }, element("div", { class: "view3d" }, canvas), panel));
   section.classList.add("live"); // the canvas takes the size that it has
-  const viewer = new Viewer(canvas, { camera, uncertainty, sources: [{}] });
+  const viewer = new Viewer(canvas, { camera, sources: [{}] });
   const [view] = viewer.views;
-  const values = { channel: 0, quantity: 0, turn: 0, exposure: 0, tone: "none", background: true, blur: 0.3 };
+  const values = { channel: 0, turn: 0, exposure: 0, tone: "none", background: true, blur: 0.3 };
   const set = (change) => viewer.set(Object.assign(values, change));
   viewer.controls.enableZoom = false; // the wheel scrolls the page, until the canvas is clicked
   canvas.style.touchAction = "pan-y"; // as does a finger that moves up or down
@@ -45,7 +44,7 @@ export async function object(section, { camera, lights, uncertainty }) {
     view.setLight(asLight(halves(content, width, height)));
     if (loaded) viewer.draw();
   };
-  panel.append(tabs("What is shown", SHOWN, (i) => set({ channel: CHANNELS.indexOf(SHOWN[i]) })));
+  panel.append(tabs("What is shown", CHANNELS, (channel) => set({ channel })));
   if (lights.length > 1) panel.append(tabs("Light", lights.map((one) => one.name), light));
   else if (lights.length) light(0);
   const behind = element("input", { type: "checkbox", checked: true, onchange: () => set({ background: behind.checked }) });

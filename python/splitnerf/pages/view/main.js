@@ -3,8 +3,8 @@ import { Cameras } from "./cameras.js";
 import { Connection } from "./connection.js";
 import { listenForFiles } from "./drop.js";
 import { Final } from "./final.js";
-import { Panel, showLegend } from "./panel.js";
-import { Lost, readAsset, readDeviations, readLight, readPhoto, readScene, sendLight } from "./server.js";
+import { Panel } from "./panel.js";
+import { Lost, readAsset, readLight, readPhoto, readScene, sendLight } from "./server.js";
 import { Training } from "./training.js";
 import { Viewer } from "./viewer.js";
 
@@ -75,7 +75,6 @@ class Page {
     this.viewer.set(values);
     this.cameras?.show(values.cameras);
     this.cameras?.look(values.through);
-    showLegend(this.description.uncertainty, values);
     this.lights.choose(values.light).catch(failed);
     this.final.set(values.final);
   }
@@ -124,7 +123,6 @@ class Page {
       const description = this.marked(await readScene());
       await Promise.all(this.viewer.views.map((view, i) => this.loadInto(view, i, description.sources[i])));
       this.description = description;
-      this.panel.setSources(description.sources);
       this.panel.setLights(description.lights, this.panel.values.light);
       this.viewer.start = description.camera;
       if (first) this.viewer.home(); // later the camera stays where it is
@@ -142,9 +140,7 @@ class Page {
   async loadInto(view, number, source) {
     if (view.version === source.version) return;
     try {
-      const deviations = source.uncertainty ? await readDeviations(number) : null;
       await view.setAsset(await readAsset(number));
-      view.setDeviations(deviations);
       view.version = source.version;
     } catch (error) {
       if (!(error instanceof Lost)) view.version = source.version; // it would not load the next time either

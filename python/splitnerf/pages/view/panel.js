@@ -2,7 +2,7 @@
 import { CHANNELS } from "./channels.js";
 
 const KEYS = [
-  ["1 – 6", "what is shown"],
+  ["1 – 5", "what is shown"],
   ["← → ↑ ↓", "turn the object"],
   ["+ −", "nearer, farther"],
   ["[ ]", "turn the light"],
@@ -24,8 +24,6 @@ export class Panel {
   constructor(description, changed) {
     this.changed = changed;
     this.fillChannels();
-    this.setSources(description.sources);
-    this.fill(field("quantity"), description.uncertainty.quantities.map((name, i) => [i, name]));
     this.setLights(description.lights, description.first_light ?? undefined);
     this.fill(field("through"), [[-1, "none"], ...description.cameras.map((camera, i) => [i, camera.name])]);
     field("photo-fields").hidden = description.cameras.length === 0;
@@ -41,7 +39,6 @@ export class Panel {
     const number = (id) => Number(field(id).value);
     return {
       channel: CHANNELS.indexOf(document.querySelector("[name=channel]:checked").value),
-      quantity: number("quantity"),
       light: field("light").value,
       turn: number("turn"),
       exposure: number("exposure"),
@@ -82,19 +79,11 @@ export class Panel {
     }
   }
 
-  /** Offers what these assets have. */
-  setSources(sources) {
-    const choice = document.querySelector("[name=channel][value=uncertainty]");
-    choice.disabled = !sources.some((source) => source.uncertainty);
-    choice.parentElement.title = choice.disabled ? "only a run with uncertainty.exr has it" : "";
-  }
-
   tell() {
     for (const output of document.querySelectorAll("#panel output")) {
       const input = output.parentElement.querySelector("input");
       output.value = `${input.value}${input.dataset.unit ?? ""}`;
     }
-    field("quantity-row").hidden = CHANNELS[this.values.channel] !== "uncertainty";
     this.changed(this.values);
   }
 
@@ -115,8 +104,7 @@ export class Panel {
   /** What each key does; `viewer` is moved by some. */
   actions(viewer) {
     const channel = (number) => {
-      const choice = document.querySelectorAll("[name=channel]")[number];
-      if (!choice.disabled) choice.checked = true;
+      document.querySelectorAll("[name=channel]")[number].checked = true;
       this.tell();
     };
     const tone = () => {
@@ -168,18 +156,4 @@ export class Panel {
       action();
     });
   }
-}
-
-/** The legend of the uncertainty: its colours, and from which value it counts as unknown. */
-export function showLegend(uncertainty, { channel, quantity }) {
-  const legend = field("legend");
-  legend.hidden = CHANNELS[channel] !== "uncertainty";
-  if (legend.hidden) return;
-  const css = (rows) => rows.map((row) => `rgb(${row.map((value) => Math.round(255 * value)).join(" ")})`);
-  const [dark, darker] = css(uncertainty.unknown_colours);
-  const limit = uncertainty.unknown[quantity];
-  const end = uncertainty.quantities[quantity] === "normal" ? `${Math.round((limit * 180) / Math.PI)}°` : limit.toFixed(2);
-  legend.innerHTML = `<div>standard deviation</div><i style="background:linear-gradient(90deg,${css(uncertainty.known_colours)})"></i>
-    <div><span>0</span><span>${end}</span></div>
-    <i style="background:repeating-linear-gradient(45deg,${dark} 0 3px,${darker} 3px 6px)"></i><div>more: unknown</div>`;
 }

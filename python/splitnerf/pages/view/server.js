@@ -43,9 +43,6 @@ export const press = (button) => asked(`control/${button}`, { method: "POST" });
 
 export const readLight = async (number) => asLight(await readHalves(`lights/${number}`));
 
-/** The deviations in the asset's texture coordinates, whose v runs from the top. */
-export const readDeviations = (number) => readHalves(`deviations/${number}`);
-
 /** Sends the bytes of a light; the server reads them and answers with the light's number. */
 export async function sendLight(file) {
   const answer = await asked(`lights?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });

@@ -1,18 +1,18 @@
 // One asset in its light.
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import { channelUniforms, withChannels } from "./channels.js";
+import { withChannels } from "./channels.js";
 import { Plate } from "./final.js";
 
 const Z_UP = Math.PI / 2; // about x: from the y up of GLB files and of three's lights
 export const PLAIN = new THREE.Color(0x8f9296);
 
 export class View {
-  constructor(uncertainty) {
+  constructor() {
     this.scene = new THREE.Scene();
     this.object = new THREE.Group();
     this.scene.add(this.object);
-    this.uniforms = channelUniforms(uncertainty);
+    this.uniforms = { channel: { value: 0 } }; // of all materials of the asset
     this.light = null;
     this.version = 0; // of the asset that is shown
     this.plate = new Plate();
@@ -30,11 +30,6 @@ export class View {
     this.object.add(scene);
   }
 
-  setDeviations(texture) {
-    this.uniforms.deviations.value?.dispose();
-    this.uniforms.deviations.value = texture;
-  }
-
   /** The light, an equirectangular texture that becomes this view's own. */
   setLight(texture) {
     this.light?.dispose();
@@ -46,7 +41,6 @@ export class View {
   set(values) {
     this.values = values;
     this.uniforms.channel.value = values.channel;
-    this.uniforms.quantity.value = values.quantity;
     const angle = (values.turn * Math.PI) / 180;
     for (const rotation of [this.scene.environmentRotation, this.scene.backgroundRotation]) rotation.set(Z_UP, 0, angle, "ZYX");
     this.setBackground();

@@ -20,7 +20,7 @@ export class Viewer extends EventTarget {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("start", () => this.leave());
     this.controls.addEventListener("change", () => this.draw());
-    this.views = description.sources.map(() => new View(description.uncertainty));
+    this.views = description.sources.map(() => new View());
     this.overlay = new THREE.Scene();
     this.boxes = [];
     this.through = null; // the photo's camera that is looked through
