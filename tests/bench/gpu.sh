@@ -31,7 +31,7 @@ if [ -n "$dry" ]; then
   device=cpu slower=4 picture="size=24, n_train=6, n_test=2, spp=4" ops="--tiny --seconds .002 --minutes 5" steps_before=6 all_tests= jobs=1
   steps=(60 40 20) until=60 until_paper=12 profiled=2
   small=(--set max_rays=64 --set log2_table_size=10 --set grid_resolution=16 --set mesh_resolution=24 --set light_resolution=16
-    --set target_samples=256 --set initial_rays=64 --set light_samples=64 --set light_queries=64 --set environment_height=16
+    --set target_samples=256 --set initial_rays=64 --set light_samples=64 --set light_queries=64 --set occlusion.environment_height=16
     --set occlusion_rays=4 --set surface.levels_open_by=0)
 fi
 deadline=$((${GPU_SECONDS:-570} * slower)) # SECONDS counts from the start of this shell

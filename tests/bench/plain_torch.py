@@ -165,7 +165,7 @@ def use_plain_torch() -> None:
     training.make_optimiser = unfused
 
 
-UNSKIPPED = dict(sample_above=0.0, shades_per_ray=0, light_step_every=1)
+UNSKIPPED = dict(**{"sampling.min_weight": 0.0}, shades_per_ray=0, light_step_every=1)
 
 
 def colours(data: Path, source: Path) -> Tensor:

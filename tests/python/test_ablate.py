@@ -12,14 +12,13 @@ from splitnerf.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, make_rows
 from splitnerf.ablate.table import Score, csv_table, differences, markdown_table
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
-from splitnerf.config.settings import OLD_NAMES
 from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.errors import InputError
 
 SMALL = [
     "n_levels=2", "log2_table_size=8", "target_samples=256", "initial_rays=32", "grid_resolution=16", "light_resolution=16",
     "light_queries=8", "eikonal_points=16", "mesh_resolution=16", "export_resolution=16", "export_environment_height=16",
-    "export_faces=200", "export_texture_size=32", "refine=false",
+    "export_faces=200", "export_texture_size=32", "refinement.enabled=false",
 ]  # fmt: skip
 
 
@@ -50,7 +49,7 @@ def test_each_of_the_papers_ablations_changes_one_thing_of_its_preset(name):
     rows = {row.name: row for row in make_rows(preset("paper"), [name])}
     ablated, reference = (flat(dataclasses.asdict(rows[row].config)) for row in (name, rows[name].reference))
     assert rows[name].reference == FULL
-    assert [key for key in ablated if ablated[key] != reference[key]] == [OLD_NAMES[next(reversed(PAPER[name]))]]
+    assert [key for key in ablated if ablated[key] != reference[key]] == [next(reversed(PAPER[name]))]
 
 
 def test_a_row_brings_what_it_is_compared_with():
@@ -60,7 +59,7 @@ def test_a_row_brings_what_it_is_compared_with():
     split = "light by the split sum"
     assert references == {f"{by_mlp}, no occlusion loss": by_mlp, by_mlp: split, split: FULL}
     assert "summed light" not in {row.name for row in make_rows(Config())}
-    split = make_rows(Config().replace({"shading": "split"}), ["split sum, no occlusion"])
+    split = make_rows(Config().replace({"shading.method": "split"}), ["split sum, no occlusion"])
     assert [(row.name, row.reference) for row in split[1:]] == [("split sum, no occlusion", FULL)]
 
 
@@ -127,4 +126,4 @@ def test_it_runs_and_goes_on(tmp_path, capsys):
     assert main([*command, "--set", "mask_weight=0.5"]) == BAD_INPUT
     assert "other settings" in capsys.readouterr().err
     assert main(["ablate", "--list"]) == DONE
-    assert "no metal regulariser: metal_regulariser = False" in capsys.readouterr().out
+    assert "no metal regulariser: losses.metal_regulariser = False" in capsys.readouterr().out

@@ -21,7 +21,7 @@ from splitnerf.render.averages import averaging_factor, training_photos
 from splitnerf.render.rays import PixelSource
 from splitnerf.training import loop
 
-PLAIN = {"occlusion": "off", "shading": "split", "preview_every": 2.0, "deterministic": True}
+PLAIN = {"occlusion.kind": "off", "shading.method": "split", "preview_every": 2.0, "deterministic": True}
 
 
 def seeded() -> torch.Generator:

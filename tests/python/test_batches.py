@@ -72,7 +72,7 @@ def test_whole_pixels_are_seen_before_what_lies_behind_them():
 
 
 def test_without_smoothness_no_neighbours_are_drawn():
-    probes = drawn(normal_smoothness=0.0).probes
+    probes = drawn(**{"losses.smoothness_weight": 0.0}).probes
     assert len(probes.anywhere) == 4000 and len(probes.chosen) == len(probes.shifts) == 0
 
 

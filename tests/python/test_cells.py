@@ -206,7 +206,7 @@ def test_each_refresh_adds_a_mirror():
 def test_a_correction_counts_by_the_weight_of_its_surface(monkeypatch):
     """Two balls behind one another, the first of which covers part of a pixel: the heavier one is corrected, by its share."""
     model, cells = ball()
-    model.config = model.config.replace({"shading": "summed"})
+    model.config = model.config.replace({"shading.method": "summed"})
     model.occlusion.ready = model.occlusion.is_unoccluded = True
     centres, radii = torch.tensor([[0.5, 0, 0], [-0.7, 0, 0]]), torch.tensor([0.3, 0.6])
 
@@ -223,7 +223,7 @@ def test_a_correction_counts_by_the_weight_of_its_surface(monkeypatch):
     cells = torch.ones_like(cells) * (~between)[:, None, None]
     heights = torch.tensor([0.26, 0.29, 0.3, 0.31, 0.33])
     rays = torch.stack([torch.tensor([4.0, y, 0]) for y in heights]), torch.tensor([[-1.0, 0, 0]] * 5), torch.full((5,), 0.5)
-    model.config = model.config.replace({"sample_above": 0.0})
+    model.config = model.config.replace({"sampling.min_weight": 0.0})
     found = find_samples(model, cells, *rays)
     added = {False: 0.0, True: 1.0}
     means = []

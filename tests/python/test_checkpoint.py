@@ -133,11 +133,6 @@ def sent(n: int, *senders: int, **changed: object) -> dict:
     return {"sky": SKY, "aims": AIMS, "sent": torch.zeros(n, 3), "senders": torch.tensor(senders, dtype=torch.int64)} | changed
 
 
-def old(n: int | None) -> dict:
-    """Cached light of before rays were aimed, with that of n vertices."""
-    return {"sky": SKY, "sent": None if n is None else torch.zeros(n, 3)}
-
-
 def gaps(texels: torch.Tensor) -> torch.Tensor:
     """The same shape in memory with gaps."""
     return texels.repeat(1, 2)[:, ::2]
@@ -156,8 +151,6 @@ ALLOWED = {
     "light that a mesh sends": lambda c: c.update(MESH, occlusion_light=sent(4, 0, 2, 255, 4 * 256 - 1)),
     "light of a mesh that nothing hits": lambda c: c.update(MESH, occlusion_light=sent(0)),
     "light that was not sent yet": lambda c: c.update(MESH, occlusion_light=sent(0, sent=None, senders=None)),
-    "light that vertices sent": lambda c: c.update(MESH, occlusion_light=old(4)),
-    "light of vertices, not sent yet": lambda c: c.update(MESH, occlusion_light=old(None)),
     "light that weighs rays": lambda c: c.update(environment=torch.zeros(32, 64, 3)),
     "a GPU": lambda c: c.update(device="cuda", generator=torch.zeros(16, dtype=torch.uint8)),
 }  # fmt: skip
@@ -193,10 +186,6 @@ REFUSED = {
     "light of no mesh": (
         lambda c: c.update(occlusion_light=sent(2, 0, 4), mesh_vertices=None, mesh_faces=None), "name vertices that are none",
     ),
-    "light of other vertices": (lambda c: c.update(MESH, occlusion_light=old(5)), "the light that the mesh sends"),
-    "light of vertices of no mesh": (
-        lambda c: c.update(occlusion_light=old(4), mesh_vertices=None, mesh_faces=None), "the light that the mesh sends",
-    ),
     "senders without aims": (lambda c: c["occlusion_light"].pop("aims"), "occlusion_light is missing or of another kind"),
     "a mesh of a number": (lambda c: c.update(MESH, mesh_vertices=torch.tensor(1.0)), "mesh_vertices is missing"),
     "no light of the occlusion": (lambda c: c.update(occlusion_light={}), "occlusion_light is missing"),
@@ -211,6 +200,8 @@ REFUSED = {
     "light's noise in a column": (lambda c: c.update(light_noise=c["light_noise"][:, None]), "light_noise is missing"),
     "light's noise of NaN": (lambda c: c["light_noise"].fill_(torch.nan), "light_noise has NaN"),
     "a frame of single precision": (lambda c: c.update(box_from_world=torch.eye(4)), "box_from_world is missing"),
+    "no exposures": (lambda c: c.pop("exposures"), "exposures is missing"),
+    "no word on how it ended": (lambda c: c.pop("stopped"), "stopped is missing"),
     "a mean of quality that is a word": (lambda c: c.update(psnr_mean="high"), "psnr_mean is of another type"),
     "an unknown device": (lambda c: c.update(device="tpu"), "device is 'tpu'"),
     "cells of another shape": (lambda c: c.update(cells=c["cells"].flatten()), "cells is missing"),
@@ -252,30 +243,6 @@ def test_what_no_run_writes_is_refused(content, tmp_path, case):
 
 
 # ---- what is taken back ----
-
-
-def test_a_checkpoint_of_before_rays_were_aimed_goes_on(data, tmp_path):
-    """With the rays that its mesh was traced by, its sky, and the light of the mesh computed anew; then as all runs do."""
-    dented = dict(  # a surface that blocks some of its own sky
-        n_levels=2, levels_open_by=0.0, learning_rate=0.05, warmup_steps=1, open_below=0.0, occlusion="bits", indirect=True,
-    )  # fmt: skip
-    dataset, config, path = load_dataset(data), tiny(steps=20, **dented), tmp_path / "checkpoint.pt"
-    bits = trainer.train(dataset, config, tmp_path).model.occlusion
-    assert not torch.equal(bits.directions, bits.centres)
-    content = torch.load(path, weights_only=True)
-    light, n = content["occlusion_light"], len(content["mesh_vertices"])
-    assert len(light.pop("senders")) > 30 and not torch.equal(light.pop("aims"), bits.centres)
-    light.update(sent=torch.full((n, 3), 9e9), sky=torch.full((256, 3), 0.7))
-    torch.save(content, path)
-    resumed = trainer.Training(dataset, config.replace({"steps": 24}), tmp_path, torch.device("cpu"))
-    resumed.restore()
-    bits = resumed.model.occlusion
-    assert torch.equal(bits.directions, bits.centres) and (bits.light == 0.7).all()
-    assert len(bits.radiance) == len(bits.senders.vertices) > 30 and bits.radiance.max() < 1e3
-    scene = trainer.train(dataset, config.replace({"steps": 24}), tmp_path, resume=True)
-    bits = scene.model.occlusion
-    assert scene.finished and scene.step == 24 and not torch.equal(bits.directions, bits.centres)
-    assert load_checkpoint(path)["occlusion_light"].keys() == bits.cached_light().keys()
 
 
 def test_moments_come_back_and_rates_are_those_of_the_settings(content):

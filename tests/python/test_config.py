@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from known_settings import CHOICES, FAST, LIMITS, SETTINGS, UNITS
 
 from splitnerf.cli import DONE, main
-from splitnerf.config import FIELDS, GROUPS, OLD_NAMES, Config, parse_setting, preset, settings_table
+from splitnerf.config import FIELDS, GROUPS, SHORT_NAMES, Config, parse_setting, preset, settings_table
 from splitnerf.config.setting import setting
 from splitnerf.errors import InputError
 from splitnerf.training.checkpoint import config_of
@@ -37,9 +37,9 @@ def check_same(found: dict[str, object], expected: dict[str, object]) -> None:
 
 
 def test_presets_hold_the_numbers_of_the_tables():
-    check_same(values(Config()), {name: row[1] for name, row in SETTINGS.items()})
+    check_same(values(Config()), {name: row[0] for name, row in SETTINGS.items()})
     check_same(values(preset("cpu")), values(Config()))
-    check_same(values(preset("paper")), {name: row[2] for name, row in SETTINGS.items()})
+    check_same(values(preset("paper")), {name: row[1] for name, row in SETTINGS.items()})
     check_same(values(preset("fast")), values(Config()) | FAST)
     with pytest.raises(InputError, match="unknown preset 'gpu'; there are cpu, fast, paper"):
         preset("gpu")
@@ -74,17 +74,21 @@ def test_every_group_says_what_it_holds():
         assert kind.__doc__.strip() and not kind.__doc__.startswith(kind.__name__ + "(")
 
 
-def test_old_names_and_new_ones_belong_together_one_by_one():
-    assert OLD_NAMES == {row[0]: name for name, row in SETTINGS.items()}
-    assert len(OLD_NAMES) == len(SETTINGS) == len(FIELDS)
+def test_short_names_are_those_that_one_group_alone_has():
     config = preset("paper")
-    for name, (old, _, value, _) in SETTINGS.items():
-        assert config[name] == config[old] == value
-        split = {"shading.method": "split"}  # goes with all others
-        assert Config().replace({old: value} | split) == Config().replace({name: value} | split)
+    for name, (_, value, _) in SETTINGS.items():
+        group, key = name.split(".")
+        same = [other for other in SETTINGS if other.endswith(f".{key}")]
+        short = [f"{group}_{key}", *([key] if same == [name] or group == "run" else [])]
+        assert [other for other, of in SHORT_NAMES.items() if of == name] == short
+        for other in (name, *short):
+            assert config[other] == value
+            split = {"shading.method": "split"}  # goes with all others
+            assert Config().replace({other: value} | split) == Config().replace({name: value} | split)
+    assert not SHORT_NAMES.keys() & GROUPS.keys() and "share" not in SHORT_NAMES and SHORT_NAMES["steps"] == "run.steps"
 
 
-def test_settings_change_by_old_name_by_new_one_and_by_group():
+def test_settings_change_by_name_by_short_one_and_by_group():
     changed = Config().replace(
         {"light_resolution": 64, "losses.eikonal_weight": 2.0, "export": {"faces": 7, "resolution": 9}}
     )
@@ -95,8 +99,6 @@ def test_settings_change_by_old_name_by_new_one_and_by_group():
     # The last one counts, whatever it is called by.
     assert Config().replace({"n_levels": 5, "surface": {"n_levels": 6}}).surface.n_levels == 6
     assert Config().replace({"surface": {"n_levels": 6}, "n_levels": 5}).surface.n_levels == 5
-    # What shares its name with a group: a table is the group's, a word the old setting's.
-    assert Config().replace({"light": "mlp"}) == Config().replace({"light": {"kind": "mlp"}})
     assert Config().replace({}) == Config()
     # What was changed before stays, in the same group and in others.
     again = preset("paper").replace({"surface.n_levels": 5})
@@ -116,12 +118,13 @@ def test_settings_cannot_change_in_place():
     [
         ({"surface.n_levls": 4}, "unknown setting 'surface.n_levls'; did you mean surface.n_levels? "),
         ({"light_resolutoin": 4}, "unknown setting 'light_resolutoin'; did you mean light.resolution? "),
-        ({"sdf_widht": 4}, "unknown setting 'sdf_widht'; did you mean surface.width? "),
+        ({"surface_widht": 4}, "unknown setting 'surface_widht'; did you mean surface.width? "),
         ({"export": {"face": 4}}, "unknown setting 'export.face'; did you mean export.faces? "),
         ({"zzz": 4}, "unknown setting 'zzz'; `splitnerf info --settings` lists them"),
         ({3: 4}, "unknown setting 3; "),
         ({"losses": 4}, "losses is a group of settings; set one of them, such as losses.colour_weight"),
-        ({"light": 4}, "light.kind takes a value of type str, got 4"),
+        ({"light": 4}, "light is a group of settings; set one of them, such as light.kind"),
+        ({"light_kind": 4}, "light.kind takes a value of type str, got 4"),
         ({"surface.n_levels": "many"}, "surface.n_levels takes a value of type int, got 'many'"),
         ({"n_levels": 4.0}, "surface.n_levels takes a value of type int, got 4.0"),
         ({"n_levels": True}, "surface.n_levels takes a value of type int, got True"),
@@ -137,7 +140,7 @@ def test_settings_cannot_change_in_place():
         ({"min_transmittance": 1}, "sampling.min_transmittance must be in [0, 1), got 1.0"),
         ({"occlusion_offset": 1e19}, "occlusion.offset must be in [0, 1024], got 1e+19"),
         ({"sphere_radius": 1e30}, "surface.sphere_radius must be in [0, 1024], got 1e+30"),
-        ({"light": "mlp", "light_samples": 1}, "losses.light_samples must be in [2, 16777216], got 1"),
+        ({"light.kind": "mlp", "light_samples": 1}, "losses.light_samples must be in [2, 16777216], got 1"),
         ({"growth": 16.0, "n_levels": 32}, "a level of the hash grid needs fewer than 1073741824 cells"),
         ({"export.faces": -1}, "export.faces must be in [0, 16777216], got -1"),
         ({"export.faces": 16777217}, "export.faces must be in [0, 16777216], got 16777217"),
@@ -226,7 +229,7 @@ def test_the_file_has_a_table_for_each_group(tmp_path):
     preset("paper").write(path)
     table = tomllib.loads(path.read_text())
     assert list(table) == list(GROUPS) and table["surface"]["n_levels"] == 16
-    path.write_text('seed = 3\nlight = "mlp"\nlight_width = 32\n')  # as before there were groups
+    path.write_text('seed = 3\nlight_kind = "mlp"\nlight_width = 32\n')
     assert Config.read(path) == Config().replace({"run.seed": 3, "light.kind": "mlp", "light.width": 32})
 
 
@@ -252,7 +255,7 @@ def test_files_that_hold_no_settings_are_named(tmp_path, text, message):
 def test_settings_as_they_are_typed():
     typed = {
         "n_levels=4": ("surface.n_levels", 4), "surface.n_levels = 4": ("surface.n_levels", 4),
-        "box=2.5": ("surface.box", 2.5), "light=mlp": ("light.kind", "mlp"), 'light="mlp"': ("light.kind", "mlp"),
+        "box=2.5": ("surface.box", 2.5), "light.kind=mlp": ("light.kind", "mlp"), 'light.kind="mlp"': ("light.kind", "mlp"),
         "indirect=false": ("occlusion.indirect", False), "light={width=8}": ("light", {"width": 8}),
         "no_such=1": ("no_such", 1), "query=": ("shading.query", ""),
         f"n_levels={'1' * 5000}": ("surface.n_levels", "1" * 5000),  # more digits than Python makes a number of
@@ -260,7 +263,7 @@ def test_settings_as_they_are_typed():
     for text, expected in typed.items():
         name, value = parse_setting(text)
         assert (name, value) == expected and type(value) is type(expected[1]), text
-    # Old name and new one are one setting, so that of two the last counts.
+    # A name and its short one are one setting, so that of two the last counts.
     assert dict(map(parse_setting, ["surface.n_levels=4", "n_levels=5"])) == {"surface.n_levels": 5}
     for text, message in (("n_levels", "takes key=value"), ("=4", "takes key=value"), ('n_levels="\n', "cannot read")):
         with pytest.raises(InputError, match=message):
@@ -281,7 +284,7 @@ def test_the_table_lists_every_setting_under_its_group(capsys):
     for line in lines:
         name, value = line.split("  ")[0].strip().split(" = ")
         known = FIELDS[name].metadata
-        assert value == str(SETTINGS[name][2]).lower()
+        assert value == str(SETTINGS[name][1]).lower()
         columns = f"{name} = {value}", str(known["limits"]).removeprefix("in "), known["unit"], known["meaning"]
         assert re.split(" {2,}", line) == [column for column in columns if column]
 

@@ -27,7 +27,7 @@ def bowl() -> trimesh.Trimesh:
 
 def with_mesh(mesh: trimesh.Trimesh, **settings: object) -> SceneModel:
     torch.manual_seed(0)
-    model = SceneModel(tiny(n_levels=2, shading="summed", open_below=0.0, **settings))
+    model = SceneModel(tiny(n_levels=2, **{"shading.method": "summed"}, open_below=0.0, **settings))
     with torch.no_grad():
         model.light.texels.zero_()
     assert not model.sums_light
@@ -111,7 +111,7 @@ def test_a_new_mesh_is_lit_and_its_light_bounces_three_times(monkeypatch):
 def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
     """Asked on the surface, about each ray's heaviest sample; here it adds the ray's number to its colour."""
     model, cells = ball()
-    model.config = model.config.replace({"shading": "summed"})
+    model.config = model.config.replace({"shading.method": "summed"})
     model.occlusion.ready = model.occlusion.is_unoccluded = True
     rays = torch.tensor([[4.0, 0.3, 0], [4.0, 5.0, 0], [4.0, -0.2, 0.2]]), torch.tensor([[-1.0, 0, 0]] * 3), torch.full((3,), 0.5)
     asked = {}
@@ -157,7 +157,7 @@ def test_samples_that_are_left_out_weigh_next_to_nothing(variance):
     """Broad densities reach far: what is found covers a ray as all samples of it do."""
     opacities = []
     for sample_above in (0.0, 1e-3):
-        model, _ = ball(sample_above=sample_above)
+        model, _ = ball(**{"sampling.min_weight": sample_above})
         with torch.no_grad():
             model.variance.fill_(variance)
         grid = make_grid(model.config)
@@ -216,7 +216,7 @@ def test_scattered_light_is_compensated_where_that_is_set(compensate):
 @pytest.mark.parametrize("name", ["analytic", "finite_difference"])
 def test_normals_are_taken_as_set(name):
     torch.manual_seed(0)
-    model = SceneModel(tiny(normals=name, shading="split"))
+    model = SceneModel(tiny(normals=name, **{"shading.method": "split"}))
     with torch.no_grad():
         model.sdf_field.grid.table.normal_(std=0.02)
     x = torch.rand(50, 3) - 0.5
@@ -232,7 +232,7 @@ def test_the_bits_are_made_as_they_are_set():
 
 def test_without_a_mesh_and_where_nothing_is_blocked_factors_have_their_channels():
     for channels in (1, 3):
-        model = SceneModel(tiny(occlusion_channels=channels, shading="split"))
+        model = SceneModel(tiny(occlusion_channels=channels, **{"shading.method": "split"}))
         model.light, model.material = TwoLights(1.0, 1.0), Given(points_of(0.0))
         g = generator(4)
         normals = unit(torch.randn(K, 3, generator=g))

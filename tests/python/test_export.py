@@ -256,12 +256,13 @@ def save_run(run, **state):
         }
     )
     run.mkdir()
+    model = SceneModel(config)
     content = dict(
-        step=0, seconds=0.0, n_rays=64, meshed_at=0.0, previewed_at=0.0, model=SceneModel(config).state_dict(),
+        step=0, seconds=0.0, n_rays=64, meshed_at=0.0, previewed_at=0.0, psnr_mean=None, stopped=False, exposures=torch.zeros(0, 4), model=model.state_dict(),
         optimiser={"state": {}}, device="cpu", generator=torch.get_rng_state(), torch_generator=torch.get_rng_state(),
         occupancy=torch.zeros(16**3), cells=torch.ones(16, 16, 16, dtype=torch.uint8),
         environment=None, light_noise=torch.zeros(2, dtype=torch.float64),
-        occlusion_light={"sky": torch.ones(256, 3), "sent": None}, mesh_vertices=None, mesh_faces=None, **state,
+        occlusion_light=model.occlusion.cached_light() | {"sky": torch.ones(256, 3)}, mesh_vertices=None, mesh_faces=None, **state,
     )  # fmt: skip
     save_checkpoint(run / "checkpoint.pt", config=config, fingerprint="", state=content)
     return run

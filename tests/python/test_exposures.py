@@ -148,7 +148,7 @@ class TestLoss:
         """And so is what lies behind the object at the masks' edges."""
         edges = EdgePixels([((np.array([0]), np.array([1])), np.uint8([[51, 76, 102]]))], 1, CPU)
         balance = np.float32([0.8, 1.2, 1.1])
-        batch = self.batch(0.5, edges, balance.tolist(), compositing="srgb", shading="split")
+        batch = self.batch(0.5, edges, balance.tolist(), compositing="srgb", **{"shading.method": "split"})
         assert torch.equal(batch.exposure, torch.ones(1, 3)) and batch.whole.item()
         behind = srgb_to_linear(np.float32([51, 76, 102]) / 255)
         np.testing.assert_allclose(srgb_to_linear(batch.background[0].numpy()), 2 * behind / balance, rtol=1e-4)

@@ -90,7 +90,7 @@ def step(monkeypatch) -> Fake:
     monkeypatch.setattr(torch.cuda, "graph_pool_handle", pools.handle)
     torch.manual_seed(0)
     config = tiny(
-        target_samples=1000, light_step_every=LIGHT_PERIOD, priors_from=PRIORS_FROM, shading="summed",
+        target_samples=1000, light_step_every=LIGHT_PERIOD, priors_from=PRIORS_FROM, **{"shading.method": "summed"},
         table_dtype="float16", steps=100,
     )  # fmt: skip
     return Fake(SceneModel(config))

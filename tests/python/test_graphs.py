@@ -39,7 +39,7 @@ def recording(monkeypatch):
 
 @pytest.mark.parametrize("settings", [
     {}, {"sparse_steps": True, "table_dtype": "bfloat16", "seed": 3},
-    {"table_dtype": "float16", "sample_above": 0.0, "grid_every": 3, "target_samples": 16384},
+    {"table_dtype": "float16", "sampling.min_weight": 0.0, "grid_every": 3, "target_samples": 16384},
 ])  # fmt: skip
 def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, recording, settings):
     """While the light moves, levels open, meshes come, priors begin and the anneal goes on. Both have the same capacity."""
@@ -232,9 +232,9 @@ def test_a_step_that_exceeds_its_room_moves_nothing(data, tmp_path, monkeypatch,
 
 
 def test_what_cannot_be_recorded_is_refused():
-    for settings in ({"light": "mlp"}, {"occlusion": "mlp"}, {"normals": "finite_difference"}):
+    for settings in ({"light.kind": "mlp"}, {"occlusion.kind": "mlp"}, {"normals": "finite_difference"}):
         with pytest.raises(InputError, match="cuda_graphs"):
-            Config().replace({"cuda_graphs": True, "shading": "split", **settings})
+            Config().replace({"cuda_graphs": True, "shading.method": "split", **settings})
 
 
 def test_waiting_while_recording_is_refused():

@@ -33,7 +33,7 @@ from splitnerf.refinement.job import OtherState, refine_folder
 from splitnerf.refinement.pixels import covered_pixels
 from splitnerf.report.last_stage import last_stage_section
 
-REFINED = ("--set", "refine=true", "--set", "refinement_sweeps=2")
+REFINED = ("--set", "refinement.enabled=true", "--set", "refinement_sweeps=2")
 DELIVERED = ("mesh.glb", "environment.exr", "environment.hdr", "refinement.json")
 
 
@@ -89,7 +89,7 @@ def test_what_is_delivered_is_what_is_scored(run, data):
 
 def test_without_a_last_stage_the_fields_are_scored(data, tmp_path):
     run = tmp_path / "run"
-    assert train(data, run, "--steps", "12", "--set", "refine=true", "--no-refine") == DONE
+    assert train(data, run, "--steps", "12", "--set", "refinement.enabled=true", "--no-refine") == DONE
     assert json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
     assert not (run / "trained").exists() and not any((run / name).exists() for name in DELIVERED[3:])
     assert "The last stage" not in (run / "report.html").read_text()

@@ -177,7 +177,7 @@ def test_occlusion_is_traced_for_its_share_as_it_is_set(monkeypatch, channels):
     ray.sdf, ray.points.roughness = torch.zeros(n), torch.ones(n, 1)
     ray.points.occlusion_d, ray.points.occlusion_s = torch.full((n, channels), 0.6), torch.full((n, channels), 0.2)
     config = tiny(
-        occlusion_share=0.2, occlusion_channels=channels, occlusion_offset=0.037, occlusion_rays=5, occlusion_loss_form="square"
+        occlusion_share=0.2, occlusion_channels=channels, occlusion_offset=0.037, occlusion_rays=5, **{"losses.occlusion_form": "square"}
     )
     loss = losses.occlusion_loss(ray, None, None, config, generator(), 9)
     assert loss.item() == pytest.approx(0.1, rel=1e-4) and asked.pop("n") == pytest.approx(0.2 * n, rel=0.15)
@@ -210,7 +210,7 @@ def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch, form, facto
         return torch.full((len(positions), 1), 0.5), torch.full((len(positions), 1), 0.5)
 
     monkeypatch.setattr(losses, "occlusion_factors", factors)
-    config = tiny(occlusion_share=0.3, occlusion_channels=1, occlusion_loss_form=form)
+    config = tiny(occlusion_share=0.3, occlusion_channels=1, **{"losses.occlusion_form": form})
     found = []
     for seed in range(2):
         torch.manual_seed(seed)
@@ -298,7 +298,7 @@ def test_factors_are_drawn_to_the_traced_ones_and_diffuse_light_to_grey(monkeypa
     monkeypatch.setattr(losses, "occlusion_factors", lambda *args, **_: (torch.full((4, 1), 0.5),) * 2)
     ray = occlusion_rays(4)
     factors = [x.requires_grad_() for x in (ray.points.occlusion_d, ray.points.occlusion_s)]
-    config = tiny(occlusion_share=1.1, occlusion_channels=1, occlusion_loss_form="square")
+    config = tiny(occlusion_share=1.1, occlusion_channels=1, **{"losses.occlusion_form": "square"})
     losses.occlusion_loss(ray, None, None, config, generator(), 0).backward()
     for factor in factors:
         expected = 2 * ray.shares * (factor[:, 0].detach() - 0.5) / ray.shares.sum()

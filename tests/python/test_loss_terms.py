@@ -16,7 +16,7 @@ from splitnerf.training.batches import Batch, draw_numbers, make_probes, probe_c
 from splitnerf.training.step import loss_terms
 
 SMALL = {
-    "n_levels": 4, "log2_table_size": 10, "grid_resolution": 16, "material_width": 16, "occlusion_width": 16, "light_width": 16,
+    "n_levels": 4, "log2_table_size": 10, "grid_resolution": 16, "materials.width": 16, "occlusion_width": 16, "light_width": 16,
     "light_samples": 64, "light_queries": 32, "min_step": 0.02,
 }  # fmt: skip
 

@@ -78,7 +78,7 @@ def test_the_last_stage_is_said_with_what_it_begins_from(data, tmp_path, monkeyp
 
     monkeypatch.setattr("splitnerf.delivery.refine_folder", refused)
     asking = Asking()
-    reconstruct(data, tmp_path / "run", tiny(steps=30, refine=True), observers=[asking])
+    reconstruct(data, tmp_path / "run", tiny(steps=30, **{"refinement.enabled": True}), observers=[asking])
     assert asking.heard[-3:] == [("export", None), ("last stage", True), ("evaluation", True)]
 
 

@@ -25,7 +25,7 @@ from splitnerf.training.losses import Term
 from splitnerf.training.schedule import next_ray_count
 from splitnerf.training.step import Room
 
-PLAIN = {"occlusion": "off", "shading": "split", "preview_every": 2.0}  # nothing is traced, nothing shown
+PLAIN = {"occlusion.kind": "off", "shading.method": "split", "preview_every": 2.0}  # nothing is traced, nothing shown
 
 
 def calls(monkeypatch, kind: type, name: str, note) -> list:
@@ -106,7 +106,7 @@ def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkey
 
     monkeypatch.setattr(loop.Training, "__init__", noted)
     config = tiny(
-        steps=20, mesh_every=0.2, preview_every=2.0, occlusion="mlp", shading="split", environment_height=12, occlusion_rays=4
+        steps=20, mesh_every=0.2, preview_every=2.0, **{"occlusion.kind": "mlp", "shading.method": "split", "occlusion.environment_height": 12}, occlusion_rays=4
     )
     loop.train(load_dataset(data), config, tmp_path)
     assert heights == [(4, 12), (16, 12)] and training["it"].environment.shape == (12, 24, 3)
@@ -225,7 +225,7 @@ def test_progress_is_the_larger_share_of_steps_or_minutes(data, tmp_path, step, 
 
 @pytest.mark.parametrize(("refine", "share"), [(True, 0.6), (False, 1.0)])
 def test_training_leaves_the_last_stage_its_share_of_the_minutes(data, tmp_path, refine, share):
-    config = tiny(steps=100, max_minutes=2.0, refine=refine, refinement_share=0.4)
+    config = tiny(steps=100, max_minutes=2.0, **{"refinement.enabled": refine}, refinement_share=0.4)
     assert config.training_minutes + config.refinement_minutes == 2.0
     training = loop.Training(load_dataset(data), config, tmp_path, torch.device("cpu"))
     training.seconds = 60.0
@@ -301,14 +301,14 @@ def test_a_thread_makes_the_meshes_where_that_is_set(data, tmp_path, monkeypatch
     monkeypatch.setattr(meshes, "make_mesh", slowly)
     use = SceneModel.use_mesh
     monkeypatch.setattr(SceneModel, "use_mesh", lambda self, bits: used.append(at[0]) or use(self, bits))
-    config = tiny(steps=12, mesh_every=0.5, preview_every=2.0, background_meshes=True, deterministic=deterministic)
+    config = tiny(steps=12, mesh_every=0.5, preview_every=2.0, **{"mesh.background": True}, deterministic=deterministic)
     loop.train(load_dataset(data), config, tmp_path)
     assert threading.main_thread() not in makers and len(makers) == 2
     assert (used[0] == 6) == deterministic and used[-1] == 11
 
 
-@pytest.mark.parametrize("settings", [{}, {"occlusion": "off", "shading": "split"},
-                                      {"occlusion": "mlp", "shading": "split", "occlusion_weight": 0.0}])  # fmt: skip
+@pytest.mark.parametrize("settings", [{}, {"occlusion.kind": "off", "shading.method": "split"},
+                                      {"occlusion.kind": "mlp", "shading.method": "split", "occlusion_weight": 0.0}])  # fmt: skip
 def test_occlusion_is_traced_only_where_an_mlp_learns_it(data, tmp_path, settings):
     loop.train(load_dataset(data), tiny(steps=6, mesh_every=0.3, preview_every=2.0, **settings), tmp_path)
     assert not any("loss_occlusion" in line for line in lines_of(tmp_path))
@@ -318,7 +318,7 @@ def test_occlusion_is_traced_only_where_an_mlp_learns_it(data, tmp_path, setting
 def test_meshes_are_asked_for_where_they_are_used(data, tmp_path, monkeypatch, occlusion, asked):
     """The last one is for the bits: they are stored with it."""
     requests = calls(monkeypatch, meshes.SurfaceMesh, "request", lambda _, progress: progress)
-    config = tiny(steps=6, mesh_every=0.5, preview_every=2.0, occlusion=occlusion, shading="split")
+    config = tiny(steps=6, mesh_every=0.5, preview_every=2.0, **{"occlusion.kind": occlusion, "shading.method": "split"})
     loop.train(load_dataset(data), config, tmp_path)
     assert requests == asked
 

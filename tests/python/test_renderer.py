@@ -68,12 +68,12 @@ def test_gradients_of_a_picture_are_its_derivatives():
 def test_no_sample_of_weight_is_missed_and_few_points_are_asked(anneal, variance, share):
     """Of the whole lattice those that weigh more than the least weight and a half are found, broad as the density may be; of a sharp
     one the field is asked at less than a third of the lattice."""
-    model, _ = ball(sample_above=1e-3)
+    model, _ = ball(**{"sampling.min_weight": 1e-3})
     with torch.no_grad():
         model.variance.fill_(variance)
     rays = oblique()
     found = find_samples(model, FULL, *rays, anneal)
-    model.config = model.config.replace({"sample_above": 0.0})
+    model.config = model.config.replace({"sampling.min_weight": 0.0})
     whole = find_samples(model, FULL, *rays, anneal)
     weights = rendered(model, whole).weights
     heavy = weights > 1.5e-3
@@ -86,7 +86,7 @@ def test_no_sample_of_weight_is_missed_and_few_points_are_asked(anneal, variance
 
 def test_more_samples_count_while_the_cosine_is_annealed():
     """A ray that leaves the surface has weight as well then."""
-    model, _ = ball(sample_above=1e-3)
+    model, _ = ball(**{"sampling.min_weight": 1e-3})
     with torch.no_grad():
         model.variance.fill_(0.3)
     early, late = (len(find_samples(model, FULL, *oblique(), anneal).directions) for anneal in (0.0, 1.0))
@@ -98,7 +98,7 @@ def test_a_ray_ends_where_little_light_is_left(sample_above):
     rays = torch.tensor([[4.0, 0.1, 0]]), torch.tensor([[-1.0, 0, 0]]), torch.tensor([0.5])
     found, opacity = {}, {}
     for least in (1e-3, 0.5):
-        model, _ = ball(sample_above=sample_above, min_transmittance=least)
+        model, _ = ball(**{"sampling.min_weight": sample_above}, min_transmittance=least)
         found[least] = find_samples(model, FULL, *rays)
         opacity[least] = rendered(model, found[least]).opacity.item()
     assert opacity[1e-3] > 0.99 and 0.5 < opacity[0.5] < 0.95
@@ -108,7 +108,7 @@ def test_a_ray_ends_where_little_light_is_left(sample_above):
 
 @pytest.mark.parametrize("sample_above", [0.0, 1e-3])
 def test_a_ray_is_asked_at_no_more_points_than_are_allowed(sample_above):
-    model, _ = ball(sample_above=sample_above, max_samples_per_ray=3)
+    model, _ = ball(**{"sampling.min_weight": sample_above}, max_samples_per_ray=3)
     assert find_samples(model, FULL, *oblique()).evaluated.max() == 3
 
 
@@ -150,7 +150,7 @@ def test_padding_repeats_the_first_samples_and_changes_nothing():
 
 def test_values_of_shaded_samples_are_those_of_their_places():
     """Some of the samples are shaded, others with another phase; what they stand for adds up to the coverage and the colour."""
-    model, cells = ball(sample_above=0.0)
+    model, cells = ball(**{"sampling.min_weight": 0.0})
     found = find_samples(model, cells, *oblique())
     ray = rendered(model, found, shades_per_ray=2)
     assert len(ray.shaded) < 0.5 * len(ray.weights) and not torch.equal(ray.shaded, torch.arange(len(ray.shaded)))
@@ -183,10 +183,10 @@ class Slabs(torch.nn.Module):
 @pytest.mark.parametrize("capacity", [None, (60, 20)])
 def test_walls_behind_each_other_are_segments_of_their_own(monkeypatch, capacity):
     """A ray through both has a shaded sample and a leader on each; it is corrected at the heaviest, on the first wall."""
-    model, _ = ball(sample_above=0.0, step_scale=0.5)
+    model, _ = ball(**{"sampling.min_weight": 0.0}, step_scale=0.5)
     with torch.no_grad():
         model.variance.fill_(0.37)
-    model.config = model.config.replace({"shading": "summed"})
+    model.config = model.config.replace({"shading.method": "summed"})
     monkeypatch.setattr(model, "surface", Slabs().forward)
     model.occlusion = Given(lambda query, _: Occlusion(torch.ones(len(query.normals), 1), torch.ones(len(query.normals), 1)))
     model.occlusion.ready, model.occlusion.cell_light = True, lambda maps: None

@@ -73,7 +73,7 @@ def test_warm_ups_at_the_bounds(warmup, steps, expected):
 @pytest.mark.parametrize("light", ["pyramid", "mlp"])
 def test_each_part_has_its_rate_and_its_decay(light, sparse):
     """The sharpness and the light's texels have rates of their own and no decay, all else the common ones; none is left out."""
-    settings = RATES | {"weight_decay": 0.03, "light": light, "shading": "split", "sparse_steps": sparse}
+    settings = RATES | {"weight_decay": 0.03, "light.kind": light, "shading.method": "split", "sparse_steps": sparse}
     model = SceneModel(tiny(**settings))
     optimiser = make_optimiser(model, tiny(**settings))
     rates, decays, sparsely = {}, {}, {}
@@ -199,7 +199,7 @@ def test_the_light_moves_once_in_its_period_and_with_the_last_step():
     config = Config().replace({"steps": 10, "light_step_every": 4})
     assert light_period(config) == 4
     assert [step for step in range(10) if light_moves(config, step)] == [3, 7, 9]
-    mlp = config.replace({"light": "mlp", "shading": "split"})
+    mlp = config.replace({"light.kind": "mlp", "shading.method": "split"})
     assert light_period(mlp) == 1 and all(light_moves(mlp, step) for step in range(10))
 
 

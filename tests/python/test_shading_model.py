@@ -47,7 +47,7 @@ def points_of(metallic: float, roughness: float = 0.4) -> tuple:
 
 def shade(light: Light, materials: tuple, occlusion: Occlusion | None = None, **settings: object) -> ShadedPoints:
     """Points of these materials, seen from anywhere above, by a model with this light and these factors."""
-    model = SceneModel(tiny(shading="split", **settings))
+    model = SceneModel(tiny(**{"shading.method": "split"}, **settings))
     model.light, model.material = light, Given(materials)
     if occlusion is not None:
         model.occlusion = Given(occlusion)
@@ -146,7 +146,7 @@ def test_white_returns_its_light_by_the_exact_term_and_more_by_the_published_one
 @pytest.mark.parametrize("mode", FRESNEL_MODES)
 def test_the_model_shades_by_the_term_that_is_set(mode):
     light, materials = TwoLights(2.0, 3.0), points_of(0.8, roughness=0.7)
-    shaded = shade(light, materials, fresnel_mode=mode)
+    shaded = shade(light, materials, **{"shading.fresnel": mode})
     g = generator(4)
     normals = unit(torch.randn(K, 3, generator=g))
     views = unit(normals + 0.97 * unit(torch.randn(K, 3, generator=g)))
@@ -177,7 +177,7 @@ class Steps(torch.nn.Module):
 )
 def test_the_light_loss_is_the_mean_over_queries_of_the_sum_over_channels(form, expected):
     """Eq. (11): the mean over s of |g(s) - gbar(s)|^2, a vector's length: off by (.1, -.2, 2) costs .01 + .04 + 4."""
-    config = tiny(light="mlp", shading="split", light_loss_form=form, light_noise=0.0, light_lobe_below=0.0)
+    config = tiny(**{"light.kind": "mlp", "shading.method": "split", "losses.light_form": form}, light_noise=0.0, light_lobe_below=0.0)
     for n_queries in (16, 64):
         found = losses.light_loss(Steps([0.1, -0.2, 2.0]), config.replace({"light_queries": n_queries}), generator(), 0)
         assert found.item() == pytest.approx(expected, rel=1e-4)

@@ -68,7 +68,7 @@ def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     from splitnerf.workflow import load_run
 
     config = preset("cpu").replace(SMALL | {
-        "steps": 24, "occlusion": "bits", "indirect": True, "indirect_every": 5, "occlusion_directions": 256, "open_below": 0.0,
+        "steps": 24, "occlusion.kind": "bits", "indirect": True, "indirect_every": 5, "occlusion_directions": 256, "open_below": 0.0,
     })  # fmt: skip
     dataset = load_dataset(data)
     trained = train_scene(dataset, config, tmp_path)
@@ -92,7 +92,7 @@ def test_without_a_mesh_nothing_is_occluded():
 
     small = SMALL
     for kind in ("mlp", "bits", "off"):
-        model = SceneModel(preset("cpu").replace(small | {"occlusion": kind, "shading": "split"}))
+        model = SceneModel(preset("cpu").replace(small | {"occlusion.kind": kind, "shading.method": "split"}))
         points = torch.rand(5, 3)
         field = model.surface(points)
         up = torch.tensor([[0.0, 0.0, 1.0]]).expand(5, 3)
@@ -101,7 +101,7 @@ def test_without_a_mesh_nothing_is_occluded():
 
 
 @pytest.mark.parametrize("settings", [
-    {"occlusion": "bits", "occlusion_directions": 250}, {"occlusion": "bits", "occlusion_directions": 2048},
+    {"occlusion.kind": "bits", "occlusion_directions": 250}, {"occlusion.kind": "bits", "occlusion_directions": 2048},
     {"indirect_every": 0},
 ])  # fmt: skip
 def test_settings_of_the_bits_are_checked(settings):
@@ -155,7 +155,7 @@ def test_torch_adds_in_a_fixed_order_where_asked():
 
 # Runs by what decides their steps to come. One cell is always near the surface: the grid is the same.
 ONE_CELL = {"grid_resolution": 1, "hull_until": 0.0, "mesh_every": 0.25}
-MLP_LIGHT = ONE_CELL | {"light": "mlp", "shading": "split", "occlusion": "off", "light_samples": 256}
+MLP_LIGHT = ONE_CELL | {"light.kind": "mlp", "shading.method": "split", "occlusion.kind": "off", "light_samples": 256}
 RESUMED = {
     "a convex surface": ONE_CELL | {"open_below": 0.0, "grid_every": 8},
     "sparse steps": ONE_CELL | {"sparse_steps": True, "table_dtype": "float16"},
@@ -167,7 +167,7 @@ RESUMED |= {
     "the grid's cells": {"grid_every": 5},
     "the light that weighs the bits": DENTED | {"indirect": False},
     "the light that the mesh sends": DENTED | {"indirect_every": 16},
-    "the light that weighs the rays": DENTED | {"occlusion": "mlp", "shading": "split"},
+    "the light that weighs the rays": DENTED | {"occlusion.kind": "mlp", "shading.method": "split"},
     "the light loss's noise": MLP_LIGHT | {"light_noise": 0.5, "light_samples": 512},
 }
 
@@ -187,7 +187,7 @@ def test_an_interrupted_run_ends_with_the_bits_of_an_uninterrupted_one(data, tmp
         _stop_after(stop - 1, lambda: train_scene(dataset, config, tmp_path / "halves"))
     # The light moves every 4 steps: the run goes on until it has.
     stopped = load_checkpoint(tmp_path / "halves" / "checkpoint.pt")["step"]
-    assert stopped == (stop if settings.get("light") != "mlp" else stop - 1)
+    assert stopped == (stop if settings.get("light.kind") != "mlp" else stop - 1)
     train_scene(dataset, config, tmp_path / "halves", resume=True)
     whole, halves = (flat(load_checkpoint(tmp_path / name / "checkpoint.pt")) for name in ("whole", "halves"))
     assert whole.keys() == halves.keys() and whole["step"] == 28

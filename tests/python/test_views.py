@@ -38,7 +38,7 @@ class Given(torch.nn.Module):
 def ball(**settings: object) -> tuple[SceneModel, torch.Tensor]:
     """A model whose field is a ball, nearly, under constant light of 1, and its cells."""
     torch.manual_seed(0)
-    model = SceneModel(tiny(start_levels=4, sdf_width=512, sphere_radius=RADIUS, shading="split", **settings))
+    model = SceneModel(tiny(start_levels=4, **{"surface.width": 512}, sphere_radius=RADIUS, **{"shading.method": "split"}, **settings))
     with torch.no_grad():
         model.variance.fill_(0.5)
         model.light.texels.zero_()
@@ -116,7 +116,7 @@ def test_in_srgb_no_sample_is_brighter_than_white():
 @pytest.mark.parametrize("min_weight", [0.0, 1e-3])
 def test_samples_stand_in_their_middles_and_probes_behind_them(min_weight):
     """The k points from anywhere come first, then each chosen sample with its shift."""
-    model, cells = ball(sample_above=min_weight)
+    model, cells = ball(**{"sampling.min_weight": min_weight})
     rays = torch.tensor([[4.0, 0, 0], [4.0, 0.1, 0]]), torch.tensor([[-1.0, 0, 0]] * 2), torch.tensor([0.2, 0.9])
     anywhere, shifts = torch.rand(3, 3), 0.1 * torch.randn(2, 3)
     found = find_samples(model, cells, *rays, probes=ProbePoints(anywhere, torch.tensor([0.0, 0.99]), shifts))
@@ -134,7 +134,7 @@ def test_samples_stand_in_their_middles_and_probes_behind_them(min_weight):
 
 
 def asked_by_shade(**settings) -> tuple:
-    model = SceneModel(tiny(shading="split", **settings))
+    model = SceneModel(tiny(**{"shading.method": "split"}, **settings))
     model.occlusion = Given(lambda query, _: Occlusion(torch.full((40, 1), 0.5), torch.full((40, 1), 0.25)))
     g = generator(1)
     normals, views = (unit(torch.randn(40, 3, generator=g)) for _ in range(2))
@@ -161,7 +161,7 @@ def test_occlusion_is_asked_on_the_surface_on_the_viewers_side():
 
 def test_heads_read_what_is_set():
     for inputs in ("outputs", "grid"):
-        _, (query, _), *_, positions, outputs, features = asked_by_shade(head_inputs=inputs)
+        _, (query, _), *_, positions, outputs, features = asked_by_shade(**{"materials.inputs": inputs})
         expected = outputs if inputs == "outputs" else torch.cat([outputs, positions, features], 1)
         assert torch.equal(torch.cat(list(query.inputs), 1), expected)
 
@@ -203,7 +203,7 @@ def test_parts_are_as_large_as_they_are_set():
     parts = {"surface": surface, "materials": materials, "light": light, "occlusion": occlusion}
     settings = {f"{part}.{key}": value for part, values in parts.items() for key, value in values.items()}
     for inputs, n_inputs in (("outputs", 7), ("grid", 7 + 3 + 12)):
-        model = SceneModel(tiny(shading="split").replace(settings | {"materials.inputs": inputs}))
+        model = SceneModel(tiny(**{"shading.method": "split"}).replace(settings | {"materials.inputs": inputs}))
         spec = model.sdf_field.grid.spec
         assert (spec.n_levels, spec.n_features, spec.base_resolution, spec.growth, spec.log2_table_size) == (3, 4, 5, 1.7, 9)
         assert model.sdf_field.hidden_direction.shape == (24, 15) and model.sdf_field.out_direction.shape == (7, 24)
@@ -214,7 +214,7 @@ def test_parts_are_as_large_as_they_are_set():
         assert [tuple(p.shape) for p in model.occlusion.net.parameters() if p.dim() == 2] == [(18, n_inputs), (6, 18)]
         assert not model.occlusion.directional and model.variance.requires_grad
     assert SceneModel(tiny(light_resolution=32)).light.resolution == 32
-    nothing = SceneModel(tiny(shading="split").replace({"occlusion.kind": "off", "occlusion.channels": 3})).occlusion
+    nothing = SceneModel(tiny(**{"shading.method": "split"}).replace({"occlusion.kind": "off", "occlusion.channels": 3})).occlusion
     assert nothing.n_channels == 3 and not nothing.needs_mesh
 
 

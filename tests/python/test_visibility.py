@@ -278,10 +278,10 @@ def test_the_model_shades_with_the_light_of_its_mesh():
     settings = {
         "n_levels": 2,
         "log2_table_size": 8,
-        "occlusion": "bits",
+        "occlusion.kind": "bits",
         "indirect": True,
         "occlusion_directions": 64,
-        "shading": "split",
+        "shading.method": "split",
     }
     torch.manual_seed(0)
     model = SceneModel(Config().replace(settings | {"initial_roughness": 0.9}))

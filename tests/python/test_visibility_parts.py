@@ -208,7 +208,7 @@ def test_the_light_is_kept_in_its_place_for_recorded_steps():
     assert torch.equal(bits.light, expected.radiance) and not bits.light.requires_grad
     bits.set_light(EvaluatedLight(light, expected._replace(radiance=2 * expected.radiance)))
     assert torch.equal(bits.light, 2 * expected.radiance)
-    bits.restore_light({"sky": expected.radiance.detach(), "sent": None})
+    bits.restore_light({"sky": expected.radiance.detach(), "sent": None, "senders": None})
     assert torch.equal(bits.light, expected.radiance) and bits.light.data_ptr() == place
     assert not bits.state_dict()
 
@@ -249,21 +249,6 @@ def test_light_of_other_senders_comes_back_to_those_that_are_there():
     sent = torch.cat([2 * before[~lost], torch.full((len(strange), 3), 77.0)])[order]
     bits.restore_light(kept | {"sent": sent, "senders": theirs})
     torch.testing.assert_close(bits.radiance, torch.where(lost[:, None], before, 2 * before))
-
-
-def test_light_that_was_kept_before_rays_were_aimed():
-    """The rays go to the middles of the cells as they did; what the vertices sent is no sender's."""
-    mesh = dented()
-    bits = VisibilityBits(256, OFFSET, 3, True)
-    bits.aim(EvaluatedLight(Painted()))
-    old = {"sky": torch.rand(256, 3, generator=generator(1)), "sent": torch.rand(len(mesh.vertices), 3)}
-    bits.restore_aims(old)
-    bits.use(bits.trace(scene_of(mesh), corners(mesh)[0], faces_of(mesh)))
-    lit_up(bits)
-    before = bits.radiance.clone()
-    bits.restore_light(old)
-    assert torch.equal(bits.directions, lattice(256)) and torch.equal(bits.light, old["sky"])
-    assert torch.equal(bits.radiance, before)
 
 
 @pytest.mark.parametrize("chunk", [1 << 15, 50])

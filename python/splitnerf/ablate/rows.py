@@ -11,41 +11,41 @@ from splitnerf.errors import InputError
 FULL = "full"
 
 # The settings that split sum and predicted occlusion need; preset `paper` has them, so that a row changes one setting.
-SPLIT: dict[str, object] = {"shading": "split"}
-BY_MLP = SPLIT | {"occlusion": "mlp"}
-SUMMED: dict[str, object] = {"shading": "summed", "occlusion": "bits", "compositing": "linear", "fresnel_mode": "exact"}
+SPLIT: dict[str, object] = {"shading.method": "split"}
+BY_MLP = SPLIT | {"occlusion.kind": "mlp"}
+SUMMED: dict[str, object] = {"shading.method": "summed", "occlusion.kind": "bits", "shading.compositing": "linear", "shading.fresnel": "exact"}
 
 # The paper's own ablations (its table of relighting and albedo).
 PAPER: dict[str, dict[str, object]] = {
-    "no occlusion averaging": {"occlusion_channels": 3},
-    "split sum, occlusion by MLP, no occlusion loss": BY_MLP | {"occlusion_weight": 0.0},
-    "no metal regulariser": {"metal_regulariser": False},
-    "mip-map light": {"light": "pyramid"},
+    "no occlusion averaging": {"occlusion.channels": 3},
+    "split sum, occlusion by MLP, no occlusion loss": BY_MLP | {"losses.occlusion_weight": 0.0},
+    "no metal regulariser": {"losses.metal_regulariser": False},
+    "mip-map light": {"light.kind": "pyramid"},
 }
 SWITCHES: dict[str, dict[str, object]] = {
-    "no last stage": {"refine": False},
-    "MLP light": {"light": "mlp"},
+    "no last stage": {"refinement.enabled": False},
+    "MLP light": {"light.kind": "mlp"},
     "light by the split sum": SPLIT,
     "summed light": SUMMED,
     "split sum, occlusion by MLP": BY_MLP,
-    "split sum, occlusion by MLP, of position alone": BY_MLP | {"occlusion_directional": False},
-    "split sum, occlusion averaged over channels": SPLIT | {"occlusion_channels": 1},
-    "split sum, no occlusion": SPLIT | {"occlusion": "off"},
-    "split sum, Fresnel as in the paper": SPLIT | {"fresnel_mode": "paper"},
-    "split sum, Fresnel as in the released code": SPLIT | {"fresnel_mode": "code"},
-    "split sum, light asked at the reflection": SPLIT | {"query": "reflection"},
-    "split sum, composited in sRGB": SPLIT | {"compositing": "srgb"},
-    "no indirect light": {"indirect": False},
-    "no energy compensation": {"compensate": False},
-    "normals by finite differences": {"normals": "finite_difference"},
-    "materials from the SDF's outputs": {"head_inputs": "outputs"},
-    "no mask loss": {"mask_weight": 0.0},
-    "no neutral light": {"neutral_weight": 0.0},
-    "no smoothness of normals": {"normal_smoothness": 0.0},
-    "no material entropy": {"entropy_weight": 0.0},
-    "dark metals allowed": {"dark_metal_weight": 0.0},
-    "metals by halves": {"binary_metal_weight": 0.0},
-    "no metal loss at all": {"metal_regulariser": False, "binary_metal_weight": 0.0, "dark_metal_weight": 0.0},
+    "split sum, occlusion by MLP, of position alone": BY_MLP | {"occlusion.directional": False},
+    "split sum, occlusion averaged over channels": SPLIT | {"occlusion.channels": 1},
+    "split sum, no occlusion": SPLIT | {"occlusion.kind": "off"},
+    "split sum, Fresnel as in the paper": SPLIT | {"shading.fresnel": "paper"},
+    "split sum, Fresnel as in the released code": SPLIT | {"shading.fresnel": "code"},
+    "split sum, light asked at the reflection": SPLIT | {"shading.query": "reflection"},
+    "split sum, composited in sRGB": SPLIT | {"shading.compositing": "srgb"},
+    "no indirect light": {"occlusion.indirect": False},
+    "no energy compensation": {"shading.compensate": False},
+    "normals by finite differences": {"surface.normals": "finite_difference"},
+    "materials from the SDF's outputs": {"materials.inputs": "outputs"},
+    "no mask loss": {"losses.mask_weight": 0.0},
+    "no neutral light": {"losses.neutral_weight": 0.0},
+    "no smoothness of normals": {"losses.smoothness_weight": 0.0},
+    "no material entropy": {"losses.entropy_weight": 0.0},
+    "dark metals allowed": {"losses.dark_metal_weight": 0.0},
+    "metals by halves": {"losses.binary_metal_weight": 0.0},
+    "no metal loss at all": {"losses.metal_regulariser": False, "losses.binary_metal_weight": 0.0, "losses.dark_metal_weight": 0.0},
 }
 # The references of rows that differ from the full method in more settings than the one that they are named after.
 REFERENCES = {

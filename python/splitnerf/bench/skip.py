@@ -21,10 +21,10 @@ from splitnerf.outputs import render_maps
 from splitnerf.training.loop import train
 
 # The settings that turn each skip off.
-UNSKIPPED: dict[str, object] = {"sample_above": 0.0, "shades_per_ray": 0, "light_step_every": 1, "open_below": 0.0}
+UNSKIPPED: dict[str, object] = {"sampling.min_weight": 0.0, "shades_per_ray": 0, "light_step_every": 1, "open_below": 0.0}
 # The settings that belong to each skip.
 SKIPS: dict[str, tuple[str, ...]] = {
-    "samples found without gradients": ("sample_above",),
+    "samples found without gradients": ("sampling.min_weight",),
     "few shaded samples a ray": ("shades_per_ray",),
     "light moved every few steps": ("light_step_every",),
 }

@@ -21,7 +21,7 @@ SWITCHES: dict[str, dict[str, object]] = {
     "light moved every 2 steps": {"light_step_every": 2},
     "512 occlusion bits": {"occlusion_directions": 512},
     "finer hash grid": {"log2_table_size": 18, "n_levels": 11},
-    "MLP light": {"light": "mlp"},
+    "MLP light": {"light.kind": "mlp"},
     "light by the split sum": SPLIT,
     "normals by finite differences": {"normals": "finite_difference"},
 }

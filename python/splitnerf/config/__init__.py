@@ -2,10 +2,10 @@
 
 from splitnerf.config.groups import MIN_EXPORT_SIZE
 from splitnerf.config.presets import PRESETS, parse_setting, preset
-from splitnerf.config.settings import FIELDS, GROUPS, OLD_NAMES, Config
+from splitnerf.config.settings import FIELDS, GROUPS, SHORT_NAMES, Config
 from splitnerf.config.table import settings_table
 
 __all__ = [
-    "FIELDS", "GROUPS", "MIN_EXPORT_SIZE", "OLD_NAMES", "PRESETS", "Config", "parse_setting", "preset",
+    "FIELDS", "GROUPS", "MIN_EXPORT_SIZE", "PRESETS", "SHORT_NAMES", "Config", "parse_setting", "preset",
     "settings_table",
 ]  # fmt: skip

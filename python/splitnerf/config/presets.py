@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from splitnerf.config.settings import OLD_NAMES, Config
+from splitnerf.config.settings import SHORT_NAMES, Config
 from splitnerf.errors import InputError
 
 if sys.version_info >= (3, 11):
@@ -83,5 +83,5 @@ def parse_setting(text: str) -> tuple[str, object]:
         except ValueError:
             continue
         name = key.strip()
-        return name if isinstance(parsed, dict) else OLD_NAMES.get(name, name), parsed
+        return SHORT_NAMES.get(name, name), parsed
     raise InputError(f"--set {key}: cannot read the value {value!r}")

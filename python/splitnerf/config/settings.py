@@ -42,30 +42,6 @@ UNLIMITED = 10**9
 MOST_CELLS = 1 << 30  # along an edge of the hash grid's finest level
 SUMMED_DIRECTIONS = 256  # fewer do not resolve the lobes that `shading.method = summed` sums
 
-# Names that settings had before there were groups, where they differ from the name within the group.
-RENAMED = {
-    "surface.width": "sdf_width", "surface.outputs": "sdf_outputs",
-    "materials.width": "material_width", "materials.layers": "material_layers", "materials.inputs": "head_inputs",
-    "light.kind": "light", "light.resolution": "light_resolution", "light.width": "light_width",
-    "light.layers": "light_layers", "light.direction_frequencies": "light_direction_frequencies",
-    "light.roughness_frequencies": "light_roughness_frequencies", "light.activation": "light_activation",
-    "shading.method": "shading", "shading.fresnel": "fresnel_mode",
-    "occlusion.kind": "occlusion", "occlusion.channels": "occlusion_channels",
-    "occlusion.directional": "occlusion_directional", "occlusion.width": "occlusion_width",
-    "occlusion.layers": "occlusion_layers", "occlusion.share": "occlusion_share", "occlusion.rays": "occlusion_rays",
-    "occlusion.ray_start": "occlusion_ray_start", "occlusion.offset": "occlusion_offset",
-    "occlusion.directions": "occlusion_directions",
-    "mesh.every": "mesh_every", "mesh.resolution": "mesh_resolution", "mesh.background": "background_meshes",
-    "sampling.min_weight": "sample_above",
-    "losses.smoothness_weight": "normal_smoothness", "losses.light_form": "light_loss_form",
-    "losses.occlusion_form": "occlusion_loss_form", "losses.metal_form": "metal_loss_form",
-    "refinement.enabled": "refine", "refinement.share": "refinement_share", "refinement.sweeps": "refinement_sweeps",
-    "exposure.refine": "exposure_refine", "exposure.white_balance": "exposure_white_balance",
-    "separation.share": "separation_share", "separation.steps": "separation_steps",
-    "export.resolution": "export_resolution", "export.faces": "export_faces",
-    "export.texture_size": "export_texture_size", "export.environment_height": "export_environment_height",
-}  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Config:
@@ -106,8 +82,8 @@ class Config:
                 raise InputError(message)
 
     def __getitem__(self, name: str) -> object:
-        """The value of a setting by its name: ``group.name``, or its older name without a group."""
-        group, _, key = OLD_NAMES.get(name, name).partition(".")
+        """The value of a setting by its name, or by a short one, see :data:`SHORT_NAMES`."""
+        group, _, key = SHORT_NAMES.get(name, name).partition(".")
         return getattr(getattr(self, group), key)
 
     @property
@@ -134,7 +110,7 @@ class Config:
         """A copy with some settings changed.
 
         Args:
-            settings: Values by ``group.name`` or by the older name without a group, or a table of values by group.
+            settings: Values by ``group.name`` or by a short name, see :data:`SHORT_NAMES`, or a table of values by group.
 
         Raises:
             InputError: A name is unknown, or a value is not allowed.
@@ -165,7 +141,12 @@ class Config:
 
 GROUPS = {group.name: group.default_factory for group in dataclasses.fields(Config)}
 FIELDS = {f"{group}.{known.name}": known for group, kind in GROUPS.items() for known in dataclasses.fields(kind)}
-OLD_NAMES = {RENAMED.get(name, known.name): name for name, known in FIELDS.items()}
+_GROUPS_OF = {known.name: [group for group in GROUPS if f"{group}.{known.name}" in FIELDS] for known in FIELDS.values()}
+SHORT_NAMES = {name.replace(".", "_"): name for name in FIELDS} | {
+    key: f"{groups[0]}.{key}" for key, groups in _GROUPS_OF.items() if len(groups) == 1 or groups[0] == "run"
+}
+"""What settings may be called, too: `light_resolution` for `light.resolution`; and by the name in the group alone where no other group
+has it, or the group is `run`: `n_levels` for `surface.n_levels`."""
 
 # Settings that exclude each other: when, and what to say.
 RULES = (
@@ -212,12 +193,12 @@ def _flat(settings: dict[str, object]) -> Iterator[tuple[str, object]]:
 
 def _known(key: object) -> str:
     """The name of a setting with its group. Raises InputError where there is none."""
-    name = OLD_NAMES.get(key, key)
+    name = SHORT_NAMES.get(key, key)
     if name in FIELDS:
         return name
     if name in GROUPS:
         member = next(known for known in FIELDS if known.startswith(f"{name}."))
         raise InputError(f"{name} is a group of settings; set one of them, such as {member}")
-    near = difflib.get_close_matches(str(key), [*FIELDS, *OLD_NAMES], n=1)
-    hint = f"did you mean {OLD_NAMES.get(near[0], near[0])}? " if near else ""
+    near = difflib.get_close_matches(str(key), [*FIELDS, *SHORT_NAMES], n=1)
+    hint = f"did you mean {SHORT_NAMES.get(near[0], near[0])}? " if near else ""
     raise InputError(f"unknown setting {key!r}; {hint}`splitnerf info --settings` lists them")

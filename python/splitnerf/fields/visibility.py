@@ -156,23 +156,21 @@ class VisibilityBits(OcclusionModel):
     def restore_light(self, cached: dict[str, Tensor | None]) -> None:
         """Restores the result of :meth:`cached_light`, on the same mesh traced in the same directions.
 
-        Senders that are not stored keep the radiance that they have: another machine's rays may hit a few others, and
-        older checkpoints have the radiance of vertices, which no sender takes.
+        Senders that are not stored keep the radiance that they have: another machine's rays may hit a few others.
         """
         self.light.copy_(cached["sky"])
-        stored = cached.get("senders")
-        if cached["sent"] is None or self.senders is None:
+        stored = cached["senders"]
+        if stored is None or self.senders is None:
             self.radiance = None
-        elif stored is not None:
+        else:
             stored, ours = stored.to(self.light.device), self._sender_numbers()
             radiance = self.light.new_zeros(len(ours), 3) if self.radiance is None else self.radiance.clone()
             radiance[torch.isin(ours, stored)] = cached["sent"].to(radiance.device)[torch.isin(stored, ours)]
             self.radiance = radiance
 
     def restore_aims(self, cached: dict[str, Tensor | None]) -> None:
-        """Restores the directions in which a mesh is traced from :meth:`cached_light`: the cells' centres where an
-        older checkpoint has none."""
-        self.aims = cached.get("aims", self.centres).to(self.centres.device)
+        """Restores the directions in which a mesh is traced from :meth:`cached_light`."""
+        self.aims = cached["aims"].to(self.centres.device)
 
     def _sender_numbers(self) -> Tensor:
         """A number [p] int64 of each sender, ascending: k times its vertex plus its direction."""

@@ -17,7 +17,7 @@ from splitnerf.render.occupancy import OccupancyGrid
 FORMAT = 1
 LARGEST = {"step": 1e12, "seconds": 1e12, "meshed_at": 1.0, "previewed_at": 1.0}
 MOMENTS = ("exp_avg", "exp_avg_sq")
-CACHED_LIGHT = (("sky", "aims", "sent", "senders"), ("sky", "sent"))  # now, and before rays were aimed
+CACHED_LIGHT = {"sky", "aims", "sent", "senders"}
 
 
 def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict) -> None:
@@ -120,19 +120,16 @@ def restored_grid(grid: OccupancyGrid, content: dict, path: Path) -> tuple[Tenso
 def _check_content(content: dict) -> None:
     """Raises ValueError or InputError where a value is not what the trainer writes."""
     kinds = {"config": dict, "fingerprint": str, "step": int, "seconds": float, "n_rays": int, "meshed_at": float,
-             "previewed_at": float, "model": dict, "optimiser": dict}  # fmt: skip
+             "previewed_at": float, "stopped": bool, "model": dict, "optimiser": dict}  # fmt: skip
     for key, kind in kinds.items():
         if not isinstance(content.get(key), kind):
             raise ValueError(f"{key} is missing or of another type")
     for key, largest in LARGEST.items():
         if not 0 <= content[key] <= largest:
             raise ValueError(f"{key} is {content[key]}")
-    if type(content.get("psnr_mean")) not in (float, type(None)):  # older checkpoints have none
+    if type(content.get("psnr_mean")) not in (float, type(None)):  # None before the first step
         raise ValueError("psnr_mean is of another type")
-    if type(content.get("stopped", False)) is not bool:  # older checkpoints have none
-        raise ValueError("stopped is of another type")
-    if "exposures" in content:  # older checkpoints have none
-        check_tensor("exposures", content["exposures"], (-1, 4), torch.float32)
+    check_tensor("exposures", content.get("exposures"), (-1, 4), torch.float32)
     config = config_of(content)
     if (start := content.get("start")) is not None:
         if not isinstance(start, dict):
@@ -179,8 +176,7 @@ def _check_light(config: Config, content: dict) -> None:
     if content.get("environment") is not None:
         check_tensor("environment", content["environment"], (height, 2 * height, 3), torch.float32)
     has_mesh = content.get("mesh_vertices") is not None
-    kinds = CACHED_LIGHT if config.occlusion.kind == "bits" else ((),)
-    if not isinstance(cached, dict) or cached.keys() not in map(set, kinds):
+    if not isinstance(cached, dict) or cached.keys() != (CACHED_LIGHT if config.occlusion.kind == "bits" else set()):
         raise ValueError("occlusion_light is missing or of another kind")
     if cached:
         _check_bits(cached, config.occlusion.directions, len(content["mesh_vertices"]) if has_mesh else 0)
@@ -189,19 +185,16 @@ def _check_light(config: Config, content: dict) -> None:
 def _check_bits(cached: dict, k: int, n_vertices: int) -> None:
     """Raises ValueError where the cached light is not that of bits of k directions on a mesh of so many vertices."""
     check_tensor("the sky's light", cached["sky"], (k, 3), torch.float32)
-    if "aims" in cached:
-        check_tensor("the traced directions", cached["aims"], (k, 3), torch.float32)
-        if (cached["aims"].norm(dim=1) - 1.0).abs().max() > 1e-3:
-            raise ValueError("the traced directions are not of length 1")
-    n, senders = n_vertices, cached.get("senders")
+    check_tensor("the traced directions", cached["aims"], (k, 3), torch.float32)
+    if (cached["aims"].norm(dim=1) - 1.0).abs().max() > 1e-3:
+        raise ValueError("the traced directions are not of length 1")
+    senders = cached["senders"]
     if senders is None and cached["sent"] is None:
         return
-    if "senders" in cached:
-        check_tensor("the number of each sender", senders, (-1,), torch.int64)
-        n = len(senders)
-        if n and not (senders[0] >= 0 and senders[-1] < n_vertices * k and (senders[1:] > senders[:-1]).all()):
-            raise ValueError("the numbers of the senders do not ascend, or name vertices that are none")
-    check_tensor("the light that the mesh sends", cached["sent"], (n, 3), torch.float32)
+    check_tensor("the number of each sender", senders, (-1,), torch.int64)
+    if len(senders) and not (senders[0] >= 0 and senders[-1] < n_vertices * k and (senders[1:] > senders[:-1]).all()):
+        raise ValueError("the numbers of the senders do not ascend, or name vertices that are none")
+    check_tensor("the light that the mesh sends", cached["sent"], (len(senders), 3), torch.float32)
 
 
 def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:

@@ -169,12 +169,11 @@ class Training:
         self.model.light.loss_samples.restore(content["light_noise"].tolist())
         if content["environment"] is not None:
             self.environment = content["environment"].to(self.grid.device)
-        for name in ("step", "seconds", "n_rays", "previewed_at"):
+        for name in ("step", "seconds", "n_rays", "previewed_at", "psnr_mean"):
             setattr(self, name, content[name])
-        self.psnr_mean = content.get("psnr_mean")
         # A run that was stopped for its export goes on with the export's last stage; one that has it trains on.
-        self.stopped = content.get("stopped", False) and (self.run / STATE).is_file()
-        if self.exposures.learned and "exposures" in content:
+        self.stopped = content["stopped"] and (self.run / STATE).is_file()
+        if self.exposures.learned:
             self.exposures.restore(content["exposures"])
         if content.get("start") is not None:
             tensors = {name: x.to(self.grid.device) for name, x in content["start"].items()}
