@@ -2,7 +2,7 @@
 
     python tests/mutants.py python/splitnerf/training/schedule.py ...
 
-A change that no test sees is printed as a diff. What is left over after tests were added is explained in docs/mutants.md.
+A change that no test sees is printed as a diff.
 cosmic-ray writes each change into the file itself and takes it back; so the file must have no changes that are not committed.
 """
 
