@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from skimage.transform import resize
+from PIL import Image
 
 from splitnerf.data.environment import sample_environment
 from splitnerf.data.images import LDR_SUFFIXES, over_background, read_image, read_radiance, srgb_to_linear
@@ -66,7 +66,8 @@ def fill(plate: np.ndarray, width: int, height: int) -> np.ndarray:
     scale = max(width / columns, height / rows)
     shape = (max(height, round(rows * scale)), max(width, round(columns * scale)))
     if shape != (rows, columns):
-        plate = resize(plate, shape, order=1, mode="edge", anti_aliasing=scale < 1)
+        size, bands = shape[::-1], np.float32(plate).transpose(2, 0, 1)
+        plate = np.stack([Image.fromarray(band).resize(size, Image.Resampling.BILINEAR) for band in bands], axis=-1)
     top, left = (shape[0] - height) // 2, (shape[1] - width) // 2
     return np.ascontiguousarray(plate[top : top + height, left : left + width], np.float32)
 
