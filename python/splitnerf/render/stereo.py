@@ -1,7 +1,8 @@
 """Depth from photos alone: each photo's pixels are compared with its neighbours' at many depths.
 
 A distance field moves where colours change nearby, so it never opens a cavity that it began as a solid: a lid, far from the
-floor behind it, shows no direction in which it should move. Stereo compares all depths at once, and needs neither materials nor light.
+floor behind it, shows no direction in which it should move. Stereo compares all depths at once, and needs neither materials nor
+light. Windows that follow a surface found before show its depth several times more precisely than windows that face the camera.
 """
 
 from __future__ import annotations
@@ -20,16 +21,16 @@ from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, march_rays
 from splitnerf.render.rays import image_rays
 
 MOST_PHOTOS, MOST_VIEWS = 150, 50  # that are compared, and that get depths
-EDGE = 100  # pixels, about, along the shorter edge of the compared photos
-STEP = 0.03  # between two depths, scene units
+EDGE, FIRST_EDGE = 100, 50  # pixels, about, along the shorter edge of the compared photos, and of those compared first
+STEP = 0.04  # between the depths that are compared first, scene units
 MOST_DEPTHS = 128
 NEIGHBOURS, BEST = 6, 3  # photos compared with one, and those of them that count: others may see something in front
 ANGLES = 4.0, 15.0, 45.0  # degrees between a photo and a neighbour: least, best, largest
 WINDOW = 3  # pixels on each side of a compared one
 VARIANCE_FLOOR = 1e-7  # of grey values, for windows without contrast
-AGREE = 0.06  # scene units within which two photos' depths agree
-NEAR_ANGLES, WIDE_ANGLES = (5.0, 25.0), (25.0, 75.0)  # degrees
-TRUNCATION = 0.12  # scene units; surfaces farther apart do not mix
+ELSEWHERE = 0.1  # scene units from a depth to others that are no part of the same peak
+HIDDEN = 0.1  # scene units behind a photo's surface from which a point counts as hidden
+PRIOR_WEIGHT = 0.05  # of what was known before, beside one pixel's correlation
 
 
 class GreyPhotos(NamedTuple):
@@ -58,10 +59,10 @@ def spread_out(n: int, most: int) -> np.ndarray:
     return np.unique(np.linspace(0, n - 1, min(n, most)).astype(int))
 
 
-def grey_photos(photos: Dataset, device: torch.device | str = "cpu") -> GreyPhotos:
-    """At most :data:`MOST_PHOTOS` of the photos, averaged down to about :data:`EDGE` pixels."""
+def grey_photos(photos: Dataset, device: torch.device | str = "cpu", edge: int = EDGE) -> GreyPhotos:
+    """At most :data:`MOST_PHOTOS` of the photos, averaged down to about `edge` pixels."""
     chosen = spread_out(len(photos), MOST_PHOTOS)
-    factor = max(1, min(photos.height, photos.width) // EDGE)
+    factor = max(1, min(photos.height, photos.width) // edge)
     pixels = [decoded(np.asarray(averaged_codes(photos.images.codes[i], factor))) for i in chosen]
     rgba = torch.from_numpy(np.stack(pixels)).to(device)
     poses, lenses = (torch.from_numpy(x[chosen]).float().to(device) for x in (photos.poses, photos.intrinsics))
@@ -74,8 +75,14 @@ def angles_between(poses: Tensor) -> Tensor:
     return torch.rad2deg(torch.acos((directions @ directions.T).clamp(-1, 1)))
 
 
+def _neighbours(angles: Tensor) -> list[int]:
+    """The photos to compare with one, by the angles [n] between it and each."""
+    apart = (angles - ANGLES[1]).abs() + torch.where(angles < ANGLES[0], 360.0, 0.0)
+    return [j for j in apart.argsort()[:NEIGHBOURS].tolist() if ANGLES[0] <= angles[j] < ANGLES[2]]
+
+
 @torch.no_grad()
-def depth_maps(photos: GreyPhotos, hull: Tensor, box: float) -> tuple[Tensor, Tensor]:
+def depth_maps(photos: GreyPhotos, hull: Tensor, box: float) -> tuple[Tensor, Tensor, Tensor]:
     """The depth of each pixel of :meth:`GreyPhotos.spread` at which its window looks most like those of neighbouring photos.
 
     Args:
@@ -86,52 +93,77 @@ def depth_maps(photos: GreyPhotos, hull: Tensor, box: float) -> tuple[Tensor, Te
     Returns:
         depths: [n, h, w] distances from the camera, scene units; 0 where nothing is known.
         scores: [n, h, w] mean normalised cross-correlation with the best neighbours, in [-1, 1].
+        margins: [n, h, w] by how much the score stands out from those of depths farther away than :data:`ELSEWHERE`.
+
+    Source: Hu and Mordohai 2012, "A quantitative evaluation of confidence measures for stereo vision", for the margin.
     """
     cells = torch.where(hull, CELL_OCCUPIED, CELL_EMPTY).to(torch.uint8)
-    angles, maps = angles_between(photos.poses), []
+    maps = []
     for i in spread_out(len(photos.grey), MOST_VIEWS).tolist():
-        away = angles[i]
-        apart = (away - ANGLES[1]).abs() + torch.where(away < ANGLES[0], 360.0, 0.0)
-        near = [j for j in apart.argsort()[:NEIGHBOURS].tolist() if ANGLES[0] <= away[j] < ANGLES[2]]
-        maps.append(_depth_map(photos, i, near, cells, box))
+        rays = image_rays(photos.poses[i], photos.intrinsics[i], *photos.grey.shape[1:])
+        first, last = (x.view_as(photos.grey[i]) for x in _limits(*rays, cells, box))
+        maps.append(_swept(photos, i, rays, first, last - first, STEP))
     return tuple(torch.stack(x) for x in zip(*maps))
 
 
-def _depth_map(photos: GreyPhotos, i: int, near: list[int], cells: Tensor, box: float) -> tuple[Tensor, Tensor]:
-    """The depths and scores [h, w] of one photo."""
-    grey, mask = photos.grey[i], photos.masks[i]
-    height, width = grey.shape
-    depths, scores = torch.zeros_like(grey), torch.full_like(grey, -1.0)
-    rays_o, rays_d = image_rays(photos.poses[i], photos.intrinsics[i], height, width)
-    first, last = _limits(rays_o, rays_d, cells, box)
-    inside = mask & (last > 0).view_as(mask)
+@torch.no_grad()
+def refined_depths(photos: GreyPhotos, base: Tensor, reach: float, step: float) -> tuple[Tensor, Tensor]:
+    """Depths and scores as of :func:`depth_maps`, next to a surface that is known about: the windows follow it.
+
+    Args:
+        photos: All photos.
+        base: [n, h, w] the depths of that surface in all photos, scene units; 0 where it is not seen.
+        reach: How far from it depths are compared, scene units; the outermost ones are no result.
+        step: Between two depths, scene units.
+    """
+    maps = []
+    for i in spread_out(len(photos.grey), MOST_VIEWS).tolist():
+        rays = image_rays(photos.poses[i], photos.intrinsics[i], *photos.grey.shape[1:])
+        span = torch.where(base[i] > 0, 2 * reach, 0.0)
+        maps.append(_swept(photos, i, rays, base[i] - reach, span, step, base)[:2])
+    return tuple(torch.stack(x) for x in zip(*maps))
+
+
+def _swept(
+    photos: GreyPhotos, i: int, rays: tuple[Tensor, Tensor], first: Tensor, span: Tensor, step: float, base: Tensor | None = None,
+) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
+    """The depths, scores and margins [h, w] of one photo, compared from depths `first` [h, w] over `span` [h, w], which is 0 where there
+    is nothing to compare. A photo does not count where its own surface, of depths `base` [n, h, w], hides the middle of the span."""
+    grey, (rays_o, rays_d) = photos.grey[i], rays
+    (height, width), near = grey.shape, _neighbours(angles_between(photos.poses)[i])
+    depths, scores, margins = torch.zeros_like(grey), torch.full_like(grey, -1.0), torch.zeros_like(grey)
+    inside = photos.masks[i] & (span > 0)
     if not near or not inside.any():
-        return depths, scores
+        return depths, scores, margins
     rows, columns = inside.any(1).nonzero(), inside.any(0).nonzero()
     part = (
         slice(max(0, int(rows[0]) - WINDOW), int(rows[-1]) + WINDOW + 1),
         slice(max(0, int(columns[0]) - WINDOW), int(columns[-1]) + WINDOW + 1),
     )
-    inside, rays_d = inside[part], rays_d.view(height, width, 3)[part]
-    first, last = first.view(height, width)[part], last.view(height, width)[part]
-    first = torch.where(inside, first, first[inside].mean())
-    span = torch.where(inside, last - first, 0.0)
-    along = STEP * torch.arange(min(MOST_DEPTHS, int(span.max() / STEP) + 2), device=grey.device)[:, None, None]
-    of_photo = _Window(grey[part][None, None])
-    compared = []
+    inside, rays_d, first, span = inside[part], rays_d.view(height, width, 3)[part], first[part], span[part]
+    first, span = torch.where(inside, first, first[inside].mean()), torch.where(inside, span, 0.0)
+    along = step * torch.arange(min(MOST_DEPTHS, int(span.max() / step + 0.5) + 1), device=grey.device)[:, None, None]
+    of_photo, compared = _Window(grey[part][None, None], inside[None, None].float()), []
     for j in near:
-        turned = photos.poses[j, :3, :3]
-        start, directions = (rays_o[0] - photos.poses[j, :3, 3]) @ turned, rays_d @ turned
-        points = start + (first + along)[..., None] * directions
-        at = _projected(points, photos.intrinsics[j]) * points.new_tensor([2 / width, 2 / height]) - 1
-        seen = photos.grey[j].expand(len(along), 1, height, width)
-        compared.append(of_photo.correlation(F.grid_sample(seen, at, align_corners=False))[:, 0])
+        start, turned = rays_o[0] - photos.poses[j, :3, 3], photos.poses[j, :3, :3]
+        at = _projected((start @ turned) + (first + along)[..., None] * (rays_d @ turned), photos.intrinsics[j])
+        at = at * at.new_tensor([2 / width, 2 / height]) - 1
+        others = F.grid_sample(photos.grey[j].expand(len(along), 1, height, width), at, align_corners=False)
+        alike = of_photo.correlation(others)[:, 0]
+        if base is not None:
+            behind, seen = _behind(photos, base, base > 0, j, (rays_o[0] + (first + 0.5 * span)[..., None] * rays_d).view(-1, 3))
+            alike = torch.where(((behind < -HIDDEN) & seen).view_as(inside), -1.0, alike)
+        compared.append(alike)
     score = torch.stack(compared).topk(min(BEST, len(near)), 0).values.mean(0)
-    score = torch.where(along > span + STEP, -1.0, score)
+    score = torch.where(along > span + 0.5 * step, -1.0, score)
     best, k = score.max(0)
-    depths[part] = torch.where(inside, first + STEP * (k + _peak(score, k)), 0.0)
+    elsewhere = torch.where((along - step * k).abs() > ELSEWHERE, score, -1.0).amax(0)
+    margins[part] = torch.where(inside, best - elsewhere, 0.0)
+    if base is not None:
+        best = torch.where((k == 0) | (k == len(along) - 1), -1.0, best)
+    depths[part] = torch.where(inside, first + step * (k + _peak(score, k)), 0.0)
     scores[part] = torch.where(inside, best, -1.0)
-    return depths, scores
+    return depths, scores, margins
 
 
 def _limits(rays_o: Tensor, rays_d: Tensor, cells: Tensor, box: float) -> tuple[Tensor, Tensor]:
@@ -152,17 +184,23 @@ def _projected(points: Tensor, intrinsics: Tensor) -> Tensor:
 
 
 class _Window:
-    """Windows of a picture [1, 1, h, w], to be compared with others'."""
+    """The parts within a mask of windows of a picture, [1, 1, h, w] both, to be compared with others'."""
 
-    def __init__(self, picture: Tensor):
-        self.picture, self.mean = picture, _mean(picture)
-        self.variance = (_mean(picture.square()) - self.mean.square()).clamp(min=0)
+    def __init__(self, picture: Tensor, mask: Tensor):
+        self.mask, self.share = mask, _mean(mask).clamp(min=1e-3)
+        self.picture = picture * mask
+        self.mean, self.variance = self._moments(self.picture)
+
+    def _moments(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean and variance within the mask."""
+        mean = _mean(pictures) / self.share
+        return mean, (_mean(pictures.square()) / self.share - mean.square()).clamp(min=0)
 
     def correlation(self, others: Tensor) -> Tensor:
         """[k, 1, h, w] normalised cross-correlation with the windows of pictures [k, 1, h, w]."""
-        mean = _mean(others)
-        variance = (_mean(others.square()) - mean.square()).clamp(min=0)
-        shared = _mean(others * self.picture) - mean * self.mean
+        others = others * self.mask
+        mean, variance = self._moments(others)
+        shared = _mean(others * self.picture) / self.share - mean * self.mean
         return shared / (self.variance * variance + VARIANCE_FLOOR).sqrt()
 
 
@@ -178,41 +216,6 @@ def _peak(score: Tensor, k: Tensor) -> Tensor:
     return (0.5 * (before - after) / (before - 2 * here + after).clamp(max=-1e-6)).clamp(-0.5, 0.5)
 
 
-@torch.no_grad()
-def supporting_views(photos: GreyPhotos, depths: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
-    """How many other photos found a surface at a pixel's point: [n, h, w] near by, and from far.
-
-    A reflection looks like a surface behind the mirror, at a place that moves with the camera: photos from far disagree.
-
-    Args:
-        photos, depths: The photos that have depths, and these.
-        known: [n, h, w] bool, the depths that count.
-    """
-    angles, (n, height, width) = angles_between(photos.poses), depths.shape
-    counts = [torch.zeros_like(depths, dtype=torch.int32) for _ in range(2)]
-    for i in range(n):
-        rays_o, rays_d = image_rays(photos.poses[i], photos.intrinsics[i], height, width)
-        points = rays_o + depths[i].reshape(-1, 1) * rays_d
-        for j in range(n):
-            for count, (least, most) in zip(counts, (NEAR_ANGLES, WIDE_ANGLES)):
-                if least <= angles[i, j] < most:
-                    apart, seen = _behind(photos, depths, known, j, points)
-                    count[i] += ((apart.abs() < AGREE) & seen).view(height, width) & known[i]
-    return counts[0], counts[1]
-
-
-def surface_points(photos: GreyPhotos, depths: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
-    """The points of known depths, scene units, and the unit directions from them to their cameras, [m, 3] each; the arguments
-    are those of :func:`supporting_views`."""
-    found, towards = [], []
-    for i, (depth, here) in enumerate(zip(depths, known)):
-        rays_o, rays_d = image_rays(photos.poses[i], photos.intrinsics[i], *depth.shape)
-        here = here.reshape(-1)
-        found.append((rays_o + depth.reshape(-1, 1) * rays_d)[here])
-        towards.append(-rays_d[here])
-    return torch.cat(found), torch.cat(towards)
-
-
 def _behind(photos: GreyPhotos, depths: Tensor, known: Tensor, j: int, points: Tensor) -> tuple[Tensor, Tensor]:
     """How far the surface of photo j lies behind points [m, 3] along its rays, [m], and whether it is known, [m] bool."""
     height, width = depths.shape[1:]
@@ -225,31 +228,61 @@ def _behind(photos: GreyPhotos, depths: Tensor, known: Tensor, j: int, points: T
 
 
 @torch.no_grad()
-def solid_cells(photos: GreyPhotos, depths: Tensor, known: Tensor, hull: Tensor, box: float) -> Tensor:
-    """[r, r, r] bool: the cells of the hull that the depths do not show to be empty. What no photo sees stays solid.
+def fused_distances(
+    photos: GreyPhotos, depths: Tensor, weights: Tensor, hull: Tensor, box: float, truncation: float, before: Tensor | None = None,
+) -> tuple[Tensor, Tensor]:  # fmt: skip
+    """[r, r, r] distances to the surface of depth maps along the rays, the mean over the photos, positive outside; and the mean weight
+    of the depths that say so, 0 where none does.
 
-    A cell is solid where the mean of its truncated distances to the photos' surfaces is negative.
+    Between pixels the depths are interpolated. Where they jump by more than two truncations, at an outline, a place is only known
+    to be empty, and only if it lies in front of both surfaces: so thin walls stay.
 
     Args:
-        photos, depths: The photos that have depths, and these.
-        hull, box: See :func:`depth_maps`.
-        known: [n, h, w] bool, the depths that count.
+        photos, depths: The photos that have depths, and these, [n, h, w].
+        weights: [n, h, w] how much the depths count; 0 where nothing is known.
+        hull, box: See :func:`depth_maps`; nothing is outside of the hull.
+        truncation: Scene units; farther behind a surface nothing is known, and larger distances are this one.
+        before: [r, r, r] what was known before; None: the hull is solid.
 
     Source: Curless and Levoy 1996, for the mean of truncated distances.
     """
-    resolution = hull.shape[0]
-    axis = (torch.arange(resolution, device=hull.device) + 0.5) * (2 * box / resolution) - box
-    index = hull.nonzero()
-    points = axis[index]
-    total, weight = torch.zeros(2, len(points), device=hull.device)
+    resolution, index = hull.shape[0], hull.nonzero()
+    points = ((torch.arange(resolution, device=hull.device) + 0.5) * (2 * box / resolution) - box)[index]
+    known = torch.full_like(points[:, 0], -truncation) if before is None else before[tuple(index.T)].clamp(-truncation, truncation)
+    total, weight = PRIOR_WEIGHT * known, torch.full_like(known, PRIOR_WEIGHT)
+    votes = torch.zeros_like(known)
     for j in range(len(depths)):
-        behind, seen = _behind(photos, depths, known, j, points)
-        share = ((behind > -TRUNCATION) & seen).float()
-        total += share * behind.clamp(-TRUNCATION, TRUNCATION)
+        behind, share = _behind_pixels(photos, depths[j], weights[j], j, points, truncation)
+        total += share * behind.clamp(-truncation, truncation)
         weight += share
-    solid = torch.zeros_like(hull)
-    solid[tuple(index.T)] = (total < 0) | (weight == 0)
-    return solid
+        votes += share > 0
+    distances, trust = torch.full(hull.shape, truncation, device=hull.device), torch.zeros(hull.shape, device=hull.device)
+    distances[tuple(index.T)], trust[tuple(index.T)] = total / weight, (weight - PRIOR_WEIGHT) / votes.clamp(min=1)
+    return distances, trust
+
+
+def _behind_pixels(
+    photos: GreyPhotos, depths: Tensor, weights: Tensor, j: int, points: Tensor, truncation: float
+) -> tuple[Tensor, Tensor]:
+    """How far the surface of depths [h, w] lies behind points [m, 3] along the rays of photo j, and how much that counts, [m] each."""
+    height, width = depths.shape
+    from_camera = points - photos.poses[j, :3, 3]
+    in_camera, away = from_camera @ photos.poses[j, :3, :3], from_camera.norm(dim=1)
+    place = _projected(in_camera, photos.intrinsics[j]) - 0.5
+    corner = place.floor()
+    right, below = (place - corner).unbind(-1)
+    x, y = corner.long().unbind(-1)
+    corners = [(y.clamp(0, height - 1), x.clamp(0, width - 1)) for y, x in ((y, x), (y, x + 1), (y + 1, x), (y + 1, x + 1))]
+    near, counts = (torch.stack([values[at] for at in corners]) for values in (depths, weights))
+    shares = torch.stack([(1 - below) * (1 - right), (1 - below) * right, below * (1 - right), below * right]) * (counts > 0)
+    total = shares.sum(0).clamp(min=1e-6)
+    mean, count = (shares * near).sum(0) / total, (shares * counts).sum(0) / total
+    nearest = torch.where(counts > 0, near, torch.inf).amin(0)
+    farthest = torch.where(counts > 0, near, 0.0).amax(0)
+    jumps = farthest - nearest > 2 * truncation
+    behind = torch.where(jumps, nearest, mean) - away
+    seen = (in_camera[:, 2] < 0) & (farthest > 0) & (behind > torch.where(jumps, truncation, -truncation))
+    return torch.where(seen, behind, 0.0), torch.where(seen, count, 0.0)
 
 
 def signed_distance(solid: Tensor, box: float) -> Tensor:

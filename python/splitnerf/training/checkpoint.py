@@ -134,9 +134,8 @@ def _check_content(content: dict) -> None:
     if (start := content.get("start")) is not None:
         if not isinstance(start, dict):
             raise ValueError("start is of another type")
-        check_tensor("start's distance", start.get("distance"), (config.sampling.grid_resolution,) * 3, torch.float32)
-        for name in ("points", "towards"):
-            check_tensor(f"start's {name}", start.get(name), (-1, 3), torch.float32)
+        for name in ("distance", "trust"):
+            check_tensor(f"start's {name}", start.get(name), (config.sampling.grid_resolution,) * 3, torch.float32)
     if not 1 <= content["n_rays"] <= max(config.sampling.initial_rays, config.sampling.max_rays):
         raise ValueError(f"n_rays is {content['n_rays']}")
     for name, parameter in content["model"].items():

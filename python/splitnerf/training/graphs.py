@@ -18,7 +18,7 @@ from splitnerf.training.batches import Batch
 from splitnerf.training.losses import Terms
 from splitnerf.training.room import RoomyStep
 from splitnerf.training.schedule import light_moves, light_period
-from splitnerf.training.start import HELD_UNTIL, SIDES_UNTIL
+from splitnerf.training.start import HELD_UNTIL
 from splitnerf.training.step import Room
 
 MOST_GRAPHS = 4  # graphs kept; they share work memory, but each has its own gradients
@@ -109,7 +109,7 @@ class GraphedStep(RoomyStep):
             model.sdf_field.grid.n_active,
             since,
             progress >= c.losses.priors_from,
-            self.start is not None and (progress < HELD_UNTIL, progress < SIDES_UNTIL),
+            self.start is not None and progress < HELD_UNTIL,
             self.mesh.made_at,
             model.occlusion.ready,
         )

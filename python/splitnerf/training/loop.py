@@ -48,7 +48,7 @@ from splitnerf.training.optimiser import make_optimiser, set_learning_rate
 from splitnerf.training.repeatable import same_bits
 from splitnerf.training.room import RoomyStep
 from splitnerf.training.schedule import light_moves, light_period, next_ray_count, progress_of
-from splitnerf.training.start import SIDES_UNTIL, StartShape, fit_to, start_shape
+from splitnerf.training.start import HELD_UNTIL, StartShape, fit_to, start_shape
 from splitnerf.training.step import Step
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps and the last one are all logged
@@ -239,9 +239,9 @@ class Training:
     def start_state(self) -> dict[str, Tensor] | None:
         """The run's start, as long as the surface is held near it."""
         start = self.take_step.start
-        if start is None or self.progress >= SIDES_UNTIL:
+        if start is None or self.progress >= HELD_UNTIL:
             return None
-        return {"distance": start.distance, "points": start.points, "towards": start.towards}
+        return {"distance": start.distance, "trust": start.trust}
 
     @property
     def progress(self) -> float:

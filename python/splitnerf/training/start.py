@@ -2,47 +2,62 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
+import numpy as np
 import torch
+from scipy import ndimage
+from scipy.spatial import cKDTree
 from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset
+from splitnerf.export.meshing import extract_mesh
 from splitnerf.fields import SdfField
+from splitnerf.ops import MeshScene
+from splitnerf.render.rays import image_rays
 from splitnerf.render.renderer import RenderedRays
-from splitnerf.render.stereo import depth_maps, grey_photos, signed_distance, solid_cells, supporting_views, surface_points
+from splitnerf.render.stereo import (
+    EDGE,
+    FIRST_EDGE,
+    MOST_VIEWS,
+    GreyPhotos,
+    depth_maps,
+    fused_distances,
+    grey_photos,
+    refined_depths,
+    spread_out,
+)
 
-HELD_UNTIL = 0.3  # share of the run until which the surface is held near the start
-SIDES_UNTIL = 0.5  # share of the run until which it is held between points on both of its sides
-SHAPE_WEIGHT, POINTS_WEIGHT = 15.0, 30.0  # of the distances from the shape, and of the sides of the surface
-FREE_CELLS = 1.0  # distance from the shape that costs nothing, in cells
-POINTS, BEHIND = 384, 128  # random points beside the stereo's surface in each step, and those behind it
-BESIDE, FREE = (0.015, 0.065), 1.0  # scene units: from the surface to points next to it, and farthest in front of it
-FARTHEST = 0.1  # scene units; an error beyond it pulls no more
-NEAR_VIEWS, WIDE_VIEWS = 1, 3  # photos that agree with a depth
-ALIKE = 0.5  # correlation above which windows are alike
-TRUSTED_SHARE = 0.75  # of the depths of windows that are alike, on which photos agree
+HELD_UNTIL = 0.5  # share of the run until which the surface is held near the start
+SHAPE_WEIGHT = 15.0  # of the distances from the shape
+FREE_CELLS = 0.5  # distance from the shape that costs nothing, in cells
+NEAR_CELLS = 4.0  # from the surface to the points at which the field is compared with it
+POINTS = 384  # such points in each step
+ALIKE = 0.5  # correlation from which a depth is trusted whole
+MARGIN, CLEAR_SHARE = 0.1, 0.47  # of correlations; the share of the object's pixels whose depth must stand out by it
+GUESSED = 0.01  # weight of a depth that no correlation supports
+FIRST_TRUNCATION, FIRST_BLUR = 0.12, 1.0  # of the depths that are compared first, scene units and cells
+PASSES = (  # reach of the depths around the surface, their step, the truncation, scene units; blur in cells
+    (0.3, 0.05, 0.12, 1.0),
+    (0.15, 0.025, 0.08, 0.7),
+    (0.06, 0.0125, 0.06, 0.7),
+)
 FIT_STEPS, FIT_POINTS, FIT_RATE = 200, 8192, 0.01
-NEAR_CELLS = 4.0  # half the points of a fit lie within so many cells of the surface
 FIT_EIKONAL = 0.1
 
 
-class StartShape(NamedTuple):
+class StartShape:
     """A shape as a grid of distances.
 
-    Attributes:
+    Args:
         distance: [r, r, r] signed distances at the cells' centres over [x, y, z], scene units, negative inside.
+        trust: [r, r, r] the correlation of the photos' windows that say so, in [0, 1].
         box: Half size of the cube that the cells cover, scene units.
-        points: [m, 3] points of the surface by depths on which photos agree, scene units.
-        towards: [m, 3] unit directions from the points to the cameras that see them.
     """
 
-    distance: Tensor
-    box: float
-    points: Tensor
-    towards: Tensor
+    def __init__(self, distance: Tensor, trust: Tensor, box: float):
+        self.distance, self.trust, self.box = distance, trust, box
+        self.near = (distance.abs() < NEAR_CELLS * self.cell).nonzero()  # [m, 3] cells by the surface
 
     @property
     def cell(self) -> float:
@@ -51,39 +66,37 @@ class StartShape(NamedTuple):
 
     def at(self, positions: Tensor) -> Tensor:
         """[n] distances at positions [n, 3], read linearly."""
-        places = (positions / self.box).view(1, -1, 1, 1, 3)
-        grid = self.distance.permute(2, 1, 0)[None, None]
-        return F.grid_sample(grid, places, padding_mode="border", align_corners=False).view(-1)
+        return read(self.distance, self.box, positions)
 
-    def drawn(self, generator: torch.Generator) -> Tensor:
-        """[POINTS, 3] random places on the rays of random points: the first third behind the surface, the others in
-        front of it."""
-        draw = {"generator": generator, "device": self.points.device}
-        chosen, random = torch.randint(len(self.points), (POINTS,), **draw), torch.rand(POINTS, **draw)
-        along = BESIDE[0] + (BESIDE[1] - BESIDE[0]) * random
-        along[:BEHIND] *= -1
-        along[-BEHIND:] = BESIDE[1] + (FREE - BESIDE[1]) * random[-BEHIND:]
-        return self.points[chosen] + along[:, None] * self.towards[chosen]
+    def drawn(self, n: int, generator: torch.Generator) -> Tensor:
+        """[n, 3] random places near the surface, on both sides."""
+        draw = {"generator": generator, "device": self.distance.device}
+        at = self.near[torch.randint(len(self.near), (n,), **draw)]
+        return (at + torch.rand(at.shape, **draw)) * self.cell - self.box
+
+    def left(self, sdf: Tensor, positions: Tensor) -> Tensor:
+        """[n] how far signed distances [n] at positions [n, 3] have left the shape, beyond :data:`FREE_CELLS`, scene units, times
+        the squared trust in it."""
+        away = ((sdf - self.at(positions)).abs() - FREE_CELLS * self.cell).clamp(min=0)
+        return away * (read(self.trust, self.box, positions) / ALIKE).clamp(max=1).square()
 
     def shape_loss(self, ray: RenderedRays) -> Tensor:
-        """How far the rays' surface has left the shape, beyond :data:`FREE_CELLS`: the mean over the shaded samples by their
-        weights, scene units."""
-        away = ((ray.sdf - self.at(ray.positions.detach())).abs() - FREE_CELLS * self.cell).clamp(min=0)
-        return (ray.shares @ away) / ray.shares.sum().clamp(min=1e-8)
+        """How far the rays' surface has left the shape: the mean over the shaded samples by their weights, scene units."""
+        return (ray.shares @ self.left(ray.sdf, ray.positions.detach())) / ray.shares.sum().clamp(min=1e-8)
 
 
-def side_loss(sdf: Tensor) -> Tensor:
-    """How deep the points of :meth:`StartShape.drawn`, of signed distances [POINTS], lie on the wrong side of the surface; the
-    mean, scene units."""
-    return torch.cat([sdf[:BEHIND], -sdf[BEHIND:]]).clamp(min=0, max=FARTHEST).mean()
+def read(grid: Tensor, box: float, positions: Tensor) -> Tensor:
+    """[n] values at positions [n, 3] of a grid [r, r, r] over [-box, box]^3, interpolated linearly between the cells' centres."""
+    places = (positions / box).view(1, -1, 1, 1, 3)
+    return F.grid_sample(grid.permute(2, 1, 0)[None, None], places, padding_mode="border", align_corners=False).view(-1)
 
 
 def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | None:
-    """The shape that photos suggest, inside of their visual hull; None where they do not agree.
+    """The shape that photos suggest, inside of their visual hull; None where most of their pixels fit at many depths.
 
-    Where most photos agree on the depths of windows that are alike, the mean of all depths counts: those of dark surfaces and of
-    such without texture are noisy, but not biased, and their mean opens cavities down to the floor. On glossy objects photos
-    do not agree, as reflections look like surfaces behind the object.
+    First the depths of all pixels are compared, then those next to the surface that they make, more and more finely: there the
+    windows follow the surface. Objects without texture fit at all depths, and on glossy ones reflections look like surfaces behind
+    the object: both begin with a sphere, in which shading and outlines carve.
 
     Args:
         photos: The photos of the training.
@@ -92,37 +105,78 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
     """
     if not hull.any():
         return None
-    box, grey = config.surface.box, grey_photos(photos, hull.device)
-    depths, scores = depth_maps(grey, hull, box)
-    grey, found = grey.spread(), depths > 0
-    near, wide = supporting_views(grey, depths, found & (scores > 0))
-    without = near.amax((1, 2), keepdim=True) == 0  # photos that have no neighbour so near
-    agreed, alike = ((near >= NEAR_VIEWS) | without) & (wide >= WIDE_VIEWS), found & (scores > ALIKE)
-    sure = agreed & alike
-    if sure.sum() <= TRUSTED_SHARE * alike.sum():
+    box, small, grey = config.surface.box, *(grey_photos(photos, hull.device, edge) for edge in (FIRST_EDGE, EDGE))
+    depths, scores, margins = depth_maps(small, hull, box)
+    small = small.spread()
+    if (margins > MARGIN).sum() <= CLEAR_SHARE * small.masks.sum():
         return None
-    solid = solid_cells(grey, depths, found & (scores > 0), hull, box)
-    if not solid.any():
-        solid = hull
-    wide_by = box / hull.shape[0]  # half a cell: those of the hull reach beyond the masks
-    points, towards = surface_points(grey, depths, sure)
-    return StartShape(signed_distance(solid, box) + wide_by, box, points, towards)
+    weights = torch.where((depths > 0) & (scores > 0), scores, 0.0)
+    solid, _ = fused_distances(small, depths, weights, hull, box, FIRST_TRUNCATION)
+    solid, spread = blurred(solid, FIRST_BLUR), grey.spread()
+    for reach, step, truncation, blur in PASSES:
+        if not (solid < 0).any():
+            return None
+        base = surface_depths(solid, box, grey)
+        depths, scores = refined_depths(grey, base, reach, step)
+        base, known = base[spread_out(len(base), MOST_VIEWS)], (depths > 0) & (scores > 0)
+        depths, weights = torch.where(known, depths, base), torch.where(known, scores, GUESSED * (base > 0))
+        solid, trust = fused_distances(spread, depths, weights, hull, box, truncation, solid)
+        solid = blurred(solid, blur)
+    return StartShape(exact_distances(solid, box), trust, box) if (solid < 0).any() else None
+
+
+def blurred(distances: Tensor, cells: float) -> Tensor:
+    """Distances [r, r, r], smoothed over about so many cells."""
+    return torch.from_numpy(ndimage.gaussian_filter(distances.cpu().numpy(), cells)).to(distances.device)
+
+
+def surface_mesh(distances: Tensor, box: float, resolution: int) -> tuple[np.ndarray, np.ndarray]:
+    """The zero level of distances [r, r, r] as vertices [n, 3] and faces [m, 3]."""
+    grid = distances.cpu()
+    return extract_mesh(lambda positions: read(grid, box, positions), box, resolution, dense=True)
+
+
+def surface_depths(distances: Tensor, box: float, photos: GreyPhotos) -> Tensor:
+    """[n, h, w] the distances from the cameras to the zero level of distances [r, r, r], scene units; 0 beside it."""
+    vertices, faces = surface_mesh(distances, box, len(distances))
+    scene, maps = MeshScene(vertices, faces), torch.zeros_like(photos.grey)
+    for depths, pose, lens in zip(maps, photos.poses, photos.intrinsics):
+        origins, directions = (x.cpu().numpy() for x in image_rays(pose, lens, *depths.shape))
+        hit, u, v = scene.trace_closest(origins, directions)
+        points = np.einsum("nk,nkx->nx", np.stack([1 - u - v, u, v], 1), vertices[faces[hit]])
+        away = np.where(hit >= 0, np.linalg.norm(points - origins, axis=1), 0.0)
+        depths.copy_(torch.from_numpy(away).view_as(depths))
+    return maps
+
+
+def exact_distances(distances: Tensor, box: float) -> Tensor:
+    """[r, r, r] the distances to the zero level of truncated ones, negative inside. Bodies under a fiftieth of the largest one are
+    left out."""
+    solid = (distances < 0).cpu().numpy()
+    bodies, n = ndimage.label(solid)
+    if n > 1:
+        sizes = np.bincount(bodies.reshape(-1))[1:]
+        small = solid & ~np.isin(bodies, 1 + np.flatnonzero(sizes > 0.02 * sizes.max()))
+        distances = torch.where(torch.from_numpy(small).to(distances.device), distances.abs(), distances)
+        solid &= ~small
+    vertices, _ = surface_mesh(distances, box, 2 * len(distances))
+    axis = (np.arange(len(solid)) + 0.5) * (2 * box / len(solid)) - box
+    centres = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1)
+    away, _ = cKDTree(vertices).query(centres.reshape(-1, 3))
+    signed = np.where(solid, -1.0, 1.0) * away.reshape(solid.shape)
+    return torch.from_numpy(signed.astype(np.float32)).to(distances.device)
 
 
 def fit_to(field: SdfField, shape: StartShape, generator: torch.Generator, config: Config) -> None:
     """Fits the open levels of a distance field to a shape."""
     steps = max(1, min(FIT_STEPS, config.run.steps // 10))
     optimiser = torch.optim.Adam(field.parameters(), lr=FIT_RATE, betas=(0.9, 0.99), eps=1e-15)
-    near = (shape.distance.abs() < NEAR_CELLS * shape.cell).nonzero()
     draw = {"generator": generator, "device": shape.distance.device}
     for step in range(steps):
         for group in optimiser.param_groups:
             group["lr"] = FIT_RATE * 0.1 ** (step / steps)
-        at = near[torch.randint(len(near), (FIT_POINTS // 2,), **draw)]
-        positions = torch.cat([
-            (at + torch.rand(at.shape, **draw)) * shape.cell - shape.box,
-            shape.box * (2 * torch.rand(FIT_POINTS - len(at), 3, **draw) - 1),
-        ])  # fmt: skip
+        anywhere = shape.box * (2 * torch.rand(FIT_POINTS // 2, 3, **draw) - 1)
+        positions = torch.cat([shape.drawn(FIT_POINTS // 2, generator), anywhere])
         sample = field.sample(positions)
         error = (sample.sdf - shape.at(positions)).abs().mean()
         slope = (sample.gradient.norm(dim=1) - 1).square().mean()

@@ -20,7 +20,7 @@ from splitnerf.training.late_occlusion import LateOcclusion
 from splitnerf.training.losses import Terms
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
-from splitnerf.training.start import HELD_UNTIL, POINTS_WEIGHT, SHAPE_WEIGHT, SIDES_UNTIL, StartShape, side_loss
+from splitnerf.training.start import HELD_UNTIL, POINTS, SHAPE_WEIGHT, StartShape
 
 CHANNELS = 3
 
@@ -91,8 +91,9 @@ class Step:
         """The samples of a batch, see :func:`splitnerf.render.renderer.find_samples`."""
         anneal = cosine_anneal(self.model.config, progress)
         probes = batch.probes
-        if self.start is not None and progress < SIDES_UNTIL:
-            probes = probes._replace(anywhere=torch.cat([probes.anywhere, self.start.drawn(self.generator)]))
+        if self.start is not None and progress < HELD_UNTIL:
+            drawn = self.start.drawn(POINTS, self.generator)
+            probes = probes._replace(anywhere=torch.cat([probes.anywhere, drawn]))
         return find_samples(
             self.model, self.grid.cells, *batch.rays, anneal, probes, capacity, batch.phase, self.s
         )
@@ -108,18 +109,18 @@ class Step:
         terms = loss_terms(
             self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen, self.late
         )
-        self.hold(terms, ray, progress)
+        self.hold(terms, ray, found, progress)
         self.model.zero_grad(set_to_none=True)
         terms.backward()
         return ray, terms
 
-    def hold(self, terms: Terms, ray: RenderedRays, progress: float) -> None:
+    def hold(self, terms: Terms, ray: RenderedRays, found: FoundSamples, progress: float) -> None:
         """Adds the terms that hold the surface near the run's start."""
-        if self.start is not None and progress < HELD_UNTIL:
-            terms.add({"start": SHAPE_WEIGHT}, self.start.shape_loss(ray))
-        n_drawn = len(ray.anywhere) - self.model.config.losses.eikonal_points
-        if n_drawn > 0:
-            terms.add({"sides": POINTS_WEIGHT}, side_loss(ray.anywhere[-n_drawn:]))
+        if self.start is None or progress >= HELD_UNTIL:
+            return
+        terms.add({"start": SHAPE_WEIGHT}, self.start.shape_loss(ray))
+        drawn = found.positions[len(found.directions) :][len(ray.anywhere) - POINTS : len(ray.anywhere)]
+        terms.add({"near_start": SHAPE_WEIGHT}, self.start.left(ray.anywhere[-POINTS:], drawn).mean())
 
     def settle(self, counts: Room, room: Room, s: float) -> bool:
         """Takes in the counts of a step with this room and its sharpness. Returns whether the results may be used."""
