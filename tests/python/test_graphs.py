@@ -130,7 +130,8 @@ def called(function, pool, generator):
 
 def test_a_surface_that_is_held_near_its_start_gets_the_same_bits_from_graphs(data, tmp_path, monkeypatch, recording):
     def ball(photos, hull, config):
-        return type(shape_of_ball())(*(getattr(x, "to", lambda _, x=x: x)(hull.device) for x in shape_of_ball(16)))
+        shape = shape_of_ball(16)
+        return type(shape)(shape.distance.to(hull.device), shape.trust.to(hull.device), shape.box)
 
     monkeypatch.setattr(trainer, "start_shape", ball)  # the tiny photos are too few
     runs = []

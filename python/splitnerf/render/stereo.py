@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from scipy import ndimage
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -283,16 +282,3 @@ def _behind_pixels(
     behind = torch.where(jumps, nearest, mean) - away
     seen = (in_camera[:, 2] < 0) & (farthest > 0) & (behind > torch.where(jumps, truncation, -truncation))
     return torch.where(seen, behind, 0.0), torch.where(seen, count, 0.0)
-
-
-def signed_distance(solid: Tensor, box: float) -> Tensor:
-    """[r, r, r] float32 signed distances at the cells' centres to the surface of solid cells [r, r, r], scene units, negative
-    inside, smoothed over about a cell. Bodies under a fiftieth of the largest one are left out."""
-    cells = solid.cpu().numpy()
-    bodies, n = ndimage.label(cells)
-    if n > 1:
-        sizes = np.bincount(bodies.reshape(-1))[1:]
-        cells = np.isin(bodies, 1 + np.flatnonzero(sizes > 0.02 * sizes.max()))
-    outside, inside = (ndimage.distance_transform_edt(x) for x in (~cells, cells))
-    distance = np.where(cells, 0.5 - inside, outside - 0.5) * (2 * box / len(cells))
-    return torch.from_numpy(ndimage.gaussian_filter(distance, 1.0).astype(np.float32)).to(solid.device)

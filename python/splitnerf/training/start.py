@@ -28,7 +28,7 @@ from splitnerf.render.stereo import (
     spread_out,
 )
 
-HELD_UNTIL = 0.5  # share of the run until which the surface is held near the start
+HELD_UNTIL = 0.7  # share of the run until which the surface is held near the start
 SHAPE_WEIGHT = 15.0  # of the distances from the shape
 FREE_CELLS = 0.5  # distance from the shape that costs nothing, in cells
 NEAR_CELLS = 4.0  # from the surface to the points at which the field is compared with it
@@ -37,13 +37,12 @@ ALIKE = 0.5  # correlation from which a depth is trusted whole
 MARGIN, CLEAR_SHARE = 0.1, 0.47  # of correlations; the share of the object's pixels whose depth must stand out by it
 GUESSED = 0.01  # weight of a depth that no correlation supports
 FIRST_TRUNCATION, FIRST_BLUR = 0.12, 1.0  # of the depths that are compared first, scene units and cells
-PASSES = (  # reach of the depths around the surface, their step, the truncation, scene units; blur in cells
-    (0.3, 0.05, 0.12, 1.0),
-    (0.15, 0.025, 0.08, 0.7),
-    (0.06, 0.0125, 0.06, 0.7),
+PASSES = (  # edge of the photos; reach of the depths around the surface, their step, the truncation, scene units; blur in cells
+    *[(FIRST_EDGE, 0.3, 0.04, 0.12, 1.0)] * 4,
+    (EDGE, 0.15, 0.025, 0.08, 0.7),
+    (EDGE, 0.06, 0.0125, 0.06, 0.7),
 )
 FIT_STEPS, FIT_POINTS, FIT_RATE = 200, 8192, 0.01
-FIT_EIKONAL = 0.1
 
 
 class StartShape:
@@ -105,22 +104,21 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
     """
     if not hull.any():
         return None
-    box, small, grey = config.surface.box, *(grey_photos(photos, hull.device, edge) for edge in (FIRST_EDGE, EDGE))
-    depths, scores, margins = depth_maps(small, hull, box)
-    small = small.spread()
-    if (margins > MARGIN).sum() <= CLEAR_SHARE * small.masks.sum():
+    box, sizes = config.surface.box, {edge: grey_photos(photos, hull.device, edge) for edge in (FIRST_EDGE, EDGE)}
+    depths, scores, margins = depth_maps(sizes[FIRST_EDGE], hull, box)
+    spread = sizes[FIRST_EDGE].spread()
+    if (margins > MARGIN).sum() <= CLEAR_SHARE * spread.masks.sum():
         return None
     weights = torch.where((depths > 0) & (scores > 0), scores, 0.0)
-    solid, _ = fused_distances(small, depths, weights, hull, box, FIRST_TRUNCATION)
-    solid, spread = blurred(solid, FIRST_BLUR), grey.spread()
-    for reach, step, truncation, blur in PASSES:
+    solid = blurred(fused_distances(spread, depths, weights, hull, box, FIRST_TRUNCATION)[0], FIRST_BLUR)
+    for edge, reach, step, truncation, blur in PASSES:
         if not (solid < 0).any():
             return None
-        base = surface_depths(solid, box, grey)
+        grey, base = sizes[edge], surface_depths(solid, box, sizes[edge])
         depths, scores = refined_depths(grey, base, reach, step)
         base, known = base[spread_out(len(base), MOST_VIEWS)], (depths > 0) & (scores > 0)
         depths, weights = torch.where(known, depths, base), torch.where(known, scores, GUESSED * (base > 0))
-        solid, trust = fused_distances(spread, depths, weights, hull, box, truncation, solid)
+        solid, trust = fused_distances(grey.spread(), depths, weights, hull, box, truncation, solid)
         solid = blurred(solid, blur)
     return StartShape(exact_distances(solid, box), trust, box) if (solid < 0).any() else None
 
@@ -177,10 +175,7 @@ def fit_to(field: SdfField, shape: StartShape, generator: torch.Generator, confi
             group["lr"] = FIT_RATE * 0.1 ** (step / steps)
         anywhere = shape.box * (2 * torch.rand(FIT_POINTS // 2, 3, **draw) - 1)
         positions = torch.cat([shape.drawn(FIT_POINTS // 2, generator), anywhere])
-        sample = field.sample(positions)
-        error = (sample.sdf - shape.at(positions)).abs().mean()
-        slope = (sample.gradient.norm(dim=1) - 1).square().mean()
         optimiser.zero_grad(set_to_none=True)
-        (error + FIT_EIKONAL * slope).backward()
+        (field.sdf(positions) - shape.at(positions)).abs().mean().backward()
         optimiser.step()
     optimiser.zero_grad(set_to_none=True)
