@@ -1,4 +1,4 @@
-"""The demo scene: a copper ball, a blue torus and a matte box on a stone plinth, under a procedural sky.
+"""The demo scene: a copper ball, a blue torus and a striped clay bowl on a stone plinth, under a procedural sky.
 
 Everything is built in memory and rendered by the project's own path tracer, so that `splitnerf demo` needs no
 download and has the full truth (materials, normals, light, mesh) to compare with.
@@ -45,21 +45,21 @@ def build_scene() -> DemoScene:
     """Builds the demo mesh: four closed parts that touch, each with its own material."""
     lift = 0.004  # the parts sink this deep into the plinth, so that no light passes below them
     ball = _moved(_ball(0.34), (-0.30, -0.14, PLINTH_TOP + 0.34 - lift))
-    box = _turned(_rounded_box((0.19, 0.19, 0.35), 0.06), np.radians(28))
-    box = _moved(box, (0.22, 0.34, PLINTH_TOP + 0.35 - lift))
+    bowl = _moved(_bowl(outer=0.30, inner=0.24), (0.26, 0.34, PLINTH_TOP + 0.30 - lift))
     torus = _moved(_torus(0.20, 0.09), (0.32, -0.32, PLINTH_TOP + 0.09 - lift))
     plinth = _plinth(radius=0.84, height=0.18, bevel=0.035)
 
     # An inlaid ring gives the plinth a change of material that no shape announces.
     radius = np.hypot(plinth[0][:, 0], plinth[0][:, 1])
     inlay = (np.abs(radius - 0.74) < 0.027) & (plinth[2][:, 2] > 0.99)
+    stripes = np.sin(60 * bowl[0][:, 2]) > 0
     stone, bronze = (0.50, 0.46, 0.40), (0.28, 0.075, 0.05)
     plinth_albedo = np.where(inlay[:, None], bronze, stone)
     plinth_roughness = np.where(inlay, 0.35, 0.65)
 
     parts = [
         (ball, (0.95, 0.60, 0.42), 0.25, 1.0),
-        (box, (0.72, 0.42, 0.10), 0.85, 0.0),
+        (bowl, np.where(stripes[:, None], (0.72, 0.42, 0.10), (0.62, 0.58, 0.50)), 0.85, 0.0),
         (torus, (0.035, 0.13, 0.42), 0.15, 0.0),
         (plinth, plinth_albedo, plinth_roughness, 0.0),
     ]
@@ -173,18 +173,6 @@ def _ball(radius: float) -> Shape:
     return sphere.vertices * radius, sphere.faces, np.array(sphere.vertices)
 
 
-def _rounded_box(half: tuple[float, float, float], rounding: float) -> Shape:
-    """All points at distance `rounding` from a smaller box, pushed out from the point of it that is nearest."""
-    cube = trimesh.creation.box(extents=(2, 2, 2))
-    for _ in range(5):
-        cube = cube.subdivide()
-    outer = cube.vertices * half
-    inner = np.clip(outer, rounding - np.array(half), np.array(half) - rounding)
-    normals = outer - inner
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return inner + rounding * normals, cube.faces, normals
-
-
 def _torus(major: float, minor: float) -> Shape:
     n_major, n_minor = 160, 80
     turns = [np.arange(n) * 2 * np.pi / n for n in (n_major, n_minor)]
@@ -195,18 +183,37 @@ def _torus(major: float, minor: float) -> Shape:
 
 
 def _plinth(*, radius: float, height: float, bevel: float) -> Shape:
-    """A disc with rounded rims below PLINTH_TOP: a profile of (radius, z, normal) turned about z."""
-    n_turn, n_arc = 256, 8
+    """A disc with rounded rims below PLINTH_TOP."""
     top, bottom, flat = PLINTH_TOP, PLINTH_TOP - height, radius - bevel
     profile = [(r, bottom, 0.0, -1.0) for r in np.linspace(0, flat, 24)]
     for centre, start in ((bottom + bevel, -np.pi / 2), (top - bevel, 0.0)):
-        for angle in start + np.linspace(0, np.pi / 2, n_arc):
-            c, s = np.cos(angle), np.sin(angle)
-            profile.append((flat + bevel * c, centre + bevel * s, c, s))
-    profile += [(r, top, 0.0, 1.0) for r in np.linspace(flat, 0, 160)]
-    # Where a rim meets a flat or the wall both name the same ring once.
-    repeats = [i > 0 and np.allclose(p, profile[i - 1], atol=1e-9) for i, p in enumerate(profile)]
-    profile = np.array([p for p, repeat in zip(profile, repeats) if not repeat])
+        profile += _arc(flat, centre, bevel, start, start + np.pi / 2)
+    return _revolved(profile + [(r, top, 0.0, 1.0) for r in np.linspace(flat, 0, 160)])
+
+
+def _bowl(*, outer: float, inner: float) -> Shape:
+    """Half a hollow ball below the origin, with a round rim."""
+    wall = 0.5 * (outer - inner)
+    below, rim, within = (0.0, 0.0, outer, -np.pi / 2, 0.0), (outer - wall, 0.0, wall, 0.0, np.pi), (0.0, 0.0, inner, 0.0, -np.pi / 2)
+    inside = [(r, z, -normal_r, -normal_z) for r, z, normal_r, normal_z in _arc(*within, n=96)]
+    return _revolved(_arc(*below, n=96) + _arc(*rim, n=24) + inside)
+
+
+Profile = list[tuple[float, float, float, float]]  # radius, z, and the normal's parts along both
+
+
+def _arc(r: float, z: float, radius: float, start: float, end: float, n: int = 8) -> Profile:
+    """Points of a circle about (r, z), between two angles from the horizontal."""
+    turns = [(np.cos(angle), np.sin(angle)) for angle in np.linspace(start, end, n)]
+    return [(r + radius * c, z + radius * s, c, s) for c, s in turns]
+
+
+def _revolved(points: Profile) -> Shape:
+    """A profile from pole to pole, turned about z."""
+    n_turn = 256
+    # Where two parts of a profile meet both name the same ring once.
+    repeats = [i > 0 and np.allclose(p, points[i - 1], atol=1e-9) for i, p in enumerate(points)]
+    profile = np.array([p for p, repeat in zip(points, repeats) if not repeat])
     turn = np.arange(n_turn) * 2 * np.pi / n_turn
     r, z, normal_r, normal_z = (profile[None, :, k] for k in range(4))
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
@@ -231,13 +238,6 @@ def _grid_triangles(n_rows: int, n_columns: int, *, wrap_columns: bool) -> np.nd
 
 def _moved(shape: Shape, offset: tuple[float, float, float]) -> Shape:
     return shape[0] + np.array(offset), shape[1], shape[2]
-
-
-def _turned(shape: Shape, angle: float) -> Shape:
-    """Turns a shape about z by an angle in radians."""
-    c, s = np.cos(angle), np.sin(angle)
-    rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    return shape[0] @ rotation.T, shape[1], shape[2] @ rotation.T
 
 
 # ---- light ----
