@@ -51,8 +51,9 @@ def test_the_floor_of_a_bowl_stands_where_it_is(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape, material, f_score", [("bowl", "matte", 0.9), ("mask", "glossy", 0.9), ("plinth", "matte", 0.9)])
-def test_two_minutes_make_a_hollow_shape(shape, material, f_score, tmp_path):
-    data = photographed(tmp_path, shape, "--material", material, "--size", "120", "--train", "60", "--test", "2", "--spp", "32")
+@pytest.mark.parametrize("shape, material", [("bowl", "matte"), ("mask", "glossy"), ("plinth", "matte")])
+def test_two_minutes_make_a_hollow_shape(shape, material, tmp_path):
+    images = ("--size", "120", "--train", "60", "--test", "2", "--spp", "32")
+    data = photographed(tmp_path, shape, "--material", material, *images)
     assert main(["train", str(data), "--out", str(tmp_path / "run"), "--set", "run.steps=2500", "--no-refine"]) == DONE
-    assert read_evaluation(tmp_path / "run")["f_score"] > f_score
+    assert read_evaluation(tmp_path / "run")["f_score"] > 0.9

@@ -23,7 +23,6 @@ from splitnerf.training.start import (
     StartShape,
     exact_distances,
     fit_to,
-    start_shape,
     surface_depths,
 )
 
@@ -196,9 +195,10 @@ def test_a_field_is_held_where_the_photos_are_sure_and_within_half_a_cell():
     points = torch.tensor([[0.9, 0.0, 0.0], [-0.9, 0.0, 0.0]])
     sure = torch.where(torch.arange(CELLS)[:, None, None] < CELLS // 2, 0.05, 0.8).expand_as(shape.trust)
     unsure = StartShape(shape.distance, sure, BOX)
-    assert torch.allclose(shape.left(shape.at(points) + 0.4 * shape.cell, points), torch.zeros(2))
-    assert torch.allclose(shape.left(shape.at(points) - 1.5 * shape.cell, points), torch.full((2,), shape.cell), atol=1e-6)
-    assert torch.allclose(unsure.left(shape.at(points) + 1.5 * shape.cell, points), shape.cell * torch.tensor([1.0, 0.01]), atol=1e-6)
+    true = shape.at(points)
+    for held, cells, expected in ((shape, 0.4, [0.0, 0.0]), (shape, -1.5, [1.0, 1.0]), (unsure, 1.5, [1.0, 0.01])):
+        left = held.left(true + cells * shape.cell, points)
+        assert torch.allclose(left, shape.cell * torch.tensor(expected), atol=1e-6)
 
 
 def test_a_field_takes_a_shape():

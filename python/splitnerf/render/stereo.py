@@ -1,8 +1,9 @@
 """Depth from photos alone: each photo's pixels are compared with its neighbours' at many depths.
 
-A distance field moves where colours change nearby, so it never opens a cavity that it began as a solid: a lid, far from the
-floor behind it, shows no direction in which it should move. Stereo compares all depths at once, and needs neither materials nor
-light. Windows that follow a surface found before show its depth several times more precisely than windows that face the camera.
+A distance field moves where colours change nearby, so it never opens a cavity that it began as a solid: a lid, far from
+the floor behind it, shows no direction in which it should move. Stereo compares all depths at once, and needs neither
+materials nor light. Windows that follow a surface found before show its depth several times more precisely than windows
+that face the camera.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def _neighbours(angles: Tensor) -> list[int]:
 
 @torch.no_grad()
 def depth_maps(photos: GreyPhotos, hull: Tensor, box: float) -> tuple[Tensor, Tensor, Tensor]:
-    """The depth of each pixel of :meth:`GreyPhotos.spread` at which its window looks most like those of neighbouring photos.
+    """The depth of each pixel of :meth:`GreyPhotos.spread` at which its window looks most like those of neighbours.
 
     Args:
         photos: All photos.
@@ -124,10 +125,12 @@ def refined_depths(photos: GreyPhotos, base: Tensor, reach: float, step: float) 
 
 
 def _swept(
-    photos: GreyPhotos, i: int, rays: tuple[Tensor, Tensor], first: Tensor, span: Tensor, step: float, base: Tensor | None = None,
+    photos: GreyPhotos, i: int, rays: tuple[Tensor, Tensor], first: Tensor, span: Tensor, step: float,
+    base: Tensor | None = None,
 ) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
-    """The depths, scores and margins [h, w] of one photo, compared from depths `first` [h, w] over `span` [h, w], which is 0 where there
-    is nothing to compare. A photo does not count where its own surface, of depths `base` [n, h, w], hides the middle of the span."""
+    """The depths, scores and margins [h, w] of one photo, compared from depths `first` [h, w] over `span` [h, w], which
+    is 0 where there is nothing to compare. A photo does not count where its own surface, of depths `base` [n, h, w],
+    hides the middle of the span."""
     grey, (rays_o, rays_d) = photos.grey[i], rays
     (height, width), near = grey.shape, _neighbours(angles_between(photos.poses)[i])
     depths, scores, margins = torch.zeros_like(grey), torch.full_like(grey, -1.0), torch.zeros_like(grey)
@@ -150,7 +153,8 @@ def _swept(
         others = F.grid_sample(photos.grey[j].expand(len(along), 1, height, width), at, align_corners=False)
         alike = of_photo.correlation(others)[:, 0]
         if base is not None:
-            behind, seen = _behind(photos, base, base > 0, j, (rays_o[0] + (first + 0.5 * span)[..., None] * rays_d).view(-1, 3))
+            middles = rays_o[0] + (first + 0.5 * span)[..., None] * rays_d
+            behind, seen = _behind(photos, base, j, middles.view(-1, 3))
             alike = torch.where(((behind < -HIDDEN) & seen).view_as(inside), -1.0, alike)
         compared.append(alike)
     score = torch.stack(compared).topk(min(BEST, len(near)), 0).values.mean(0)
@@ -215,26 +219,27 @@ def _peak(score: Tensor, k: Tensor) -> Tensor:
     return (0.5 * (before - after) / (before - 2 * here + after).clamp(max=-1e-6)).clamp(-0.5, 0.5)
 
 
-def _behind(photos: GreyPhotos, depths: Tensor, known: Tensor, j: int, points: Tensor) -> tuple[Tensor, Tensor]:
-    """How far the surface of photo j lies behind points [m, 3] along its rays, [m], and whether it is known, [m] bool."""
+def _behind(photos: GreyPhotos, depths: Tensor, j: int, points: Tensor) -> tuple[Tensor, Tensor]:
+    """How far the surface of photo j lies behind points [m, 3] along its rays, [m], and whether it has one there, [m]."""
     height, width = depths.shape[1:]
     from_camera = points - photos.poses[j, :3, 3]
     in_camera = from_camera @ photos.poses[j, :3, :3]
     x, y = _projected(in_camera, photos.intrinsics[j]).floor().long().unbind(-1)
     seen = (in_camera[:, 2] < 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
     x, y = x.clamp(0, width - 1), y.clamp(0, height - 1)
-    return depths[j, y, x] - from_camera.norm(dim=1), seen & known[j, y, x]
+    return depths[j, y, x] - from_camera.norm(dim=1), seen & (depths[j, y, x] > 0)
 
 
 @torch.no_grad()
 def fused_distances(
-    photos: GreyPhotos, depths: Tensor, weights: Tensor, hull: Tensor, box: float, truncation: float, before: Tensor | None = None,
+    photos: GreyPhotos, depths: Tensor, weights: Tensor, hull: Tensor, box: float, truncation: float,
+    before: Tensor | None = None,
 ) -> tuple[Tensor, Tensor]:  # fmt: skip
-    """[r, r, r] distances to the surface of depth maps along the rays, the mean over the photos, positive outside; and the mean weight
-    of the depths that say so, 0 where none does.
+    """[r, r, r] distances to the surface of depth maps along the rays, the mean over the photos, positive outside; and the
+    mean weight of the depths that say so, 0 where none does.
 
-    Between pixels the depths are interpolated. Where they jump by more than two truncations, at an outline, a place is only known
-    to be empty, and only if it lies in front of both surfaces: so thin walls stay.
+    Between pixels the depths are interpolated. Where they jump by more than two truncations, at an outline, a place is
+    only known to be empty, and only if it lies in front of both surfaces: so thin walls stay.
 
     Args:
         photos, depths: The photos that have depths, and these, [n, h, w].
@@ -245,9 +250,11 @@ def fused_distances(
 
     Source: Curless and Levoy 1996, for the mean of truncated distances.
     """
-    resolution, index = hull.shape[0], hull.nonzero()
+    resolution, index, cells = hull.shape[0], hull.nonzero(), hull.nonzero(as_tuple=True)
     points = ((torch.arange(resolution, device=hull.device) + 0.5) * (2 * box / resolution) - box)[index]
-    known = torch.full_like(points[:, 0], -truncation) if before is None else before[tuple(index.T)].clamp(-truncation, truncation)
+    known = torch.full_like(points[:, 0], -truncation)
+    if before is not None:
+        known = before[cells].clamp(-truncation, truncation)
     total, weight = PRIOR_WEIGHT * known, torch.full_like(known, PRIOR_WEIGHT)
     votes = torch.zeros_like(known)
     for j in range(len(depths)):
@@ -255,15 +262,17 @@ def fused_distances(
         total += share * behind.clamp(-truncation, truncation)
         weight += share
         votes += share > 0
-    distances, trust = torch.full(hull.shape, truncation, device=hull.device), torch.zeros(hull.shape, device=hull.device)
-    distances[tuple(index.T)], trust[tuple(index.T)] = total / weight, (weight - PRIOR_WEIGHT) / votes.clamp(min=1)
+    distances = torch.full(hull.shape, truncation, device=hull.device)
+    trust = torch.zeros_like(distances)
+    distances[cells], trust[cells] = total / weight, (weight - PRIOR_WEIGHT) / votes.clamp(min=1)
     return distances, trust
 
 
 def _behind_pixels(
     photos: GreyPhotos, depths: Tensor, weights: Tensor, j: int, points: Tensor, truncation: float
 ) -> tuple[Tensor, Tensor]:
-    """How far the surface of depths [h, w] lies behind points [m, 3] along the rays of photo j, and how much that counts, [m] each."""
+    """How far the surface of depths [h, w] lies behind points [m, 3] along the rays of photo j, and how much that counts,
+    [m] each."""
     height, width = depths.shape
     from_camera = points - photos.poses[j, :3, 3]
     in_camera, away = from_camera @ photos.poses[j, :3, :3], from_camera.norm(dim=1)
@@ -271,9 +280,11 @@ def _behind_pixels(
     corner = place.floor()
     right, below = (place - corner).unbind(-1)
     x, y = corner.long().unbind(-1)
-    corners = [(y.clamp(0, height - 1), x.clamp(0, width - 1)) for y, x in ((y, x), (y, x + 1), (y + 1, x), (y + 1, x + 1))]
+    square = ((y, x), (y, x + 1), (y + 1, x), (y + 1, x + 1))
+    corners = [(y.clamp(0, height - 1), x.clamp(0, width - 1)) for y, x in square]
     near, counts = (torch.stack([values[at] for at in corners]) for values in (depths, weights))
-    shares = torch.stack([(1 - below) * (1 - right), (1 - below) * right, below * (1 - right), below * right]) * (counts > 0)
+    shares = torch.stack([(1 - below) * (1 - right), (1 - below) * right, below * (1 - right), below * right])
+    shares = shares * (counts > 0)
     total = shares.sum(0).clamp(min=1e-6)
     mean, count = (shares * near).sum(0) / total, (shares * counts).sum(0) / total
     nearest = torch.where(counts > 0, near, torch.inf).amin(0)

@@ -37,7 +37,8 @@ ALIKE = 0.5  # correlation from which a depth is trusted whole
 MARGIN, CLEAR_SHARE = 0.2, 0.25  # of correlations; the share of the object's pixels whose depth must stand out by it
 GUESSED = 0.01  # weight of a depth that no correlation supports
 FIRST_TRUNCATION, FIRST_BLUR = 0.12, 1.0  # of the depths that are compared first, scene units and cells
-PASSES = (  # edge of the photos; reach of the depths around the surface, their step, the truncation, scene units; blur in cells
+# Edge of the photos; reach of the depths around the surface, their step, the truncation, scene units; blur in cells.
+PASSES = (
     *[(FIRST_EDGE, 0.3, 0.04, 0.12, 1.0)] * 4,
     (EDGE, 0.15, 0.025, 0.08, 0.7),
     (EDGE, 0.06, 0.0125, 0.06, 0.7),
@@ -74,18 +75,18 @@ class StartShape:
         return (at + torch.rand(at.shape, **draw)) * self.cell - self.box
 
     def left(self, sdf: Tensor, positions: Tensor) -> Tensor:
-        """[n] how far signed distances [n] at positions [n, 3] have left the shape, beyond :data:`FREE_CELLS`, scene units, times
-        the squared trust in it."""
+        """[n] how far signed distances [n] at positions [n, 3] have left the shape, beyond :data:`FREE_CELLS`, scene units,
+        times the squared trust in it, in units of :data:`ALIKE`."""
         away = ((sdf - self.at(positions)).abs() - FREE_CELLS * self.cell).clamp(min=0)
         return away * (read(self.trust, self.box, positions) / ALIKE).clamp(max=1).square()
 
     def shape_loss(self, ray: RenderedRays) -> Tensor:
-        """How far the rays' surface has left the shape: the mean over the shaded samples by their weights, scene units."""
+        """How far the rays' surface has left the shape: the mean over shaded samples by their weights, scene units."""
         return (ray.shares @ self.left(ray.sdf, ray.positions.detach())) / ray.shares.sum().clamp(min=1e-8)
 
 
 def read(grid: Tensor, box: float, positions: Tensor) -> Tensor:
-    """[n] values at positions [n, 3] of a grid [r, r, r] over [-box, box]^3, interpolated linearly between the cells' centres."""
+    """[n] values at positions [n, 3] of a grid [r, r, r] over [-box, box]^3, linear between the cells' centres."""
     places = (positions / box).view(1, -1, 1, 1, 3)
     return F.grid_sample(grid.permute(2, 1, 0)[None, None], places, padding_mode="border", align_corners=False).view(-1)
 
@@ -93,9 +94,9 @@ def read(grid: Tensor, box: float, positions: Tensor) -> Tensor:
 def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | None:
     """The shape that photos suggest, inside of their visual hull; None where most of their pixels fit at many depths.
 
-    First the depths of all pixels are compared, then those next to the surface that they make, more and more finely: there the
-    windows follow the surface. Objects without texture fit at all depths, and on glossy ones reflections look like surfaces behind
-    the object: both begin with a sphere, in which shading and outlines carve.
+    First the depths of all pixels are compared, then those next to the surface that they make, more and more finely:
+    there the windows follow the surface. Objects without texture fit at all depths, and on glossy ones reflections look
+    like surfaces behind the object: both begin with a sphere, in which shading and outlines carve.
 
     Args:
         photos: The photos of the training.
@@ -148,8 +149,8 @@ def surface_depths(distances: Tensor, box: float, photos: GreyPhotos) -> Tensor:
 
 
 def exact_distances(distances: Tensor, box: float) -> Tensor:
-    """[r, r, r] the distances to the zero level of truncated ones, negative inside. Bodies under a fiftieth of the largest one are
-    left out."""
+    """[r, r, r] the distances to the zero level of truncated ones, negative inside. Bodies under a fiftieth of the largest
+    one are left out."""
     solid = (distances < 0).cpu().numpy()
     bodies, n = ndimage.label(solid)
     if n > 1:
