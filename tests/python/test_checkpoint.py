@@ -146,8 +146,9 @@ ALLOWED = {
     "parameters whose sum is too large": lambda c: c["model"]["light.texels"].fill_(3e38),
     "the largest progress": lambda c: c.update(meshed_at=1.0, previewed_at=1.0, seconds=0.0, step=0),
     "no mean of quality yet": lambda c: c.update(psnr_mean=None),
-    "a mesh": lambda c: c.update(MESH),
-    "a mesh of smaller numbers": lambda c: c.update(MESH, mesh_faces=MESH["mesh_faces"].int()),
+    "a mesh of smaller numbers": lambda c: c.update(
+        MESH, mesh_faces=MESH["mesh_faces"].int(), occlusion_light=sent(0)
+    ),
     "light that a mesh sends": lambda c: c.update(MESH, occlusion_light=sent(4, 0, 2, 255, 4 * 256 - 1)),
     "light of a mesh that nothing hits": lambda c: c.update(MESH, occlusion_light=sent(0)),
     "light that was not sent yet": lambda c: c.update(MESH, occlusion_light=sent(0, sent=None, senders=None)),
