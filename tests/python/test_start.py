@@ -95,6 +95,7 @@ def test_windows_that_follow_a_surface_find_it_more_precisely(box_photos, found)
     photos, true = box_photos
     beside = torch.where(true > 0, true + 0.05, 0.0)
     depths, scores = stereo.refined_depths(photos, beside, 0.1, 0.02)
+    assert ((depths - beside).abs()[scores > 0] < 0.09).all()  # the outermost are no result
     known = (scores > 0.7) & (true > 0)
     assert known.sum() > 0.5 * (true > 0).sum()
     error = (depths - true)[known].abs()
@@ -129,7 +130,6 @@ def test_depths_open_a_cavity_that_no_outline_shows(box_photos, found):
 
 
 def test_true_depths_make_the_true_walls(box_photos):
-    """Also next to the rim, where depths jump from the wall to the floor."""
     photos, true = box_photos
     distances, trust = stereo.fused_distances(photos, true, (true > 0).float(), hull(), BOX, 0.08)
     shape = StartShape(distances, trust, BOX)
@@ -138,6 +138,20 @@ def test_true_depths_make_the_true_walls(box_photos):
     assert (wall(0.5) < -0.03).all()
     assert (wall(0.35) > 0.02).all() and (wall(0.65) > 0.02).all()
     assert (trust[distances.abs() < 0.04] > 0.9).all()
+
+
+def test_a_jump_between_two_pixels_empties_nothing_behind_the_nearer_surface():
+    """A camera looks down from z = 3 on two planes, one 2 and one 3 away, whose edge passes beside a cell's centre."""
+    pose, lens = torch.eye(4)[None].clone(), torch.tensor([[110.0, 110.0, 40.0, 40.0]])
+    pose[0, 2, 3] = 3.0
+    depths = torch.where(torch.arange(SIZE) < 42, 2.0, 3.0).expand(1, SIZE, SIZE)
+    photo = stereo.GreyPhotos(torch.zeros_like(depths), depths > 0, pose, lens)
+    everywhere = torch.ones(CELLS, CELLS, CELLS, dtype=torch.bool)
+    distances, trust = stereo.fused_distances(photo, depths, torch.ones_like(depths), everywhere, BOX, 0.08)
+    behind, in_front, beside = (24, 24, 39), (24, 24, 44), (20, 24, 39)  # 0.03 behind the nearer plane, 0.28 before it
+    assert distances[behind] < -0.0799 and trust[behind] == 0
+    assert distances[in_front] > 0.07 and trust[in_front] == 1
+    assert -0.06 < distances[beside] < -0.02 and trust[beside] == 1
 
 
 def test_without_depths_what_was_known_stays(box_photos, found):
