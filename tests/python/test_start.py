@@ -150,8 +150,8 @@ def test_a_jump_between_two_pixels_empties_nothing_behind_the_nearer_surface():
     distances, trust = stereo.fused_distances(photo, depths, torch.ones_like(depths), everywhere, BOX, 0.08)
     behind, in_front, beside = (24, 24, 39), (24, 24, 44), (20, 24, 39)  # 0.03 behind the nearer plane, 0.28 before it
     assert distances[behind] < -0.0799 and trust[behind] == 0
-    assert distances[in_front] > 0.07 and trust[in_front] == 1
-    assert -0.06 < distances[beside] < -0.02 and trust[beside] == 1
+    assert distances[in_front] > 0.07 and trust[in_front] > 0.99
+    assert -0.06 < distances[beside] < -0.02 and trust[beside] > 0.99
 
 
 def test_without_depths_what_was_known_stays(box_photos, found):
