@@ -2,7 +2,7 @@
 
     python tests/bench/figures.py DATA --mlp RUN --pyramid RUN --no-loss RUN --out FOLDER [--view 0]
 
-The runs: `--set light=mlp --set occlusion=mlp --set shading=split`, the defaults, and the first with
+The runs: `--set light.kind=mlp --set occlusion.kind=mlp --set shading.method=split`, the defaults, and the first with
 `--set occlusion_weight=0`. Any may be left out, and what needs it with it.
 
     lights.png       the recovered light of both models beside the truth, one factor per channel taken out

@@ -203,6 +203,11 @@ REFUSED = {
     "a frame of single precision": (lambda c: c.update(box_from_world=torch.eye(4)), "box_from_world is missing"),
     "no exposures": (lambda c: c.pop("exposures"), "exposures is missing"),
     "no word on how it ended": (lambda c: c.pop("stopped"), "stopped is missing"),
+    "no mean of quality": (lambda c: c.pop("psnr_mean"), "psnr_mean is of another type"),
+    "a start without a surface": (
+        lambda c: c.update(start={"distance": torch.full((16, 16, 16), 2.0), "trust": torch.ones(16, 16, 16)}),
+        "start has no surface",
+    ),
     "a mean of quality that is a word": (lambda c: c.update(psnr_mean="high"), "psnr_mean is of another type"),
     "an unknown device": (lambda c: c.update(device="tpu"), "device is 'tpu'"),
     "cells of another shape": (lambda c: c.update(cells=c["cells"].flatten()), "cells is missing"),

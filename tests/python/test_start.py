@@ -154,6 +154,19 @@ def test_a_jump_between_two_pixels_empties_nothing_behind_the_nearer_surface():
     assert -0.06 < distances[beside] < -0.02 and trust[beside] > 0.99
 
 
+def test_a_photo_says_nothing_of_what_it_does_not_show(box_photos):
+    """Photos that are cut in the middle of the box leave its other half as it was."""
+    photos, true = box_photos
+    half = stereo.GreyPhotos(photos.grey[:1], photos.masks[:1], photos.poses[:1], photos.intrinsics[:1])
+    known = torch.where(torch.arange(SIZE) < SIZE // 2, (true[:1] > 0).float(), 0.0)[..., : SIZE // 2]
+    _, trust = stereo.fused_distances(half, true[:1, :, : SIZE // 2], known, hull(), BOX, 0.08)
+    points = hull().nonzero() * (2 * BOX / CELLS) + BOX / CELLS - BOX
+    in_camera = (points - photos.poses[0, :3, 3]) @ photos.poses[0, :3, :3]
+    column = photos.intrinsics[0, 2] - photos.intrinsics[0, 0] * in_camera[:, 0] / in_camera[:, 2]
+    assert (trust[hull()][column > SIZE // 2 + 1] == 0).all()
+    assert (trust[hull()][column < SIZE // 2 - 1] > 0).any()
+
+
 def test_without_depths_what_was_known_stays(box_photos, found):
     none, photos = torch.zeros_like(found[1]), box_photos[0]
     distances, trust = stereo.fused_distances(photos, found[0], none, hull(), BOX, 0.12)

@@ -94,7 +94,7 @@ class Surface:
     width: int = setting(64, "neurons of the hidden layer", at_least=1, at_most=1024)
     outputs: int = setting(13, "outputs of the network, the distance among them", at_least=1, at_most=1024)
     start: str = setting(
-        "stereo", "shape that training starts from; stereo: what the photos' depths leave of their visual hull; sphere: the paper",
+        "stereo", "shape that training starts from; stereo: what the photos' depths leave of their visual hull, or a sphere where too few depths are clear; sphere: the paper",
         choices=("stereo", "sphere"),
     )  # fmt: skip
     sphere_radius: float = setting(

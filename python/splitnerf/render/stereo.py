@@ -1,7 +1,7 @@
 """Depth from photos alone: each photo's pixels are compared with its neighbours' at many depths.
 
-A distance field moves where colours change nearby, so it never opens a cavity that it began as a solid: a lid, far from
-the floor behind it, shows no direction in which it should move. Stereo compares all depths at once, and needs neither
+A distance field moves where colours change nearby. If a cavity starts filled, the field cannot open it: the lid is far
+from the floor, so no gradient points inwards. Stereo compares all depths at once, and needs neither
 materials nor light. Windows that follow a surface found before show its depth several times more precisely than windows
 that face the camera.
 """
@@ -27,7 +27,7 @@ MOST_DEPTHS = 128
 NEIGHBOURS, BEST = 6, 3  # photos compared with one, and those of them that count: others may see something in front
 ANGLES = 4.0, 15.0, 45.0  # degrees between a photo and a neighbour: least, best, largest
 WINDOW = 3  # pixels on each side of a compared one
-VARIANCE_FLOOR = 1e-7  # of grey values, for windows without contrast
+VARIANCE_FLOOR = 1e-7  # of the product of two windows' variances of grey values, for windows without contrast
 ELSEWHERE = 0.1  # scene units from a depth to others that are no part of the same peak
 HIDDEN = 0.1  # scene units behind a photo's surface from which a point counts as hidden
 PRIOR_WEIGHT = 0.05  # of what was known before, beside one pixel's correlation
@@ -160,8 +160,9 @@ def _swept(
     score = torch.stack(compared).topk(min(BEST, len(near)), 0).values.mean(0)
     score = torch.where(along > span + 0.5 * step, -1.0, score)
     best, k = score.max(0)
-    elsewhere = torch.where((along - step * k).abs() > ELSEWHERE, score, -1.0).amax(0)
-    margins[part] = torch.where(inside, best - elsewhere, 0.0)
+    others = ((along - step * k).abs() > ELSEWHERE) & (along <= span + 0.5 * step)
+    elsewhere = torch.where(others, score, -1.0).amax(0)
+    margins[part] = torch.where(inside & others.any(0), best - elsewhere, 0.0)
     if base is not None:
         best = torch.where((k == 0) | (k == len(along) - 1), -1.0, best)
     depths[part] = torch.where(inside, first + step * (k + _peak(score, k)), 0.0)
@@ -289,7 +290,8 @@ def _behind_pixels(
     mean, count = (shares * near).sum(0) / total, (shares * counts).sum(0) / total
     nearest = torch.where(counts > 0, near, torch.inf).amin(0)
     farthest = torch.where(counts > 0, near, 0.0).amax(0)
+    inside = (place > -1).all(1) & (place[:, 0] < width) & (place[:, 1] < height)
     jumps = farthest - nearest > 2 * truncation
     behind = torch.where(jumps, nearest, mean) - away
-    seen = (in_camera[:, 2] < 0) & (farthest > 0) & (behind > torch.where(jumps, truncation, -truncation))
+    seen = inside & (in_camera[:, 2] < 0) & (farthest > 0) & (behind > torch.where(jumps, truncation, -truncation))
     return torch.where(seen, behind, 0.0), torch.where(seen, count, 0.0)

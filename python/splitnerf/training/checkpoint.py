@@ -13,6 +13,7 @@ from splitnerf.data.tensor_files import check_tensor, read_tensors, write_tensor
 from splitnerf.errors import InputError
 from splitnerf.ops.hash_grid import HashGridSpec
 from splitnerf.render.occupancy import OccupancyGrid
+from splitnerf.training.start import StartShape
 
 FORMAT = 1
 LARGEST = {"step": 1e12, "seconds": 1e12, "meshed_at": 1.0, "previewed_at": 1.0}
@@ -127,7 +128,7 @@ def _check_content(content: dict) -> None:
     for key, largest in LARGEST.items():
         if not 0 <= content[key] <= largest:
             raise ValueError(f"{key} is {content[key]}")
-    if type(content.get("psnr_mean")) not in (float, type(None)):  # None before the first step
+    if type(content.get("psnr_mean", "missing")) not in (float, type(None)):  # None before the first step
         raise ValueError("psnr_mean is of another type")
     check_tensor("exposures", content.get("exposures"), (-1, 4), torch.float32)
     config = config_of(content)
@@ -136,6 +137,8 @@ def _check_content(content: dict) -> None:
             raise ValueError("start is of another type")
         for name in ("distance", "trust"):
             check_tensor(f"start's {name}", start.get(name), (config.sampling.grid_resolution,) * 3, torch.float32)
+        if len(StartShape(start["distance"], start["trust"], config.surface.box).near) == 0:
+            raise ValueError("start has no surface")
     if not 1 <= content["n_rays"] <= max(config.sampling.initial_rays, config.sampling.max_rays):
         raise ValueError(f"n_rays is {content['n_rays']}")
     for name, parameter in content["model"].items():

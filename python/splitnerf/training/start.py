@@ -11,7 +11,7 @@ from torch.nn import functional as F
 
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset
-from splitnerf.export.meshing import extract_mesh
+from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.fields import SdfField
 from splitnerf.ops import MeshScene
 from splitnerf.render.rays import image_rays
@@ -112,16 +112,17 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
         return None
     weights = torch.where((depths > 0) & (scores > 0), scores, 0.0)
     solid = blurred(fused_distances(spread, depths, weights, hull, box, FIRST_TRUNCATION)[0], FIRST_BLUR)
-    for edge, reach, step, truncation, blur in PASSES:
-        if not (solid < 0).any():
-            return None
-        grey, base = sizes[edge], surface_depths(solid, box, sizes[edge])
-        depths, scores = refined_depths(grey, base, reach, step)
-        base, known = base[spread_out(len(base), MOST_VIEWS)], (depths > 0) & (scores > 0)
-        depths, weights = torch.where(known, depths, base), torch.where(known, scores, GUESSED * (base > 0))
-        solid, trust = fused_distances(grey.spread(), depths, weights, hull, box, truncation, solid)
-        solid = blurred(solid, blur)
-    return StartShape(exact_distances(solid, box), trust, box) if (solid < 0).any() else None
+    try:
+        for edge, reach, step, truncation, blur in PASSES:
+            grey, base = sizes[edge], surface_depths(solid, box, sizes[edge])
+            depths, scores = refined_depths(grey, base, reach, step)
+            base, known = base[spread_out(len(base), MOST_VIEWS)], (depths > 0) & (scores > 0)
+            depths, weights = torch.where(known, depths, base), torch.where(known, scores, GUESSED * (base > 0))
+            solid, trust = fused_distances(grey.spread(), depths, weights, hull, box, truncation, solid)
+            solid = blurred(solid, blur)
+        return StartShape(exact_distances(solid, box), trust, box)
+    except EmptyMesh:
+        return None
 
 
 def blurred(distances: Tensor, cells: float) -> Tensor:
@@ -149,7 +150,7 @@ def surface_depths(distances: Tensor, box: float, photos: GreyPhotos) -> Tensor:
 
 
 def exact_distances(distances: Tensor, box: float) -> Tensor:
-    """[r, r, r] the distances to the zero level of truncated ones, negative inside. Bodies under a fiftieth of the largest
+    """[r, r, r] the distances to the nearest vertex of the zero level of truncated ones, negative inside. Bodies under a fiftieth of the largest
     one are left out."""
     solid = (distances < 0).cpu().numpy()
     bodies, n = ndimage.label(solid)
