@@ -84,11 +84,11 @@ def test_stereo_finds_the_depths_of_a_textured_cavity(box_photos, found):
 
 
 def test_depths_of_texture_stand_out_and_those_of_a_slow_gradient_do_not(box_photos, found):
-    share = lambda margins: (margins > MARGIN).sum() / box_photos[0].masks.sum()  # noqa: E731
-    assert share(found[2]) > CLEAR_SHARE + 0.2
+    n_pixels = box_photos[0].masks.sum()
+    assert (found[2] > MARGIN).sum() > (CLEAR_SHARE + 0.2) * n_pixels
     rows = torch.linspace(0.4, 0.6, SIZE)[:, None].expand(SIZE, SIZE)
     plain = box_photos[0]._replace(grey=rows * box_photos[0].masks)
-    assert share(stereo.depth_maps(plain, hull(), BOX)[2]) < 0.5 * CLEAR_SHARE
+    assert (stereo.depth_maps(plain, hull(), BOX)[2] > MARGIN).sum() < 0.5 * CLEAR_SHARE * n_pixels
 
 
 def test_windows_that_follow_a_surface_find_it_more_precisely(box_photos, found):
@@ -120,13 +120,12 @@ def test_depths_open_a_cavity_that_no_outline_shows(box_photos, found):
     depths, scores, _ = found
     weights = torch.where((depths > 0) & (scores > 0.5), scores, 0.0)
     solid = stereo.fused_distances(box_photos[0], depths, weights, hull(), BOX, 0.12)[0] < 0
-    cell = 2 * BOX / CELLS
-    at = lambda *p: bool(solid[tuple(int((x + BOX) / cell) for x in p)])  # noqa: E731
     assert hull()[CELLS // 2, CELLS // 2, CELLS // 2]
-    for empty in ((0.0, 0.0, 0.5), (0.0, 0.0, 0.0), (0.2, 0.2, 0.2), (0.0, 0.0, -0.25)):
-        assert not at(*empty), empty
-    for full in ((0.5, 0.0, 0.0), (0.0, -0.5, 0.3), (0.0, 0.0, -0.5)):
-        assert at(*full), full
+    empty = torch.tensor([[0.0, 0.0, 0.5], [0.0, 0.0, 0.0], [0.2, 0.2, 0.2], [0.0, 0.0, -0.25]])
+    full = torch.tensor([[0.5, 0.0, 0.0], [0.0, -0.5, 0.3], [0.0, 0.0, -0.5]])
+    for places, expected in ((empty, False), (full, True)):
+        cells = ((places + BOX) / (2 * BOX / CELLS)).long()
+        assert (solid[tuple(cells.T)] == expected).all()
 
 
 def test_true_depths_make_the_true_walls(box_photos):
@@ -134,9 +133,10 @@ def test_true_depths_make_the_true_walls(box_photos):
     distances, trust = stereo.fused_distances(photos, true, (true > 0).float(), hull(), BOX, 0.08)
     shape = StartShape(distances, trust, BOX)
     height = torch.linspace(-0.3, 0.5, 9)
-    wall = lambda x: shape.at(torch.stack([torch.full_like(height, x), 0 * height, height], 1))  # noqa: E731
-    assert (wall(0.5) < -0.03).all()
-    assert (wall(0.35) > 0.02).all() and (wall(0.65) > 0.02).all()
+    x = torch.tensor([0.35, 0.5, 0.65])  # before the wall, within it and behind it
+    places = torch.stack(torch.meshgrid(x, torch.zeros(1), height, indexing="ij"), -1)
+    before, within, behind = shape.at(places.view(-1, 3)).view(3, -1)
+    assert (before > 0.02).all() and (within < -0.03).all() and (behind > 0.02).all()
     assert (trust[distances.abs() < 0.04] > 0.9).all()
 
 

@@ -13,6 +13,7 @@ from splitnerf.config import Config
 from splitnerf.devices import start_fetching
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
 from splitnerf.render.masks import widened
+from splitnerf.render.rays import projected
 
 DENSITY_CUTOFF = 7.0  # where |f| > cutoff / s, the NeuS density is below e^-7 of its peak
 LIPSCHITZ = 1.25  # bound on |grad f|; the eikonal loss keeps it in practice
@@ -162,15 +163,13 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
     allowed = int(WRONG_MASKS * n)
     misses, sights = torch.zeros(2, len(centres), dtype=torch.int32, device=masks.device)
     for i in range(n):
-        fx, fy, cx, cy = intrinsics[i].tolist()
         inside = (misses <= allowed).nonzero().squeeze(1)
         camera = (centres[inside] - poses[i, :3, 3]) @ poses[i, :3, :3]
         depth = -camera[:, 2]
-        x, y = cx + fx * camera[:, 0] / depth, cy - fy * camera[:, 1] / depth
         # The mask is widened by a cell's size in pixels, so that thin parts keep their cells.
-        radius = int(math.ceil(fx * cell / max(1e-3, float(depth.median())))) if len(depth) else 0
+        radius = int(math.ceil(float(intrinsics[i, 0]) * cell / max(1e-3, float(depth.median())))) if len(depth) else 0
         wide = widened(masks[i] > 0, radius)
-        column, row = x.floor().long(), y.floor().long()
+        column, row = projected(camera, intrinsics[i]).floor().long().unbind(1)
         seen = (depth > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
         misses[inside[seen]] += ~wide[row[seen], column[seen]]
         sights[inside[seen]] += 1

@@ -55,6 +55,13 @@ def through_pixels(matrix: Tensor, x: Tensor, y: Tensor) -> Tensor:
     return F.normalize((matrix * points[..., None, :]).sum(-1), dim=-1)
 
 
+def projected(points: Tensor, intrinsics: Tensor) -> Tensor:
+    """[..., 2] image points of points [..., 3] in the camera's axes; those behind the camera have no meaning."""
+    fx, fy, cx, cy = intrinsics.unbind()
+    depth = (-points[..., 2]).clamp(min=1e-6)
+    return torch.stack([cx + fx * points[..., 0] / depth, cy - fy * points[..., 1] / depth], -1)
+
+
 def image_rays(pose: Tensor, intrinsics: Tensor, height: int, width: int) -> tuple[Tensor, Tensor]:
     """Rays through all pixel centres of an image, row by row, [H * W, 3] each."""
     rows, columns = (torch.arange(n, device=pose.device) + 0.5 for n in (height, width))

@@ -1,9 +1,8 @@
 """Depth from photos alone: each photo's pixels are compared with its neighbours' at many depths.
 
 A distance field moves where colours change nearby. If a cavity starts filled, the field cannot open it: the lid is far
-from the floor, so no gradient points inwards. Stereo compares all depths at once, and needs neither
-materials nor light. Windows that follow a surface found before show its depth several times more precisely than windows
-that face the camera.
+from the floor, so no gradient points inwards. Stereo compares all depths at once, and needs neither materials nor light.
+Windows that follow a surface found before show its depth several times more precisely than windows that face the camera.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from torch.nn import functional as F
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, march_rays
-from splitnerf.render.rays import image_rays
+from splitnerf.render.rays import image_rays, projected
 
 MOST_PHOTOS, MOST_VIEWS = 150, 50  # that are compared, and that get depths
 EDGE, FIRST_EDGE = 100, 50  # pixels, about, along the shorter edge of the compared photos, and of those compared first
@@ -129,7 +128,7 @@ def _swept(
     base: Tensor | None = None,
 ) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
     """The depths, scores and margins [h, w] of one photo, compared from depths `first` [h, w] over `span` [h, w], which
-    is 0 where there is nothing to compare. A photo does not count where its own surface, of depths `base` [n, h, w],
+    is 0 where there is nothing to compare. A photo counts as unlike where its own surface, of depths `base` [n, h, w],
     hides the middle of the span."""
     grey, (rays_o, rays_d) = photos.grey[i], rays
     (height, width), near = grey.shape, _neighbours(angles_between(photos.poses)[i])
@@ -148,7 +147,7 @@ def _swept(
     of_photo, compared = _Window(grey[part][None, None], inside[None, None].float()), []
     for j in near:
         start, turned = rays_o[0] - photos.poses[j, :3, 3], photos.poses[j, :3, :3]
-        at = _projected((start @ turned) + (first + along)[..., None] * (rays_d @ turned), photos.intrinsics[j])
+        at = projected((start @ turned) + (first + along)[..., None] * (rays_d @ turned), photos.intrinsics[j])
         at = at * at.new_tensor([2 / width, 2 / height]) - 1
         others = F.grid_sample(photos.grey[j].expand(len(along), 1, height, width), at, align_corners=False)
         alike = of_photo.correlation(others)[:, 0]
@@ -178,13 +177,6 @@ def _limits(rays_o: Tensor, rays_d: Tensor, cells: Tensor, box: float) -> tuple[
     middles = torch.cat([packed.middles, rays_o.new_zeros(1)])  # none at all is no error
     first, last = middles[packed.offsets[:-1]], middles[ends]
     return torch.where(missed, 0.0, first), torch.where(missed, 0.0, last)
-
-
-def _projected(points: Tensor, intrinsics: Tensor) -> Tensor:
-    """[..., 2] pixels of points [..., 3] in the camera's axes."""
-    fx, fy, cx, cy = intrinsics.unbind()
-    depth = (-points[..., 2]).clamp(min=1e-6)
-    return torch.stack([cx + fx * points[..., 0] / depth, cy - fy * points[..., 1] / depth], -1)
 
 
 class _Window:
@@ -225,7 +217,7 @@ def _behind(photos: GreyPhotos, depths: Tensor, j: int, points: Tensor) -> tuple
     height, width = depths.shape[1:]
     from_camera = points - photos.poses[j, :3, 3]
     in_camera = from_camera @ photos.poses[j, :3, :3]
-    x, y = _projected(in_camera, photos.intrinsics[j]).floor().long().unbind(-1)
+    x, y = projected(in_camera, photos.intrinsics[j]).floor().long().unbind(-1)
     seen = (in_camera[:, 2] < 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
     x, y = x.clamp(0, width - 1), y.clamp(0, height - 1)
     return depths[j, y, x] - from_camera.norm(dim=1), seen & (depths[j, y, x] > 0)
@@ -277,7 +269,7 @@ def _behind_pixels(
     height, width = depths.shape
     from_camera = points - photos.poses[j, :3, 3]
     in_camera, away = from_camera @ photos.poses[j, :3, :3], from_camera.norm(dim=1)
-    place = _projected(in_camera, photos.intrinsics[j]) - 0.5
+    place = projected(in_camera, photos.intrinsics[j]) - 0.5
     corner = place.floor()
     right, below = (place - corner).unbind(-1)
     x, y = corner.long().unbind(-1)
