@@ -1,8 +1,9 @@
 """Depth from photos alone: each photo's pixels are compared with its neighbours' at many depths.
 
 A distance field moves where colours change nearby. If a cavity starts filled, the field cannot open it: the lid is far
-from the floor, so no gradient points inwards. Stereo compares all depths at once, and needs neither materials nor light.
-Windows that follow a surface found before show its depth several times more precisely than windows that face the camera.
+from the floor, so no gradient points inwards. Stereo compares all depths at once, and needs neither materials nor
+light. Windows that follow a surface found before show its depth several times more precisely than windows that face the
+camera.
 """
 
 from __future__ import annotations
@@ -213,7 +214,7 @@ def _peak(score: Tensor, k: Tensor) -> Tensor:
 
 
 def _behind(photos: GreyPhotos, depths: Tensor, j: int, points: Tensor) -> tuple[Tensor, Tensor]:
-    """How far the surface of photo j lies behind points [m, 3] along its rays, [m], and whether it has one there, [m]."""
+    """How far photo j's surface lies behind points [m, 3] along its rays, [m], and whether it has one there, [m]."""
     height, width = depths.shape[1:]
     from_camera = points - photos.poses[j, :3, 3]
     in_camera = from_camera @ photos.poses[j, :3, :3]
@@ -228,8 +229,8 @@ def fused_distances(
     photos: GreyPhotos, depths: Tensor, weights: Tensor, hull: Tensor, box: float, truncation: float,
     before: Tensor | None = None,
 ) -> tuple[Tensor, Tensor]:  # fmt: skip
-    """[r, r, r] distances to the surface of depth maps along the rays, the mean over the photos, positive outside; and the
-    mean weight of the depths that say so, 0 where none does.
+    """[r, r, r] distances to the surface of depth maps along the rays, the mean over the photos, positive outside; and
+    the mean weight of the depths that say so, 0 where none does.
 
     Between pixels the depths are interpolated. Where they jump by more than two truncations, at an outline, a place is
     only known to be empty, and only if it lies in front of both surfaces: so thin walls stay.
@@ -264,8 +265,8 @@ def fused_distances(
 def _behind_pixels(
     photos: GreyPhotos, depths: Tensor, weights: Tensor, j: int, points: Tensor, truncation: float
 ) -> tuple[Tensor, Tensor]:
-    """How far the surface of depths [h, w] lies behind points [m, 3] along the rays of photo j, and how much that counts,
-    [m] each."""
+    """How far the surface of depths [h, w] lies behind points [m, 3] along the rays of photo j, and how much that
+    counts, [m] each."""
     height, width = depths.shape
     from_camera = points - photos.poses[j, :3, 3]
     in_camera, away = from_camera @ photos.poses[j, :3, :3], from_camera.norm(dim=1)

@@ -75,8 +75,8 @@ class StartShape:
         return (at + torch.rand(at.shape, **draw)) * self.cell - self.box
 
     def left(self, sdf: Tensor, positions: Tensor) -> Tensor:
-        """[n] how far signed distances [n] at positions [n, 3] have left the shape, beyond :data:`FREE_CELLS`, scene units,
-        times the squared trust in it, in units of :data:`ALIKE`."""
+        """[n] how far signed distances [n] at positions [n, 3] have left the shape, beyond :data:`FREE_CELLS`, scene
+        units, times the squared trust in it, in units of :data:`ALIKE`."""
         away = ((sdf - self.at(positions)).abs() - FREE_CELLS * self.cell).clamp(min=0)
         return away * (read(self.trust, self.box, positions) / ALIKE).clamp(max=1).square()
 
@@ -150,8 +150,8 @@ def surface_depths(distances: Tensor, box: float, photos: GreyPhotos) -> Tensor:
 
 
 def exact_distances(distances: Tensor, box: float) -> Tensor:
-    """[r, r, r] the distances to the nearest vertex of the zero level of truncated ones, negative inside. Bodies under a fiftieth of the largest
-    one are left out."""
+    """[r, r, r] the distances to the nearest vertex of the zero level of truncated ones, negative inside. Bodies under a
+    fiftieth of the largest one are left out."""
     solid = (distances < 0).cpu().numpy()
     bodies, n = ndimage.label(solid)
     if n > 1:
