@@ -207,7 +207,7 @@ def test_a_signal_ends_a_rendering():
     try:
         asking.start()
         with pytest.raises(Asked):
-            render(square(Material()), spp=1 << 15)
+            render(square(Material()), spp=1 << 18)
     finally:
         done.set()
         asking.join()
