@@ -21,6 +21,7 @@ PACKAGE = Path("python/splitnerf")
 # The fast tests of each file, by the longest beginning of its path that is listed.
 TESTS = {
     "config/": "test_config.py",
+    "devices.py": "test_device.py test_meshes.py test_late_occlusion.py test_train.py",
     "doctor/": "test_doctor.py",
     "evaluate/": "test_evaluate.py test_metrics.py test_protocol.py",
     "export/": "test_export.py test_export_parts.py test_bake.py test_meshing.py test_tangents.py",
@@ -33,7 +34,6 @@ TESTS = {
     "render/model.py": "test_views.py test_correction.py test_shading_model.py test_scene.py test_summed_light.py test_schedule.py",
     "render/path_traced.py": "test_path_traced.py",
     "render/rays.py": "test_pixel_rays.py",
-    "training/background.py": "test_meshes.py test_late_occlusion.py",
     "training/checkpoint.py": "test_checkpoint.py test_hostile_files.py",
     "training/finite.py": "test_finite.py",
     "training/graphs.py": "test_graph_rules.py test_graphs.py",
@@ -42,9 +42,7 @@ TESTS = {
     "training/late_occlusion.py": "test_late_occlusion.py test_device.py",
     "training/losses.py": "test_light_loss.py test_loss_terms.py test_physics.py test_shading_model.py test_scene.py",
     "training/meshes.py": "test_meshes.py",
-    "training/optimiser.py": "test_schedule.py",
     "progress.py": "test_progress.py",
-    "training/repeatable.py": "test_train.py",
     "training/schedule.py": "test_schedule.py",
     "training/step.py": "test_loss_terms.py test_correction.py test_schedule.py test_train.py",
 }

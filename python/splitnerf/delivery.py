@@ -18,6 +18,7 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import over_background
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.truth import load_scene_truth, load_view_truths
+from splitnerf.devices import same_bits
 from splitnerf.errors import InputError
 from splitnerf.evaluate.asset import asset_predictions
 from splitnerf.evaluate.jobs import Evaluated, Protocol, asset_mesh, relit_scores, score_asset
@@ -34,7 +35,6 @@ from splitnerf.report import write_report
 from splitnerf.training.loop import TrainedScene
 from splitnerf.training.metrics import METRICS, read_metrics
 from splitnerf.training.observer import Observer
-from splitnerf.training.repeatable import same_bits
 
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
 LAST_STAGE_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))

@@ -1,9 +1,11 @@
-"""Devices of tensors, and processors."""
+"""Devices of tensors, processors, and threads beside the training."""
 
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 import torch
@@ -56,6 +58,24 @@ def tensor_cores(on: bool) -> Iterator[None]:
         yield
     finally:
         products.fp32_precision = before
+
+
+@contextmanager
+def same_bits(on: bool) -> Iterator[None]:
+    """With ``on``, makes torch add in a fixed order within the block; the program's own operators always do so.
+
+    Without it, threads that scatter into one tensor add in the order in which they arrive. Sums still depend on the
+    number of threads and on the processor's instruction set.
+    """
+    before = torch.are_deterministic_algorithms_enabled(), torch.utils.deterministic.fill_uninitialized_memory
+    try:
+        if on:
+            torch.use_deterministic_algorithms(True)
+            torch.utils.deterministic.fill_uninitialized_memory = False  # no code reads memory before it writes it
+        yield
+    finally:
+        torch.use_deterministic_algorithms(before[0])
+        torch.utils.deterministic.fill_uninitialized_memory = before[1]
 
 
 def let_segments_grow() -> None:
@@ -127,3 +147,18 @@ class SideStream:
         """Lets later work of the caller begin when all work that was given here is done."""
         if self._stream is not None:
             torch.cuda.current_stream(self._device).wait_stream(self._stream)
+
+
+
+def in_background(function: Callable, *args: object) -> Future:
+    """Calls a function in a thread of its own, which ends with the program; the future holds its result or exception."""
+    future = Future()
+    threading.Thread(target=_fulfil, args=(future, function, *args), daemon=True).start()
+    return future
+
+
+def _fulfil(future: Future, function: Callable, *args: object) -> None:
+    try:
+        future.set_result(function(*args))
+    except BaseException as error:  # the thread that asks for the result raises it
+        future.set_exception(error)

@@ -41,7 +41,7 @@ from splitnerf.data.images import read_image, read_radiance, write_image
 from splitnerf.errors import InputError
 from splitnerf.export.glb import write_glb
 from splitnerf.render.model import SceneModel
-from splitnerf.training.optimiser import make_optimiser
+from splitnerf.training.schedule import make_optimiser
 
 DEFAULTS = {"-rss_limit_mb": "3000", "-timeout": "20", "-max_len": "65536"}
 INSTRUMENTED = ("splitnerf", "zipfile", "pickletools", "torch._weights_only_unpickler")

@@ -24,7 +24,7 @@ from splitnerf.render.occupancy import make_grid
 from splitnerf.training import checkpoint
 from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint, restore_generator, restore_optimiser, restored_grid
-from splitnerf.training.optimiser import make_optimiser
+from splitnerf.training.schedule import make_optimiser
 
 
 @pytest.fixture(scope="module")

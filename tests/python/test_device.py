@@ -13,7 +13,7 @@ from tiny_runs import tiny
 
 from splitnerf.training import losses, numbers
 from splitnerf.training import loop as trainer
-from splitnerf.training.background import in_background
+from splitnerf.devices import in_background
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.room import RoomyStep

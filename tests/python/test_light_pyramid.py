@@ -19,7 +19,7 @@ from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight, LightMlp, LightPyramid, VisibilityBits
 from splitnerf.ops import sample_ggx_lobe
 from splitnerf.render.model import SceneModel
-from splitnerf.training.optimiser import make_optimiser, set_learning_rate
+from splitnerf.training.schedule import make_optimiser, set_learning_rate
 
 DATA = Path(os.environ.get("SPLITNERF_DATA", Path(__file__).parents[3] / "shared" / "data"))
 ALL_ROUGHNESS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.45, 0.5, 0.7, 1.0)

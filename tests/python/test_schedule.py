@@ -15,7 +15,7 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.render.model import SceneModel
 from splitnerf.training import loop as trainer
 from splitnerf.training import step as step_module
-from splitnerf.training.optimiser import make_optimiser, set_learning_rate
+from splitnerf.training.schedule import make_optimiser, set_learning_rate
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period, next_ray_count
 
 RATES = {"learning_rate": 0.01, "variance_learning_rate": 0.001, "light_learning_rate": 0.02}

@@ -133,7 +133,7 @@ def test_a_deterministic_run_can_be_repeated_bit_by_bit(data, tmp_path):
 
 
 def test_torch_adds_in_a_fixed_order_where_asked():
-    from splitnerf.training.repeatable import same_bits
+    from splitnerf.devices import same_bits
 
     for on in (False, True):
         with same_bits(on):

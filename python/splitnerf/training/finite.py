@@ -8,11 +8,11 @@ from collections.abc import Iterable, Iterator
 import torch
 from torch import Tensor
 
-from splitnerf.training.batches import Batch
 from splitnerf.data.dataset import Dataset
 from splitnerf.notes import note
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
+from splitnerf.training.batches import Batch
 
 MOST_SKIPPED = 10  # steps in a row
 UNEXPLAINED = "none of what it comes from"

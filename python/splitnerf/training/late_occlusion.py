@@ -12,12 +12,11 @@ import torch
 from torch import Tensor
 
 from splitnerf.config import Config
-from splitnerf.devices import pinned, start_fetching
+from splitnerf.devices import in_background, pinned, start_fetching
 from splitnerf.fields import OcclusionQuery
 from splitnerf.ops import MeshScene
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
-from splitnerf.training.background import in_background
 from splitnerf.training.losses import OcclusionPoints, occlusion_error, occlusion_points, traced_factors
 
 

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
-from splitnerf.devices import let_segments_grow, spare_processors, tensor_cores
+from splitnerf.devices import let_segments_grow, same_bits, spare_processors, tensor_cores
 from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight
 from splitnerf.notes import note_once
@@ -44,10 +44,15 @@ from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS, add_metrics, keep_metrics
 from splitnerf.training.numbers import PastStep, StepNumbers
 from splitnerf.training.observer import Observer, Observers, heed
-from splitnerf.training.optimiser import make_optimiser, set_learning_rate
-from splitnerf.training.repeatable import same_bits
 from splitnerf.training.room import RoomyStep
-from splitnerf.training.schedule import light_moves, light_period, next_ray_count, progress_of
+from splitnerf.training.schedule import (
+    light_moves,
+    light_period,
+    make_optimiser,
+    next_ray_count,
+    progress_of,
+    set_learning_rate,
+)
 from splitnerf.training.start import HELD_UNTIL, StartShape, fit_to, start_shape
 from splitnerf.training.step import Step
 

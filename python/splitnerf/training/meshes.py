@@ -9,12 +9,11 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from splitnerf.devices import SideStream
+from splitnerf.devices import SideStream, in_background
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.fields.visibility import TracedBits
 from splitnerf.ops import MeshScene, SdfNetwork, sdf_values
 from splitnerf.render.model import SceneModel
-from splitnerf.training.background import in_background
 
 
 class TracedMesh(NamedTuple):
