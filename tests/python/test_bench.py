@@ -46,7 +46,7 @@ def test_files_mark_the_front_and_the_default(tmp_path):
     result = Result("work", "Work", ("cpp",), ["b is twice as fast"], [CHART], [("More", ["x"], [[1]])])
     facts = provenance.provenance(result.sources)
     text = markdown(result, facts)
-    assert "| **d** * |" in text and "| c |" in text and "- b is twice as fast" in text and "## More" in text
+    assert "- b is twice as fast" in text and "[work.csv](work.csv)" in text and "## More" in text
     write_csv(tmp_path / "work.csv", facts, csv_rows(result.charts))
     lines = (tmp_path / "work.csv").read_text().splitlines()
     heads = [line for line in lines if line.startswith("#")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from splitnerf.bench.charts import table as table_lines
@@ -109,16 +109,6 @@ def input_text(rows: Rows) -> str:
     return "; ".join(parts)
 
 
-def inputs_of(results: Iterable[Result], verdicts: Iterable[Verdict]) -> list[tuple[str, str, str]]:
-    """(operator, which, input) that made each worst error, and that broke a property."""
-    lines = []
-    for r in results:
-        lines.append((r.entry.name, "forward", input_text(r.worst_forward)))
-        if r.entry.smooth:
-            lines.append((r.entry.name, "gradient", input_text(r.worst_gradient)))
-    return lines + [(v.claim.name, "broken", input_text(v.worst)) for v in verdicts if not v.holds]
-
-
 def write(results: list[Result], verdicts: list[Verdict], command: str, folder: Path) -> tuple[Path, Path]:
     """Writes stability.md and stability.csv, with machine, versions and commit in their heads."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -143,16 +133,15 @@ def markdown_text(results: list[Result], verdicts: list[Verdict], facts: dict[st
     lines += table_lines(COLUMNS, [row_of(r) for r in results])
     claims = [[v.claim.name, v.cases, v.broken, v.claim.statement] for v in verdicts]
     lines += ["", *table_lines(["operator", "cases", "broken", "what must hold"], claims)]
-    lines += ["", "## Inputs of the worst errors", ""]
-    lines += table_lines(["operator", "of", "input"], inputs_of(results, verdicts))
+    lines += ["", f"The inputs of the worst errors are in [{NAME}.csv]({NAME}.csv)."]
     return "\n".join(lines) + "\n"
 
 
 INTRODUCTION = """Each operator in float32 against itself in float64 on the same adversarial numbers: extreme values
 crossed with ordinary ones, and a search around the worst. An error is the largest difference in one output or gradient
 of a row over the largest number there plus, where the condition counts, how much the true value changes by a relative
-change of the inputs; the columns "without condition" leave the latter out. The condition is only asked for above what
-is promised: an error just below that is an upper bound. The outputs of the worst thousand inputs were asked again in
-50 digits where the operator has such a formula: "against exact". Gradients are held against float64 alone. "Not finite" counts
+change of the inputs; the columns "without condition" leave the latter out. The condition is only computed above the
+promised error: an error just below that is an upper bound. The outputs of the worst thousand inputs were computed again in
+50 digits where the operator has such a formula: "against exact". Gradients are compared with float64 alone. "Not finite" counts
 rows with NaN or infinity where the truth has a float32, or whose truth is NaN. Tables of the hash
 grid may be float16 or bfloat16: compared with float64 on the same numbers. No other input may be: they raise."""

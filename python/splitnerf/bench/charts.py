@@ -47,7 +47,7 @@ class Chart:
         title: What is measured, and on what.
         cost: Name and unit of the horizontal axis.
         error: Name and unit of the vertical axis.
-        points: In the order of the table.
+        points: In the order of the CSV file.
     """
 
     title: str
@@ -126,21 +126,12 @@ def csv_rows(charts: Sequence[Chart]) -> Iterator[list[object]]:
 
 
 def markdown(result: Result, facts: dict[str, str]) -> str:
-    """The result as text: findings, then a table for each chart; * marks the front, and the default is bold."""
+    """The result as text: findings, picture and further tables; the CSV file holds the points of the charts."""
     lines = [f"# {result.title}", "", header(facts), ""]
     lines += [f"- {finding}" for finding in result.findings]
     if result.charts:
         lines += ["", f"![{result.title}]({result.name}.png)"]
-        lines += ["", "`*`: no other is both faster and more accurate. **Bold**: the default."]
-    for chart in result.charts:
-        front = chart.front()
-        rows = []
-        for p in chart.points:
-            mark = "**" if p.default else ""
-            spread = "" if p.low == p.high else f" ({p.low:.3g} to {p.high:.3g})"
-            name = f"{mark}{p.series}{mark}{' *' if p in front else ''}"
-            rows.append([name, p.variant, f"{p.cost:.3g}{spread}", f"{p.error:.3g}"])
-        lines += ["", f"## {chart.title}", "", *table(["", "", chart.cost, chart.error], rows)]
+        lines += ["", f"Every point is in [{result.name}.csv]({result.name}.csv)."]
     for title, heads, rows in result.tables:
         lines += ["", f"## {title}", "", *table(heads, rows)]
     return "\n".join(lines) + "\n"

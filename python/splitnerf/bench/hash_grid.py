@@ -79,7 +79,7 @@ def run(quick: bool, rounds: int) -> Result:
         [*key, f"{1e3 * times[key].seconds:.1f}", f"{1e3 * times[key].low:.1f} to {1e3 * times[key].high:.1f}"]
         for key in calls
     ]
-    beside = ("Time beside peers, of which Dr.Jit has a grid of its own", ["", "dtype", "ms", "quartiles"], rows)
+    beside = ("Time of peers; Dr.Jit has a grid of its own", ["", "dtype", "ms", "quartiles"], rows)
     return Result("hash_grid", "Hash grid encoding: time against error", SOURCES, findings, [chart], [beside])
 
 

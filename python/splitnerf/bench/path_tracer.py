@@ -61,7 +61,7 @@ def run(quick: bool, rounds: int) -> Result:
     for way in (w for w in renderers if w != "splitnerf"):
         apart = rms((np.clip(means[way][0], 0, 1) - image)[inside & (means[way][1] > INSIDE)])
         check("path tracer: RMS from its converged image", {way: apart}, APART)
-        findings.append(f"converged images of splitnerf and {way} are {apart:.4f} apart (RMS)")
+        findings.append(f"converged images of splitnerf and {way} differ by {apart:.4f} (RMS)")
     errors = {
         (way, f"{n} spp"): float(np.mean([error_of(render(n, seed), means[way]) for seed in range(SEEDS)]))
         for way, render in renderers.items() for n in samples

@@ -72,7 +72,7 @@ def run(quick: bool, rounds: int) -> Result:
         tables.append((f"Relative error of the radiance, % RMS over normals, {name} light", heads, rows))
         findings.append(
             f"{name} light, largest error: "
-            + ", ".join(f"{100 * worst[q]:.0f} % asked at the {q}" for q in QUERIES)
+            + ", ".join(f"{100 * worst[q]:.0f} % queried at the {q}" for q in QUERIES)
             + f"; noise of the truth at most {100 * worst[NOISE]:.1f} %"
         )
     tables.append(furnace())
