@@ -31,6 +31,7 @@ from splitnerf.refinement.job import RECORD, STATE, TRAINED, OtherState, forget_
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.render.seen import Cameras
 from splitnerf.report import write_report
 from splitnerf.training.loop import TrainedScene
 from splitnerf.training.metrics import METRICS, read_metrics
@@ -76,7 +77,7 @@ def finish(
         clock = time.monotonic()
         discard_last_stage(run)
         try:
-            mesh = write_assets(run, trained.model, dataset.box_from_world).mesh
+            mesh = write_assets(run, trained.model, dataset.box_from_world, Cameras.of(dataset)).mesh
         except EmptyMesh as error:
             failure = error
         timings["export"] = time.monotonic() - clock

@@ -24,7 +24,7 @@ from splitnerf.export.glb import write_glb
 from splitnerf.export.mesh import write_mesh_ply
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.obj import write_obj
-from splitnerf.export.simplify import drop_floaters_and_cavities, is_closed
+from splitnerf.export.simplify import capped, drop_floaters_and_cavities, is_closed
 from splitnerf.export.surface import Surface, surface_materials
 from splitnerf.export.textured import textured_asset
 from splitnerf.export.usdz import require_usd, write_usdz
@@ -33,6 +33,7 @@ from splitnerf.progress import Progress, tracked
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import render_view
+from splitnerf.render.seen import Cameras, seen_vertices
 
 FORMATS = ("glb", "ply", "obj", "usdz")
 REPORT_ROUGHNESS = (0.0, 0.25, 0.5, 1.0)
@@ -79,6 +80,7 @@ def write_assets(
     out: Path,
     model: SceneModel,
     box_from_world: np.ndarray,
+    cameras: Cameras,
     *,
     formats: Sequence[str] = ("glb", "ply"),
     resolution: int | None = None,
@@ -88,12 +90,13 @@ def write_assets(
     """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as asked, environment.exr and environment.hdr.
 
     All files are in the data's own world frame; GLB, OBJ and USDZ are decimated, textured and y up. The PLY holds the
-    extracted mesh with vertex colours.
+    extracted mesh with vertex colours. What no photo shows is a cap between its edges.
 
     Args:
         out: The folder.
         model: The scene.
         box_from_world: [4, 4], see :class:`splitnerf.data.dataset.Dataset`.
+        cameras: Those of the photos.
         formats: The names of the formats, out of :data:`FORMATS`.
         resolution, n_faces, texture_size: The sizes of grid, mesh and textures; None for the values of the group
             `export`.
@@ -112,6 +115,9 @@ def write_assets(
     with Progress(0.0, leave=False, at_once=True) as bar:
         bar.show(0.0, f"export, surface on a grid of {resolution}^3")
         vertices, faces, n_dropped = drop_floaters_and_cavities(*extract_mesh(surface.sdf, c.surface.box, resolution))
+        spacing = 2.0 * c.surface.box / (resolution - 1)
+        seen = seen_vertices(vertices, faces, cameras, 0.25 * spacing)
+        vertices = capped(vertices, faces, seen)
         world_from_box = np.linalg.inv(box_from_world)
         mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
         exported = Exported(mesh, len(faces), is_closed(faces), n_dropped)
@@ -120,7 +126,7 @@ def write_assets(
         if set(formats) - {"ply"}:
             textured = textured_asset(
                 "object", vertices, faces, surface, n_faces=n_faces, texture_size=texture_size or c.export.texture_size,
-                spacing=2.0 * c.surface.box / (resolution - 1), occlusion_offset=c.occlusion.offset,
+                spacing=spacing, occlusion_offset=c.occlusion.offset, on_surface=seen,
                 tell=lambda share, part: bar.show(0.1 + 0.8 * share, f"export, {part}"),
             )  # fmt: skip
             bar.show(0.9, "export, files")

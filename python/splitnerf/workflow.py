@@ -29,6 +29,7 @@ from splitnerf.outputs import Exported, write_assets
 from splitnerf.refinement.job import STATE
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
+from splitnerf.render.seen import Cameras
 from splitnerf.separation.job import SHEET, discard_separated, separate
 from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_model, restored_grid
 from splitnerf.training.loop import TrainedScene, begin_training, check_repeatable, check_same_scene
@@ -252,6 +253,6 @@ def export_run(
             with atomic_path(out / ORIGIN) as temporary:
                 shutil.copyfile(run / ORIGIN, temporary)
         return write_assets(
-            out, model, content["box_from_world"].numpy(), formats=formats, resolution=resolution, n_faces=n_faces,
-            texture_size=texture_size,
+            out, model, content["box_from_world"].numpy(), Cameras(**content["cameras"]), formats=formats,
+            resolution=resolution, n_faces=n_faces, texture_size=texture_size,
         )  # fmt: skip

@@ -145,6 +145,23 @@ TEST(Scene, PacketsAgreeWithSingleRays) {
   }
 }
 
+TEST(Scene, RaysWithTracesOfRoundingMeetWhatIsThere) {
+  // Up to the lamp above a sphere, from points below it: x and y of points in its planes of symmetry are about 1e-22.
+  const Scene scene = make_scene(sphere_mesh(64, 128));
+  for (const float trace : {0.f, 3e-22f, 6.6e-22f, 1e-20f, 1e-15f}) {
+    std::vector<Vec> origins, directions;
+    for (uint32_t i = 0; i < 1024; ++i) {
+      const float across = 0.5f * random_unit<float>(i, 0) - 0.25f;
+      origins.push_back(i % 2 ? Vec{trace, across, -2} : Vec{across, -trace, -2});
+      directions.push_back(normalize(Vec{0, 0, 3} - origins.back()));
+    }
+    for (uint8_t v : visibility(scene, origins, directions)) ASSERT_EQ(v, 0) << trace;
+    std::vector<Hit> hits(origins.size());
+    scene.trace_closest(&origins[0].x, &directions[0].x, int64_t(origins.size()), kInfinity, hits.data());
+    for (const Hit& hit : hits) ASSERT_GT(hit.t, 0) << trace;
+  }
+}
+
 TEST(Scene, RejectsUnusableMeshes) {
   TestMesh mesh = cube_mesh();
   mesh.triangles[4] = 8;

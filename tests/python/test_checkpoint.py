@@ -200,6 +200,12 @@ REFUSED = {
     "light's noise of one number": (lambda c: c.update(light_noise=torch.zeros(1).double()), "light_noise is missing"),
     "light's noise in a column": (lambda c: c.update(light_noise=c["light_noise"][:, None]), "light_noise is missing"),
     "light's noise of NaN": (lambda c: c["light_noise"].fill_(torch.nan), "light_noise has NaN"),
+    "no cameras": (lambda c: c.update(cameras=None), "cameras are missing"),
+    "cameras without lenses": (lambda c: c["cameras"].pop("intrinsics"), "cameras are missing"),
+    "more cameras than lenses": (
+        lambda c: c["cameras"].update(poses=torch.cat(2 * [c["cameras"]["poses"]])), "cameras' intrinsics",
+    ),
+    "a photo's size of three numbers": (lambda c: c["cameras"].update(size=torch.ones(3).long()), "cameras' size"),
     "a frame of single precision": (lambda c: c.update(box_from_world=torch.eye(4)), "box_from_world is missing"),
     "no exposures": (lambda c: c.pop("exposures"), "exposures is missing"),
     "no word on how it ended": (lambda c: c.pop("stopped"), "stopped is missing"),

@@ -15,8 +15,6 @@ import pytest
 import torch
 import trimesh
 from PIL import Image
-
-from splitnerf.training.checkpoint import save_checkpoint
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config
 from splitnerf.data.asset import Asset, Material
@@ -30,6 +28,8 @@ from splitnerf.export.usdz import write_usdz
 from splitnerf.fields import Light
 from splitnerf.outputs import write_assets
 from splitnerf.render.model import SceneModel
+from splitnerf.render.seen import Cameras
+from splitnerf.training.checkpoint import save_checkpoint
 
 
 @pytest.fixture
@@ -195,6 +195,7 @@ def test_ply_keeps_the_frame_and_encodes_colours(tmp_path, ball):
     assert mesh.visual.vertex_colors[:, :3] / 255 == pytest.approx(linear_to_srgb(albedo), abs=0.5 / 255 + 1e-6)
 
 
+CAMERAS = Cameras(torch.eye(4)[None], torch.tensor([[8.0, 8, 8, 8]]), torch.tensor([16, 16]))
 BAD_MESHES = {
     "empty": (np.zeros((0, 3)), np.zeros((0, 3), int)),
     "no faces": (np.eye(3), np.zeros((0, 3), int)),
@@ -262,7 +263,8 @@ def save_run(run, **state):
         optimiser={"state": {}}, device="cpu", generator=torch.get_rng_state(), torch_generator=torch.get_rng_state(),
         occupancy=torch.zeros(16**3), cells=torch.ones(16, 16, 16, dtype=torch.uint8),
         environment=None, light_noise=torch.zeros(2, dtype=torch.float64),
-        occlusion_light=model.occlusion.cached_light() | {"sky": torch.ones(256, 3)}, mesh_vertices=None, mesh_faces=None, **state,
+        occlusion_light=model.occlusion.cached_light() | {"sky": torch.ones(256, 3)}, mesh_vertices=None, mesh_faces=None,
+        cameras=CAMERAS._asdict(), **state,
     )  # fmt: skip
     save_checkpoint(run / "checkpoint.pt", config=config, fingerprint="", state=content)
     return run
@@ -314,7 +316,7 @@ def test_the_exported_light_stands_as_it_does_in_the_world(tmp_path, suffix):
     small = {"n_levels": 2, "log2_table_size": 8, "export_resolution": 24, "export_environment_height": 32}
     model = SceneModel(Config().replace(small))
     model.light = ThreeLamps()
-    write_assets(tmp_path, model, np.eye(4), formats=("ply",))
+    write_assets(tmp_path, model, np.eye(4), CAMERAS, formats=("ply",))
     pixels = oiio.ImageBuf(str(tmp_path / f"environment.{suffix}")).get_pixels(oiio.FLOAT)[..., :3]
     assert pixels.shape == (32, 64, 3)
     row, column = np.mgrid[:32, :64] + 0.5

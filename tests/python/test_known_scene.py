@@ -18,11 +18,11 @@ import pytest
 import trimesh
 from blender_data import look_at
 from PIL import Image
-from tiny_runs import tiny
-
 from splitnerf.data.dataset import load_dataset
 from splitnerf.outputs import write_assets
+from splitnerf.render.seen import Cameras
 from splitnerf.training.loop import train
+from tiny_runs import tiny
 
 CENTRE, RADIUS = np.array([0.9, -0.6, 0.4]), 0.8
 RED, BLUE = np.array([0.65, 0.12, 0.08]), np.array([0.08, 0.15, 0.6])  # linear albedo, along and against TO_RED
@@ -102,7 +102,7 @@ def result(tmp_path_factory) -> Result:
     )  # fmt: skip
     dataset = load_dataset(root)
     trained = train(dataset, config, root)
-    write_assets(root, trained.model, dataset.box_from_world)
+    write_assets(root, trained.model, dataset.box_from_world, Cameras.of(dataset))
     mesh = trimesh.load(root / "mesh.glb", process=False).to_geometry()
     texture = np.asarray(mesh.visual.material.baseColorTexture.convert("RGB"), np.float64) / 255
     h, w = texture.shape[:2]

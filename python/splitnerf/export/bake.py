@@ -10,8 +10,8 @@ import torch
 from scipy.ndimage import distance_transform_edt, zoom
 
 from splitnerf import _core
-from splitnerf.ops import MeshScene, occlusion_factors
 from splitnerf.export.surface import Surface, surface_materials, to_level_set
+from splitnerf.ops import MeshScene, occlusion_factors
 
 BAND = 1 << 20  # texels rasterised and evaluated at a time
 OCCLUSION_SHRINK = 4  # occlusion is baked at a quarter of the size
@@ -96,7 +96,10 @@ def bands(uv: np.ndarray, faces: np.ndarray, size: int) -> Iterator[Texels]:
         yield Texels(start * size + np.flatnonzero(hit), triangle[hit], weights)
 
 
-def bake(mesh: UnwrappedMesh, surface: Surface, size: int, *, reach: float, offset: float) -> Textures:
+def bake(
+    mesh: UnwrappedMesh, surface: Surface, size: int, *, reach: float, offset: float,
+    on_surface: np.ndarray | None = None,
+) -> Textures:  # fmt: skip
     """Evaluates the fields at each texel's point, which is first moved onto the zero level set along the mesh's normal.
 
     Beside the maps it takes about as much memory for a texture of 8192 x 8192 as for a small one: the texels are evaluated
@@ -108,6 +111,8 @@ def bake(mesh: UnwrappedMesh, surface: Surface, size: int, *, reach: float, offs
         size: The number of texels along an edge.
         reach: The largest distance between mesh and level set, in the surface's units.
         offset: The distance of an occlusion ray's start from the mesh along its normal, in the surface's units.
+        on_surface: [n] bool, the vertices of the zero level set; texels of faces with others stay where they are, with
+            the mesh's normals. None: all.
 
     Returns:
         The maps; a texel outside the charts has the value of the nearest texel inside.
@@ -121,8 +126,14 @@ def bake(mesh: UnwrappedMesh, surface: Surface, size: int, *, reach: float, offs
         if len(texels.index) == 0:
             continue
         rows, normals = texels.index, texels.interpolate(mesh.normals, mesh.faces)
-        points = to_level_set(surface, texels.interpolate(mesh.vertices, mesh.faces), reach, _unit(normals))
+        places, smooth = texels.interpolate(mesh.vertices, mesh.faces), _unit(normals)
+        points = to_level_set(surface, places, reach, smooth)
+        if on_surface is not None:
+            capped = ~on_surface[mesh.faces[texels.triangle]].all(axis=1)
+            points[capped] = places[capped]
         albedo[rows], roughness, metallic, fine_normals = surface_materials(surface, points)
+        if on_surface is not None:
+            fine_normals[capped] = smooth[capped]
         roughness_metallic[rows] = np.column_stack([roughness, metallic])
         normal[rows] = to_tangent_space(fine_normals, normals, texels.interpolate(mesh.tangents, mesh.faces))
         covered[rows] = True

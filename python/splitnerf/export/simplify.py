@@ -1,4 +1,5 @@
-"""Simplifies an extracted mesh: removes floaters and cavities, reduces the number of faces; a closed mesh stays closed."""
+"""Simplifies an extracted mesh: removes floaters and cavities, caps what no photo shows, reduces the number of faces; a
+closed mesh stays closed."""
 
 from __future__ import annotations
 
@@ -6,8 +7,9 @@ from itertools import product
 
 import fast_simplification
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, diags
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import cg
 
 MIN_COMPONENT = 0.01  # share of the largest component's faces
 # The quadric simplification sometimes pinches thin parts; then another aggressiveness or target is tried.
@@ -37,6 +39,28 @@ def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple
     dropped = ((count < MIN_COMPONENT * count.max()) | (volume < 0)) & (count > 0)
     vertices, faces = _compact(vertices, faces[~dropped[label[faces[:, 0]]]])
     return vertices, faces, int(dropped.sum())
+
+
+def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """Vertices [n, 3] of which those not seen lie on a membrane between those seen, in the middle of their neighbours.
+
+    A flat rim gets a flat cap. Components without seen vertices stay as they are.
+
+    Args:
+        vertices, faces: The mesh, [n, 3] and [m, 3], closed.
+        seen: [n] bool.
+    """
+    n, edges = len(vertices), np.concatenate([faces[:, :2], faces[:, 1:], faces[:, [2, 0]]])  # each in both directions
+    links = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=(n, n)).tocsr()
+    _, component = connected_components(links, directed=False)
+    free = ~seen & np.isin(component, component[seen])
+    if not free.any():
+        return vertices
+    balance = (diags(np.asarray(links.sum(1)).ravel()) - links)[free]
+    result, pull = vertices.copy(), -(balance[:, ~free] @ vertices[~free].astype(np.float64))
+    for axis in range(3):
+        result[free, axis] = cg(balance[:, free], pull[:, axis], x0=vertices[free, axis], rtol=1e-6, maxiter=5000)[0]
+    return result
 
 
 def is_closed(faces: np.ndarray) -> bool:

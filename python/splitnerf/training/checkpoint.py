@@ -13,6 +13,7 @@ from splitnerf.data.tensor_files import check_tensor, read_tensors, write_tensor
 from splitnerf.errors import InputError
 from splitnerf.ops.hash_grid import HashGridSpec
 from splitnerf.render.occupancy import OccupancyGrid
+from splitnerf.render.seen import Cameras
 from splitnerf.training.start import StartShape
 
 FORMAT = 1
@@ -162,6 +163,7 @@ def _check_content(content: dict) -> None:
     box = content["box_from_world"]
     if not (box[0, 0] > 0 and torch.equal(box[:, :3], box[0, 0] * torch.eye(4, 3).double()) and box[3, 3] == 1):
         raise ValueError("box_from_world is not a uniform scale and a translation")
+    _check_cameras(content.get("cameras"))
     vertices, faces = content.get("mesh_vertices"), content.get("mesh_faces")
     if vertices is not None or faces is not None:
         check_tensor("mesh_vertices", vertices, (-1, 3), torch.float32)
@@ -169,6 +171,15 @@ def _check_content(content: dict) -> None:
         if not (faces.numel() and 0 <= int(faces.min()) and int(faces.max()) < len(vertices)):
             raise ValueError("mesh_faces is empty or names vertices that are none")
     _check_light(config, content)
+
+
+def _check_cameras(cameras: object) -> None:
+    """Raises ValueError where they are none."""
+    if not isinstance(cameras, dict) or cameras.keys() != set(Cameras._fields):
+        raise ValueError("cameras are missing or of another type")
+    check_tensor("cameras' poses", cameras["poses"], (-1, 4, 4), torch.float32)
+    check_tensor("cameras' intrinsics", cameras["intrinsics"], (len(cameras["poses"]), 4), torch.float32)
+    check_tensor("cameras' size", cameras["size"], (2,), torch.int64)
 
 
 def _check_light(config: Config, content: dict) -> None:

@@ -27,6 +27,7 @@ from splitnerf.render.averages import training_photos
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import PixelSource
+from splitnerf.render.seen import Cameras
 from splitnerf.training.batches import draw_batch
 from splitnerf.training.checkpoint import (
     load_checkpoint,
@@ -238,6 +239,7 @@ class Training:
                 environment=self.environment, light_noise=self.model.light.loss_samples.state(),
                 occlusion_light=self.model.occlusion.cached_light(),
                 box_from_world=torch.from_numpy(self.dataset.box_from_world), start=self.start_state(), **self.mesh.state(),
+                cameras=Cameras.of(self.dataset)._asdict(),
             ),
         )  # fmt: skip
 

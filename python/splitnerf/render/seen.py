@@ -1,0 +1,68 @@
+"""Which parts of a mesh the photos show."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+import trimesh
+from torch import Tensor
+
+from splitnerf.data.dataset import Dataset
+from splitnerf.ops import MeshScene
+from splitnerf.render.rays import projected
+
+GRAZING = 0.05  # cosine between the surface's normal and a line of sight below which a photo shows nothing of it
+
+
+class Cameras(NamedTuple):
+    """The cameras of photos of one size.
+
+    Attributes:
+        poses: [n, 4, 4] float32 camera-to-world, OpenGL axes, scene units.
+        intrinsics: [n, 4] float32 fx, fy, cx, cy, pixels.
+        size: [2] int64 height and width, pixels.
+    """
+
+    poses: Tensor
+    intrinsics: Tensor
+    size: Tensor
+
+    @classmethod
+    def of(cls, photos: Dataset) -> Cameras:
+        """Those of a data set."""
+        poses, intrinsics = (torch.from_numpy(x).float() for x in (photos.poses, photos.intrinsics))
+        return cls(poses, intrinsics, torch.tensor([photos.height, photos.width]))
+
+
+def seen_vertices(vertices: np.ndarray, faces: np.ndarray, cameras: Cameras, offset: float) -> np.ndarray:
+    """[n] bool, whether a photo shows a vertex: within its frame, from the front, with nothing of the mesh in between.
+
+    Args:
+        vertices, faces: The mesh, [n, 3] float32 scene units, and [m, 3], outward.
+        cameras: The photos' cameras.
+        offset: How far in front of the surface a line of sight begins, scene units.
+    """
+    scene = MeshScene(vertices, faces)
+    normals = np.asarray(trimesh.Trimesh(vertices, faces, process=False).vertex_normals, np.float32)
+    starts, seen = vertices + offset * normals, np.zeros(len(vertices), bool)
+    limits = cameras.size.flip(0)
+    for pose, lens in zip(cameras.poses, cameras.intrinsics):
+        places = torch.from_numpy(starts[~seen]) - pose[:3, 3]
+        in_camera = places @ pose[:3, :3]
+        at = projected(in_camera, lens)
+        in_frame = (in_camera[:, 2] < 0) & (at > 0).all(1) & (at < limits).all(1)
+        to_camera = -places / places.norm(dim=1, keepdim=True)
+        in_front = (to_camera.numpy() * normals[~seen]).sum(1) > GRAZING
+        rows = np.flatnonzero(in_frame.numpy() & in_front)
+        candidates = np.flatnonzero(~seen)[rows]
+        hit, _, _ = scene.trace_closest(starts[candidates], to_camera.numpy()[rows])
+        seen[candidates[hit < 0]] = True
+    return majority(faces, seen)
+
+
+def majority(faces: np.ndarray, flags: np.ndarray) -> np.ndarray:
+    """[n] bool, what most corners of a vertex's faces say: a ray in a million slips through between two faces."""
+    votes = np.bincount(faces.ravel(), 2.0 * flags[faces].sum(1).repeat(3) - 3.0, minlength=len(flags))
+    return np.where(votes == 0, flags, votes > 0)
