@@ -69,7 +69,7 @@ mutants: install
 	$(BIN)/python tests/mutants.py $(MUTANTS)
 
 viewer:
-	cd python/splitnerf/pages && npm ci --no-audit --no-fund && npm run build
+	cd python/splitnerf_tools/pages && npm ci --no-audit --no-fund && npm run build
 
 docs: install
 	$(BIN)/python -m pip install --quiet -e '.[docs]' --no-build-isolation

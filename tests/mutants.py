@@ -21,8 +21,7 @@ PACKAGE = Path("python/splitnerf")
 # The fast tests of each file, by the longest beginning of its path that is listed.
 TESTS = {
     "config/": "test_config.py",
-    "devices.py": "test_device.py test_meshes.py test_late_occlusion.py test_train.py",
-    "doctor/": "test_doctor.py",
+    "devices.py": "test_device.py test_doctor.py test_meshes.py test_late_occlusion.py test_train.py",
     "evaluate/": "test_evaluate.py test_metrics.py test_protocol.py",
     "export/": "test_export.py test_export_parts.py test_bake.py test_meshing.py test_tangents.py",
     "fields/": "test_heads.py test_scene.py test_shading_model.py",

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import trimesh
 
 from splitnerf.config import Config
@@ -15,26 +14,23 @@ from splitnerf.data.dataset import Dataset, spread
 from splitnerf.data.environment import read_environment
 from splitnerf.data.exposures import EXPOSURES
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.images import over_background
 from splitnerf.data.json_files import read_json, write_json
-from splitnerf.data.truth import load_scene_truth, load_view_truths
+from splitnerf.data.truth import load_view_truths
 from splitnerf.devices import same_bits
 from splitnerf.errors import InputError
-from splitnerf.evaluate.asset import asset_predictions
 from splitnerf.evaluate.jobs import Evaluated, Protocol, asset_mesh, relit_scores, score_asset
 from splitnerf.evaluate.lpips import load_distance
 from splitnerf.export.meshing import EmptyMesh
 from splitnerf.notes import note
-from splitnerf.outputs import evaluate_scene, light_panels, write_assets
+from splitnerf.outputs import evaluate_scene, write_assets
+from splitnerf.plugins import installed
 from splitnerf.refinement.fit import RefinementSettings, decibels
 from splitnerf.refinement.job import RECORD, STATE, TRAINED, OtherState, forget_state, refine_folder
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.render.seen import Cameras
-from splitnerf.report import write_report
 from splitnerf.training.loop import TrainedScene
-from splitnerf.training.metrics import METRICS, read_metrics
 from splitnerf.training.observer import Observer
 
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
@@ -192,66 +188,6 @@ def last_stage_summary(run: Path) -> dict:
 
 
 def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings: dict[str, float]) -> None:
-    """report.html: maps beside the truth, what the last stage changed, the light, curves and settings."""
-    views, predictions, truths = evaluated.dataset, evaluated.predictions, evaluated.truths
-    shown = spread(range(len(views)), REPORT_VIEWS)
-    pages = []
-    for i in shown:
-        prediction = dict(predictions[i])
-        for old, new in (("occlusion_d", "occlusion_diffuse"), ("occlusion_s", "occlusion_specular")):
-            if old in prediction:
-                prediction[new] = prediction.pop(old)
-        truth = {key: value for key, value in vars(truths[i]).items() if key != "name"}
-        truth |= {"rgb": views.images[i, ..., :3], "alpha": views.images[i, ..., 3]}
-        pages.append({"name": views.frame_names[i], "truth": truth, "prediction": prediction})
-    light = run / "environment.exr"
-    write_report(
-        run / "report.html",
-        title=f"{run.resolve().name} · {views.name}",
-        summary={"Result": headline(evaluated.scores), "All scores": evaluated.scores, "Settings": asdict(model.config)},
-        views=pages,
-        last_stage=last_stage_page(run, views, predictions, shown, evaluated.scores) if is_refined(run) else None,
-        lights=light_panels(model),
-        light_truth=load_scene_truth(views.root).light,
-        history=read_metrics(run / METRICS),
-        timings=timings,
-        light=read_environment(light) if light.is_file() else None,
-        asset=run / "mesh.glb",
-        albedo_scale=evaluated.scores["albedo"] and evaluated.scores["albedo"]["lsq"]["scale"],
-    )
-
-
-def last_stage_page(run: Path, views: Dataset, predictions: list[dict], shown: list[int], scores: dict) -> dict | None:
-    """What the report shows of the last stage, see :func:`splitnerf.report.write_report`; None where a file
-    that it shows is gone."""
-    source = run / TRAINED
-    if not all((folder / name).is_file() for folder in (source, run) for name in ASSET_FILES[:2]):
-        return None
-    chosen = views.select(shown)
-    lights = [read_environment(folder / "environment.exr") for folder in (source, run)]
-    before = asset_predictions(AssetRenderer(read_asset(source / "mesh.glb")), chosen, lights[0], scores["spp"])
-    pages = []
-    for k, i in enumerate(shown):
-        photo, coverage = views.images[i, ..., :3], views.images[i, ..., 3]
-        pictures = [over_background(photo, coverage)]
-        pictures += [over_background(p["rgb"], p["alpha"]) for p in (before[k], predictions[i])]
-        errors = [float(np.square(p["alpha"] - coverage).mean()) for p in (before[k], predictions[i])]
-        pages.append({"name": views.frame_names[i], "pictures": pictures, "coverage": errors})
-    return {"views": pages, "summary": scores["last_stage"], "lights": lights}
-
-
-def headline(evaluation: dict) -> dict[str, float]:
-    """The most important scores; scores without truth in the data are left out."""
-    novel_view, relight, albedo = (evaluation[key] or {} for key in ("novel_view", "relight", "albedo"))
-    scores = {
-        "novel views, PSNR dB": novel_view.get("psnr"),
-        "novel views, SSIM": novel_view.get("ssim"),
-        "relit views, PSNR dB": relight.get("psnr"),
-        "albedo, PSNR dB": albedo.get("psnr"),
-        "normals, degrees": evaluation["normal_mae_deg"],
-        "roughness, mean error": evaluation["roughness_mae"],
-        "metallic, accuracy": evaluation["metallic_balanced_accuracy"],
-        "light, PSNR dB": evaluation["light_psnr"],
-        "mesh, F-score": evaluation["f_score"],
-    }
-    return {name: value for name, value in scores.items() if value is not None}
+    """report.html, where a plugin writes it."""
+    if (write_report := installed().write_report) is not None:
+        write_report(run, model, evaluated, timings)

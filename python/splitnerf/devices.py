@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
@@ -30,6 +31,47 @@ def choose_device(name: str) -> torch.device:
     if not torch.cuda.is_available():
         raise InputError(f"--device {name}: torch finds no GPU; install a torch built for CUDA and its driver")
     return torch.device("cuda", torch.cuda.current_device())
+
+
+def devices() -> list[str]:
+    """The devices that the operators can run on."""
+    built = _core.cuda_architectures()
+    usable = built and torch.cuda.is_available() and covers(built, *torch.cuda.get_device_capability())
+    return ["cpu", "cuda"] if usable else ["cpu"]
+
+
+def covers(architectures: str, major: int, minor: int) -> bool:
+    """Whether kernels built for these architectures (as CMake names them) run on a GPU of this capability.
+
+    Machine code runs on GPUs of its major number from its minor one on, PTX on all later GPUs.
+    """
+    for number, kind in re.findall(r"(\d+)[a-z]?(-real|-virtual)?", architectures):
+        older = int(number) <= 10 * major + minor
+        if older and (kind != "-real" or int(number) // 10 == major):
+            return True
+    return False
+
+
+def fit_device(failing_operators: Callable[[str], tuple[list[str], int]] | None) -> tuple[str, str]:
+    """The GPU where all operators pass their test on it, else the CPU: ``cuda`` or ``cpu``, and why, in a clause.
+
+    Args:
+        failing_operators: The names of the operators that fail on a device, and how many were tested; None for no test.
+    """
+    if not _core.cuda_architectures():
+        return "cpu", "this build has no GPU kernels"
+    if not torch.cuda.is_available():
+        return "cpu", "torch finds no GPU"
+    name = torch.cuda.get_device_name()
+    if "cuda" not in devices():
+        return "cpu", f"this build has no kernels for the {name}"
+    if failing_operators is None:
+        return "cuda", f"the build has kernels for the {name}"
+    failed, n_tested = failing_operators("cuda")
+    if failed:
+        others = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
+        return "cpu", f"the {name} fails the test of {failed[0]}{others} (splitnerf doctor)"
+    return "cuda", f"the {name} passes the test of {n_tested} operators"
 
 
 def refuse_one_processor() -> None:

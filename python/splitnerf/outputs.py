@@ -28,7 +28,6 @@ from splitnerf.export.simplify import capped, drop_floaters_and_cavities, is_clo
 from splitnerf.export.surface import Surface, surface_materials
 from splitnerf.export.textured import textured_asset
 from splitnerf.export.usdz import require_usd, write_usdz
-from splitnerf.ops import fibonacci_directions, prefilter_light
 from splitnerf.progress import Progress, tracked
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
@@ -36,7 +35,6 @@ from splitnerf.render.renderer import render_view
 from splitnerf.render.seen import Cameras, seen_vertices
 
 FORMATS = ("glb", "ply", "obj", "usdz")
-REPORT_ROUGHNESS = (0.0, 0.25, 0.5, 1.0)
 
 
 def render_maps(model: SceneModel, grid: OccupancyGrid, dataset: Dataset, index: int) -> dict[str, np.ndarray]:
@@ -163,25 +161,6 @@ def surface_of(model: SceneModel) -> Surface:
         return (*material, torch.nn.functional.normalize(field.gradient, dim=1))
 
     return Surface(*map(from_cpu, (model.sdf_field.sdf, gradient, materials)))
-
-
-@torch.no_grad()
-def light_panels(model: SceneModel, height: int = 64, n_samples: int = 8192) -> list[dict]:
-    """g(w, rho) beside its Monte Carlo estimate from g(w, 0), as [height, 2 height, 3] maps."""
-    from splitnerf.fields.light import panorama_directions
-
-    sources = fibonacci_directions(n_samples, torch.Generator(model.device).manual_seed(0))
-    maps = model.light.evaluate()
-    light = torch.cat([maps(d, torch.zeros_like(d[:, :1])) for d in sources.split(1 << 15)])
-    queries = panorama_directions(height, model.device).reshape(-1, 3)
-    panels = []
-    for roughness in REPORT_ROUGHNESS:
-        g = model.light.panorama(height, roughness)
-        g_bar = g
-        if roughness > 0:
-            g_bar = prefilter_light(queries, torch.full_like(queries[:, :1], roughness), sources, light).view_as(g)
-        panels.append({"roughness": roughness, "g": g.cpu().numpy(), "g_bar": g_bar.cpu().numpy()})
-    return panels
 
 
 def evaluate_scene(

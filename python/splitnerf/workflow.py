@@ -26,11 +26,11 @@ from splitnerf.evaluate.jobs import Evaluated, Protocol, choose_views, evaluatio
 from splitnerf.files import atomic_path, held
 from splitnerf.notes import note_once
 from splitnerf.outputs import Exported, write_assets
+from splitnerf.plugins import installed
 from splitnerf.refinement.job import STATE
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.render.seen import Cameras
-from splitnerf.separation.job import SHEET, discard_separated, separate
 from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_model, restored_grid
 from splitnerf.training.loop import TrainedScene, begin_training, check_repeatable, check_same_scene
 from splitnerf.training.meshes import SurfaceMesh
@@ -102,11 +102,12 @@ def begin_or_go_on(run: Path) -> tuple[bool, bool]:
 
 
 def is_finished(run: Path) -> bool:
-    """Whether a run has delivered what its checkpoint holds: the report is its last file, then its state goes."""
-    checkpoint, report = run / "checkpoint.pt", run / "report.html"
-    if not (checkpoint.is_file() and report.is_file()) or (run / STATE).exists():
+    """Whether a run has delivered what its checkpoint holds: the last file is the report or, where nothing writes one, the
+    evaluation; then its state goes."""
+    checkpoint, last = run / "checkpoint.pt", run / ("report.html" if installed().write_report else "evaluation.json")
+    if not (checkpoint.is_file() and last.is_file()) or (run / STATE).exists():
         return False
-    return report.stat().st_mtime_ns >= checkpoint.stat().st_mtime_ns
+    return last.stat().st_mtime_ns >= checkpoint.stat().st_mtime_ns
 
 
 def reconstruct(
@@ -161,19 +162,17 @@ def load_with_masks(
     folder, reading = run / SEPARATED, config.reading
     if is_separated(folder) and not overwrite:
         reading = replace(reading, separated=folder)
-    train, test = load_splits(data, downscale, reading, masked=False)
+    find_masks = installed().find_masks
+    train, test = load_splits(data, downscale, reading, masked=find_masks is None)
     if train.masked:
         if overwrite:
-            discard_separated(folder)
+            shutil.rmtree(folder, ignore_errors=True)
         return config, train, test
-    note_once(f"{data}: nothing says where the object is; it is looked for in the middle of the photos, see {folder / SHEET}")
     minutes = config.run.max_minutes * config.separation.share
     steps = UNLIMITED if minutes > 0 else config.separation.steps
-    found = separate(train, test, folder, steps=steps, minutes=minutes, seed=config.run.seed)
-    table = "above a table" if found.table else "without a table under it"
-    note_once(f"{data}: the object, {table}, covers {found.share:.0%} of the photos")
+    seconds = find_masks(train, test, folder, steps=steps, minutes=minutes, seed=config.run.seed)
     if config.run.max_minutes > 0:
-        left = config.run.max_minutes - found.seconds / 60
+        left = config.run.max_minutes - seconds / 60
         config = config.replace({"run.max_minutes": max(left, 0.1 * config.run.max_minutes)})
     return config, *load_splits(data, downscale, replace(reading, separated=folder))
 

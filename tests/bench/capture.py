@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.capture.exposure import Exposures
-from splitnerf.capture.job import PrepareSettings, exposures_of, write_data
-from splitnerf.capture.photographs import find_photographs
-from splitnerf.capture.poses import Lens, Reconstruction, reconstruct
-from splitnerf.capture.world import settle
+from splitnerf_tools.capture.exposure import Exposures
+from splitnerf_tools.capture.job import PrepareSettings, exposures_of, write_data
+from splitnerf_tools.capture.photographs import find_photographs
+from splitnerf_tools.capture.poses import Lens, Reconstruction, reconstruct
+from splitnerf_tools.capture.world import settle
 
 PARTS = ("cameras", "masks", "exposures")
 

@@ -115,7 +115,7 @@ wheel() { # of these sources, and its operators are right on this machine
   fi
   "$run_python" -m splitnerf doctor
   "$run_python" -c 'import sys
-from splitnerf.doctor.machine import devices
+from splitnerf.devices import devices
 print("operators for", ", ".join(devices()))
 sys.exit(sys.argv[1] not in devices())' $device
 }
@@ -126,7 +126,7 @@ data() { # prints the folder of a data set, last
   done
   "$run_python" -c "
 from pathlib import Path
-from splitnerf.demo.scene import write_demo_dataset
+from splitnerf_tools.demo.scene import write_demo_dataset
 write_demo_dataset(Path('$work/writing'), $picture)" && mv "$work/writing" "$work/demo" && echo "$work/demo"
 }
 

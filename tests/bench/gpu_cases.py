@@ -17,8 +17,8 @@ from test_reference import DIFFERENTIABLE
 from torch import Tensor, nn
 from torch.utils._pytree import tree_leaves, tree_map
 
-from splitnerf.bench import reference
 from splitnerf.ops import brdf_lut
+from splitnerf_tools.bench import reference
 
 UNREAD = {"sparse_product": (3, 4, 5), "read_pixels": (0, 5, 6, 7, 8)}  # inputs for the backward pass, or of which few numbers are read
 

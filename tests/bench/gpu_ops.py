@@ -25,9 +25,9 @@ from typing import NamedTuple
 
 import torch
 
-from splitnerf.bench.provenance import header, provenance
 from splitnerf.devices import tensor_cores
 from splitnerf.ops import AdamW
+from splitnerf_tools.bench.provenance import header, provenance
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("cpp", "python/splitnerf/ops")

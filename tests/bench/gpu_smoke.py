@@ -22,8 +22,8 @@ sys.path[:0] = [str(Path(__file__).parents[1] / "python")]
 
 def families(device: str) -> dict[str, list[str]]:
     """The operators that run on a device, by family."""
-    from splitnerf.doctor.self_test import operators
-    from splitnerf.doctor.table import CHECKS
+    from splitnerf_tools.doctor.self_test import operators
+    from splitnerf_tools.doctor.table import CHECKS
 
     found: dict[str, list[str]] = {}
     for name in operators(device):
@@ -37,7 +37,7 @@ def wrong_with(op: str, device: str) -> list[str]:
     from op_cases import CASES, check_against_the_cpu, moved
     from op_checks import lib
 
-    from splitnerf.doctor.self_test import failures
+    from splitnerf_tools.doctor.self_test import failures
 
     said = [f"{op}: {failure.said} ({failure.known})" for failure in failures(device, [op])]
     for dtype in (torch.float64, torch.float32) if op in CASES else ():

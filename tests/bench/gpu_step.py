@@ -28,7 +28,6 @@ from torch import Tensor
 from torch.overrides import TorchFunctionMode
 from torch.utils._pytree import tree_leaves, tree_map
 
-from splitnerf.bench.provenance import header, provenance
 from splitnerf.config import Config, preset
 from splitnerf.config.presets import parse_setting
 from splitnerf.data.dataset import Dataset, load_dataset
@@ -41,6 +40,7 @@ from splitnerf.training.numbers import PastStep
 from splitnerf.training.room import SAMPLE_SLACK, round_up
 from splitnerf.training.schedule import light_moves
 from splitnerf.training.step import Room
+from splitnerf_tools.bench.provenance import header, provenance
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("cpp", "python/splitnerf")

@@ -25,7 +25,6 @@ import torch
 from torch.autograd import DeviceType
 from torch.profiler import ProfilerActivity, profile
 
-from splitnerf.bench.provenance import header, provenance
 from splitnerf.config import parse_setting, preset
 from splitnerf.data.dataset import load_dataset, spread
 from splitnerf.devices import choose_device
@@ -33,6 +32,7 @@ from splitnerf.outputs import evaluate_scene
 from splitnerf.training import graphs, loop
 from splitnerf.training.loop import TrainedScene, Training
 from splitnerf.training.metrics import METRICS
+from splitnerf_tools.bench.provenance import header, provenance
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("cpp", "python/splitnerf")

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
-from splitnerf.bench.provenance import header, provenance
+from splitnerf_tools.bench.provenance import header, provenance
 
 WIDTH, HEIGHT, FOCAL = 4000, 3000, 4200.0
 DISTANCE = 3.0

@@ -22,13 +22,13 @@ from unittest.mock import patch
 import torch
 from torch.utils._python_dispatch import TorchDispatchMode
 
-from splitnerf.bench.provenance import header, provenance
 from splitnerf.config import parse_setting, preset
 from splitnerf.data.dataset import load_dataset
-from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.fields import heads
 from splitnerf.training.loop import Training
 from splitnerf.training.room import RoomyStep
+from splitnerf_tools.bench.provenance import header, provenance
+from splitnerf_tools.demo.scene import write_demo_dataset
 
 # Kernels and memory sets of an operator with more than one, as its launcher in cpp/cuda/ and cpp/torch/ makes them.
 KERNELS = {

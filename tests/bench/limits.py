@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.bench.provenance import header, provenance
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.environment import read_environment
@@ -33,6 +32,7 @@ from splitnerf.evaluate.relight import RelitViews, relight
 from splitnerf.evaluate.similarity import ScaledView, on_white, scaled_scores
 from splitnerf.relight.job import asset_of
 from splitnerf.render.path_traced import AssetRenderer
+from splitnerf_tools.bench.provenance import header, provenance
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bench.swap import MATERIALS, PARTS, Canvas  # noqa: E402

@@ -24,7 +24,7 @@ import trimesh
 
 import splitnerf.ops as ops
 from splitnerf.data.environment import directions_of_texels
-from splitnerf.demo.scene import build_environment
+from splitnerf_tools.demo.scene import build_environment
 
 GOLD, BLUE, GREY = "#c77c11", "#1f5fa8", "#777777"
 

@@ -23,7 +23,6 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from splitnerf.bench import reference
 from splitnerf.config import Config, parse_setting
 from splitnerf.fields.sdf import SOFTPLUS_BETA, SdfField, SdfSample
 from splitnerf.ops import hash_grid as hash_module
@@ -39,6 +38,7 @@ from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training import loop as training
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.workflow import load_run, load_splits
+from splitnerf_tools.bench import reference
 
 # ---- field ----
 

@@ -17,13 +17,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-from splitnerf.bench.charts import write_csv
-from splitnerf.bench.provenance import header, provenance
 from splitnerf.data.images import write_image
-from splitnerf.demo.scene import build_environment
 from splitnerf.evaluate.jobs import read_evaluation
 from splitnerf.files import atomic_path
-from splitnerf.synth.shapes import MATERIALS, SHAPES
+from splitnerf_tools.bench.charts import write_csv
+from splitnerf_tools.bench.provenance import header, provenance
+from splitnerf_tools.demo.scene import build_environment
+from splitnerf_tools.synth.shapes import MATERIALS, SHAPES
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("cpp", "python/splitnerf")

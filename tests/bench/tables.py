@@ -2,7 +2,7 @@
 
     python tests/bench/tables.py        (make tables)
 
-The head of a table says at which commit it was made and which sources it measures (splitnerf.bench.provenance); pages
+The head of a table says at which commit it was made and which sources it measures (splitnerf_tools.bench.provenance); pages
 of docs/benchmarks without such a head are unknown.
 """
 
@@ -13,7 +13,7 @@ import shlex
 import sys
 from pathlib import Path
 
-from splitnerf.bench.provenance import git
+from splitnerf_tools.bench.provenance import git
 
 ROOT = Path(__file__).resolve().parents[2]
 HEAD = re.compile(r"\bcommit (?P<commit>\w+)(?P<changed>\+?);.*\bmeasures `(?P<sources>[^`]+)`")

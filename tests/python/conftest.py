@@ -15,9 +15,9 @@ from viewer_server import numbered_sky, serving, triangle
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import write_image
-from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.refinement.texels import AssetTexels
 from splitnerf.training.loop import train
+from splitnerf_tools.demo.scene import write_demo_dataset
 
 
 def tiny_dataset(folder: Path, n_train: int) -> Path:

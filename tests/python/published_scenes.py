@@ -11,8 +11,8 @@ import trimesh
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from splitnerf.render.path_traced import AssetRenderer
-from splitnerf.synth.cameras import orbit, spiral
-from splitnerf.synth.jobs import (
+from splitnerf_tools.synth.cameras import orbit, spiral
+from splitnerf_tools.synth.jobs import (
     CAMERA_ANGLE_X, CAMERA_DISTANCE, TEST_ELEVATION, TEST_SWING, TRAIN_ELEVATIONS, SynthSettings, normalised, synthesise,
     unit_sphere,
 )  # fmt: skip

@@ -8,12 +8,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from splitnerf.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, make_rows
-from splitnerf.ablate.table import Score, csv_table, differences, markdown_table
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
-from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.errors import InputError
+from splitnerf_tools.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, make_rows
+from splitnerf_tools.ablate.table import Score, csv_table, differences, markdown_table
+from splitnerf_tools.demo.scene import write_demo_dataset
 
 SMALL = [
     "n_levels=2", "log2_table_size=8", "target_samples=256", "initial_rays=32", "grid_resolution=16", "light_resolution=16",

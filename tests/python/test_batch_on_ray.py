@@ -19,8 +19,8 @@ from pathlib import Path
 import pytest
 from tiny_runs import SMALL, as_options
 
-from splitnerf.batch.scenes import known_scenes
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED
+from splitnerf_tools.batch.scenes import known_scenes
 
 pytestmark = [
     pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install 'splitnerf[batch]'"),

@@ -14,15 +14,15 @@ import torch
 from bench import tables
 from torch.nn import functional as F
 
-from splitnerf.bench import charts, harness, normals, path_tracer, provenance, shading, split_sum, whole
-from splitnerf.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv, write_result
-from splitnerf.bench.harness import interleaved
-from splitnerf.bench.lights import MapLight, octahedral_directions, pyramid_of
-from splitnerf.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
 from splitnerf.cli import BAD_INPUT, DONE, main
-from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.errors import CheckFailed
 from splitnerf.fields import SdfField
+from splitnerf_tools.bench import charts, harness, normals, path_tracer, provenance, shading, split_sum, whole
+from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv, write_result
+from splitnerf_tools.bench.harness import interleaved
+from splitnerf_tools.bench.lights import MapLight, octahedral_directions, pyramid_of
+from splitnerf_tools.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
+from splitnerf_tools.demo.scene import write_demo_dataset
 
 SMALL = [
     "n_levels=2", "log2_table_size=8", "initial_rays=32", "grid_resolution=16", "light_resolution=16", "light_queries=8",

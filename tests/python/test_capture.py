@@ -17,18 +17,7 @@ from PIL import Image
 from table_scene import BALL, CAMERA, RADIUS, TABLE_RADIUS, photograph, ring, surface_colours, write_photos
 from test_files import no_more_than
 
-from splitnerf.capture import job as capture_job
-from splitnerf.capture.exposure import find_exposures
-from splitnerf.capture.job import PrepareSettings, _begin, _upright_copies, _without_camera
-from splitnerf.capture.masks import dots_of, given_masks
-from splitnerf.capture.photographs import find_photographs, read_upright, sharpness, write_png
-from splitnerf.capture.poses import Lens, Reconstruction
-from splitnerf.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
-from splitnerf.capture.undistorted import pinhole_of, undistort, without_vignetting
-from splitnerf.capture.video import write_frames
-from splitnerf.capture.world import CAMERA_DISTANCE, World, settle
 from splitnerf.cli import main
-from splitnerf.cli.prepare import STEPS, overall
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import seen_at
 from splitnerf.data.frames import TEST_STRIDE
@@ -37,6 +26,17 @@ from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight, LightPyramid
 from splitnerf.files import LOCK, PARTIAL
 from splitnerf.training.losses import SeenLight
+from splitnerf_tools.capture import job as capture_job
+from splitnerf_tools.capture.exposure import find_exposures
+from splitnerf_tools.capture.job import PrepareSettings, _begin, _upright_copies, _without_camera
+from splitnerf_tools.capture.masks import dots_of, given_masks
+from splitnerf_tools.capture.photographs import find_photographs, read_upright, sharpness, write_png
+from splitnerf_tools.capture.poses import Lens, Reconstruction
+from splitnerf_tools.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
+from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
+from splitnerf_tools.capture.video import write_frames
+from splitnerf_tools.capture.world import CAMERA_DISTANCE, World, settle
+from splitnerf_tools.commands.prepare import STEPS, overall
 
 
 PLAIN = Lens(320, 240, 320.0, 320.0, 160.0, 120.0, 0.0, 0.0, 0.0, 0.0)
@@ -195,7 +195,7 @@ def test_given_masks_may_be_black_on_the_object(tmp_path, capsys, inverted):
 
 
 def test_missing_packages_are_named(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr("splitnerf.cli.prepare.find_spec", lambda name: None)
+    monkeypatch.setattr("splitnerf_tools.commands.prepare.find_spec", lambda name: None)
     assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "data")]) == 2
     assert "splitnerf[photos]" in capsys.readouterr().err
 

@@ -20,8 +20,8 @@ from tiny_runs import SMALL, as_options
 
 from splitnerf.cli import main
 from splitnerf.data.images import read_image, write_image
-from splitnerf.demo.scene import write_demo_dataset
 from splitnerf.export.glb import write_glb
+from splitnerf_tools.demo.scene import write_demo_dataset
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BLENDER = os.environ.get("SPLITNERF_BLENDER_PYTHON") or sys.executable  # bpy 5.0 wants an older NumPy than OpenImageIO

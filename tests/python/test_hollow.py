@@ -13,9 +13,9 @@ from splitnerf.cli import DONE, main
 from splitnerf.config import preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import write_image
-from splitnerf.demo.scene import build_environment
 from splitnerf.evaluate.jobs import read_evaluation
 from splitnerf.training.loop import train
+from splitnerf_tools.demo.scene import build_environment
 
 
 def photographed(folder: Path, shape: str, *options: str) -> Path:

@@ -1,4 +1,4 @@
-"""Imports run one way: from the command line down to the compiled library, and never in a circle."""
+"""Imports run one way: the core, `splitnerf`, imports nothing of the tools; in each package they run down, never in a circle."""
 
 from __future__ import annotations
 
@@ -8,50 +8,63 @@ import grimp
 import pytest
 
 # From the top: a unit imports those of lower lines only. Units of one line do not import each other.
-LAYERS = [
+CORE = [
     {"train", "__main__"},
     {"cli"},
-    {"batch", "bench", "demo"},
-    {"ablate"},
     {"workflow"},
     {"delivery"},
-    {"capture", "view"},
-    {"training", "inspection", "separation"},
-    {"outputs", "report"},
-    {"evaluate", "refinement", "relight", "synth"},
+    {"training"},
+    {"outputs"},
+    {"evaluate", "refinement", "relight"},
     {"export", "render"},
     {"fields", "config"},
-    {"data", "doctor"},
+    {"data"},
     {"ops", "devices", "files"},
-    {"_core", "memory", "notes", "progress"},
+    {"_core", "memory", "plugins", "progress"},
+    {"notes"},
     {"errors"},
 ]
+TOOLS = [
+    {"plugin"},
+    {"commands"},
+    {"batch", "bench", "capture", "demo", "inspection", "view"},
+    {"ablate", "doctor", "report", "separation", "synth"},
+]
+LAYERS = {"splitnerf": CORE, "splitnerf_tools": TOOLS}
+Imports = dict[str, set[str]]
 
 
 @pytest.fixture(scope="module")
-def imports() -> dict[str, set[str]]:
-    """Every module of the package and what it imports of the package, the package's own `__init__` aside."""
-    graph = grimp.build_graph("splitnerf")
-    found = {m: graph.find_modules_directly_imported_by(m) - {"splitnerf"} for m in graph.modules if m != "splitnerf"}
+def imports() -> Imports:
+    """Every module of both packages and what it imports of them, the packages' own `__init__` aside."""
+    graph = grimp.build_graph(*LAYERS)
+    found = {m: graph.find_modules_directly_imported_by(m) - set(LAYERS) for m in graph.modules - set(LAYERS)}
     assert len(found) > 60
     return found
 
 
 def unit(module: str) -> str:
-    return module.split(".")[1]
+    """The package or module directly in `splitnerf` or `splitnerf_tools` that a module belongs to."""
+    return ".".join(module.split(".")[:2])
 
 
-def wrong_way(imports: dict[str, set[str]]) -> list[str]:
-    level = {name: i for i, line in enumerate(LAYERS) for name in line}
+def wrong_way(imports: Imports) -> list[str]:
+    """The imports that run up the layers, or from the core to the tools."""
+    level = {f"{package}.{name}": i for package, lines in LAYERS.items() for i, line in enumerate(lines) for name in line}
+
+    def allowed(module: str, imported: str) -> bool:
+        here, there = (name.partition(".")[0] for name in (module, imported))
+        return here == "splitnerf_tools" if here != there else level[unit(imported)] > level[unit(module)]
+
     return [
         f"{module} imports {imported}"
         for module, targets in imports.items()
         for imported in targets
-        if unit(imported) not in ("_core", unit(module)) and level[unit(imported)] <= level[unit(module)]
+        if unit(imported) != unit(module) and imported != "splitnerf._core" and not allowed(module, imported)
     ]
 
 
-def circle(imports: dict[str, set[str]]) -> list[str]:
+def circle(imports: Imports) -> list[str]:
     """Modules that import each other in a circle; empty where there is none."""
     try:
         TopologicalSorter(imports).prepare()
@@ -60,11 +73,13 @@ def circle(imports: dict[str, set[str]]) -> list[str]:
     return []
 
 
-def test_every_unit_has_a_layer(imports):
-    assert {unit(module) for module in imports} | {"_core"} == set().union(*LAYERS)
+@pytest.mark.parametrize("package", LAYERS)
+def test_every_unit_has_a_layer(imports, package):
+    units = {unit(module) for module in imports if module.startswith(f"{package}.")}
+    assert units | {"splitnerf._core"} == {f"{package}.{name}" for name in set().union(*LAYERS[package])} | {"splitnerf._core"}
 
 
-def test_imports_run_down_the_layers(imports):
+def test_imports_run_down_the_layers_and_none_of_the_core_is_of_a_tool(imports):
     assert wrong_way(imports) == []
 
 
@@ -77,3 +92,8 @@ def test_a_planted_import_is_found(imports):
     planted = {**imports, "splitnerf.fields.sdf": imports["splitnerf.fields.sdf"] | {"splitnerf.training.loop"}}
     assert wrong_way(planted) == ["splitnerf.fields.sdf imports splitnerf.training.loop"]
     assert {"splitnerf.fields.sdf", "splitnerf.training.loop"} <= set(circle(planted))
+
+
+def test_a_planted_import_of_a_tool_is_found(imports):
+    planted = {**imports, "splitnerf.workflow": imports["splitnerf.workflow"] | {"splitnerf_tools.view.live"}}
+    assert wrong_way(planted) == ["splitnerf.workflow imports splitnerf_tools.view.live"]

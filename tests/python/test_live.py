@@ -27,13 +27,13 @@ from splitnerf.outputs import surface_of
 from splitnerf.render.model import SceneModel
 from splitnerf.training.loop import Training
 from splitnerf.training.observer import Wish
-from splitnerf.view import live as live_module
-from splitnerf.view.grown import grown_asset, grown_glb
-from splitnerf.view.live import Live
-from splitnerf.view.news import News
-from splitnerf.view.server import ViewServer
-from splitnerf.view.shown import Shown
-from splitnerf.view.watched import watched
+from splitnerf_tools.view import live as live_module
+from splitnerf_tools.view.grown import grown_asset, grown_glb
+from splitnerf_tools.view.live import Live
+from splitnerf_tools.view.news import News
+from splitnerf_tools.view.server import ViewServer
+from splitnerf_tools.view.shown import Shown
+from splitnerf_tools.view.watched import watched
 
 CPU = torch.device("cpu")
 
@@ -44,7 +44,7 @@ def eager(monkeypatch):
     for name in ("TOLD_EVERY", "GROWN_EVERY"):
         monkeypatch.setattr(live_module, name, 0.0)
     monkeypatch.setattr(live_module, "GROWN_SHARE", 1e9)
-    monkeypatch.setattr("splitnerf.view.live.grown_asset", functools.partial(grown_asset, resolution=16))
+    monkeypatch.setattr("splitnerf_tools.view.live.grown_asset", functools.partial(grown_asset, resolution=16))
 
 
 class Stepped:
@@ -256,7 +256,7 @@ def test_pages_hear_the_end_and_it_waits_for_them_a_moment(monkeypatch):
     news.end("again")
     assert news.state["ended"] == "over"
     thread.join()
-    monkeypatch.setattr("splitnerf.view.news.FAREWELL", 0.0)
+    monkeypatch.setattr("splitnerf_tools.view.news.FAREWELL", 0.0)
     stubborn = News()
     listening = stubborn.listen(lambda: False)
     next(listening)

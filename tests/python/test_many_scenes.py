@@ -14,16 +14,16 @@ import pytest
 from test_files import HOLDS
 from tiny_runs import as_options
 
-from splitnerf.batch import child
-from splitnerf.batch.child import Outcome, Work, train_scene
-from splitnerf.batch.cluster import LONGEST_FOLDER, Share, n_at_once, own_folder, share_of
-from splitnerf.batch.job import Batch, Told, Watch, run_batch
-from splitnerf.batch.scenes import Scene, asked_scenes, fingerprint, keep_scenes, known_scenes, scene_name
-from splitnerf.batch.table import Rows, markdown
 from splitnerf.cli import BAD_INPUT, FAILED, build_parser, main
-from splitnerf.cli.batch import given_options
 from splitnerf.errors import InputError
 from splitnerf.files import LOCK, is_held, remove_partial
+from splitnerf_tools.batch import child
+from splitnerf_tools.batch.child import Outcome, Work, train_scene
+from splitnerf_tools.batch.cluster import LONGEST_FOLDER, Share, n_at_once, own_folder, share_of
+from splitnerf_tools.batch.job import Batch, Told, Watch, run_batch
+from splitnerf_tools.batch.scenes import Scene, asked_scenes, fingerprint, keep_scenes, known_scenes, scene_name
+from splitnerf_tools.batch.table import Rows, markdown
+from splitnerf_tools.commands.batch import given_options
 
 GB = 1e9
 
@@ -247,7 +247,7 @@ def test_a_run_in_use_is_waited_for_and_then_left_alone(tmp_path, monkeypatch):
 PARENT = """
 import os, subprocess, sys
 words = [sys.executable, "-c", sys.argv[1], sys.argv[2]]
-child = subprocess.Popen([sys.executable, "-m", "splitnerf.batch.child", str(os.getpid()), *words])
+child = subprocess.Popen([sys.executable, "-m", "splitnerf_tools.batch.child", str(os.getpid()), *words])
 child.wait()
 """
 CHILD = """

@@ -7,7 +7,6 @@ import pytest
 import torch
 from op_checks import unit
 
-from splitnerf.bench.lights import MapLight
 from splitnerf.data.asset import Asset, Material
 from splitnerf.ops import (
     fibonacci_directions,
@@ -19,6 +18,7 @@ from splitnerf.ops import (
     summed_light,
 )
 from splitnerf.render.path_traced import AssetRenderer
+from splitnerf_tools.bench.lights import MapLight
 
 COSINES, ROUGHNESS, METALLIC = (0.2, 0.5, 0.9), (0.1, 0.4, 0.8), (0.0, 0.5, 1.0)
 ALBEDO = (0.02, 0.1, 0.6)  # black, where Fresnel's term is all that shows, to bright

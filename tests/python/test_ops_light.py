@@ -8,8 +8,8 @@ import torch
 from op_cases import prefilter_backward_inputs, prefilter_inputs
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 
-from splitnerf.bench import reference
 from splitnerf.ops import fibonacci_directions, prefilter_light, sample_ggx_lobe
+from splitnerf_tools.bench import reference
 
 
 @pytest.mark.parametrize("device", DEVICES)

@@ -9,10 +9,10 @@ import torch
 from op_cases import CASES, field_gradients, pixel_inputs, rand
 from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 
-from splitnerf.bench import reference
 from splitnerf.ops import (
     gradient_losses, linear_to_srgb, material_losses, pixel_losses, quadratic_entropy, srgb_to_linear,
 )  # fmt: skip
+from splitnerf_tools.bench import reference
 
 
 def same_as(ours: tuple, theirs: tuple, leaves: tuple, twins: tuple) -> None:

@@ -19,7 +19,6 @@ from op_cases import (
 )
 from op_checks import check_op, generator, grad_leaves, lib
 
-from splitnerf.bench import reference
 from splitnerf.ops import (
     CELL_EMPTY,
     SdfNetwork,
@@ -28,6 +27,7 @@ from splitnerf.ops import (
     sdf_values,
     surface_weights,
 )
+from splitnerf_tools.bench import reference
 
 
 def depth_between(f, f_next, s: float):

@@ -18,7 +18,7 @@ from splitnerf.evaluate.published import nerfactor, shiny, stanford_orb, tensoir
 from splitnerf.evaluate.published.common import Delivered
 from splitnerf.evaluate.published.folders import FolderTruth
 from splitnerf.evaluate.published.table import PROTOCOLS, published, table
-from splitnerf.synth.layouts import LAYOUTS
+from splitnerf_tools.synth.layouts import LAYOUTS
 
 SIDE = 24
 RANDOM = np.random.default_rng(5)

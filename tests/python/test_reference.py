@@ -21,8 +21,8 @@ from op_cases import (
 from op_checks import as_tuple, generator, grad_leaves, lib
 from shading_inputs import mixed_sums_inputs, split_sum_inputs
 
-from splitnerf.bench import reference
-from splitnerf.bench.hash_grid import SPEC
+from splitnerf_tools.bench import reference
+from splitnerf_tools.bench.hash_grid import SPEC
 
 # The inputs of each operator to which there is a gradient.
 DIFFERENTIABLE = {

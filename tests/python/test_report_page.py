@@ -13,7 +13,7 @@ from PIL import Image
 
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.export.glb import write_glb
-from splitnerf.report import write_report
+from splitnerf_tools.report import write_report
 
 RED, BLUE = (0.8, 0.2, 0.2), (0.2, 0.2, 0.7)
 LAMP = (5, 12)  # row and column of a texel of the true light

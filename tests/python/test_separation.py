@@ -13,7 +13,6 @@ import torch
 from blender_data import look_at
 from tiny_runs import train
 
-from splitnerf.capture import masks as capture_masks
 from splitnerf.cli import main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.ground import find_table
@@ -22,14 +21,15 @@ from splitnerf.data.normalisation import box_of_views
 from splitnerf.data.photos import separated_mask
 from splitnerf.data.reading import SEPARATED, Reading
 from splitnerf.errors import InputError
-from splitnerf.separation import job, training
-from splitnerf.separation.field import (
+from splitnerf_tools.capture import masks as capture_masks
+from splitnerf_tools.separation import job, training
+from splitnerf_tools.separation.field import (
     RadianceField, RayMeasure, Rendered, contracted, resampled, search_loss, spread_loss, with_less_gradient,
 )  # fmt: skip
-from splitnerf.separation.foot import find_foot
-from splitnerf.separation.masks import _points, at_edges, find_mask, with_mirrors
-from splitnerf.separation.region import CELLS, Region, find_region
-from splitnerf.separation.table import Table
+from splitnerf_tools.separation.foot import find_foot
+from splitnerf_tools.separation.masks import _points, at_edges, find_mask, with_mirrors
+from splitnerf_tools.separation.region import CELLS, Region, find_region
+from splitnerf_tools.separation.table import Table
 
 SIZE, FOCAL = 40, 40.0
 

@@ -8,13 +8,13 @@ from bench import shapes as bench
 from bench import tables
 
 from splitnerf.cli import BAD_INPUT, DONE, build_parser, main
-from splitnerf.cli import synth as command
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.evaluate.jobs import asset_mesh
-from splitnerf.synth.shapes import MATERIALS, SHAPES, pattern, shape_asset
+from splitnerf_tools.commands import synth as command
+from splitnerf_tools.synth.shapes import MATERIALS, SHAPES, pattern, shape_asset
 
 TUNNELS = {"mug": 1, "rings": 1, "mask": 2}  # through the body; the others have none
 WALLS = {"bowl": 0.08, "mug": 0.08, "box": 0.08, "vase": 0.07, "shell": 0.06, "mask": 0.07}

@@ -14,7 +14,6 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.fields import SdfField
 from splitnerf.ops import HashGridSpec
 from splitnerf.render import stereo
-from splitnerf.synth.cameras import spiral
 from splitnerf.training import loop
 from splitnerf.training.loop import begin_training, train
 from splitnerf.training.start import (
@@ -25,6 +24,7 @@ from splitnerf.training.start import (
     fit_to,
     surface_depths,
 )
+from splitnerf_tools.synth.cameras import spiral
 
 SIZE, VIEWS, BOX, CELLS = 80, 40, 1.5, 48
 

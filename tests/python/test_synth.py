@@ -17,9 +17,9 @@ from splitnerf.data.relit import read_relit, relight_maps
 from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.evaluate.relight import FIRST_SEED
 from splitnerf.render.path_traced import AssetRenderer
-from splitnerf.synth.cameras import orbit, spiral
-from splitnerf.synth.jobs import SynthSettings, normalised, render_views, synthesise, unit_sphere
-from splitnerf.synth.writer import FULL_TRUTH, SceneWriter
+from splitnerf_tools.synth.cameras import orbit, spiral
+from splitnerf_tools.synth.jobs import SynthSettings, normalised, render_views, synthesise, unit_sphere
+from splitnerf_tools.synth.writer import FULL_TRUTH, SceneWriter
 
 SIZE = 24
 HALF_STEP = 0.5 / 255 + 1e-6

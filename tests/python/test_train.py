@@ -288,7 +288,7 @@ def test_a_deterministic_run_goes_on_where_it_began(data, tmp_path, monkeypatch)
     """On the CPU, though there is a GPU by now and the command does not repeat what it asked for."""
     run = tmp_path / "run"
     assert train(data, run, "--steps", "4", "--deterministic") == DONE
-    monkeypatch.setattr("splitnerf.doctor.choice.fit_device", lambda: ("cuda", "it is fit"))
+    monkeypatch.setattr("splitnerf.devices.fit_device", lambda test: ("cuda", "it is fit"))
     assert main(["train", str(data), "--out", str(run), "--resume", "--steps", "6"]) == DONE
 
 

@@ -26,11 +26,11 @@ from splitnerf.export.glb import write_glb
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training
 from splitnerf.training.observer import Observer
-from splitnerf.view import live as live_module
-from splitnerf.view.grown import grown_asset
-from splitnerf.view.live import Live
-from splitnerf.view.server import Handler, ViewServer
-from splitnerf.view.shown import Shown
+from splitnerf_tools.view import live as live_module
+from splitnerf_tools.view.grown import grown_asset
+from splitnerf_tools.view.live import Live
+from splitnerf_tools.view.server import Handler, ViewServer
+from splitnerf_tools.view.shown import Shown
 
 pytestmark = needs_chromium
 RESTLESS = {"restless": True}
@@ -59,7 +59,7 @@ def walk(data, tmp_path_factory):
     versions = []
     with ExitStack() as stack:
         patch = stack.enter_context(pytest.MonkeyPatch.context())
-        patch.setattr("splitnerf.view.live.grown_asset", functools.partial(grown_asset, resolution=24))
+        patch.setattr("splitnerf_tools.view.live.grown_asset", functools.partial(grown_asset, resolution=24))
         patch.setattr(live_module, "GROWN_EVERY", 1.0)
         server = stack.enter_context(serving(ViewServer(live.shown, live=live)))
         training = Training(load_dataset(data), tiny(steps=100_000), run, torch.device("cpu"), [live, Slowly()])
@@ -120,13 +120,13 @@ def test_a_cut_connection_is_said_and_mended(tmp_path, monkeypatch):
     triangle().write(folder / "mesh.glb")
     is_gone = Handler._is_gone
     monkeypatch.setattr(Handler, "_is_gone", lambda handler: cutting.is_set() or is_gone(handler))
-    monkeypatch.setattr("splitnerf.view.news.HEARTBEAT", 0.2)
-    monkeypatch.setattr("splitnerf.view.news.News.end", lambda *_: None)
+    monkeypatch.setattr("splitnerf_tools.view.news.HEARTBEAT", 0.2)
+    monkeypatch.setattr("splitnerf_tools.view.news.News.end", lambda *_: None)
 
     def start(token, port=0):
         cutting.clear()
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("splitnerf.view.server.secrets.token_urlsafe", lambda _: token)
+            patch.setattr("splitnerf_tools.view.server.secrets.token_urlsafe", lambda _: token)
             return servers.enter_context(serving(ViewServer(Shown([folder]), port=port)))
 
     def cut():

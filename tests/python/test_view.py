@@ -19,22 +19,22 @@ import numpy as np
 import pytest
 from viewer_server import ask, camera_of, error_of, halves, numbered_sky, serving, triangle
 
-import splitnerf.view
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.frames import read_frames
 from splitnerf.data.images import area_average, decode_image, encode_image, read_image, write_image
 from splitnerf.data.reading import Reading
 from splitnerf.render.path_traced import AssetRenderer
-from splitnerf.report.browser import as_halves
-from splitnerf.view import final
-from splitnerf.view import server as server_module
-from splitnerf.view.final import Camera, Tracer
-from splitnerf.view.photos import Photos
-from splitnerf.view.server import ViewServer
-from splitnerf.view.shown import MOST_DROPPED, Shown
+from splitnerf_tools.report.browser import as_halves
+from splitnerf_tools.view import final
+from splitnerf_tools.view import server as server_module
+from splitnerf_tools.view.final import Camera, Tracer
+from splitnerf_tools.view.photos import Photos
+from splitnerf_tools.view.server import ViewServer
+from splitnerf_tools.view.shown import MOST_DROPPED, Shown
+import splitnerf_tools.view
 
-PAGE = Path(splitnerf.view.__file__).parent
+PAGE = Path(splitnerf_tools.view.__file__).parent
 SOURCES = PAGE.parent / "pages"
 
 
@@ -170,7 +170,7 @@ def test_uploads_have_limits(served, monkeypatch):
 
 
 def test_a_light_of_many_rows_is_made_smaller(shown_run, tmp_path, monkeypatch):
-    monkeypatch.setattr("splitnerf.view.shown.MOST_ROWS", 4)
+    monkeypatch.setattr("splitnerf_tools.view.shown.MOST_ROWS", 4)
     with serving(shown_run) as server:
         light = halves(ask(server, "lights/0"))
     blocks = numbered_sky().reshape(4, 2, 8, 2, 3).mean(axis=(1, 3))
@@ -195,7 +195,7 @@ def test_photos_are_served_with_their_cameras(shown_run, data):
 
 
 def test_large_photos_are_averaged_down_and_masks_hide_nothing(shown_run, data, tmp_path, monkeypatch):
-    monkeypatch.setattr("splitnerf.view.photos.LARGEST", 10)
+    monkeypatch.setattr("splitnerf_tools.view.photos.LARGEST", 10)
     with serving(shown_run, photos=Photos(data)) as server:
         assert decode_image(ask(server, "photos/0")[2], "photo").shape == (8, 8, 4)
     shutil.copytree(data, tmp_path / "data")
@@ -313,7 +313,7 @@ def refused(capsys, *words):
 
 
 def test_what_cannot_be_shown_is_refused_before_anything_is_served(shown_run, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("splitnerf.view.server.ViewServer.__init__", lambda *_: pytest.fail("served"))
+    monkeypatch.setattr("splitnerf_tools.view.server.ViewServer.__init__", lambda *_: pytest.fail("served"))
     content = (shown_run / "mesh.glb").read_bytes()
     (tmp_path / "cut.glb").write_bytes(content[: len(content) // 2])
     (tmp_path / "text.glb").write_text("hello")

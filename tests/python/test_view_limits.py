@@ -14,10 +14,10 @@ from urllib.parse import urlsplit
 import pytest
 from viewer_server import ask, camera_of, serving
 
-from splitnerf.view import final
-from splitnerf.view import server as server_module
-from splitnerf.view.final import Camera, Tracer
-from splitnerf.view.shown import Shown
+from splitnerf_tools.view import final
+from splitnerf_tools.view import server as server_module
+from splitnerf_tools.view.final import Camera, Tracer
+from splitnerf_tools.view.shown import Shown
 
 
 def silent(server) -> socket.socket:

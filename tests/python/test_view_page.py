@@ -19,9 +19,9 @@ from splitnerf.data.images import area_average, linear_to_srgb, read_image, writ
 from splitnerf.export.glb import write_glb
 from splitnerf.relight.cameras import bounding_sphere, turntable
 from splitnerf.render.path_traced import AssetRenderer
-from splitnerf.view.photos import Photos
-from splitnerf.view.server import ViewServer
-from splitnerf.view.shown import Shown
+from splitnerf_tools.view.photos import Photos
+from splitnerf_tools.view.server import ViewServer
+from splitnerf_tools.view.shown import Shown
 
 SIZE = 160
 TURN = 90
@@ -144,7 +144,7 @@ def through(run, photos):
         {"do": "set", "selector": "#turn", "value": TURN}, picture("turned"), *keys("f"), picture("again"),
     ]  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("splitnerf.view.final.PASSES", (1, 1, 30))
+        patch.setattr("splitnerf_tools.view.final.PASSES", (1, 1, 30))
         told = look(Shown([run]), steps, photos)
     return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
 

@@ -11,8 +11,8 @@ import numpy as np
 from gltf_builder import Gltf
 from painted_ball import looking
 
-from splitnerf.view.server import ViewServer
-from splitnerf.view.shown import Shown
+from splitnerf_tools.view.server import ViewServer
+from splitnerf_tools.view.shown import Shown
 
 
 def numbered_sky(height=8):

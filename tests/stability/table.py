@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from splitnerf.bench.charts import table as table_lines
-from splitnerf.bench.charts import write_csv
-from splitnerf.bench.provenance import header, provenance
+from splitnerf_tools.bench.charts import table as table_lines
+from splitnerf_tools.bench.charts import write_csv
+from splitnerf_tools.bench.provenance import header, provenance
 from stability import fields, light, losses, optimiser, properties, rays, shading, step
 from stability.entry import Entry, Rows
 from stability.properties import Property, Verdict, verify

@@ -1,4 +1,4 @@
-"""The command line: one module a command, each with `add_parser` and `run`.
+"""The command line: one module a command, each with `add_parser` and `run`; plugins add commands.
 
 Exit codes: 0 done, 1 failed, 2 bad input or usage, 130 interrupted (state saved).
 """
@@ -8,20 +8,22 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from functools import partial
 
 import splitnerf
-from splitnerf.cli import (
-    ablate, batch, bench, demo, doctor, evaluate, export, info, inspect, prepare, refine, relight, synth, train, view,
-)  # fmt: skip
+from splitnerf.cli import evaluate, export, info, refine, relight, train
 from splitnerf.cli.completion import SHELLS, PrintCompletion
 from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
-from splitnerf.cli.help import Help
+from splitnerf.cli.help import Help, ProgramHelp
 from splitnerf.cli.streams import lasting_streams
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
+from splitnerf.plugins import TITLES, installed
 from splitnerf.progress import ended_by_signals
 
-COMMANDS = (prepare, inspect, train, batch, export, refine, relight, view, evaluate, synth, ablate, bench, demo, doctor, info)
+COMMANDS = {
+    "reconstruction": (train, refine), "results": (export, relight, evaluate), "this installation": (info,),
+}  # fmt: skip
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "build_parser", "main"]
 
 
@@ -35,9 +37,14 @@ def build_parser() -> argparse.ArgumentParser:
         "--print-completion", action=PrintCompletion, choices=SHELLS, metavar="SHELL",
         help=f"print the script that completes commands in a shell ({', '.join(SHELLS)})",
     )  # fmt: skip
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in COMMANDS:
-        command.add_parser(commands)
+    commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
+    groups = {}
+    for title in TITLES:
+        n_before = len(commands.choices)
+        for command in COMMANDS.get(title, ()) + installed().commands[title]:
+            command.add_parser(commands)
+        groups |= {name: title for name in list(commands.choices)[n_before : n_before + 1]}
+    parser.formatter_class = partial(ProgramHelp, groups=groups)
     for command in commands.choices.values():
         command.formatter_class = Help
     return parser

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 
 TITLE = "examples:"
 
@@ -28,3 +29,19 @@ class Help(argparse.HelpFormatter):
         paragraph, title, lines = text.partition(TITLE)
         filled = super()._fill_text(paragraph, width, indent) if paragraph.strip() else ""
         return "\n\n".join(part for part in (filled, title + lines if title else "") if part)
+
+
+class ProgramHelp(Help):
+    """The help of the program: a title stands above each group of commands.
+
+    Args:
+        groups: The title by the group's first command.
+    """
+
+    def __init__(self, prog: str, groups: Mapping[str, str]):
+        super().__init__(prog)
+        self._groups = groups
+
+    def _format_action(self, action: argparse.Action) -> str:
+        text, title = super()._format_action(action), self._groups.get(action.dest)
+        return f"{'':{self._current_indent - 2}}{title}:\n{text}" if title else text

@@ -13,6 +13,7 @@ from splitnerf.cli.help import examples
 from splitnerf.cli.reading import add_reading_options, reading_options
 from splitnerf.cli.summary import print_scores, print_summary
 from splitnerf.errors import InputError
+from splitnerf.plugins import installed
 
 if TYPE_CHECKING:
     from splitnerf.config import Config
@@ -120,9 +121,9 @@ def observers_of(args: argparse.Namespace, run: Path) -> list[AbstractContextMan
 
         found.append(TensorBoard(args.tensorboard))
     if args.view is not None:
-        from splitnerf.view.watched import watched
-
-        found.append(watched(run.resolve().name, args.view))
+        if (watch := installed().watch) is None:
+            raise InputError("--view: no plugin shows a training, see `splitnerf --help`; leave it out")
+        found.append(watch(run.resolve().name, args.view))
     return found
 
 
@@ -212,12 +213,12 @@ def device_for(wanted: str, deterministic: bool) -> str:
     """The name of the device that is asked for; for ``auto`` of one that is fit, and a note says why where torch finds a GPU."""
     import torch
 
-    from splitnerf.doctor.choice import fit_device
+    from splitnerf.devices import fit_device
     from splitnerf.notes import note
 
     if wanted != "auto":
         return wanted
-    device, why = ("cpu", "no GPU repeats bits") if deterministic else fit_device()
+    device, why = ("cpu", "no GPU repeats bits") if deterministic else fit_device(installed().failing_operators)
     if torch.cuda.is_available():
         note(f"trains on the {'GPU' if device == 'cuda' else 'CPU'}: {why}")
     return device

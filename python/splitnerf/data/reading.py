@@ -21,7 +21,7 @@ class Reading:
             others have `train` in it.
         mask_kind: What mask files mean whose layout leaves it open. "object": white is the object; "ignore": black is
             to be ignored; "auto": what the masks look like.
-        separated: The folder in which training wrote masks of photos that have none, see :mod:`splitnerf.separation`; or None.
+        separated: The folder in which training wrote masks of photos that have none; or None.
         max_memory: GB that all photos may take in memory, more are read from a file; 0: half of what is available.
     """
 

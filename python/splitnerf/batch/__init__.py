@@ -1,5 +1,0 @@
-"""Many scenes: a training for each, on one machine or on a cluster, and one table of their results.
-
-Ray gives each scene its share of a machine (:mod:`splitnerf.batch.cluster`); a process of its own trains it there
-(:mod:`splitnerf.batch.child`); the program that was called watches them and writes the table (:mod:`splitnerf.batch.job`).
-"""

@@ -1,0 +1,179 @@
+"""Ray, here or on a cluster: how it is started, and which share of a machine a scene gets."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import socket
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+from typing import TextIO
+
+from splitnerf.errors import InputError, plain
+from splitnerf.memory import memory_bytes
+from splitnerf.progress import ended_by_signals
+from splitnerf_tools.batch.scenes import LOGS
+from splitnerf_tools.doctor.machine import GIB, TRAINING_GIB, processors
+
+GB = 1e9
+TRAINING = TRAINING_GIB * GIB / GB  # GB of memory of a training without its photos
+MEMORY = 4.0  # GB of a scene, photos included
+GPU = 0.25  # of a scene: four at once made a third more steps together than one alone did on an H100, see docs/cuda.md
+PATIENCE = 10.0  # seconds for a cluster to answer
+OBJECT_STORE = 100 << 20  # bytes; results are small
+SHARE_OF_FREE = 0.9  # of the free memory of this machine, for the scenes
+LONGEST_FOLDER = 37  # letters of the folder of Ray's own: its sockets' paths have 64 more, and a system allows 103
+# Read when Ray is imported: no report of its use, sockets on 127.0.0.1 alone, and answers to those alone who have the token.
+NO_REPORT = {"RAY_USAGE_STATS_ENABLED": "0"}
+ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
+NO_KILL = {"RAY_kill_child_processes_on_worker_exit": "false"}  # they save their state, see splitnerf_tools.batch.child.become
+
+
+@dataclass(frozen=True)
+class Share:
+    """What a scene gets of a machine: cores and GPUs, which may be fractions, and GB of memory."""
+
+    cores: float
+    gpus: float
+    memory: float
+
+    @property
+    def threads(self) -> int:
+        """Of a training."""
+        return max(1, int(self.cores))
+
+    @property
+    def photos(self) -> float:
+        """GB of its memory that its photos may take; more are read from a file."""
+        return max(self.memory - TRAINING, self.memory / 4)
+
+    def __str__(self) -> str:
+        gpus = f", {self.gpus:g} GPU" if self.gpus else ""
+        return f"{self.cores:g} {'core' if self.cores == 1 else 'cores'}{gpus} and {self.memory:.3g} GB"
+
+
+def share_of(
+    machines: Sequence[Mapping[str, float]], n_scenes: int, *, cores: float | None, gpus: float | None,
+    memory: float | None, photos: float | None = None, whole_gpu: bool = False,
+) -> Share:  # fmt: skip
+    """The share of each of some scenes.
+
+    Args:
+        machines: What Ray says that each has: "CPU", "GPU", "memory" in bytes.
+        n_scenes: The number of scenes; cores are divided among them, and each gets at least one.
+        cores, gpus, memory: What the user asks for, memory in GB; None for what a training needs.
+        photos: GB that the photos of a scene may take; None for what its memory leaves.
+        whole_gpu: Whether a training fills a GPU.
+
+    Raises:
+        InputError: No machine has as much.
+    """
+    totals = [[machine.get(key, 0.0) for machine in machines] for key in ("CPU", "GPU", "memory")]
+    most_cores, most_gpus, most_memory = (max(values, default=0.0) for values in totals)
+    if cores is None:
+        cores = min(most_cores, max(1.0, sum(totals[0]) // max(1, n_scenes)))
+    if gpus is None:
+        gpus = 0.0 if most_gpus == 0 else 1.0 if whole_gpu else GPU
+    if memory is None:
+        memory = min(MEMORY if photos is None else TRAINING + photos, most_memory / GB)
+    share = Share(cores, gpus, memory)
+    needs = (("cores", cores, "CPU", "cores"), ("gpus", gpus, "GPU", "GPUs"), ("memory", memory * GB, "memory", "GB"))
+    for (option, need, _, unit), most in zip(needs, (most_cores, most_gpus, most_memory)):
+        if need > most:
+            scale = GB if option == "memory" else 1.0
+            raise InputError(
+                f"--{option}-per-scene {need / scale:g}: no machine offers as much; the largest offers {most / scale:.3g} {unit}"
+            )
+    if not any(all(need <= machine.get(key, 0.0) for _, need, key, _ in needs) for machine in machines):
+        raise InputError(f"no machine offers {share} together; ask for less by --cores-per-scene, --gpus-per-scene or --memory-per-scene")
+    return share
+
+
+def n_at_once(machines: Sequence[Mapping[str, float]], share: Share) -> int:
+    """How many scenes these machines hold at a time."""
+    needs = {"CPU": share.cores, "GPU": share.gpus, "memory": share.memory * GB}
+    return sum(min(int(machine.get(key, 0.0) / need + 1e-6) for key, need in needs.items() if need > 0) for machine in machines)
+
+
+@contextmanager
+def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
+    """Ray, connected to a cluster, or started on this machine and ended with the block.
+
+    What Ray says goes into a file of the batch's logs. Signals to end raise KeyboardInterrupt within the block.
+
+    Args:
+        address: Of the cluster's head; None for this machine.
+        out: The batch's folder.
+
+    Raises:
+        InputError: Ray is not installed, or no cluster answers.
+    """
+    if find_spec("ray") is None:
+        raise InputError("batch needs the package ray: pip install 'splitnerf[batch]'")
+    os.environ.update(NO_REPORT if address else NO_REPORT | ALONE | NO_KILL | {"RAY_AUTH_TOKEN": secrets.token_hex(32)})
+    if address and Path("~/.ray/auth_token").expanduser().is_file():  # `ray start` wrote it, and its cluster asks for it
+        os.environ.setdefault("RAY_AUTH_MODE", "token")
+    import ray
+
+    (out / LOGS).mkdir(exist_ok=True)
+    own = None if address else own_folder()
+    with open(out / LOGS / "ray.log", "a", encoding="utf-8", errors="backslashreplace") as log:
+        with redirect_stdout(log), redirect_stderr(log):
+            try:
+                with _compiled_words_to(log):
+                    if own is None:
+                        _connect(ray, address)
+                    else:
+                        ray.init(
+                            address="local", num_cpus=processors(), object_store_memory=OBJECT_STORE, include_dashboard=False,
+                            logging_level="error", log_to_driver=False, _temp_dir=own,
+                            _memory=int(SHARE_OF_FREE * memory_bytes()[1]),
+                        )  # fmt: skip
+                with ended_by_signals():  # Ray put one of its own in the place of SIGTERM's
+                    yield ray
+            finally:
+                ray.shutdown()
+                if own is not None:
+                    shutil.rmtree(own, ignore_errors=True)
+
+
+def machines_of(ray: ModuleType) -> list[dict[str, float]]:
+    """What each machine of Ray's has."""
+    return [node["Resources"] for node in ray.nodes() if node["Alive"] and node["Resources"].get("CPU")]
+
+
+@contextmanager
+def _compiled_words_to(log: TextIO) -> Iterator[None]:
+    """Within the block standard error is a file, for compiled code too, which knows nothing of Python's streams."""
+    kept = os.dup(2)
+    os.dup2(log.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+def _connect(ray: ModuleType, address: str) -> None:
+    host, _, port = address.rpartition(":")
+    try:
+        if port.isdigit():  # Ray itself would try for minutes
+            socket.create_connection((host.rpartition("/")[2].strip("[]"), int(port)), PATIENCE).close()
+        ray.init(address=address, logging_level="error", log_to_driver=False)
+    except (OSError, ValueError, OverflowError, ray.exceptions.RayError) as error:
+        why = plain(str(error).strip()).partition(". ")[0]
+        raise InputError(f"--address {address}: no Ray cluster answers ({why}); start one by `ray start --head`") from None
+
+
+def own_folder() -> str:
+    """A folder for Ray's sockets and logs that no other user reads, with a short name."""
+    place = tempfile.gettempdir()
+    if len(place) > LONGEST_FOLDER - len("/sn-12345678"):
+        place = "/tmp"
+    return tempfile.mkdtemp(prefix="sn-", dir=place)

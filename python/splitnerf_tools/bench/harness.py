@@ -1,0 +1,159 @@
+"""Shared by all benchmarks: checks the methods, times them in turns, and makes charts of time against error."""
+
+from __future__ import annotations
+
+import importlib
+import statistics
+import time
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from splitnerf.errors import CheckFailed
+from splitnerf_tools.bench.charts import Chart, Point, write_result
+
+ROUNDS, QUICK_ROUNDS = 15, 7
+SHORTEST = 0.005  # seconds of one measurement; faster calls are repeated within it
+SETTLING = 0.004  # seconds of pause before each measurement, since threads of the call before still spin
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Seconds of one call: the median of the rounds, and the quartiles beside it."""
+
+    seconds: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """The ratio of two calls' times: the median over rounds in which both ran, and the quartiles."""
+
+    value: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{self.value:.2f}x ({self.low:.2f} to {self.high:.2f})"
+
+
+class Times:
+    """Seconds by call and round, from :func:`interleaved`."""
+
+    def __init__(self, seconds: Mapping[Hashable, list[float]]):
+        self.seconds = seconds
+
+    def __getitem__(self, name: Hashable) -> Timing:
+        return Timing(*_median_and_quartiles(self.seconds[name]))
+
+    def ratio(self, slow: Hashable, fast: Hashable) -> Ratio:
+        """The ratio of the times of `slow` to those of `fast`, round by round."""
+        return Ratio(*_median_and_quartiles([a / b for a, b in zip(self.seconds[slow], self.seconds[fast])]))
+
+
+def interleaved(calls: Mapping[Hashable, Callable[[], object]], rounds: int) -> Times:
+    """Runs every call once to warm up, then times all calls in turns, so that all run under the same load.
+
+    Args:
+        calls: The calls by name.
+        rounds: The number of measurements of each.
+    """
+    repeats = {}
+    for name, call in calls.items():
+        call()
+        started = time.perf_counter()
+        call()
+        repeats[name] = max(1, round(SHORTEST / max(time.perf_counter() - started, 1e-7)))
+    seconds: dict[Hashable, list[float]] = {name: [] for name in calls}
+    for _ in range(rounds):
+        for name, call in calls.items():
+            time.sleep(SETTLING)
+            started = time.perf_counter()
+            for _ in range(repeats[name]):
+                call()
+            seconds[name].append((time.perf_counter() - started) / repeats[name])
+    return Times(seconds)
+
+
+def _median_and_quartiles(values: list[float]) -> tuple[float, float, float]:
+    if len(values) < 2:
+        return values[0], values[0], values[0]
+    low, middle, high = statistics.quantiles(values, n=4, method="inclusive")
+    return middle, low, high
+
+
+def rms(values: ArrayLike) -> float:
+    """Root of the mean square of all numbers."""
+    return float(np.sqrt(np.mean(np.square(np.asarray(values, np.float64)))))
+
+
+def with_gradients(way: Callable[..., Tensor], inputs: tuple[Tensor, ...], cotangent: Tensor) -> Callable[[], tuple]:
+    """A call that returns a function's result and the gradients of all inputs."""
+    leaves = tuple(x.clone().requires_grad_() for x in inputs)
+
+    def call() -> tuple[Tensor, ...]:
+        out = way(*leaves)
+        return out.detach(), *torch.autograd.grad(out, leaves, cotangent)
+
+    return call
+
+
+def check(subject: str, errors: Mapping[Hashable, float], limit: float) -> None:
+    """Checks a method's errors before it is timed.
+
+    Raises:
+        CheckFailed: An error is not below the limit.
+    """
+    for name, error in errors.items():
+        if not error < limit:
+            way = name if isinstance(name, str) else " ".join(name)
+            raise CheckFailed(f"{subject}: {way} is wrong by {error:.1e}, more than {limit:.1e}")
+
+
+def chart_of(
+    title: str, cost: str, error: str, times: Times | Mapping[tuple[str, str], Timing],
+    errors: Mapping[tuple[str, str], float], default: Collection[tuple[str, str]], scale: float = 1e3,
+) -> Chart:  # fmt: skip
+    """Times against errors.
+
+    Args:
+        title, cost, error: The texts of :class:`splitnerf_tools.bench.charts.Chart` with these names.
+        times: Seconds by series and variant.
+        errors: Errors by series and variant, in the order of the table.
+        default: The keys of the library's defaults.
+        scale: The number of units of cost in a second.
+    """
+    points = []
+    for key, value in errors.items():
+        t = times[key]
+        points.append(Point(*key, scale * t.seconds, value, scale * t.low, scale * t.high, key in default))
+    return Chart(title, cost, error, points)
+
+
+def run_benchmarks(names: Sequence[str], quick: bool, out: Path, show: Callable[[str], None]) -> list[Path]:
+    """Checks and times the operators, writes the charts, and shows the findings as they come.
+
+    Args:
+        names: The names of modules in this package, each with ``run(quick, rounds)``.
+        quick: Whether to use small inputs and few rounds, which takes minutes in all.
+        out: The folder of the results; created if missing.
+        show: A function called with each line.
+
+    Raises:
+        CheckFailed: An operator's results are wrong.
+        InputError: matplotlib is missing.
+    """
+    files = []
+    for name in names:
+        result = importlib.import_module(f"splitnerf_tools.bench.{name}").run(quick, QUICK_ROUNDS if quick else ROUNDS)
+        files += write_result(result, out)
+        show(result.title)
+        for finding in result.findings:
+            show(f"  {finding}")
+    return files

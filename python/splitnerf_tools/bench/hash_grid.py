@@ -1,0 +1,88 @@
+"""The hash grid encoding: throughput forward and backward, beside plain torch and Dr.Jit, and the machine's gathers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from splitnerf import _core
+from splitnerf.ops import HashGridSpec, hash_encode
+from splitnerf_tools.bench import reference
+from splitnerf_tools.bench.charts import Result
+from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients
+from splitnerf_tools.bench.peers import DrJitHashGrid, drjit_ready
+
+SPEC = HashGridSpec(n_levels=16, n_features=2, base_resolution=32, growth=1.3195079, log2_table_size=19)
+TOLERANCE = 1e-3  # difference between ours and plain torch, relative to the largest value
+CORNERS = 8
+SOURCES = ("cpp/*hash*", "python/splitnerf/ops/hash_grid.py")
+
+
+def run(quick: bool, rounds: int) -> Result:
+    """Forward and backward of 16 levels x 2 features, 2^19 entries a level, on random points.
+
+    Args:
+        quick: Whether to use fewer points and leave out Dr.Jit, which takes a minute to compile.
+        rounds: The number of timing rounds.
+
+    Raises:
+        CheckFailed: A result is wrong.
+    """
+    torch.manual_seed(0)
+    n = 1 << (15 if quick else 17)
+    x, cotangent = torch.rand(n, 3), torch.randn(n, SPEC.n_outputs)
+    table = 0.1 * torch.randn(SPEC.n_entries, SPEC.n_features)
+    arguments = SPEC.arguments(SPEC.n_levels)
+
+    def ours(x: Tensor, table: Tensor) -> Tensor:
+        return hash_encode(x, table, SPEC)
+
+    def plain(x: Tensor, table: Tensor) -> Tensor:
+        return reference.hash_encode(x, table, *arguments)
+
+    def way(encode: Callable[[Tensor, Tensor], Tensor], dtype: torch.dtype) -> Callable[[], tuple]:
+        at, leaf, grad = (t.to(dtype) for t in (x, table, cotangent))
+        return with_gradients(partial(encode, at), (leaf,), grad)
+
+    true = way(plain, torch.float64)()
+    calls: dict[tuple[str, str], Callable[[], object]] = {
+        ("splitnerf", "float32"): way(ours, torch.float32),
+        ("splitnerf", "float64"): way(ours, torch.float64),
+        ("torch eager", "float32"): way(plain, torch.float32),
+    }
+    errors = {key: max(relative(a, b) for a, b in zip(call(), true)) for key, call in calls.items()}
+    check("hash grid", errors, TOLERANCE)
+    if not quick and drjit_ready():
+        peers = {storage: DrJitHashGrid(SPEC, storage, x, cotangent) for storage in ("Float32", "Float16")}
+        calls |= {("Dr.Jit", storage.lower()): peer.forward_backward for storage, peer in peers.items()}
+    entries = 1 << SPEC.log2_table_size
+    # The array is written once: until then all pages of np.zeros share one page of memory.
+    one_level, gathers = np.ones((entries, 2), np.float32), n * SPEC.n_levels * CORNERS
+    limit = ("gathers", "one level")
+    times = interleaved(calls | {limit: lambda: _core.random_gathers(one_level, gathers)}, rounds)
+
+    first, peer = ("splitnerf", "float32"), ("torch eager", "float32")
+    rate = gathers / times[limit].seconds
+    findings = [
+        f"forward and backward of {n} points: {times.ratio(peer, first)} as fast as torch eager",
+        f"the machine's gathers on one level: {rate / 1e6:.0f} M a second; forward and backward, counted as two gathers for each "
+        f"corner and level, reach {2 * times[limit].seconds / times[first].seconds:.0%} of it",
+    ]
+    findings += [f"{times.ratio(key, first)} as fast as Dr.Jit with {key[1]}" for key in calls if key[0] == "Dr.Jit"]
+    title, cost = f"{n} points, 16 levels x 2, 2^19 entries", "ms forward and backward"
+    chart = chart_of(title, cost, "largest error, of the largest value", times, errors, {first})
+    rows = [
+        [*key, f"{1e3 * times[key].seconds:.1f}", f"{1e3 * times[key].low:.1f} to {1e3 * times[key].high:.1f}"]
+        for key in calls
+    ]
+    beside = ("Time of peers; Dr.Jit has a grid of its own", ["", "dtype", "ms", "quartiles"], rows)
+    return Result("hash_grid", "Hash grid encoding: time against error", SOURCES, findings, [chart], [beside])
+
+
+def relative(a: Tensor, true: Tensor) -> float:
+    """The largest difference, relative to the largest true value."""
+    return float((a.double() - true).abs().max() / true.abs().max())

@@ -1,0 +1,210 @@
+"""The errors of the split sum against the integral that it splits, and of its table against quadrature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from scipy import ndimage
+from torch import Tensor
+from torch.nn import functional as F
+
+from splitnerf import _core
+from splitnerf.ops import (
+    QUERIES,
+    LightSums,
+    monte_carlo_light,
+    query_direction,
+    sample_bsdf,
+    shade_sums,
+    specular_share,
+    split_sum_shade,
+    summed_light,
+)
+from splitnerf_tools.bench.charts import Chart, Point, Result
+from splitnerf_tools.bench.harness import rms
+from splitnerf_tools.bench.lights import MapLight, lights
+from splitnerf_tools.bench.prefilter import Truth
+
+ROUGHNESS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
+COSINES = (0.1, 0.5, 0.9)  # n.v
+MATERIALS = {"metal": (1.0, 1.0), "dielectric": (0.0, 0.5)}  # metallic, albedo
+FINEST = 256  # quadrature points of a table's entry
+CHECKED = 41  # roughnesses and cosines at which tables are compared
+N_NORMALS = 64
+GROUPS = 4  # groups of samples of the truth
+LAMP_SHARE = 5e-4  # share of the texels, the brightest ones, that count as lamps
+PARTS = 4  # parts of a lamp's texel along its edge
+SOURCES = ("cpp/*split_sum*", "cpp/*brdf_lut*", "cpp/*monte_carlo*", "python/splitnerf/ops/shading.py",
+           "python/splitnerf/ops/monte_carlo.py")  # fmt: skip
+NOISE = "noise"
+KARIS = "Karis 2014, fit"
+
+
+def run(quick: bool, rounds: int) -> Result:
+    """Errors against sums over many samples of the BSDF; nothing is timed.
+
+    Args:
+        quick: Whether to use few roughnesses and fewer samples.
+        rounds: Not used, since nothing is timed.
+    """
+    torch.manual_seed(0)
+    tables, findings = [], []
+    maps = lights()
+    levels = ROUGHNESS[1::2] if quick else ROUGHNESS
+    n_samples, height = (1024, 256) if quick else (8192, 1024)
+    normals, across = (F.normalize(torch.randn(N_NORMALS, 3), dim=1) for _ in range(2))
+    for name in list(maps)[:1] if quick else maps:
+        light = SplitLight(maps[name])
+        rows, truth = [], Truth(light.whole, height, 1 << 14)
+        worst: dict[str, float] = dict.fromkeys((*QUERIES, NOISE), 0.0)
+        for material, (metallic, albedo) in MATERIALS.items():
+            for rho in levels:
+                row = [material, f"{rho:g}"]
+                for cosine in COSINES:
+                    views = views_at(normals, across, cosine)
+                    errors = split_errors(light, truth, normals, views, rho, metallic, albedo, n_samples)
+                    row += [f"{100 * errors[query]:.1f}" for query in QUERIES]
+                    worst = {key: max(worst[key], errors[key]) for key in worst}
+                rows.append(row)
+        heads = ["material", "roughness", *(f"n.v {c:g}, {query}" for c in COSINES for query in QUERIES)]
+        tables.append((f"Relative error of the radiance, % RMS over normals, {name} light", heads, rows))
+        findings.append(
+            f"{name} light, largest error: "
+            + ", ".join(f"{100 * worst[q]:.0f} % queried at the {q}" for q in QUERIES)
+            + f"; noise of the truth at most {100 * worst[NOISE]:.1f} %"
+        )
+    tables.append(furnace())
+    charts = table_charts((8, 16, 32) if quick else (8, 16, 32, 64))
+    shipped = [next(p for p in chart.points if p.default) for chart in charts]
+    fit = next(p for p in charts[0].points if p.series == KARIS)
+    findings.append(
+        f"the table of {shipped[0].variant} over sqrt(n.v): RMS error {shipped[0].error:.1g} of F1 and F2, {shipped[1].error:.1g} "
+        f"of chi; Karis' fit, which was made for another shadowing term: {fit.error:.1g}"
+    )
+    return Result("split_sum", "The split sum: what it costs in error", SOURCES, findings, charts, tables)
+
+
+class SplitLight:
+    """A map as the sum of two: lamps, integrated by quadrature over their texels, and the rest, integrated by samples.
+
+    Args:
+        radiance: [h, w, 3].
+    """
+
+    def __init__(self, radiance: np.ndarray):
+        height, width = radiance.shape[:2]
+        level = np.quantile(radiance.max(-1), 1 - LAMP_SHARE)
+        rest = np.minimum(radiance, level)
+        self.whole, self.rest, self.lamps = (MapLight(m.astype(np.float32)) for m in (radiance, rest, radiance - rest))
+        # A bilinear map is not zero up to a texel beside its lamps.
+        lit = ndimage.binary_dilation((radiance > level).any(-1), np.ones((3, 3)))
+        rows, columns = np.nonzero(lit)
+        inside = (np.arange(PARTS) + 0.5) / PARTS
+        v = ((rows[:, None] + inside) / height)[:, :, None]
+        u = ((columns[:, None] + inside) / width)[:, None, :]
+        v, u = (np.broadcast_to(x, (len(rows), PARTS, PARTS)).reshape(-1) for x in (v, u))
+        polar, azimuth = np.pi * v, 2 * np.pi * (0.5 - u)
+        self.directions = torch.from_numpy(
+            np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], 1)
+        ).float()
+        self.solid_angles = torch.from_numpy(np.sin(polar) * 2 * np.pi**2 / (height * width * PARTS**2)).float()
+
+
+def views_at(normals: Tensor, across: Tensor, cosine: float) -> Tensor:
+    """[n, 3] directions at this cosine to the normals."""
+    aside = F.normalize(torch.linalg.cross(normals, across), dim=1)
+    return cosine * normals + (1 - cosine**2) ** 0.5 * aside
+
+
+def split_errors(
+    light: SplitLight, truth: Truth, normals: Tensor, views: Tensor, rho: float, metallic: float, albedo: float, n: int
+) -> dict[str, float]:
+    """Relative RMS error over the normals, by the query direction of g, and that of the truth itself.
+
+    Args:
+        light, truth: The light, and its pre-integral.
+        normals, views: [k, 3].
+        rho, metallic, albedo: The roughness, metallic and albedo of the material, each in [0, 1].
+        n: The number of BSDF samples in each of `GROUPS` groups; the spread of the groups measures the noise.
+    """
+    count, column = len(normals), torch.ones(len(normals), 1)
+    roughness, metal, colour = rho * column, metallic * column, albedo * torch.ones(count, 3)
+    diffuse = truth(normals, 1.0)
+    seen = torch.ones(count, len(light.directions))
+    share = specular_share(normals, views, colour, roughness, metal)
+    lamps = summed_light(
+        normals, views, roughness, light.directions, light.solid_angles, light.lamps(light.directions), seen
+    )
+    groups = []
+    for seed in range(GROUPS):
+        directions, pdf = sample_bsdf(normals, views, roughness, share, n, seed)
+        radiance = light.rest(directions.reshape(-1, 3)).view(count, n, 3)
+        rest = monte_carlo_light(normals, views, roughness, directions, pdf, radiance)
+        whole = LightSums(*(a + b for a, b in zip(rest, lamps)))._replace(diffuse=diffuse)
+        groups.append(shade_sums(normals, views, colour, roughness, metal, whole, True))
+    true = torch.stack(groups).mean(0)
+    size = true.square().mean().sqrt()
+    errors = {NOISE: float(torch.stack(groups).std(0).square().mean().sqrt() / GROUPS**0.5 / size)}
+    ones = torch.ones(count, 3)
+    for query in QUERIES:
+        specular = truth(query_direction(normals, views, roughness, query), rho)
+        out = split_sum_shade(normals, views, colour, roughness, metal, specular, diffuse, ones, ones, compensate=True)
+        errors[query] = float((out - true).square().mean().sqrt() / size)
+    return errors
+
+
+def furnace() -> tuple[str, list[str], list[list[str]]]:
+    """The share of constant light that a white metal reflects at normal incidence; 1 would be free of loss."""
+    rows = []
+    axis, ones = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(1, 3)
+    for rho in ROUGHNESS:
+        values = [
+            split_sum_shade(
+                axis, axis, ones, torch.full((1, 1), rho), torch.ones(1, 1), ones, ones, ones, ones, compensate=on
+            )
+            for on in (False, True)
+        ]
+        rows.append([f"{rho:g}", *(f"{v.mean().item():.3f}" for v in values)])
+    return "Reflectance of a white metal, n.v = 1", ["roughness", "single scattering", "compensated"], rows
+
+
+def table_charts(sizes: tuple[int, ...]) -> list[Chart]:
+    """Charts of the errors of F1, F2 and chi against quadrature: tables by size and spacing, and an analytic fit."""
+    rho, cosine = np.linspace(0.02, 1, CHECKED), np.linspace(0.02, 1, CHECKED)
+    true = np.array([[_core.integrate_brdf(c, r, FINEST) for c in cosine] for r in rho])
+    spacings: dict[str, tuple[Callable, Callable]] = {
+        "table over sqrt(n.v)": (np.square, np.sqrt),
+        "table over n.v": (abs, abs),
+    }
+    found: list[list[Point]] = [[], []]
+    for series, (to_cosine, from_cosine) in spacings.items():
+        for size in sizes:
+            nodes = np.linspace(0, 1, size)
+            entries = [[_core.integrate_brdf(max(to_cosine(x), 1e-4), r, FINEST) for x in nodes] for r in nodes]
+            apart = bilinear(np.array(entries), rho, from_cosine(cosine)) - true
+            default = size == len(_core.brdf_lut()) and to_cosine is np.square
+            cost = 12 * size * size
+            for points, part in zip(found, (apart[..., :2], apart[..., 2])):
+                points.append(Point(series, f"{size} x {size}", cost, rms(part), cost, cost, default))
+    fit = karis_fit(rho[:, None], cosine[None, :])
+    found[0].append(Point(KARIS, "8 numbers", 32, rms(fit - true[..., :2]), 32, 32))
+    names = ("F1 and F2 against quadrature", "chi against quadrature")
+    return [Chart(name, "bytes held", "RMS error", points) for name, points in zip(names, found)]
+
+
+def bilinear(table: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """[len(rows), len(columns), C] of a [n, n, C] table whose nodes are spread over [0, 1]."""
+    y, x = (t * (len(table) - 1) for t in (rows, columns))
+    y0, x0 = (np.minimum(t.astype(int), len(table) - 2) for t in (y, x))
+    fy, fx = (y - y0)[:, None, None], (x - x0)[None, :, None]
+    upper, lower = (table[y0 + k][:, x0] * (1 - fx) + table[y0 + k][:, x0 + 1] * fx for k in (0, 1))
+    return upper * (1 - fy) + lower * fy
+
+
+def karis_fit(roughness: np.ndarray, n_dot_v: np.ndarray) -> np.ndarray:
+    """[..., 2] F1 and F2 by the approximation of Karis 2014, "Physically Based Shading on Mobile"."""
+    r = [a * roughness + b for a, b in ((-1, 1), (-0.0275, 0.0425), (-0.572, 1.04), (0.022, -0.04))]
+    edge = np.minimum(r[0] * r[0], np.exp2(-9.28 * n_dot_v)) * r[0] + r[1]
+    return np.stack([-1.04 * edge + r[2], 1.04 * edge + r[3]], -1)

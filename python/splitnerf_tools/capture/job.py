@@ -1,0 +1,255 @@
+"""From a folder of photographs to data for training: poses, pinhole images, masks, exposures and a page about them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from splitnerf.data.dataset import SURROUNDINGS
+from splitnerf.data.images import srgb_to_linear, write_image
+from splitnerf.errors import InputError
+from splitnerf.files import LOCK, atomic_path, held, remove_partial
+from splitnerf.notes import note
+from splitnerf_tools.capture.exposure import Exposures, find_exposures
+from splitnerf_tools.capture.masks import find_masks, given_masks
+from splitnerf_tools.capture.page import write_page
+from splitnerf_tools.capture.photographs import (
+    Photograph, find_photographs, is_upright, read_upright, sharpness, write_png,
+)  # fmt: skip
+from splitnerf_tools.capture.poses import Lens, Reconstruction, reconstruct
+from splitnerf_tools.capture.surroundings import Shot, surroundings
+from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
+from splitnerf_tools.capture.video import SUFFIXES, write_frames
+from splitnerf_tools.capture.world import World, settle
+
+FEW_LOST = 0.2  # share of the photos without a camera from which a note tells of them
+BLURRED = 0.12  # share of the median sharpness below which a photo is left out
+TRANSFORMS = "transforms.json"
+DARK = 0.02  # sRGB value that 1 % of a photo's pixels must exceed
+
+
+@dataclass(frozen=True)
+class PrepareSettings:
+    """How photos are prepared.
+
+    Attributes:
+        max_size: The longest edge of the written images in pixels; 0 keeps the photos'.
+        masks: A folder with masks of the photos, or None to find them.
+        frames: The number of frames that are taken of a video.
+        seed: The seed of all random choices.
+    """
+
+    max_size: int = 0
+    masks: Path | None = None
+    frames: int = 100
+    seed: int = 0
+
+
+@dataclass
+class Prepared:
+    """What was prepared.
+
+    Attributes:
+        world: Cameras and points.
+        exposures: The photos' brightness.
+        left_out: Why photos were left out, by name.
+        mask_share: [n] the share of each image that its mask covers.
+    """
+
+    world: World
+    exposures: Exposures
+    left_out: dict[str, str]
+    mask_share: np.ndarray
+
+
+def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable[[str, float], None]) -> Prepared:
+    """Writes `images/`, `masks/`, `transforms.json`, `surroundings.exr` and `prepare.html`.
+
+    What an interrupted call with the same photos has done in `out/work` is used again.
+
+    Raises:
+        InputError: The photos cannot be read or do not fit together, or the folder holds other files.
+    """
+    work = out / "work"
+    if out.is_dir() and {path.name for path in out.iterdir()} - {LOCK} and not (work.is_dir() or (out / "frames").is_dir()):
+        raise InputError(f"{out}: holds other files; give a new folder")
+    with held(out):
+        photos = _photographs(source, out, settings, report)
+        _begin(work, photos, settings)
+        kept, left_out = _sorted_out(photos, report)
+        _check_sizes(kept)
+        images = _upright_copies(kept, work)
+        found = reconstruct(kept, images, work, settings.seed, report)
+        left_out |= _without_camera(kept, found.names, source)
+        world = settle(found, settings.seed)
+        by_name = {photo.name: photo for photo in kept}
+        exposures = exposures_of(world.scene, by_name, report)
+        shares = write_data(world, exposures, by_name, out, settings, report)
+        write_page(out, world, exposures.gains, shares, left_out, source.resolve().name)
+    return Prepared(world, exposures, left_out, shares)
+
+
+def _photographs(
+    source: Path, out: Path, settings: PrepareSettings, report: Callable[[str, float], None]
+) -> list[Photograph]:
+    """The photos of a folder, or the frames of a video, which are written into `out/frames`."""
+    if source.suffix.lower() not in SUFFIXES:
+        return find_photographs(source)
+    write_frames(source, out / "frames", settings.frames, lambda share: report("frames", share))
+    return find_photographs(out / "frames")
+
+
+def _begin(work: Path, photos: list[Photograph], settings: PrepareSettings) -> None:
+    """Empties the working folder where it holds another set of photos."""
+    files = [(p.name, p.path.stat().st_size, p.path.stat().st_mtime_ns) for p in photos]
+    print_of_photos = hashlib.sha256(json.dumps([files, settings.seed]).encode()).hexdigest()
+    marker = work / "photos.sha256"
+    if work.exists() and (not marker.exists() or marker.read_text() != print_of_photos):
+        shutil.rmtree(work)
+    work.mkdir(parents=True, exist_ok=True)
+    with atomic_path(marker) as temporary:
+        temporary.write_text(print_of_photos)
+
+
+def _sorted_out(photos: list[Photograph], report: Callable[[str, float], None]) -> tuple[list[Photograph], dict[str, str]]:
+    """The photos that are neither blurred nor dark, and why the others are left out."""
+    sharp, bright = np.zeros(len(photos)), np.zeros(len(photos))
+    for i, photo in enumerate(photos):
+        pixels = read_upright(photo.path)
+        sharp[i], bright[i] = sharpness(pixels), np.quantile(pixels[::4, ::4], 0.99) / np.iinfo(pixels.dtype).max
+        report("photos", (i + 1) / len(photos))
+    reasons = {}
+    for photo, s, b in zip(photos, sharp, bright):
+        if b < DARK:
+            reasons[photo.name] = "too dark"
+        elif s < BLURRED * np.median(sharp):
+            reasons[photo.name] = f"blurred: {100 * s / np.median(sharp):.0f} % of the others' sharpness"
+    return [photo for photo in photos if photo.name not in reasons], reasons
+
+
+def _check_sizes(photos: list[Photograph]) -> None:
+    """Raises InputError where photos are of different sizes, which training does not take."""
+    for photo in photos:
+        if (photo.width, photo.height) != (photos[0].width, photos[0].height):
+            sizes = [f"{p.path.name} is {p.width}x{p.height}" for p in (photos[0], photo)]
+            raise InputError(f"{photo.path.parent}: {sizes[0]}, {sizes[1]}; give photos of one size")
+
+
+def _upright_copies(photos: list[Photograph], work: Path) -> Path:
+    """The folder `work/photos` with a folder for each lens; files that COLMAP reads as they are, are linked."""
+    folder = work / "photos"
+    remove_partial(folder)  # COLMAP would read them as photos
+    lenses = sorted({photo.lens for photo in photos})
+    for photo in photos:
+        group = folder / f"lens_{lenses.index(photo.lens) + 1}"
+        group.mkdir(parents=True, exist_ok=True)
+        suffix = photo.path.suffix.lower()
+        as_is = suffix in (".jpg", ".jpeg", ".png") and is_upright(photo)
+        target = group / f"{photo.name}{suffix if as_is else '.png'}"
+        if target.exists():
+            continue
+        if as_is:
+            target.symlink_to(photo.path.resolve())
+        else:
+            with atomic_path(target) as temporary:
+                pixels = read_upright(photo.path)
+                pixels = pixels if pixels.dtype == np.uint8 else (pixels >> 8).astype(np.uint8)
+                Image.fromarray(pixels).save(temporary, format="PNG", compress_level=1)
+    return folder
+
+
+def _without_camera(photos: list[Photograph], placed: list[str], source: Path) -> dict[str, str]:
+    """Why photos are left out whose names are not among those with a camera; a note where they are many."""
+    lost = sorted({photo.name for photo in photos} - set(placed))
+    if len(lost) > FEW_LOST * len(photos):
+        note(
+            f"{source}: {len(lost)} of {len(photos)} photos do not fit together with the others; take more between them, and leave "
+            "the object where it stands (on a turntable it moves against what is around it, and so does its light)"
+        )
+    return dict.fromkeys(lost, "its camera was not found: too little in common with the others")
+
+
+def exposures_of(scene: Reconstruction, by_name: dict[str, Photograph], report: Callable[[str, float], None]) -> Exposures:
+    """The exposures by the photos' values at the points that they show."""
+    values, radii = np.zeros(len(scene.photo_of)), np.zeros(len(scene.photo_of))
+    for i, name in enumerate(scene.names):
+        lens, here = scene.lenses[i], scene.photo_of == i
+        pixels = read_upright(by_name[name].path)
+        luminance = srgb_to_linear(pixels / np.float32(np.iinfo(pixels.dtype).max)) @ np.float32([0.2126, 0.7152, 0.0722])
+        padded = np.pad(luminance, 1, mode="edge")
+        smooth = sum(padded[a : a + lens.height, b : b + lens.width] for a in range(3) for b in range(3)) / 9
+        x, y = scene.observed[here].astype(int).T
+        values[here] = smooth[y.clip(0, lens.height - 1), x.clip(0, lens.width - 1)]
+        half_diagonal = 0.5 * np.hypot(lens.width, lens.height)
+        radii[here] = np.linalg.norm(scene.observed[here] - [lens.cx, lens.cy], axis=1) / half_diagonal
+        report("exposures", (i + 1) / len(scene.names))
+    by_file = np.array([by_name[name].exposure or np.nan for name in scene.names])
+    return find_exposures(scene.photo_of, scene.point_of, values, radii, by_file)
+
+
+def write_data(
+    world: World, exposures: Exposures, by_name: dict[str, Photograph], out: Path, settings: PrepareSettings,
+    report: Callable[[str, float], None],
+) -> np.ndarray:  # fmt: skip
+    """Writes `images/`, `masks/`, `transforms.json` and `surroundings.exr`; returns the share that each mask covers."""
+    scene, pinholes = world.scene, [pinhole_of(lens, settings.max_size) for lens in world.scene.lenses]
+    for folder in ("images", "masks"):
+        (out / folder).mkdir(exist_ok=True)
+    for i, (name, pinhole) in enumerate(zip(scene.names, pinholes)):
+        photo = without_vignetting(read_upright(by_name[name].path), scene.lenses[i], exposures.vignetting)
+        write_png(out / "images" / f"{name}.png", undistort(photo, scene.lenses[i], pinhole))
+        report("images", (i + 1) / len(scene.names))
+    if settings.masks is None:
+        _write_transforms(world, exposures, pinholes, out, masked=False)
+        try:
+            masks = find_masks(out, world, settings.seed, lambda share: report("masks", share))
+        except BaseException:
+            (out / TRANSFORMS).unlink()  # data without their masks are half of the data
+            raise
+    else:
+        masks = given_masks(world, settings.masks, settings.max_size)
+    for name, pinhole, mask in zip(scene.names, pinholes, masks):
+        small, size = Image.fromarray((255 * mask + 0.5).astype(np.uint8)), (pinhole.width, pinhole.height)
+        write_png(out / "masks" / f"{name}.png", np.asarray(small.resize(size, Image.Resampling.BILINEAR)))
+    _write_transforms(world, exposures, pinholes, out, masked=True)
+    write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
+    return np.array([mask.mean() for mask in masks])
+
+
+def surroundings_of(world: World, exposures: Exposures, out: Path, settings: PrepareSettings) -> np.ndarray:
+    """What the written images show around the object, see :func:`splitnerf_tools.capture.surroundings.surroundings`."""
+    scene = world.scene
+    points = scene.points[world.object_points]
+    centre = np.median(points, axis=0) if len(points) else np.zeros(3)
+
+    def shots() -> Iterator[Shot]:
+        for i, name in enumerate(scene.names):
+            files = (str(out / folder / f"{name}.png") for folder in ("images", "masks"))
+            image, mask = (cv2.imread(file, cv2.IMREAD_UNCHANGED) for file in files)
+            lens = pinhole_of(scene.lenses[i], settings.max_size)
+            yield Shot(image[..., ::-1], mask > 127, scene.poses[i], lens, float(exposures.gains[i]))
+
+    return surroundings(shots(), centre, world.table_radius)
+
+
+def _write_transforms(world: World, exposures: Exposures, pinholes: list[Lens], out: Path, *, masked: bool) -> None:
+    """`transforms.json`, with the masks that stand beside it or without."""
+    frames = []
+    for i, (name, pinhole) in enumerate(zip(world.scene.names, pinholes)):
+        mask = {"mask_path": f"masks/{name}.png"} if masked else {}
+        frames.append({
+            "file_path": f"images/{name}.png", **mask, "w": pinhole.width, "h": pinhole.height,
+            "fl_x": pinhole.fx, "fl_y": pinhole.fy, "cx": pinhole.cx, "cy": pinhole.cy,
+            "exposure": float(exposures.gains[i]), "transform_matrix": world.scene.poses[i].tolist(),
+        })  # fmt: skip
+    content = {"camera_model": "PINHOLE", "mask_kind": "object", "frames": frames}
+    with atomic_path(out / TRANSFORMS) as temporary:
+        temporary.write_text(json.dumps(content, indent=1))

@@ -1,0 +1,91 @@
+"""Masks of the object in photographs: those of a folder, or found by a radiance field of the whole place.
+
+No network with downloaded weights takes part. Colours alone (GrabCut in each photo, held together by a visual hull) were worse:
+they fill the gap below a handle, lose dark undersides and thin rods.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.normalisation import transform_points
+from splitnerf.data.reading import Reading
+from splitnerf.errors import InputError
+from splitnerf.notes import note
+from splitnerf_tools.capture.photographs import read_upright
+from splitnerf_tools.capture.poses import FLIP
+from splitnerf_tools.capture.undistorted import pinhole_of, undistort
+from splitnerf_tools.capture.world import World
+from splitnerf_tools.separation.job import find_object, table_under
+from splitnerf_tools.separation.masks import find_mask, surface_points
+from splitnerf_tools.separation.table import Table
+from splitnerf_tools.separation.training import train_field
+
+STEPS = 5500  # of the field
+
+
+def find_masks(out: Path, world: World, seed: int, report: Callable[[float], None]) -> list[np.ndarray]:
+    """[h, w] masks in [0, 1] of the photos of `out/transforms.json`, in their order, at a size of their own.
+
+    Args:
+        out: The folder of the undistorted photos.
+        world: The cameras' world.
+        seed: The seed of the field.
+        report: Called with the share done.
+
+    Raises:
+        InputError: Nothing stands in the middle of the photos.
+    """
+    photos = load_dataset(out, "train", 1, Reading("all"), masked=False)
+    to_box = photos.box_from_world
+    field = train_field(photos, steps=STEPS, minutes=0.0, seed=seed, report=lambda share, _: report(0.8 * share))
+    points = surface_points(field, photos)
+    table = Table(np.array([0.0, 0, 1]), float(to_box[2, 3])) if world.table else table_under(points, photos, seed)
+    region, _ = find_object(field, photos, table, points)
+    masks = []
+    for i in range(len(photos)):
+        masks.append(find_mask(field, region, photos, i))
+        report(0.8 + 0.2 * (i + 1) / len(photos))
+    return masks
+
+
+def given_masks(world: World, folder: Path, max_size: int) -> list[np.ndarray]:
+    """[h, w] bool, the masks of a folder as the undistorted photos have them; those that are black on the object are turned
+    around.
+
+    Raises:
+        InputError: A photo has no mask, or one of another size.
+    """
+    scene, masks, score = world.scene, [], 0.0
+    for i, name in enumerate(scene.names):
+        lens = scene.lenses[i]
+        found = [path for path in sorted(folder.iterdir()) if path.name.split(".")[0] == name]
+        if not found:
+            raise InputError(f"{folder}: has no mask {name}.png; add it or leave --masks out")
+        mask = read_upright(found[0])[..., 0]
+        if mask.shape != (lens.height, lens.width):
+            size = f"{mask.shape[1]}x{mask.shape[0]}"
+            raise InputError(f"{found[0]}: is {size}, its photo {lens.width}x{lens.height}; make them equal")
+        masks.append(undistort(mask, lens, pinhole_of(lens, max_size)) > np.iinfo(mask.dtype).max / 2)
+        of_object, others = dots_of(world, i, max_size)
+        for dots, sign in ((of_object, 1), (others, -1)):
+            row, column = dots[:, ::-1].astype(int).clip(0, np.array(masks[-1].shape) - 1).T
+            score += sign * masks[-1][row, column].mean() if len(dots) else 0.0
+    if score < 0:
+        note(f"{folder}: the masks are black on the object; they are turned around")
+    return [mask if score >= 0 else ~mask for mask in masks]
+
+
+def dots_of(world: World, i: int, max_size: int) -> tuple[np.ndarray, np.ndarray]:
+    """[k, 2] where the undistorted photo `i` shows the points that it sees, in pixels: those of the object, and the others."""
+    scene = world.scene
+    seen = scene.point_of[scene.photo_of == i]
+    camera = np.linalg.inv(scene.poses[i] @ FLIP)
+    local = transform_points(camera, scene.points[seen]) @ pinhole_of(scene.lenses[i], max_size).matrix.T
+    places = local[:, :2] / np.maximum(local[:, 2:], 1e-9)
+    of_object = world.object_points[seen]
+    return places[of_object], places[~of_object]

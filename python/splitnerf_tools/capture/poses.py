@@ -1,0 +1,229 @@
+"""Camera poses of photographs by structure from motion (COLMAP, through pycolmap)."""
+
+from __future__ import annotations
+
+import sqlite3
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+
+from splitnerf.errors import InputError
+from splitnerf_tools.capture.photographs import Photograph
+
+LONGEST = 2000  # edge in pixels of the photos in which features are looked for: 16 megapixels take 7 s each
+MOST_FEATURES = 4096  # of a photo: more take longer in all that follows
+EXHAUSTIVE = 250  # photos up to which each is matched with each other one
+OVERLAP = 15  # neighbours in the order of names with which a photo is matched beyond that
+MIN_PHOTOS = 3
+FEW = 10  # photos up to which points that two of them show are kept
+ITERATIONS = 20  # of each adjustment: 15 and 30 give the same cameras; 100 took minutes
+MAX_ERROR, SHORTEST = 2.0, 3  # pixels of reprojection and photos of a point beyond and below which the adjustment drops it
+OUTLIER = 0.5  # pixels of reprojection from which on an observation counts less
+ADJUSTMENTS = 3
+CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height
+FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # between OpenCV's and OpenGL's camera axes
+
+
+@dataclass
+class Lens:
+    """A camera's projection in OpenCV's model.
+
+    Attributes:
+        width, height: The size of the photos in pixels.
+        fx, fy, cx, cy: Focal lengths and principal point in pixels; pixel centres at +0.5.
+        k1, k2, p1, p2: Radial and tangential distortion.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    k1: float
+    k2: float
+    p1: float
+    p2: float
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """[3, 3] float64."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
+
+    @property
+    def distortion(self) -> np.ndarray:
+        """[4] float64, k1 k2 p1 p2."""
+        return np.array([self.k1, self.k2, self.p1, self.p2])
+
+
+@dataclass
+class Reconstruction:
+    """What structure from motion finds.
+
+    Attributes:
+        names: Names of the n registered photos.
+        poses: [n, 4, 4] float64 camera-to-world, OpenGL axes.
+        lenses: The lens of each registered photo.
+        points: [m, 3] float64 sparse points.
+        photo_of, point_of: [k] int64, the photo and the point of each observation.
+        observed: [k, 2] float64, its place in the distorted photo in pixels; pixel centres at +0.5.
+        error: Mean reprojection error in pixels.
+        n_models: Number of separate models that were found; this is the largest.
+    """
+
+    names: list[str]
+    poses: np.ndarray
+    lenses: list[Lens]
+    points: np.ndarray
+    photo_of: np.ndarray
+    point_of: np.ndarray
+    observed: np.ndarray
+    error: float
+    n_models: int
+
+    def camera_points(self, photo: int, points: np.ndarray) -> np.ndarray:
+        """[m, 3] points [m, 3] in OpenCV's axes of a photo's camera."""
+        camera = np.linalg.inv(self.poses[photo] @ FLIP)
+        return points @ camera[:3, :3].T + camera[:3, 3]
+
+
+def reconstruct(
+    photos: list[Photograph], images: Path, folder: Path, seed: int, report: Callable[[str, float], None]
+) -> Reconstruction:
+    """Finds cameras and sparse points.
+
+    Args:
+        photos: The photos.
+        images: A folder with the photos, upright, as `GROUP/NAME.png` or `.jpg`; the photos of a group share a lens.
+        folder: A working folder; what is found there of an earlier, interrupted call is used.
+        seed: The seed of all random choices.
+        report: Called with the step's name and the share done.
+
+    Raises:
+        InputError: Fewer than three photos fit together.
+    """
+    database = folder / "features.db"
+    extraction, pipeline = pycolmap.FeatureExtractionOptions(), pycolmap.IncrementalPipelineOptions()
+    extraction.max_image_size, extraction.sift.max_num_features = LONGEST, MOST_FEATURES
+    reader = pycolmap.ImageReaderOptions()
+    reader.camera_model = "OPENCV"
+    pipeline.random_seed = pipeline.mapper.random_seed = seed
+    n = len(photos)
+    with _quiet():
+        with _counted(database, "keypoints", n, lambda share: report("features", share)):
+            pycolmap.extract_features(
+                database, images, camera_mode=pycolmap.CameraMode.PER_FOLDER, reader_options=reader,
+                extraction_options=extraction,
+            )  # fmt: skip
+        if n <= EXHAUSTIVE:
+            with _counted(database, "two_view_geometries", n * (n - 1) // 2, lambda share: report("matches", share)):
+                pycolmap.match_exhaustive(database)
+        else:
+            pairing = pycolmap.SequentialPairingOptions()
+            pairing.overlap, pairing.quadratic_overlap = OVERLAP, True
+            with _counted(database, "two_view_geometries", n * 2 * OVERLAP, lambda share: report("matches", share)):
+                pycolmap.match_sequential(database, pairing_options=pairing)
+        placed = iter(range(3, n + 1))
+        models = pycolmap.incremental_mapping(
+            database, images, folder, pipeline, next_image_callback=lambda: report("cameras", next(placed, n) / n)
+        )
+        model = max(models.values(), key=lambda found: found.num_reg_images(), default=None)
+        if model is None or model.num_reg_images() < MIN_PHOTOS:
+            raise InputError(
+                f"{photos[0].path.parent}: the photos do not fit together; take more, each with two thirds in common with "
+                "the next, of an object that does not move on a table with a pattern"
+            )
+        model = _adjusted(model)
+    return _taken_out(model, len(models))
+
+
+def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
+    """The model with everything refined at once, the principal points too, which the mapping holds at the photos' centres.
+
+    Points that are no points, such as highlights and mirrored lamps, fit nearly: a loss with heavy tails (Cauchy's) keeps
+    them from pulling at the cameras. Where few photos leave the principal points open, they stay at the centres.
+    """
+    shortest = SHORTEST if model.num_reg_images() > FEW else 2
+    for principal_points in (True, False):
+        refined = pycolmap.Reconstruction(model)
+        options, chosen = pycolmap.BundleAdjustmentOptions(), pycolmap.BundleAdjustmentConfig()
+        options.refine_principal_point, options.print_summary = principal_points, False
+        options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
+        options.ceres.loss_function_scale = OUTLIER
+        options.ceres.solver_options.max_num_iterations = ITERATIONS
+        for image in refined.reg_image_ids():
+            chosen.add_image(image)
+        chosen.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+        for _ in range(ADJUSTMENTS):
+            pycolmap.create_default_bundle_adjuster(options, chosen, refined).solve()
+            refined.update_point_3d_errors()
+            points = refined.points3D.items()
+            for key in [k for k, point in points if point.error > MAX_ERROR or point.track.length() < shortest]:
+                refined.delete_point3D(key)
+        if all(_is_central(camera) for camera in refined.cameras.values()):
+            break
+    return refined
+
+
+def _is_central(camera: pycolmap.Camera) -> bool:
+    """Whether a camera's principal point is near the middle of its photos."""
+    size = np.array([camera.width, camera.height])
+    return bool((np.abs(np.array(camera.params[2:4]) - size / 2) < CENTRAL * size).all())
+
+
+def _taken_out(model: pycolmap.Reconstruction, n_models: int) -> Reconstruction:
+    numbers = {key: i for i, key in enumerate(sorted(model.points3D))}
+    images = sorted((model.images[key] for key in model.reg_image_ids()), key=lambda image: image.name)
+    poses, lenses, photo_of, point_of, observed = [], [], [], [], []
+    for i, image in enumerate(images):
+        world_to_camera = np.vstack([image.cam_from_world().matrix(), [0, 0, 0, 1]])
+        poses.append(np.linalg.inv(world_to_camera) @ FLIP)
+        lenses.append(Lens(image.camera.width, image.camera.height, *map(float, image.camera.params)))
+        for index in image.get_observation_point2D_idxs():
+            point = image.points2D[index]
+            photo_of.append(i), point_of.append(numbers[point.point3D_id]), observed.append(point.xy)
+    return Reconstruction(
+        [Path(image.name).stem for image in images], np.array(poses), lenses,
+        np.array([model.points3D[key].xyz for key in sorted(model.points3D)]), np.array(photo_of), np.array(point_of),
+        np.array(observed), float(model.compute_mean_reprojection_error()), n_models,
+    )  # fmt: skip
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keeps COLMAP's log to errors."""
+    log = pycolmap.logging
+    before = log.minloglevel, log.alsologtostderr
+    log.minloglevel, log.alsologtostderr = log.Level.ERROR.value, False
+    try:
+        yield
+    finally:
+        log.minloglevel, log.alsologtostderr = before
+
+
+@contextmanager
+def _counted(database: Path, table: str, total: int, report: Callable[[float], None], every: float = 1.0) -> Iterator[None]:
+    """Reports the share of a table's rows while a step of COLMAP fills it."""
+    done = threading.Event()
+
+    def watch() -> None:
+        while not done.wait(every):
+            try:
+                with sqlite3.connect(f"file:{database}?mode=ro", uri=True, timeout=0.1) as base:
+                    rows = base.execute(f"SELECT COUNT(*) FROM {table}").fetchone()[0]  # noqa: S608
+            except sqlite3.Error:
+                continue
+            report(min(1.0, rows / max(total, 1)))
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()

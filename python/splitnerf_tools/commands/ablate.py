@@ -1,0 +1,92 @@
+"""splitnerf ablate."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.cli.help import examples
+from splitnerf.cli.train import budget
+from splitnerf.errors import InputError
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    parser = commands.add_parser(
+        "ablate", help="measure what each part of the method is worth",
+        description="Trains on each DATA with the full method and with one part at a time taken out or exchanged, each for "
+        "the same time, and writes ablation.csv, ablation.md and the runs into OUT. Repeat the command to go on.",
+        epilog=examples("splitnerf ablate data --minutes 6", "splitnerf ablate --list"),
+    )  # fmt: skip
+    parser.add_argument("data", type=Path, nargs="*", metavar="DATA")
+    parser.add_argument("--out", type=Path, default=Path("runs/ablation"), metavar="OUT", help="default: runs/ablation")
+    parser.add_argument("--minutes", type=float, metavar="M", help="training time of each run (default: 6, or --steps)")
+    parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps of each run")
+    parser.add_argument("--rows", metavar="LIST", help="names of rows, by semicolons (default: all; --list names them)")
+    parser.add_argument("--list", action="store_true", help="print the rows and what they set, and train nothing")
+    parser.add_argument(
+        "--seeds",
+        type=int,
+        default=1,
+        metavar="N",
+        help="runs of rows within 0.3 dB of what they are compared with, 3 or more (default: 1)",
+    )
+    parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
+    parser.add_argument("--views", type=int, metavar="N", help="test views to score (default: all)")
+    parser.add_argument("--spp", type=int, default=32, metavar="N", help="paths a pixel of relit views (default: 32)")
+    parser.add_argument("--preset", choices=["cpu", "paper"], default="cpu", help="the full method (default: cpu)")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all rows"
+    )
+    parser.set_defaults(execute=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    from splitnerf.config import parse_setting, preset
+    from splitnerf_tools.ablate.rows import PAPER, SWITCHES, make_rows
+
+    if args.seeds != 1 and args.seeds < 3:
+        raise InputError(f"--seeds must be 1, or 3 and more, for two say nothing of their spread; got {args.seeds}")
+    if args.minutes is not None and args.minutes <= 0:
+        raise InputError(f"--minutes must be positive, got {args.minutes}")
+    minutes = 6.0 if args.minutes is None and args.steps is None else args.minutes
+    settings = dict(parse_setting(text) for text in args.settings) | budget(args.steps, minutes)
+    names = None if args.rows is None else [name.strip() for name in args.rows.split(";") if name.strip()]
+    rows = make_rows(preset(args.preset).replace({"run.cuda_graphs": False} | settings), names)  # not all rows can
+    for name in names or []:
+        if all(row.name != name for row in rows):
+            print(f"{name}: changes nothing here, left out", file=sys.stderr)
+    if args.list:
+        for row in rows[1:]:
+            print(f"{row.name}: {', '.join(f'{k} = {v}' for k, v in (PAPER | SWITCHES)[row.name].items())}")
+        return DONE
+    if not args.data:
+        raise InputError("give at least one DATA folder, or --list")
+
+    from splitnerf.data.frames import refuse_data
+    from splitnerf.evaluate.jobs import Protocol
+    from splitnerf.files import atomic_path, held
+    from splitnerf_tools.ablate.job import Interrupted, Plan, ablate
+    from splitnerf_tools.ablate.table import csv_table, markdown_table
+
+    scenes = {scene.resolve().name: scene for scene in args.data}
+    if len(scenes) < len(args.data):
+        raise InputError("two DATA folders have the same name; ablate them into different --out")
+
+    def show(scores: list) -> None:
+        for name, text in (("ablation.csv", csv_table(scores)), ("ablation.md", markdown_table(scores))):
+            with atomic_path(args.out / name) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+
+    plan = Plan(list(scenes.values()), rows, args.seeds, Protocol(args.downscale, args.views, args.spp), args.out)
+    refuse_data(args.out)
+    try:
+        with held(args.out):
+            scores = ablate(plan, show)
+    except Interrupted:
+        print(f"stopped; the state is in {args.out}. To go on, repeat the command.")
+        return INTERRUPTED
+    print(markdown_table(scores))
+    print(f"results: {args.out / 'ablation.md'}, {args.out / 'ablation.csv'}")
+    return DONE

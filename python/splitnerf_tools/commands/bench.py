@@ -1,0 +1,165 @@
+"""splitnerf bench."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+from pathlib import Path
+
+from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.errors import InputError
+
+# Modules of splitnerf_tools.bench, each with run(quick, rounds), and what they compare.
+OPERATORS = {
+    "prefilter": "estimators of the light's integral over a lobe: time against error",
+    "split_sum": "the split sum and its table against the integral: error alone",
+    "hash_grid": "the encoding beside plain torch, Dr.Jit and the machine's gathers",
+    "normals": "analytic normals beside finite differences: time against angle",
+    "shading": "split-sum shading and the light's integral beside plain and compiled torch",
+    "occlusion": "traced rays beside cached bits, and beside Open3D, trimesh and Mitsuba",
+    "path_tracer": "error against time beside Mitsuba",
+}
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    parser = commands.add_parser(
+        "bench", help="measure run time against error",
+        description=f"Without BENCHMARK: {', '.join(OPERATORS)}. Each checks the operators, times them beside plain "
+        "torch and the peers that are installed (drjit, open3d, mitsuba), and writes a table, a CSV file and a picture. "
+        "Measured maps and meshes are taken from the folder SPLITNERF_DATA, else procedural ones.",
+    )  # fmt: skip
+    add_quick(parser, default=False)
+    add_out(parser, default=None)
+    parser.set_defaults(execute=run_operators)
+    benchmarks = parser.add_subparsers(dest="benchmark", metavar="BENCHMARK")
+    for name, what in OPERATORS.items():
+        operator = benchmarks.add_parser(name, help=what, description=f"Measures {what}.")
+        add_quick(operator)
+        add_out(operator)
+    add_skip(benchmarks)
+    add_whole(benchmarks)
+
+
+def add_skip(benchmarks: argparse._SubParsersAction) -> None:
+    skip = benchmarks.add_parser(
+        "skip", help="what it is worth to leave out what a scene does not need",
+        description="Trains on DATA without any skip, with one at a time, and with all, for M minutes and for as many steps as "
+        "the first run made, and prints steps a second as a ratio, and the PSNR of novel views at equal steps and time.",
+    )  # fmt: skip
+    skip.add_argument("--data", type=Path, required=True, metavar="DATA")
+    skip.add_argument("--minutes", type=float, default=3.0, metavar="M", help="training time of each run (default: 3)")
+    skip.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
+    skip.add_argument(
+        "--against", type=Path, metavar="SPLITNERF", help="the program of another build, for the first line"
+    )
+    skip.add_argument("--out", type=Path, metavar="OUT", help="keep the runs (default: a folder that is removed)")
+    skip.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all runs"
+    )
+    skip.set_defaults(execute=run_skip)
+
+
+def add_whole(benchmarks: argparse._SubParsersAction) -> None:
+    whole = benchmarks.add_parser(
+        "whole", help="error of novel views, albedo and relit views against wall time",
+        description="Trains on each DATA for each of the times, with the preset cpu, with the preset paper, and with one setting "
+        "changed at a time that buys time with error or error with time, and draws what each reaches. Repeat the command with the "
+        "same --runs to go on or to add times.",
+    )  # fmt: skip
+    whole.add_argument("--data", type=Path, action="append", required=True, metavar="DATA", help="may be repeated")
+    whole.add_argument("--minutes", default="0.5,2", metavar="LIST", help="training times, by commas (default: 0.5,2)")
+    whole.add_argument("--only", metavar="LIST", help="names of configurations, by semicolons (default: all)")
+    whole.add_argument("--runs", type=Path, default=Path("runs/whole"), metavar="RUNS", help="default: runs/whole")
+    whole.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
+    whole.add_argument("--views", type=int, metavar="N", help="test views to score (default: all)")
+    whole.add_argument("--spp", type=int, default=32, metavar="N", help="paths a pixel of relit views (default: 32)")
+    whole.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all runs"
+    )
+    add_out(whole)
+    whole.set_defaults(execute=run_whole)
+
+
+def add_quick(parser: argparse.ArgumentParser, default: object = argparse.SUPPRESS) -> None:
+    where = "small inputs: a few minutes, to run before and after a change"
+    parser.add_argument("--quick", action="store_true", default=default, help=where)
+
+
+def add_out(parser: argparse.ArgumentParser, default: object = argparse.SUPPRESS) -> None:
+    where = "folder of the files (default: docs/benchmarks in a checkout, else here)"
+    parser.add_argument("--out", type=Path, default=default, metavar="DIR", help=where)
+
+
+def default_folder() -> Path:
+    return Path("docs/benchmarks") if Path("docs").is_dir() else Path()
+
+
+def run_operators(args: argparse.Namespace) -> int:
+    from splitnerf_tools.bench.harness import run_benchmarks
+
+    names = [args.benchmark] if args.benchmark else list(OPERATORS)
+    for path in run_benchmarks(names, args.quick, args.out or default_folder(), print_now):
+        print(path)
+    return DONE
+
+
+def print_now(line: str) -> None:
+    print(line, flush=True)
+
+
+def run_skip(args: argparse.Namespace) -> int:
+    from splitnerf.config import parse_setting, preset
+    from splitnerf.workflow import load_splits
+    from splitnerf_tools.bench.skip import run_other, skip_table
+
+    if args.minutes <= 0:
+        raise InputError(f"--minutes must be positive, got {args.minutes}")
+    if args.out is not None and args.out.exists() and any(args.out.iterdir()):
+        raise InputError(f"{args.out}: is not empty; give another --out")
+    full = preset("cpu").replace({"refinement.enabled": False} | dict(parse_setting(text) for text in args.settings))
+    training, test = load_splits(args.data, args.downscale)
+    if test is None:
+        raise InputError(f"{args.data}: has no test views to score")
+    with tempfile.TemporaryDirectory() as temporary:
+        out = args.out or Path(temporary)
+        out.mkdir(parents=True, exist_ok=True)
+        other = None
+        if args.against is not None:
+            other = lambda: run_other(args.against, args.data, args.minutes, args.downscale, out / "against")  # noqa: E731
+        skip_table(full, args.minutes, training, test, out, other, print_now)
+    return DONE
+
+
+def run_whole(args: argparse.Namespace) -> int:
+    from splitnerf.config import parse_setting
+    from splitnerf.evaluate.jobs import Protocol
+    from splitnerf.files import held
+    from splitnerf_tools.ablate.job import Interrupted
+    from splitnerf_tools.bench.charts import write_result
+    from splitnerf_tools.bench.whole import NAMES, configurations, whole
+
+    try:
+        minutes = [float(text) for text in args.minutes.split(",")]
+    except ValueError:
+        minutes = []
+    if not minutes or not all(0 < value < math.inf for value in minutes):
+        raise InputError(f"--minutes takes positive numbers with commas between them, got {args.minutes!r}")
+    names = NAMES if args.only is None else [name.strip() for name in args.only.split(";") if name.strip()]
+    unknown = [name for name in names if name not in NAMES]
+    if unknown:
+        raise InputError(f"--only: no configuration is called {unknown[0]!r}; there are: {'; '.join(NAMES)}")
+    scenes = list(dict.fromkeys(path.resolve() for path in args.data))
+    if len({scene.name for scene in scenes}) < len(scenes):
+        raise InputError("two DATA folders have the same name; measure them into different --runs")
+    configs = configurations(names, dict(parse_setting(text) for text in args.settings))
+    protocol = Protocol(args.downscale, args.views, args.spp)
+    try:
+        with held(args.runs):
+            result = whole(scenes, configs, minutes, protocol, args.runs, print_now)
+    except Interrupted:
+        print(f"stopped; the state is in {args.runs}. To go on, repeat the command.")
+        return INTERRUPTED
+    for path in write_result(result, args.out or default_folder()):
+        print(path)
+    return DONE

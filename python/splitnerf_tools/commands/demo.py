@@ -1,0 +1,55 @@
+"""splitnerf demo."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from splitnerf.cli.exit_codes import DONE, INTERRUPTED
+from splitnerf.cli.help import examples
+from splitnerf.cli.summary import print_summary
+from splitnerf.cli.train import budget
+from splitnerf.errors import InputError
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    parser = commands.add_parser(
+        "demo", help="render a small scene, reconstruct it and print the errors against its truth",
+        description="Makes a scene with known shape, materials and sky, renders it with the built-in path tracer, "
+        "trains on it and prints the errors. Nothing is downloaded.",
+        epilog=examples("splitnerf demo", "splitnerf demo --max-minutes 1 --out runs/short --overwrite"),
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)"
+    )
+    parser.add_argument("--max-minutes", type=float, default=4.0, metavar="M", help="time of training and last stage (default: 4)")
+    parser.add_argument("--no-refine", action="store_true", help="no last stage: training gets all minutes")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
+    parser.set_defaults(execute=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    from splitnerf.config import preset
+    from splitnerf.data.frames import refuse_data
+    from splitnerf.files import held
+    from splitnerf.workflow import check_run, reconstruct
+    from splitnerf_tools.demo.scene import write_demo_dataset
+
+    if not args.max_minutes > 0:
+        raise InputError(f"--max-minutes must be positive, got {args.max_minutes}")
+    settings = {"run.seed": args.seed, "refinement.enabled": not args.no_refine, **budget(None, args.max_minutes)}
+    config, data = preset("cpu").replace(settings), args.out / "data"
+    with held(args.out):
+        check_run(args.out, resume=False, overwrite=args.overwrite)
+        if not args.overwrite:
+            refuse_data(data)
+        print(f"rendering the demo scene into {data} ...", file=sys.stderr)
+        write_demo_dataset(data, seed=args.seed)
+        trained, evaluation = reconstruct(data, args.out, config, overwrite=args.overwrite)
+    if evaluation is None:
+        print(f"stopped; the state is in {args.out}. To go on: splitnerf train {data} --out {args.out} --resume")
+        return INTERRUPTED
+    print_summary(args.out, evaluation, trained.step, trained.seconds)
+    return DONE

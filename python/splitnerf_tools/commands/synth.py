@@ -1,0 +1,77 @@
+"""splitnerf synth."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.help import examples
+from splitnerf.errors import InputError
+
+LAYOUTS = ("blender", "nerfactor", "tensoir", "shiny", "stanford-orb", "neus")
+SHAPES = ("bowl", "mug", "box", "vase", "shell", "rings", "plinth", "mask")
+MATERIALS = ("matte", "glossy", "metal")
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    parser = commands.add_parser(
+        "synth", help="render a dataset with full truth from a GLB file or a built-in shape",
+        description="Renders ASSET or a built-in shape, brought to the unit sphere, from cameras around it under the light MAP, "
+        "with true albedo, roughness, metallic, normals and relit views, in a layout that train and evaluate read.",
+        epilog=examples(
+            "splitnerf synth chair.glb --light studio.hdr --out data",
+            "splitnerf synth chair.glb --light studio.hdr --relight field.hdr city.hdr --size 400 --out data",
+            "splitnerf synth --shape mug --material glossy --light studio.hdr --out data",
+        ),
+    )  # fmt: skip
+    rendered = parser.add_mutually_exclusive_group(required=True)
+    rendered.add_argument("asset", type=Path, nargs="?", metavar="ASSET.glb")
+    rendered.add_argument(
+        "--shape", choices=SHAPES, metavar="NAME", help=f"a built-in shape, hollow, pierced or touching: {', '.join(SHAPES)}"
+    )
+    parser.add_argument("--material", choices=MATERIALS, help="of the shape, under a painted pattern (default: matte)")
+    parser.add_argument(
+        "--light", type=Path, required=True, metavar="MAP", help="environment map of the photos, .hdr or .exr"
+    )
+    parser.add_argument(
+        "--relight", type=Path, nargs="+", default=[], metavar="MAP", help="maps of the relit test views"
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="DATA", help="folder to write, absent or empty")
+    parser.add_argument("--size", type=int, default=200, metavar="N", help="width and height in pixels (default: 200)")
+    parser.add_argument("--train", type=int, default=100, metavar="N", help="number of train views (default: 100)")
+    parser.add_argument("--test", type=int, default=20, metavar="N", help="number of test views (default: 20)")
+    parser.add_argument("--spp", type=int, default=256, metavar="N", help="paths a pixel (default: 256)")
+    parser.add_argument(
+        "--layout",
+        choices=LAYOUTS, metavar="SET", default="blender",
+        help=f"whose files the data look like (default: blender): {', '.join(LAYOUTS)}; the first three hold full truth, and "
+        "only these and stanford-orb take --relight",
+    )  # fmt: skip
+    parser.add_argument(
+        "--renderer",
+        choices=["project", "blender"],
+        default="project",
+        help="the built-in path tracer (default), or Cycles through bpy",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the noise and the first camera (default: 0)")
+    parser.set_defaults(execute=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    from splitnerf.export.glb import write_glb
+    from splitnerf_tools.synth.jobs import SynthSettings, synthesise
+    from splitnerf_tools.synth.shapes import shape_asset
+
+    if args.material and not args.shape:
+        raise InputError("--material is that of a built-in shape; give --shape, or leave it out")
+    settings = SynthSettings(args.size, args.train, args.test, args.spp, args.layout, args.renderer, args.seed)
+    with tempfile.TemporaryDirectory() as folder:
+        asset = args.asset
+        if args.shape:
+            asset = Path(folder) / f"{args.shape}.glb"
+            write_glb(asset, shape_asset(args.shape, args.material or MATERIALS[0]))
+        out = synthesise(asset, args.light, args.relight, args.out, settings)
+    print(f"{args.train} train and {args.test} test views under {1 + len(args.relight)} lights: {out}")
+    return DONE

@@ -1,0 +1,64 @@
+"""How bright each photo shows the object, beside photos from nearby directions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from splitnerf.data.images import srgb_to_linear
+from splitnerf_tools.inspection.hull import Fit
+from splitnerf_tools.inspection.views import View
+
+NEIGHBOURS, NEAR = 4, 40.0  # photos that one is compared with, and degrees between their directions at most
+LEAST_SHARED = 20  # cells that two photos must both show
+BEHIND = 2.0  # cells by which a cell may lie behind the first in its pixel and be seen
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+DARKEST = 1e-3  # of the linear values that count
+
+
+def differences(views: Sequence[View], fit: Fit) -> np.ndarray:
+    """[n] by how many powers of two each photo is brighter than its neighbours in direction, NaN where it has none.
+
+    Two photos are compared where both show a cell of the hull's surface, by the median of the ratios there; a photo's
+    difference is the median over its neighbours.
+    """
+    surface = _surface(fit)
+    values = np.stack([_seen_values(view, surface, fit.cell) for view in views])
+    directions = np.stack([view.place - fit.centre for view in views])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    cosines = directions @ directions.T
+    np.fill_diagonal(cosines, -2)
+    result = np.full(len(views), np.nan)
+    for i, row in enumerate(cosines):
+        ratios = [values[i] - values[j] for j in np.argsort(-row)[:NEIGHBOURS] if row[j] > np.cos(np.radians(NEAR))]
+        medians = [np.nanmedian(ratio) for ratio in ratios if np.isfinite(ratio).sum() >= LEAST_SHARED]
+        if medians:
+            result[i] = np.median(medians)
+    return result
+
+
+def _surface(fit: Fit) -> np.ndarray:
+    """[m, 3] the cells of the hull that have fewer than six neighbours."""
+    tree = cKDTree(fit.cells)
+    return fit.cells[tree.query_ball_point(fit.cells, 1.1 * fit.cell, return_length=True) < 7]
+
+
+def _seen_values(view: View, cells: np.ndarray, cell: float) -> np.ndarray:
+    """[m] the logarithm, base 2, of the luminance at which a view shows cells; NaN where it does not."""
+    values = np.full(len(cells), np.nan)
+    local = (cells - view.place) @ view.pose[:3, :3]
+    depth = np.maximum(-local[:, 2], 1e-6)
+    fx, fy, cx, cy = view.intrinsics
+    x, y = np.floor(cx + fx * local[:, 0] / depth), np.floor(cy - fy * local[:, 1] / depth)
+    height, width = view.mask.shape
+    shown = np.flatnonzero((-local[:, 2] > cell) & (x >= 0) & (x < width) & (y >= 0) & (y < height))
+    x, y, depth = x[shown].astype(int), y[shown].astype(int), depth[shown]
+    step = max(1, round(1.5 * fx * cell / float(np.median(depth)))) if len(shown) else 1
+    first = np.full((height // step + 1, width // step + 1), np.inf)
+    np.minimum.at(first, (y // step, x // step), depth)
+    visible = (depth <= first[y // step, x // step] + BEHIND * cell) & view.mask[y, x]
+    luminance = srgb_to_linear(view.colour[y[visible], x[visible]]) @ LUMINANCE
+    values[shown[visible]] = np.where(luminance > DARKEST, np.log2(np.maximum(luminance, DARKEST)), np.nan)
+    return values

@@ -1,0 +1,231 @@
+"""What a data set holds, one line a finding, and what may be wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.frames import layout_of, split_rule
+from splitnerf.data.reading import Reading
+from splitnerf.errors import InputError
+from splitnerf_tools.inspection.brightness import differences
+from splitnerf_tools.inspection.directions import angles, largest_gap
+from splitnerf_tools.inspection.duplicates import duplicates
+from splitnerf_tools.inspection.hull import Fit, fit_masks
+from splitnerf_tools.inspection.views import View, views_of
+
+WIDEST_GAP = 120.0  # degrees of azimuth without a camera
+SMALLEST_SHARE, LARGEST_CUT, LARGEST_CLIPPED = 0.05, 0.01, 0.05  # of the photo, of its edge, of the object
+ROUGH = 0.75  # median agreement of masks and poses from which on they fit
+ENOUGH = 8  # photos whose hull is near enough to the object for that
+UNEVEN, OUTLIER, OUTLIER_DEVIATIONS = 0.1, 0.3, 6.0  # powers of two between neighbours: of most, of one
+NAMED = 3  # photos in a line
+
+
+@dataclass
+class Finding:
+    """One line of the list.
+
+    Attributes:
+        name: What was looked at.
+        value: What was found.
+        advice: What to do about it; empty where nothing is suspected.
+        suspects: What is suspected of a photo, in a few words, by its number; the worst come first.
+    """
+
+    name: str
+    value: str
+    advice: str = ""
+    suspects: dict[int, str] = field(default_factory=dict)
+
+
+@dataclass
+class Inspection:
+    """All that was found.
+
+    Attributes:
+        title: The data's name.
+        views: The photos, those to train on first.
+        fit: The object's hull, and how the masks fit it.
+        azimuth, elevation: [n] degrees, the cameras' directions from the hull's centre.
+        upward: [3] unit vector.
+        brightness: [n] differences from photos nearby, powers of two; NaN where there is none.
+        findings: The lines.
+    """
+
+    title: str
+    views: list[View]
+    fit: Fit
+    azimuth: np.ndarray
+    elevation: np.ndarray
+    upward: np.ndarray
+    brightness: np.ndarray
+    findings: list[Finding]
+
+
+def inspect(train: Dataset, test: Dataset | None, reading: Reading) -> Inspection:
+    """Looks at a data set.
+
+    Args:
+        train: The photos to train on.
+        test: Those that are held out, or None.
+        reading: How they were read.
+
+    Raises:
+        InputError: The masks and poses leave no hull.
+    """
+    views = views_of(train) + ([] if test is None else views_of(test))
+    fit = fit_masks(views)
+    if fit is None:
+        raise InputError(f"{train.root}: no part of space lies in most of the masks; check the poses and masks")
+    azimuth, elevation, upward = angles(views, fit.centre)
+    brightness = differences(views, fit)
+    findings = [
+        _layout(train, test, reading),
+        _sizes(train, test),
+        _distances(views, fit, train.box_from_world),
+        _directions(azimuth, elevation),
+        _inside(views, fit),
+        _shares(views),
+        _cut(views),
+        _agreement(views, fit),
+        _moved(views, fit),
+        _duplicates(views, fit),
+        _brightness(views, brightness),
+        _clipped(views),
+    ]
+    return Inspection(train.name, views, fit, azimuth, elevation, upward, brightness, findings)
+
+
+def _layout(train: Dataset, test: Dataset | None, reading: Reading) -> Finding:
+    layout = layout_of(train.root).__name__.split(".")[-1].replace("_", " ")
+    held_out = 0 if test is None else len(test)
+    split = f"{len(train)} photos to train on, {held_out} held out ({split_rule(train.root, reading)})"
+    return Finding("layout", f"{layout}; {split}")
+
+
+def _sizes(train: Dataset, test: Dataset | None) -> Finding:
+    sizes = {f"{split.width} x {split.height}" for split in (train, test) if split is not None}
+    across = np.degrees(2 * np.arctan(0.5 * train.width / train.intrinsics[:, 0]))
+    reduced = f", averaged down by {train.downscale}" if train.downscale > 1 else ""
+    return Finding("size", f"{' and '.join(sorted(sizes))} pixels{reduced}, {_range(across, '.0f')} degrees across")
+
+
+def _distances(views: Sequence[View], fit: Fit, box_from_world: np.ndarray) -> Finding:
+    radii = np.linalg.norm([view.place - fit.centre for view in views], axis=1) / fit.radius
+    unit = fit.radius / np.cbrt(np.linalg.det(box_from_world[:3, :3]))
+    value = f"{_range(radii, '.3g')} radii of the object; one is {unit:.3g} of the data's units"
+    return Finding("distance of cameras", value)
+
+
+def _directions(azimuth: np.ndarray, elevation: np.ndarray) -> Finding:
+    gap, begin = largest_gap(azimuth, elevation)
+    value = f"largest gap {gap:.0f} degrees around; {_range(elevation, '.0f')} degrees above the horizon"
+    advice = ""
+    if gap > WIDEST_GAP:
+        sector = f"{begin:.0f} to {(begin + gap + 180) % 360 - 180:.0f} degrees"
+        advice = f"no photo shows the side from azimuth {sector}, so it will be guessed: add photos from there"
+    return Finding("directions", value, advice)
+
+
+def _inside(views: Sequence[View], fit: Fit) -> Finding:
+    suspects = dict.fromkeys(fit.inside, "camera in the object")
+    advice = f"check their poses, or leave them out: {_named(views, suspects)}" if suspects else ""
+    return Finding("cameras in the object", f"{len(suspects) or 'none'}", advice, suspects)
+
+
+def _shares(views: Sequence[View]) -> Finding:
+    shares = np.array([view.share for view in views])
+    suspects = {int(i): f"object on {shares[i]:.1%}" for i in np.argsort(shares) if shares[i] < SMALLEST_SHARE}
+    advice = ""
+    if suspects:
+        advice = f"the object is small in {len(suspects)}, go nearer or cut them out: {_named(views, suspects)}"
+    return Finding("masks cover", f"{_range(100 * shares, '.1f')} % of the photo", advice, suspects)
+
+
+def _cut(views: Sequence[View]) -> Finding:
+    shares = np.array([view.cut for view in views])
+    suspects = {int(i): f"cut, {shares[i]:.0%} of the edge" for i in np.argsort(-shares) if shares[i] > LARGEST_CUT}
+    advice = ""
+    if suspects:
+        advice = f"keep the whole object in most photos, go farther away: {_named(views, suspects)}"
+    return Finding("cut by the edge", f"{len(suspects) or 'none'}", advice, suspects)
+
+
+def _agreement(views: Sequence[View], fit: Fit) -> Finding:
+    suspects = {i: f"mask fits {fit.agreement[i]:.2f}" for i in fit.outliers}
+    advice = ""
+    if suspects:
+        advice = f"look at the masks and poses of {_named(views, suspects)}"
+    elif len(views) >= ENOUGH and np.median(fit.agreement) < ROUGH:
+        advice = "masks and poses fit badly everywhere: are the poses, the lens and the masks those of these photos?"
+    value = f"intersection over union with the others' hull {_range(fit.agreement, '.2f')}"
+    return Finding("masks against poses", f"{value}, {len(suspects) or 'no'} outliers", advice, suspects)
+
+
+def _moved(views: Sequence[View], fit: Fit) -> Finding:
+    if fit.shift is None:
+        return Finding("object moved", "no")
+    suspects = dict.fromkeys(fit.outliers, "object elsewhere")
+    value = f"by {np.linalg.norm(fit.shift) / (2 * fit.radius):.0%} of its size, in {len(suspects)} photos"
+    advice = f"leave them or the others out, or repair their poses: {_named(views, suspects)}"
+    return Finding("object moved", value, advice, suspects)
+
+
+def _duplicates(views: Sequence[View], fit: Fit) -> Finding:
+    pairs = duplicates(views, fit.radius)
+    suspects: dict[int, str] = {}
+    for i, j, what in pairs:
+        suspects.setdefault(i, f"{what}: {views[j].name}")
+        suspects.setdefault(j, f"{what}: {views[i].name}")
+    kinds = sorted({what for _, _, what in pairs})
+    value = ", ".join(f"{sum(pair[2] == kind for pair in pairs)} pairs, {kind}" for kind in kinds) or "none"
+    listed = [f"{views[i].name} and {views[j].name}" for i, j, _ in pairs]
+    advice = f"keep one, or check the poses: {_some(listed)}" if pairs else ""
+    return Finding("duplicate photos", value, advice, suspects)
+
+
+def _brightness(views: Sequence[View], brightness: np.ndarray) -> Finding:
+    exposures = np.array([view.exposure for view in views])
+    stated = np.ptp(exposures) > 0
+    value = f"exposures stated, {_range(exposures, '.2f')}" if stated else "no exposures stated"
+    known = np.abs(brightness[np.isfinite(brightness)])
+    if len(known) == 0:
+        return Finding("brightness", f"{value}; no two photos are near enough to compare")
+    usual = 1.4826 * float(np.median(known))
+    sizes, least = np.abs(np.nan_to_num(brightness)), max(OUTLIER, OUTLIER_DEVIATIONS * usual)
+    suspects = {int(i): f"brightness {brightness[i]:+.2f} EV" for i in np.argsort(-sizes) if sizes[i] > least}
+    value += f"; photos differ from those beside them by {usual:.2g} EV, at most {known.max():.2g}"
+    advice = ""
+    if usual > UNEVEN:
+        wrong = "the stated exposures do not make them alike" if stated else "they were not exposed alike"
+        advice = f"the object shines, or {wrong}: give `exposure` in each frame, or use `splitnerf prepare`"
+    elif suspects:
+        advice = f"exposed otherwise, or the light changed: {_named(views, suspects)}"
+    return Finding("brightness", value, advice, suspects)
+
+
+def _clipped(views: Sequence[View]) -> Finding:
+    shares = np.array([view.clipped for view in views])
+    suspects = {int(i): f"clipped {shares[i]:.0%}" for i in np.argsort(-shares) if shares[i] > LARGEST_CLIPPED}
+    advice = f"expose less, what is clipped has no colour: {_named(views, suspects)}" if suspects else ""
+    return Finding("clipped", f"{_range(100 * shares, '.1f')} % of the object's pixels", advice, suspects)
+
+
+def _range(values: np.ndarray, form: str) -> str:
+    """The least and the greatest of values and their median, in words."""
+    low, middle, high = (f"{np.quantile(values, q):{form}}" for q in (0, 0.5, 1))
+    return low if low == high else f"{low} to {high} (median {middle})"
+
+
+def _named(views: Sequence[View], suspects: Iterable[int]) -> str:
+    return _some([views[i].name for i in suspects])
+
+
+def _some(names: Sequence[str]) -> str:
+    """The first of some names, and how many there are more."""
+    rest = len(names) - NAMED
+    return ", ".join(names[:NAMED]) + (f" and {rest} more" if rest > 0 else "")

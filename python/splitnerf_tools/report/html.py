@@ -1,0 +1,134 @@
+"""Builds the report: maps of the test views, the light, curves and tables on one page without outside references."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from markupsafe import Markup
+
+from splitnerf_tools.report.asset import asset_section
+from splitnerf_tools.report.browser import script_json
+from splitnerf_tools.report.curves import PALETTE, curve_data, line_chart
+from splitnerf_tools.report.last_stage import last_stage_section
+from splitnerf_tools.report.light import embedded_light, panels_section
+from splitnerf_tools.report.page import write_html
+from splitnerf_tools.report.views import views_section
+
+def write_report(
+    path: str | os.PathLike,
+    *,
+    title: str,
+    summary: Mapping[str, Mapping],
+    views: Sequence[Mapping],
+    lights: Sequence[Mapping],
+    light_truth: np.ndarray | None,
+    history: Sequence[Mapping],
+    timings: Mapping[str, float],
+    last_stage: Mapping | None = None,
+    light: np.ndarray | None = None,
+    asset: Path | None = None,
+    albedo_scale: Sequence[float] | None = None,
+) -> None:
+    """Writes a self-contained HTML page, atomically: pictures and tables, and a script that makes them answer.
+
+    Args:
+        path: The file to write.
+        title: Heading, for example the scene's name.
+        summary: Tables by name, each row name -> value; nested mappings become dotted rows. The first is shown as
+            tiles, so it should hold a few key numbers; the others are folded.
+        views: Per test view `name`, `truth` and `prediction`; both map names of float arrays, each optional: `rgb`
+            [H, W, 3] sRGB straight, `alpha` [H, W], `albedo` [H, W, 3] linear, `roughness` [H, W], `metallic` [H, W],
+            `normal` [H, W, 3] unit world, `occlusion_diffuse` and `occlusion_specular` [H, W] or [H, W, 1 | 3];
+            in a truth also `normal_mask` [H, W] bool. None counts as absent.
+        lights: Per roughness `roughness`, `g` [h, w, 3] linear, and `g_bar` [h, w, 3], its Monte Carlo estimate, or
+            None.
+        light_truth: [h, w, 3] linear radiance, or None.
+        history: Lines of `metrics.jsonl`: `step`, `loss`, `psnr`, `loss_*`; each but `step` optional.
+        timings: Seconds by part of the run.
+        last_stage: What the last stage changed, see :func:`splitnerf_tools.report.last_stage.last_stage_section`; None without one.
+        light: [h, w, 3] linear radiance that is delivered, or None.
+        asset: The GLB that is delivered; None, or one that is not there, for a page without a 3D view.
+        albedo_scale: [3] the factor of the albedo under which it is scored, see `evaluation.json`; None for 1.
+
+    Raises:
+        OSError: The page cannot be written.
+    """
+    tables = [{"name": name, "rows": _rows(table)} for name, table in summary.items()]
+    total = sum(timings.values())
+    before = None if last_stage is None else last_stage["lights"][0]
+    named = (("recovered light", light), ("true light", light_truth), ("before the last stage", before))
+    embedded = [embedded_light(name, radiance) for name, radiance in named if radiance is not None]
+    glb, charts = asset_section(asset), _charts(history)
+    write_html(
+        path,
+        "splitnerf_tools.report",
+        "report.html.j2",
+        title=title,
+        tiles=tables[0] if tables else None,
+        tables=tables[1:],
+        views=views_section(views, albedo_scale) if views else None,
+        last_stage=None if last_stage is None else last_stage_section(last_stage),
+        lights=embedded,
+        panels=panels_section(lights),
+        charts=[line_chart(title, series, log=log) for title, series, log in charts],
+        asset=glb,
+        timings=[
+            {"name": name, "value": f"{seconds:.4g} s", "share": 100 * seconds / total if total > 0 else 0}
+            for name, seconds in timings.items()
+        ],
+        data=script_json(
+            {
+                "lights": [{key: value for key, value in one.items() if key != "picture"} for one in embedded],
+                "charts": [curve_data(title, series, log=log) for title, series, log in charts],
+                "colours": PALETTE,
+                "camera": glb and glb["camera"],
+            }
+        ),
+        script=Markup(files("splitnerf_tools.report").joinpath("report.js").read_text(encoding="utf-8")),
+    )
+
+
+def _rows(table: Mapping, prefix: str = "") -> list[tuple[str, str]]:
+    rows = []
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            rows += _rows(value, f"{prefix}{key}.")
+        else:
+            rows.append((f"{prefix}{key}", _text(value)))
+    return rows
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (float, np.floating)):
+        return f"{value:.4g}"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_text(item) for item in value)
+    return str(value)
+
+
+def _charts(history: Sequence[Mapping]) -> list[tuple[str, dict, bool]]:
+    """Title, lines by name, and whether the axis is logarithmic, of each chart that has a number."""
+
+    def series(key: str) -> list[tuple[float, float]]:
+        return [(float(line["step"]), float(line[key])) for line in history if _number(line.get(key))]
+
+    parts = sorted({key for line in history for key in line if key.startswith("loss_")})
+    charts = [
+        ("PSNR of the batch (dB)", {"psnr": series("psnr")}, False),
+        ("Loss", {"loss": series("loss")}, True),
+        ("Terms of the loss", {key.removeprefix("loss_"): series(key) for key in parts}, True),
+    ]
+    return [chart for chart in charts if any(chart[1].values())]
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,151 @@
+"""From photos without masks to a folder with masks and what is around the object."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.data.dataset import SURROUNDINGS, Dataset, spread
+from splitnerf.data.ground import find_table
+from splitnerf.data.images import read_image, write_image
+from splitnerf.data.json_files import write_json
+from splitnerf.data.photos import resized_mask, separated_mask
+from splitnerf.data.reading import SEPARATION
+from splitnerf.errors import InputError
+from splitnerf.notes import note_once
+from splitnerf.progress import Progress, ended_by_signals, tracked
+from splitnerf_tools.separation.field import RadianceField
+from splitnerf_tools.separation.masks import find_mask, points_near, surface_points, surroundings
+from splitnerf_tools.separation.region import Region, find_region
+from splitnerf_tools.separation.table import Table
+from splitnerf_tools.separation.training import train_field
+
+SHEET = "sheet.jpg"
+SHOWN, DIMMED = 12, 0.25  # photos on the sheet, and the factor of what is around the object
+BEFORE_MIDDLE = 0.7  # how far before the middle of the views a wall may stand, scene units: seen from one side, it is vague
+NEAR_TABLE = 1.5  # distance from the middle within which points tell of the table, scene units
+MOST_POINTS = 20000  # of those that the search for the table takes
+
+
+@dataclass(frozen=True)
+class Separated:
+    """What was found.
+
+    Attributes:
+        table: Whether the object stands on a plane, or before a wall.
+        share: The mean share of the photos that the object covers.
+        seconds: The time that it took.
+    """
+
+    table: bool
+    share: float
+    seconds: float
+
+
+def separate(
+    train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int
+) -> Separated:
+    """Writes a mask for each photo, `surroundings.exr`, and `sheet.jpg`, which shows some of the masks, into an empty folder.
+
+    A radiance field of the whole place is trained on the photos. What it shows within what all cameras look at, above the
+    plane of a table if there is one, and hangs together in the middle, is the object.
+
+    Args:
+        train: The photos, without masks.
+        test: Photos that get masks but are not trained on; or None.
+        folder: The folder; what is in it is deleted once the object is found.
+        steps, minutes: See :func:`splitnerf_tools.separation.training.train_field`.
+        seed: The seed of the random numbers.
+
+    Raises:
+        InputError: Nothing stands in the middle.
+        RuntimeError: Numbers of the training are no longer finite.
+    """
+    started = time.monotonic()
+    data = train.root
+    note_once(f"{data}: nothing says where the object is; it is looked for in the middle of the photos, see {folder / SHEET}")
+    usual = float(np.exp(np.log(train.exposures).mean()))  # the field knows colours in [0, 1]
+    train, test = (split and split.exposed(split.exposures / usual) for split in (train, test))
+    with ended_by_signals():
+        with Progress(0.0) as bar:
+            field = train_field(
+                train, steps=steps, minutes=minutes, seed=seed,
+                report=lambda share, told: bar.show(share, f"what is around the object, {told}"),
+            )  # fmt: skip
+        points = surface_points(field, train)
+        region, points = find_object(field, train, table_under(points, train, seed), points)
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        shares = [write_masks(field, region, split, folder) for split in (train, test) if split is not None]
+        around = surroundings(field, region, points)
+        write_image(folder / SURROUNDINGS, around / np.float32([usual] * 3 + [1]))
+        write_sheet(train, folder)
+        found = Separated(region.table is not None, float(np.mean(np.concatenate(shares))), time.monotonic() - started)
+        write_json(folder / SEPARATION, vars(found))
+    table = "above a table" if found.table else "without a table under it"
+    note_once(f"{data}: the object, {table}, covers {found.share:.0%} of the photos")
+    return found
+
+
+def find_object(
+    field: RadianceField, photos: Dataset, table: Table | None, points: np.ndarray | None = None
+) -> tuple[Region, np.ndarray]:
+    """What stands in the middle of the photos, and the points [n, 3] that they show, which may be given.
+
+    Raises:
+        InputError: Nothing stands there.
+    """
+    points = surface_points(field, photos) if points is None else points
+    if table is not None:
+        table = Table.through(table.normal, table.offset, points[np.linalg.norm(points, axis=1) < NEAR_TABLE].astype(np.float64))
+    region = find_region(points, table, len(photos))
+    if region is None:
+        raise InputError(f"{photos.root}: nothing stands out in the middle of the photos; add masks of the object")
+    return region if table is None else region.with_foot(*points_near(field, photos, region)), points
+
+
+def table_under(points: np.ndarray, dataset: Dataset, seed: int) -> Table | None:
+    """The plane on which the object stands or, where there is none, the wall behind it; None without both.
+
+    Args:
+        points: [n, 3] what the photos show, scene units.
+        dataset: The photos.
+        seed: The seed of the search.
+    """
+    random = np.random.default_rng(seed)
+    near = points[np.linalg.norm(points, axis=1) < NEAR_TABLE]
+    near = near[random.permutation(len(near))[:MOST_POINTS]].astype(np.float64)
+    places = dataset.poses[:, :3, 3].astype(np.float64)
+    distance = float(np.median(np.linalg.norm(places, axis=1)))
+    for axis, reach in ((dataset.poses[:, :3, 1].mean(0), 0.0), (places.mean(0), BEFORE_MIDDLE)):
+        axis = axis / np.linalg.norm(axis).clip(1e-9)
+        plane = find_table(near, reach * axis, axis, distance, random)
+        if plane is not None:
+            return Table(*plane)
+    return None
+
+
+def write_masks(field: RadianceField, region: Region, split: Dataset, folder: Path) -> np.ndarray:
+    """Writes the masks of a split; returns the share [n] that each covers."""
+    shares = []
+    for i in tracked(range(len(split)), "masks, photo"):
+        mask = find_mask(field, region, split, i)
+        write_image(folder / separated_mask(split.image_paths[i]), mask)
+        shares.append(mask.mean())
+    return np.array(shares)
+
+
+def write_sheet(dataset: Dataset, folder: Path) -> None:
+    """`sheet.jpg`: some photos, dark where they do not show the object."""
+    rows, chosen = [], spread(range(len(dataset)), SHOWN)
+    for i in chosen:
+        photo = dataset.images[i, ..., :3]
+        mask = resized_mask(read_image(folder / separated_mask(dataset.image_paths[i])), *photo.shape[:2])
+        rows.append(photo * (DIMMED + (1 - DIMMED) * mask[..., None]))
+    columns = -(-len(rows) // 3)
+    rows += [np.zeros_like(rows[0])] * (3 * columns - len(rows))
+    write_image(folder / SHEET, np.concatenate([np.concatenate(rows[k * columns : (k + 1) * columns], 1) for k in range(3)]))

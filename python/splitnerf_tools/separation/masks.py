@@ -1,0 +1,174 @@
+"""Masks and surroundings of photos by a trained radiance field and the region of the object in it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+from scipy import ndimage
+from torch import Tensor
+from torch.nn.functional import interpolate, max_pool2d
+
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.environment import directions_of_texels, texels_of_directions
+from splitnerf.data.images import srgb_to_linear
+from splitnerf.render.rays import image_rays
+from splitnerf_tools.separation.field import RadianceField
+from splitnerf_tools.separation.region import Region
+from splitnerf_tools.separation.walker import random_walk
+
+SAMPLES = 64, 32  # of a ray, of the first search and of the second
+CHUNK = 4096  # rays
+LONGEST = 800  # edge of a mask in pixels
+COARSER = 4  # factor by which the first mask is smaller
+RIM = 3  # every other pixel beside a mask in which solid cells say nothing
+BAND = 3  # pixels on both sides of a mask's edge, in which the photo's colours move it
+HINT, CERTAIN = 0.1, 50.0  # what the mask counts there beside a neighbour of the pixel's own colour, and beyond
+CONTRAST = 10.0  # of colours, see :func:`splitnerf_tools.separation.walker.random_walk`
+UNDECIDED = 0.02  # a coarse pixel is decided where it and its neighbours are this near to 0 or to 1
+POINTS, DENSE = 5000, 80000  # pixels of a photo whose points are asked for, about: of all of it, and near the foot
+STEEP = 0.4  # sine of the elevation from which a camera looks at the table from above; less where few look so
+AROUND = 0.2  # distance from what stands on a table within which the table is looked at closely, scene units
+HEIGHT = 64  # of the map of the surroundings
+PATCHES = 16  # from pole to pole, in which points are counted
+FEW = 8  # points in a patch that tell it fully
+CLIPPED = 0.97  # sRGB
+
+
+def coverage(field: RadianceField, region: Region, rays_o: Tensor, rays_d: Tensor) -> Tensor:
+    """[n] the share of each ray's colour that comes from the region."""
+    found = []
+    for o, d in zip(rays_o.split(CHUNK), rays_d.split(CHUNK)):
+        rendered = field.render(o, d, *SAMPLES)
+        distances = region.above_table(o, d, rendered.distances)
+        found.append((rendered.weights * region.holds(o[:, None] + distances[..., None] * d[:, None])).sum(1))
+    return torch.cat(found)
+
+
+@torch.no_grad()
+def surface_points(field: RadianceField, dataset: Dataset) -> np.ndarray:
+    """[n, 3] the points that the photos show, scene units: where half of a ray's light is gone."""
+    return np.concatenate([_points(field, *view_rays(dataset, i, _size(dataset, POINTS))) for i in range(len(dataset))])
+
+
+@torch.no_grad()
+def points_near(field: RadianceField, dataset: Dataset, region: Region) -> tuple[np.ndarray, np.ndarray]:
+    """More points [n, 3] around a region where it meets its table, as seen from above, and their colours [n, 3], sRGB."""
+    table, middle = region.table, region.middle()
+    normal = torch.from_numpy(table.normal.astype(np.float32))
+    cells = region.centres() - middle
+    reach = float((cells - (cells @ normal)[:, None] * normal).norm(dim=1).max()) + AROUND
+    centre = middle - (middle @ normal - table.offset) * normal
+    points, colours, size = [], [], _size(dataset, DENSE)
+    axes = torch.from_numpy(dataset.poses[:, :3, 2])
+    steep = min(STEEP, 0.7 * float((axes @ normal).median()))
+    for i in range(len(dataset)):
+        rays_o, rays_d = view_rays(dataset, i, size)
+        down = (rays_d @ normal).clamp(max=-1e-6)
+        meets = rays_o + ((table.offset - rays_o @ normal) / down)[:, None] * rays_d
+        near = ((meets - centre).norm(dim=1) < reach) & (rays_d @ normal < -steep)
+        points.append(_points(field, rays_o[near], rays_d[near]))
+        rows, columns = (((torch.arange(n) + 0.5) * whole / n).long() for n, whole in zip(size, (dataset.height, dataset.width)))
+        photo = torch.from_numpy(np.asarray(dataset.images[i, ..., :3]))[rows][:, columns].reshape(-1, 3)
+        colours.append(photo[near].numpy())
+    return np.concatenate(points), np.concatenate(colours)
+
+
+def _size(dataset: Dataset, n: int) -> tuple[int, int]:
+    """The height and width of an image of about n pixels, or of the photos where these have fewer."""
+    stride = max(1.0, math.sqrt(dataset.height * dataset.width / n))
+    return max(1, round(dataset.height / stride)), max(1, round(dataset.width / stride))
+
+
+def _points(field: RadianceField, rays_o: Tensor, rays_d: Tensor) -> np.ndarray:
+    """[n, 3] where half of each ray's light is gone."""
+    points = [rays_o[:0]]
+    for o, d in zip(rays_o.split(CHUNK), rays_d.split(CHUNK)):
+        if len(o) == 0:
+            break
+        rendered = field.render(o, d, *SAMPLES)
+        at = (rendered.weights.cumsum(1) < 0.5).sum(1, keepdim=True).clamp(max=SAMPLES[1] - 1)
+        points.append(o + rendered.distances.gather(1, at) * d)
+    return torch.cat(points).numpy()
+
+
+def view_rays(dataset: Dataset, index: int, size: tuple[int, int]) -> tuple[Tensor, Tensor]:
+    """The rays of a view through the pixels of an image of it with another height and width, see
+    :func:`splitnerf.render.rays.image_rays`."""
+    height, width = size
+    scale = torch.tensor([width / dataset.width, height / dataset.height] * 2)
+    pose, intrinsics = (torch.from_numpy(x[index]) for x in (dataset.poses, dataset.intrinsics))
+    return image_rays(pose, intrinsics * scale, height, width)
+
+
+@torch.no_grad()
+def find_mask(field: RadianceField, region: Region, dataset: Dataset, index: int) -> np.ndarray:
+    """[h, w] the coverage of a view by the object, in [0, 1]: first coarsely, then fully where it changes."""
+    shrink = max(1.0, max(dataset.height, dataset.width) / LONGEST)
+    size, small = (
+        (max(1, round(dataset.height / factor)), max(1, round(dataset.width / factor))) for factor in (shrink, shrink * COARSER)
+    )
+    coarse = coverage(field, region, *view_rays(dataset, index, small)).view(1, 1, *small)
+    most, least = max_pool2d(coarse, 3, 1, 1), -max_pool2d(-coarse, 3, 1, 1)
+    half = -(-size[0] // 2), -(-size[1] // 2)
+    undecided = interpolate(((most > UNDECIDED) & (least < 1 - UNDECIDED)).float(), size, mode="nearest").view(-1)
+    mask = (interpolate(coarse, size, mode="bilinear", align_corners=False) > 0.5).float().view(-1)
+    chosen = undecided.nonzero().squeeze(1)
+    rays_o, rays_d = view_rays(dataset, index, size)
+    if len(chosen):
+        mask[chosen] = coverage(field, region, rays_o[chosen], rays_d[chosen])
+    mask = with_mirrors(mask.view(size).clamp(0, 1), region, half, *view_rays(dataset, index, half)).numpy()
+    photo = torch.from_numpy(np.asarray(dataset.images[index, ..., :3])).permute(2, 0, 1)
+    return at_edges(mask, interpolate(photo[None], size, mode="area")[0].permute(1, 2, 0).numpy())
+
+
+def at_edges(mask: np.ndarray, photo: np.ndarray) -> np.ndarray:
+    """A mask [h, w] whose outline is moved, by a few pixels at most, to where the photo's [h, w, 3] colours change."""
+    inside = mask > 0.5
+    near = ndimage.binary_dilation(inside, iterations=BAND) & ~ndimage.binary_erosion(inside, iterations=BAND, border_value=1)
+    hints = np.where(near, HINT * (2 * mask - 1), np.where(inside, CERTAIN, -CERTAIN))
+    shares = random_walk(hints, photo, ndimage.binary_dilation(near), CONTRAST)
+    return np.where(near, shares, inside).astype(np.float32)
+
+
+def with_mirrors(mask: Tensor, region: Region, half: tuple[int, int], rays_o: Tensor, rays_d: Tensor) -> Tensor:
+    """A mask [h, w] with what of its outside other photos show to be solid, but for a rim as wide as they are vague.
+
+    Args:
+        mask: The coverage of a view.
+        region: The object.
+        half: The height and width of an image of every other pixel.
+        rays_o, rays_d: [half, 3] the view's rays through that image.
+    """
+    outside = (interpolate(mask[None, None], half, mode="area")[0, 0] < 0.5).view(-1).nonzero().squeeze(1)
+    blocked = torch.zeros(half[0] * half[1])
+    for chosen in outside.split(CHUNK):
+        blocked[chosen] = region.blocks(rays_o[chosen], rays_d[chosen]).float()
+    planes = blocked.view(1, 1, *half)
+    edge = 2 * RIM + 1
+    core = -max_pool2d(-planes, edge, 1, RIM)  # opened: thin rims go
+    opened = max_pool2d(core, edge, 1, RIM)
+    return torch.maximum(mask, interpolate(opened, mask.shape, mode="nearest")[0, 0])
+
+
+@torch.no_grad()
+def surroundings(field: RadianceField, region: Region, points: np.ndarray) -> np.ndarray:
+    """[HEIGHT, 2 HEIGHT, 4] the linear radiance that reaches the object's middle, and how well photos tell it, in [0, 1].
+
+    Args:
+        field: The field.
+        region: The object, through which the rays pass.
+        points: [n, 3] what the photos show, see :func:`surface_points`.
+    """
+    middle = region.middle()
+    directions = torch.from_numpy(directions_of_texels(HEIGHT)[0].reshape(-1, 3).astype(np.float32))
+    colours = [
+        field.render(middle.expand_as(d), d, *SAMPLES, hidden=region.holds).colour for d in directions.split(CHUNK)
+    ]
+    colour = torch.cat(colours).clamp(0, 1).numpy()
+    seen = points[~region.holds(torch.from_numpy(points)).numpy()] - middle.numpy()
+    counts = np.bincount(texels_of_directions(seen, PATCHES), minlength=2 * PATCHES**2).reshape(PATCHES, 2 * PATCHES)
+    counts = counts.repeat(HEIGHT // PATCHES, 0).repeat(HEIGHT // PATCHES, 1).ravel()
+    known = np.minimum(1, counts / FEW) * (colour.max(1) < CLIPPED)
+    return np.column_stack([srgb_to_linear(colour), known]).reshape(HEIGHT, 2 * HEIGHT, 4).astype(np.float32)

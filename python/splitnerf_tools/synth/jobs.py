@@ -1,0 +1,190 @@
+"""From an asset and environment maps to a dataset with truth."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from tqdm import tqdm
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.environment import read_environment, resize_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.relit import PREFIX
+from splitnerf.errors import InputError
+from splitnerf.files import LOCK, held
+from splitnerf.notes import note
+from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_SPP, MOST_VIEWS, AssetRenderer
+from splitnerf_tools.synth.cameras import orbit, spiral
+from splitnerf_tools.synth.layouts import LAYOUTS, WRITERS
+from splitnerf_tools.synth.placed import write_placed_glb
+from splitnerf_tools.synth.writer import Writer
+
+RENDERERS = ("project", "blender")
+CAMERA_ANGLE_X = 0.6911112070083618  # radians, as in the NeRF Blender scenes
+CAMERA_DISTANCE = 3.0233467  # three quarters of theirs: it frames the unit sphere
+TRAIN_ELEVATIONS, TEST_ELEVATION, TEST_SWING = (-20.0, 78.0), 30.0, 20.0
+MAP_SIZE = (256, 512)
+
+
+class ViewRenderer(Protocol):
+    """The interface of renderers: :class:`splitnerf.render.path_traced.AssetRenderer`, or Blender."""
+
+    def render(
+        self, environment: np.ndarray, pose: np.ndarray, intrinsics: tuple[float, float, float, float],
+        width: int, height: int, *, spp: int, seed: int,
+    ) -> dict[str, np.ndarray]: ...  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SynthSettings:
+    """How much to render, and how to store it.
+
+    Attributes:
+        size: Width and height of the images in pixels.
+        train: Number of train views.
+        test: Number of test views.
+        spp: Paths a pixel.
+        layout: One of :data:`splitnerf_tools.synth.layouts.LAYOUTS`.
+        renderer: "project" for the path tracer, "blender" for Blender's Cycles.
+        seed: The seed of the renderings and of the first camera's azimuth.
+    """
+
+    size: int = 200
+    train: int = 100
+    test: int = 20
+    spp: int = 256
+    layout: str = "blender"
+    renderer: str = "project"
+    seed: int = 0
+
+    def check(self) -> None:
+        """Raises InputError where a setting has no meaning."""
+        for name, most in (("size", LARGEST_PICTURE), ("train", MOST_VIEWS), ("test", MOST_VIEWS), ("spp", MOST_SPP)):
+            if not 1 <= getattr(self, name) <= most:
+                raise InputError(f"--{name} must be at least 1 and at most {most}, got {getattr(self, name)}")
+        if self.seed < 0:
+            raise InputError(f"--seed must not be negative, got {self.seed}")
+        for name, known in (("layout", LAYOUTS), ("renderer", RENDERERS)):
+            if getattr(self, name) not in known:
+                raise InputError(f"--{name} must be one of {', '.join(known)}, got {getattr(self, name)}")
+
+
+def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, settings: SynthSettings) -> Path:
+    """Renders a dataset with truth.
+
+    The asset is moved and scaled so that its bounding box is centred at the origin and its farthest vertex lies on the
+    unit sphere; its emission is left out, so that the environment is the only light. A GLB file is copied to
+    `asset.glb` with the same placement.
+
+    Args:
+        asset: A glTF file.
+        light: The environment map of the photos.
+        relight: The maps of the relit test views.
+        out: The dataset's folder, absent or empty.
+        settings: What to render.
+
+    Returns:
+        The folder to train on: `out`, or one in it where the layout has one.
+
+    Raises:
+        InputError: The asset, a map, the folder, the layout or a setting cannot be used, or Blender is missing.
+        OSError: A file cannot be written.
+    """
+    settings.check()
+    if out.exists() and (not out.is_dir() or any(path.name != LOCK for path in out.iterdir())):
+        raise InputError(f"{out}: exists and is not an empty folder; give another --out")
+    names = [path.stem.removeprefix(PREFIX) for path in relight]
+    if len(set(names)) < len(names):
+        raise InputError(f"--relight: two maps are called {max(names, key=names.count)}; rename one")
+    writer: Writer = WRITERS[settings.layout](out, CAMERA_ANGLE_X)
+    if relight and not writer.relights:
+        raise InputError(f"--relight: the layout {settings.layout} has no images in other lights; leave it out")
+    maps = [resized(read_environment(path)) for path in (light, *relight)]
+    original = read_asset(asset)
+    if any(any(material.emission) for material in original.materials):
+        note(f"{asset}: emits light; left out, the environment is the only light")
+    centre, scale = unit_sphere(original)
+    renderer: ViewRenderer
+    if settings.renderer == "blender":
+        from splitnerf_tools.synth.blender import BlenderRenderer
+
+        renderer = BlenderRenderer(asset, centre, scale)
+    else:
+        renderer = AssetRenderer(normalised(original, centre, scale))
+
+    with held(out):
+        write_placed_glb(asset, out / "asset.glb", centre, scale)
+        writer.mesh((original.vertices - centre) * scale, original.triangles)
+        stored = writer.light(maps[0])
+        stored_relight = {name: writer.light(environment, name) for name, environment in zip(names, maps[1:])}
+        render_views(renderer, writer, stored, stored_relight, settings)
+        writer.close()
+    return writer.root
+
+
+def render_views(
+    renderer: ViewRenderer,
+    writer: Writer,
+    light: np.ndarray,
+    relight: dict[str, np.ndarray],
+    settings: SynthSettings,
+) -> None:
+    """Renders all views and hands them to the writer.
+
+    Args:
+        renderer: The asset, inside the unit sphere.
+        writer: Takes the views.
+        light: [h, w, 3] linear radiance of the photos.
+        relight: [h, w, 3] each, by name, for the test views.
+        settings: Numbers, size and seed.
+    """
+    size = settings.size
+    focal = 0.5 * size / np.tan(0.5 * CAMERA_ANGLE_X)
+    turn = np.random.default_rng(settings.seed).uniform(0, 360) if settings.seed else 0.0
+    cameras = {
+        "train": spiral(settings.train, CAMERA_DISTANCE, TRAIN_ELEVATIONS, turn),
+        "test": orbit(settings.test, CAMERA_DISTANCE, TEST_ELEVATION, TEST_SWING),
+    }
+    total = settings.train + settings.test * (1 + len(relight))
+    seeds = itertools.count(settings.seed * total)  # every image has its own
+    with tqdm(total=total, desc="rendering", unit="view", leave=False, disable=None) as progress:
+
+        def shot(environment: np.ndarray, pose: np.ndarray) -> dict[str, np.ndarray]:
+            seed = next(seeds) % (1 << 31)
+            lens = (focal, focal, size / 2, size / 2)
+            progress.update()
+            return renderer.render(environment, pose, lens, size, size, spp=settings.spp, seed=seed)
+
+        for split, poses in cameras.items():
+            for i, pose in enumerate(poses):
+                writer.view(split, i, pose, shot(light, pose))
+        for name, environment in relight.items():
+            for i, pose in enumerate(cameras["test"]):
+                writer.relit("test", i, name, pose, shot(environment, pose))
+
+
+def unit_sphere(asset: Asset) -> tuple[np.ndarray, float]:
+    """Centre [3] of the asset's bounding box, and the scale that then brings its farthest vertex to distance 1."""
+    used = asset.vertices[np.unique(asset.triangles)].astype(np.float64)
+    centre = (used.min(axis=0) + used.max(axis=0)) / 2
+    return centre, float(1 / np.linalg.norm(used - centre, axis=1).max())
+
+
+def normalised(asset: Asset, centre: np.ndarray, scale: float) -> Asset:
+    """The asset in the dataset's world, (x - centre) scale, without emission."""
+    return replace(
+        asset,
+        vertices=((asset.vertices - centre) * scale).astype(np.float32),
+        materials=[replace(m, emission=(0.0, 0.0, 0.0), emission_texture=None) for m in asset.materials],
+    )
+
+
+def resized(environment: np.ndarray) -> np.ndarray:
+    """The map at no more than 512 x 256 pixels."""
+    height, width = (min(a, b) for a, b in zip(environment.shape, MAP_SIZE))
+    return resize_environment(environment, height, width)

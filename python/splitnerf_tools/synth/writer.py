@@ -1,0 +1,149 @@
+"""Writes rendered views as a dataset, in the layouts that hold full truth; all others are in :mod:`splitnerf_tools.synth.layouts`.
+
+Layouts:
+    blender     `transforms_{train,test}.json`, `{train,test}/r_000.png`; for test views also `_albedo.png`, `_orm.png`
+                (R = 1, G = roughness, B = metallic), `_normal.exr` and `_relit_<map>.png`.
+    nerfactor   a folder per view, `train_000`, `test_000`, with `rgba.png` and `metadata.json`; for test views also
+                `albedo.png`, `normal.png` and `rgba_<map>.png`.
+    tensoir     the same, with truth for the train views too.
+
+In the dataset's folder of each: `light.hdr`, `relight_<map>.hdr`, `mesh.ply`. Colours are sRGB with straight alpha (but the
+albedo of nerfactor and tensoir is linear), normals world space without the normal map.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from splitnerf.data.layouts import view_folders
+from splitnerf.data.images import linear_to_srgb, read_hdr, write_image
+from splitnerf.data.json_files import write_json
+from splitnerf.data.relit import PREFIX, relit_path
+from splitnerf.export.mesh import write_mesh_ply
+
+FULL_TRUTH = ("blender", "nerfactor", "tensoir")
+Maps = dict[str, np.ndarray]
+
+
+class Writer(Protocol):
+    """What a layout's class takes, see :class:`SceneWriter`; `close` writes the files that name the views, last.
+
+    Attributes:
+        root: The folder to train on.
+        relights: Whether the layout has images under other lights.
+    """
+
+    root: Path
+    relights: bool
+
+    def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray: ...
+
+    def mesh(self, vertices: np.ndarray, triangles: np.ndarray) -> None: ...
+
+    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None: ...
+
+    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class SceneWriter:
+    """Takes the renderings of one scene; the files that name the views are written last, by `close`.
+
+    Args:
+        out: The dataset's folder; made where it is missing.
+        camera_angle_x: Horizontal field of view of all cameras, in radians.
+        layout: One of `FULL_TRUTH`.
+
+    Raises:
+        OSError: A file cannot be written (any method).
+    """
+
+    relights = True
+
+    def __init__(self, out: Path, camera_angle_x: float, layout: str = "blender"):
+        self.root = Path(out)
+        self.out, self.camera_angle_x, self.layout = Path(out), camera_angle_x, layout
+        self._views: dict[str, list[tuple[Path, dict]]] = {}
+
+    def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
+        """Writes an environment map.
+
+        Args:
+            environment: [h, w, 3] linear radiance.
+            name: The map's name; None for the light of the photos.
+
+        Returns:
+            The map as the file holds it, to render with.
+        """
+        path = self.out / ("light.hdr" if name is None else f"{PREFIX}{name}.hdr")
+        write_image(path, environment)
+        return read_hdr(path)
+
+    def mesh(self, vertices: np.ndarray, triangles: np.ndarray) -> None:
+        """Writes the true mesh, vertices [n, 3] in the world of the cameras, triangles [m, 3]."""
+        write_mesh_ply(self.out / "mesh.ply", vertices, triangles)
+
+    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
+        """Writes a photo, and the truth of test views.
+
+        Args:
+            split: "train" or "test".
+            index: Number of the view in its split.
+            pose: [4, 4] camera-to-world, OpenGL axes.
+            maps: The maps of `AssetRenderer.render`: `radiance` and `alpha`; where truth is written also `albedo`,
+                `roughness`, `metallic` and `smooth_normal`.
+        """
+        image = self._image_path(split, index)
+        write_image(image, straight_rgba(maps))
+        height, width = maps["alpha"].shape
+        if self.layout == "blender":
+            entry = {"file_path": f"./{split}/{image.stem}", "transform_matrix": pose.tolist()}
+        else:
+            entry = {"cam_angle_x": self.camera_angle_x, "cam_transform_mat": view_folders.format_matrix(pose)}
+            entry |= {"imw": width, "imh": height}
+        self._views.setdefault(split, []).append((image, entry))
+        if split == "test" or self.layout == "tensoir":
+            self._write_truth(image, maps)
+
+    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None:
+        """Writes a relit view under map `name`, after a call of :meth:`view` for it; `pose` and `maps` are as there."""
+        write_image(relit_path(self._image_path(split, index), name), straight_rgba(maps))
+
+    def close(self) -> None:
+        """Writes the poses, which complete the dataset."""
+        for split, views in self._views.items():
+            if self.layout == "blender":
+                content = {"camera_angle_x": self.camera_angle_x, "frames": [entry for _, entry in views]}
+                write_json(self.out / f"transforms_{split}.json", content)
+                continue
+            for image, entry in views:
+                write_json(image.with_name(view_folders.METADATA), entry)
+
+    def _image_path(self, split: str, index: int) -> Path:
+        if self.layout == "blender":
+            return self.out / split / f"r_{index:03d}.png"
+        return self.out / f"{split}_{index:03d}" / view_folders.PHOTO
+
+    def _write_truth(self, image: Path, maps: Maps) -> None:
+        alpha, normal = maps["alpha"][..., None], maps["smooth_normal"]
+        if self.layout != "blender":
+            write_image(image.with_name("albedo.png"), np.concatenate([maps["albedo"], alpha], axis=-1))
+            write_image(image.with_name("normal.png"), np.concatenate([0.5 * normal + 0.5, alpha], axis=-1))
+            return
+        albedo = np.concatenate([linear_to_srgb(maps["albedo"]), alpha], axis=-1)
+        orm = np.stack([maps["alpha"] > 0, maps["roughness"], maps["metallic"], maps["alpha"]], axis=-1)
+        write_image(image.with_name(f"{image.stem}_albedo.png"), albedo)
+        write_image(image.with_name(f"{image.stem}_orm.png"), orm)
+        # EXR stores colours associated with alpha.
+        premultiplied = np.concatenate([normal * alpha, alpha], axis=-1)
+        write_image(image.with_name(f"{image.stem}_normal.exr"), premultiplied, half=True)
+
+
+def straight_rgba(maps: Maps) -> np.ndarray:
+    """[H, W, 4] sRGB, straight alpha."""
+    alpha = maps["alpha"][..., None]
+    return np.concatenate([linear_to_srgb(maps["radiance"] / np.maximum(alpha, 1e-8)), alpha], axis=-1)

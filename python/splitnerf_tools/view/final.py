@@ -1,0 +1,174 @@
+"""The path tracer's picture of what the page shows: a small one first, then better and better ones."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.environment import rotate_environment
+from splitnerf.data.layouts.frame import checked_pose
+from splitnerf.errors import InputError
+from splitnerf.render.path_traced import AssetRenderer
+from splitnerf_tools.report.browser import as_halves
+from splitnerf_tools.view.shown import Shown
+
+FIRST_SIDE = 256  # pixels of the first picture's longer side
+LARGEST_SIDE, MOST_PIXELS = 4096, 1 << 22
+PATHS_A_CALL = 1 << 16  # so that a call of the tracer ends soon after the camera moves
+PASSES = (1, 1, 2, 4, 8, 16, 32, 64, 128)  # paths a pixel of the pictures of the whole size, each with those before it
+
+
+@dataclass(frozen=True)
+class Camera:
+    """What the page looks through.
+
+    Attributes:
+        pose: [4, 4] float64 camera-to-world, OpenGL axes.
+        intrinsics: (fx, fy, cx, cy) in pixels.
+        width, height: Pixels.
+        lights: The number of each asset's light.
+        turn: Degrees by which the light is turned, counter-clockwise seen from above.
+    """
+
+    pose: np.ndarray
+    intrinsics: tuple[float, float, float, float]
+    width: int
+    height: int
+    lights: tuple[int, ...]
+    turn: float
+
+    @staticmethod
+    def of(content: object, n_assets: int) -> Camera:
+        """The camera of a page's JSON, whose keys are the attributes.
+
+        Raises:
+            InputError: A value is missing or cannot be used.
+        """
+        try:
+            pose = np.reshape(np.array(content["pose"], np.float64), (4, 4))
+            intrinsics = tuple(float(value) for value in content["intrinsics"])
+            width, height, turn = int(content["width"]), int(content["height"]), float(content["turn"])
+            lights = tuple(int(number) for number in content["lights"])
+        except (LookupError, TypeError, ValueError, OverflowError) as error:
+            raise InputError(f"the camera cannot be read ({type(error).__name__}); load the page again") from None
+        sizes = 1 <= min(width, height) and max(width, height) <= LARGEST_SIDE and width * height <= MOST_PIXELS
+        lens = len(intrinsics) == 4 and np.isfinite(intrinsics).all() and 1e-3 < min(intrinsics[:2]) and max(map(abs, intrinsics)) < 1e7
+        if not (sizes and lens and len(lights) == n_assets and abs(turn) <= 3600):
+            raise InputError("the camera has numbers beyond reason; load the page again")
+        return Camera(checked_pose(pose, "the camera's pose"), intrinsics, width, height, lights, turn)
+
+    def scaled(self, side: int) -> Camera:
+        """The same camera with a smaller picture, whose longer side has so many pixels."""
+        share = min(1.0, side / max(self.width, self.height))
+        width, height = (max(1, round(share * pixels)) for pixels in (self.width, self.height))
+        fx, fy, cx, cy = self.intrinsics
+        across, down = width / self.width, height / self.height
+        return Camera(self.pose, (fx * across, fy * down, cx * across, cy * down), width, height, self.lights, self.turn)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One picture of an asset: `content` is [height, width] float16 RGBA, linear, premultiplied; `spp` its paths a pixel."""
+
+    asset: int
+    width: int
+    height: int
+    spp: int
+    content: bytes
+
+
+class Tracer:
+    """Traces one request at a time; a newer request ends the one before.
+
+    Args:
+        shown: The assets and lights.
+    """
+
+    def __init__(self, shown: Shown):
+        self._shown = shown
+        self._renderers: dict[int, tuple[Asset, AssetRenderer]] = {}  # of the newest asset of each number
+        self._newest, self._counting, self._working = 0, threading.Lock(), threading.Lock()
+
+    def pictures(self, camera: Camera, gone: Callable[[], bool]) -> Iterator[Picture]:
+        """Better and better pictures of each asset, until all passes are made, a newer request comes, or `gone` says so.
+
+        Raises:
+            InputError: A light is no longer kept.
+        """
+        mine = self._next()
+        lights = [self._light(number, camera.turn) for number in camera.lights]
+
+        def ended() -> bool:
+            return self._newest != mine or gone()
+
+        with self._working:
+            scenes = [(self._renderer(asset), light) for asset, light in enumerate(lights)]
+        yield from self._refined(camera.scaled(FIRST_SIDE), scenes, PASSES[:1], ended)
+        yield from self._refined(camera, scenes, PASSES, ended)
+
+    def stop(self) -> None:
+        """Ends the request that is worked at, and waits for its end: no thread is within the tracer when the program ends."""
+        self._next()
+        with self._working:
+            pass
+
+    def _next(self) -> int:
+        with self._counting:
+            self._newest += 1
+            return self._newest
+
+    def _light(self, number: int, turn: float) -> np.ndarray:
+        light = self._shown.light(number)
+        if light is None:
+            raise InputError("this light is no longer kept; drop it again")
+        return rotate_environment(light.radiance, turn)
+
+    def _renderer(self, asset: int) -> AssetRenderer:
+        newest = self._shown.sources[asset].asset
+        if asset not in self._renderers or self._renderers[asset][0] is not newest:
+            self._renderers[asset] = newest, AssetRenderer(newest)
+        return self._renderers[asset][1]
+
+    def _refined(
+        self, camera: Camera, scenes: list[tuple[AssetRenderer, np.ndarray]], passes: tuple[int, ...], ended: Callable[[], bool]
+    ) -> Iterator[Picture]:
+        """The mean of all passes so far, after each pass, for each asset with its light; who takes them slowly holds up nobody."""
+        sums, total = [np.zeros((camera.height, camera.width, 4), np.float32) for _ in scenes], 0
+        for number, spp in enumerate(passes):
+            total += spp
+            for asset, scene in enumerate(scenes):
+                with self._working:
+                    if not self._add(sums[asset], scene, camera, spp, number, ended):
+                        return
+                width, height, content = as_halves(sums[asset] / total)
+                yield Picture(asset, width, height, total, content)
+
+    def _add(
+        self, total: np.ndarray, scene: tuple[AssetRenderer, np.ndarray], camera: Camera, spp: int, seed: int, ended: Callable[[], bool]
+    ) -> bool:
+        """Adds spp paths a pixel, some rows at a time; False where it ended before."""
+        renderer, light = scene
+        fx, fy, cx, cy = camera.intrinsics
+        spp_a_call = min(spp, max(1, PATHS_A_CALL // camera.width))
+        rows = max(1, PATHS_A_CALL // (camera.width * spp_a_call))
+        for top in range(0, camera.height, rows):
+            strip = total[top : top + rows]
+            for call in range(-(-spp // spp_a_call)):
+                if ended():
+                    return False
+                paths = min(spp_a_call, spp - call * spp_a_call)
+                images = renderer.render(
+                    light, camera.pose, (fx, fy, cx, cy - top), camera.width, len(strip), spp=paths, seed=_seed(seed, top, call),
+                )  # fmt: skip
+                strip[..., :3] += paths * images["radiance"]
+                strip[..., 3] += paths * images["alpha"]
+        return True
+
+
+def _seed(number: int, top: int, call: int) -> int:
+    """A number of its own for each call of the tracer; pictures of equal requests are equal."""
+    return (number << 24) + (top << 11) + call

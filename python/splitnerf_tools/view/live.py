@@ -1,0 +1,200 @@
+"""A run that trains, as the page shows it: its surface, light and numbers, and the buttons that steer it."""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from splitnerf.config.settings import UNLIMITED
+from splitnerf.data.asset import Asset
+from splitnerf.data.normalisation import transform_points
+from splitnerf.errors import InputError, plain
+from splitnerf.training.metrics import METRICS, read_metrics
+from splitnerf.training.observer import Observed, Observer, Wish
+from splitnerf_tools.view.grown import grown_asset, grown_glb
+from splitnerf_tools.view.news import News
+from splitnerf_tools.view.shown import Light, Shown, Source
+
+TOLD_EVERY = 0.5  # seconds between two states
+GROWN_EVERY, GROWN_SHARE = 4.0, 0.05  # least seconds between two surfaces, and the largest share of the time that they take
+LIGHT_HEIGHT = 64  # rows of the light while it is recovered
+WISHES = {"pause": Wish.PAUSE, "checkpoint": Wish.SAVE, "stop": Wish.STOP}  # of the buttons; "resume" takes one back
+SAID = {"pause": "pauses until its page resumes it, or Ctrl-C ends it", "stop": "stops and exports"}
+CURVES = ("step", "seconds", "psnr", "loss")  # and the terms of the loss
+
+
+class Live(Observer):
+    """Shows a run in the page while it trains. As long as no page is open, it does nothing between steps.
+
+    Args:
+        name: What the page calls the run.
+
+    Attributes:
+        shown: What the server shows: the run's surface so far and its light.
+        news: The newest state for the pages: `stage`; `step` of `steps` (null where the time alone counts), `progress`, `left` (seconds, or null), `psnr`; `paused`;
+            `version` of the asset, 0 for none; `lines`, the number of lines of the log; `saved`, the step of the checkpoint that was
+            asked for last; `ended`.
+    """
+
+    def __init__(self, name: str):
+        self.name, self.shown, self.news = name, Shown([]), News()
+        self._light = self.shown.add_light(Light("recovered light", np.ones((8, 16, 3), np.float32)))
+        self.shown.keep_lights()
+        self._world_from_box = np.eye(4)
+        self._frame(np.eye(4))
+        self.shown.sources.append(Source(name, self.shown.frame, bytes, self._light, version=0))
+        self._lines: list[dict] = []
+        self._asked: set[Wish] = set()
+        self._lock = threading.Lock()
+        self._began = (0.0, 0.0)  # seconds and progress
+        self._told_at = self._grown_at = -float("inf")
+        self._cost, self._grown_step, self._taken = 0.0, -1, 0
+        self._saving = False
+        self._delivered: Path | None = None
+        self.news.tell(
+            stage="preparation", step=0, steps=None, progress=0.0, left=None, psnr=None, paused=False, version=0, lines=0, saved=None,
+        )  # fmt: skip
+
+    # ---- called by the training's thread ----
+
+    def began(self, training: Observed) -> None:
+        self._world_from_box = np.linalg.inv(training.dataset.box_from_world)
+        self._frame(self._world_from_box)
+        self._lines = [_curves_of(line) for line in read_metrics(training.run / METRICS)]
+        self._began = training.seconds, training.progress
+        self._tell(training, stage="training")
+
+    def logged(self, line: dict[str, object]) -> None:
+        self._lines.append(_curves_of(line))
+
+    def between_steps(self, training: Observed) -> Wish | None:
+        if self._saving:
+            self._saving = False
+            self._tell(training, saved=training.step)
+        if self.news.listeners:
+            self._show(training)
+        return self._wish() if self._asked else None
+
+    def delivering(self, stage: str, folder: Path | None = None) -> None:
+        with self._lock:
+            self._asked.clear()
+        changes = {}
+        if folder is not None and (folder / "mesh.glb").is_file():
+            self._delivered, changes = folder, {"version": self.shown.sources[0].version + 1}
+        self.news.tell(stage=stage, paused=False, left=None, progress=1.0, lines=len(self._lines), **changes)
+
+    # ---- called by the server's threads ----
+
+    def ask(self, button: str) -> None:
+        """What a button asks; the training hears of it after its step.
+
+        Raises:
+            InputError: There is no such button, or the run does not train.
+        """
+        if button not in {*WISHES, "resume"}:
+            raise InputError("there is no such button")
+        with self._lock:
+            if self.news.state["stage"] != "training":
+                raise InputError("the run does not train now")
+            if button == "resume":
+                self._asked.discard(Wish.PAUSE)
+            else:
+                self._asked.add(WISHES[button])
+        if button in ("pause", "resume"):
+            self.news.tell(paused=button == "pause")
+        if button in SAID:
+            print(f"splitnerf: note: the run {SAID[button]}, as its page asks", file=sys.stderr)
+
+    def lines(self, first: int) -> list[dict]:
+        """The lines of the log from a number on."""
+        return self._lines[first:]
+
+    def taken(self, source: Source) -> None:
+        """A page has loaded an asset; the next one is made."""
+        self._taken = max(self._taken, source.version)
+
+    def load(self) -> None:
+        """Shows the asset that the run has delivered, as soon as a page asks for it."""
+        with self._lock:
+            folder, self._delivered = self._delivered, None
+        if folder is None:
+            return
+        try:
+            source = self.shown.source_of(folder, self.name, self._light)
+        except (InputError, OSError, MemoryError) as error:
+            words = plain(f"{type(error).__name__}: {error}")
+            said = str(error) if isinstance(error, InputError) else f"{folder}: cannot be shown ({words})"
+            self.shown.problems.append(said)
+            self.news.tell(version=self.shown.sources[0].version)  # what is shown stays
+            return
+        self.shown.frame = source.asset
+        self.shown.sources[0] = replace(source, version=self.shown.sources[0].version + 1)
+
+    # ----
+
+    def _frame(self, world_from_box: np.ndarray) -> None:
+        """The first camera has the whole ball of radius 1 in view, in which normalisation puts the object."""
+        corners = np.concatenate([np.eye(3), -np.eye(3)]).astype(np.float32)
+        self.shown.frame = Asset(
+            "frame", transform_points(world_from_box, corners), np.int32([[0, 1, 2], [3, 4, 5]]), corners, np.zeros(2, np.int32)
+        )
+
+    def _tell(self, training: Observed, **changes: object) -> None:
+        steps, (seconds, progress) = training.config.run.steps, self._began
+        gained, left = training.progress - progress, None
+        if gained > 0:
+            left = (training.seconds - seconds) * (1.0 - training.progress) / gained
+        self._told_at = time.monotonic()
+        self.news.tell(
+            step=training.step, steps=None if steps >= UNLIMITED else steps, progress=training.progress, left=left,
+            psnr=_rounded(training.psnr_mean), lines=len(self._lines), **changes,
+        )  # fmt: skip
+
+    def _show(self, training: Observed) -> None:
+        """Tells the state where the last one is old enough, with a new surface where one is wanted."""
+        now = time.monotonic()
+        if now - self._told_at < TOLD_EVERY:
+            return
+        due = now - self._grown_at >= max(GROWN_EVERY, self._cost / GROWN_SHARE)
+        version = self.shown.sources[0].version
+        if due and self._taken >= version and training.step != self._grown_step:
+            version = self._grow(training)
+            self._grown_at = time.monotonic()
+            self._cost = self._grown_at - now
+        self._tell(training, version=version)
+
+    def _grow(self, training: Observed) -> int:
+        """Takes over surface and light as they are now; returns the asset's version."""
+        old, self._grown_step = self.shown.sources[0], training.step
+        try:
+            light = training.model.light.panorama(LIGHT_HEIGHT).detach().cpu().numpy()
+            asset = grown_asset(training.model, self._world_from_box)
+        except RuntimeError:  # no surface yet, or one that the training itself refuses
+            return old.version
+        self.shown.add_light(Light("recovered light", light), self._light)
+        self.shown.sources[0] = Source(self.name, asset, lambda: grown_glb(asset), self._light, version=old.version + 1)
+        return old.version + 1
+
+    def _wish(self) -> Wish | None:
+        with self._lock:
+            if Wish.SAVE in self._asked:
+                self._asked.discard(Wish.SAVE)
+                self._saving = True
+                return Wish.SAVE
+            return next((wish for wish in (Wish.STOP, Wish.PAUSE) if wish in self._asked), None)
+
+
+def _curves_of(line: dict[str, object]) -> dict[str, object]:
+    """What the page draws of a line of metrics.jsonl, in few digits; None for what is not finite, which JSON has no word for."""
+    drawn = {name: value for name, value in line.items() if name in CURVES or name.startswith("loss_")}
+    return {name: _rounded(value) if isinstance(value, float) else value for name, value in drawn.items()}
+
+
+def _rounded(value: float | None) -> float | None:
+    return float(f"{value:.5g}") if value is not None and math.isfinite(value) else None

@@ -1,0 +1,187 @@
+"""What the viewer shows: assets, and lights to show them in."""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import TypeVar
+
+import numpy as np
+
+from splitnerf.data.asset import Asset
+from splitnerf.data.environment import read_environment, resize_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.errors import InputError, plain
+from splitnerf.notes import note
+from splitnerf_tools.report.browser import camera_of
+
+MOST_ROWS = 1024  # of a light that is kept
+MOST_DROPPED = 8  # lights that were dropped onto the page; an older one is forgotten
+Read = TypeVar("Read")
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light: its name, and [h, 2 h, 3] float32 linear radiance of at most 1024 rows, see `read_environment`."""
+
+    name: str
+    radiance: np.ndarray
+
+
+@dataclass
+class Source:
+    """One asset.
+
+    Attributes:
+        name: What the page calls it.
+        asset: The asset; the path tracer draws it.
+        encode: Makes the bytes of its GLB.
+        light: The number of the run's own light, or None.
+        version: Counts an asset that grows; 0 where there is nothing to load yet.
+    """
+
+    name: str
+    asset: Asset
+    encode: Callable[[], bytes]
+    light: int | None = None
+    version: int = 1
+
+    @functools.cached_property
+    def content(self) -> bytes:
+        """The bytes of its GLB."""
+        return self.encode()
+
+
+class Shown:
+    """One or two assets and their lights. Lights that are dropped onto the page are added while it is shown.
+
+    Args:
+        paths: Runs' folders or GLB files.
+        light: An environment map that is shown first, or None.
+
+    Attributes:
+        sources: The assets.
+        problems: One line for each file beside an asset that cannot be read.
+        frame: What the first camera has in view; None for the first asset.
+
+    Raises:
+        InputError: An asset or the light cannot be read.
+    """
+
+    def __init__(self, paths: list[Path], light: Path | None = None):
+        self.problems: list[str] = []
+        self.frame: Asset | None = None
+        self._lights: dict[int, Light] = {}
+        self._next, self._lock = 0, threading.Lock()
+        self._first = None if light is None else self.add_light(light_of(light, light.name))
+        self.sources = [self.source_of(path) for path in paths]
+        self._white = self.add_light(Light("white", np.ones((8, 16, 3), np.float32)))
+        self.keep_lights()
+
+    def light(self, number: int) -> Light | None:
+        """A light by its number; None where there is none."""
+        with self._lock:
+            return self._lights.get(number)
+
+    def add_light(self, light: Light, number: int | None = None) -> int:
+        """Adds a light, or puts it in the place of the one with this number; returns its number."""
+        with self._lock:
+            if number is None:
+                number, self._next = self._next, self._next + 1
+            self._lights[number] = light
+            return number
+
+    def keep_lights(self) -> None:
+        """The lights so far are never forgotten."""
+        self._kept = self._next
+
+    def drop(self, name: str, content: bytes) -> int:
+        """Adds a light out of the bytes of an .exr or .hdr file; returns its number.
+
+        Raises:
+            InputError: It is none; the message names the file.
+        """
+        name = plain(PurePosixPath(name.replace("\\", "/")).name)[:100]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"light{Path(name).suffix.lower()}"
+            path.write_bytes(content)
+            try:
+                number = self.add_light(light_of(path, name))
+            except InputError as error:
+                raise InputError(str(error).replace(str(path), name)) from None
+        with self._lock:
+            for old in [n for n in self._lights if n >= self._kept][:-MOST_DROPPED]:
+                del self._lights[old]
+        return number
+
+    def description(self) -> dict:
+        """What the page needs to know, for JSON. The camera is that of `splitnerf relight`; lengths are the data's, z is up."""
+        sources = list(self.sources)
+        framed = sources[0].asset if self.frame is None else self.frame
+        with self._lock:
+            lights = [{"number": number, "name": light.name} for number, light in self._lights.items()]
+        return {
+            "sources": [
+                {"name": source.name, "light": source.light, "version": source.version} for source in sources
+            ],
+            "lights": lights,
+            "first_light": self._first,
+            "white": self._white,
+            "problems": self.problems,
+            "camera": camera_of(framed),
+        }
+
+    def source_of(self, path: Path, name: str | None = None, light: int | None = None) -> Source:
+        """The asset of a run's folder or a GLB; the light beside a `mesh.glb` belongs to it.
+
+        Args:
+            path: The folder or the GLB.
+            name: What the page calls it; None for the name of folder or file.
+            light: The number that its light takes over; None for a new one.
+
+        Raises:
+            InputError: It cannot be read.
+        """
+        glb = path / "mesh.glb" if path.is_dir() else path
+        if path.is_dir() and not glb.is_file():
+            raise InputError(f"{path}: has no mesh.glb; finish its training, or give a .glb file")
+        asset = read_asset(glb)
+        content = glb.read_bytes()
+        if not content.startswith(b"glTF"):
+            raise InputError(f"{glb}: is a .gltf, whose parts the page cannot load; export it as GLB")
+        name, own = name or run_name(glb), None
+        if glb.name == "mesh.glb":
+            beside = glb.with_name("environment.exr")
+            own = self._beside(beside, lambda path: self.add_light(light_of(path, f"light of {name}"), light))
+        return Source(name, asset, lambda: content, own)
+
+    def _beside(self, path: Path, read: Callable[[Path], Read]) -> Read | None:
+        """What `read` makes of a file; None where there is none, or where it cannot be read, which becomes a line."""
+        if not path.exists():
+            return None
+        try:
+            return read(path)
+        except InputError as error:
+            self.problems.append(str(error))
+            note(str(error))
+            return None
+
+
+def run_name(glb: Path) -> str:
+    """What a GLB is called: a run's by the name of its folder."""
+    return glb.resolve().parent.name if glb.name == "mesh.glb" else glb.name
+
+
+def light_of(path: Path, name: str) -> Light:
+    """The light of an .exr or .hdr file, made smaller where it has more rows than are kept.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    radiance = read_environment(path)
+    height = min(radiance.shape[0], MOST_ROWS)
+    return Light(name, resize_environment(radiance, height, 2 * height))
