@@ -1,5 +1,6 @@
 # make demo   installs what is missing, builds, and reconstructs an embedded scene
-# make test   installs, builds, and runs gtest and pytest
+# make test   installs, builds, looks at the budgets, and runs gtest and pytest
+# make budget   prints how large each part is beside its budget, and fails where one is exceeded
 # make sanitize   builds gtest with AddressSanitizer and UndefinedBehaviorSanitizer, and the GPU's kernels with ThreadSanitizer
 # make faults   plants faults in the GPU's kernels and says what finds each
 # make stability   asks each operator STABILITY_CASES times and writes docs/benchmarks/stability.md; more in STABILITY_OPTIONS
@@ -25,12 +26,15 @@ CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || tr
 CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 READERS := json colmap neus png exr hdr glb checkpoint
 
-.PHONY: demo test test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures lock wheels clean
+.PHONY: demo test budget test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures lock wheels clean
 
 demo: install
 	$(BIN)/splitnerf demo
 
-test: install gtest pytest
+test: install budget gtest pytest
+
+budget: install
+	@$(BIN)/python tests/budget.py
 
 gtest: install
 	$(CMAKE_TESTS) -B $(BUILD)

@@ -13,7 +13,6 @@ import trimesh
 from torch import Tensor
 
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import linear_to_srgb, over_background, write_image
 from splitnerf.data.normalisation import transform_points
 from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.evaluate.exposure import exposed_like
@@ -31,30 +30,10 @@ from splitnerf.export.usdz import require_usd, write_usdz
 from splitnerf.progress import Progress, tracked
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
-from splitnerf.render.renderer import render_view
+from splitnerf.render.renderer import render_maps
 from splitnerf.render.seen import Cameras, seen_vertices
 
 FORMATS = ("glb", "ply", "obj", "usdz")
-
-
-def render_maps(model: SceneModel, grid: OccupancyGrid, dataset: Dataset, index: int) -> dict[str, np.ndarray]:
-    """All maps of one view as float32 arrays, see :func:`splitnerf.render.renderer.render_view`."""
-    pose, intrinsics = (torch.from_numpy(x[index]).to(model.device) for x in (dataset.poses, dataset.intrinsics))
-    maps = render_view(model, grid.cells, pose, intrinsics, dataset.height, dataset.width)
-    return {name: value.cpu().numpy() for name, value in maps.items()}
-
-
-def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Dataset, step: int) -> Path:
-    """``previews/step_NNNNNN.png``: the first view's photo, render, albedo and normals side by side; returns its path."""
-    maps = render_maps(model, grid, dataset, 0)
-    photo = over_background(dataset.images[0, ..., :3], dataset.images[0, ..., 3])
-    panels = [photo] + [
-        over_background(rgb, maps["alpha"])
-        for rgb in (maps["rgb"], linear_to_srgb(maps["albedo"]), 0.5 * maps["normal"] + 0.5)
-    ]
-    path = run / "previews" / f"step_{step:06d}.png"
-    write_image(path, np.concatenate(panels, axis=1).astype(np.float32))
-    return path
 
 
 @dataclass(frozen=True)

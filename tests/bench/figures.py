@@ -23,7 +23,7 @@ from splitnerf.data.images import linear_to_srgb, over_background, write_image
 from splitnerf.data.truth import load_scene_truth, load_view_truths
 from splitnerf.evaluate.metrics import lsq_scale, solid_angle_weights
 from splitnerf.evaluate.sheet import picture_grid
-from splitnerf.outputs import render_maps
+from splitnerf.render.renderer import render_maps
 from splitnerf.workflow import load_run, load_splits
 from splitnerf_tools.report.run import light_panels
 

@@ -63,7 +63,7 @@ def test_the_error_falls_with_other_steps_and_tables(data, tmp_path, settings):
 def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     """Trained, resumed and loaded, a run with occlusion.kind=bits renders with the factors of the mesh that it stored."""
     from splitnerf.data.dataset import load_dataset
-    from splitnerf.outputs import render_maps
+    from splitnerf.render.renderer import render_maps
     from splitnerf.training.loop import train as train_scene
     from splitnerf.workflow import load_run
 

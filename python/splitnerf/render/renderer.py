@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from splitnerf.config import Config
+from splitnerf.data.dataset import Dataset
 from splitnerf.fields import EvaluatedLight, RaySegments
 from splitnerf.ops import (
     PackedSamples,
@@ -23,7 +25,7 @@ from splitnerf.ops import (
     take_rows,
 )
 from splitnerf.render.model import SceneModel, ShadedPoints
-from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ
+from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ, OccupancyGrid
 from splitnerf.render.rays import image_rays
 
 MIN_OPACITY = 1e-4
@@ -291,3 +293,10 @@ def render_view(
         "occlusion_s": image[..., 10],
         "normal": torch.nn.functional.normalize(image[..., 11:14], dim=-1),
     }
+
+
+def render_maps(model: SceneModel, grid: OccupancyGrid, dataset: Dataset, index: int) -> dict[str, np.ndarray]:
+    """All maps of one view as float32 arrays, see :func:`render_view`."""
+    pose, intrinsics = (torch.from_numpy(x[index]).to(model.device) for x in (dataset.poses, dataset.intrinsics))
+    maps = render_view(model, grid.cells, pose, intrinsics, dataset.height, dataset.width)
+    return {name: value.cpu().numpy() for name, value in maps.items()}

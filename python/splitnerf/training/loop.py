@@ -20,7 +20,6 @@ from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight
 from splitnerf.notes import note_once
 from splitnerf.ops import MeshScene
-from splitnerf.outputs import write_preview
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.refinement.job import STATE
 from splitnerf.render.averages import training_photos
@@ -42,7 +41,7 @@ from splitnerf.training.finite import GradientWatch, check_state, explain_loss
 from splitnerf.training.graphs import GraphedStep
 from splitnerf.training.losses import SeenLight
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.metrics import METRICS, add_metrics, keep_metrics
+from splitnerf.training.metrics import METRICS, add_metrics, keep_metrics, write_preview
 from splitnerf.training.numbers import PastStep, StepNumbers
 from splitnerf.training.observer import Observer, Observers, heed
 from splitnerf.training.room import RoomyStep

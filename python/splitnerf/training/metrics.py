@@ -1,11 +1,18 @@
-"""The lines of a run's metrics.jsonl."""
+"""What a run writes while it trains: the lines of metrics.jsonl, and previews."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
+import numpy as np
+
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.images import linear_to_srgb, over_background, write_image
 from splitnerf.files import atomic_path, reason
+from splitnerf.render.model import SceneModel
+from splitnerf.render.occupancy import OccupancyGrid
+from splitnerf.render.renderer import render_maps
 
 METRICS = "metrics.jsonl"
 
@@ -32,6 +39,19 @@ def add_metrics(path: Path, line: dict) -> None:
             log.write(json.dumps(line) + "\n")
     except OSError as error:
         raise OSError(f"{path}: cannot be written ({reason(error)})") from error
+
+
+def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Dataset, step: int) -> Path:
+    """``previews/step_NNNNNN.png``: the first view's photo, render, albedo and normals side by side; returns its path."""
+    maps = render_maps(model, grid, dataset, 0)
+    photo = over_background(dataset.images[0, ..., :3], dataset.images[0, ..., 3])
+    panels = [photo] + [
+        over_background(rgb, maps["alpha"])
+        for rgb in (maps["rgb"], linear_to_srgb(maps["albedo"]), 0.5 * maps["normal"] + 0.5)
+    ]
+    path = run / "previews" / f"step_{step:06d}.png"
+    write_image(path, np.concatenate(panels, axis=1).astype(np.float32))
+    return path
 
 
 def _parsed(text: str) -> dict | None:

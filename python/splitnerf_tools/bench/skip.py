@@ -16,7 +16,7 @@ from splitnerf.data.images import over_background
 from splitnerf.data.json_files import read_json
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
-from splitnerf.outputs import render_maps
+from splitnerf.render.renderer import render_maps
 from splitnerf.training.loop import train
 from splitnerf_tools.bench.provenance import header, provenance
 
