@@ -14,7 +14,7 @@ from splitnerf.data.environment import directions_of_texels
 from splitnerf.export.bake import rasterise
 from splitnerf.ops import MeshScene
 from splitnerf.refinement.fit import RefinementSettings, Stage
-from splitnerf.refinement.lamps import Points, brightest_glow, compact_lamp, degrees_from, disc, parts_of_light, unit
+from splitnerf.refinement.lamps import Points, brightest_lobe, compact_lamp, degrees_from, disc, parts_of_light, unit
 from splitnerf.refinement.texels import AssetTexels
 
 SUN = unit(np.array([0.5, -0.3, 0.8]))
@@ -66,10 +66,10 @@ def found(asset, albedo, light):
     return compact_lamp(AssetTexels(with_textures(asset, albedo_texture=albedo)), light, 3, 0)
 
 
-def test_the_brightest_glow_is_the_one_of_most_power():
+def test_the_brightest_lobe_is_the_one_of_most_power():
     sky = glowing_sky(12.0)
     sky[40, 30] = 60.0  # brighter, and small
-    glow = brightest_glow(sky)
+    glow = brightest_lobe(sky)
     assert degrees_from(glow.direction, SUN) < 1.5
     np.testing.assert_allclose(glow.power, POWER, rtol=0.12)
     assert (glow.radiance <= sky).all() and (glow.radiance >= 0).all()
@@ -93,7 +93,7 @@ def test_a_disc_is_filled_evenly():
 def test_a_sun_is_found_by_its_shadow_in_the_albedo(ball_over_plate):
     light = glowing_sky(12.0, unit(SUN + np.array([0.05, 0.03, 0.0])))  # smeared, and 3 degrees off
     new, lamp = found(ball_over_plate, shaded_albedo(ball_over_plate, 0.3, light), light)
-    assert degrees_from(np.array(lamp.direction), SUN) < 0.6 < degrees_from(brightest_glow(light).direction, SUN)
+    assert degrees_from(np.array(lamp.direction), SUN) < 0.6 < degrees_from(brightest_lobe(light).direction, SUN)
     directions, areas = directions_of_texels(64)
     assert (new * areas[..., None]).sum() == pytest.approx((light * areas[..., None]).sum(), rel=1e-3)
     lit = degrees_from(directions, np.array(lamp.direction))[new.mean(2) > 2 * light.max()]

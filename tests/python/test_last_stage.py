@@ -392,8 +392,8 @@ def test_a_slow_outline_leaves_time_for_the_sweeps(painted, monkeypatch):
 def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     refine_folder(folder, painted[1], folder, QUICK)
     printed = capsys.readouterr().err
-    assert printed.startswith("  0% 00:00<? last stage, outline, round 1 of 3\n")
-    assert re.search(r"100% .* last stage, step 4, photos [1-4]\d\.\d\d dB", printed)
+    assert printed.startswith("  0% 00:00<? refinement, outline, round 1 of 3\n")
+    assert re.search(r"100% .* refinement, step 4, photos [1-4]\d\.\d\d dB", printed)
     summary = delivery.last_stage_summary(folder)
     before, after = summary["photos_psnr"]
     assert after > before and summary["steps"] == 4

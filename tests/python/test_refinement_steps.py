@@ -14,7 +14,7 @@ from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
-from splitnerf.refinement.like_texels import usual_gloss, weighted_medians
+from splitnerf.refinement.similar_texels import usual_gloss, weighted_medians
 from splitnerf.refinement.normal_equations import APART, EDGE, METAL_APART, NormalEquations, Prior
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
 
@@ -60,7 +60,7 @@ def test_small_differences_are_smoothed_and_edges_are_kept():
     assert abs(found[2, 5] - found[1, 5]) < abs(found[1, 5] - found[0, 5])
 
 
-def test_like_texels_pull_at_the_cost_that_is_written():
+def test_similar_texels_pull_at_the_cost_that_is_written():
     observed, like = torch.zeros(3, N_UNKNOWNS), torch.zeros(3, N_UNKNOWNS)
     observed[:, 3], like[:, 3] = torch.tensor([0.3, 0.3, 0.9]), torch.tensor([0.3, 0.35, 0.3])
     found = fitted(chain(like=0.5), observed, like)

@@ -1,1 +1,1 @@
-"""The last stage of a run: the exported asset and the light are fitted to the photos through the path tracer's model."""
+"""Refinement: fits the exported asset and the light to the photos, by the model of the path tracer."""

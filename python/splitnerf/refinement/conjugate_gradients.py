@@ -1,4 +1,4 @@
-"""Conjugate gradients for a positive definite system that is known by its products."""
+"""Conjugate gradients for a positive definite system that is given by its products."""
 
 from __future__ import annotations
 

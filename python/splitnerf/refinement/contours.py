@@ -1,7 +1,8 @@
 """The contours of a mesh in photos: where its outline runs, and how the coverage of pixels changes as vertices move.
 
-The coverage of a pixel is the share of its filter that the mesh fills. Where a piece of the outline moves outward by d, it
-grows by d times the filter's integral along the piece. Source: Li, Aittala, Durand and Lehtinen 2018 (edge sampling).
+The coverage of a pixel is the share of its filter that the mesh fills. Where a piece of the outline moves outward by d,
+it grows by d times the filter's integral along the piece. Source: Li, Aittala, Durand and Lehtinen 2018 (edge
+sampling).
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from splitnerf.ops import MeshScene
 from splitnerf.refinement.pixels import PixelFilter, Pixels
 
 PIECE = 0.5  # pixels, the greatest length of a piece of a contour
-LONGEST = 50.0  # heights and widths of the photo; an edge of more pixels comes close to the plane of the camera
-BESIDE = 0.02  # pixels beside a piece at which it is seen whether the mesh ends there
+LONGEST = 50.0  # heights and widths of the photo; a longer edge comes close to the plane of the camera
+BESIDE = 0.02  # pixels from a piece to the point at which a ray checks that the mesh ends there
 
 
 class Edges(NamedTuple):
@@ -34,7 +35,7 @@ class Edges(NamedTuple):
 
 
 class Mesh:
-    """A mesh whose outline is looked for.
+    """A mesh whose outline is computed.
 
     Args:
         vertices: [m, 3] world, each place once.
@@ -67,7 +68,8 @@ class Pieces(NamedTuple):
 
 
 def edges_of(triangles: np.ndarray) -> Edges:
-    """The edges of triangles [t, 3]. Those of one triangle, or of more than two, are left out: the rims of an open mesh."""
+    """The edges of triangles [t, 3]. Those of one triangle, or of more than two, are left out: the rims of an open
+    mesh."""
     ends = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     opposite = np.concatenate([triangles[:, 2], triangles[:, 0], triangles[:, 1]])
     _, first, of_edge, count = np.unique(ends, axis=0, return_index=True, return_inverse=True, return_counts=True)
@@ -123,7 +125,8 @@ def outline_pieces(mesh: Mesh, pixels: Pixels, view: int, shape: tuple[int, int]
     edge, share, points = edge[free], share[free], points[free]
     ends, outward = ends[edge], outward[edge]
     depths = -local[ends][:, :, 2]
-    share = share * depths[:, 0] / (share * depths[:, 0] + (1 - share) * depths[:, 1])  # linear in space, not in the image
+    # linear in space, not in the image
+    share = share * depths[:, 0] / (share * depths[:, 0] + (1 - share) * depths[:, 1])
     x, y, z = (local[ends] * np.stack([1 - share, share], axis=1)[..., None]).sum(axis=1).T
     fx, fy = intrinsics[:2]
     right, down = outward.T

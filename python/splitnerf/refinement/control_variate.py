@@ -1,4 +1,4 @@
-"""Derivatives of integrals over few directions with less noise: those of a white light are known."""
+"""Derivatives of integrals over few directions with less noise, by a white light whose integrals are known."""
 
 from __future__ import annotations
 

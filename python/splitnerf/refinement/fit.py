@@ -1,11 +1,11 @@
 """The fit of an asset's textures and of the light to photos, through the path tracer's model.
 
-A pixel is seen by two rays through its filter, and each ray's point by directions of its own. The error of one ray's colour
-times that of the other is the squared error without the noise (in expectation), and one ray's derivatives times the other's
-error are its gradient. An error counts as at the tone of the brightest pixel around it: shape and normals are never quite
-true, and a highlight a pixel off its place would cost more in the dark beside its place than in it, and all lamps would
-come out too dim. Batches of pixels are gathered into normal equations of the texels and of the light, and a sweep of batches
-ends with a step of each.
+A pixel is seen by two rays through its filter, and each ray's point by directions of its own. The error of one ray's
+colour times that of the other is the squared error without the noise (in expectation), and one ray's derivatives times
+the other's error are its gradient. An error counts as at the tone of the brightest pixel around it: shape and normals
+are never quite true, and a highlight a pixel off its place would cost more in the dark next to its place than in it,
+and all lamps would come out too dim. Batches of pixels are gathered into normal equations of the texels and of the
+light, and a sweep of batches ends with a step of each.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.lamps import CompactLamp, compact_lamp
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
-from splitnerf.refinement.like_texels import usual_gloss
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.outline import ROUNDS, fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
+from splitnerf.refinement.similar_texels import usual_gloss
 from splitnerf.refinement.texels import PATCH_PIXELS, AssetTexels, SurfaceSamples, check_form, materials_of, patch_width
 from splitnerf.refinement.unknowns import (
     GROUPS,
@@ -47,9 +47,9 @@ from splitnerf.refinement.unknowns import (
 )
 
 CLAMP_INDIRECT = 10.0
-SWEEPS_OF_LARGE_STEPS = 4  # after as many the light's steps are half as large: they average over the noise of sweeps
-SWEEP_PIXELS = 1 << 18  # of a sweep, at most: beyond, more steps are worth more than more pixels
-LEAST_SWEEPS = 4  # that the minutes of a stage have room for: a sweep that would take longer gathers fewer pixels
+SWEEPS_OF_LARGE_STEPS = 4  # afterwards the light's steps are half as large, to average over the noise of sweeps
+SWEEP_PIXELS = 1 << 18  # the most pixels of a sweep: more steps are worth more than more pixels
+LEAST_SWEEPS = 4  # that fit into the minutes of a refinement: a longer sweep gathers fewer pixels
 LEAST_BATCHES = 8  # of a sweep, however short the time
 OUTLINE_SHARE = 0.5  # of the minutes, after which no further round of the outline begins, nor the search for a lamp
 MIN_TONE = 0.02  # linear value below which errors weigh as at this one
@@ -61,19 +61,21 @@ class RefinementSettings:
 
     Attributes:
         sweeps: Gauss-Newton steps.
-        minutes: Time that the outline and the sweeps keep to, see :class:`Stage`; 0 does not limit.
+        minutes: Time limit of the outline and the sweeps, see :class:`Stage`; 0: none.
         sweep_share: Pixels of a sweep as a share of all, at most SWEEP_PIXELS, and fewer where the minutes are short.
         pixels: Pixels of a batch.
         directions: Directions of a ray's point.
-        bounces: Scattering events of the light that the asset sends to itself.
-        keep: Share of the observations that outlives a sweep.
-        smooth_albedo, smooth_gloss, smooth_normal: Weights of the differences between neighbours' steps where a texel is as wide
-            as a pixel; those of finer texels are larger, so that a step is smooth over a pixel.
+        bounces: Scattering events of interreflection.
+        keep: Share of the observations that is kept after a sweep.
+        smooth_albedo, smooth_gloss, smooth_normal: Weights of the differences between neighbours' steps where a texel
+            is as wide as a pixel; those of finer texels are larger, so that a step is smooth over a pixel.
         flat_gloss, flat_normal: Weights of the differences between neighbours' values; edges cost little.
         like_roughness: Weight of the difference between a texel's roughness and the usual one of its colour.
-        like_metal: Weight of the difference between a texel's metallic and the usual one of its colour and place, where that is metal.
+        like_metal: Weight of the difference between a texel's metallic and the usual one of its colour and place, where
+            that is metal.
         anchor: Weight of the distance to the start.
-        light_step: Share of the light's first Gauss-Newton step that is taken, less of the later ones; 0 keeps the light.
+        light_step: Share of the light's first Gauss-Newton step that is taken, less of the later ones; 0 keeps the
+            light.
         outline: Whether vertices move first, so that the asset covers the pixels as the masks do.
         seed: Seed of all random numbers.
     """
@@ -100,14 +102,14 @@ class RefinementSettings:
 
 @dataclass(frozen=True)
 class Refined:
-    """What a refinement leaves.
+    """The result of a refinement.
 
     Attributes:
         asset: The asset.
         light: [h, 2 h, 3] linear radiance.
         outline: Mean squared errors of the coverage at the outline, before each round and at the end; empty where the
             shape was kept.
-        sweeps: What each sweep says.
+        sweeps: The report of each sweep.
         saturated: The share of the covered pixels' values that the photos clip.
         lamp: The lamp that was made compact at the start, or None.
     """
@@ -121,13 +123,13 @@ class Refined:
 
 
 class Sweep(NamedTuple):
-    """What one sweep says.
+    """The report of one sweep.
 
     Attributes:
         number: Sweeps so far.
         seconds: Time since the start.
-        error: Mean squared error of the photos before the sweep's step, without the noise, in sRGB units at the tone of the
-            brightest pixel around; it may come out slightly negative.
+        error: Mean squared error of the photos before the sweep's step, without the noise, in sRGB units at the tone of
+            the brightest pixel around; it may come out slightly negative.
         moved: [7] root mean square of the step, by unknown.
     """
 
@@ -138,14 +140,14 @@ class Sweep(NamedTuple):
 
 
 class Shaded(NamedTuple):
-    """What n points send to the viewer, by k directions of the light.
+    """Radiance of n points towards the viewer, from k directions of the light.
 
     Attributes:
         colours: [n, 3] linear radiance.
         radiance: [n, k, 3] light that arrives, a leaf of the graph.
-        visible: [n, k] 1 where it is the environment's.
+        visible: [n, k] 1 where the environment is seen, 0 where the asset blocks it.
         texels, shares: [n k, 4] where the environment is read.
-        sky: [n, k, 3] its radiance.
+        sky: [n, k, 3] radiance of the environment.
     """
 
     colours: Tensor
@@ -193,14 +195,14 @@ class Refinement:
         self.step_seconds = 0.0  # that the last sweep took after its batches
 
     def make_lamp_compact(self) -> CompactLamp | None:
-        """Brings the brightest glow of the light together where the albedo shows the edge of its shadow; None where not."""
+        """Makes the brightest lobe of the light compact if the albedo shows the edge of its shadow; else None."""
         light, lamp = compact_lamp(self.texels, self.light.radiance().numpy(), self.patch_width, self.settings.seed)
         if lamp is not None:
             self.light.set_radiance(torch.from_numpy(light))
         return lamp
 
     def state(self) -> dict[str, object]:
-        """All that further sweeps depend on beside the arguments, as tensors and plain values."""
+        """The state that further sweeps depend on, without the arguments, as tensors and plain values."""
         return {
             "unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient,
             "light": self.light.levels,
@@ -208,10 +210,10 @@ class Refinement:
         }  # fmt: skip
 
     def restore(self, state: dict[str, object]) -> None:
-        """Takes back what :meth:`state` gave of a fit with the same arguments.
+        """Restores what :meth:`state` returned for a fit with the same arguments.
 
         Raises:
-            ValueError, KeyError, TypeError: It is another fit's.
+            ValueError, KeyError, TypeError: The state belongs to another fit.
         """
         sums = {"unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient}
         for name, tensor in sums.items():
@@ -248,7 +250,7 @@ class Refinement:
     def shade(self, surface: TexturedSurface, samples: SurfaceSamples, unknowns: Tensor) -> Shaded:
         """The light that n points send to the viewer, differentiable in unknowns [n, 7] and the light that arrives.
 
-        It is an estimate without bias but for the clamp and the last bounce of the light that the asset sends to itself.
+        The estimate is unbiased, except for the clamp and the last bounce of interreflection.
         """
         s, m = self.settings, materials_of(to_values(unknowns), samples)
         light = self.light.radiance()
@@ -297,7 +299,8 @@ class Refinement:
         """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step.
 
         Args:
-            seconds: After which no further batch is gathered, LEAST_BATCHES aside; the step counts as long as the last one.
+            seconds: After which no further batch is gathered, LEAST_BATCHES aside; the step counts as long as the last
+                one.
             report: Called after each batch.
 
         Returns:
@@ -342,27 +345,29 @@ def srgb_slope(linear: Tensor) -> Tensor:
 
 
 class Stage:
-    """A refinement sweep by sweep: what it has said so far, and the state by which it can go on elsewhere.
+    """A refinement, sweep by sweep, with a state from which another process can continue.
 
-    Minutes limit it so: after OUTLINE_SHARE of them no further round of the outline begins, the first one aside, and no lamp
-    is looked for. A sweep takes a LEAST_SWEEPS-th of them at most, and the last one what is left. One sweep is always made.
+    The minutes limit it: after OUTLINE_SHARE of them no further round of the outline begins, except the first, and no
+    lamp is searched for. A sweep takes at most a LEAST_SWEEPS-th of them, the last one the rest. One sweep is always
+    made.
 
     Args:
         dataset, asset, environment, settings: See :class:`Refinement`.
-        state: What :meth:`state` gave of a stage with the same other arguments, `sweeps` and `minutes` aside; None begins.
-        show: Called with the share done and what is being done, often.
+        state: What :meth:`state` returned with the same arguments (`sweeps` and `minutes` may differ); None begins.
+        show: Called often with the share done and a message.
 
     Attributes:
         outline, sweeps, lamp: See :class:`Refined`.
 
     Raises:
-        ValueError, KeyError, TypeError: The asset or the light has another form, or the state is another stage's.
+        ValueError, KeyError, TypeError: The asset or the light has another form, or the state belongs to another
+            refinement.
         InputError: The photos show nothing.
     """
 
     def __init__(
         self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings, state: dict | None = None,
-        show: Callable[[float, str], None] = lambda share, told: None,
+        show: Callable[[float, str], None] = lambda share, message: None,
     ):  # fmt: skip
         check_form(asset)
         self.settings, self.show, self.outline, self.sweeps = settings, show, [], []
@@ -374,33 +379,34 @@ class Stage:
             self.started -= float(state["seconds"])
         elif settings.outline:
             asset, self.outline = fit_outline(dataset, asset, settings.seed, self._begins)
-        show(self.progress, "last stage, the texels' pixels")
+        show(self.progress, "refinement, the texels' pixels")
         self.fit, self.lamp = Refinement(dataset, asset, environment, settings), None
         if state is not None:
             self.fit.restore(state["fit"])
             self.lamp = None if state["lamp"] is None else CompactLamp(*state["lamp"])
         elif settings.light_step > 0 and self.seconds < OUTLINE_SHARE * self.limit:
-            show(self.progress, "last stage, looking for a lamp")
+            show(self.progress, "refinement, looking for a lamp")
             self.lamp = self.fit.make_lamp_compact()
 
     def _begins(self, turn: int) -> bool:
-        """Whether a round of the outline has time, if it takes as long as those before; the first one always has."""
-        self.show(self.progress, f"last stage, outline, round {turn + 1} of {ROUNDS}")
+        """Whether there is time for a round of the outline as long as those before; always for the first."""
+        self.show(self.progress, f"refinement, outline, round {turn + 1} of {ROUNDS}")
         return turn == 0 or self.seconds * (turn + 1) / turn <= OUTLINE_SHARE * self.limit
 
     @property
     def seconds(self) -> float:
-        """The time that the stage has taken, in all its parts."""
+        """Seconds spent in all parts of the refinement."""
         return time.monotonic() - self.started
 
     @property
     def limit(self) -> float:
-        """The seconds that it may take."""
+        """The time limit in seconds."""
         return 60.0 * self.settings.minutes if self.settings.minutes > 0 else math.inf
 
     @property
     def finished(self) -> bool:
-        """Whether all sweeps are made, or what is left of the minutes is less than half of a sweep like the last one."""
+        """Whether all sweeps are made, or what is left of the minutes is less than half of a sweep like the last
+        one."""
         if len(self.sweeps) >= self.settings.sweeps:
             return True
         return bool(self.sweeps) and self.limit - self.seconds <= 0.5 * self.last_seconds
@@ -418,18 +424,18 @@ class Stage:
         seconds = self.limit / LEAST_SWEEPS
         if self.sweeps:
             seconds = min(seconds, self.limit - started)
-        told = self.told(len(self.sweeps) + 1)
-        error, moved = self.fit.sweep(seconds, lambda: self.show(min(0.99, self.progress), told))
+        message = self.message(len(self.sweeps) + 1)
+        error, moved = self.fit.sweep(seconds, lambda: self.show(min(0.99, self.progress), message))
         self.last_seconds = self.seconds - started
         self.sweeps.append(Sweep(len(self.sweeps) + 1, self.seconds, error, moved))
         return self.sweeps[-1]
 
-    def told(self, step: int) -> str:
-        """What is shown of a step: the photos' error before the last whole one."""
-        return f"last stage, step {step}" + (f", photos {decibels(self.sweeps[-1].error):.2f} dB" if self.sweeps else "")
+    def message(self, step: int) -> str:
+        """The message of a step, with the error of the photos before the last whole step."""
+        return f"refinement, step {step}" + (f", photos {decibels(self.sweeps[-1].error):.2f} dB" if self.sweeps else "")
 
     def state(self) -> dict[str, object]:
-        """What goes on from here, as tensors and plain values."""
+        """The state from which the refinement continues, as tensors and plain values."""
         vertices = torch.from_numpy(np.ascontiguousarray(self.fit.texels.asset.vertices, np.float32))
         return {
             "vertices": vertices, "outline": self.outline, "sweeps": [list(sweep) for sweep in self.sweeps],
@@ -437,7 +443,7 @@ class Stage:
         }  # fmt: skip
 
     def result(self) -> Refined:
-        """What the stage leaves."""
+        """The result so far."""
         fit = self.fit
         light, saturated = fit.light.radiance().detach().numpy(), float(fit.pixels.saturated.mean())
         return Refined(fit.texels.asset_with(fit.maps()), light, self.outline, self.sweeps, saturated, self.lamp)

@@ -45,7 +45,7 @@ def fitting_height(height: int) -> int:
 
 
 def read_light(folder: Path) -> np.ndarray:
-    """[h, 2 h, 3] the light beside an asset, averaged down to a height that can be fitted.
+    """[h, 2 h, 3] the light in the folder of an asset, averaged down to a height that can be fitted.
 
     Raises:
         InputError: There is none, or it cannot be used.
@@ -66,12 +66,13 @@ def occlusion_texture(asset: Asset) -> np.ndarray:
 
 
 def source_of(run: Path) -> Path:
-    """The folder in a run that holds what training alone exported: RUN/trained, or RUN where there was no last stage."""
+    """The folder in a run that holds what training alone exported: RUN/trained, or RUN where there was no
+    refinement."""
     return run / TRAINED if (run / TRAINED / "mesh.glb").is_file() else run
 
 
 class OtherState(InputError):
-    """A state from which a refinement cannot go on."""
+    """A state from which a refinement cannot continue."""
 
 
 class StateFile:
@@ -79,7 +80,7 @@ class StateFile:
 
     Args:
         folder: The folder of the results.
-        origin: What tells the refinement from others, see :func:`origin_of`.
+        origin: The hash that identifies the refinement, see :func:`origin_of`.
         minutes: The time between two saves.
     """
 
@@ -106,7 +107,7 @@ class StateFile:
 
     def take(self, stage: Stage) -> None:
         """Remembers the state of a stage that has made its sweeps to their ends."""
-        self.content = {}  # so that there are never three states in memory
+        self.content = {}  # never three states in memory
         self.content = copy.deepcopy(stage.state())
 
     def save(self) -> None:
@@ -132,8 +133,8 @@ def origin_of(source: Path, dataset: Dataset, settings: RefinementSettings) -> s
 def refine_folder(
     source: Path, dataset: Dataset, out: Path, settings: RefinementSettings, *, resume: bool = False, save_minutes: float = 2.0
 ) -> Refined | None:
-    """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it and keeps the state before the sweep.
-    While the first sweep is prepared there is nothing to keep: Ctrl-C raises KeyboardInterrupt.
+    """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it and keeps the state before the
+    sweep. While the first sweep is prepared there is nothing to keep: Ctrl-C raises KeyboardInterrupt.
 
     Args:
         source: The folder of mesh.glb and environment.exr.
@@ -141,7 +142,7 @@ def refine_folder(
         out: The folder of the results: mesh.glb, environment.exr and .hdr, and refinement.json. The state of
             an unfinished refinement stands there; the caller deletes it (:func:`forget_state`) once all is done.
         settings: What the fit does.
-        resume: Whether to go on from that state, if there is one.
+        resume: Whether to continue from that state, if there is one.
         save_minutes: The time between two saves of the state.
 
     Returns:
@@ -169,7 +170,7 @@ def refine_folder(
                 if complete:
                     kept.take(stage)
                     kept.save_if_due()
-                    bar.show(stage.progress, stage.told(len(stage.sweeps)))
+                    bar.show(stage.progress, stage.message(len(stage.sweeps)))
         kept.save()  # also where all is done: what follows may be interrupted, too
         if not complete or not stage.finished:
             return None
@@ -197,7 +198,7 @@ def begin(
     dataset: Dataset, asset: Asset, light: np.ndarray, settings: RefinementSettings, state: dict | None, path: Path,
     show: Callable[[float, str], None],
 ) -> Stage:  # fmt: skip
-    """A stage that begins, or goes on from the state in the file `path`. Raises InputError where it cannot."""
+    """A new refinement, or one that continues from the state in the file `path`. Raises InputError where it cannot."""
     try:
         return Stage(dataset, asset, light, settings, state, show)
     except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:

@@ -1,11 +1,11 @@
 """A lamp that training smeared is made compact again.
 
-Training's light is smooth. A sun comes out as a glow of tens of degrees, whose shadows have no edges, and the albedo takes the
-edges of the sun's shadow. Nothing pulls them out again: light and albedo together explain the photos. But albedo knows nothing
-of shadows. Of two points close together, one in the shadow of a part of the glow and one beside it, the albedo is the same on
-average over many pairs. If the glow stands for a compact lamp, the albedo beside the shadow is instead as much brighter as the
-lamp adds there. So the lamp's direction, width and power are those that leave the least contrasts between such points. The
-light of the glow is then brought together; the power of all light stays.
+Training's light is smooth. A sun comes out as a lobe of tens of degrees, whose shadows have no edges, so the albedo
+takes the edges of the sun's shadow. Light and albedo together then explain the photos, and no further step separates
+them. But the true albedo does not depend on shadows: of two close points, one in the shadow of a part of the lobe and
+one outside it, it is the same on average over many pairs. If the lobe stands for a compact lamp, the albedo outside the
+shadow is instead brighter by what the lamp adds there. So the lamp's direction, width and power are those that leave
+the smallest contrasts between such points. The light of the lobe is then made compact; the power of all light stays.
 """
 
 from __future__ import annotations
@@ -20,31 +20,33 @@ from splitnerf.export.bake import rasterise
 from splitnerf.ops import MeshScene, visibility_bits
 from splitnerf.refinement.texels import AssetTexels, materials_of, neighbours
 
-REACH = 30.0  # degrees from a glow's middle to its end
+REACH = 30.0  # degrees from a lobe's middle to its end
 RING = 15.0  # width in degrees of the ring around it whose median is the light behind it
-APART = 6  # widths of a patch between the points of a pair: with 2, training's blur makes suns of 1 degree into lamps of 8
-N_PAIRS = 50_000  # pairs among which those at shadows' edges are sought
+# widths of a patch between the points of a pair: with 2, training's blur makes suns of 1 degree into lamps of 8
+APART = 6
+N_PAIRS = 50_000  # pairs among which those at edges of shadows are searched
 N_EDGE = 4_000  # pairs at the edges of shadows of which contrasts are computed
-FEWEST = 100  # such pairs; with fewer the glow stays
-LEAST_PART = 0.1  # by which a glow's middle shines on them unequally, 1 for all of it on one point that faces it
+FEWEST = 100  # such pairs; with fewer the lobe stays
+LEAST_PART = 0.1  # minimum difference in visibility of the lobe between the two points of a pair
 MIN_ALIKE = 0.8  # cosine of the normals of a pair
 MAX_METALLIC = 0.5  # a metal's albedo scales what it mirrors, not its irradiance
 MIN_ALBEDO = 0.05  # of the brighter one of a pair; darker dielectrics mirror more than they scatter
 LARGEST_CONTRAST = 1.5  # of log albedo; beyond it, it is the texture's
-NEAR = 0.15  # contrasts that differ by more count less and less
-FARTHEST = 12.0  # degrees from the glow's direction to the farthest lamp that is tried
+NEAR = 0.15  # contrast from which on the cost grows slowly
+FARTHEST = 12.0  # degrees from the lobe's direction to the farthest lamp that is tried
 N_TRIED, N_FINER, FINER = 448, 64, 1.0  # directions that are tried; then those within some degrees of the best
 RADII = (1.0, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 12.0)  # degrees
 LEAST_RADIUS = 3.0  # degrees, of the lamp in the light: fits of lamps narrower than two of its texels are noisy
 FACTORS = np.arange(1.0, 3.01, 0.1)  # of the lamp's power; every COARSE-th is tried first
 COARSE = 4
-N_CENTRAL, N_TABLE = 32, 1792  # directions of the disc of FARTHEST degrees, and of all that lamps may fill; multiples of 32
-N_BEHIND, N_GLOW = 512, 256  # directions that stand for the other light and for the glow; multiples of 32
+# directions of the disc of FARTHEST degrees, and of all that lamps may fill; multiples of 32
+N_CENTRAL, N_TABLE = 32, 1792
+N_BEHIND, N_LOBE = 512, 256  # directions that stand for the other light and for the lobe; multiples of 32
 MIN_SIGMAS = 5.0  # by which a compact lamp must explain the pairs better
 DARK = 0.02  # share of the mean light that counts as none
 
 
-class Glow(NamedTuple):
+class Lobe(NamedTuple):
     """The light around the brightest lamp of a map.
 
     Attributes:
@@ -59,13 +61,13 @@ class Glow(NamedTuple):
 
 
 class CompactLamp(NamedTuple):
-    """What the pairs say.
+    """The lamp that the pairs indicate.
 
     Attributes:
         direction: [3] unit, a list.
-        radius: Degrees, as the pairs say; in the light it is at least LEAST_RADIUS.
-        factor: The lamp's power beside the glow's, where the rest of the light stays.
-        pairs: The number of pairs that told it.
+        radius: Degrees; in the light it is at least LEAST_RADIUS.
+        factor: The lamp's power divided by the lobe's; the rest of the light stays.
+        pairs: The number of pairs used.
     """
 
     direction: list[float]
@@ -74,8 +76,8 @@ class CompactLamp(NamedTuple):
     pairs: int
 
 
-def brightest_glow(light: np.ndarray) -> Glow:
-    """The glow of most power in a map [h, 2 h, 3]."""
+def brightest_lobe(light: np.ndarray) -> Lobe:
+    """The lobe of most power in a map [h, 2 h, 3]."""
     directions, areas = directions_of_texels(light.shape[0])
     power = light.mean(axis=2) * areas
     sky = directions_of_texels(24)[0].reshape(-1, 3)
@@ -88,7 +90,7 @@ def brightest_glow(light: np.ndarray) -> Glow:
         if not radiance.any():
             break
         middle = unit((directions * (radiance.mean(axis=2) * areas)[..., None]).sum(axis=(0, 1)))
-    return Glow(middle, radiance, (radiance * areas[..., None]).sum(axis=(0, 1)))
+    return Lobe(middle, radiance, (radiance * areas[..., None]).sum(axis=(0, 1)))
 
 
 def degrees_from(directions: np.ndarray, middle: np.ndarray) -> np.ndarray:
@@ -120,7 +122,7 @@ def disc(direction: np.ndarray, radius: float, n: int) -> np.ndarray:
 
 
 class Points(NamedTuple):
-    """Points of an asset's surface, two by two: those of a pair are close together and face the same way.
+    """Points of an asset's surface in pairs; the points of a pair are close and have similar normals.
 
     Attributes:
         scene: The mesh.
@@ -140,7 +142,8 @@ class Points(NamedTuple):
         return Points(self.scene, *of_points)
 
     def cosines(self, directions: np.ndarray) -> np.ndarray:
-        """[2 k, n] irradiance by lamps of power 1 at directions [n, 3], n a multiple of 32: the cosine, 0 where hidden."""
+        """[2 k, n] irradiance by lamps of power 1 at directions [n, 3], n a multiple of 32: the cosine, 0 where
+        hidden."""
         tensors = (torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (self.origins, self.geometric, directions))
         bits = visibility_bits(self.scene, *tensors, offset=0.0)[0][:, 0].contiguous().numpy()
         seen = np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little")
@@ -167,47 +170,49 @@ def pairs_of(texels: AssetTexels, apart: int, seed: int) -> Points:
     return points.chosen(alike & dielectric & (albedo.mean(axis=1).reshape(-1, 2).max(axis=1) > MIN_ALBEDO))
 
 
-def at_edges(points: Points, glow: Glow, seed: int) -> Points:
-    """At most N_EDGE of the pairs on which a glow's middle shines unequally: it is partly hidden from one, or one faces it more."""
-    central = points.cosines(disc(glow.direction, FARTHEST, N_CENTRAL))
+def at_edges(points: Points, lobe: Lobe, seed: int) -> Points:
+    """At most N_EDGE of the pairs on which a lobe's middle shines unequally: it is partly hidden from one, or one faces
+    it more."""
+    central = points.cosines(disc(lobe.direction, FARTHEST, N_CENTRAL))
     part = np.abs(central[0::2] - central[1::2]).mean(axis=1)
     return points.chosen(np.random.default_rng(seed).permutation(np.flatnonzero(part > LEAST_PART))[:N_EDGE])
 
 
 class Contrasts:
-    """The contrasts of pairs' log albedo, and what lamps in the place of a glow leave of them.
+    """The contrasts of pairs' log albedo, and what lamps in the place of a lobe leave of them.
 
     Args:
         points: The pairs.
         light: [h, 2 h, 3] linear radiance.
-        glow: The glow in it.
+        lobe: The lobe in it.
 
     Attributes:
         costs: [k] of the contrasts as they are.
     """
 
-    def __init__(self, points: Points, light: np.ndarray, glow: Glow):
+    def __init__(self, points: Points, light: np.ndarray, lobe: Lobe):
         self._contrast = np.clip(points.albedo[0::2] - points.albedo[1::2], -LARGEST_CONTRAST, LARGEST_CONTRAST)
         self.costs = robust(self._contrast)
-        self._power = float(glow.power.mean())
-        self._directions = disc(glow.direction, FARTHEST + max(RADII), N_TABLE)
+        self._power = float(lobe.power.mean())
+        self._directions = disc(lobe.direction, FARTHEST + max(RADII), N_TABLE)
         self._table = points.cosines(self._directions)
         arriving = [
             points.cosines(directions) @ powers.mean(axis=1)
-            for directions, powers in (parts_of_light(light - glow.radiance, N_BEHIND), parts_of_light(glow.radiance, N_GLOW))
+            for directions, powers in (parts_of_light(light - lobe.radiance, N_BEHIND), parts_of_light(lobe.radiance, N_LOBE))
         ]  # fmt: skip
         self._behind, self._before = arriving[0], arriving[0] + arriving[1]
         self._least = max(DARK * float(self._before.mean()), 1e-20)
 
     def lamps(self, middles: np.ndarray, radius: float) -> np.ndarray:
-        """[2 k, n] irradiance of the points by lamps of the glow's power around middles [n, 3], of a radius in degrees."""
+        """[2 k, n] irradiance of the points by lamps of the lobe's power around middles [n, 3], of a radius in
+        degrees."""
         spacing = (FARTHEST + max(RADII)) * np.sqrt(np.pi / N_TABLE)
         away = np.degrees(np.arccos(np.clip(self._directions @ middles.T, -1, 1)))
         shares = np.clip((radius - away) / spacing + 0.5, 0, 1)
         return self._power * (self._table @ (shares / shares.sum(axis=0)).astype(np.float32))
 
     def costs_left(self, lamps: np.ndarray, factor: float) -> np.ndarray:
-        """[k, n] of what lamps of an irradiance [2 k, n] times a factor leave of the contrasts in the glow's place."""
+        """[k, n] of what lamps of an irradiance [2 k, n] times a factor leave of the contrasts in the lobe's place."""
         after = np.maximum(self._behind[:, None] + factor * lamps, self._least)
         change = np.log(after / np.maximum(self._before, self._least)[:, None])
         change = np.clip(change[0::2] - change[1::2], -LARGEST_CONTRAST, LARGEST_CONTRAST)
@@ -241,7 +246,7 @@ def best_lamp(contrasts: Contrasts, middles: np.ndarray, radii: tuple[float, ...
 
 
 def compact_lamp(texels: AssetTexels, light: np.ndarray, patch: int, seed: int) -> tuple[np.ndarray, CompactLamp | None]:
-    """The light with its brightest glow brought together, where the albedo says that it is a compact lamp.
+    """The light with its brightest lobe made compact, if the albedo indicates a compact lamp.
 
     Args:
         texels: The asset that was trained with the light.
@@ -250,33 +255,35 @@ def compact_lamp(texels: AssetTexels, light: np.ndarray, patch: int, seed: int) 
         seed: Of the choice of pairs.
 
     Returns:
-        The light, and what was found: None where the glow stays as it is. So it does where the best lamp is the broadest that is
+        The light, and what was found: None where the lobe stays as it is. So it does where the best lamp is the
+            broadest that is
         tried, or within FINER of the farthest: there may be a better one beyond. The largest power is taken.
     """
-    glow = brightest_glow(light)
-    if not glow.radiance.any():
+    lobe = brightest_lobe(light)
+    if not lobe.radiance.any():
         return light, None
-    points = at_edges(pairs_of(texels, APART * patch, seed), glow, seed)
+    points = at_edges(pairs_of(texels, APART * patch, seed), lobe, seed)
     n_pairs = len(points.albedo) // 2
     if n_pairs < FEWEST:
         return light, None
-    contrasts = Contrasts(points, light, glow)
-    rough = best_lamp(contrasts, disc(glow.direction, FARTHEST, N_TRIED), RADII, FACTORS[::COARSE])
+    contrasts = Contrasts(points, light, lobe)
+    rough = best_lamp(contrasts, disc(lobe.direction, FARTHEST, N_TRIED), RADII, FACTORS[::COARSE])
     best = best_lamp(contrasts, disc(rough.direction, FINER, N_FINER), (rough.radius,), FACTORS)
     gain = contrasts.costs - contrasts.costs_left(contrasts.lamps(best.direction[None], best.radius), best.factor)[:, 0]
-    at_rim = best.radius == max(RADII) or degrees_from(best.direction, glow.direction) > FARTHEST - FINER
+    at_rim = best.radius == max(RADII) or degrees_from(best.direction, lobe.direction) > FARTHEST - FINER
     if at_rim or not gain.mean() > MIN_SIGMAS * gain.std() / np.sqrt(n_pairs):
         return light, None
     found = CompactLamp(best.direction.tolist(), best.radius, best.factor, n_pairs)
-    return with_lamp(light, glow, found), found
+    return with_lamp(light, lobe, found), found
 
 
-def with_lamp(light: np.ndarray, glow: Glow, lamp: CompactLamp) -> np.ndarray:
-    """A map [h, 2 h, 3] of the same power with a lamp, at least LEAST_RADIUS and one texel wide, in the place of a glow."""
+def with_lamp(light: np.ndarray, lobe: Lobe, lamp: CompactLamp) -> np.ndarray:
+    """A map [h, 2 h, 3] of the same power with a lamp, at least LEAST_RADIUS and one texel wide, in the place of a
+    lobe."""
     directions, areas = directions_of_texels(light.shape[0])
     away = degrees_from(directions, np.array(lamp.direction))
     inside = away <= max(lamp.radius, LEAST_RADIUS, away.min())
-    changed = light - glow.radiance
-    changed[inside] += lamp.factor * glow.power / areas[inside].sum()
+    changed = light - lobe.radiance
+    changed[inside] += lamp.factor * lobe.power / areas[inside].sum()
     power_of = lambda map_: (map_.mean(axis=2) * areas).sum()  # noqa: E731
     return (changed * (power_of(light) / power_of(changed))).astype(np.float32)

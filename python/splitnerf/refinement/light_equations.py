@@ -1,9 +1,10 @@
-"""Gauss-Newton steps of the light: what the photos say of it, and a prior that makes it as smooth and grey as they allow.
+"""Gauss-Newton steps of the light: equations from the photos, and a prior that makes it as smooth and grey as they
+allow.
 
-A pixel is a linear function of the light. The gradient comes from all pixels; the curvature from some of them and from a bound
-of its whole, without which steps are far too long where few of them look (Levenberg 1944; Marquardt 1963). The unknowns are
-the levels of log radiance. Each of a finer level's texels is expected to be near zero, in colour nearer than in brightness,
-and with heavy tails, as windows and lamps have edges.
+A pixel is a linear function of the light. The gradient comes from all pixels; the curvature from some of them and from
+a bound of its whole, without which steps are far too long where few of them see the light (Levenberg 1944; Marquardt
+1963). The unknowns are the levels of log radiance. Each of a finer level's texels is expected to be near zero, in
+colour nearer than in brightness, and with heavy tails, as windows and lamps have edges.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from splitnerf.data.environment import directions_of_texels, seen_at
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.light import EnvironmentLight, read, read_adjoint, sum_of_levels
 
-WEIGHT = 1e-7  # of the prior beside the mean squared error of the photos in sRGB units
+WEIGHT = 1e-7  # of the prior, relative to the mean squared error of the photos in sRGB units
 BRIGHTNESS = 0.5  # deviation of the mean of the channels' log radiance from the coarser levels, on each level
 COLOUR = 0.4  # deviation of a channel's log radiance from that mean on the coarsest level; half of it on each next one
 TAILS = 3.0  # degrees of freedom of Student's t distribution
-WEIGHT_SEEN = 1e-3  # of the light that photos show, beside the mean squared error of the photos in sRGB units
+WEIGHT_SEEN = 1e-3  # of the light that photos show, relative to the same error
 SEEN = 0.2  # deviation of its log radiance
 DARK = 1e-3  # radiance below it counts as dark
 N_PROBES = 4  # random vectors by which the diagonal is estimated
@@ -54,7 +55,8 @@ class LightEquations:
     Args:
         light: The light that :meth:`step` moves.
         share_of_rows: The share of the rays from which the curvature comes.
-        surroundings: [h, 2 h, 4] what the photos show around the object, see :class:`splitnerf.data.dataset.Dataset`, or None.
+        surroundings: [h, 2 h, 4] what the photos show around the object, see :class:`splitnerf.data.dataset.Dataset`,
+            or None.
     """
 
     def __init__(self, light: EnvironmentLight, share_of_rows: float = 0.08, surroundings: np.ndarray | None = None):
@@ -149,7 +151,7 @@ class LightEquations:
         return float(change.square().mean().sqrt())
 
     def _from_seen(self, radiance: Tensor) -> tuple[Tensor, Tensor]:
-        """How far the log radiance of the texels [t, 3] is from what photos show, and the weights of its squares."""
+        """Log radiance of the texels [t, 3] minus what photos show, and the weights of its squares."""
         if self._seen is None:
             return torch.zeros_like(radiance), torch.zeros_like(radiance)
         target, known = self._seen
@@ -157,7 +159,8 @@ class LightEquations:
         return away, WEIGHT_SEEN * known / (SEEN**2 + away.square() / TAILS)
 
     def _diagonal(self, curvature: Callable[[Tensor], Tensor]) -> Tensor:
-        """An estimate of the curvature's diagonal, smoothed over neighbours. Source: Bekas, Kokiopoulou and Saad 2007."""
+        """An estimate of the curvature's diagonal, smoothed over neighbours. Source: Bekas, Kokiopoulou and Saad
+        2007."""
         random, total = torch.Generator().manual_seed(0), torch.zeros(sum(self._sizes))
         for _ in range(N_PROBES):
             signs = torch.randint(0, 2, total.shape, generator=random).float() * 2 - 1
@@ -167,8 +170,8 @@ class LightEquations:
 
 
 def seen_texels(height: int, surroundings: np.ndarray) -> tuple[Tensor, Tensor]:
-    """The log radiance [t, 3] that photos show in the directions of a map's texels, and their weights [t, 1]: how well it is
-    known, times the texel's share of the sphere."""
+    """The log radiance [t, 3] that photos show in the directions of a map's texels, and their weights [t, 1]: how well
+    it is known, times the texel's share of the sphere."""
     directions, areas = (part.reshape(height * 2 * height, -1) for part in directions_of_texels(height))
     radiance, known = seen_at(surroundings, directions)
     target = np.log(np.maximum(radiance, DARK))
@@ -177,7 +180,8 @@ def seen_texels(height: int, surroundings: np.ndarray) -> tuple[Tensor, Tensor]:
 
 
 def parts_of(level: Tensor, number: int) -> tuple[Tensor, Tensor]:
-    """Deviations of a level [3, h, w] in brightness [1, h, w] and in colour [3, h, w]; of the coarsest from its mean."""
+    """Deviations of a level [3, h, w] in brightness [1, h, w] and in colour [3, h, w]; of the coarsest from its
+    mean."""
     if number == 0:
         level = level - level.mean((1, 2), keepdim=True)
     mean = level.mean(0, keepdim=True)

@@ -1,4 +1,4 @@
-"""Gauss-Newton steps of all texels: what the photos say of each, gathered over batches, and a prior that joins them."""
+"""Gauss-Newton steps of all texels: equations from the photos, summed over batches, and a prior that joins texels."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.unknowns import METALLIC
 
 EDGE = 0.05  # length of the differences between neighbours from which on they count as an edge
-# Distances to the values of like texels from which on these pull less; the second is for metallic, whose pull ends farther off.
+# Distances to the values of similar texels from which on these pull less; the second is for metallic, whose pull ends
+# farther off.
 APART, METAL_APART = 0.3, 0.4
 
 
 class Prior(NamedTuple):
-    """What holds the unknowns where photos say little, in units of each unknown's mean curvature.
+    """The prior of the unknowns where photos determine them poorly, in units of each unknown's mean curvature.
 
     Attributes:
         pairs: [k, 2] int64, texels that are neighbours.
         smooth: [n] weight of the differences between the steps of neighbours.
-        flat: [n] weight of the differences d between the values of neighbours; their cost is log(1 + (d / EDGE)^2), so that
-            small differences are smoothed and edges are kept (Black and Anandan 1996).
+        flat: [n] weight of the differences d between the values of neighbours; their cost is log(1 + (d / EDGE)^2), so
+            that small differences are smoothed and edges are kept (Black and Anandan 1996).
         groups: Numbers of unknowns, in order, that have their edges in common.
         anchor: [n] weight of the distance to the start.
-        like: [n] weight of the distance d to the values of like texels, see :func:`likeness`.
+        like: [n] weight of the distance d to the values of similar texels, see :func:`likeness`.
     """
 
     pairs: Tensor
@@ -44,10 +45,11 @@ class Prior(NamedTuple):
 
 
 def likeness(apart: Tensor) -> Tensor:
-    """[m, n] the weights by which squared distances [m, n] to the values of like texels have the gradient of their cost.
+    """[m, n] the weights by which squared distances [m, n] to the values of similar texels have the gradient of their
+    cost.
 
-    The costs are log(1 + (d / APART)^2), and for metallic (d / METAL_APART)^2 / (1 + (d / METAL_APART)^2), which is bounded
-    (Geman and McClure 1987).
+    The costs are log(1 + (d / APART)^2), and for metallic (d / METAL_APART)^2 / (1 + (d / METAL_APART)^2), which is
+    bounded (Geman and McClure 1987).
     """
     weights = 1.0 / (1.0 + (apart / APART).square())
     weights[:, METALLIC] = 1.0 / (1.0 + (apart[:, METALLIC] / METAL_APART).square()).square()
@@ -57,17 +59,17 @@ def likeness(apart: Tensor) -> Tensor:
 class NormalEquations:
     """Sums J^T W J and J^T W r of texels, m of them with n unknowns each; texels are joined by the prior alone.
 
-    A pixel's value depends on the four texels around each of its points. Each texel gets its bilinear share of the whole
-    sums, so that the curvature is never below the true one: steps fall short rather than overshoot.
+    A pixel's value depends on the four texels around each of its points. Each texel gets its bilinear share of the
+    whole sums, so that the curvature is never below the true one: steps fall short rather than overshoot.
 
-    Derivatives are estimates, and their squares hold the variance of their noise. That shortens the steps of what a photo
-    says little about. (Scaled down to what the products of a pixel's two rays say, roughness and metallic drifted.)
+    Derivatives are estimates, and their squares hold the variance of their noise. That shortens the steps of unknowns
+    that a photo determines poorly. (Scaled down to the products of a pixel's two rays, roughness and metallic drifted.)
 
     Args:
         start: [m, n] unknowns at the start.
         prior: The prior.
-        keep: The share of the sums that outlives a step, in [0, 1). They are carried to the new unknowns as if the photos
-            were linear functions of them.
+        keep: The share of the sums that is kept after a step, in [0, 1). They are carried to the new unknowns as if the
+            photos were linear functions of them.
     """
 
     def __init__(self, start: Tensor, prior: Prior, keep: float):
@@ -106,7 +108,7 @@ class NormalEquations:
 
         Args:
             unknowns: The unknowns.
-            like: [m, n] the values of like texels, NaN where there are none.
+            like: [m, n] the values of similar texels, NaN where there are none.
             n_iterations: The number of conjugate gradients.
         """
         prior = self.prior

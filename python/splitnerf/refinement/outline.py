@@ -20,9 +20,10 @@ from splitnerf.refinement.pixels import PixelFilter, Pixels, pixels_of
 ROUNDS = 3
 RAYS = 32  # of a pixel
 LARGEST = 1.0  # pixels that a vertex may move in a round
-SMOOTH, ANCHOR = 0.3, 0.02  # weights of the differences of neighbours' moves and of the moves, in units of the mean curvature
+# weights of the differences of neighbours' moves and of the moves, in units of the mean curvature
+SMOOTH, ANCHOR = 0.3, 0.02
 BATCH = 4096  # pixels
-MOST = 1 << 22  # pixels near the edges that a fit holds, about; each meets rays and rows of a matrix
+MOST = 1 << 22  # pixels near the edges, about; each needs rays and rows of a matrix
 
 
 def outline_pixels(dataset: Dataset) -> tuple[Pixels, np.ndarray]:
@@ -100,7 +101,7 @@ def fit_outline(
         dataset: The photos, whose alpha is the mask.
         asset: A closed asset in the photos' world frame.
         seed: The seed of the rays.
-        begins: Asked before each round, whose number it is given, from 0 to ROUNDS - 1, whether the round is made.
+        begins: Called before each round with its number, 0 to ROUNDS - 1; returns whether to make it.
 
     Returns:
         The moved asset, or the given one where moving it did not lower the error, and the mean squared error of the

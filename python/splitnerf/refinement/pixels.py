@@ -15,9 +15,9 @@ from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf.data.pixels import per_channel
 
 MIN_ALPHA = 0.99  # of a pixel that the object covers
-MOST = 1 << 25  # covered pixels that a fit holds, about: 1.4 GB
+MOST = 1 << 25  # covered pixels of a fit, about: 1.4 GB
 NEARBY = 0.01  # pixels to either side over which a density is a mean
-SATURATED = 254.5 / 255.0  # share of a photo's largest sRGB value from which it says only that there was so much light
+SATURATED = 254.5 / 255.0  # share of a photo's largest sRGB value from which on it is a lower bound
 
 
 @dataclass
@@ -28,9 +28,9 @@ class Pixels:
         view: [n] int64, the number of the photo.
         centre: [n, 2] float32, (x, y) of the pixel's centre.
         target: [n, 3] float32 linear radiance.
-        brightest: [n, 3] float32 the largest linear radiance of the pixel and those of its eight neighbours that the object
-            covers.
-        saturated: [n, 3] bool, whether the photo gives a lower bound alone.
+        brightest: [n, 3] float32 the largest linear radiance of the pixel and those of its eight neighbours that the
+            object covers.
+        saturated: [n, 3] bool, whether the photo only gives a lower bound.
         poses: [views, 3, 4] float32 camera-to-world, OpenGL axes, the data's world frame.
         intrinsics: [views, 4] float32 fx, fy, cx, cy in pixels.
     """
@@ -75,7 +75,7 @@ def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int, 
 
     Args:
         dataset: The split.
-        choose: Gives of a photo by its number the pixels [H, W] bool that are taken.
+        choose: Returns the pixels [H, W] bool to take from the photo of a number.
         most: The number of pixels, about, beyond which a random share of them is taken: a pixel takes 43 bytes.
         seed: The seed of that share.
     """
@@ -106,7 +106,8 @@ def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int, 
 
 
 def brightest_around(photo: np.ndarray) -> np.ndarray:
-    """[H, W, 3] the largest values of each pixel of a photo [H, W, 4] and its eight neighbours, where the object covers them."""
+    """[H, W, 3] the largest values of each pixel of a photo [H, W, 4] and its eight neighbours, where the object covers
+    them."""
     covered = torch.from_numpy(photo[..., :3] * (photo[..., 3:] >= MIN_ALPHA)).permute(2, 0, 1)
     return F.max_pool2d(covered, kernel_size=3, stride=1, padding=1).permute(1, 2, 0).numpy()
 
@@ -123,7 +124,8 @@ class PixelFilter:
     N_QUANTILES = 4096
 
     def density(self, offsets: np.ndarray) -> np.ndarray:
-        """[...] the density per square pixel of offsets [..., 2] from a pixel's centre, by differences of its quantiles."""
+        """[...] the density per square pixel of offsets [..., 2] from a pixel's centre, by differences of its
+        quantiles."""
         quantiles = self._at(np.arange(self.N_QUANTILES) / self.N_QUANTILES).astype(np.float64)
         quantiles = np.append(quantiles, self.WIDTH / 2)
         below, above = (

@@ -1,4 +1,4 @@
-"""The textures of an asset: which texels its charts cover, and what the points that rays meet read of them."""
+"""The textures of an asset: which texels its charts cover, and what points of the surface read from them."""
 
 from __future__ import annotations
 
@@ -98,7 +98,8 @@ class AssetTexels:
         self.pairs = torch.from_numpy(neighbours(covered, self.chart, self.size))
 
     def rows(self, footprints: Footprints) -> Tensor:
-        """[n, 4] the covered texels that points read; texels outside the charts have the value of the nearest inside."""
+        """[n, 4] the covered texels that points read; texels outside the charts have the value of the nearest
+        inside."""
         return self._row_of[footprints.texels]
 
     def spread(self, values: Tensor) -> Tensor:
@@ -134,7 +135,8 @@ class AssetTexels:
 
 
 class Materials(NamedTuple):
-    """Materials of points: albedo [n, 3], roughness and metallic [n, 1], unit shading normals [n, 3] that face the viewer."""
+    """Materials of points: albedo [n, 3], roughness and metallic [n, 1], unit shading normals [n, 3] that face the
+    viewer."""
 
     albedo: Tensor
     roughness: Tensor
@@ -179,7 +181,8 @@ def charts(asset: Asset) -> np.ndarray:
 
 
 def neighbours(covered: Texels, chart: np.ndarray, size: int, apart: int = 1) -> np.ndarray:
-    """[k, 2] pairs of covered texels beside or above each other, some texels apart in one chart; chart [m] is each texel's."""
+    """[k, 2] pairs of covered texels in one row or column and chart, `apart` texels from each other; chart [m] of each
+    texel."""
     chart_map, number = (np.full(size * size, -1, np.int64) for _ in range(2))
     chart_map[covered.index], number[covered.index] = chart, np.arange(len(covered.index))
     chart_map, number = chart_map.reshape(size, size), number.reshape(size, size)

@@ -1,4 +1,4 @@
-"""What like texels have in common: a prior for roughness and metal of those about which the photos say little."""
+"""Usual values of similar texels: a prior for roughness and metallic where the photos determine them poorly."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ METAL = 0.5  # the usual metallic from which on a kind of texels is metal
 
 
 def usual_gloss(unknowns: Tensor, start: Tensor, positions: np.ndarray, seed: int) -> Tensor:
-    """What each texel's roughness and metallic would be by what is like it: [m, n], NaN for all that has no such value.
+    """The usual roughness and metallic of texels similar to each one: [m, n], NaN where there is no such value.
 
-    The usual roughness is that of a colour; the usual metallic that of a colour in a place, at the start: what the prior itself
-    turned into metal would turn its neighbours, step by step. It counts where it is metal, for texels with less: a metal in which little is mirrored looks like a dark dielectric, so that islands of one arise in a
-    metal; the opposite is rare, and details of metal in the colour of the cloth around them are not to be lost. Without the
-    place, enamel would become metal where gold elsewhere has its colour.
+    The usual roughness is that of a colour. The usual metallic is that of a colour in a place, before all steps,
+    because metal that the prior made would spread to its neighbours. It counts only where it is metal, for texels with
+    less: a metal that mirrors little looks like a dark dielectric, which leaves islands of dielectric in metal. The
+    opposite is rare. Without the place, enamel would become metal where gold elsewhere has its colour.
 
     Args:
         unknowns: [m, n], see :mod:`splitnerf.refinement.unknowns`.
@@ -46,8 +46,9 @@ def usual_gloss(unknowns: Tensor, start: Tensor, positions: np.ndarray, seed: in
 def usual(values: Tensor, features: np.ndarray, n_kinds: int, random: np.random.Generator) -> Tensor:
     """[m] the usual value of each texel's kind.
 
-    Texels of like features are of one kind. Its usual value is the median of the texels around, weighted by a Gaussian of
-    their distance from the kind's centre. What the photos say of each has no weight: glossy texels would speak for all.
+    Texels of similar features are of one kind. Its usual value is the median of the texels around, weighted by a
+    Gaussian of their distance from the kind's centre. They are not weighted by certainty: glossy texels would decide
+    for all.
 
     Args:
         values: [m].
