@@ -202,7 +202,7 @@ def test_six_scenes_of_which_one_is_killed_and_one_damaged(data, tmp_path, call)
     first.wait_until(lambda: "splitnerf: note: ball: its worker was killed; it goes on from its last checkpoint" in first.err)
     first.wait_until(lambda: sum((out / scene.name / "mesh.glb").exists() for scene in good) >= 2)
     first.program.send_signal(signal.SIGINT)
-    assert first.end() == INTERRUPTED and "stopped; to go on, repeat the command." in first.out
+    assert first.end() == INTERRUPTED and "stopped; to continue, repeat the command." in first.out
     assert not list(out.glob("*/lock")) and not list(out.rglob(".*"))
     states = {scene.name: scene.state for scene in known_scenes(out)}
     assert set(states.values()) <= {"done", "stopped", "waiting", "refused"} and "done" in states.values()

@@ -206,7 +206,7 @@ def test_an_interrupted_call_says_how_to_go_on(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr(capture_job, "prepare", interrupted)
     assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "data")]) == 130
-    assert "the same command goes on" in capsys.readouterr().err
+    assert "the same command continues" in capsys.readouterr().err
 
 
 def test_sigterm_ends_it_without_a_stack_trace(tmp_path):

@@ -191,10 +191,10 @@ def test_each_refresh_adds_a_mirror():
         )
         levels.append(bits.radiance.clone())
     assert bits.radiance.max() <= 0.5 + 1e-6
-    open_ = bits.senders.mirrored < 0
+    open_ = bits.emitters.mirrored < 0
     assert 0.05 < open_.float().mean() < 0.9
     torch.testing.assert_close(bits.radiance[open_], torch.full_like(bits.radiance[open_], 0.5))
-    once = (bits.senders.mirrored >= 0) & open_[bits.senders.mirrored.clamp(min=0)]
+    once = (bits.emitters.mirrored >= 0) & open_[bits.emitters.mirrored.clamp(min=0)]
     assert (levels[0][once] == 0).all()
     torch.testing.assert_close(levels[1][once], torch.full_like(levels[1][once], 0.25))
     assert torch.equal(levels[3][once], levels[1][once])

@@ -128,9 +128,9 @@ SKY = torch.zeros(256, 3)  # of as many directions as the bits have
 AIMS = torch.tensor([[0.0, 0.6, -0.8]]).repeat(256, 1)
 
 
-def sent(n: int, *senders: int, **changed: object) -> dict:
-    """Cached light, with that of n senders of these numbers, some of it changed."""
-    return {"sky": SKY, "aims": AIMS, "sent": torch.zeros(n, 3), "senders": torch.tensor(senders, dtype=torch.int64)} | changed
+def sent(n: int, *emitters: int, **changed: object) -> dict:
+    """Cached light, with that of n emitters of these numbers, some of it changed."""
+    return {"sky": SKY, "aims": AIMS, "sent": torch.zeros(n, 3), "emitters": torch.tensor(emitters, dtype=torch.int64)} | changed
 
 
 def gaps(texels: torch.Tensor) -> torch.Tensor:
@@ -151,7 +151,7 @@ ALLOWED = {
     ),
     "light that a mesh sends": lambda c: c.update(MESH, occlusion_light=sent(4, 0, 2, 255, 4 * 256 - 1)),
     "light of a mesh that nothing hits": lambda c: c.update(MESH, occlusion_light=sent(0)),
-    "light that was not sent yet": lambda c: c.update(MESH, occlusion_light=sent(0, sent=None, senders=None)),
+    "light that was not sent yet": lambda c: c.update(MESH, occlusion_light=sent(0, sent=None, emitters=None)),
     "light that weighs rays": lambda c: c.update(environment=torch.zeros(32, 64, 3)),
     "a GPU": lambda c: c.update(device="cuda", generator=torch.zeros(16, dtype=torch.uint8)),
 }  # fmt: skip
@@ -171,23 +171,23 @@ REFUSED = {
         lambda c: c["occlusion_light"].update(aims=torch.cat([AIMS[1:], 1.01 * AIMS[:1]])), "are not of length 1",
     ),
     "an aim of NaN": (lambda c: c["occlusion_light"]["aims"][7].fill_(torch.nan), "the traced directions has NaN"),
-    "light of other senders": (
+    "light of other emitters": (
         lambda c: c.update(MESH, occlusion_light=sent(5, 0, 2, 3, 4)), "the light that the mesh sends is missing",
     ),
-    "light of senders of no numbers": (
-        lambda c: c.update(MESH, occlusion_light=sent(4, senders=None)), "the number of each sender is missing",
+    "light of emitters of no numbers": (
+        lambda c: c.update(MESH, occlusion_light=sent(4, emitters=None)), "the number of each emitter is missing",
     ),
-    "numbers of senders without light": (
+    "numbers of emitters without light": (
         lambda c: c.update(MESH, occlusion_light=sent(4, 0, 2, 3, 4, sent=None)), "the light that the mesh sends is missing",
     ),
-    "senders out of order": (lambda c: c.update(MESH, occlusion_light=sent(3, 0, 5, 4)), "senders do not ascend"),
-    "a sender twice": (lambda c: c.update(MESH, occlusion_light=sent(3, 0, 5, 5)), "senders do not ascend"),
-    "a sender one too far": (lambda c: c.update(MESH, occlusion_light=sent(2, 0, 4 * 256)), "name vertices that are none"),
-    "a sender before the first": (lambda c: c.update(MESH, occlusion_light=sent(2, -1, 4)), "name vertices that are none"),
+    "emitters out of order": (lambda c: c.update(MESH, occlusion_light=sent(3, 0, 5, 4)), "emitters do not ascend"),
+    "an emitter twice": (lambda c: c.update(MESH, occlusion_light=sent(3, 0, 5, 5)), "emitters do not ascend"),
+    "an emitter one too far": (lambda c: c.update(MESH, occlusion_light=sent(2, 0, 4 * 256)), "name vertices that are none"),
+    "an emitter before the first": (lambda c: c.update(MESH, occlusion_light=sent(2, -1, 4)), "name vertices that are none"),
     "light of no mesh": (
         lambda c: c.update(occlusion_light=sent(2, 0, 4), mesh_vertices=None, mesh_faces=None), "name vertices that are none",
     ),
-    "senders without aims": (lambda c: c["occlusion_light"].pop("aims"), "occlusion_light is missing or of another kind"),
+    "emitters without aims": (lambda c: c["occlusion_light"].pop("aims"), "occlusion_light is missing or of another kind"),
     "a mesh of a number": (lambda c: c.update(MESH, mesh_vertices=torch.tensor(1.0)), "mesh_vertices is missing"),
     "no light of the occlusion": (lambda c: c.update(occlusion_light={}), "occlusion_light is missing"),
     "light of an occlusion without any": (

@@ -124,7 +124,7 @@ def test_the_grid_of_a_gpu_waits_for_no_count(monkeypatch):
 
 
 @pytest.mark.parametrize("device", ["cpu", "cuda"])
-def test_a_gpu_shades_a_million_senders_at_a_time(monkeypatch, device):
+def test_a_gpu_shades_a_million_emitters_at_a_time(monkeypatch, device):
     """Where each part costs the host its launches; the CPU takes parts that stay in its caches."""
     parts, shade = [], model.split_sum_shade
     monkeypatch.setattr(visibility, "SHADED_CHUNK", visibility.SHADED_CHUNK | {"cpu": 50})
@@ -135,7 +135,7 @@ def test_a_gpu_shades_a_million_senders_at_a_time(monkeypatch, device):
         scene.sdf_field.grid.table.data.normal_(0.0, 0.3)
         scene.sdf_field.hidden_direction.data[:, 3:].normal_(0.0, 0.05)  # dents, that rays from the surface hit
         SurfaceMesh(scene).request(0.1)
-        n = len(scene.occlusion.senders.vertices)
+        n = len(scene.occlusion.emitters.vertices)
         parts.clear()
         scene.refresh_indirect(scene.evaluate_light())
     assert n > 100 and parts == ([n] if device == "cuda" else [50] * (n // 50) + [n % 50] * (n % 50 > 0))

@@ -125,7 +125,7 @@ def test_views_are_evenly_spread(views):
     assert choose_views(views, Protocol(views=3))[0].frame_names == ["r_0", "r_2", "r_4"]
     assert len(choose_views(views, Protocol())[0]) == 5
     for count in (0, 6):
-        with pytest.raises(InputError, match=f"has 5 test views, {count} were asked for"):
+        with pytest.raises(InputError, match=f"has 5 test views, {count} were requested"):
             choose_views(views, Protocol(views=count))
     with pytest.raises(InputError, match="--spp must be at least 1"):
         choose_views(views, Protocol(spp=0))

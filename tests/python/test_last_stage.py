@@ -19,7 +19,7 @@ from tiny_runs import train
 
 from splitnerf import delivery, progress
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
-from splitnerf.cli.summary import print_last_stage
+from splitnerf.cli.summary import print_refinement
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image
 from splitnerf.data.tensor_files import read_tensors
@@ -397,9 +397,9 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     summary = delivery.last_stage_summary(folder)
     before, after = summary["photos_psnr"]
     assert after > before and summary["steps"] == 4
-    print_last_stage(summary)
+    print_refinement(summary)
     assert f"colours {before:.2f} -> {after:.2f} dB, coverage at the outline" in capsys.readouterr().out
-    print_last_stage(None)
+    print_refinement(None)
     assert capsys.readouterr().out == ""
 
 

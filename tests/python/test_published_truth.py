@@ -63,9 +63,9 @@ def test_the_truth_scores_nearly_perfectly_by_the_protocol_of_its_set(layout, tm
 @pytest.mark.parametrize(("options", "message"), [
     (["--protocol", "nerfactor"], "--protocol needs --data"),
     (["--protocol", "nerfactor", "--data", "D"], "does not look like nerfactor's data"),
-    (["--protocol", "shiny", "--data", "D", "--lights", "low"], "--lights does not go with --protocol"),
-    (["--protocol", "nerfactor", "--data", "D", "--views", "3"], "--views does not go with --protocol nerfactor"),
-    (["--protocol", "nerfactor", "--data", "D", "--downscale", "2"], "--downscale does not go with --protocol"),
+    (["--protocol", "shiny", "--data", "D", "--lights", "low"], "--lights cannot be used with --protocol"),
+    (["--protocol", "nerfactor", "--data", "D", "--views", "3"], "--views cannot be used with --protocol nerfactor"),
+    (["--protocol", "nerfactor", "--data", "D", "--downscale", "2"], "--downscale cannot be used with --protocol"),
     (["--data", "D", "--truth", "D"], "--truth needs --protocol"),
 ])  # fmt: skip
 def test_options_that_do_not_fit(options, message, tmp_path, capsys):
@@ -79,4 +79,4 @@ def test_another_file_is_not_replaced_by_scores(tmp_path, capsys):
     write_image(tmp_path / "a.png", np.zeros((2, 2)))
     options = ["--protocol", "nerfactor", "--data", str(tmp_path), "--out", str(tmp_path / "a.png")]
     assert main(["evaluate", str(tmp_path / "a.glb"), *options]) == BAD_INPUT
-    assert "is no earlier result" in capsys.readouterr().err
+    assert "is not an earlier result" in capsys.readouterr().err

@@ -58,7 +58,7 @@ def test_relight_replaces_only_its_own_pictures(tmp_path, asset, grey, capsys):
     before = {path: path.read_bytes() for path in photos.iterdir()}
     for words in ((), ("--overwrite",), ("--overwrite", "--turntable", "2")):
         error = refused(capsys, *relit(asset, "--env", grey, "--out", photos, *words))
-        assert "000.exr: is none that relight wrote" in error
+        assert "000.exr: was not written by relight" in error
     assert before == {path: path.read_bytes() for path in photos.iterdir()}
     for name in ("000.png", "000.exr"):
         (photos / name).unlink()
@@ -186,7 +186,7 @@ def test_scores_of_another_run_are_not_replaced(data, other_data, tmp_path, caps
     assert "was trained on other images" in refused(capsys, "evaluate", run, "--data", other_data)
     for option, victim in (("--table", "checkpoint.pt"), ("--out", "checkpoint.pt"), ("--out", "config.toml")):
         words = ["evaluate", run, "--data", data, option, run / victim]
-        assert f"{victim}: is no earlier result, and would be replaced" in refused(capsys, *words)
+        assert f"{victim}: is not an earlier result, and would be replaced" in refused(capsys, *words)
     assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     (tmp_path / "empty.json").touch()
     for _ in range(2):

@@ -204,8 +204,8 @@ def test_walls_behind_each_other_are_segments_of_their_own(monkeypatch, capacity
     assert n_rays == n - 1 and n_segments == 2 * (n - 1) < m and ray.opacity[0] > 0.8
     _, segments = model.occlusion.asked
     x = ray.positions[:, 0]
-    torch.testing.assert_close(x[segments.leaders[:n_segments]].abs(), torch.full((n_segments,), 0.5), rtol=0, atol=0.05)
-    assert torch.equal(x[segments.leaders][segments.segment][:m].sign(), x[:m].sign())
+    torch.testing.assert_close(x[segments.representatives[:n_segments]].abs(), torch.full((n_segments,), 0.5), rtol=0, atol=0.05)
+    assert torch.equal(x[segments.representatives][segments.segment][:m].sign(), x[:m].sign())
     candidates, number = asked[0][3:]
     assert (number is None) == (capacity is None) and (number is None or number == n_rays)
     torch.testing.assert_close(x[candidates[:n_rays]], torch.full((n_rays,), 0.5), rtol=0, atol=0.05)

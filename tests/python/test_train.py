@@ -78,7 +78,7 @@ def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     after = render_maps(model, grid, dataset, 0)
     ours, stored = model.occlusion, trained.model.occlusion
     assert len(content["mesh_vertices"]) == len(ours.cache.vertices)
-    assert torch.equal(ours.directions, stored.directions) and len(ours.senders.vertices) == len(stored.radiance)
+    assert torch.equal(ours.directions, stored.directions) and len(ours.emitters.vertices) == len(stored.radiance)
     for name in ("occlusion_d", "occlusion_s", "rgb"):
         np.testing.assert_allclose(before[name], after[name], atol=0.02, err_msg=name)
     assert 0.0 < before["occlusion_d"][before["alpha"] > 0.5].mean() <= 1.0

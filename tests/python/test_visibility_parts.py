@@ -83,7 +83,7 @@ def test_the_numbers_of_set_bits():
 @pytest.mark.parametrize("indirect", [True, False])
 def test_what_is_kept_of_a_mesh_is_what_its_vertices_see(indirect):
     """From the offset along the normals, in the directions of the light, as many vertices as came, though two are in
-    one place; what they hit where it counts, by the number of the sender."""
+    one place; what they hit where it counts, by the number of the emitter."""
     mesh = dented()
     vertices, faces = corners(mesh)[0], faces_of(mesh)
     vertices, faces = torch.cat([vertices, vertices[faces[-1]]]), faces.clone()
@@ -102,34 +102,34 @@ def test_what_is_kept_of_a_mesh_is_what_its_vertices_see(indirect):
         )
         assert torch.equal(traced.cache.vertices, vertices) and torch.equal(traced.cache.normals, normals)
         assert torch.equal(traced.cache.directions, towards) and traced.cache.radius == expected.radius
-        assert torch.equal(traced.cache.bits, expected.bits) and (traced.senders is not None) == indirect
+        assert torch.equal(traced.cache.bits, expected.bits) and (traced.emitters is not None) == indirect
         if indirect:
-            hits, senders = traced.cache.hits, traced.senders
+            hits, emitters = traced.cache.hits, traced.emitters
             assert torch.equal(hits >= 0, expected.hits >= 0)
             vertex, direction = (hits >= 0).nonzero().unbind(1)
             row = hits[vertex, direction].long()
-            assert torch.equal(senders.vertices[row], expected.hits[vertex, direction].long())
-            assert torch.equal(senders.directions[row], direction)
-            assert torch.equal(row.unique(), torch.arange(len(senders.vertices)))
-            assert len(set(zip(*(x.tolist() for x in senders[:2])))) == len(senders.vertices) > 100
+            assert torch.equal(emitters.vertices[row], expected.hits[vertex, direction].long())
+            assert torch.equal(emitters.directions[row], direction)
+            assert torch.equal(row.unique(), torch.arange(len(emitters.vertices)))
+            assert len(set(zip(*(x.tolist() for x in emitters[:2])))) == len(emitters.vertices) > 100
         else:
             assert traced.cache.hits.numel() == 0
 
 
-def test_a_sender_knows_its_sides_and_what_it_mirrors():
+def test_a_emitter_knows_its_sides_and_what_it_mirrors():
     """It is seen against the ray that hits it. What it mirrors is what its own vertex sees in the traced direction that
     is nearest to the mirrored one."""
     bits = bits_on(dented())
-    senders, n = bits.senders, bits.cache.normals[bits.senders.vertices]
-    ray = bits.directions[senders.directions]
+    emitters, n = bits.emitters, bits.cache.normals[bits.emitters.vertices]
+    ray = bits.directions[emitters.directions]
     mirrored = ray - 2 * (ray * n).sum(1, keepdim=True) * n
     nearest = ((mirrored[:, None] - bits.directions) ** 2).sum(-1)
     least, found = nearest.topk(2, largest=False)
     clear = least[:, 1] - least[:, 0] > 1e-5
-    expected = bits.cache.hits[senders.vertices, found[:, 0]].long()
-    assert torch.equal(senders.mirrored[clear], expected[clear]) and clear.float().mean() > 0.9
-    assert 0.01 < (senders.mirrored >= 0).float().mean() < 0.99
-    assert torch.equal(senders.facing, (ray * n).sum(1, keepdim=True) < 0)
+    expected = bits.cache.hits[emitters.vertices, found[:, 0]].long()
+    assert torch.equal(emitters.mirrored[clear], expected[clear]) and clear.float().mean() > 0.9
+    assert 0.01 < (emitters.mirrored >= 0).float().mean() < 0.99
+    assert torch.equal(emitters.facing, (ray * n).sum(1, keepdim=True) < 0)
 
 
 def test_a_mesh_is_convex_whose_every_vertex_sees_all_but_a_share_of_its_sky():
@@ -145,17 +145,17 @@ def test_a_mesh_is_convex_whose_every_vertex_sees_all_but_a_share_of_its_sky():
 
 
 def test_a_new_mesh_takes_the_place_of_the_one_before():
-    """With its bits, directions and senders, its convexity, and no light of its own."""
+    """With its bits, directions and emitters, its convexity, and no light of its own."""
     bits = bits_on(dented(), open_below=0.02)
     assert bits.ready and not bits.is_unoccluded
     lit_up(bits)
-    assert len(bits.radiance) == len(bits.senders.vertices) > 0
+    assert len(bits.radiance) == len(bits.emitters.vertices) > 0
     ball, place = trimesh.creation.icosphere(2), bits.directions.data_ptr()
     bits.aim(EvaluatedLight(Painted()))
     bits.use(bits.trace(scene_of(ball), corners(ball)[0], faces_of(ball)))
     assert bits.is_unoccluded and bits.radiance is None and len(bits.cache.vertices) == len(ball.vertices)
     assert torch.equal(bits.directions, bits.aims) and bits.directions.data_ptr() == place
-    assert not torch.equal(bits.directions, bits.centres) and len(bits.senders.vertices) == 0
+    assert not torch.equal(bits.directions, bits.centres) and len(bits.emitters.vertices) == 0
     assert not VisibilityBits(256, OFFSET, 3, True).ready
     visible, sent = bits.visibility(torch.zeros(5, 3), torch.ones(5, 3))
     assert torch.equal(visible, torch.ones(5, 256)) and sent is None
@@ -208,7 +208,7 @@ def test_the_light_is_kept_in_its_place_for_recorded_steps():
     assert torch.equal(bits.light, expected.radiance) and not bits.light.requires_grad
     bits.set_light(EvaluatedLight(light, expected._replace(radiance=2 * expected.radiance)))
     assert torch.equal(bits.light, 2 * expected.radiance)
-    bits.restore_light({"sky": expected.radiance.detach(), "sent": None, "senders": None})
+    bits.restore_light({"sky": expected.radiance.detach(), "sent": None, "emitters": None})
     assert torch.equal(bits.light, expected.radiance) and bits.light.data_ptr() == place
     assert not bits.state_dict()
 
@@ -227,38 +227,38 @@ def test_light_that_was_kept_comes_back():
         if sends:
             lit_up(ours)
         kept = {name: x if x is None else x.clone() for name, x in ours.cached_light().items()}
-        assert (kept["sent"] is not None) == (kept["senders"] is not None) == sends
+        assert (kept["sent"] is not None) == (kept["emitters"] is not None) == sends
         theirs.restore_light(kept)
         for a, b in zip(ours(queries(mesh)), theirs(queries(mesh))):
             assert (a is None and b is None) or torch.equal(a, b)
     assert torch.equal(theirs.radiance, kept["sent"]) and theirs.radiance.data_ptr() != kept["sent"].data_ptr()
-    theirs.restore_light(kept | {"sent": None, "senders": None})
+    theirs.restore_light(kept | {"sent": None, "emitters": None})
     assert theirs.radiance is None
 
 
-def test_light_of_other_senders_comes_back_to_those_that_are_there():
+def test_light_of_other_emitters_comes_back_to_those_that_are_there():
     """Rays of another machine may hit a few others: those that are not stored keep what they have."""
     bits = bits_on(dented())
     lit_up(bits)
     before, kept = bits.radiance.clone(), bits.cached_light()
-    numbers = bits.senders.vertices * 256 + bits.senders.directions
-    assert torch.equal(kept["senders"], numbers) and (numbers.diff() > 0).all()
+    numbers = bits.emitters.vertices * 256 + bits.emitters.directions
+    assert torch.equal(kept["emitters"], numbers) and (numbers.diff() > 0).all()
     lost = torch.arange(len(numbers)) % 3 == 1
     strange = torch.tensor([n for n in range(numbers[-1] + 9) if n not in set(numbers.tolist())][::50])
     theirs, order = torch.cat([numbers[~lost], strange]).sort()
     sent = torch.cat([2 * before[~lost], torch.full((len(strange), 3), 77.0)])[order]
-    bits.restore_light(kept | {"sent": sent, "senders": theirs})
+    bits.restore_light(kept | {"sent": sent, "emitters": theirs})
     torch.testing.assert_close(bits.radiance, torch.where(lost[:, None], before, 2 * before))
 
 
 @pytest.mark.parametrize("chunk", [1 << 15, 50])
-def test_each_sender_sends_what_it_reflects(monkeypatch, chunk):
+def test_each_emitter_sends_what_it_reflects(monkeypatch, chunk):
     """The materials of its vertex under the light there, towards the ray that sees it, in parts; again in the same
-    memory, after the first was read. Its mirror shows the sky, blurred by a cell, or what another sender sent before."""
+    memory, after the first was read. Its mirror shows the sky, blurred by a cell, or what another emitter sent before."""
     monkeypatch.setattr(visibility, "SHADED_CHUNK", {"cpu": chunk})
     bits, light, asked, seen, before = bits_on(dented()), EvaluatedLight(Hazy()), [], [], []
     bits.set_light(light)
-    cache, senders = bits.cache, bits.senders
+    cache, emitters = bits.cache, bits.emitters
 
     def materials(x: torch.Tensor) -> tuple[torch.Tensor, ...]:
         assert len(x) <= chunk and not torch.is_grad_enabled()
@@ -272,7 +272,7 @@ def test_each_sender_sends_what_it_reflects(monkeypatch, chunk):
         return torch.stack([here[0][:, 0], views[:, 1] + light_s[:, 1], light_d[:, 2]], 1)
 
     x, n, rho = cache.vertices, cache.normals, 0.3 + 0.2 * cache.vertices[:, :1]
-    at, views, up = senders.vertices, -bits.directions[senders.directions], torch.ones(len(x), 1)
+    at, views, up = emitters.vertices, -bits.directions[emitters.directions], torch.ones(len(x), 1)
     here, previous = (x.abs()[at], rho[at], 7 * x[at, 1:2]), None
     for turn in range(3):
         asked.clear(), seen.clear(), before.clear()
@@ -283,11 +283,11 @@ def test_each_sender_sends_what_it_reflects(monkeypatch, chunk):
         o_d, _, i_d, _ = cached_occlusion(cache, x, n, n, rho, bits.light, previous)
         light_d = (o_d * light(n, up) + (0 if i_d is None else i_d))[at]
         sky = light(query_direction(n[at], views, rho[at]), (rho[at] ** 4 + 1 / 256) ** 0.25)
-        shown = torch.zeros_like(sky) if previous is None else previous[senders.mirrored.clamp(min=0)]
-        light_s = torch.where((senders.mirrored < 0)[:, None], sky, shown)
+        shown = torch.zeros_like(sky) if previous is None else previous[emitters.mirrored.clamp(min=0)]
+        light_s = torch.where((emitters.mirrored < 0)[:, None], sky, shown)
         for found, expected in zip(map(torch.cat, zip(*seen)), (n[at], views, *here, light_s, light_d)):
             torch.testing.assert_close(found, expected)
-        sent = torch.stack([here[0][:, 0], views[:, 1] + light_s[:, 1], light_d[:, 2]], 1) * senders.facing
+        sent = torch.stack([here[0][:, 0], views[:, 1] + light_s[:, 1], light_d[:, 2]], 1) * emitters.facing
         torch.testing.assert_close(bits.radiance, sent)
         assert place in (None, bits.radiance.data_ptr()) and not bits.radiance.requires_grad
         assert previous is None or (bits.radiance - previous).abs().max() > 1e-3

@@ -64,7 +64,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def execute(args: argparse.Namespace) -> tuple[int, str]:
-    """Runs a command; returns the exit code and, where it failed, one line that says why."""
+    """Runs a command; returns the exit code and, if it failed, one line with the reason."""
     try:
         code = args.execute(args)
         sys.stdout.flush()

@@ -19,9 +19,9 @@ SETS = ("stanford-orb", "nerfactor", "tensoir", "shiny")
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "evaluate", help="score runs or GLB files against the truth, and put the scores into a table",
-        description="Path-traces the test views of DATA, of the asset that RUN's last stage fitted or of a GLB file (a RUN "
-        "without a last stage is rendered from its checkpoint), relights the asset under the data's maps, and writes "
-        "evaluation.json and report.html into RUN (for a file FILE_evaluation.json beside it). Without --data it reads the "
+        description="Path-traces the test views of DATA, of the asset that RUN's refinement fitted or of a GLB file (a RUN "
+        "without refinement is rendered from its checkpoint), relights the asset under the data's maps, and writes "
+        "evaluation.json and report.html into RUN (for a file FILE_evaluation.json next to it). Without --data it reads the "
         "scores written before, for --table. With --protocol it scores by the rules of a published set.",
         epilog=examples(
             "splitnerf evaluate runs/a --data data",
@@ -54,7 +54,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         "--protocol", choices=SETS, metavar="SET",
-        help=f"score mesh.glb as a published set is, beside published numbers, and write RUN/SET.json: {', '.join(SETS)}",
+        help=f"score mesh.glb by the rules of a published set, print the published scores too, and write RUN/SET.json: {', '.join(SETS)}",
     )  # fmt: skip
     parser.add_argument(
         "--truth", type=Path, metavar="FOLDER",
@@ -70,7 +70,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--env",
         type=Path,
         metavar="MAP",
-        help="the light of the photos, for a GLB file (default: the environment.exr or .hdr beside it)",
+        help="the light of the photos, for a GLB file (default: the environment.exr or .hdr in its folder)",
     )
     parser.add_argument(
         "--out", type=Path, metavar="FILE.json", help="where to write the scores of one RUN; leaves RUN untouched"
@@ -113,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check_usage(args: argparse.Namespace) -> None:
-    """Refuses options that do not go together, and files of other kinds in the place of results.
+    """Refuses options that exclude each other, and files of other kinds in the place of results.
 
     Raises:
         InputError: Two options exclude each other, or a file would be lost; the message names them.
@@ -128,9 +128,9 @@ def check_usage(args: argparse.Namespace) -> None:
     ruled_out = [name for name in OWN_RULES if getattr(args, name) is not None]
     if args.protocol and (ruled_out or args.downscale != 1):
         name = (ruled_out or ["downscale"])[0].replace("_", "-")
-        raise InputError(f"--{name} does not go with --protocol, which has rules of its own; leave it out")
+        raise InputError(f"--{name} cannot be used with --protocol, which has rules of its own; leave it out")
     if args.protocol and args.views is not None and args.protocol not in ("tensoir", "shiny"):
-        raise InputError(f"--views does not go with --protocol {args.protocol}, which chooses its views; leave it out")
+        raise InputError(f"--views cannot be used with --protocol {args.protocol}, which chooses its views; leave it out")
     if args.truth is not None and not args.protocol:
         raise InputError("--truth needs --protocol; leave it out")
     if args.data and len(args.data) not in (1, len(args.targets)):
@@ -145,7 +145,7 @@ def check_usage(args: argparse.Namespace) -> None:
     holds = holds_published if args.protocol else holds_evaluation
     for name, path, is_ours in (("table", args.table, holds_table), ("out", args.out, holds)):
         if path is not None and path.is_file() and path.stat().st_size and not is_ours(path):
-            raise InputError(f"{path}: is no earlier result, and would be replaced; give another --{name}")
+            raise InputError(f"{path}: is not an earlier result, and would be replaced; give another --{name}")
 
 
 def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
@@ -172,7 +172,8 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
 
 
 def score_by_set(target: Path, data: Path, args: argparse.Namespace) -> None:
-    """Scores one run or file by the protocol of a published set, writes the scores, and prints them beside published ones."""
+    """Scores one run or file by the protocol of a published set, writes the scores, and prints them with published
+    ones."""
     from splitnerf.data.json_files import write_json
     from splitnerf.evaluate.jobs import is_asset
     from splitnerf.evaluate.published.common import Options

@@ -15,7 +15,7 @@ MIN_FACES = 100
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "export", help="write a run's textured mesh and light",
-        description="Writes what RUN trained, before its last stage: mesh.glb (watertight where the object is, decimated, "
+        description="Writes what RUN trained, before its refinement: mesh.glb (watertight where the object is, decimated, "
         "UV-unwrapped, with albedo, occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex "
         "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces and "
         "the walls of cavities are dropped.",
@@ -25,7 +25,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ),
     )  # fmt: skip
     parser.add_argument("run", type=Path, metavar="RUN")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained after a last stage)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained if it was refined)")
     for option, kind, default, name, text in (
         ("--faces", int, None, "N", "faces of the textured mesh, 0 keeps all (default: as in training)"),
         ("--texture-size", int, None, "N", "texels along an edge (default: as in training)"),

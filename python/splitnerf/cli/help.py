@@ -1,4 +1,4 @@
-"""How the commands' help looks: examples stand at its end, a line each."""
+"""The format of the commands' help: examples at its end, a line each."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from splitnerf.data.reading import Reading
 
 
-def add_reading_options(parser: argparse.ArgumentParser, default: str = "as the data say or look like") -> None:
-    """Adds --eval-mode, --mask-kind and --max-memory; `default` says in the help of the first two what holds without them."""
+def add_reading_options(parser: argparse.ArgumentParser, default: str = "as the data state or suggest") -> None:
+    """Adds --eval-mode, --mask-kind and --max-memory; `default` is the help text of the first two's default."""
     parser.add_argument(
         "--eval-mode", choices=["all", "fraction", "filename"],
         help="what of the data is for testing: fraction, every 8th view; filename, the views with `test` or `eval` in "
@@ -36,7 +36,7 @@ def reading_options(args: argparse.Namespace) -> dict[str, object]:
 
 
 def reading_of(args: argparse.Namespace, target: Path) -> Reading:
-    """How to read data: as the options say, else as the run does that `target` is or is a file of, else by default."""
+    """How to read data: by the options, else as in the run that `target` is or belongs to, else by default."""
     from splitnerf.config import Config
     from splitnerf.data.reading import SEPARATED, is_separated
 

@@ -1,4 +1,5 @@
-"""Standard output and error that outlive their reader: a long run does not end because a pipe or a terminal did."""
+"""Standard output and error that survive the end of their reader, a pipe or a terminal, so that a long run
+continues."""
 
 from __future__ import annotations
 
@@ -15,12 +16,12 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class Lasting:
-    """A text stream: what is written after its reader has gone is dropped.
+    """A text stream that drops what is written after its reader has ended.
 
     Args:
         stream: The stream.
-        results: Whether it takes results, and not words about the work: a full disk is then an error, and a terminal
-            shows the names of files and does not obey them.
+        results: Whether it carries results in place of messages: a full disk is then an error, and control characters
+            in names of files are shown and not obeyed by a terminal.
     """
 
     def __init__(self, stream: TextIO, *, results: bool):
@@ -45,7 +46,7 @@ class Lasting:
         except OSError as error:
             if self._results and error.errno in NO_ROOM:
                 raise
-            with suppress(OSError, ValueError):  # what is left in its buffer goes nowhere either
+            with suppress(OSError, ValueError):  # the rest of its buffer is dropped too
                 nowhere = os.open(os.devnull, os.O_WRONLY)
                 os.dup2(nowhere, self._stream.fileno())
                 os.close(nowhere)
@@ -55,7 +56,7 @@ class Lasting:
 
 @contextmanager
 def lasting_streams() -> Iterator[None]:
-    """Within the block both streams are there and last."""
+    """Within the block both streams exist and survive the end of their readers."""
     while (number := os.open(os.devnull, os.O_RDWR)) <= 2:  # else the next file of the program would take the number
         pass
     os.close(number)

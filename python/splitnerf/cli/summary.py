@@ -8,26 +8,26 @@ from pathlib import Path
 def print_summary(
     run: Path, evaluation: dict, step: int | None = None, seconds: float | None = None, device: str = "cpu"
 ) -> None:
-    """Prints the steps and where they were made, the errors against the truth in the data, and the path of the results."""
+    """Prints the steps and the device, the errors against the truth in the data, and the path of the results."""
     if step is not None and seconds is not None:
         print(f"{step} steps in {seconds:.0f} s on the {'CPU' if device == 'cpu' else 'GPU'}")
-    print_last_stage(evaluation.get("last_stage"))
+    print_refinement(evaluation.get("last_stage"))
     print_scores(evaluation)
     print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")
 
 
-def print_last_stage(summary: dict | None) -> None:
-    """A line for what the last stage changed, if there was one."""
+def print_refinement(summary: dict | None) -> None:
+    """A line with the changes by the refinement, if there was one."""
     if summary is None:
         return
     changes = ["colours {:.2f} -> {:.2f} dB".format(*summary["photos_psnr"])]
     if summary["outline_error"]:
         changes.append("coverage at the outline, squared error {:.2g} -> {:.2g}".format(*summary["outline_error"]))
-    print(f"last stage, on the photos: {', '.join(changes)}, in {summary['steps']} steps, {summary['seconds']:.0f} s")
+    print(f"refinement, on the photos: {', '.join(changes)}, in {summary['steps']} steps, {summary['seconds']:.0f} s")
 
 
 def print_scores(evaluation: dict) -> None:
-    """A line for each score that there is, after its free scale where it has one."""
+    """A line for each score, after its free scale if it has one."""
     for name, key in (("novel views", "novel_view"), ("relit views", "relight"), ("albedo", "albedo")):
         scores = evaluation.get(key)
         if scores:

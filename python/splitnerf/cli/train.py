@@ -24,16 +24,16 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "train", help="reconstruct an object from posed images",
         description="Trains on DATA (transforms files, COLMAP's, NeuS's and other layouts, see docs/data.md), fits the exported asset and its light "
-        "to the photos in a last stage, and writes mesh.glb, mesh.ply, environment.exr/.hdr, evaluation.json and "
+        "to the photos, and writes mesh.glb, mesh.ply, environment.exr/.hdr, evaluation.json and "
         "report.html into the run's folder.",
         epilog=examples(
             "splitnerf train data --max-minutes 30", "splitnerf train data --preset fast --downscale 2 --out runs/fast",
             "splitnerf train data --resume auto --view",
             after="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient alone skips "
-            "its step. The message names where it came from; --resume goes on from the last checkpoint.",
+            "its step. The message names its origin; --resume continues from the last checkpoint.",
         ),
     )  # fmt: skip
-    parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images; masks help, else the object is looked for")
+    parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images; without masks the object is searched for")
     parser.add_argument("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
     add_alias(parser, "--output-dir", "--out")
     add_training_options(parser)
@@ -44,7 +44,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--resume", nargs="?", const=True, choices=["auto"], metavar="auto",
         help="continue the run in --out from its checkpoint; auto: begin where there is none, leave a finished run alone",
     )  # fmt: skip
-    parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
+    parser.add_argument("--overwrite", action="store_true", help="replace the run in --out")
     parser.add_argument(
         "--view", nargs="?", const=0, type=port, metavar="PORT",
         help="show the run in a page while it trains",
@@ -61,7 +61,7 @@ def port(text: str) -> int:
 
 
 def add_alias(parser: argparse.ArgumentParser, alias: str, option: str) -> None:
-    """Lets users type an option as other programs name it; the help does not list it."""
+    """Accepts another program's name of an option, which the help does not list."""
     of = next(action for action in parser._actions if option in action.option_strings)
     parser.add_argument(alias, dest=of.dest, type=of.type, default=argparse.SUPPRESS, help=argparse.SUPPRESS)
 
@@ -75,7 +75,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
     add_alias(parser, "--max-num-iterations", "--steps")
     add_alias(parser, "--n_steps", "--steps")
-    parser.add_argument("--max-minutes", type=float, metavar="M", help="time of training and last stage; the schedule fits itself to it")
+    parser.add_argument("--max-minutes", type=float, metavar="M", help="time of training and refinement; the schedule fits itself to it")
     parser.add_argument(
         "--device", choices=["auto", "cpu", "cuda"], default="auto",
         help="where to train; auto: on the GPU if it passes the operators' test, else on the CPU (default: auto)",
@@ -89,7 +89,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-refine",
         action="store_true",
-        help="no last stage: deliver what training exports, and give training all minutes",
+        help="no refinement: deliver what training exports, and give training all minutes",
     )
     parser.add_argument(
         "--set",
@@ -114,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def observers_of(args: argparse.Namespace, run: Path) -> list[AbstractContextManager[Observer]]:
-    """Who the options let look on."""
+    """The observers that the options request."""
     found = []
     if args.tensorboard:
         from splitnerf.training.tensorboard import TensorBoard
@@ -147,7 +147,7 @@ def settings_of(args: argparse.Namespace) -> dict[str, object]:
 def train_in(
     run: Path, args: argparse.Namespace, settings: dict[str, object], observers: Sequence[Observer] = ()
 ) -> int:
-    """Trains in a folder that this process holds, while observers look on, and prints the outcome; returns the exit code."""
+    """Trains in a locked folder, calls the observers, prints the outcome and returns the exit code."""
     from splitnerf.devices import choose_device
     from splitnerf.evaluate.jobs import read_evaluation
     from splitnerf.workflow import reconstruct
@@ -165,21 +165,21 @@ def train_in(
         observers=observers,
     )  # fmt: skip
     if evaluation is None:
-        where = "in the last stage" if trained.finished else f"at step {trained.step}"
-        print(f"stopped {where}; the state is in {run}. To go on, repeat the command with --resume.")
+        where = "in the refinement" if trained.finished else f"at step {trained.step}"
+        print(f"stopped {where}; the state is in {run}. To continue, repeat the command with --resume.")
         return INTERRUPTED
     print_summary(run, evaluation, trained.step, trained.seconds, device.type)
     return DONE
 
 
 class Plan(NamedTuple):
-    """What a command does in its run's folder.
+    """The plan of a command for its run's folder.
 
     Attributes:
         config: The settings.
         device: The name of the device.
-        resume, overwrite: What it does with a run that stands there.
-        is_finished: Whether that run is finished, and nothing is left to do.
+        resume, overwrite: What to do with an existing run.
+        is_finished: Whether that run is finished.
     """
 
     config: Config
@@ -190,7 +190,7 @@ class Plan(NamedTuple):
 
 
 def planned(run: Path, args: argparse.Namespace, settings: dict[str, object]) -> Plan:
-    """What a command does. Raises InputError where its options do not fit the run that stands there."""
+    """The plan of a command. Raises InputError where its options do not fit the existing run."""
     from splitnerf.config import preset
     from splitnerf.devices import choose_device
     from splitnerf.training.checkpoint import config_of, load_checkpoint
@@ -210,7 +210,8 @@ def planned(run: Path, args: argparse.Namespace, settings: dict[str, object]) ->
 
 
 def device_for(wanted: str, deterministic: bool) -> str:
-    """The name of the device that is asked for; for ``auto`` of one that is fit, and a note says why where torch finds a GPU."""
+    """The name of the requested device; for ``auto`` of a usable one, with a note on the reason where torch finds a
+    GPU."""
     import torch
 
     from splitnerf.devices import fit_device
@@ -225,7 +226,7 @@ def device_for(wanted: str, deterministic: bool) -> str:
 
 
 def budget(steps: int | None, minutes: float | None) -> dict[str, object]:
-    """The settings that end a run: the given one of steps and minutes; both together if both are given."""
+    """The settings that end a run: steps, minutes, or both."""
     from splitnerf.config.settings import UNLIMITED
 
     if minutes is None:

@@ -1,4 +1,4 @@
-"""The exposures of photos that a run was not trained on, by its own images of them."""
+"""The exposures of held-out photos, fitted to the run's own images of them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from splitnerf.data.images import srgb_to_linear
 from splitnerf.data.pixels import per_channel
 from splitnerf.data.truth import OPAQUE
 
-DARKEST, BRIGHTEST = 0.01, 0.95  # linear values of a photo as it is that count
+DARKEST, BRIGHTEST = 0.01, 0.95  # linear values of a photo between which pixels count
 
 
 def exposed_like(views: Dataset, predictions: Sequence[dict[str, np.ndarray]]) -> Dataset:
-    """Views whose exposure is that at which they are nearest to predictions: one factor a photo, the median of the ratios of
-    the channels' means where the object covers both; photos without such pixels stay.
+    """Views with exposures fitted to predictions: one factor a photo, the median ratio of the channels' means where the
+    object covers both. Photos without such pixels keep their exposure.
 
     Args:
         views: The photos.

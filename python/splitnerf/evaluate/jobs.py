@@ -29,7 +29,7 @@ from splitnerf.render.path_traced import MOST_SPP, AssetRenderer
 
 @dataclass(frozen=True)
 class Protocol:
-    """Which views and lights an evaluation takes.
+    """The views and lights of an evaluation.
 
     Attributes:
         downscale: Integer factor by which images are averaged down.
@@ -75,7 +75,7 @@ def choose_views(dataset: Dataset, protocol: Protocol) -> tuple[Dataset, dict[st
     """The views of a split that a protocol takes, and its maps.
 
     Raises:
-        InputError: The data do not hold what the protocol asks for.
+        InputError: The data lack views or maps that the protocol needs.
     """
     maps = relight_maps(dataset, protocol.maps, protocol.lights)
     count = protocol.views
@@ -83,7 +83,7 @@ def choose_views(dataset: Dataset, protocol: Protocol) -> tuple[Dataset, dict[st
         count = PROTOCOLS[protocol.lights][1] if protocol.lights else len(dataset)
     if not 1 <= count <= len(dataset):
         found = f"{dataset.root}: has {len(dataset)} {dataset.split} views"
-        raise InputError(f"{found}, {count} were asked for; change --views")
+        raise InputError(f"{found}, {count} were requested; change --views")
     return dataset.select(spread(range(len(dataset)), count)), maps
 
 
@@ -109,7 +109,7 @@ def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None 
         path: The file, in the data's world frame as a run exports it.
         data: The dataset.
         protocol: Views and lights.
-        env: The light of the photos for the novel views; None for the environment.exr or .hdr beside the file. Without
+        env: The light of the photos for the novel views; None for the environment.exr or .hdr in its folder. Without
             either `novel_view` and `light_psnr` are None.
 
     Raises:
@@ -157,7 +157,7 @@ def is_asset(path: Path) -> bool:
 
 
 def evaluation_path(target: Path) -> Path:
-    """Where the scores of a run, or of an asset's file, are kept."""
+    """The file of the scores of a run, or of an asset's file."""
     return target.with_name(f"{target.stem}_evaluation.json") if is_asset(target) else target / "evaluation.json"
 
 
@@ -165,7 +165,7 @@ def read_evaluation(target: Path) -> dict:
     """The scores that an earlier evaluation of a run or a file wrote.
 
     Raises:
-        InputError: There are none, or the file is not one of scores.
+        InputError: There are none, or the file holds no scores.
     """
     path = evaluation_path(target)
     if not path.is_file():

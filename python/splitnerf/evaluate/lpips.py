@@ -1,4 +1,5 @@
-"""LPIPS where installed: Zhang et al., The Unreasonable Effectiveness of Deep Features as a Perceptual Metric, 2018."""
+"""LPIPS, if it is installed: Zhang et al., The Unreasonable Effectiveness of Deep Features as a Perceptual Metric,
+2018."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ def load_distance() -> Distance | None:
 
 
 def find_distance() -> tuple[Distance | None, str]:
-    """The VGG distance of the package `lpips`, or None and what is missing for it, in a line.
+    """The VGG distance of the package `lpips`, or None and a line that says what is missing.
 
     Nothing is downloaded: the backbone's weights must lie in `checkpoints` of torch's hub folder.
 
@@ -44,7 +45,7 @@ def find_distance() -> tuple[Distance | None, str]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             network = lpips.LPIPS(net="vgg", verbose=False).eval()
-    except Exception as error:  # torch raises whatever a damaged file leads to
+    except Exception as error:  # a damaged file may raise anything
         return None, f"{weights} cannot be used ({plain(str(error))[:80]}); replace it by {SOURCE}"
 
     def distance(image: np.ndarray, truth: np.ndarray) -> float:

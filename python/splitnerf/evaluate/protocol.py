@@ -1,4 +1,4 @@
-"""What `splitnerf evaluate` measures: rendered maps of the test views against images and truth."""
+"""The scores of `splitnerf evaluate`: rendered maps of the test views against images and truth."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def evaluate_maps(
 ) -> dict:
     """Scores the maps of the test views, the light and the mesh.
 
-    PSNR and SSIM are over sRGB on white, means over images. Pixels that the photos do not know count in no PSNR of novel
-    views and are white in both images elsewhere. Albedo knows one free factor per channel and scene, since light and
-    albedo share it, see :func:`splitnerf.evaluate.similarity.scaled_scores`. Foreground is alpha > 0.9 in prediction
-    and truth.
+    PSNR and SSIM are over sRGB on white, means over images. Pixels that are invalid in the photos do not count in the
+    PSNR of novel views and are white in both images elsewhere. Albedo has one free factor per channel and scene, since
+    light and albedo share it, see :func:`splitnerf.evaluate.similarity.scaled_scores`. Foreground is alpha > 0.9 in
+    prediction and truth.
 
     Args:
         predictions: Per view float32 maps: `rgb` [H, W, 3] sRGB straight, `alpha` [H, W], `albedo` [H, W, 3] linear,

@@ -41,7 +41,7 @@ class RelitViews:
                 yield self.view(name, i)
 
     def view(self, name: str, index: int) -> ScaledView:
-        """One image beside its truth."""
+        """One image with its truth."""
         prediction = self.images[name][index].astype(np.float32) / 255
         truth = read_relit(self.dataset, index, name)
         return ScaledView(

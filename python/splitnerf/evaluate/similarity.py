@@ -18,7 +18,7 @@ SCORES = ("psnr", "ssim", "lpips")
 
 @dataclass
 class ScaledView:
-    """A prediction that is known up to one factor per channel, beside its truth.
+    """A prediction that is known up to one factor per channel, with its truth.
 
     Attributes:
         group: The group whose scores are averaged in addition to those of all views, such as the light's name.

@@ -102,8 +102,7 @@ def bake(
 ) -> Textures:  # fmt: skip
     """Evaluates the fields at each texel's point, which is first moved onto the zero level set along the mesh's normal.
 
-    Beside the maps it takes about as much memory for a texture of 8192 x 8192 as for a small one: the texels are evaluated
-    in bands.
+    The texels are evaluated in bands, so that the memory in addition to the maps does not grow with the texture.
 
     Args:
         mesh: The mesh, in the frame of the surface.

@@ -44,8 +44,8 @@ def glb_content(
     Args:
         asset: The asset, with one material.
         occlusion: [h, w] occlusion in [0, 1], 1 = open, with the size of the roughness-metallic texture; or None.
-        path: What messages call the file.
-        filtering: glTF's number of the textures' filter; None leaves it to who draws.
+        path: The name of the file in messages.
+        filtering: glTF's number of the textures' filter; None leaves it to the viewer.
 
     Raises:
         RuntimeError: See :func:`splitnerf.export.maps.encode_maps`.

@@ -67,7 +67,7 @@ def encode_maps(path: object, asset: Asset, occlusion: np.ndarray | None) -> Map
 
 
 def encoded(encode: Callable[..., np.ndarray], *maps: np.ndarray) -> np.ndarray:
-    """[h, w, 3] uint8 of what `encode` makes of maps [h, w] or [h, w, c], given to it some rows at a time."""
+    """[h, w, 3] uint8: `encode` of maps [h, w] or [h, w, c], called for some rows at a time."""
     height, width = maps[0].shape[:2]
     pixels, rows = np.empty((height, width, 3), np.uint8), max(1, BAND // width)
     for band in (slice(start, start + rows) for start in range(0, height, rows)):

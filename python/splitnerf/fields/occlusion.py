@@ -59,11 +59,11 @@ class RaySegments(NamedTuple):
     """Segments of rays, each on one surface, and the segment of each point.
 
     Attributes:
-        leaders: [k] int64, the point that represents each segment.
+        representatives: [k] int64, the point that represents each segment.
         segment: [n] int64, the segment of each point.
     """
 
-    leaders: Tensor
+    representatives: Tensor
     segment: Tensor
 
 
@@ -86,28 +86,28 @@ class TracedBits(NamedTuple):
     """The traced visibility of a mesh's vertices.
 
     Attributes:
-        cache: The visibility bits. ``hits`` are numbers of senders.
+        cache: The visibility bits. ``hits`` are numbers of emitters.
         is_unoccluded: Whether the mesh blocks so little that it counts as convex.
-        senders: The vertices that rays hit, each with the direction that it is hit from; None without indirect light.
+        emitters: The vertices that rays hit, each with the direction that it is hit from; None without indirect light.
     """
 
     cache: VisibilityCache
     is_unoccluded: bool
-    senders: Senders | None
+    emitters: Emitters | None
 
     def to(self, device: torch.device | str) -> TracedBits:
         """A copy on a device; tensors that already are there are not copied."""
-        senders = None if self.senders is None else self.senders.to(device)
-        return TracedBits(self.cache.to(device), self.is_unoccluded, senders)
+        emitters = None if self.emitters is None else self.emitters.to(device)
+        return TracedBits(self.cache.to(device), self.is_unoccluded, emitters)
 
 
-class Senders(NamedTuple):
+class Emitters(NamedTuple):
     """The mesh's vertices as they are seen: one row for each vertex and direction in which rays hit it.
 
     Attributes:
         vertices: [p] int64, the vertex.
         directions: [p] int64, the traced direction that hits it; it is seen from the opposite direction.
-        mirrored: [p] int64, the sender that the vertex sees in the mirror direction, -1 where that is open.
+        mirrored: [p] int64, the emitter that the vertex sees in the mirror direction, -1 where that is open.
         facing: [p, 1] bool, whether it is seen from the outside.
     """
 
@@ -116,9 +116,9 @@ class Senders(NamedTuple):
     mirrored: Tensor
     facing: Tensor
 
-    def to(self, device: torch.device | str) -> Senders:
+    def to(self, device: torch.device | str) -> Emitters:
         """A copy on a device."""
-        return Senders(*(part.to(device) for part in self))
+        return Emitters(*(part.to(device) for part in self))
 
 
 class OcclusionModel(nn.Module, abc.ABC):

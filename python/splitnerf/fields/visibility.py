@@ -21,7 +21,7 @@ from splitnerf.fields.occlusion import (
     OcclusionQuery,
     RaySegments,
     Reflect,
-    Senders,
+    Emitters,
     TracedBits,
 )
 from splitnerf.ops import (
@@ -38,7 +38,7 @@ from splitnerf.ops import (
 TEXELS_PER_CELL = 8  # fewest texels per direction of a light without texels of its own
 LOBE_DIRECTIONS = 15  # fewest directions within a lobe that a sum over the directions resolves
 DIM = 1e-12  # power of a cell, W / m^2, below which its direction is that of its centre
-SHADED_CHUNK = {"cpu": 1 << 15, "cuda": 1 << 20}  # vertices or senders shaded at a time
+SHADED_CHUNK = {"cpu": 1 << 15, "cuda": 1 << 20}  # vertices or emitters shaded at a time
 
 
 class Cells(NamedTuple):
@@ -63,8 +63,8 @@ def bit_counts(words: Tensor) -> Tensor:
     return torch.from_numpy(bits.sum(axis=1, dtype=np.int64))
 
 
-def senders_of(cache: VisibilityCache) -> tuple[Tensor, Senders]:
-    """The senders of a traced mesh, and the hits [n, k] int32 as numbers of senders in place of vertices."""
+def emitters_of(cache: VisibilityCache) -> tuple[Tensor, Emitters]:
+    """The emitters of a traced mesh, and the hits [n, k] int32 as numbers of emitters in place of vertices."""
     n_directions = len(cache.directions)
     vertex, direction = (cache.hits >= 0).nonzero().unbind(1)
     keys, row = torch.unique(cache.hits[vertex, direction].long() * n_directions + direction, return_inverse=True)
@@ -75,7 +75,7 @@ def senders_of(cache: VisibilityCache) -> tuple[Tensor, Senders]:
     cosine = (normals * view_dirs).sum(1, keepdim=True)
     mirror = 2.0 * cosine * normals - view_dirs
     nearest = torch.cat([(part @ cache.directions.T).argmax(1) for part in mirror.split(SHADED_CHUNK["cpu"])] or [directions])
-    return rows, Senders(vertices, directions, rows[vertices, nearest].long(), cosine > 0)
+    return rows, Emitters(vertices, directions, rows[vertices, nearest].long(), cosine > 0)
 
 
 class VisibilityBits(OcclusionModel):
@@ -85,7 +85,7 @@ class VisibilityBits(OcclusionModel):
     traced towards it, come from one direction: that of the cell's light when the mesh was made (:meth:`aim`).
 
     The module has no parameters and no state_dict: :meth:`use` stores the cache of a traced mesh, :meth:`set_light` the
-    current light, :meth:`refresh` the radiance of the senders. No gradient flows through the factors.
+    current light, :meth:`refresh` the radiance of the emitters. No gradient flows through the factors.
 
     Args:
         n_directions: The number of cells, one about each point of a Fibonacci sphere; a multiple of 32.
@@ -107,8 +107,8 @@ class VisibilityBits(OcclusionModel):
         self.register_buffer("light", torch.ones_like(directions), persistent=False)
         self._cells: Cells | None = None
         self.cache: VisibilityCache | None = None
-        self.senders: Senders | None = None
-        self.radiance: Tensor | None = None  # of each sender
+        self.emitters: Emitters | None = None
+        self.radiance: Tensor | None = None  # of each emitter
 
     @torch.no_grad()
     def aim(self, light: EvaluatedLight) -> None:
@@ -132,13 +132,13 @@ class VisibilityBits(OcclusionModel):
         is_unoccluded = len(blocked) > 0 and blocked.max().item() < self.open_below
         if not self.indirect:
             return TracedBits(cache, is_unoccluded, None)
-        rows, senders = senders_of(cache)
-        return TracedBits(dataclasses.replace(cache, hits=rows), is_unoccluded, senders)
+        rows, emitters = emitters_of(cache)
+        return TracedBits(dataclasses.replace(cache, hits=rows), is_unoccluded, emitters)
 
     def use(self, traced: TracedBits) -> None:
-        """Switches to these bits. The radiance of the senders is unknown until :meth:`refresh`."""
+        """Switches to these bits. The radiance of the emitters is unknown until :meth:`refresh`."""
         super().use(traced)
-        self.cache, self.is_unoccluded, self.senders = traced.to(self.directions.device)
+        self.cache, self.is_unoccluded, self.emitters = traced.to(self.directions.device)
         self.directions.copy_(self.cache.directions)
         self.radiance = None
 
@@ -149,21 +149,21 @@ class VisibilityBits(OcclusionModel):
 
     def cached_light(self) -> dict[str, Tensor | None]:
         """The environment's radiance of each direction [k, 3], the directions of the traced rays [k, 3], and the
-        radiance [p, 3] and the numbers [p] of the senders, or None for both."""
-        senders = None if self.radiance is None else self._sender_numbers()
-        return {"sky": self.light, "aims": self.directions, "sent": self.radiance, "senders": senders}
+        radiance [p, 3] and the numbers [p] of the emitters, or None for both."""
+        emitters = None if self.radiance is None else self._emitter_numbers()
+        return {"sky": self.light, "aims": self.directions, "sent": self.radiance, "emitters": emitters}
 
     def restore_light(self, cached: dict[str, Tensor | None]) -> None:
         """Restores the result of :meth:`cached_light`, on the same mesh traced in the same directions.
 
-        Senders that are not stored keep the radiance that they have: another machine's rays may hit a few others.
+        Emitters that are not stored keep the radiance that they have: another machine's rays may hit a few others.
         """
         self.light.copy_(cached["sky"])
-        stored = cached["senders"]
-        if stored is None or self.senders is None:
+        stored = cached["emitters"]
+        if stored is None or self.emitters is None:
             self.radiance = None
         else:
-            stored, ours = stored.to(self.light.device), self._sender_numbers()
+            stored, ours = stored.to(self.light.device), self._emitter_numbers()
             radiance = self.light.new_zeros(len(ours), 3) if self.radiance is None else self.radiance.clone()
             radiance[torch.isin(ours, stored)] = cached["sent"].to(radiance.device)[torch.isin(stored, ours)]
             self.radiance = radiance
@@ -172,9 +172,9 @@ class VisibilityBits(OcclusionModel):
         """Restores the directions in which a mesh is traced from :meth:`cached_light`."""
         self.aims = cached["aims"].to(self.centres.device)
 
-    def _sender_numbers(self) -> Tensor:
-        """A number [p] int64 of each sender, ascending: k times its vertex plus its direction."""
-        return self.senders.vertices * len(self.directions) + self.senders.directions
+    def _emitter_numbers(self) -> Tensor:
+        """A number [p] int64 of each emitter, ascending: k times its vertex plus its direction."""
+        return self.emitters.vertices * len(self.directions) + self.emitters.directions
 
     def cell_light(self, light: LightMaps) -> CellLight:
         """The light's mean over each direction's cell, differentiable in the light. A texel belongs to one cell, so
@@ -214,12 +214,12 @@ class VisibilityBits(OcclusionModel):
 
     @torch.no_grad()
     def refresh(self, light: EvaluatedLight, materials: Materials, reflect: Reflect) -> None:
-        """Shades the senders again. They receive the radiance of the refresh before, so that each call adds a bounce.
+        """Shades the emitters again. They receive the radiance of the refresh before, so that each call adds a bounce.
 
-        A sender reflects towards the one direction that it is seen from. Its specular light is the environment's, or
-        that of the sender that it sees in the mirror direction. Seen from behind it is black.
+        An emitter reflects towards the one direction that it is seen from. Its specular light is the environment's, or
+        that of the emitter that it sees in the mirror direction. Seen from behind it is black.
         """
-        if self.senders is None or self.is_unoccluded:
+        if self.emitters is None or self.is_unoccluded:
             return
         x, n, chunk = self.cache.vertices, self.cache.normals, SHADED_CHUNK[self.light.device.type]
         at_vertices = [torch.cat(parts) for parts in zip(*map(materials, x.split(chunk)))]
@@ -228,7 +228,7 @@ class VisibilityBits(OcclusionModel):
         before = x.new_zeros(1, 3) if self.radiance is None else F.pad(self.radiance, (0, 0, 0, 1))
         blur = lobe_roughness(4.0 * math.pi / len(self.centres)) ** 4  # a ray stands for all of its cell
         parts = []
-        for vertices, directions, mirrored, facing in zip(*(part.split(chunk) for part in self.senders)):
+        for vertices, directions, mirrored, facing in zip(*(part.split(chunk) for part in self.emitters)):
             here, views = [part[vertices] for part in at_vertices], -self.directions[directions]
             sky = light(query_direction(n[vertices], views, here[1]), (here[1] ** 4 + blur).sqrt().sqrt())
             seen = before[mirrored.clamp(max=len(before) - 1)]
@@ -239,10 +239,10 @@ class VisibilityBits(OcclusionModel):
 
     @torch.no_grad()
     def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:
-        """The factors at points; with segments, those of each segment's leader for all of its points."""
+        """The factors at points. With segments, all points of one have the factors of its representative."""
         if segments is not None:
-            leaders = self.answer(OcclusionQuery((), *take_rows(list(query[1:]), segments.leaders)), None)
-            known = [part for part in leaders if part is not None]
+            answers = self.answer(OcclusionQuery((), *take_rows(list(query[1:]), segments.representatives)), None)
+            known = [part for part in answers if part is not None]
             return Occlusion(*take_rows(known, segments.segment))
         o_d, o_s, i_d, i_s = cached_occlusion(
             self.cache, query.positions, query.normals, query.lobe_dirs, query.roughness, self.light, self.radiance

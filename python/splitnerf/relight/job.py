@@ -109,7 +109,7 @@ def relight(
 
 
 def folder_name(path: Path) -> str:
-    """The name of a map's folder. Raises InputError where it would be another folder than one below --out."""
+    """The name of a map's folder. Raises InputError where the folder would not be below --out."""
     if not path.stem.strip("."):
         raise InputError(f"{path}: has no name that a folder could have; rename the map")
     return path.stem

@@ -31,10 +31,10 @@ def own_files(folder: Path) -> set[str]:
 
 
 def check_folder(folder: Path, names: list[str], *, overwrite: bool) -> set[str]:
-    """The files of an earlier call in a folder where files of these names are to be.
+    """The files of an earlier call in a folder, which files of these names would replace.
 
     Raises:
-        InputError: There are some and `overwrite` is false, or a file of one of the names is none of them.
+        InputError: There are some and `overwrite` is false, or a file of one of the names is from another program.
     """
     refuse_data(folder)
     own = own_files(folder)
@@ -42,7 +42,7 @@ def check_folder(folder: Path, names: list[str], *, overwrite: bool) -> set[str]
         raise InputError(f"{folder}: holds frames already; replace them with --overwrite, or give another --out")
     foreign = [name for name in names if name not in own and (folder / name).exists()]
     if foreign:
-        raise InputError(f"{folder / foreign[0]}: is none that relight wrote, and would be lost; give another --out")
+        raise InputError(f"{folder / foreign[0]}: was not written by relight and would be lost; give another --out")
     return own
 
 
@@ -69,7 +69,7 @@ def straight_srgb(linear: np.ndarray) -> np.ndarray:
 
 
 def display_frame(linear: np.ndarray) -> np.ndarray:
-    """[h, w, 3] uint8 sRGB for animations, which know no partial alpha: over white, in linear light."""
+    """[h, w, 3] uint8 sRGB for animations, which have no partial alpha: over white, in linear light."""
     over_white = linear[..., :3] + (1 - linear[..., 3:])
     return to_uint8(linear_to_srgb(np.clip(over_white, 0, 1)))
 
@@ -124,6 +124,6 @@ def write_mp4(path: Path, frames: list[np.ndarray], fps: float) -> None:
         writer.send(None)
         for frame in frames:
             writer.send(np.ascontiguousarray(frame[:height, :width]))
-        writer.close()  # says nothing where the disk was full
+        writer.close()  # raises nothing if the disk was full
         if imageio_ffmpeg.count_frames_and_secs(str(temporary))[0] != len(frames):
             raise OSError(f"{path}: ffmpeg cannot write it; the disk may be full")

@@ -1,4 +1,4 @@
-"""Pixels beside the masks' edges: what the photo shows there, and what it would show without the object."""
+"""Pixels near the masks' edges: the photo's colours, and the background behind the object there."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.ops import EdgeRuns
 from splitnerf.render.masks import joined, runs_of, widened
 
-PARTLY = 0.02, 0.98  # coverage between which a pixel lies on an edge
-BRIGHTEST = 250  # of 255: what is behind may be brighter than the photo shows, so that the mask has to say where the edge is
+PARTLY = 0.02, 0.98  # a pixel of a coverage in between lies on an edge
+BRIGHTEST = 250  # of 255: a brighter background may be clipped, so that the mask decides where the edge is
 
 
 class EdgePixels:
     """The pixels within a band along the edges of the masks, where a mask is not trusted to a pixel.
 
-    There a pixel's colour is compared whole: with the object's over the colour of what lies behind it, which is filled in from
-    outside the band. 24 bytes a run of neighbours and 3 a pixel.
+    There a pixel's colour is compared including the background: the object over the colour behind it, which is filled
+    in from outside the band. 24 bytes a run of neighbours and 3 a pixel.
 
     Args:
-        photos: What :func:`edge_of` finds in each photo.
+        photos: The result of :func:`edge_of` for each photo.
         n_pixels: The number of pixels of a photo.
-        device: Where the pixels are looked up.
+        device: The device of lookups.
 
     Attributes:
         runs: The pixels and the colours behind the object there, at the photos' own exposures.
@@ -45,13 +45,13 @@ class EdgePixels:
 def edge_of(
     colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """The pixels of a photo within a band along its mask's edges as runs (see :func:`splitnerf.render.masks.runs_of`), and the sRGB
-    colours [k, 3] uint8 behind the object there. Pixels before what is too bright for the photo are left out.
+    """The pixels of a photo within a band along its mask's edges as runs (see :func:`splitnerf.render.masks.runs_of`),
+    and the sRGB colours [k, 3] uint8 behind the object there. Pixels in front of a clipped background are left out.
 
     Args:
         colours: [H, W, 3] sRGB, whole numbers or floats in [0, 1].
         alpha: [H, W] the mask, in [0, 1].
-        known: [H, W] bool, the pixels that say something; None for all.
+        known: [H, W] bool, the valid pixels; None for all.
         width: The pixels on each side of an edge.
     """
     near, behind = edge_mask(colours, alpha, known, width)
@@ -61,7 +61,7 @@ def edge_of(
 def edge_mask(
     colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The pixels [H, W] bool and the colours [k, 3] of :func:`edge_of`, which says what the arguments are."""
+    """The pixels [H, W] bool and the colours [k, 3] of :func:`edge_of`, with the same arguments."""
     near, outside = band(alpha, width)
     if known is not None:
         near, outside = near & known, outside & known
@@ -77,13 +77,13 @@ def edge_mask(
 def average_with_edges(photo: np.ndarray, factor: int, known: np.ndarray | None, width: int) -> np.ndarray:
     """Averages a photo down as :class:`EdgePixels` compares it.
 
-    Along the mask's edges and outside of the mask, a pixel is the mean of all that the photo shows there. The other pixels that
-    the object covers in part are means of the object alone: there the mask has to say where the edge is.
+    Along the mask's edges and outside of the mask, a pixel is the mean of object and background. The other pixels that
+    the object covers in part are means of the object alone: there the mask decides where the edge is.
 
     Args:
         photo: [H, W, 4] sRGB of a whole photo, and its mask.
         factor: The edge of a block in pixels, at least 2.
-        known: [H // factor, W // factor] bool, the averages that say something; None for all.
+        known: [H // factor, W // factor] bool, the valid averages; None for all.
         width: The pixels of the average on each side of an edge.
 
     Returns:
@@ -97,16 +97,16 @@ def average_with_edges(photo: np.ndarray, factor: int, known: np.ndarray | None,
 
 
 def band(alpha: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """[H, W] bool each: the pixels within `width` of the edge of a mask [H, W], and those more than twice as far outside it, which
-    the object does not touch where the mask is wrong by no more than the band is wide."""
+    """[H, W] bool each: the pixels within `width` of the edge of a mask [H, W], and those more than twice as far
+    outside it, which the object does not touch where the mask is wrong by no more than the band is wide."""
     inside, partly = torch.from_numpy(alpha > 0.5), torch.from_numpy((alpha > PARTLY[0]) & (alpha < PARTLY[1]))
     near = (widened(inside, width) & widened(~inside, width)) | partly
     return near.numpy(), (~widened(inside | partly, 2 * width) & ~near).numpy()
 
 
 def filled_in(colours: np.ndarray, near: np.ndarray, outside: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """The pixels [k] of a band that have some outside within reach, and their mean colour [k, 3], weighted by a Gaussian, over every
-    third pixel in both directions.
+    """The pixels [k] of a band that have some outside within reach, and their mean colour [k, 3], weighted by a
+    Gaussian, over every third pixel in both directions.
 
     Args:
         colours: [H, W, 3].

@@ -27,7 +27,8 @@ def widened(mask: Tensor, radius: int) -> Tensor:
 
 
 def reduced(mask: Tensor, factor: int) -> Tensor:
-    """[H // factor, W // factor] bool, the blocks with a pixel of `mask` [H, W] in them; incomplete blocks are cropped."""
+    """[H // factor, W // factor] bool, the blocks with a pixel of `mask` [H, W] in them; incomplete blocks are
+    cropped."""
     height, width = mask.shape[0] // factor, mask.shape[1] // factor
     blocks = mask[: height * factor, : width * factor].reshape(height, factor, width, factor)
     return blocks.any(dim=3).any(dim=1)

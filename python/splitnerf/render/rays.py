@@ -77,7 +77,7 @@ class DrawnRays(NamedTuple):
         pixels: [n, 4] sRGB of the photos as they are, in [0, 1], straight alpha.
         view: [n] int64, the photos' numbers.
         exposure: [n, 3] the factors of the photos' linear values.
-        background: [n, 3] sRGB colours behind the pixels: at edges what the photo would show there without the object.
+        background: [n, 3] sRGB colours behind the pixels; at edges the photo's background, filled in.
         whole: [n] bool, the pixels along the masks' edges.
     """
 
@@ -94,15 +94,15 @@ class PixelSource:
     """Draws training rays: most of them near the objects' masks, the rest anywhere.
 
     Args:
-        dataset: The train split; pixels that are not known are never drawn.
+        dataset: The train split; invalid pixels are never drawn.
         foreground_share: Share of the rays, in [0, 1], that are drawn within a few pixels of a mask.
         generator: The random generator of the pixels; images and cameras are kept on its device.
         edge_pixels: The width on each side of the masks' edges in pixels of `edges`; 0: none.
 
     Attributes:
-        edges: The pixels along the masks' edges; None where there are none, or the photos' colours outside are not known.
-        foreground, known: The known pixels near a mask, and all known pixels.
-        possible: [n, h, w] bool, where the photos may show the object: within the masks, and where nothing is known. Those
+        edges: The pixels along the masks' edges; None where there are none, or the photos have no colours outside.
+        foreground, known: The valid pixels near a mask, and all valid pixels.
+        possible: [n, h, w] bool, where the photos may show the object: within the masks, and at invalid pixels. Those
             of large photos are smaller by `hull_factor`, a pixel being true where one within it is.
     """
 
@@ -129,7 +129,8 @@ class PixelSource:
             near.append(runs_of(wide))
             possible.append(reduced(seen, self.hull_factor))
             del alpha, mask, wide, seen, known_here
-            give_back()  # else a photo's arrays, large ones, leave gaps between the runs that stay: 13 MB at 12 megapixels
+            # else a photo's arrays, large ones, leave gaps between the runs that stay: 13 MB at 12 megapixels
+            give_back()
         self.possible = torch.stack(possible).to(self.device)
         n_pixels = self.height * self.width
         self.foreground = pixel_list(near, n_pixels, self.device)

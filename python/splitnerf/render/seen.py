@@ -13,7 +13,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.ops import MeshScene
 from splitnerf.render.rays import projected
 
-GRAZING = 0.05  # cosine between the surface's normal and a line of sight below which a photo shows nothing of it
+GRAZING = 0.05  # cosine between the surface's normal and a line of sight below which a photo does not show it
 
 
 class Cameras(NamedTuple):
@@ -31,7 +31,7 @@ class Cameras(NamedTuple):
 
     @classmethod
     def of(cls, photos: Dataset) -> Cameras:
-        """Those of a data set."""
+        """The cameras of a data set."""
         poses, intrinsics = (torch.from_numpy(x).float() for x in (photos.poses, photos.intrinsics))
         return cls(poses, intrinsics, torch.tensor([photos.height, photos.width]))
 
@@ -63,6 +63,7 @@ def seen_vertices(vertices: np.ndarray, faces: np.ndarray, cameras: Cameras, off
 
 
 def majority(faces: np.ndarray, flags: np.ndarray) -> np.ndarray:
-    """[n] bool, what most corners of a vertex's faces say: a ray in a million slips through between two faces."""
+    """[n] bool, the majority over the corners of a vertex's faces, because a ray in a million slips between two
+    faces."""
     votes = np.bincount(faces.ravel(), 2.0 * flags[faces].sum(1).repeat(3) - 3.0, minlength=len(flags))
     return np.where(votes == 0, flags, votes > 0)

@@ -19,7 +19,7 @@ from splitnerf.training.start import StartShape
 FORMAT = 1
 LARGEST = {"step": 1e12, "seconds": 1e12, "meshed_at": 1.0, "previewed_at": 1.0}
 MOMENTS = ("exp_avg", "exp_avg_sq")
-CACHED_LIGHT = {"sky", "aims", "sent", "senders"}
+CACHED_LIGHT = {"sky", "aims", "sent", "emitters"}
 
 
 def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict) -> None:
@@ -201,13 +201,13 @@ def _check_bits(cached: dict, k: int, n_vertices: int) -> None:
     check_tensor("the traced directions", cached["aims"], (k, 3), torch.float32)
     if (cached["aims"].norm(dim=1) - 1.0).abs().max() > 1e-3:
         raise ValueError("the traced directions are not of length 1")
-    senders = cached["senders"]
-    if senders is None and cached["sent"] is None:
+    emitters = cached["emitters"]
+    if emitters is None and cached["sent"] is None:
         return
-    check_tensor("the number of each sender", senders, (-1,), torch.int64)
-    if len(senders) and not (senders[0] >= 0 and senders[-1] < n_vertices * k and (senders[1:] > senders[:-1]).all()):
-        raise ValueError("the numbers of the senders do not ascend, or name vertices that are none")
-    check_tensor("the light that the mesh sends", cached["sent"], (len(senders), 3), torch.float32)
+    check_tensor("the number of each emitter", emitters, (-1,), torch.int64)
+    if len(emitters) and not (emitters[0] >= 0 and emitters[-1] < n_vertices * k and (emitters[1:] > emitters[:-1]).all()):
+        raise ValueError("the numbers of the emitters do not ascend, or name vertices that are none")
+    check_tensor("the light that the mesh sends", cached["sent"], (len(emitters), 3), torch.float32)
 
 
 def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:

@@ -16,7 +16,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "ablate", help="measure what each part of the method is worth",
         description="Trains on each DATA with the full method and with one part at a time taken out or exchanged, each for "
-        "the same time, and writes ablation.csv, ablation.md and the runs into OUT. Repeat the command to go on.",
+        "the same time, and writes ablation.csv, ablation.md and the runs into OUT. Repeat the command to continue.",
         epilog=examples("splitnerf ablate data --minutes 6", "splitnerf ablate --list"),
     )  # fmt: skip
     parser.add_argument("data", type=Path, nargs="*", metavar="DATA")
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf_tools.ablate.rows import PAPER, SWITCHES, make_rows
 
     if args.seeds != 1 and args.seeds < 3:
-        raise InputError(f"--seeds must be 1, or 3 and more, for two say nothing of their spread; got {args.seeds}")
+        raise InputError(f"--seeds must be 1, or 3 and more, as two do not show their spread; got {args.seeds}")
     if args.minutes is not None and args.minutes <= 0:
         raise InputError(f"--minutes must be positive, got {args.minutes}")
     minutes = 6.0 if args.minutes is None and args.steps is None else args.minutes
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
         with held(args.out):
             scores = ablate(plan, show)
     except Interrupted:
-        print(f"stopped; the state is in {args.out}. To go on, repeat the command.")
+        print(f"stopped; the state is in {args.out}. To continue, repeat the command.")
         return INTERRUPTED
     print(markdown_table(scores))
     print(f"results: {args.out / 'ablation.md'}, {args.out / 'ablation.csv'}")

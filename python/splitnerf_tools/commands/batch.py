@@ -35,7 +35,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "batch", help="reconstruct many scenes, on this machine or on a cluster", parents=[training_options()],
         description="Trains on each of SCENES in a process of its own, DIR/NAME for each, as many at once as the machines of Ray "
-        "hold, and writes one table, DIR/batch.md and batch.json. Ctrl-C saves the state of all; the same command goes on. Needs "
+        "hold, and writes one table, DIR/batch.md and batch.json. Ctrl-C saves the state of all; the same command continues. Needs "
         "pip install 'splitnerf[batch]'.",
         epilog=examples(
             "splitnerf batch scenes/* --out runs/all --max-minutes 30",
@@ -46,7 +46,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="the folder of the runs and of the table")
     parser.add_argument("--address", metavar="HOST:PORT", help="the Ray cluster to use (default: Ray is started here)")
     parser.add_argument("--cores-per-scene", type=float, metavar="N", help="default: all cores, divided among the scenes")
-    parser.add_argument("--gpus-per-scene", type=float, metavar="N", help="default: .25 where there are GPUs; preset paper: 1")
+    parser.add_argument("--gpus-per-scene", type=float, metavar="N", help="default: 0.25 where there are GPUs; preset paper: 1")
     parser.add_argument("--memory-per-scene", type=float, metavar="GB", help="default: 4; photos may take all but 2.15 of it")
     parser.add_argument("--retries", type=int, default=3, metavar="N", help="of a scene whose process was killed (default: 3)")
     parser.add_argument(
@@ -145,11 +145,11 @@ def conclusion(batch: Batch, all_ended: bool) -> int:
     counts = Counter(scene.state for scene in batch.asked)
     print(f"{', '.join(f'{count} {state}' for state, count in counts.items())} ({UNITS}); table: {batch.out / TABLE}")
     if not all_ended:
-        print("stopped; to go on, repeat the command.")
+        print("stopped; to continue, repeat the command.")
         return INTERRUPTED
     if counts[SCENE_DONE] == len(batch.asked):
         return DONE
     if counts[REFUSED]:
         print("a refused scene is tried again when its files have changed, or with --retry-refused")
-    print(f"what each scene said: {batch.out / LOGS}")
+    print(f"output of each scene: {batch.out / LOGS}")
     return FAILED

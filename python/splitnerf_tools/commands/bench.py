@@ -14,19 +14,19 @@ from splitnerf.errors import InputError
 OPERATORS = {
     "prefilter": "estimators of the light's integral over a lobe: time against error",
     "split_sum": "the split sum and its table against the integral: error alone",
-    "hash_grid": "the encoding beside plain torch, Dr.Jit and the machine's gathers",
-    "normals": "analytic normals beside finite differences: time against angle",
-    "shading": "split-sum shading and the light's integral beside plain and compiled torch",
-    "occlusion": "traced rays beside cached bits, and beside Open3D, trimesh and Mitsuba",
-    "path_tracer": "error against time beside Mitsuba",
+    "hash_grid": "the encoding against plain torch, Dr.Jit and the machine's gathers",
+    "normals": "analytic normals against finite differences: time against angle",
+    "shading": "split-sum shading and the light's integral against plain and compiled torch",
+    "occlusion": "traced rays against cached bits, and against Open3D, trimesh and Mitsuba",
+    "path_tracer": "error against time, with Mitsuba",
 }
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "bench", help="measure run time against error",
-        description=f"Without BENCHMARK: {', '.join(OPERATORS)}. Each checks the operators, times them beside plain "
-        "torch and the peers that are installed (drjit, open3d, mitsuba), and writes a table, a CSV file and a picture. "
+        description=f"Without BENCHMARK: {', '.join(OPERATORS)}. Each checks the operators, times them and plain "
+        "torch and the peers that are installed (drjit, open3d, mitsuba), and writes a page, a CSV file and a picture. "
         "Measured maps and meshes are taken from the folder SPLITNERF_DATA, else procedural ones.",
     )  # fmt: skip
     add_quick(parser, default=False)
@@ -65,7 +65,7 @@ def add_whole(benchmarks: argparse._SubParsersAction) -> None:
         "whole", help="error of novel views, albedo and relit views against wall time",
         description="Trains on each DATA for each of the times, with the preset cpu, with the preset paper, and with one setting "
         "changed at a time that buys time with error or error with time, and draws what each reaches. Repeat the command with the "
-        "same --runs to go on or to add times.",
+        "same --runs to continue or to add times.",
     )  # fmt: skip
     whole.add_argument("--data", type=Path, action="append", required=True, metavar="DATA", help="may be repeated")
     whole.add_argument("--minutes", default="0.5,2", metavar="LIST", help="training times, by commas (default: 0.5,2)")
@@ -158,7 +158,7 @@ def run_whole(args: argparse.Namespace) -> int:
         with held(args.runs):
             result = whole(scenes, configs, minutes, protocol, args.runs, print_now)
     except Interrupted:
-        print(f"stopped; the state is in {args.runs}. To go on, repeat the command.")
+        print(f"stopped; the state is in {args.runs}. To continue, repeat the command.")
         return INTERRUPTED
     for path in write_result(result, args.out or default_folder()):
         print(path)

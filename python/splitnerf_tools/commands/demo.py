@@ -23,10 +23,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)"
     )
-    parser.add_argument("--max-minutes", type=float, default=4.0, metavar="M", help="time of training and last stage (default: 4)")
-    parser.add_argument("--no-refine", action="store_true", help="no last stage: training gets all minutes")
+    parser.add_argument("--max-minutes", type=float, default=4.0, metavar="M", help="time of training and refinement (default: 4)")
+    parser.add_argument("--no-refine", action="store_true", help="no refinement: training gets all minutes")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--overwrite", action="store_true", help="replace a run that stands in --out")
+    parser.add_argument("--overwrite", action="store_true", help="replace the run in --out")
     parser.set_defaults(execute=run)
 
 
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         write_demo_dataset(data, seed=args.seed)
         trained, evaluation = reconstruct(data, args.out, config, overwrite=args.overwrite)
     if evaluation is None:
-        print(f"stopped; the state is in {args.out}. To go on: splitnerf train {data} --out {args.out} --resume")
+        print(f"stopped; the state is in {args.out}. To continue: splitnerf train {data} --out {args.out} --resume")
         return INTERRUPTED
     print_summary(args.out, evaluation, trained.step, trained.seconds)
     return DONE

@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
 
     page = args.out / PAGE if args.out.is_dir() else args.out
     if page.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{page}: is no page; give --out a name that ends in .html, or a folder")
+        raise InputError(f"{page}: is not a page; give --out a name that ends in .html, or a folder")
     reading = reading_of(args, args.data)
     found = inspect(*load_splits(args.data, args.downscale, reading), reading)
     for finding in found.findings:

@@ -22,7 +22,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "prepare", help="find cameras, masks and exposures of photographs",
         description="Reads a folder of photographs, or a video, of one object that does not move, and writes DATA, which train "
-        "reads: images without lens distortion, masks, transforms.json, and prepare.html to look at. The same command goes on "
+        "reads: images without lens distortion, masks, transforms.json, and prepare.html to look at. The same command continues "
         "where it was interrupted.",
         epilog=examples(
             "splitnerf prepare photos --out data",
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         try:
             result = prepare(args.photos, args.out, settings, report)
         except KeyboardInterrupt:
-            raise KeyboardInterrupt("interrupted; the same command goes on: features and matches are kept") from None
+            raise KeyboardInterrupt("interrupted; the same command continues: features and matches are kept") from None
     n, lost = len(result.world.scene.names), len(result.left_out)
     print(f"{n} of {n + lost} photos, reprojection error {result.world.scene.error:.2f} pixels: {args.out}")
     print(f"look at {args.out / 'prepare.html'}, then: splitnerf train {args.out}")

@@ -1,4 +1,4 @@
-"""What the protocols of published sets share: the delivered asset, its renderings at a set's cameras, and scores' forms."""
+"""Shared by the protocols of published sets: the delivered asset, its renderings at a set's cameras, and the scores."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Column = tuple[str, str, str]  # key, title, format
 
 @dataclass(frozen=True)
 class Options:
-    """What an evaluation may choose.
+    """The options of an evaluation.
 
     Attributes:
         spp: Paths a pixel.
@@ -51,12 +51,12 @@ class Options:
 
 @dataclass
 class Scores:
-    """What a protocol finds.
+    """The scores of a protocol.
 
     Attributes:
         means: The numbers of the table by key; None where the data hold no truth.
         images: The numbers of each image, with its name.
-        notes: What the reader of the numbers has to know.
+        notes: Restrictions of the scores, for the reader.
     """
 
     means: dict[str, float | None]
@@ -83,8 +83,8 @@ class Delivered:
         """The maps of `AssetRenderer.render` at a frame's camera.
 
         Args:
-            frame: The frame; its photo's file says the size.
-            light: [h, w, 3], None for no matter which.
+            frame: The frame; its photo's file has the size.
+            light: [h, w, 3]; None: any, for maps that do not depend on it.
             factor: The integer by which the photo is larger.
         """
         header, pose = read_header(frame.image_path), frame.pose.copy()
@@ -97,7 +97,7 @@ class Delivered:
 
     def with_albedo(self, scale: np.ndarray) -> Delivered:
         """The same with albedo times a factor per channel, clipped to 1."""
-        if self.asset.colors is not None:  # these and the materials' factors are multiplied, and no factor is above 1
+        if self.asset.colors is not None:  # vertex colours and factors are multiplied, and no factor is above 1
             asset = replace(self.asset, colors=(self.asset.colors * scale).clip(0, 1).astype(np.float32))
         else:
             asset = replace(self.asset, materials=[_scaled(material, scale) for material in self.asset.materials])
@@ -118,7 +118,7 @@ def _scaled(material: Material, scale: np.ndarray) -> Material:
 
 
 def srgb_on_white(maps: dict[str, np.ndarray]) -> np.ndarray:
-    """[H, W, 3] the image of a rendering, clipped, in sRGB over white, in the order of an image file's viewer."""
+    """[H, W, 3] the image of a rendering, clipped, in sRGB over white, composited as image viewers do."""
     alpha = maps["alpha"][..., None]
     straight = linear_to_srgb(np.clip(maps["radiance"] / np.maximum(alpha, 1e-8), 0, 1))
     return straight * alpha + 1 - alpha

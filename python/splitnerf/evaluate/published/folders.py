@@ -1,4 +1,4 @@
-"""What the protocols of view folders share: NeRFactor's and TensoIR's truth, and how images are laid over white."""
+"""Shared by the protocols of view folders: the truth of NeRFactor and TensoIR, and compositing over white."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from splitnerf.evaluate.published.common import Options, unit
 
 @dataclass
 class FolderTruth:
-    """The truth of a view folder: `image` [H, W, 3] sRGB over white, `alpha` [H, W], `albedo` [H, W, 3] linear, straight, and
-    `normal` [H, W, 3] unit, world; the last two None where there is no file."""
+    """The truth of a view folder: `image` [H, W, 3] sRGB over white, `alpha` [H, W], `albedo` [H, W, 3] linear,
+    straight, and `normal` [H, W, 3] unit, world; the last two None where there is no file."""
 
     image: np.ndarray
     alpha: np.ndarray
@@ -26,7 +26,7 @@ class FolderTruth:
 
 
 def read_truth(frame: Frame) -> FolderTruth:
-    """Reads the files beside a view's photo. Raises InputError where one cannot be used."""
+    """Reads the files in the folder of a view's photo. Raises InputError where one cannot be used."""
     rgba = _read(frame.image_path)
     albedo, normal = (frame.image_path.with_name(name) for name in ("albedo.png", "normal.png"))
     return FolderTruth(

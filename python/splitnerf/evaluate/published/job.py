@@ -25,8 +25,8 @@ def score_published(target: Path, data: Path, name: str, options: Options, env: 
         target: The run or the file, in the data's world frame.
         data: The folder that was trained on.
         name: One of :data:`splitnerf.evaluate.published.table.PROTOCOLS`.
-        options: Paths a pixel, and where lights and truth lie.
-        env: The light of the photos for novel views; None for the environment.exr or .hdr beside the file.
+        options: Paths a pixel, and the folders of lights and truth.
+        env: The light of the photos for novel views; None for the environment.exr or .hdr in its folder.
 
     Returns:
         `protocol`, `scores` by key, `images` with those of each, `notes`, `published` and `spp`.
@@ -67,5 +67,5 @@ def holds_published(path: Path) -> bool:
 
 
 def published_path(target: Path, name: str) -> Path:
-    """Where the scores of a protocol are kept: in the run's folder, or beside the file."""
+    """The file of a protocol's scores: in the run's folder, or next to the asset's file."""
     return target.with_name(f"{target.stem}_{name}.json") if is_asset(target) else target / f"{name}.json"

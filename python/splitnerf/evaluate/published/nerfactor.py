@@ -1,8 +1,8 @@
 """NeRFactor: validation views 0 to 7 for views, albedo and normals, test views 49, 99, 149 and 199 for relighting.
 
-Source: the repository's README (the choice of views) and nerfactor/test.py (the scale of albedo: one factor per channel by least
-squares in linear light over the first validation view, alpha above .9, applied before relighting). The script that computed the
-paper's table is not in the repository: PSNR and SSIM are over sRGB on white here.
+Source: the repository's README (the choice of views) and nerfactor/test.py (the scale of albedo: one factor per channel
+by least squares in linear light over the first validation view, alpha above 0.9, applied before relighting). The script
+that computed the paper's table is not in the repository: PSNR and SSIM are over sRGB on white here.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
 
 
 def albedo_scale(maps: dict[str, np.ndarray], truth: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """[3] the factors that bring albedo nearest to the truth [H, W, 3], where alpha [H, W] is above .9."""
+    """[3] the factors that bring albedo nearest to the truth [H, W, 3], where alpha [H, W] is above 0.9."""
     known = alpha > OPAQUE
     return lsq_scale(maps["albedo"][known], truth[known])
 

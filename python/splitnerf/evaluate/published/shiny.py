@@ -62,7 +62,7 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
 def _rgba(frame: Frame) -> np.ndarray:
     """[H, W, 4] the photo of a pinhole, its alpha the object's."""
     if frame.distortion is not None or frame.mask_path is not None or frame.exposure != 1 or frame.gamma:
-        raise InputError(f"{frame.image_path}: the frame has distortion, a mask or a curve, which the set has not; leave it out")
+        raise InputError(f"{frame.image_path}: the frame has distortion, a mask or a curve, which the set does not have; leave it out")
     rgba = read_image(frame.image_path)
     if rgba.shape[2] != 4:
         raise InputError(f"{frame.image_path}: has no alpha, which the set's photos have; give photos with it")

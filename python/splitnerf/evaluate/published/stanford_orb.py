@@ -31,12 +31,13 @@ COLUMNS: tuple[Column, ...] = (
 )  # fmt: skip
 SIDE = 512  # pixels at which images are compared
 EROSION = np.ones((5, 5), bool)
-BRIGHTEST = 4.0  # at which PSNR-H clips
+BRIGHTEST = 4.0  # where PSNR-H clips
 SAMPLES = 30_000  # of the surface
 
 
 def score(delivered: Delivered, root: Path, options: Options) -> Scores:
-    """Scores the photos of `transforms_novel.json` and `transforms_test.json`, the normals of the latter, and the mesh."""
+    """Scores the photos of `transforms_novel.json` and `transforms_test.json`, the normals of the latter, and the
+    mesh."""
     images, notes = [], []
     views = layout.relit(root, {}, options.truth) if (root / layout.NOVEL).is_file() else []
     for view in tracked(views, "relit, image"):
@@ -51,14 +52,15 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
             high, result["view_psnr_l"] = image_psnr(maps["radiance"], photo, mask, scaled=False)
             result["view_psnr_h"] = high if _is_hdr(frame) else None
         if not _is_hdr(frame) and not notes:
-            notes.append(f"no PSNR-H: {layout.HDR} with the photos' EXR files is not beside the data's folder")
+            notes.append(f"no PSNR-H: {layout.HDR} with the photos' EXR files is not next to the data's folder")
         images.append(result)
     means = {key: mean_of(images, key) for key, _, _ in COLUMNS} | {"chamfer": _chamfer(delivered, root, options)}
     return Scores(means, images, notes)
 
 
 def with_radiance(frame: Frame) -> Frame:
-    """The frame with the photo of `blender_HDR` where it has that of `blender_LDR`, whose values are clipped, and the former exists."""
+    """The frame with the photo of `blender_HDR` in place of that of `blender_LDR`, whose values are clipped, if it
+    exists."""
     photo = frame.image_path.absolute()
     path = photo.parents[2].with_name(layout.HDR) / photo.parents[1].name / photo.parent.name / f"{photo.stem}.exr"
     return replace(frame, image_path=path) if not _is_hdr(frame) and is_file(path) else frame
@@ -74,9 +76,9 @@ def image_psnr(
     """PSNR-H and PSNR-L in dB; None where nothing is inside of the eroded mask.
 
     Both images are black outside of the mask, eroded by 5 x 5, and the error is the mean over the whole frame. With
-    `scaled` each channel of the prediction has the factor that least squares give in linear light. PSNR-H: both images times
-    mean(sRGB(y)) / mean(y) of the truth y clipped to 1, then clipped at 4, linear. PSNR-L: clipped at 1, in sRGB. Neither is
-    less than that of an image that is .5 inside.
+    `scaled` each channel of the prediction has the factor that least squares give in linear light. PSNR-H: both images
+    times mean(sRGB(y)) / mean(y) of the truth y clipped to 1, then clipped at 4, linear. PSNR-L: clipped at 1, in sRGB.
+    Neither is less than that of an image that is 0.5 inside.
 
     Args:
         prediction: [H, W, 3] linear.
@@ -100,19 +102,20 @@ def image_psnr(
 
 
 def eroded(mask: np.ndarray) -> np.ndarray:
-    """[H, W] bool, the pixels of a mask [H, W] in [0, 1] above .5 whose 5 x 5 neighbours in the image are so too."""
+    """[H, W] bool, the pixels of a mask [H, W] in [0, 1] above 0.5 whose 5 x 5 neighbours in the image are so too."""
     return binary_erosion(mask > 0.5, EROSION, border_value=1)
 
 
 def normal_distance(prediction: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float | None:
-    """The mean of 1 - cos of the angle between normals [H, W, 3] of any length, over the eroded mask; None where that is empty."""
+    """The mean of 1 - cos of the angle between normals [H, W, 3] of any length, over the eroded mask; None where that
+    is empty."""
     inside = eroded(mask)
     return float((1 - (unit(prediction) * unit(truth)).sum(axis=-1))[inside].mean()) if inside.any() else None
 
 
 def chamfer(mesh: trimesh.Trimesh, truth: np.ndarray) -> float:
-    """2000 times the mean of both directions' mean squared distance between points spread over a mesh and points [n, 3]: what
-    the paper's table shows, which is twice what it says."""
+    """2000 times the mean squared distance between points on a mesh and points [n, 3], averaged over both directions.
+    This is the scale of the paper's table, twice the one that its text states."""
     points = np.asarray(trimesh.sample.sample_surface(mesh, SAMPLES, seed=0)[0])
     return float(1e3 * ((nearest(truth, points) ** 2).mean() + (nearest(points, truth) ** 2).mean()))
 
@@ -133,7 +136,7 @@ def _normals(maps: dict, frame: Frame, mask: np.ndarray, root: Path, options: Op
         return None
     try:
         truth = np.load(path, allow_pickle=False)
-    except Exception as error:  # NumPy raises whatever it meets
+    except Exception as error:  # a damaged file may raise anything
         raise InputError(f"{path}: cannot be read as an array ({str(error)[:80]}); replace it") from None
     factor = _factor(frame)
     if truth.shape != (mask.shape[0] * factor, mask.shape[1] * factor, 3):

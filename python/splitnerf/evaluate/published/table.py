@@ -1,4 +1,4 @@
-"""The protocols by name, and published numbers beside ours."""
+"""The protocols by name, and a table of published scores and ours."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ NUMBERS = Path(__file__).with_name("numbers.json")
 
 
 def published(name: str) -> dict:
-    """What was published under a protocol: `source`, `date`, and `rows`, each with `method` and some of the columns' keys."""
+    """The published scores of a protocol: `source`, `date`, and `rows`, each with `method` and some of the columns'
+    keys."""
     return json.loads(NUMBERS.read_text(encoding="utf-8")).get(name, {"source": None, "date": None, "rows": []})
 
 
 def table(name: str, ours: dict[str, float | None], label: str) -> str:
-    """Our numbers above the published ones, as lines of text; what nobody has is left out."""
+    """Our scores above the published ones, as lines of text, without empty columns."""
     columns: tuple[Column, ...] = PROTOCOLS[name].COLUMNS
     rows = [({"method": label} | ours), *published(name)["rows"]]
     columns = tuple(column for column in columns if any(row.get(column[0]) is not None for row in rows))

@@ -1,9 +1,9 @@
 """TensoIR-Synthetic: all test views; relit under five lights, albedo, normals and novel views.
 
 Source: Jin et al., TensoIR: Tensorial Inverse Rendering, CVPR 2023; its repository's renderer.py and
-scripts/relight_importance.py. Albedo is rescaled per channel by the median of truth / albedo over the pixels of 20 views where
-alpha is not 0, before relighting and before its PSNR, which is over all views together to the power of 1 / 2.2. Normals are
-compared over whole images, the background pointing to +z in both.
+scripts/relight_importance.py. Albedo is rescaled per channel by the median of truth / albedo over the pixels of 20
+views where alpha is not 0, before relighting and before its PSNR, which is over all views together to the power of 1 /
+2.2. Normals are compared over whole images, the background pointing to +z in both.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ def albedo_scale(delivered: Delivered, frames: list) -> np.ndarray:
 
 
 def albedo_error(maps: dict[str, np.ndarray], truth: FolderTruth, scale: np.ndarray) -> float:
-    """The mean squared error of albedo over white, times the scale where the truth's alpha is not 0, white elsewhere, to the
-    power of 1 / 2.2."""
+    """The mean squared error of albedo over white, times the scale where the truth's alpha is not 0, white elsewhere,
+    to the power of 1 / 2.2."""
     ours = over_background(maps["albedo"], maps["alpha"]) * scale
     ours = np.where(truth.alpha[..., None] > 0, np.clip(ours, 0, 1), 1.0)
     theirs = over_background(truth.albedo, truth.alpha)
