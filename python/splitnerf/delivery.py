@@ -1,4 +1,4 @@
-"""From a trained scene to what a run delivers: the export, the last stage, the scores and the report."""
+"""From a trained scene to what a run delivers: the export, the refinement, the scores and the report."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from splitnerf.training.loop import TrainedScene
 from splitnerf.training.observer import Observer
 
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
-LAST_STAGE_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
+REFINEMENT_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
 REPORT_VIEWS = 4
 VIEW_BUDGET = 1 << 20  # pixels of the test views that a run scores by path tracing at its end, REPORT_VIEWS views aside
 
 
 def is_refined(run: Path) -> bool:
-    """Whether a run delivers what a last stage fitted."""
+    """Whether a run delivers what a refinement fitted."""
     return (run / RECORD).is_file() and (run / "mesh.glb").is_file()
 
 
@@ -52,7 +52,7 @@ def export_folder(run: Path) -> Path:
 def finish(
     trained: TrainedScene, dataset: Dataset, test: Dataset | None, run: Path, *, resume: bool, observers: Observer = Observer()
 ) -> dict | None:
-    """Makes the files of a trained run: meshes, environment, evaluation and report, after a last stage if it has one.
+    """Makes the files of a trained run: meshes, environment, evaluation and report, after a refinement if it has one.
 
     Without a surface (:class:`EmptyMesh`) the environment, the evaluation and the report are still written.
 
@@ -60,24 +60,24 @@ def finish(
         trained: The scene.
         dataset, test: The train split, and the test split or None.
         run: The run's folder.
-        resume: Whether to go on with the last stage, if the scene has not changed since it was interrupted.
+        resume: Whether to go on with the refinement, if the scene has not changed since it was interrupted.
         observers: Who looks on.
 
     Returns:
-        The evaluation; None where the last stage was interrupted.
+        The evaluation; None where the refinement was interrupted.
     """
     config, timings, mesh, failure = trained.model.config, {"training": trained.seconds}, None, None
-    last_stage = config.refinement.enabled
-    if not (last_stage and resume and trained.n_new == 0 and (run / STATE).is_file()):
+    refines = config.refinement.enabled
+    if not (refines and resume and trained.n_new == 0 and (run / STATE).is_file()):
         observers.delivering("export")
         clock = time.monotonic()
-        discard_last_stage(run)
+        discard_refinement(run)
         try:
             mesh = write_assets(run, trained.model, dataset.box_from_world, Cameras.of(dataset)).mesh
         except EmptyMesh as error:
             failure = error
         timings["export"] = time.monotonic() - clock
-    if last_stage and not failure and not refine_trained(run, dataset, config, resume, observers):
+    if refines and not failure and not refine_trained(run, dataset, config, resume, observers):
         return None
     observers.delivering("evaluation", run)
     clock = time.monotonic()
@@ -96,7 +96,7 @@ def finish(
 
 
 def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, observers: Observer) -> bool:
-    """Makes the last stage of a run, from what training exported to the run or, in a run that goes on, to RUN/trained.
+    """Makes the refinement of a run, from what training exported to the run or, in a run that goes on, to RUN/trained.
 
     Photos or an asset that it cannot use leave it out, with a note; the run then delivers what training exported.
 
@@ -109,7 +109,7 @@ def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, ob
     """
     if not (run / STATE).is_file():  # else what stands in the run may be a result of the stage that goes on
         move_assets(run, run / TRAINED)
-    observers.delivering("last stage", run / TRAINED)
+    observers.delivering("refinement", run / TRAINED)
     settings = RefinementSettings(
         sweeps=config.refinement_sweeps, minutes=config.refinement_minutes, seed=abs(config.run.seed) % (1 << 31)
     )
@@ -122,7 +122,7 @@ def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, ob
         raise
     except InputError as error:
         move_assets(run / TRAINED, run)
-        note(f"{run}: without a last stage, as {error}")
+        note(f"{run}: without refinement, as {error}")
         return True
     except RuntimeError:
         move_assets(run / TRAINED, run)
@@ -138,9 +138,9 @@ def move_assets(source: Path, target: Path) -> None:
             os.replace(source / name, target / name)
 
 
-def discard_last_stage(run: Path) -> None:
-    """Deletes what a last stage wrote beside the asset, and what it started from."""
-    for name in LAST_STAGE_FILES:
+def discard_refinement(run: Path) -> None:
+    """Deletes what a refinement wrote beside the asset, and what it started from."""
+    for name in REFINEMENT_FILES:
         (run / name).unlink(missing_ok=True)
     if (run / TRAINED).is_dir() and not any((run / TRAINED).iterdir()):
         (run / TRAINED).rmdir()
@@ -150,7 +150,7 @@ def score_run(
     run: Path, model: SceneModel, grid: OccupancyGrid, views: Dataset, mesh: trimesh.Trimesh | None, timings: dict[str, float],
     maps: dict[str, Path], spp: int,
 ) -> Evaluated:  # fmt: skip
-    """Scores what a run delivers: the asset and its light by path tracing after a last stage, else the trained fields. Where
+    """Scores what a run delivers: the asset and its light by path tracing after a refinement, else the trained fields. Where
     the run learned exposures, each view gets one by its own image.
 
     Args:
@@ -158,25 +158,25 @@ def score_run(
         model, grid: The trained scene.
         views: The views.
         mesh: The trained mesh before its decimation, which is scored with the fields; None for that of mesh.glb.
-        timings: Seconds by part, "training" at least; that of a last stage is added.
+        timings: Seconds by part, "training" at least; that of a refinement is added.
         maps: Environment maps of relit views by name, which are rendered of mesh.glb.
         spp: Paths a pixel.
     """
     asset = read_asset(run / "mesh.glb") if (run / "mesh.glb").is_file() else None
     free = (run / EXPOSURES).is_file()
     if is_refined(run):
-        timings["last stage"] = read_json(run / RECORD, "seconds")["seconds"]
-        seconds = round(timings["training"] + timings["last stage"], 1)
+        timings["refinement"] = read_json(run / RECORD, "seconds")["seconds"]
+        seconds = round(timings["training"] + timings["refinement"], 1)
         evaluated = score_asset(asset, read_environment(run / "environment.exr"), views, maps, spp, seconds, free)
-        return replace(evaluated, scores=evaluated.scores | {"last_stage": last_stage_summary(run)})
+        return replace(evaluated, scores=evaluated.scores | {"refinement": refinement_summary(run)})
     relit, relight = (None, None) if asset is None else relit_scores(AssetRenderer(asset), views, maps, spp)
     mesh = asset_mesh(asset) if mesh is None and asset is not None else mesh
     scores, predictions, views = evaluate_scene(model, grid, views, mesh, timings["training"], relight, load_distance(), free)
     return Evaluated(scores, views, predictions, load_view_truths(views), relit)
 
 
-def last_stage_summary(run: Path) -> dict:
-    """What the last stage of a run changed, in numbers: pairs are before and after."""
+def refinement_summary(run: Path) -> dict:
+    """What the refinement of a run changed, in numbers: pairs are before and after."""
     record = read_json(run / RECORD, "sweeps")
     sweeps, outline = record["sweeps"], record["outline"]
     return {

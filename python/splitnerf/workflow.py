@@ -19,7 +19,7 @@ from splitnerf.data.frames import has_test_split, refuse_data, split_rule
 from splitnerf.data.json_files import write_json
 from splitnerf.data.reading import SEPARATED, Reading, is_separated
 from splitnerf.data.truth import read_mesh
-from splitnerf.delivery import LAST_STAGE_FILES, discard_last_stage, finish, is_refined, score_run, write_run_report
+from splitnerf.delivery import REFINEMENT_FILES, discard_refinement, finish, is_refined, score_run, write_run_report
 from splitnerf.devices import refuse_one_processor
 from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Evaluated, Protocol, choose_views, evaluation_path
@@ -41,7 +41,7 @@ from splitnerf.training.schedule import progress_of
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 RUN_FILES = (
     "config.toml", "checkpoint.pt", METRICS, "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
-    "evaluation.json", "report.html", ORIGIN, EXPOSURES, *LAST_STAGE_FILES,
+    "evaluation.json", "report.html", ORIGIN, EXPOSURES, *REFINEMENT_FILES,
 )  # fmt: skip
 
 
@@ -87,7 +87,7 @@ def present_in(run: Path) -> list[str]:
 
 def clear_run(run: Path) -> None:
     """Deletes the files of a run, and nothing else."""
-    discard_last_stage(run)
+    discard_refinement(run)
     for name in RUN_FILES:
         (run / name).unlink(missing_ok=True)
     for preview in (run / "previews").glob("step_*.png"):
@@ -244,7 +244,7 @@ def export_run(
         EmptyMesh: The surface is empty.
     """
     if is_refined(run) and out.resolve() == run.resolve():
-        raise InputError(f"{run}: delivers what its last stage fitted, which this would replace; give another --out")
+        raise InputError(f"{run}: delivers what its refinement fitted, which this would replace; give another --out")
     refuse_data(out)
     model, _, content = load_run(run)
     with held(out):

@@ -234,7 +234,7 @@ def test_the_box_does_not_count_what_is_not_known(half_known):
     assert box == pytest.approx(true, rel=0.05, abs=0.05) and -box[0, 3] / box[0, 0] == pytest.approx(7.0, abs=0.1)
 
 
-def test_the_last_stage_reads_known_pixels_only(half_known):
+def test_refinement_reads_known_pixels_only(half_known):
     data = half_known
     pixels = covered_pixels(data)
     assert len(pixels) == (data.images[..., 3] > 0.5).sum()

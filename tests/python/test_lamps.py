@@ -151,7 +151,7 @@ def test_metal_says_nothing(ball_over_plate):
     assert compact_lamp(AssetTexels(metal), light, 3, 0)[1] is None
 
 
-def test_the_last_stage_begins_with_the_compact_lamp(ball_over_plate):
+def test_refinement_begins_with_the_compact_lamp(ball_over_plate):
     light = glowing_sky(12.0)
     asset = with_textures(ball_over_plate, albedo_texture=shaded_albedo(ball_over_plate, 0.3, light))
     settings = RefinementSettings(sweeps=1, sweep_share=0.05, pixels=200, directions=4, outline=False)

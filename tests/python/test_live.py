@@ -194,7 +194,7 @@ def test_buttons_are_for_the_page_alone(stepped):
 
 def test_the_delivered_asset_is_shown(stepped, tmp_path):
     """Each time in the place of the one before, with its light; what is read, is read when a page asks."""
-    for version, (stage, folder) in enumerate((("last stage", tmp_path / "trained"), ("evaluation", tmp_path / "final")), start=1):
+    for version, (stage, folder) in enumerate((("refinement", tmp_path / "trained"), ("evaluation", tmp_path / "final")), start=1):
         folder.mkdir()
         content = triangle().write(folder / "mesh.glb").read_bytes()
         write_image(folder / "environment.exr", np.full((4, 8, 3), version, np.float32))

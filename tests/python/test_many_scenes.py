@@ -449,7 +449,7 @@ def test_progress_is_that_of_the_runs_that_have_begun(tmp_path):
     for name in "bc":
         (tmp_path / name / LOCK).touch()
     share, text = watch.look(batch.asked[1:])
-    assert share == pytest.approx((1 + 0.8 * 1.5) / 4) and text == "b 50%, c last stage, 1 waiting"
+    assert share == pytest.approx((1 + 0.8 * 1.5) / 4) and text == "b 50%, c refinement, 1 waiting"
     many = Batch(tmp_path, [], [Scene(20 * "x" + str(i), "/", []) for i in range(6)], [], 3, False)
     for scene in many.asked:
         (tmp_path / scene.name).mkdir()

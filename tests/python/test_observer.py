@@ -71,7 +71,7 @@ def test_observers_hear_of_all_that_happens(data, tmp_path):
     assert resumed.heard[0] == ("began", 40)
 
 
-def test_the_last_stage_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch):
+def test_refinement_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch):
     def refused(source, *_, **__):
         assert (source / "mesh.glb").is_file()
         raise InputError("nothing to fit")
@@ -79,7 +79,7 @@ def test_the_last_stage_is_said_with_what_it_begins_from(data, tmp_path, monkeyp
     monkeypatch.setattr("splitnerf.delivery.refine_folder", refused)
     asking = Asking()
     reconstruct(data, tmp_path / "run", tiny(steps=30, **{"refinement.enabled": True}), observers=[asking])
-    assert asking.heard[-3:] == [("export", None), ("last stage", True), ("evaluation", True)]
+    assert asking.heard[-3:] == [("export", None), ("refinement", True), ("evaluation", True)]
 
 
 def test_a_run_that_is_stopped_delivers_and_can_go_on(data, tmp_path):
@@ -125,7 +125,7 @@ def test_a_checkpoint_shows_the_levels_that_were_open(data, tmp_path):
 
 @pytest.mark.parametrize("stage_begun", [True, False])
 def test_a_stopped_run_goes_on_where_it_was(data, tmp_path, stage_begun):
-    """With its last stage, if that was interrupted; else with the training."""
+    """With its refinement, if that was interrupted; else with the training."""
     config = tiny(steps=40)
     stopped = trained(data, tmp_path, config, Asking(20, Wish.STOP))
     assert stopped.finished and stopped.step == 20

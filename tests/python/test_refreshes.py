@@ -224,7 +224,7 @@ def test_progress_is_the_larger_share_of_steps_or_minutes(data, tmp_path, step, 
 
 
 @pytest.mark.parametrize(("refine", "share"), [(True, 0.6), (False, 1.0)])
-def test_training_leaves_the_last_stage_its_share_of_the_minutes(data, tmp_path, refine, share):
+def test_training_leaves_the_refinement_its_share_of_the_minutes(data, tmp_path, refine, share):
     config = tiny(steps=100, max_minutes=2.0, **{"refinement.enabled": refine}, refinement_share=0.4)
     assert config.training_minutes + config.refinement_minutes == 2.0
     training = loop.Training(load_dataset(data), config, tmp_path, torch.device("cpu"))

@@ -167,7 +167,7 @@ def test_report_without_truth_or_history(tmp_path):
 
 
 def test_lights_are_carried_in_16_bits(tmp_path):
-    """256 x 128 texels of the delivered light, the true one, and the one before the last stage, in the light's own order."""
+    """256 x 128 texels of the delivered light, the true one, and the one before the refinement, in the light's own order."""
     light = np.random.default_rng(0).gamma(0.5, 2.0, (256, 512, 3)).astype(np.float32)
     light[0, 0] = 1e6
     _, parsed = write(tmp_path, light=light)

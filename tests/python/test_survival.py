@@ -441,7 +441,7 @@ def started(*words: str) -> BaseProcess:
 
 @pytest.mark.parametrize("n_kills", [5, pytest.param(30, marks=pytest.mark.slow)])
 def test_kills_end_with_the_bits_of_an_unbroken_run(data, tmp_path, n_kills):
-    """With -9 and at random moments: while it starts, trains, exports, in the last stage and in the scores."""
+    """With -9 and at random moments: while it starts, trains, exports, in the refinement and in the scores."""
     settings = SMALL | {"refinement.enabled": True, "refinement_sweeps": 2, "checkpoint_minutes": 0.0, "mesh_every": 0.2}
     words = ["train", str(data), "--steps", "40", "--deterministic", "--resume", "auto", *as_options(settings), "--out"]
 

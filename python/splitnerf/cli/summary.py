@@ -11,7 +11,7 @@ def print_summary(
     """Prints the steps and the device, the errors against the truth in the data, and the path of the results."""
     if step is not None and seconds is not None:
         print(f"{step} steps in {seconds:.0f} s on the {'CPU' if device == 'cpu' else 'GPU'}")
-    print_refinement(evaluation.get("last_stage"))
+    print_refinement(evaluation.get("refinement"))
     print_scores(evaluation)
     print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")
 

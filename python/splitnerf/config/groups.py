@@ -24,7 +24,7 @@ class Run:
     preset: str = setting("cpu", "name of the preset that the settings started from")
     seed: int = setting(0, "seed of all random numbers", at_least=-LARGEST_SEED, at_most=LARGEST_SEED)
     steps: int = setting(6000, "optimiser steps of the whole run", unit="steps", at_least=1, at_most=10**9)
-    max_minutes: float = setting(0.0, "time of training and last stage; 0: steps and sweeps end them", unit="minutes")
+    max_minutes: float = setting(0.0, "time of training and refinement; 0: steps and sweeps end them", unit="minutes")
     deterministic: bool = setting(False, "the same bits in two runs on one machine with one number of threads")
     cuda_graphs: bool = setting(False, "a GPU's launches of a step recorded and repeated; rays change in number seldom")
     tensor_cores: bool = setting(
@@ -330,13 +330,13 @@ class Optimiser:
 
 @dataclass(frozen=True)
 class Refinement:
-    """The last stage: the exported asset and its light are fitted to the photos."""
+    """Refinement: the exported asset and its light are fitted to the photos."""
 
-    enabled: bool = setting(True, "whether there is a last stage")
+    enabled: bool = setting(True, "whether there is a refinement")
     share: float = setting(
         0.2, "share of run.max_minutes that it gets, training the rest", unit="share of the run", below=1.0
     )
-    sweeps: int = setting(16, "Gauss-Newton steps of the last stage where no minutes end it", unit="steps", at_least=1)
+    sweeps: int = setting(16, "Gauss-Newton steps of the refinement where no minutes end it", unit="steps", at_least=1)
 
 
 @dataclass(frozen=True)

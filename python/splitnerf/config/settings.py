@@ -93,17 +93,17 @@ class Config:
 
     @property
     def training_minutes(self) -> float:
-        """The minutes of the run that training gets, the rest is the last stage's; 0: no limit."""
+        """The minutes of the run that training gets, the rest is the refinement's; 0: no limit."""
         return self.run.max_minutes - self.refinement_minutes
 
     @property
     def refinement_minutes(self) -> float:
-        """The minutes of the run that the last stage gets; 0 without it, or without a limit."""
+        """The minutes of the run that the refinement gets; 0 without it, or without a limit."""
         return self.run.max_minutes * self.refinement.share if self.refinement.enabled else 0.0
 
     @property
     def refinement_sweeps(self) -> int:
-        """The most steps of the last stage: where minutes end it, as many as these allow."""
+        """The most steps of the refinement: where minutes end it, as many as these allow."""
         return UNLIMITED if self.refinement_minutes > 0 else self.refinement.sweeps
 
     def replace(self, settings: dict[str, object]) -> Config:

@@ -176,7 +176,7 @@ class Training:
             self.environment = content["environment"].to(self.grid.device)
         for name in ("step", "seconds", "n_rays", "previewed_at", "psnr_mean"):
             setattr(self, name, content[name])
-        # A run that was stopped for its export goes on with the export's last stage; one that has it trains on.
+        # A run that was stopped for its export goes on with the export's refinement; one that has it trains on.
         self.stopped = content["stopped"] and (self.run / STATE).is_file()
         if self.exposures.learned:
             self.exposures.restore(content["exposures"])

@@ -23,7 +23,7 @@ PAPER: dict[str, dict[str, object]] = {
     "mip-map light": {"light.kind": "pyramid"},
 }
 SWITCHES: dict[str, dict[str, object]] = {
-    "no last stage": {"refinement.enabled": False},
+    "no refinement": {"refinement.enabled": False},
     "MLP light": {"light.kind": "mlp"},
     "light by the split sum": SPLIT,
     "summed light": SUMMED,

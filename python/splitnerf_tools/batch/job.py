@@ -19,7 +19,7 @@ from splitnerf_tools.batch.scenes import DONE, FAILED, LOGS, REFUSED, STOPPED, T
 from splitnerf_tools.batch.table import markdown, scores_of, shortened
 
 LOOK = 1.0  # seconds between looks at the runs
-TRAINING = 0.8  # of a scene's work; the rest is its last stage and its scores
+TRAINING = 0.8  # of a scene's work; the rest is its refinement and its scores
 NAMED = 4  # scenes at work
 TAIL = 4096  # bytes that hold the last line of metrics.jsonl
 REFUSAL, INTERRUPTION = 2, 130  # exit codes of the command line
@@ -173,7 +173,7 @@ class Watch:
         self._begun |= locked  # an earlier call may have left lines in the other folders
         shares = {n: min(1.0, last_line(self._batch.out / n).get("progress", 0.0)) for n in names if n in self._begun}
         running = [name for name, share in shares.items() if share == 1 or name in locked]
-        words = [f"{shortened(n, 16)} " + (f"{shares[n]:.0%}" if shares[n] < 1 else "last stage") for n in running[:NAMED]]
+        words = [f"{shortened(n, 16)} " + (f"{shares[n]:.0%}" if shares[n] < 1 else "refinement") for n in running[:NAMED]]
         if len(running) > NAMED:
             words.append(f"{len(running) - NAMED} more at work")
         if len(running) < len(names):

@@ -28,7 +28,7 @@ class Scene:
         options: What `splitnerf train` was given.
         state: One of "waiting", "done", "failed", "refused" (bad input) and "stopped".
         steps: Optimiser steps; None before the first.
-        minutes: Time of training, and of the last stage where the scene is done.
+        minutes: Time of training, and of the refinement where the scene is done.
         scores: Scores by name, see :data:`splitnerf_tools.batch.table.COLUMNS`.
         error: Why it failed, one line.
         attempts: How many processes it took.

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from splitnerf_tools.report.asset import asset_section
 from splitnerf_tools.report.browser import script_json
 from splitnerf_tools.report.curves import PALETTE, curve_data, line_chart
-from splitnerf_tools.report.last_stage import last_stage_section
+from splitnerf_tools.report.refinement import refinement_section
 from splitnerf_tools.report.light import embedded_light, panels_section
 from splitnerf_tools.report.page import write_html
 from splitnerf_tools.report.views import views_section
@@ -29,7 +29,7 @@ def write_report(
     light_truth: np.ndarray | None,
     history: Sequence[Mapping],
     timings: Mapping[str, float],
-    last_stage: Mapping | None = None,
+    refinement: Mapping | None = None,
     light: np.ndarray | None = None,
     asset: Path | None = None,
     albedo_scale: Sequence[float] | None = None,
@@ -50,7 +50,7 @@ def write_report(
         light_truth: [h, w, 3] linear radiance, or None.
         history: Lines of `metrics.jsonl`: `step`, `loss`, `psnr`, `loss_*`; each but `step` optional.
         timings: Seconds by part of the run.
-        last_stage: What the last stage changed, see :func:`splitnerf_tools.report.last_stage.last_stage_section`; None without one.
+        refinement: What the refinement changed, see :func:`splitnerf_tools.report.refinement.refinement_section`; None without one.
         light: [h, w, 3] linear radiance that is delivered, or None.
         asset: The GLB that is delivered; None, or one that is not there, for a page without a 3D view.
         albedo_scale: [3] the factor of the albedo under which it is scored, see `evaluation.json`; None for 1.
@@ -60,8 +60,8 @@ def write_report(
     """
     tables = [{"name": name, "rows": _rows(table)} for name, table in summary.items()]
     total = sum(timings.values())
-    before = None if last_stage is None else last_stage["lights"][0]
-    named = (("recovered light", light), ("true light", light_truth), ("before the last stage", before))
+    before = None if refinement is None else refinement["lights"][0]
+    named = (("recovered light", light), ("true light", light_truth), ("before the refinement", before))
     embedded = [embedded_light(name, radiance) for name, radiance in named if radiance is not None]
     glb, charts = asset_section(asset), _charts(history)
     write_html(
@@ -72,7 +72,7 @@ def write_report(
         tiles=tables[0] if tables else None,
         tables=tables[1:],
         views=views_section(views, albedo_scale) if views else None,
-        last_stage=None if last_stage is None else last_stage_section(last_stage),
+        refinement=None if refinement is None else refinement_section(refinement),
         lights=embedded,
         panels=panels_section(lights),
         charts=[line_chart(title, series, log=log) for title, series, log in charts],

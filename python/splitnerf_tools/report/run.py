@@ -28,7 +28,7 @@ ROUGHNESS = (0.0, 0.25, 0.5, 1.0)  # of the light's panels
 
 
 def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings: dict[str, float]) -> None:
-    """report.html: maps beside the truth, what the last stage changed, the light, curves and settings."""
+    """report.html: maps beside the truth, what the refinement changed, the light, curves and settings."""
     views, predictions, truths = evaluated.dataset, evaluated.predictions, evaluated.truths
     shown = spread(range(len(views)), REPORT_VIEWS)
     pages = []
@@ -46,7 +46,7 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
         title=f"{run.resolve().name} · {views.name}",
         summary={"Result": headline(evaluated.scores), "All scores": evaluated.scores, "Settings": asdict(model.config)},
         views=pages,
-        last_stage=last_stage_page(run, views, predictions, shown, evaluated.scores) if is_refined(run) else None,
+        refinement=refinement_page(run, views, predictions, shown, evaluated.scores) if is_refined(run) else None,
         lights=light_panels(model),
         light_truth=load_scene_truth(views.root).light,
         history=read_metrics(run / METRICS),
@@ -57,8 +57,8 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
     )
 
 
-def last_stage_page(run: Path, views: Dataset, predictions: list[dict], shown: list[int], scores: dict) -> dict | None:
-    """What the report shows of the last stage, see :func:`splitnerf_tools.report.write_report`; None where a file
+def refinement_page(run: Path, views: Dataset, predictions: list[dict], shown: list[int], scores: dict) -> dict | None:
+    """What the report shows of the refinement, see :func:`splitnerf_tools.report.write_report`; None where a file
     that it shows is gone."""
     source = run / TRAINED
     if not all((folder / name).is_file() for folder in (source, run) for name in ASSET_FILES[:2]):
@@ -73,7 +73,7 @@ def last_stage_page(run: Path, views: Dataset, predictions: list[dict], shown: l
         pictures += [over_background(p["rgb"], p["alpha"]) for p in (before[k], predictions[i])]
         errors = [float(np.square(p["alpha"] - coverage).mean()) for p in (before[k], predictions[i])]
         pages.append({"name": views.frame_names[i], "pictures": pictures, "coverage": errors})
-    return {"views": pages, "summary": scores["last_stage"], "lights": lights}
+    return {"views": pages, "summary": scores["refinement"], "lights": lights}
 
 
 def headline(evaluation: dict) -> dict[str, float]:

@@ -7,7 +7,7 @@ import { press, readCurves, readLight } from "./server.js";
 const STAGES = {
   preparation: "Reads the data",
   export: "Exports the asset",
-  "last stage": "Last stage: fits asset and light to the photos",
+  "refinement": "Refinement: fits asset and light to the photos",
   evaluation: "Scores the asset, which is final",
 };
 const field = (id) => document.getElementById(id);

@@ -1,4 +1,4 @@
-"""The report's section on the last stage: what it changed."""
+"""The report's section on the refinement: what it changed."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ PICTURES = ("photo", "before", "after")
 PAIRS = (("before", "after"), ("photo", "before"), ("photo", "after"))  # that the page compares
 
 
-def last_stage_section(page: Mapping) -> dict:
+def refinement_section(page: Mapping) -> dict:
     """The contents of the section for the template.
 
     Args:
         page: `views`, each with `name`, `pictures` (photo, before and after, [H, W, 3] sRGB on white), and `coverage` (mean
             squared errors before and after); `summary`, the scores'
-            part of the last stage; `lights`, linear maps [h, w, 3] before and after, are shown with the lights.
+            part of the refinement; `lights`, linear maps [h, w, 3] before and after, are shown with the lights.
     """
     views, summary, rows = page["views"], page["summary"], []
     scores = np.array([[psnr(view["pictures"][i], view["pictures"][0]) for i in (1, 2)] for view in views])

@@ -1,4 +1,4 @@
-"""The last stage of a run: what is delivered and scored, how it ends, how it goes on, what it says."""
+"""A run with refinement: what is delivered and scored, how it ends, how it continues, its messages."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from splitnerf.refinement import fit, job
 from splitnerf.refinement.fit import Refinement, RefinementSettings, Stage
 from splitnerf.refinement.job import OtherState, refine_folder
 from splitnerf.refinement.pixels import covered_pixels
-from splitnerf_tools.report.last_stage import last_stage_section
+from splitnerf_tools.report.refinement import refinement_section
 
 REFINED = ("--set", "refinement.enabled=true", "--set", "refinement_sweeps=2")
 DELIVERED = ("mesh.glb", "environment.exr", "environment.hdr", "refinement.json")
@@ -39,7 +39,7 @@ DELIVERED = ("mesh.glb", "environment.exr", "environment.hdr", "refinement.json"
 
 @pytest.fixture(scope="module")
 def run(data, tmp_path_factory) -> Path:
-    """A run with a last stage."""
+    """A run with a refinement."""
     folder = tmp_path_factory.mktemp("refined") / "run"
     assert train(data, folder, "--steps", "25", "--deterministic", *REFINED) == DONE
     return folder
@@ -87,15 +87,15 @@ def test_what_is_delivered_is_what_is_scored(run, data):
     assert again == json.loads(before)
 
 
-def test_without_a_last_stage_the_fields_are_scored(data, tmp_path):
+def test_without_a_refinement_the_fields_are_scored(data, tmp_path):
     run = tmp_path / "run"
     assert train(data, run, "--steps", "12", "--set", "refinement.enabled=true", "--no-refine") == DONE
     assert json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
     assert not (run / "trained").exists() and not any((run / name).exists() for name in DELIVERED[3:])
-    assert "The last stage" not in (run / "report.html").read_text()
+    assert "<h2>Refinement</h2>" not in (run / "report.html").read_text()
 
 
-def test_another_run_in_the_folder_leaves_nothing_of_the_last_stage(run, data, tmp_path):
+def test_another_run_in_the_folder_leaves_nothing_of_the_refinement(run, data, tmp_path):
     again = shutil.copytree(run, tmp_path / "run")
     assert train(data, again, "--steps", "12", "--overwrite") == DONE
     assert not (again / "trained").exists() and not any((again / name).exists() for name in DELIVERED[3:])
@@ -113,23 +113,23 @@ def test_photos_that_cannot_be_fitted_leave_the_trained_asset(data, tmp_path, ca
     monkeypatch.setattr(delivery, "refine_folder", refuses)
     run = tmp_path / "run"
     assert train(data, run, "--steps", "12", *REFINED) == DONE
-    assert "without a last stage, as no pixel" in capsys.readouterr().err
+    assert "without refinement, as no pixel" in capsys.readouterr().err
     assert (run / "mesh.glb").is_file() and json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
 
 
-def test_an_export_does_not_replace_what_the_last_stage_fitted(run, tmp_path, capsys):
+def test_an_export_does_not_replace_what_the_refinement_fitted(run, tmp_path, capsys):
     run = shutil.copytree(run, tmp_path / "run")
     kept = bytes_of(run, *DELIVERED)
     options = ["--texture-size", "32", "--faces", "200"]
     assert main(["export", str(run), "--out", str(run), *options]) == BAD_INPUT
-    assert "last stage" in capsys.readouterr().err
+    assert "refinement" in capsys.readouterr().err
     assert main(["export", str(run), *options]) == DONE
     assert bytes_of(run, *DELIVERED) == kept
     assert read_asset(run / "trained" / "mesh.glb").materials[0].albedo_texture.shape == (32, 32, 3)
 
 
 def test_refine_starts_from_what_was_trained(run, data, tmp_path):
-    """The same command again on a refined run does what the last stage did."""
+    """The same command again on a refined run does what the refinement did."""
     run = shutil.copytree(run, tmp_path / "run")
     assert main(["refine", str(run), "--data", str(data), "--sweeps", "2"]) == DONE
     assert bytes_of(run / "refined", "mesh.glb", "environment.exr") == bytes_of(run, "mesh.glb", "environment.exr")
@@ -151,12 +151,12 @@ def stop_after(monkeypatch, sweeps: int) -> None:
     monkeypatch.setattr(Stage, "advance", counted)
 
 
-def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_another(run, data, tmp_path, capsys, monkeypatch):
+def test_a_run_that_was_interrupted_in_its_refinement_ends_with_the_bits_of_another(run, data, tmp_path, capsys, monkeypatch):
     halves = tmp_path / "halves"
     with monkeypatch.context() as patch:
         stop_after(patch, 1)
         assert train(data, halves, "--steps", "25", "--deterministic", *REFINED) == INTERRUPTED
-    assert "in the last stage" in capsys.readouterr().out
+    assert "in the refinement" in capsys.readouterr().out
     assert (halves / "refinement.pt").is_file() and not (halves / "mesh.glb").exists()
     trained = (halves / "trained" / "mesh.glb").stat().st_mtime_ns
     assert main(["train", str(data), "--out", str(halves), "--resume"]) == DONE
@@ -169,7 +169,7 @@ def test_a_run_that_was_interrupted_in_its_last_stage_ends_with_the_bits_of_anot
 def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_another(
     run, data, tmp_path, monkeypatch, place, minutes
 ):
-    """With a state of the last stage and without."""
+    """With a state of the refinement and without."""
     killed, minutes = tmp_path / "run", ("--set", f"checkpoint_minutes={minutes}")
 
     def fails(*_, **__):
@@ -394,7 +394,7 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     printed = capsys.readouterr().err
     assert printed.startswith("  0% 00:00<? refinement, outline, round 1 of 3\n")
     assert re.search(r"100% .* refinement, step 4, photos [1-4]\d\.\d\d dB", printed)
-    summary = delivery.last_stage_summary(folder)
+    summary = delivery.refinement_summary(folder)
     before, after = summary["photos_psnr"]
     assert after > before and summary["steps"] == 4
     print_refinement(summary)
@@ -419,7 +419,7 @@ def test_the_report_shows_before_and_after(run):
     pictures.feed(page)
     for name in ("photo", "before", "after"):
         assert sum(alt.endswith(f", {name}") for alt in pictures.found) == 2, name  # test views
-    for text in ("one factor per colour channel", "are saturated in the photos", "The last stage"):
+    for text in ("one factor per colour channel", "are saturated in the photos", "<h2>Refinement</h2>"):
         assert text in page
 
 
@@ -430,7 +430,7 @@ def test_the_reports_numbers_are_those_of_its_pictures():
         "summary": {"steps": 3, "seconds": 9.0, "photos_psnr": [20.0, 30.0], "outline_error": None, "saturated": 0.125},
         "lights": [np.ones((4, 8, 3))] * 2,
     }  # fmt: skip
-    section = last_stage_section(page)
+    section = refinement_section(page)
     assert section["rows"][0][1:] == ("20.00 dB", "40.00 dB") and section["rows"][2][1:] == ("0.2", "0.1")
     assert section["saturated"] == "12.5 %" and len(section["views"][0]["cells"]) == 3
     assert section["views"][0]["score"] == "20.00 → 40.00 dB"
