@@ -31,9 +31,9 @@ def write_report(run: Path, model: SceneModel, evaluated: Evaluated, timings: di
 
 
 def watch(name: str, port: int) -> AbstractContextManager[Observer]:
-    from splitnerf_tools.view.watched import watched
+    from splitnerf_tools.view.training_page import training_page
 
-    return watched(name, port)
+    return training_page(name, port)
 
 
 def failing_operators(device: str) -> tuple[list[str], int]:

@@ -28,7 +28,7 @@ WIDTH, HEIGHT, FOCAL = 4000, 3000, 4200.0
 DISTANCE = 3.0
 ELEVATIONS = 0.2, 0.5, 0.9, 1.2  # radians
 FIRST, STEPS = 20, 220  # steps that are not timed, and the last one
-PATIENCE = 3600.0  # seconds to the first step
+TIMEOUT = 3600.0  # seconds to the first step
 SOURCES = ("tests/bench/large_inputs.py", "python/splitnerf/data", "python/splitnerf/render/averages.py", "python/splitnerf/render/rays.py",
            "python/splitnerf/training")  # fmt: skip
 INTRODUCTION = """# Large inputs
@@ -123,7 +123,7 @@ def measure(data: Path, run: Path, budget: float | None) -> Row:
         first = None
         while not lines or lines[-1]["step"] < STEPS:
             time.sleep(0.1)
-            if process.poll() is not None or (first is None and time.monotonic() - started > PATIENCE):
+            if process.poll() is not None or (first is None and time.monotonic() - started > TIMEOUT):
                 raise SystemExit(f"{data}: the training ended before its first step; run the command alone: {' '.join(command)}")
             log = run / "metrics.jsonl"
             text = log.read_text() if log.is_file() else ""

@@ -26,7 +26,7 @@ pytestmark = [
     pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install 'splitnerf[batch]'"),
     pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="there is no /proc to look at processes in"),
 ]
-PATIENCE = 600.0  # seconds
+TIMEOUT = 600.0  # seconds
 
 
 class Call:
@@ -55,7 +55,7 @@ class Call:
 
     def wait_until(self, seen: Callable[[], object]) -> object:
         """What is seen, once it is true."""
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + TIMEOUT
         while not (found := seen()):
             assert self.program.poll() is None and time.monotonic() < until, self.out + self.err
             time.sleep(0.1)
@@ -63,7 +63,7 @@ class Call:
 
     def end(self) -> int:
         """Waits for its end; returns the exit code. Nothing of Ray is left then."""
-        code = self.program.wait(PATIENCE)
+        code = self.program.wait(TIMEOUT)
         assert [name for name in commands().values() if "raylet" in name and str(self.temporary) in name] == []
         assert list(self.temporary.glob("sn-*")) == [] and "Traceback" not in self.err
         assert all(re.match(r"(splitnerf: note: |[ \d]{3}% )", line) for line in self.err.splitlines()), self.err
@@ -186,7 +186,7 @@ def test_a_cluster_that_is_not_there_is_one_line(tmp_path, call):
         taken.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{taken.getsockname()[1]}"
         asked = call(tmp_path, "--out", tmp_path / "out", "--address", address)
-        assert asked.program.wait(PATIENCE) == BAD_INPUT
+        assert asked.program.wait(TIMEOUT) == BAD_INPUT
     assert asked.err.startswith(f"splitnerf: --address {address}: no Ray cluster answers") and len(asked.err.splitlines()) == 1
 
 

@@ -28,12 +28,12 @@ from splitnerf.render.model import SceneModel
 from splitnerf.training.loop import Training
 from splitnerf.training.observer import Wish
 from splitnerf_tools.view import live as live_module
-from splitnerf_tools.view.grown import grown_asset, grown_glb
+from splitnerf_tools.view.assets import ViewedAssets
+from splitnerf_tools.view.events import EventStream
 from splitnerf_tools.view.live import Live
-from splitnerf_tools.view.news import News
 from splitnerf_tools.view.server import ViewServer
-from splitnerf_tools.view.shown import Shown
-from splitnerf_tools.view.watched import watched
+from splitnerf_tools.view.training_asset import training_asset, training_glb
+from splitnerf_tools.view.training_page import training_page
 
 CPU = torch.device("cpu")
 
@@ -41,10 +41,10 @@ CPU = torch.device("cpu")
 @pytest.fixture
 def eager(monkeypatch):
     """States and surfaces without waits between them."""
-    for name in ("TOLD_EVERY", "GROWN_EVERY"):
+    for name in ("STATE_EVERY", "ASSET_EVERY"):
         monkeypatch.setattr(live_module, name, 0.0)
-    monkeypatch.setattr(live_module, "GROWN_SHARE", 1e9)
-    monkeypatch.setattr("splitnerf_tools.view.live.grown_asset", functools.partial(grown_asset, resolution=16))
+    monkeypatch.setattr(live_module, "ASSET_SHARE", 1e9)
+    monkeypatch.setattr("splitnerf_tools.view.live.training_asset", functools.partial(training_asset, resolution=16))
 
 
 class Stepped:
@@ -88,7 +88,7 @@ def page_of(server):
         yield heard
 
 
-def test_a_grown_asset_has_the_materials_of_the_fields(tmp_path):
+def test_a_training_asset_has_the_materials_of_the_fields(tmp_path):
     torch.manual_seed(3)
     model = SceneModel(tiny())
     model.open_levels(1.0)
@@ -97,7 +97,7 @@ def test_a_grown_asset_has_the_materials_of_the_fields(tmp_path):
             parameter.add_(0.3 * torch.randn_like(parameter))
     world_from_box = np.diag([2.0, 2.0, 2.0, 1.0])
     world_from_box[:3, 3] = 1, 2, 3
-    (tmp_path / "grown.glb").write_bytes(grown_glb(grown_asset(model, world_from_box, 24)))
+    (tmp_path / "grown.glb").write_bytes(training_glb(training_asset(model, world_from_box, 24)))
     asset = read_asset(tmp_path / "grown.glb")
     points = ((asset.vertices - [1, 2, 3]) / 2).astype(np.float32)
     assert np.abs(surface_of(model).sdf(torch.from_numpy(points)).detach().numpy()).max() < 0.1  # cells are 0.13 wide
@@ -117,8 +117,8 @@ def test_a_grown_asset_has_the_materials_of_the_fields(tmp_path):
 
 def test_nothing_is_made_while_no_page_is_open(stepped):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(live_module, "grown_asset", lambda *_: pytest.fail("a surface was made"))
-        patch.setattr(stepped.live.news, "tell", lambda **_: pytest.fail("a state was told"))
+        patch.setattr(live_module, "training_asset", lambda *_: pytest.fail("a surface was made"))
+        patch.setattr(stepped.live.events, "update", lambda **_: pytest.fail("a state was told"))
         assert [stepped.between() for _ in range(3)] == [None] * 3
 
 
@@ -146,7 +146,7 @@ def test_an_open_page_gets_surface_light_and_numbers(stepped):
         ask(stepped.server, "assets/0")
         stepped.between()
         assert stepped.live.shown.sources[0].version == 2  # the same step has the same surface
-    while stepped.live.news.listeners:  # until the server has seen that the page is gone
+    while stepped.live.events.listeners:  # until the server has seen that the page is gone
         time.sleep(0.01)
 
 
@@ -167,12 +167,12 @@ def test_curves_hold_the_lines_of_the_log(data, tmp_path):
 
 def test_buttons_steer_the_run(stepped, capsys):
     assert stepped.button("pause")[0] == 200
-    assert [stepped.between(), stepped.between()] == [Wish.PAUSE] * 2 and stepped.live.news.state["paused"]
+    assert [stepped.between(), stepped.between()] == [Wish.PAUSE] * 2 and stepped.live.events.state["paused"]
     stepped.button("checkpoint")
     assert [stepped.between(), stepped.between()] == [Wish.SAVE, Wish.PAUSE]
-    assert stepped.live.news.state["saved"] == stepped.training.step
+    assert stepped.live.events.state["saved"] == stepped.training.step
     stepped.button("resume")
-    assert stepped.between() is None and not stepped.live.news.state["paused"]
+    assert stepped.between() is None and not stepped.live.events.state["paused"]
     stepped.button("pause")
     stepped.button("stop")
     assert stepped.between() is Wish.STOP
@@ -199,7 +199,7 @@ def test_the_delivered_asset_is_shown(stepped, tmp_path):
         content = triangle().write(folder / "mesh.glb").read_bytes()
         write_image(folder / "environment.exr", np.full((4, 8, 3), version, np.float32))
         stepped.live.delivering(stage, folder)
-        assert stepped.live.news.state["version"] == version and stepped.live.shown.sources[0].version == version - 1
+        assert stepped.live.events.state["version"] == version and stepped.live.shown.sources[0].version == version - 1
         (source,) = json.loads(ask(stepped.server, "scene.json")[2])["sources"]
         assert source == {"name": "mine", "light": 1, "version": version}
         assert ask(stepped.server, "assets/0")[2] == content
@@ -208,7 +208,7 @@ def test_the_delivered_asset_is_shown(stepped, tmp_path):
     stepped.live.delivering("evaluation", tmp_path / "final")
     scene = json.loads(ask(stepped.server, "scene.json")[2])
     assert scene["sources"][0]["version"] == 2 and "mesh.glb: is neither" in scene["problems"][0]
-    assert stepped.live.news.state["version"] == 2  # pages wait for no other one
+    assert stepped.live.events.state["version"] == 2  # pages wait for no other one
 
 
 def test_a_page_changes_no_bit_of_a_deterministic_run(data, tmp_path, eager):
@@ -224,40 +224,40 @@ def test_a_page_changes_no_bit_of_a_deterministic_run(data, tmp_path, eager):
             return super().between_steps(training)
 
     live = Curious("mine")
-    live.news.listeners = 1
+    live.events.listeners = 1
     config = tiny(steps=24, deterministic=True, mesh_every=0.2)
     states = []
     for name, observers in (("watched", [live]), ("alone", [])):
         (tmp_path / name).mkdir()
         Training(load_dataset(data), config, tmp_path / name, CPU, observers).complete()
         states.append(torch.load(tmp_path / name / "checkpoint.pt", weights_only=True))
-    assert live.shown.sources[0].version >= 5 and live.news.state["saved"] == 8
+    assert live.shown.sources[0].version >= 5 and live.events.state["saved"] == 8
     for key in ("model", "optimiser", "generator", "torch_generator", "occupancy", "mesh_vertices"):
         watched, alone = flat(states[0][key]), flat(states[1][key])
         assert watched.keys() == alone.keys() and all(same(watched[name], alone[name]) for name in alone), key
 
 
 def test_pages_hear_the_end_and_it_waits_for_them_a_moment(monkeypatch):
-    news, heard = News(), []
+    events, heard = EventStream(), []
     gone = threading.Event()
 
     def page():
-        for state in news.listen(gone.is_set):
+        for state in events.listen(gone.is_set):
             heard.append(state["ended"])
             if state["ended"]:
                 gone.set()
 
     thread = threading.Thread(target=page)
     thread.start()
-    while not news.listeners:
+    while not events.listeners:
         time.sleep(0.001)
-    news.end("over")
-    assert news.listeners == 0 and heard[-1] == "over"
-    news.end("again")
-    assert news.state["ended"] == "over"
+    events.end("over")
+    assert events.listeners == 0 and heard[-1] == "over"
+    events.end("again")
+    assert events.state["ended"] == "over"
     thread.join()
-    monkeypatch.setattr("splitnerf_tools.view.news.FAREWELL", 0.0)
-    stubborn = News()
+    monkeypatch.setattr("splitnerf_tools.view.events.FAREWELL", 0.0)
+    stubborn = EventStream()
     listening = stubborn.listen(lambda: False)
     next(listening)
     stubborn.end("over")  # does not wait for ever
@@ -265,7 +265,7 @@ def test_pages_hear_the_end_and_it_waits_for_them_a_moment(monkeypatch):
 
 
 def test_a_viewer_without_a_run_has_no_buttons(tmp_path):
-    with serving(ViewServer(Shown([triangle().write(tmp_path / "a.glb")]))) as server:
+    with serving(ViewServer(ViewedAssets([triangle().write(tmp_path / "a.glb")]))) as server:
         assert error_of(ask(server, "control/stop", method="POST", body=b"")) == (404, "no run is trained here")
         assert ask(server, "curves/0")[0] == 404
         with page_of(server) as heard:
@@ -284,15 +284,15 @@ def test_the_command_prints_the_address_and_refuses_a_port_in_use(data, tmp_path
 
 
 def test_a_failure_is_told(capsys):
-    with pytest.raises(RuntimeError), watched("mine", 0) as live:
+    with pytest.raises(RuntimeError), training_page("mine", 0) as live:
         raise RuntimeError
-    assert live.news.state["ended"].startswith("the command ended before the run was done")
-    with watched("mine", 0) as live:
+    assert live.events.state["ended"].startswith("the command ended before the run was done")
+    with training_page("mine", 0) as live:
         live.delivering("evaluation")
-    assert live.news.state["ended"].startswith("the run is done")
-    with watched("mine", 0) as live:
+    assert live.events.state["ended"].startswith("the run is done")
+    with training_page("mine", 0) as live:
         pass
-    assert "--resume goes on" in live.news.state["ended"]
+    assert "--resume continues" in live.events.state["ended"]
     assert capsys.readouterr().out.count("http://127.0.0.1:") == 3
 
 
@@ -305,7 +305,7 @@ def test_what_is_not_finite_is_null(value, stepped):
     assert line == {"step": 3, "psnr": 20.123, "loss": None, "loss_colour": None}
     stepped.training.psnr_mean = value
     stepped.live.began(stepped.training)
-    assert stepped.live.news.state["psnr"] is None
+    assert stepped.live.events.state["psnr"] is None
 
 
 @pytest.mark.parametrize("error", [OSError(5, "Input/output error"), MemoryError()])
@@ -319,7 +319,7 @@ def test_a_delivered_asset_that_cannot_be_read_is_said(error, stepped, tmp_path,
     monkeypatch.setattr(stepped.live.shown, "source_of", read)
     status, _, content = ask(stepped.server, "scene.json")
     assert status == 200 and f"{tmp_path}: cannot be shown ({type(error).__name__}" in json.loads(content)["problems"][0]
-    assert stepped.live.news.state["version"] == 0  # pages wait for no newer one
+    assert stepped.live.events.state["version"] == 0  # pages wait for no newer one
 
 
 def test_a_light_that_finds_no_memory_does_not_end_the_training(stepped, monkeypatch):
@@ -327,4 +327,4 @@ def test_a_light_that_finds_no_memory_does_not_end_the_training(stepped, monkeyp
         raise torch.OutOfMemoryError("no memory")
 
     monkeypatch.setattr(stepped.training.model.light, "panorama", panorama)
-    assert stepped.live._grow(stepped.training) == 0
+    assert stepped.live._update_asset(stepped.training) == 0

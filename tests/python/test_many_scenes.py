@@ -227,7 +227,7 @@ def test_the_last_word_says_why(tmp_path, said, code, error):
 def test_a_run_in_use_is_waited_for_and_then_left_alone(tmp_path, monkeypatch):
     owner = subprocess.Popen([sys.executable, "-c", HOLDS, str(tmp_path / "run")], stdout=subprocess.PIPE)
     owner.stdout.readline()
-    monkeypatch.setattr(child, "PATIENCE", 0.3)
+    monkeypatch.setattr(child, "TIMEOUT", 0.3)
     try:
         assert is_held(tmp_path / "run")
         outcome = train_scene(work_in(tmp_path, tmp_path))

@@ -27,10 +27,10 @@ from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training
 from splitnerf.training.observer import Observer
 from splitnerf_tools.view import live as live_module
-from splitnerf_tools.view.grown import grown_asset
+from splitnerf_tools.view.assets import ViewedAssets
 from splitnerf_tools.view.live import Live
 from splitnerf_tools.view.server import Handler, ViewServer
-from splitnerf_tools.view.shown import Shown
+from splitnerf_tools.view.training_asset import training_asset
 
 pytestmark = needs_chromium
 RESTLESS = {"restless": True}
@@ -59,8 +59,8 @@ def walk(data, tmp_path_factory):
     versions = []
     with ExitStack() as stack:
         patch = stack.enter_context(pytest.MonkeyPatch.context())
-        patch.setattr("splitnerf_tools.view.live.grown_asset", functools.partial(grown_asset, resolution=24))
-        patch.setattr(live_module, "GROWN_EVERY", 1.0)
+        patch.setattr("splitnerf_tools.view.live.training_asset", functools.partial(training_asset, resolution=24))
+        patch.setattr(live_module, "ASSET_EVERY", 1.0)
         server = stack.enter_context(serving(ViewServer(live.shown, live=live)))
         training = Training(load_dataset(data), tiny(steps=100_000), run, torch.device("cpu"), [live, Slowly()])
         done = []
@@ -88,7 +88,7 @@ def walk(data, tmp_path_factory):
             text("panel", "document.getElementById('panel').scrollWidth - document.getElementById('panel').clientWidth", **RESTLESS),
             press("#pause"), wait(f"!{PHASE}.includes('paused')"),
             press("#stop"), wait(f"{PHASE}.includes('final') && {LOADED}"), text("buttons", "document.getElementById('buttons').hidden", **RESTLESS),
-            lambda: threading.Thread(target=live.news.end, args=("the run is done",)).start(),
+            lambda: threading.Thread(target=live.events.end, args=("the run is done",)).start(),
             wait(f"{LOST}.includes('The end')"), picture(run.parent / "ended.png", **RESTLESS), text("ended", LOST, **RESTLESS),
         ])  # fmt: skip
         thread.join()
@@ -120,14 +120,14 @@ def test_a_cut_connection_is_said_and_mended(tmp_path, monkeypatch):
     triangle().write(folder / "mesh.glb")
     is_gone = Handler._is_gone
     monkeypatch.setattr(Handler, "_is_gone", lambda handler: cutting.is_set() or is_gone(handler))
-    monkeypatch.setattr("splitnerf_tools.view.news.HEARTBEAT", 0.2)
-    monkeypatch.setattr("splitnerf_tools.view.news.News.end", lambda *_: None)
+    monkeypatch.setattr("splitnerf_tools.view.events.HEARTBEAT", 0.2)
+    monkeypatch.setattr("splitnerf_tools.view.events.EventStream.end", lambda *_: None)
 
     def start(token, port=0):
         cutting.clear()
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("splitnerf_tools.view.server.secrets.token_urlsafe", lambda _: token)
-            return servers.enter_context(serving(ViewServer(Shown([folder]), port=port)))
+            return servers.enter_context(serving(ViewServer(ViewedAssets([folder]), port=port)))
 
     def cut():
         cutting.set()
@@ -162,7 +162,7 @@ def test_an_asset_whose_connection_breaks_off_is_asked_for_again(tmp_path, monke
         handler.wfile.write(content[: len(content) // 2])
 
     monkeypatch.setattr(Handler, "_asset", half)
-    with serving(ViewServer(Shown([folder]))) as server:
+    with serving(ViewServer(ViewedAssets([folder]))) as server:
         told = look_at(server.url, [
             {"do": "size", "width": 500, "height": 400} | RESTLESS, {"do": "open"} | RESTLESS, text("said", SAID, **RESTLESS), read.set, wait(LOADED),
         ])["texts"]  # fmt: skip
@@ -187,7 +187,7 @@ def test_a_glb_of_200_megabytes_loads(tmp_path):
     write_glb(tmp_path / "large.glb", asset)
     assert (tmp_path / "large.glb").stat().st_size > 200e6
     clock = time.monotonic()
-    with serving(ViewServer(Shown([tmp_path / "large.glb"]))) as server:
+    with serving(ViewServer(ViewedAssets([tmp_path / "large.glb"]))) as server:
         read, clock = time.monotonic() - clock, time.monotonic()
         told = look_at(server.url, [
             {"do": "size", "width": 400, "height": 300} | RESTLESS, {"do": "open"} | RESTLESS, text("said", SAID, **RESTLESS),

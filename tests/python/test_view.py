@@ -28,10 +28,10 @@ from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.report.browser import as_halves
 from splitnerf_tools.view import final
 from splitnerf_tools.view import server as server_module
+from splitnerf_tools.view.assets import MOST_DROPPED, ViewedAssets
 from splitnerf_tools.view.final import Camera, Tracer
 from splitnerf_tools.view.photos import Photos
 from splitnerf_tools.view.server import ViewServer
-from splitnerf_tools.view.shown import MOST_DROPPED, Shown
 import splitnerf_tools.view
 
 PAGE = Path(splitnerf_tools.view.__file__).parent
@@ -170,7 +170,7 @@ def test_uploads_have_limits(served, monkeypatch):
 
 
 def test_a_light_of_many_rows_is_made_smaller(shown_run, tmp_path, monkeypatch):
-    monkeypatch.setattr("splitnerf_tools.view.shown.MOST_ROWS", 4)
+    monkeypatch.setattr("splitnerf_tools.view.assets.MOST_ROWS", 4)
     with serving(shown_run) as server:
         light = halves(ask(server, "lights/0"))
     blocks = numbered_sky().reshape(4, 2, 8, 2, 3).mean(axis=(1, 3))
@@ -244,7 +244,7 @@ def test_pictures_are_those_of_the_path_tracer(shown_run, monkeypatch):
     monkeypatch.setattr(final, "PASSES", (1, 1, 62))
     monkeypatch.setattr(final, "FIRST_SIDE", 20)
     monkeypatch.setattr(final, "PATHS_A_CALL", 500)
-    asset = Shown([shown_run]).sources[0].asset
+    asset = ViewedAssets([shown_run]).sources[0].asset
     with serving(shown_run) as server:
         for turn in (0, 90):
             camera = camera_of(60, 40, turn=turn)
@@ -275,7 +275,7 @@ def test_two_assets_are_traced_in_turns(shown_run, tmp_path, monkeypatch):
 
 def test_a_newer_request_ends_the_one_before(shown_run, monkeypatch):
     monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
-    tracer = Tracer(Shown([shown_run]))
+    tracer = Tracer(ViewedAssets([shown_run]))
     camera = Camera.of(camera_of(16, 16), 1)
     first = tracer.pictures(camera, lambda: False)
     assert next(first).spp == 1

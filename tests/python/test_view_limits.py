@@ -16,8 +16,8 @@ from viewer_server import ask, camera_of, serving
 
 from splitnerf_tools.view import final
 from splitnerf_tools.view import server as server_module
+from splitnerf_tools.view.assets import ViewedAssets
 from splitnerf_tools.view.final import Camera, Tracer
-from splitnerf_tools.view.shown import Shown
 
 
 def silent(server) -> socket.socket:
@@ -58,7 +58,7 @@ def test_silent_connections_leave_files_for_the_run(served, monkeypatch):
 
 
 def test_a_connection_without_a_token_is_closed_soon(shown_run, monkeypatch):
-    assert server_module.Handler.timeout < server_module.PATIENCE
+    assert server_module.Handler.timeout < server_module.TIMEOUT
     monkeypatch.setattr(server_module.Handler, "timeout", 0.05)
     with serving(shown_run) as server, silent(server) as page:
         page.sendall(b"GET /")
@@ -72,7 +72,7 @@ def test_one_with_a_token_may_be_silent_for_longer(shown_run, monkeypatch):
     with serving(shown_run) as server, silent(server) as page:
         page.sendall(f"GET {urlsplit(server.url).path} HTTP/1.1\r\nHost: {urlsplit(server.url).netloc}\r\n\r\n".encode())
         assert page.recv(1) == b""
-    assert patience == [server_module.PATIENCE]
+    assert patience == [server_module.TIMEOUT]
 
 
 def test_a_page_that_goes_ends_its_request(shown_run, monkeypatch):
@@ -95,7 +95,7 @@ def test_a_page_is_seen_to_go_whatever_its_files_number(shown_run, monkeypatch):
 
 def test_who_reads_no_pictures_holds_nothing_up(shown_run, monkeypatch):
     monkeypatch.setattr(final, "PASSES", (1, 1))
-    tracer = Tracer(Shown([shown_run]))
+    tracer = Tracer(ViewedAssets([shown_run]))
     pictures = tracer.pictures(Camera.of(camera_of(16, 16), 1), lambda: False)
     next(pictures)
     assert not tracer._working.locked()

@@ -19,9 +19,9 @@ from splitnerf.data.images import area_average, linear_to_srgb, read_image, writ
 from splitnerf.export.glb import write_glb
 from splitnerf.relight.cameras import bounding_sphere, turntable
 from splitnerf.render.path_traced import AssetRenderer
+from splitnerf_tools.view.assets import ViewedAssets
 from splitnerf_tools.view.photos import Photos
 from splitnerf_tools.view.server import ViewServer
-from splitnerf_tools.view.shown import Shown
 
 SIZE = 160
 TURN = 90
@@ -83,14 +83,14 @@ def seen(run):
         {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
         {"do": "text", "name": "stage", "script": "[canvas.clientWidth, canvas.clientHeight]"},
     ]  # fmt: skip
-    told = look(Shown([run]), steps)
+    told = look(ViewedAssets([run]), steps)
     return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
 
 
 @pytest.fixture(scope="module")
 def traced(run):
     """By turns of the light: the picture of `splitnerf relight`, and where it shows the object alone."""
-    source = Shown([run]).sources[0]
+    source = ViewedAssets([run]).sources[0]
     view = turntable(source.asset, 1, size=(SIZE, SIZE))[0]
 
     def picture(turn):
@@ -105,7 +105,7 @@ def traced(run):
 def photos(run):
     """The ball through three cameras whose lens looks past the middle, path traced, as a data set."""
     folder = run.parent / "data"
-    source, frames = Shown([run]).sources[0], []
+    source, frames = ViewedAssets([run]).sources[0], []
     lens = (200.0, 190.0, 95.0, 50.0)
     for i, (azimuth, elevation) in enumerate(((0.4, 0.5), (-2.0, 0.2), (2.5, -0.3))):
         pose = looking(azimuth, elevation, 5.0)
@@ -145,14 +145,14 @@ def through(run, photos):
     ]  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("splitnerf_tools.view.final.PASSES", (1, 1, 30))
-        told = look(Shown([run]), steps, photos)
+        told = look(ViewedAssets([run]), steps, photos)
     return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
 
 
 def place_of_camera(run, photos, number):
     """The pixel in which a photo's camera is seen from the front, eight keys farther away."""
-    view = turntable(Shown([run]).sources[0].asset, 1, size=(SIZE, SIZE))[0]
-    centre = bounding_sphere(Shown([run]).sources[0].asset)[0]
+    view = turntable(ViewedAssets([run]).sources[0].asset, 1, size=(SIZE, SIZE))[0]
+    centre = bounding_sphere(ViewedAssets([run]).sources[0].asset)[0]
     eye = centre + (view.pose[:3, 3] - centre) / 0.9**8
     place = view.pose[:3, :3].T @ (np.reshape(photos.cameras()[number]["pose"], (4, 4))[:3, 3] - eye)
     assert place[2] < 0
@@ -277,7 +277,7 @@ def test_two_assets_stand_side_by_side(run, ball, tmp_path):
         {"do": "style", "content": BARE}, {"do": "key", "key": "h"}, {"do": "key", "key": "2"},
         {"do": "picture", "path": str(tmp_path / "two.png")},
     ]  # fmt: skip
-    told = look(Shown([run, tmp_path / "dark.glb"]), steps)
+    told = look(ViewedAssets([run, tmp_path / "dark.glb"]), steps)
     picture = pixels(tmp_path / "two.png")
     assert told["texts"]["names"].split() == ["mine", "dark.glb"]
     for half, albedo in ((picture[:, :SIZE], 0.4), (picture[:, SIZE:], 0.02)):

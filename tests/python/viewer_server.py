@@ -12,7 +12,7 @@ from gltf_builder import Gltf
 from painted_ball import looking
 
 from splitnerf_tools.view.server import ViewServer
-from splitnerf_tools.view.shown import Shown
+from splitnerf_tools.view.assets import ViewedAssets
 
 
 def numbered_sky(height=8):
@@ -30,7 +30,7 @@ def triangle():
 
 def serving(*paths, light=None, photos=None, host="127.0.0.1"):
     """A viewer's server of these assets, which answers within the block."""
-    return looking_at.serving(ViewServer(Shown(list(paths), light), photos, host))
+    return looking_at.serving(ViewServer(ViewedAssets(list(paths), light), photos, host))
 
 
 def ask(server, path, *, method="GET", body=None, token=True, **headers):

@@ -19,7 +19,7 @@ from splitnerf.errors import plain
 from splitnerf.files import is_held
 
 PR_SET_PDEATHSIG = 1  # of Linux's prctl
-POLL, PATIENCE = 0.2, 120.0  # seconds: between looks at the process, and for an earlier one to leave the folder
+POLL, TIMEOUT = 0.2, 120.0  # seconds: between looks at the process, and for an earlier one to leave the folder
 MOST_WORDS = 500  # letters of an error
 
 
@@ -103,7 +103,7 @@ def last_word(log: Path, begin: int, code: int) -> str:
 
 def _free(run: Path) -> bool:
     """Waits for an earlier process to leave a run's folder: one whose worker was killed saves its state."""
-    until = time.monotonic() + PATIENCE
+    until = time.monotonic() + TIMEOUT
     while is_held(run):
         if time.monotonic() > until:
             return False

@@ -25,7 +25,7 @@ GB = 1e9
 TRAINING = TRAINING_GIB * GIB / GB  # GB of memory of a training without its photos
 MEMORY = 4.0  # GB of a scene, photos included
 GPU = 0.25  # of a scene: four at once made a third more steps together than one alone did on an H100, see docs/cuda.md
-PATIENCE = 10.0  # seconds for a cluster to answer
+TIMEOUT = 10.0  # seconds for a cluster to answer
 OBJECT_STORE = 100 << 20  # bytes; results are small
 SHARE_OF_FREE = 0.9  # of the free memory of this machine, for the scenes
 LONGEST_FOLDER = 37  # letters of the folder of Ray's own: its sockets' paths have 64 more, and a system allows 103
@@ -164,7 +164,7 @@ def _connect(ray: ModuleType, address: str) -> None:
     host, _, port = address.rpartition(":")
     try:
         if port.isdigit():  # Ray itself would try for minutes
-            socket.create_connection((host.rpartition("/")[2].strip("[]"), int(port)), PATIENCE).close()
+            socket.create_connection((host.rpartition("/")[2].strip("[]"), int(port)), TIMEOUT).close()
         ray.init(address=address, logging_level="error", log_to_driver=False)
     except (OSError, ValueError, OverflowError, ray.exceptions.RayError) as error:
         why = plain(str(error).strip()).partition(". ")[0]

@@ -21,7 +21,7 @@ from splitnerf.notes import note
 from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_SPP, MOST_VIEWS, AssetRenderer
 from splitnerf_tools.synth.cameras import orbit, spiral
 from splitnerf_tools.synth.layouts import LAYOUTS, WRITERS
-from splitnerf_tools.synth.placed import write_placed_glb
+from splitnerf_tools.synth.placement import write_placed_glb
 from splitnerf_tools.synth.writer import Writer
 
 RENDERERS = ("project", "blender")

@@ -1,4 +1,4 @@
-"""The path tracer's picture of what the page shows: a small one first, then better and better ones."""
+"""Path-traced pictures of the page's view: a small one first, then better ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from splitnerf.data.layouts.frame import checked_pose
 from splitnerf.errors import InputError
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.report.browser import as_halves
-from splitnerf_tools.view.shown import Shown
+from splitnerf_tools.view.assets import ViewedAssets
 
 FIRST_SIDE = 256  # pixels of the first picture's longer side
 LARGEST_SIDE, MOST_PIXELS = 4096, 1 << 22
@@ -24,7 +24,7 @@ PASSES = (1, 1, 2, 4, 8, 16, 32, 64, 128)  # paths a pixel of the pictures of th
 
 @dataclass(frozen=True)
 class Camera:
-    """What the page looks through.
+    """The camera of the page.
 
     Attributes:
         pose: [4, 4] float64 camera-to-world, OpenGL axes.
@@ -72,7 +72,8 @@ class Camera:
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture of an asset: `content` is [height, width] float16 RGBA, linear, premultiplied; `spp` its paths a pixel."""
+    """One picture of an asset: `content` is [height, width] float16 RGBA, linear, premultiplied; `spp` its paths a
+    pixel."""
 
     asset: int
     width: int
@@ -88,13 +89,14 @@ class Tracer:
         shown: The assets and lights.
     """
 
-    def __init__(self, shown: Shown):
+    def __init__(self, shown: ViewedAssets):
         self._shown = shown
         self._renderers: dict[int, tuple[Asset, AssetRenderer]] = {}  # of the newest asset of each number
         self._newest, self._counting, self._working = 0, threading.Lock(), threading.Lock()
 
     def pictures(self, camera: Camera, gone: Callable[[], bool]) -> Iterator[Picture]:
-        """Better and better pictures of each asset, until all passes are made, a newer request comes, or `gone` says so.
+        """Better and better pictures of each asset, until all passes are made, a newer request comes, or `gone` returns
+        true.
 
         Raises:
             InputError: A light is no longer kept.
@@ -111,7 +113,7 @@ class Tracer:
         yield from self._refined(camera, scenes, PASSES, ended)
 
     def stop(self) -> None:
-        """Ends the request that is worked at, and waits for its end: no thread is within the tracer when the program ends."""
+        """Ends the present request and waits for it, so that no thread is within the tracer when the program ends."""
         self._next()
         with self._working:
             pass
@@ -136,7 +138,8 @@ class Tracer:
     def _refined(
         self, camera: Camera, scenes: list[tuple[AssetRenderer, np.ndarray]], passes: tuple[int, ...], ended: Callable[[], bool]
     ) -> Iterator[Picture]:
-        """The mean of all passes so far, after each pass, for each asset with its light; who takes them slowly holds up nobody."""
+        """The mean of all passes so far, after each pass, for each asset with its light; a slow reader blocks no other
+        request."""
         sums, total = [np.zeros((camera.height, camera.width, 4), np.float32) for _ in scenes], 0
         for number, spp in enumerate(passes):
             total += spp
@@ -170,5 +173,5 @@ class Tracer:
 
 
 def _seed(number: int, top: int, call: int) -> int:
-    """A number of its own for each call of the tracer; pictures of equal requests are equal."""
+    """The seed of a call of the tracer; pictures of equal requests are equal."""
     return (number << 24) + (top << 11) + call

@@ -1,4 +1,4 @@
-"""A run that trains, as the page shows it: its surface, light and numbers, and the buttons that steer it."""
+"""A run in training for the page: its surface, light and numbers, and the buttons that control it."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from splitnerf.data.normalisation import transform_points
 from splitnerf.errors import InputError, plain
 from splitnerf.training.metrics import METRICS, read_metrics
 from splitnerf.training.observer import Observed, Observer, Wish
-from splitnerf_tools.view.grown import grown_asset, grown_glb
-from splitnerf_tools.view.news import News
-from splitnerf_tools.view.shown import Light, Shown, Source
+from splitnerf_tools.view.assets import Light, Source, ViewedAssets
+from splitnerf_tools.view.events import EventStream
+from splitnerf_tools.view.training_asset import training_asset, training_glb
 
-TOLD_EVERY = 0.5  # seconds between two states
-GROWN_EVERY, GROWN_SHARE = 4.0, 0.05  # least seconds between two surfaces, and the largest share of the time that they take
+STATE_EVERY = 0.5  # seconds between two states
+# least seconds between two surfaces, and the largest share of the time that they take
+ASSET_EVERY, ASSET_SHARE = 4.0, 0.05
 LIGHT_HEIGHT = 64  # rows of the light while it is recovered
 WISHES = {"pause": Wish.PAUSE, "checkpoint": Wish.SAVE, "stop": Wish.STOP}  # of the buttons; "resume" takes one back
-SAID = {"pause": "pauses until its page resumes it, or Ctrl-C ends it", "stop": "stops and exports"}
+ANSWERS = {"pause": "pauses until its page resumes it, or Ctrl-C ends it", "stop": "stops and exports"}
 CURVES = ("step", "seconds", "psnr", "loss")  # and the terms of the loss
 
 
@@ -33,17 +34,17 @@ class Live(Observer):
     """Shows a run in the page while it trains. As long as no page is open, it does nothing between steps.
 
     Args:
-        name: What the page calls the run.
+        name: The name of the run in the page.
 
     Attributes:
-        shown: What the server shows: the run's surface so far and its light.
-        news: The newest state for the pages: `stage`; `step` of `steps` (null where the time alone counts), `progress`, `left` (seconds, or null), `psnr`; `paused`;
-            `version` of the asset, 0 for none; `lines`, the number of lines of the log; `saved`, the step of the checkpoint that was
-            asked for last; `ended`.
+        shown: The assets of the server: the run's surface so far, and its light.
+        events: The newest state for the pages: `stage`; `step` of `steps` (null where the time alone counts),
+            `progress`, `left` (seconds, or null), `psnr`; `paused`; `version` of the asset, 0 for none; `lines`, the
+            number of lines of the log; `saved`, the step of the checkpoint that was asked for last; `ended`.
     """
 
     def __init__(self, name: str):
-        self.name, self.shown, self.news = name, Shown([]), News()
+        self.name, self.shown, self.events = name, ViewedAssets([]), EventStream()
         self._light = self.shown.add_light(Light("recovered light", np.ones((8, 16, 3), np.float32)))
         self.shown.keep_lights()
         self._world_from_box = np.eye(4)
@@ -53,11 +54,11 @@ class Live(Observer):
         self._asked: set[Wish] = set()
         self._lock = threading.Lock()
         self._began = (0.0, 0.0)  # seconds and progress
-        self._told_at = self._grown_at = -float("inf")
-        self._cost, self._grown_step, self._taken = 0.0, -1, 0
+        self._state_at = self._asset_at = -float("inf")
+        self._cost, self._asset_step, self._taken = 0.0, -1, 0
         self._saving = False
         self._delivered: Path | None = None
-        self.news.tell(
+        self.events.update(
             stage="preparation", step=0, steps=None, progress=0.0, left=None, psnr=None, paused=False, version=0, lines=0, saved=None,
         )  # fmt: skip
 
@@ -77,7 +78,7 @@ class Live(Observer):
         if self._saving:
             self._saving = False
             self._tell(training, saved=training.step)
-        if self.news.listeners:
+        if self.events.listeners:
             self._show(training)
         return self._wish() if self._asked else None
 
@@ -87,12 +88,12 @@ class Live(Observer):
         changes = {}
         if folder is not None and (folder / "mesh.glb").is_file():
             self._delivered, changes = folder, {"version": self.shown.sources[0].version + 1}
-        self.news.tell(stage=stage, paused=False, left=None, progress=1.0, lines=len(self._lines), **changes)
+        self.events.update(stage=stage, paused=False, left=None, progress=1.0, lines=len(self._lines), **changes)
 
     # ---- called by the server's threads ----
 
     def ask(self, button: str) -> None:
-        """What a button asks; the training hears of it after its step.
+        """Requests what a button stands for; the training reads the request after its step.
 
         Raises:
             InputError: There is no such button, or the run does not train.
@@ -100,27 +101,27 @@ class Live(Observer):
         if button not in {*WISHES, "resume"}:
             raise InputError("there is no such button")
         with self._lock:
-            if self.news.state["stage"] != "training":
+            if self.events.state["stage"] != "training":
                 raise InputError("the run does not train now")
             if button == "resume":
                 self._asked.discard(Wish.PAUSE)
             else:
                 self._asked.add(WISHES[button])
         if button in ("pause", "resume"):
-            self.news.tell(paused=button == "pause")
-        if button in SAID:
-            print(f"splitnerf: note: the run {SAID[button]}, as its page asks", file=sys.stderr)
+            self.events.update(paused=button == "pause")
+        if button in ANSWERS:
+            print(f"splitnerf: note: the run {ANSWERS[button]}, as its page requests", file=sys.stderr)
 
     def lines(self, first: int) -> list[dict]:
         """The lines of the log from a number on."""
         return self._lines[first:]
 
     def taken(self, source: Source) -> None:
-        """A page has loaded an asset; the next one is made."""
+        """Records that a page has loaded an asset, so that the next one is made."""
         self._taken = max(self._taken, source.version)
 
     def load(self) -> None:
-        """Shows the asset that the run has delivered, as soon as a page asks for it."""
+        """Shows the asset that the run has delivered, when a page requests it."""
         with self._lock:
             folder, self._delivered = self._delivered, None
         if folder is None:
@@ -131,7 +132,7 @@ class Live(Observer):
             words = plain(f"{type(error).__name__}: {error}")
             said = str(error) if isinstance(error, InputError) else f"{folder}: cannot be shown ({words})"
             self.shown.problems.append(said)
-            self.news.tell(version=self.shown.sources[0].version)  # what is shown stays
+            self.events.update(version=self.shown.sources[0].version)  # what is shown stays
             return
         self.shown.frame = source.asset
         self.shown.sources[0] = replace(source, version=self.shown.sources[0].version + 1)
@@ -150,35 +151,35 @@ class Live(Observer):
         gained, left = training.progress - progress, None
         if gained > 0:
             left = (training.seconds - seconds) * (1.0 - training.progress) / gained
-        self._told_at = time.monotonic()
-        self.news.tell(
+        self._state_at = time.monotonic()
+        self.events.update(
             step=training.step, steps=None if steps >= UNLIMITED else steps, progress=training.progress, left=left,
             psnr=_rounded(training.psnr_mean), lines=len(self._lines), **changes,
         )  # fmt: skip
 
     def _show(self, training: Observed) -> None:
-        """Tells the state where the last one is old enough, with a new surface where one is wanted."""
+        """Sends the state if the last one is old enough, with a new surface if one is wanted."""
         now = time.monotonic()
-        if now - self._told_at < TOLD_EVERY:
+        if now - self._state_at < STATE_EVERY:
             return
-        due = now - self._grown_at >= max(GROWN_EVERY, self._cost / GROWN_SHARE)
+        due = now - self._asset_at >= max(ASSET_EVERY, self._cost / ASSET_SHARE)
         version = self.shown.sources[0].version
-        if due and self._taken >= version and training.step != self._grown_step:
-            version = self._grow(training)
-            self._grown_at = time.monotonic()
-            self._cost = self._grown_at - now
+        if due and self._taken >= version and training.step != self._asset_step:
+            version = self._update_asset(training)
+            self._asset_at = time.monotonic()
+            self._cost = self._asset_at - now
         self._tell(training, version=version)
 
-    def _grow(self, training: Observed) -> int:
-        """Takes over surface and light as they are now; returns the asset's version."""
-        old, self._grown_step = self.shown.sources[0], training.step
+    def _update_asset(self, training: Observed) -> int:
+        """Updates surface and light; returns the asset's version."""
+        old, self._asset_step = self.shown.sources[0], training.step
         try:
             light = training.model.light.panorama(LIGHT_HEIGHT).detach().cpu().numpy()
-            asset = grown_asset(training.model, self._world_from_box)
+            asset = training_asset(training.model, self._world_from_box)
         except RuntimeError:  # no surface yet, or one that the training itself refuses
             return old.version
         self.shown.add_light(Light("recovered light", light), self._light)
-        self.shown.sources[0] = Source(self.name, asset, lambda: grown_glb(asset), self._light, version=old.version + 1)
+        self.shown.sources[0] = Source(self.name, asset, lambda: training_glb(asset), self._light, version=old.version + 1)
         return old.version + 1
 
     def _wish(self) -> Wish | None:
@@ -191,7 +192,7 @@ class Live(Observer):
 
 
 def _curves_of(line: dict[str, object]) -> dict[str, object]:
-    """What the page draws of a line of metrics.jsonl, in few digits; None for what is not finite, which JSON has no word for."""
+    """The values that the page draws of a line of metrics.jsonl, in few digits; None for those that are not finite."""
     drawn = {name: value for name, value in line.items() if name in CURVES or name.startswith("loss_")}
     return {name: _rounded(value) if isinstance(value, float) else value for name, value in drawn.items()}
 

@@ -1,4 +1,4 @@
-"""The photos that a run was made of, for the viewer: their cameras, and their pixels as a pinhole sees them."""
+"""The photos of a run for the viewer: cameras, and pixels without lens distortion."""
 
 from __future__ import annotations
 
@@ -40,8 +40,9 @@ class Photos:
         return len(self._frames)
 
     def cameras(self) -> list[dict]:
-        """For each photo, for JSON: `name`, `pose` (camera-to-world, row by row, OpenGL axes), `intrinsics` (fx, fy, cx, cy in
-        pixels of the file), `width`, `height`, and `exposure`, the factor of its linear values that the data state."""
+        """For each photo, for JSON: `name`, `pose` (camera-to-world, row by row, OpenGL axes), `intrinsics` (fx, fy,
+        cx, cy in pixels of the file), `width`, `height`, and `exposure`, the factor of its linear values that the data
+        state."""
         size = (self.height, self.width)
         return [
             {
@@ -52,7 +53,7 @@ class Photos:
         ]  # fmt: skip
 
     def png(self, number: int) -> bytes:
-        """A photo without its lens's distortion, averaged down to at most 1600 pixels; transparent where it says nothing.
+        """A photo without its lens's distortion, averaged down to at most 1600 pixels; transparent at invalid pixels.
 
         Raises:
             InputError: It cannot be read, or is gone.

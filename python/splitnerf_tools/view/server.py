@@ -1,7 +1,7 @@
-"""The viewer's web server: it answers from memory, and only those who know its address.
+"""The viewer's web server: it answers from memory, and only to requests with its token.
 
-The first part of every path is a random token, so that neither other users of the machine nor pages in the same browser can
-ask. `Host` and `Origin` are checked besides: a foreign page cannot pass for this one by a name that leads here.
+The first part of every path is a random token, so that neither other users of the machine nor pages in the same browser
+can use it. `Host` and `Origin` are checked too, against DNS rebinding.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from urllib.parse import parse_qs, urlsplit
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
 from splitnerf_tools.report.browser import as_halves
+from splitnerf_tools.view.assets import Source, ViewedAssets
+from splitnerf_tools.view.events import EventStream
 from splitnerf_tools.view.final import Camera, Tracer
-from splitnerf_tools.view.news import News
 from splitnerf_tools.view.photos import Photos
-from splitnerf_tools.view.shown import Shown, Source
 
 if TYPE_CHECKING:
     from splitnerf_tools.view.live import Live
@@ -39,7 +39,7 @@ LARGEST_UPLOAD = 128 << 20  # bytes of a light
 LARGEST_QUESTION = 1 << 16  # bytes of a camera
 PICTURE = struct.Struct("<5I")  # asset, width, height, paths a pixel, bytes that follow
 WITHOUT_REST = ("", "scene.json", "final", "events")  # addresses that nothing follows
-FIRST_PATIENCE, PATIENCE = 5.0, 60.0  # seconds that a connection may be silent: before its token is known, and then
+FIRST_TIMEOUT, TIMEOUT = 5.0, 60.0  # seconds that a connection may be silent: before its token is checked, and after
 MOST_OPEN = 64  # connections at a time: the run that is shown needs files too
 SAFETY = {
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' blob: data:; "
@@ -60,18 +60,18 @@ class Refused(Exception):
 
 
 class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
-    """Serves the page and what it shows, each request in a thread of its own.
+    """Serves the page, its assets and lights; each request has a thread of its own.
 
     Args:
         shown: The assets and lights.
         photos: The photos whose cameras are shown, or None.
         host: The address to listen at.
         port: The port; 0 takes a free one.
-        live: The run that trains and is shown, or None.
+        live: The run in training, or None.
 
     Attributes:
         url: The address of the page, token included.
-        news: What open pages are told.
+        events: The states for open pages.
 
     Raises:
         InputError: The address or the port cannot be used.
@@ -82,10 +82,10 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
     request_queue_size = MOST_OPEN  # connections that wait; more would try again after a second
 
     def __init__(
-        self, shown: Shown, photos: Photos | None = None, host: str = "127.0.0.1", port: int = 0, live: Live | None = None
+        self, shown: ViewedAssets, photos: Photos | None = None, host: str = "127.0.0.1", port: int = 0, live: Live | None = None
     ):
         self.shown, self.photos, self.host, self.tracer, self.live = shown, photos, host, Tracer(shown), live
-        self.news = News() if live is None else live.news
+        self.events = EventStream() if live is None else live.events
         self.page = files("splitnerf_tools.view").joinpath("viewer.html").read_bytes()
         self.uploading = threading.Lock()
         self._token = secrets.token_urlsafe(16)
@@ -104,7 +104,8 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
         return inner if hmac.compare_digest(token.encode(), self._token.encode()) else None
 
     def is_own(self, address: str) -> bool:
-        """Whether a `Host`, or an `Origin` without its scheme, is this server's: a name of another machine may lead here."""
+        """Whether a `Host`, or an `Origin` without its scheme, is this server's: a name of another machine may lead
+        here."""
         try:
             parts = urlsplit(f"//{address}")
             name, port = parts.hostname or "", parts.port or 80
@@ -139,13 +140,13 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
             self._open += change
 
     def server_close(self) -> None:
-        """Says so to the pages, ends what is being traced, and listens no more."""
-        self.news.end("splitnerf has ended; what is loaded stays here")
+        """Sends the end to the pages, ends the tracing, and closes the socket."""
+        self.events.end("splitnerf has ended; what is loaded stays here")
         self.tracer.stop()
         super().server_close()
 
     def handle_error(self, request, client_address) -> None:
-        """One line for what goes wrong in a thread; a page that was closed says nothing."""
+        """One line for an error in a thread, but none for a page that was closed."""
         error = sys.exc_info()[1]
         if not isinstance(error, (ConnectionError, TimeoutError)):
             print(f"splitnerf: note: a request failed ({plain(f'{type(error).__name__}: {error}')})", file=sys.stderr)
@@ -164,7 +165,7 @@ class Handler(BaseHTTPRequestHandler):
     """Answers one request."""
 
     server: ViewServer
-    timeout = FIRST_PATIENCE
+    timeout = FIRST_TIMEOUT
     server_version, sys_version = "splitnerf", ""
 
     def do_GET(self) -> None:
@@ -177,7 +178,7 @@ class Handler(BaseHTTPRequestHandler):
         self._answered({"lights": self._dropped, "final": self._final, "control": self._control})
 
     def log_message(self, format: str, *args: object) -> None:
-        """Nothing: the terminal is for errors."""
+        """Prints nothing: the terminal is for errors."""
 
     def _answered(self, answers: dict) -> None:
         """Checks where a request comes from, and answers it with the function of its path."""
@@ -201,7 +202,7 @@ class Handler(BaseHTTPRequestHandler):
         inner = self.server.inner_path(urlsplit(self.path).path)
         if inner is None:
             raise Refused(HTTPStatus.FORBIDDEN, "the token is missing or wrong; open the address that splitnerf printed")
-        self.connection.settimeout(PATIENCE)
+        self.connection.settimeout(TIMEOUT)
         return inner
 
     def _page(self, _: str) -> None:
@@ -222,7 +223,7 @@ class Handler(BaseHTTPRequestHandler):
     def _events(self, _: str) -> None:
         """A stream of the newest state, as server-sent events; it ends where the page closes it."""
         self._send_head("text/event-stream")
-        for state in self.server.news.listen(self._is_gone):
+        for state in self.server.events.listen(self._is_gone):
             self.wfile.write(b"data: " + json.dumps(state).encode() + b"\n\n")
 
     def _curves(self, rest: str) -> None:
@@ -258,7 +259,7 @@ class Handler(BaseHTTPRequestHandler):
             raise Refused(HTTPStatus.BAD_REQUEST, "the camera is no JSON; load the page again") from None
         camera = Camera.of(content, len(self.server.shown.sources))
         with closing(self.server.tracer.pictures(camera, self._is_gone)) as pictures:
-            first = next(pictures, None)  # before the head, so that an error can still be said
+            first = next(pictures, None)  # before the head, so that an error can still be sent
             self._send_head("application/octet-stream")
             for picture in () if first is None else chain([first], pictures):
                 sizes = (picture.asset, picture.width, picture.height, picture.spp, len(picture.content))

@@ -1,4 +1,4 @@
-"""What the viewer shows: assets, and lights to show them in."""
+"""The assets and lights that the viewer shows."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from splitnerf.errors import InputError, plain
 from splitnerf.notes import note
 from splitnerf_tools.report.browser import camera_of
 
-MOST_ROWS = 1024  # of a light that is kept
+MOST_ROWS = 1024  # of a light
 MOST_DROPPED = 8  # lights that were dropped onto the page; an older one is forgotten
 Read = TypeVar("Read")
 
@@ -37,11 +37,11 @@ class Source:
     """One asset.
 
     Attributes:
-        name: What the page calls it.
+        name: Its name in the page.
         asset: The asset; the path tracer draws it.
         encode: Makes the bytes of its GLB.
         light: The number of the run's own light, or None.
-        version: Counts an asset that grows; 0 where there is nothing to load yet.
+        version: The number of updates of a training's asset; 0 while there is none to load.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Source:
         return self.encode()
 
 
-class Shown:
+class ViewedAssets:
     """One or two assets and their lights. Lights that are dropped onto the page are added while it is shown.
 
     Args:
@@ -65,8 +65,8 @@ class Shown:
 
     Attributes:
         sources: The assets.
-        problems: One line for each file beside an asset that cannot be read.
-        frame: What the first camera has in view; None for the first asset.
+        problems: One line for each file of an asset that cannot be read.
+        frame: The part of space that the first camera shows; None for that of the first asset.
 
     Raises:
         InputError: An asset or the light cannot be read.
@@ -83,12 +83,12 @@ class Shown:
         self.keep_lights()
 
     def light(self, number: int) -> Light | None:
-        """A light by its number; None where there is none."""
+        """A light by its number, or None."""
         with self._lock:
             return self._lights.get(number)
 
     def add_light(self, light: Light, number: int | None = None) -> int:
-        """Adds a light, or puts it in the place of the one with this number; returns its number."""
+        """Adds a light, or replaces the one of this number; returns its number."""
         with self._lock:
             if number is None:
                 number, self._next = self._next, self._next + 1
@@ -96,14 +96,14 @@ class Shown:
             return number
 
     def keep_lights(self) -> None:
-        """The lights so far are never forgotten."""
+        """Keeps the lights so far for good."""
         self._kept = self._next
 
     def drop(self, name: str, content: bytes) -> int:
-        """Adds a light out of the bytes of an .exr or .hdr file; returns its number.
+        """Adds a light from the bytes of an .exr or .hdr file; returns its number.
 
         Raises:
-            InputError: It is none; the message names the file.
+            InputError: The bytes are not such a file; the message names it.
         """
         name = plain(PurePosixPath(name.replace("\\", "/")).name)[:100]
         with tempfile.TemporaryDirectory() as folder:
@@ -119,7 +119,8 @@ class Shown:
         return number
 
     def description(self) -> dict:
-        """What the page needs to know, for JSON. The camera is that of `splitnerf relight`; lengths are the data's, z is up."""
+        """The description of the scene for the page, for JSON. The camera is that of `splitnerf relight`; lengths are
+        the data's, z is up."""
         sources = list(self.sources)
         framed = sources[0].asset if self.frame is None else self.frame
         with self._lock:
@@ -136,12 +137,12 @@ class Shown:
         }
 
     def source_of(self, path: Path, name: str | None = None, light: int | None = None) -> Source:
-        """The asset of a run's folder or a GLB; the light beside a `mesh.glb` belongs to it.
+        """The asset of a run's folder or a GLB; the light in the folder of a `mesh.glb` belongs to it.
 
         Args:
             path: The folder or the GLB.
-            name: What the page calls it; None for the name of folder or file.
-            light: The number that its light takes over; None for a new one.
+            name: Its name in the page; None for that of the folder or file.
+            light: The number for its light; None for a new one.
 
         Raises:
             InputError: It cannot be read.

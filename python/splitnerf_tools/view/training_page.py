@@ -9,15 +9,15 @@ from contextlib import contextmanager
 from splitnerf_tools.view.live import Live
 from splitnerf_tools.view.server import ViewServer
 
-POLL = 0.1  # seconds within which the server hears that it is to end
+POLL = 0.1  # seconds between the server's checks for its end
 
 
 @contextmanager
-def watched(name: str, port: int) -> Iterator[Live]:
-    """Serves the page of a run within the block, prints its address, and tells the page how the run ended.
+def training_page(name: str, port: int) -> Iterator[Live]:
+    """Serves the page of a run within the block, prints its address, and sends the page how the run ended.
 
     Args:
-        name: What the page calls the run.
+        name: The name of the run in the page.
         port: The port of 127.0.0.1; 0 takes a free one.
 
     Raises:
@@ -31,17 +31,17 @@ def watched(name: str, port: int) -> Iterator[Live]:
         try:
             yield live
         except BaseException:
-            live.news.end("the command ended before the run was done; the terminal says why")
+            live.events.end("the command ended before the run was done; see the terminal for the reason")
             raise
         else:
-            live.news.end(ending(live))
+            live.events.end(ending(live))
         finally:
             server.shutdown()
             thread.join()
 
 
 def ending(live: Live) -> str:
-    """One line for the page at the end of a command that did what it could."""
-    if live.news.state["stage"] == "evaluation":
+    """One line for the page at the end of a command."""
+    if live.events.state["stage"] == "evaluation":
         return "the run is done and the command has ended; this page keeps what it has loaded"
-    return "the command was interrupted and has kept its state; train --resume goes on, with a new address"
+    return "the command was interrupted and has kept its state; train --resume continues, with a new address"

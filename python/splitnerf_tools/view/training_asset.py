@@ -1,4 +1,4 @@
-"""The asset of a run that still trains: its surface in few triangles, with its materials at their corners."""
+"""The asset of a run in training: its surface in few triangles, with materials at their corners."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ LINEAR = 9729  # glTF's filter; smaller pictures of the texture would mix its fa
 
 
 @torch.no_grad()
-def grown_asset(model: SceneModel, world_from_box: np.ndarray, resolution: int = RESOLUTION) -> Asset:
+def training_asset(model: SceneModel, world_from_box: np.ndarray, resolution: int = RESOLUTION) -> Asset:
     """The surface of a scene in the data's world, z up.
 
-    Albedo is a colour at each vertex. Roughness and metallic are its texture coordinates: the texture holds at each place the
-    pair that stands for it, so that they vary linearly over a triangle as the colour does.
+    Albedo is a colour at each vertex. Roughness and metallic are its texture coordinates: the texture holds at each
+    place the pair that stands for it, so that they vary linearly over a triangle as the colour does.
 
     Args:
-        model: The scene; nothing in it changes.
+        model: The scene; it is not changed.
         world_from_box: [4, 4], see :class:`splitnerf.data.dataset.Dataset`.
         resolution: Nodes along an edge of the box.
 
@@ -52,6 +52,6 @@ def all_pairs(levels: int) -> np.ndarray:
     return np.stack(np.meshgrid(steps, steps), axis=2)
 
 
-def grown_glb(asset: Asset) -> bytes:
-    """The bytes of its GLB."""
+def training_glb(asset: Asset) -> bytes:
+    """The bytes of the asset's GLB."""
     return glb_content(asset, filtering=LINEAR)
