@@ -4,9 +4,15 @@
 # HAVE names packages that the other machine has already (the large ones: numpy scipy pillow); torch is never among them.
 # PYTHON_VERSION is that of the other machine (default: this one's). Needs nvcc, a Python of that version (pythonX.Y, or WHEEL_PYTHON)
 # and one with torch (TORCH_PYTHON, default: python3). CMAKE_OPTIONS: of the build (default: CUDA on, with kernels for sm_90).
+#   tests/bench/gpu_bundle.sh sources   prints a number for the sources, so that a wheel of others is not measured in their place
 set -eu
-[ $# -ge 1 ] || { sed -n '2,6p' "$0"; exit 2; }
+[ $# -ge 1 ] || { sed -n '2,7p' "$0"; exit 2; }
 root=$(cd "$(dirname "$0")/../.." && pwd)
+numbered() { # what a wheel is made of
+  (cd "$root" && find cpp python third_party CMakeLists.txt pyproject.toml -type f ! -name '*.so*' ! -name '*.pyc' ! -path '*/node_modules/*' |
+    LC_ALL=C sort | xargs sha256sum | sha256sum | cut -c 1-16)
+}
+if [ "$1" = sources ]; then numbered; exit; fi
 mkdir -p "$1"
 out=$(cd "$1" && pwd) && shift
 python_version=${PYTHON_VERSION:-$(python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])')}
@@ -30,7 +36,7 @@ done
 python3 -m pip --disable-pip-version-check download --quiet --no-deps --only-binary=:all: --implementation cp \
   --python-version "$python_version" $options --dest "$out/wheels" $wanted
 
-sources=$("$root/tests/bench/gpu_sources.sh") # before the build: what changes meanwhile may not be in it
+sources=$(numbered) # before the build: what changes meanwhile may not be in it
 CMAKE_OPTIONS=${CMAKE_OPTIONS:-SPLITNERF_CUDA=ON CMAKE_CUDA_ARCHITECTURES=90-real} \
   sh "$root/third_party/build_wheels.sh" "$out/built" "${WHEEL_PYTHON:-python$python_version}"
 echo "$sources" >"$out/built/sources"
