@@ -60,8 +60,8 @@ def finish(
         trained: The scene.
         dataset, test: The train split, and the test split or None.
         run: The run's folder.
-        resume: Whether to go on with the refinement, if the scene has not changed since it was interrupted.
-        observers: Who looks on.
+        resume: Whether to continue the refinement, if the scene has not changed since it was interrupted.
+        observers: The observers to call.
 
     Returns:
         The evaluation; None where the refinement was interrupted.
@@ -96,7 +96,7 @@ def finish(
 
 
 def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, observers: Observer) -> bool:
-    """Makes the refinement of a run, from what training exported to the run or, in a run that goes on, to RUN/trained.
+    """Refines a run, from what training exported to the run or, in a run that continues, to RUN/trained.
 
     Photos or an asset that it cannot use leave it out, with a note; the run then delivers what training exported.
 
@@ -139,7 +139,7 @@ def move_assets(source: Path, target: Path) -> None:
 
 
 def discard_refinement(run: Path) -> None:
-    """Deletes what a refinement wrote beside the asset, and what it started from."""
+    """Deletes the files of a refinement except the asset, and those it started from."""
     for name in REFINEMENT_FILES:
         (run / name).unlink(missing_ok=True)
     if (run / TRAINED).is_dir() and not any((run / TRAINED).iterdir()):
@@ -176,7 +176,7 @@ def score_run(
 
 
 def refinement_summary(run: Path) -> dict:
-    """What the refinement of a run changed, in numbers: pairs are before and after."""
+    """The changes by the refinement of a run; pairs are before and after."""
     record = read_json(run / RECORD, "sweeps")
     sweeps, outline = record["sweeps"], record["outline"]
     return {

@@ -75,8 +75,8 @@ def fit_device(failing_operators: Callable[[str], tuple[list[str], int]] | None)
 
 
 def refuse_one_processor() -> None:
-    """Refuses a machine with one processor, where xatlas 0.0.11 (texture coordinates) crashes: it has room for one thread and
-    runs two.
+    """Refuses a machine with one processor, where xatlas 0.0.11 (texture coordinates) crashes: it allocates for one
+    thread and runs two.
 
     Raises:
         InputError: The machine has one processor.
@@ -121,16 +121,16 @@ def same_bits(on: bool) -> Iterator[None]:
 
 
 def let_segments_grow() -> None:
-    """Lets torch's allocator extend the segments of a GPU's memory, so that tensors of ever new sizes leave fewer gaps. A value
-    of the user's own in PYTORCH_ALLOC_CONF or PYTORCH_CUDA_ALLOC_CONF stays."""
+    """Lets torch's allocator extend the segments of a GPU's memory, so that tensors of ever new sizes leave fewer gaps.
+    A value of the user's own in PYTORCH_ALLOC_CONF or PYTORCH_CUDA_ALLOC_CONF stays."""
     if not {"PYTORCH_ALLOC_CONF", "PYTORCH_CUDA_ALLOC_CONF"} & os.environ.keys():
-        torch._C._accelerator_setAllocatorSettings("expandable_segments:True")  # the variables are read but once
+        torch._C._accelerator_setAllocatorSettings("expandable_segments:True")  # the variables are read only once
 
 
 @contextmanager
 def spare_processors(device: torch.device) -> Iterator[None]:
-    """Leaves two processors without torch's threads within the block, where the device is a GPU: one for the thread that feeds it,
-    one for what else runs. The rays that another thread traces use torch's threads."""
+    """Leaves two processors without torch's threads within the block, where the device is a GPU: one for the thread
+    that feeds it, one for what else runs. The rays that another thread traces use torch's threads."""
     if device.type == "cpu":
         yield
         return
@@ -164,7 +164,7 @@ def pinned(x: Tensor, device: torch.device) -> Tensor:
 class SideStream:
     """The order of another thread's work on a device: on a GPU a CUDA stream, on the CPU nothing.
 
-    Neither thread waits for work of the other but where a method says so, and then the GPU waits, not the host.
+    Neither thread waits for work of the other, except in the methods below; then the GPU waits, not the host.
 
     Args:
         device: The device of the work.
@@ -174,7 +174,7 @@ class SideStream:
         self._device, self._stream = device, torch.cuda.Stream(device) if device.type == "cuda" else None
 
     def within(self) -> AbstractContextManager[object]:
-        """The context in which the other thread works."""
+        """The context of the other thread's work."""
         return nullcontext() if self._stream is None else torch.cuda.stream(self._stream)
 
     def follow(self) -> None:
@@ -193,7 +193,8 @@ class SideStream:
 
 
 def in_background(function: Callable, *args: object) -> Future:
-    """Calls a function in a thread of its own, which ends with the program; the future holds its result or exception."""
+    """Calls a function in a thread of its own, which ends with the program; the future holds its result or
+    exception."""
     future = Future()
     threading.Thread(target=_fulfil, args=(future, function, *args), daemon=True).start()
     return future
@@ -202,5 +203,5 @@ def in_background(function: Callable, *args: object) -> Future:
 def _fulfil(future: Future, function: Callable, *args: object) -> None:
     try:
         future.set_result(function(*args))
-    except BaseException as error:  # the thread that asks for the result raises it
+    except BaseException as error:  # the thread that reads the result raises it
         future.set_exception(error)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 
 def plain(text: str) -> str:
-    """A text as one line that a terminal shows and does not obey: names from files may hold line ends and escapes."""
+    """A text as one line without control characters, which names from files may hold."""
     return escaped(" ".join(text.splitlines()))
 
 
 def escaped(text: str, kept: str = "") -> str:
-    """A text with what a terminal obeys, and what no encoding has, as Python writes it; `kept` stays as it is."""
+    """A text with control characters and surrogates escaped as Python does; `kept` stays as it is."""
     return "".join(c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -24,4 +24,4 @@ class InputError(Exception):
 
 
 class CheckFailed(RuntimeError):
-    """A benchmark's subject gives wrong results, so that its time means nothing."""
+    """A benchmark's subject gives wrong results, so that its time is meaningless."""

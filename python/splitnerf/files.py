@@ -1,4 +1,4 @@
-"""How results are written: each file whole or not at all, and into a folder by one program at a time."""
+"""Writing of results: each file whole or not at all, and into a folder by one program at a time."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from typing import TextIO
 from splitnerf.errors import InputError
 from splitnerf.notes import note
 
-LOCK = "lock"  # the file in a folder that names the program which writes there
+LOCK = "lock"  # the file in a folder that names the program that writes there
 PARTIAL = ".partial"  # part of the name of a file that is not yet whole
-_held: dict[Path, TextIO] = {}  # the locks of this program, by folder
+_locks: dict[Path, TextIO] = {}  # the locks of this program, by folder
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
-    """Yields a temporary name beside `path` that takes its place when the block succeeds.
+    """Yields a temporary name in the folder of `path` that replaces it when the block succeeds.
 
-    On any error the temporary file is removed and the old file at `path` stays. The new file is on the disk before it
-    takes the name, so that a failure of power leaves the old one or the new one.
+    On any error the temporary file is removed and the old file at `path` stays. The new file is synchronised
+    before it takes the name, so that a power failure leaves the old one or the new one.
 
     Args:
         path: The file to write; missing parent folders are made.
@@ -38,7 +38,7 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     path = Path(path)
     temporary = None
     try:
-        _check_held(path)
+        _check_locked(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=PARTIAL + path.suffix)
         os.close(handle)
@@ -62,20 +62,20 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
 
 
 @contextmanager
-def held(folder: Path) -> Iterator[None]:
-    """Makes a folder this program's own within the block; a file in it, `lock`, names the program meanwhile.
+def locked(folder: Path) -> Iterator[None]:
+    """Locks a folder for this program within the block; the file `lock` in it names the program.
 
-    The lock ends with the program, however that ends, so that the next program takes the folder over; it removes what
-    the one before left half-written. A folder that the block leaves empty is removed, if it was not there before.
+    The lock ends with the program, however that ends. The next program takes the folder over and removes half-written
+    files. A folder that the block leaves empty is removed, if it was not there before.
 
     Args:
-        folder: The folder; made where it is missing. This program may hold it already.
+        folder: The folder; made where it is missing. This program may have locked it already.
 
     Raises:
-        InputError: Another program holds the folder, or it cannot be made or written to.
+        InputError: Another program has locked the folder, or it cannot be made or written to.
     """
     key = folder.resolve()
-    if key in _held:
+    if key in _locks:
         yield
         return
     made: list[Path] = []
@@ -84,11 +84,11 @@ def held(folder: Path) -> Iterator[None]:
             raise InputError(f"{folder}: is a file; give --out a folder")
         made += [parent for parent in (folder, *folder.parents) if not parent.exists()]
         folder.mkdir(parents=True, exist_ok=True)
-        lock = _taken(folder / LOCK)
+        lock = _acquired(folder / LOCK)
     except OSError as error:
         _remove_empty(made)
         raise InputError(f"{folder}: cannot be written to ({reason(error)}); give another --out") from None
-    _held[key] = lock
+    _locks[key] = lock
     try:
         remove_partial(folder)
         yield
@@ -96,13 +96,13 @@ def held(folder: Path) -> Iterator[None]:
         with suppress(OSError):
             if _is_at(lock, folder / LOCK):
                 (folder / LOCK).unlink()
-        del _held[key]
+        del _locks[key]
         lock.close()
         _remove_empty(made)
 
 
-def is_held(folder: Path) -> bool:
-    """Whether a program, which may be this one, holds a folder."""
+def is_locked(folder: Path) -> bool:
+    """Whether a program, which may be this one, has locked a folder."""
     try:
         with open(folder / LOCK, "rb") as lock:
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -114,20 +114,20 @@ def is_held(folder: Path) -> bool:
 
 
 def remove_partial(folder: Path) -> None:
-    """Removes what a program that was killed left half-written in a folder, and in those in it that no other program holds."""
-    inner = (leftover for leftover in folder.glob(f"*/.*{PARTIAL}*") if not is_held(leftover.parent))
+    """Removes half-written files of a killed program from a folder, and from folders in it that are not locked."""
+    inner = (leftover for leftover in folder.glob(f"*/.*{PARTIAL}*") if not is_locked(leftover.parent))
     for leftover in (*folder.glob(f".*{PARTIAL}*"), *inner):
         leftover.unlink(missing_ok=True)
 
 
 def reason(error: OSError) -> str:
-    """What an error of the system says, without its number."""
+    """The message of a system error, without its number."""
     return error.strerror or str(error)
 
 
-def _taken(path: Path) -> TextIO:
-    """The lock at a path, locked and signed. Raises InputError where another program has it, OSError where it cannot be
-    written."""
+def _acquired(path: Path) -> TextIO:
+    """The lock file at a path, locked, with this program's pid. Raises InputError where another program has it, OSError
+    where it cannot be written."""
     while True:
         lock = open(path, "a+", encoding="utf-8")
         try:
@@ -162,10 +162,10 @@ def _is_at(lock: TextIO, path: Path) -> bool:
         return False
 
 
-def _check_held(path: Path) -> None:
-    """Raises OSError where a folder that this program holds, and in which the path lies, was removed or replaced."""
+def _check_locked(path: Path) -> None:
+    """Raises OSError where a folder of the path that this program has locked was removed or replaced."""
     parent = path.parent.resolve()
-    for folder, lock in _held.items():
+    for folder, lock in _locks.items():
         if folder in (parent, *parent.parents) and not _is_at(lock, folder / LOCK):
             raise OSError(f"{folder}: was removed while it was written to; nothing more is written there")
 

@@ -1,4 +1,4 @@
-"""How much memory there is, and what is given back."""
+"""Total and available memory, and its release."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import ctypes
 import os
 from pathlib import Path
 
-SHARE_OF_PHOTOS = 0.5  # of the memory that is available, where nothing is said
+SHARE_OF_PHOTOS = 0.5  # of the available memory, by default
 
 
 def memory_bytes() -> tuple[int, int]:
-    """Memory of the machine, or of the control group where it has less, and what of it is available."""
+    """Total and available memory in bytes; of the control group where that is smaller."""
     try:
         lines = Path("/proc/meminfo").read_text().splitlines()
         sizes = {name: int(rest.split()[0]) * 1024 for name, rest in (line.split(":") for line in lines)}
         total, free = sizes["MemTotal"], sizes["MemAvailable"]
-    except OSError:  # not Linux: no number of what is available
+    except OSError:  # not Linux: the available memory is unknown
         total = free = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     limit, used = control_group("memory.max"), control_group("memory.stat")  # the latter begins: anon, bytes
     if not limit or limit[0] == "max" or not used:
@@ -32,9 +32,9 @@ def control_group(name: str) -> list[str]:
 
 
 def give_back() -> None:
-    """Gives freed memory back to the system where the C library is glibc.
+    """Returns freed memory to the system where the C library is glibc.
 
-    It keeps what it cannot cut off at the end: arrays of a photo's size that lie between small ones which stay.
+    It keeps memory that does not end the heap: arrays of a photo's size between small ones that stay.
     """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:

@@ -64,7 +64,7 @@ def write_assets(
     n_faces: int | None = None,
     texture_size: int | None = None,
 ) -> Exported:
-    """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as asked, environment.exr and environment.hdr.
+    """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as requested, environment.exr and environment.hdr.
 
     All files are in the data's own world frame; GLB, OBJ and USDZ are decimated, textured and y up. The PLY holds the
     extracted mesh with vertex colours. What no photo shows is a cap between its edges.

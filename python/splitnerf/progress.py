@@ -39,7 +39,7 @@ def ended_by_signals() -> Iterator[None]:
 
 
 class Interrupt:
-    """Turns the first signal to end into a request; a second one acts as it did before."""
+    """Turns the first signal to end into a request; a second signal has its default effect."""
 
     def __enter__(self) -> Interrupt:
         self.asked = self._may_raise = False
@@ -47,7 +47,7 @@ class Interrupt:
         return self
 
     def attempt(self, work: Callable[[], None]) -> None:
-        """Does work that may be left out: a request leaves it out, and ends it where it comes meanwhile."""
+        """Does optional work: a request to end skips it, or interrupts it."""
         if self.asked:
             return
         try:
@@ -72,7 +72,7 @@ class Interrupt:
 
 
 class _Abandoned(BaseException):
-    """A request ends work that may be left out."""
+    """A request to end interrupts optional work."""
 
 
 class Progress:
@@ -91,35 +91,35 @@ class Progress:
             total=100.0, initial=100.0 * start, file=self._stream, disable=not self._is_terminal, leave=leave,
             bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining}{postfix}",
         )  # fmt: skip
-        self._start, self._started, self._told = start, time.monotonic(), -LINE_EVERY if at_once else 0.0
+        self._start, self._started, self._last_line = start, time.monotonic(), -LINE_EVERY if at_once else 0.0
 
     def __enter__(self) -> Progress:
         return self
 
-    def show(self, progress: float, told: str) -> None:
+    def show(self, progress: float, text: str) -> None:
         if self._is_terminal:
-            self._bar.set_postfix_str(told, refresh=False)
+            self._bar.set_postfix_str(text, refresh=False)
             made = 100.0 * progress - self._bar.n
             self._bar.update(made)
             if made <= 0:
                 self._bar.refresh()  # its clock goes on
             return
         elapsed = time.monotonic() - self._started
-        if elapsed - self._told >= LINE_EVERY or progress >= 1.0:
-            self._told = elapsed
+        if elapsed - self._last_line >= LINE_EVERY or progress >= 1.0:
+            self._last_line = elapsed
             made = progress - self._start
             left = tqdm.format_interval(elapsed * (1.0 - progress) / made) if made > 0 else "?"
-            print(f"{100 * progress:3.0f}% {tqdm.format_interval(elapsed)}<{left} {told}", file=self._stream, flush=True)
+            print(f"{100 * progress:3.0f}% {tqdm.format_interval(elapsed)}<{left} {text}", file=self._stream, flush=True)
 
     @contextmanager
     def aside(self) -> Iterator[None]:
-        """Within the block other lines are written, and a terminal shows no bar."""
+        """Hides the bar of a terminal within the block, so that other lines can be written."""
         self._bar.clear()
         yield
         self._bar.refresh()
 
     def skip(self, seconds: float) -> None:
-        """Leaves out the last seconds, in which nothing was done."""
+        """Excludes the last seconds, in which nothing was done."""
         self._started += seconds
         if self._is_terminal:  # else tqdm keeps no time
             self._bar.start_t += seconds
@@ -129,7 +129,7 @@ class Progress:
 
 
 def tracked(items: Sequence[Item], what: str) -> Iterator[Item]:
-    """The items, with a display of how many are done; what takes less than ten seconds shows on a terminal alone."""
+    """The items, with a display of how many are done; less than ten seconds of work show on a terminal only."""
     with Progress(0.0, leave=False) as bar:
         for i, item in enumerate(items):
             bar.show(i / len(items), f"{what} {i + 1} of {len(items)}")

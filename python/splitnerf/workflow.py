@@ -23,7 +23,7 @@ from splitnerf.delivery import REFINEMENT_FILES, discard_refinement, finish, is_
 from splitnerf.devices import refuse_one_processor
 from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Evaluated, Protocol, choose_views, evaluation_path
-from splitnerf.files import atomic_path, held
+from splitnerf.files import atomic_path, locked
 from splitnerf.notes import note_once
 from splitnerf.outputs import Exported, write_assets
 from splitnerf.plugins import installed
@@ -76,7 +76,7 @@ def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
     refuse_data(run)
     if not (resume or overwrite) and present_in(run):
         raise InputError(
-            f"{run}: holds a run already; go on with --resume, replace it with --overwrite, or give another --out"
+            f"{run}: holds a run already; continue with --resume, replace it with --overwrite, or give another --out"
         )
 
 
@@ -94,7 +94,7 @@ def clear_run(run: Path) -> None:
         preview.unlink()
 
 
-def begin_or_go_on(run: Path) -> tuple[bool, bool]:
+def begin_or_resume(run: Path) -> tuple[bool, bool]:
     """Whether to resume the run of a folder, or to overwrite it: one that ended before its first checkpoint."""
     if (run / "checkpoint.pt").is_file():
         return True, False
@@ -121,7 +121,7 @@ def reconstruct(
     overwrite: bool = False,
     observers: Sequence[Observer] = (),
 ) -> tuple[TrainedScene, dict | None]:
-    """Trains on a dataset and fills the run's folder, while observers look on. Returns the scene and, when finished, its
+    """Trains on a dataset, fills the run's folder and calls the observers. Returns the scene and, when finished, its
     evaluation.
 
     Raises:
@@ -129,7 +129,7 @@ def reconstruct(
         Diverged, EmptyMesh, OSError: See :func:`splitnerf.training.loop.train`.
     """
     check_repeatable(config, device)
-    with held(run):
+    with locked(run):
         check_run(run, resume=resume, overwrite=overwrite)
         config, dataset, test = load_with_masks(data, run, config, downscale, overwrite)
         training = begin_training(dataset, config, run, torch.device(device), resume=resume, observers=observers)
@@ -219,7 +219,7 @@ def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = N
     clock = time.monotonic()
     mesh = read_mesh(run / "mesh.ply") if (run / "mesh.ply").is_file() else None
     timings = {"training": content["seconds"]}
-    with held(run) if out is None else nullcontext():
+    with locked(run) if out is None else nullcontext():
         evaluated = score_run(run, model, grid, views, mesh, timings, maps, protocol.spp)
         timings["evaluation"] = time.monotonic() - clock
         write_json(out or evaluation_path(run), evaluated.scores)
@@ -247,7 +247,7 @@ def export_run(
         raise InputError(f"{run}: delivers what its refinement fitted, which this would replace; give another --out")
     refuse_data(out)
     model, _, content = load_run(run)
-    with held(out):
+    with locked(out):
         if (run / ORIGIN).is_file() and out.resolve() != run.resolve():
             with atomic_path(out / ORIGIN) as temporary:
                 shutil.copyfile(run / ORIGIN, temporary)

@@ -22,13 +22,13 @@ import pytest
 from splitnerf import files
 from splitnerf.data.images import read_image, write_image
 from splitnerf.errors import InputError
-from splitnerf.files import LOCK, PARTIAL, atomic_path, held
+from splitnerf.files import LOCK, PARTIAL, atomic_path, locked
 
 HOLDS = """
 import sys, time
 from pathlib import Path
-from splitnerf.files import atomic_path, held
-with held(Path(sys.argv[1])), atomic_path(Path(sys.argv[1]) / "sub" / "mesh.glb") as temporary:
+from splitnerf.files import atomic_path, locked
+with locked(Path(sys.argv[1])), atomic_path(Path(sys.argv[1]) / "sub" / "mesh.glb") as temporary:
     temporary.write_text("half")
     print("holds", flush=True)
     time.sleep(600)
@@ -129,12 +129,12 @@ def test_names_that_are_no_text(tmp_path):
 def test_a_folder_in_use_is_refused_and_its_owner_named(tmp_path, holder):
     run = tmp_path / "run"
     words = rf"run: is in use by pid {holder.pid} on {socket.gethostname()}; wait for its end, or give another --out"
-    with pytest.raises(InputError, match=words), held(run):
+    with pytest.raises(InputError, match=words), locked(run):
         pass
     assert len(list((run / "sub").iterdir())) == 1  # what the owner is writing is left alone
     holder.kill()
     holder.wait()
-    with held(run):
+    with locked(run):
         assert f"pid {os.getpid()} on " in (run / LOCK).read_text() and list((run / "sub").iterdir()) == []
     assert not (run / LOCK).exists()
 
@@ -149,14 +149,14 @@ def test_a_lock_that_its_owner_removed_meanwhile_is_none(tmp_path, monkeypatch):
         lock(file, operation)
 
     monkeypatch.setattr(fcntl, "flock", flock)
-    with held(tmp_path):
+    with locked(tmp_path):
         assert (tmp_path / LOCK).read_text().startswith(f"pid {os.getpid()} on ")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_is_held_once_by_a_program_and_may_be_held_within(tmp_path):
-    with held(tmp_path / "run"):
-        with held(tmp_path / "run"):
+def test_a_program_locks_a_folder_once_and_may_lock_it_again_within(tmp_path):
+    with locked(tmp_path / "run"):
+        with locked(tmp_path / "run"):
             pass
         assert (tmp_path / "run" / LOCK).exists()
 
@@ -165,10 +165,10 @@ def test_a_folder_that_stays_empty_is_removed(tmp_path):
     """With those around it that it took; not where there is something in it, or where it was there before."""
     (tmp_path / "there").mkdir()
     for folder in ("a/b", "there"):
-        with pytest.raises(KeyError), held(tmp_path / folder):
+        with pytest.raises(KeyError), locked(tmp_path / folder):
             raise KeyError
     assert [path.name for path in tmp_path.iterdir()] == ["there"]
-    with held(tmp_path / "c/d"):
+    with locked(tmp_path / "c/d"):
         (tmp_path / "c/mine").touch()
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["c", "mine", "there"]
 
@@ -177,7 +177,7 @@ def test_a_folder_that_was_removed_is_not_made_again(tmp_path):
     """Nor is written to where another program has made it again."""
     run = tmp_path / "run"
     for again in (False, True):
-        with held(run):
+        with locked(run):
             (run / LOCK).unlink()
             run.rmdir()
             if again:
@@ -193,7 +193,7 @@ def test_a_file_system_without_locks_is_told_of(tmp_path, monkeypatch, capsys):
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr(fcntl, "flock", fails)
-    with held(tmp_path), atomic_path(tmp_path / "a.txt") as temporary:
+    with locked(tmp_path), atomic_path(tmp_path / "a.txt") as temporary:
         temporary.write_text("whole")
     assert "has no locks (No locks available); start no second run" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
@@ -201,16 +201,16 @@ def test_a_file_system_without_locks_is_told_of(tmp_path, monkeypatch, capsys):
 
 def test_a_folder_that_cannot_be_written_to_is_refused(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="file: is a file; give --out a folder"), held(tmp_path / "file"):
+    with pytest.raises(InputError, match="file: is a file; give --out a folder"), locked(tmp_path / "file"):
         pass
-    with pytest.raises(InputError, match="run: cannot be written to .Not a directory."), held(tmp_path / "file/run"):
+    with pytest.raises(InputError, match="run: cannot be written to .Not a directory."), locked(tmp_path / "file/run"):
         pass
 
     def fails(*_, **__):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
     monkeypatch.setattr(files, "open", fails, raising=False)
-    with pytest.raises(InputError, match="a: cannot be written to .Read-only file system.; give"), held(tmp_path / "a"):
+    with pytest.raises(InputError, match="a: cannot be written to .Read-only file system.; give"), locked(tmp_path / "a"):
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
@@ -219,6 +219,6 @@ def test_what_a_killed_program_left_is_removed(tmp_path):
     """And no other hidden file."""
     for name in (f".checkpoint.abc{PARTIAL}.pt", ".mine.pt"):
         (tmp_path / name).touch()
-    with held(tmp_path):
+    with locked(tmp_path):
         pass
     assert [path.name for path in tmp_path.iterdir()] == [".mine.pt"]

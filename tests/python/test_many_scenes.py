@@ -16,7 +16,7 @@ from tiny_runs import as_options
 
 from splitnerf.cli import BAD_INPUT, FAILED, build_parser, main
 from splitnerf.errors import InputError
-from splitnerf.files import LOCK, is_held, remove_partial
+from splitnerf.files import LOCK, is_locked, remove_partial
 from splitnerf_tools.batch import child
 from splitnerf_tools.batch.child import Outcome, Work, train_scene
 from splitnerf_tools.batch.cluster import LONGEST_FOLDER, Share, n_at_once, own_folder, share_of
@@ -229,7 +229,7 @@ def test_a_run_in_use_is_waited_for_and_then_left_alone(tmp_path, monkeypatch):
     owner.stdout.readline()
     monkeypatch.setattr(child, "TIMEOUT", 0.3)
     try:
-        assert is_held(tmp_path / "run")
+        assert is_locked(tmp_path / "run")
         outcome = train_scene(work_in(tmp_path, tmp_path))
         assert outcome == Outcome(None, f"{tmp_path / 'run'}: is in use by another program", False)
         halves = list((tmp_path / "run/sub").iterdir())
@@ -241,7 +241,7 @@ def test_a_run_in_use_is_waited_for_and_then_left_alone(tmp_path, monkeypatch):
     finally:
         owner.kill()
         owner.wait()
-    assert (tmp_path / "run" / LOCK).exists() and not is_held(tmp_path / "run") and not is_held(tmp_path)
+    assert (tmp_path / "run" / LOCK).exists() and not is_locked(tmp_path / "run") and not is_locked(tmp_path)
 
 
 PARENT = """

@@ -102,14 +102,14 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.files import held
+    from splitnerf.files import locked
 
     if args.resume and args.overwrite:
         raise InputError("--resume and --overwrite exclude each other")
     run, settings = args.out or Path("runs") / args.data.resolve().name, settings_of(args)
     with ExitStack() as stack:
         observers = list(map(stack.enter_context, observers_of(args, run)))
-        stack.enter_context(held(run))
+        stack.enter_context(locked(run))
         return train_in(run, args, settings, observers)
 
 
@@ -194,9 +194,9 @@ def planned(run: Path, args: argparse.Namespace, settings: dict[str, object]) ->
     from splitnerf.config import preset
     from splitnerf.devices import choose_device
     from splitnerf.training.checkpoint import config_of, load_checkpoint
-    from splitnerf.workflow import begin_or_go_on, is_finished
+    from splitnerf.workflow import begin_or_resume, is_finished
 
-    resume, overwrite = begin_or_go_on(run) if args.resume == "auto" else (bool(args.resume), args.overwrite)
+    resume, overwrite = begin_or_resume(run) if args.resume == "auto" else (bool(args.resume), args.overwrite)
     begun = config_of(load_checkpoint(run / "checkpoint.pt")) if resume else None
     repeatable = (begun or preset("cpu")).replace(settings).run.deterministic
     device = choose_device(device_for(args.device, repeatable))

@@ -26,7 +26,7 @@ from splitnerf.errors import InputError
 from splitnerf.export.bake import UnwrappedMesh, bake_occlusion
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
-from splitnerf.files import held
+from splitnerf.files import locked
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.refinement.fit import Refined, RefinementSettings, Stage
 from splitnerf.refinement.texels import check_form
@@ -226,7 +226,7 @@ def refine_run(
     """Refines what training exported into a run; see :func:`refine_folder`."""
     source = source_of(run)
     refuse_data(out)
-    with held(out):
+    with locked(out):
         read_source(source)
         dataset = with_exposures(load_dataset(data, "train", downscale, reading), run)
         try:

@@ -15,7 +15,7 @@ from splitnerf.data.asset import Asset
 from splitnerf.data.environment import read_environment, rotate_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.errors import InputError
-from splitnerf.files import held
+from splitnerf.files import locked
 from splitnerf.relight.background import Background, compose
 from splitnerf.relight.cameras import View, bounding_sphere
 from splitnerf.relight.output import (
@@ -99,7 +99,7 @@ def relight(
     names = file_names(len(views), gif=settings.gif, mp4=settings.mp4)
     with ExitStack() as stack:
         for folder in folders:
-            stack.enter_context(held(folder))
+            stack.enter_context(locked(folder))
         earlier = [check_folder(folder, names, overwrite=overwrite) for folder in folders]
         render_frames(asset, lights, views, folders, background, settings)
         for folder, own in zip(folders, earlier):

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from splitnerf.errors import plain
-from splitnerf.files import is_held
+from splitnerf.files import is_locked
 
 PR_SET_PDEATHSIG = 1  # of Linux's prctl
 POLL, TIMEOUT = 0.2, 120.0  # seconds: between looks at the process, and for an earlier one to leave the folder
@@ -104,7 +104,7 @@ def last_word(log: Path, begin: int, code: int) -> str:
 def _free(run: Path) -> bool:
     """Waits for an earlier process to leave a run's folder: one whose worker was killed saves its state."""
     until = time.monotonic() + TIMEOUT
-    while is_held(run):
+    while is_locked(run):
         if time.monotonic() > until:
             return False
         time.sleep(POLL)

@@ -16,7 +16,7 @@ from PIL import Image
 from splitnerf.data.dataset import SURROUNDINGS
 from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.errors import InputError
-from splitnerf.files import LOCK, atomic_path, held, remove_partial
+from splitnerf.files import LOCK, atomic_path, locked, remove_partial
 from splitnerf.notes import note
 from splitnerf_tools.capture.exposure import Exposures, find_exposures
 from splitnerf_tools.capture.masks import find_masks, given_masks
@@ -81,7 +81,7 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
     work = out / "work"
     if out.is_dir() and {path.name for path in out.iterdir()} - {LOCK} and not (work.is_dir() or (out / "frames").is_dir()):
         raise InputError(f"{out}: holds other files; give a new folder")
-    with held(out):
+    with locked(out):
         photos = _photographs(source, out, settings, report)
         _begin(work, photos, settings)
         kept, left_out = _sorted_out(photos, report)

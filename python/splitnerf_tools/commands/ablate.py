@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
     from splitnerf.data.frames import refuse_data
     from splitnerf.evaluate.jobs import Protocol
-    from splitnerf.files import atomic_path, held
+    from splitnerf.files import atomic_path, locked
     from splitnerf_tools.ablate.job import Interrupted, Plan, ablate
     from splitnerf_tools.ablate.table import csv_table, markdown_table
 
@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     plan = Plan(list(scenes.values()), rows, args.seeds, Protocol(args.downscale, args.views, args.spp), args.out)
     refuse_data(args.out)
     try:
-        with held(args.out):
+        with locked(args.out):
             scores = ablate(plan, show)
     except Interrupted:
         print(f"stopped; the state is in {args.out}. To continue, repeat the command.")

@@ -57,7 +57,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.data.frames import refuse_data
-    from splitnerf.files import held
+    from splitnerf.files import locked
     from splitnerf_tools.batch.cluster import machines_of, n_at_once, ray_on, share_of
     from splitnerf_tools.batch.job import Batch, run_batch
     from splitnerf_tools.batch.scenes import asked_scenes, known_scenes
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     check_usage(args)
     refuse_data(args.out)
     options = given_options(args)
-    with held(args.out):
+    with locked(args.out):
         known = known_scenes(args.out)
         asked = asked_scenes(known, args.scenes, options)
         batch = Batch(args.out, known, asked, options, args.retries, args.retry_refused)

@@ -134,7 +134,7 @@ def run_skip(args: argparse.Namespace) -> int:
 def run_whole(args: argparse.Namespace) -> int:
     from splitnerf.config import parse_setting
     from splitnerf.evaluate.jobs import Protocol
-    from splitnerf.files import held
+    from splitnerf.files import locked
     from splitnerf_tools.ablate.job import Interrupted
     from splitnerf_tools.bench.charts import write_result
     from splitnerf_tools.bench.whole import NAMES, configurations, whole
@@ -155,7 +155,7 @@ def run_whole(args: argparse.Namespace) -> int:
     configs = configurations(names, dict(parse_setting(text) for text in args.settings))
     protocol = Protocol(args.downscale, args.views, args.spp)
     try:
-        with held(args.runs):
+        with locked(args.runs):
             result = whole(scenes, configs, minutes, protocol, args.runs, print_now)
     except Interrupted:
         print(f"stopped; the state is in {args.runs}. To continue, repeat the command.")

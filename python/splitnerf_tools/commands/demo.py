@@ -33,7 +33,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     from splitnerf.config import preset
     from splitnerf.data.frames import refuse_data
-    from splitnerf.files import held
+    from splitnerf.files import locked
     from splitnerf.workflow import check_run, reconstruct
     from splitnerf_tools.demo.scene import write_demo_dataset
 
@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--max-minutes must be positive, got {args.max_minutes}")
     settings = {"run.seed": args.seed, "refinement.enabled": not args.no_refine, **budget(None, args.max_minutes)}
     config, data = preset("cpu").replace(settings), args.out / "data"
-    with held(args.out):
+    with locked(args.out):
         check_run(args.out, resume=False, overwrite=args.overwrite)
         if not args.overwrite:
             refuse_data(data)

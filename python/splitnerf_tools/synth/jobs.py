@@ -16,7 +16,7 @@ from splitnerf.data.environment import read_environment, resize_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.relit import PREFIX
 from splitnerf.errors import InputError
-from splitnerf.files import LOCK, held
+from splitnerf.files import LOCK, locked
 from splitnerf.notes import note
 from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_SPP, MOST_VIEWS, AssetRenderer
 from splitnerf_tools.synth.cameras import orbit, spiral
@@ -117,7 +117,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
     else:
         renderer = AssetRenderer(normalised(original, centre, scale))
 
-    with held(out):
+    with locked(out):
         write_placed_glb(asset, out / "asset.glb", centre, scale)
         writer.mesh((original.vertices - centre) * scale, original.triangles)
         stored = writer.light(maps[0])
