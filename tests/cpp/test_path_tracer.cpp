@@ -93,7 +93,7 @@ TEST(PathTracer, GreySphereUnderConstantLightReflectsItsDirectionalAlbedo) {
 
 TEST(PathTracer, DiffuseSphereUnderTheSkyFollowsTheCosineLaw) {
   // Irradiance of a half-bright sky on a plane tilted by theta: pi (1 + cos theta) / 2. The
-  // specular layer of F0 = .04 is taken off by the difference of a white and a black sphere.
+  // specular layer of F0 = 0.04 is taken off by the difference of a white and a black sphere.
   RenderJob s = sphere_setup(48);
   s.roughness = 1.f;
   s.set_map(128, 256, [](Vec d) { return d.z > 0 ? 1.f : 0.f; });

@@ -247,7 +247,7 @@ TEST(Sampling, LatticesFillTheSquareEvenly) {
     fibonacci.push_back(fibonacci_lattice(i, kPoints, shift));
     r2.push_back(r2_lattice(i, shift));
   }
-  // Random points would leave about .02.
+  // Random points would leave about 0.02.
   EXPECT_LT(discrepancy(fibonacci), 0.005);
   EXPECT_LT(discrepancy(r2), 0.006);
   for (const auto& p : fibonacci) EXPECT_TRUE(p.x >= 0 && p.x < 1 && p.y >= 0 && p.y < 1);

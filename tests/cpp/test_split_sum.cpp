@@ -29,7 +29,7 @@ TEST(BrdfTable, MirrorKeepsAllLight) {
 TEST(BrdfTable, ChiMatchesMeasuredLobes) {
   const double roughness[] = {0.1, 0.3, 0.5, 0.7, 0.9}, n_dot_v[] = {0.1, 0.5, 0.9};
   const double chi[5][3] = {
-      {.993, .999, 1}, {.805, .946, .984}, {.559, .752, .877}, {.351, .465, .581}, {.131, .159, .183}};
+      {0.993, 0.999, 1}, {0.805, 0.946, 0.984}, {0.559, 0.752, 0.877}, {0.351, 0.465, 0.581}, {0.131, 0.159, 0.183}};
   for (int r = 0; r < 5; ++r) {
     for (int v = 0; v < 3; ++v) {
       EXPECT_NEAR(integrate_brdf(n_dot_v[v], roughness[r], 50000).chi, chi[r][v], 2e-3)
@@ -86,7 +86,7 @@ TEST(BrdfTable, NeverGainsEnergy) {
     const float f1 = entry[0], f2 = entry[1], chi = entry[2];
     EXPECT_TRUE(f1 >= 0 && f2 >= 0 && f1 + f2 <= 1.001f) << i << " " << f1 << " " << f2;
     EXPECT_TRUE(chi >= 0 && chi <= 1) << i;
-    // What a dielectric takes leaves its base at least .01, compensated too: nothing clamps it.
+    // What a dielectric takes leaves its base at least 0.01, compensated too: nothing clamps it.
     EXPECT_TRUE(entry[3] > 0.01f && entry[3] <= f1 + f2 + 1e-7f && entry[3] < 0.99f) << i << " " << entry[3];
   }
 }

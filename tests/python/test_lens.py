@@ -82,7 +82,7 @@ def test_a_photo_that_ends_is_unknown_beyond():
 
 
 def test_a_polynomial_that_folds_back_shows_no_second_image():
-    """1 - 1.5 r^2 grows up to r = .4714, and is back in the photo's middle at r = .8."""
+    """1 - 1.5 r^2 grows up to r = 0.4714, and is back in the photo's middle at r = 0.8."""
     lens = Distortion((-1.5, 0.0, 0.0, 0.0))
     assert lens.reach == pytest.approx(np.sqrt(1 / 4.5))
     _, known = undistort(np.ones((HEIGHT, WIDTH, 1), np.float32), lens, np.array([100.0, 100, 65, 45]))

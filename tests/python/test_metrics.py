@@ -129,7 +129,7 @@ def test_mesh_distances():
 
 def test_mesh_distances_go_both_ways():
     """A square and another one 10 above it against the first: half of the points are 10 off, and all of it is found.
-    Shares are of a hundredth of the truth's diagonal, .014: what is .02 off is not found, however large the mesh."""
+    Shares are of a hundredth of the truth's diagonal, 0.014: what is 0.02 off is not found, however large the mesh."""
     square = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     square.apply_translation([5, 7, 3])  # of no matter
     above, beside = square.copy(), square.copy()

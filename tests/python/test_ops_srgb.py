@@ -10,7 +10,7 @@ from splitnerf.ops import linear_to_srgb, srgb_to_linear
 
 
 def test_values_of_the_standard():
-    """IEC 61966-2-1: .5 decodes to .21404, the joint at .04045 to .0031308."""
+    """IEC 61966-2-1: 0.5 decodes to 0.21404, the joint at 0.04045 to 0.0031308."""
     decoded = srgb_to_linear(torch.tensor([0.0, 0.04045, 0.5, 1.0], dtype=torch.float64))
     assert decoded.tolist() == pytest.approx([0, 0.0031308, 0.2140411, 1], abs=1e-7)
     assert linear_to_srgb(torch.tensor([-1.0, 0.0, 0.5, 4.0])).tolist() == pytest.approx(

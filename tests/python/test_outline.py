@@ -83,7 +83,7 @@ def test_what_is_behind_the_camera_or_beside_the_photo_has_no_outline(painted):
 
 
 def test_an_edge_just_outside_the_photo_changes_the_pixels_at_its_border(painted):
-    """A plate that ends .7 pixels beyond: each pixel of the last column by the window at its distance, 1.2 pixels."""
+    """A plate that ends 0.7 pixels beyond: each pixel of the last column by the window at its distance, 1.2 pixels."""
     pixels, box, size, z = covered_pixels(painted[1]), trimesh.creation.box(), 40, 3.0
     pixels.poses, pixels.intrinsics = np.eye(4, dtype=np.float32)[None, :3], np.float32([[60, 60, size / 2, size / 2]])
     right = (size / 2 + 0.7) * z / 60

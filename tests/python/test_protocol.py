@@ -39,7 +39,7 @@ def where(mask: np.ndarray, inside: object, outside: object) -> np.ndarray:
 
 
 def test_materials_are_compared_where_both_have_an_object():
-    """Inside roughness is .1 too high in half of the columns and .3 too low in the others, outside all is wrong."""
+    """Inside roughness is 0.1 too high in half of the columns and 0.3 too low in the others, outside all is wrong."""
     even = np.broadcast_to(np.arange(SIZE) % 2 == 0, (SIZE, SIZE))
     truth = ViewTruth("a", roughness=np.full((SIZE, SIZE), 0.5, np.float32), metallic=where(even, 1.0, 0.0))
     prediction = {
@@ -64,14 +64,14 @@ def test_normals_are_compared_where_the_prediction_is_opaque_and_the_truth_has_s
 
 
 def test_views_stand_on_white_once():
-    """A photo of .2 that covers half of a pixel looks like .6 that covers all of it."""
+    """A photo of 0.2 that covers half of a pixel looks like 0.6 that covers all of it."""
     images = dataset(picture(0.2, 0.5))
     whole = {"rgb": picture(0.6, 1.0)[..., :3], "alpha": np.ones((SIZE, SIZE), np.float32)}
     assert evaluate_maps([whole], images, [ViewTruth("a")])["novel_view"]["psnr"] == pytest.approx(100.0, abs=1.0)
 
 
 def test_albedos_stand_on_white_by_their_own_coverage():
-    """Equal where both are opaque. Elsewhere linear .8 at .5 and .01 at .25, in sRGB over white."""
+    """Equal where both are opaque. Elsewhere linear 0.8 at 0.5 and 0.01 at 0.25, in sRGB over white."""
     edge = ~BOTH
     truth = ViewTruth("a", albedo=where(edge[..., None], [0.01] * 3, [0.3] * 3))
     prediction = {"alpha": where(edge, 0.5, 1.0), "albedo": where(edge[..., None], [0.8] * 3, [0.3] * 3)}

@@ -92,7 +92,7 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
 @pytest.mark.parametrize("metallic", [0.0, 1.0])
 def test_the_furnace_of_the_whole_model(metallic):
     """Under constant light white things, of metal or not, return that light: the split sum to 1 %, which is the
-    table's; the sum over 256 directions to .2 % in the mean and 5 % at a point."""
+    table's; the sum over 256 directions to 0.2 % in the mean and 5 % at a point."""
     torch.manual_seed(0)
     model = SceneModel(Config().replace({"n_levels": 2, "log2_table_size": 8}))
     with torch.no_grad():

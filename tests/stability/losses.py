@@ -185,7 +185,7 @@ ENTRIES = (
         floor=0.1,
         gradient_floor=100.0,
         repair=lambda rows: {"radiance": rows["radiance"].clamp(0, 1e4)},
-        reason="logarithms of ratios; a chroma below .1 counts as that, as do gradients below 100 where the dark's reach 1e4",
+        reason="logarithms of ratios; a chroma below 0.1 counts as that, as do gradients below 100 where the dark's reach 1e4",
     ),
     Entry(
         "light_prior",

@@ -40,7 +40,7 @@ def cast(rows: Rows, dtype: torch.dtype) -> Rows:
 
 
 def cotangent(output: Tensor) -> Tensor:
-    """The same numbers for every row, of both signs, in [.5, 1.5]."""
+    """The same numbers for every row, of both signs, in [0.5, 1.5]."""
     n = math.prod(output.shape[1:])
     steps = torch.arange(n, dtype=torch.float64, device=output.device)
     values = (0.5 + torch.frac(0.1 + 0.6180339887498949 * steps)) * torch.where(steps % 3 == 1, -1.0, 1.0)

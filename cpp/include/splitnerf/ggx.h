@@ -52,7 +52,7 @@ template <class T> SPLITNERF_HD T schlick(T f0, T v_dot_h) {
   return f0 + (T(1) - f0) * pow5(clamp(T(1) - v_dot_h, T(0), T(1)));
 }
 
-// Unpolarised reflectance of a smooth dielectric of refractive index 1.5 (F0 = .04), seen from outside: the mean of
+// Unpolarised reflectance of a smooth dielectric of refractive index 1.5 (F0 = 0.04), seen from outside: the mean of
 // ((g - c) / (g + c))^2 and ((n^2 c - g) / (n^2 c + g))^2 with c = v.h and g^2 = n^2 - 1 + c^2.
 // Source: Walter et al. 2007, Eq. (22).
 template <class T> SPLITNERF_HD T fresnel_dielectric(T v_dot_h) {

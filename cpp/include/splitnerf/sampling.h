@@ -110,7 +110,7 @@ template <class T> SPLITNERF_HD T pdf_cosine_hemisphere(T cosine) { return max_o
 inline constexpr double kCosineLobeLimit = 1e-3;
 
 // y - log(1 + y) for y >= 0; the difference cancels for small y, where the series
-// y^2/2 - y^3/3 + y^4/4 - ... serves instead (twelve terms leave 1e-13 at y = .1).
+// y^2/2 - y^3/3 + y^4/4 - ... serves instead (twelve terms leave 1e-13 at y = 0.1).
 template <int K, class T> SPLITNERF_HD T log1p_tail(T y) {
   if constexpr (K == 13) {
     return T(1) / T(K);

@@ -17,7 +17,7 @@ inline constexpr double kMinNdotV = 1e-4;  // n.v is clamped to [kMinNdotV, 1]
 // Texel i stands at i / (kLutSize - 1) on both axes.
 //   F1 = int D V (1 - (1 - v.h)^5) (n.l) dl,  F2 the same with (1 - v.h)^5:  E = F0 F1 + F2 with Schlick's Fresnel term
 //   chi places the mean direction of the lobe between normal and reflection, see query_direction.
-//   E_d = int D V F_d (n.l) dl with the exact Fresnel term of a dielectric, fresnel_dielectric; at most 1 - .01
+//   E_d = int D V F_d (n.l) dl with the exact Fresnel term of a dielectric, fresnel_dielectric; at most 1 - 0.01
 SPLITNERF_API const float* brdf_lut();
 
 // One entry of the table by quadrature over 2 n_points microfacet normals.
@@ -90,7 +90,7 @@ template <class T> SPLITNERF_HD Vec3<T> lookup_brdf_lut(const float* lut, T n_do
 // ---- the direction at which g is asked -------------------------------------------------------
 //
 // g assumes n = v = w_r. Asking it at the mean direction of the true lobe,
-//   d = normalize((1 - k) n + k w_r),  k = lerp(1, chi(n.v, roughness), smoothstep(.3, .4, roughness)),
+//   d = normalize((1 - k) n + k w_r),  k = lerp(1, chi(n.v, roughness), smoothstep(0.3, 0.4, roughness)),
 // removes most of that assumption's error; k = 1 (w_r itself) is the paper's form. The normal is
 // turned towards the viewer first.
 
@@ -166,7 +166,7 @@ SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bo
 // ---- shading ---------------------------------------------------------------------------------
 
 // exact: a metal and a diffuse base under a dielectric layer, mixed: the path tracer's BSDF, principled.h.
-// paper, code: one Fresnel term of F0 = .04 (1 - m) + m albedo, counted twice, as published and as released.
+// paper, code: one Fresnel term of F0 = 0.04 (1 - m) + m albedo, counted twice, as published and as released.
 enum class FresnelMode : int { kExact = 0, kPaper = 1, kCode = 2 };
 
 struct ShadeOptions {
@@ -233,7 +233,7 @@ SPLITNERF_HD SpecularAlbedo<T> specular_albedo(T fr, T rest_of_fr, const LutSamp
 // Directional albedo E = gain E_d of a dielectric layer; its partial derivatives are gain by E_d, and d_lost.
 template <class T> struct DielectricAlbedo {
   T value, d_lost;
-  T rest;  // 1 - E, at least .01
+  T rest;  // 1 - E, at least 0.01
   ScatteringGain<T> gain;
 };
 template <class T>

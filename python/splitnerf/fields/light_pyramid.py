@@ -129,9 +129,9 @@ class LightPyramid(Light):
     """g(w, rho) as the environment's texels filtered with the exact lobe, so that it is consistent by construction.
 
     The environment is an octahedral map of n^2 texels. Its log-radiance is a sum of levels of 4^2, 8^2, ..., n^2
-    texels, clamped to [-12, 12]. Filtered maps exist for rho = .1, .15, .2, .3, .4 where the lobe is wider than a
-    texel, and spherical harmonics of degree 12 for rho >= .5; all are fixed linear maps of the texels' radiance.
-    Between these nodes g is linear in rho; up to rho = .05 the texels are read unfiltered.
+    texels, clamped to [-12, 12]. Filtered maps exist for rho = 0.1, 0.15, 0.2, 0.3, 0.4 where the lobe is wider than a
+    texel, and spherical harmonics of degree 12 for rho >= 0.5; all are fixed linear maps of the texels' radiance.
+    Between these nodes g is linear in rho; up to rho = 0.05 the texels are read unfiltered.
 
     Args:
         resolution: Texels along an edge, n: a power of 2 >= 16; 64 resolves 3 degrees.

@@ -52,7 +52,7 @@ class PhotoWriter:
         raise NotImplementedError
 
     def intrinsics(self, maps: Maps) -> np.ndarray:
-        """K [3, 3] of a view, the first pixel's middle at .5."""
+        """K [3, 3] of a view, the first pixel's middle at 0.5."""
         height, width = maps["alpha"].shape
         focal = 0.5 * width / np.tan(0.5 * self.camera_angle_x)
         return np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
