@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import shutil
@@ -13,6 +14,8 @@ import pytest
 import torch
 from op_checks import has_cuda_kernel
 from pretend_gpu import pretend_gpu
+from torch.utils._python_dispatch import TorchDispatchMode
+from torch.utils._pytree import tree_leaves
 
 from splitnerf import _core, devices, memory
 from splitnerf.cli import main
@@ -21,9 +24,7 @@ from splitnerf.cli.train import device_for
 from splitnerf.devices import fit_device
 from splitnerf.errors import InputError
 from splitnerf.export.unwrap import unwrap
-from splitnerf.ops._library import lib
 from splitnerf_tools.doctor import machine, self_test
-from splitnerf_tools.doctor.table import CHECKS
 from splitnerf_tools.plugin import failing_operators
 
 OPERATORS = sorted(
@@ -31,87 +32,99 @@ OPERATORS = sorted(
 )
 
 
-def outputs(name: str) -> list[int]:
-    """The numbers of what an operator returns, or of the arguments that it writes to."""
-    schema = getattr(torch.ops.splitnerf, name).default._schema
-    written = [i for i, given in enumerate(schema.arguments) if given.alias_info and given.alias_info.is_write]
-    return written or list(range(len(schema.returns)))
-
-
 def off(x: torch.Tensor) -> torch.Tensor:
     """A hundredth too large; a whole number by one, a truth turned round."""
     return ~x if x.dtype == torch.bool else x * 1.01 if x.is_floating_point() else x + 1
 
 
-def spoil(monkeypatch, name: str, change, output: int = 0) -> None:
-    """Changes one output of an operator, once a call: within a device's context torch looks the operator up again."""
-    operator, within = getattr(lib, name), []
+class Spoilt(TorchDispatchMode):
+    """Within it the nth tensor that an operator gives, or writes to, is changed; `reached` holds all that were called."""
 
-    def spoilt(*arguments):
-        if within:
-            return operator(*arguments)
-        within.append(name)
-        result = operator(*arguments)
-        within.clear()
-        if result is None:
-            written = arguments[output] if isinstance(arguments[output], list) else [arguments[output]]
-            written[-1].copy_(change(written[-1]))
-            return None
-        if isinstance(result, torch.Tensor):
-            return change(result)
-        return tuple(change(x) if i == output else x for i, x in enumerate(result))
+    def __init__(self, name: str = "", change=off, output: int = 0):
+        super().__init__()
+        self.name, self.change, self.output, self.reached, self.n_outputs = name, change, output, set(), 0
 
-    monkeypatch.setattr(lib, name, spoilt)
+    def __torch_dispatch__(self, operator, types, args=(), kwargs=None):
+        result = operator(*args, **(kwargs or {}))
+        if operator.namespace == "splitnerf":
+            name = operator.__name__.partition(".")[0]
+            self.reached.add(name)
+            if name == self.name:
+                written = [x for x, given in zip(args, operator._schema.arguments) if given.alias_info]
+                outputs = [x for x in tree_leaves([result, written]) if isinstance(x, torch.Tensor)]
+                self.n_outputs = len(outputs)
+                if outputs[self.output].numel():
+                    outputs[self.output].copy_(self.change(outputs[self.output]))
+        return result
 
 
-def test_every_operator_has_a_check():
-    assert sorted(CHECKS) == OPERATORS
-    assert all(check.__doc__ for check in CHECKS.values())
+def test_every_operator_is_asked():
+    with Spoilt() as mode:
+        assert self_test.failures("cpu") == []
+    assert sorted(mode.reached) == OPERATORS
+    assert self_test.operators("cpu") == [name for name in OPERATORS if "_backward" not in name]
+
+
+def test_the_answers_are_those_of_this_version(tmp_path):
+    self_test.write_answers(tmp_path / "answers.json")
+    now = json.loads((tmp_path / "answers.json").read_text())
+    assert now.keys() == self_test.answers().keys()
+    for name, known in self_test.answers().items():
+        assert now[name].keys() == known.keys()
+        for result, pair in known.items() if name not in self_test.CPU_ALONE else ():
+            assert now[name][result] == pytest.approx(pair, rel=1e-7, abs=1e-7 * pair[1]), (name, result)
 
 
 def test_what_is_traced_stays_on_the_cpu():
     if not _core.cuda_architectures():
         pytest.skip("build without CUDA")
     assert {name for name in OPERATORS if not has_cuda_kernel(name)} == self_test.CPU_ALONE
-    assert set(self_test.operators("cuda")) == set(OPERATORS) - self_test.CPU_ALONE
+    assert set(self_test.operators("cuda")) == set(self_test.operators("cpu")) - self_test.CPU_ALONE
 
 
-@pytest.mark.parametrize(("name", "output"), [(name, i) for name in OPERATORS for i in outputs(name)])
-def test_an_operator_that_is_off_is_found(monkeypatch, name, output):
-    spoil(monkeypatch, name, off, output)
-    (failure,) = self_test.failures("cpu", [name])
-    assert (failure.operator, failure.device) == (name, "cpu")
-    assert failure.said.startswith("found ") and ", expected " in failure.said and failure.known
+@pytest.mark.parametrize("name", OPERATORS)
+def test_an_operator_that_is_off_is_found(name):
+    """Each of its results, one after the other."""
+    asked = name.split("_backward")[0]
+    with Spoilt(name, lambda x: x) as mode:
+        self_test.failures("cpu", [asked])
+    for output in range(mode.n_outputs):
+        with Spoilt(name, off, output):
+            (failure,) = self_test.failures("cpu", [asked])
+        assert (failure.operator, failure.device) == (asked, "cpu") and "weighted sum over its" in failure.known
+        assert failure.said.startswith("found ") and ", expected " in failure.said
 
 
 def test_a_failure_says_what_was_found(monkeypatch):
-    spoil(monkeypatch, "composite", lambda x: x + torch.tensor([[0.0, 0.0, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
-    assert self_test.failures("cpu", ["composite"])[0].said == "found 189, expected 180"
-    monkeypatch.undo()
-    spoil(monkeypatch, "composite", lambda x: x * math.nan)
-    assert self_test.failures("cpu", ["composite"])[0].said == "found nan, expected 60"
+    known = self_test.answers()["composite"]["output 0"][0]
+    with Spoilt("composite", lambda x: 2 * x):
+        (failure,) = self_test.failures("cpu", ["composite"])
+    assert failure.said == f"found {2 * known:.6g}, expected {known:.6g}"
+    assert failure.known == "a weighted sum over its output 0"
+    with Spoilt("composite", lambda x: x * math.nan):
+        assert self_test.failures("cpu", ["composite"])[0].said == f"found nan, expected {known:.6g}"
 
     def refuse(*arguments):
         raise ValueError("composite: no\nkernel")
 
-    monkeypatch.setattr(lib, "composite", refuse)
+    monkeypatch.setattr(self_test.lib, "composite", refuse)
     assert self_test.failures("cpu", ["composite"])[0].said == "raised ValueError: composite: no kernel"
 
 
-def test_the_checks_make_their_inputs_on_the_device(monkeypatch):
+def test_the_test_makes_its_inputs_on_the_device(monkeypatch):
     with pretend_gpu(monkeypatch):
         assert self_test.failures("cuda") == []
 
 
 @pytest.mark.skipif("cuda" not in devices.devices(), reason="no GPU that the kernels run on")
-def test_the_checks_pass_on_the_gpu():
+def test_the_operators_are_right_on_the_gpu():
     assert self_test.failures("cuda") == []
 
 
 def test_all_is_well_here(capsys):
     assert main(["doctor"]) == DONE
     said = capsys.readouterr().out
-    assert f"{len(OPERATORS)} operators, all as they should be" in said
+    assert f"{len(self_test.answers())} operators, all as they should be" in said
     for name in ("splitnerf", "Python", "torch", "kernels", "CUDA", "ray tracing", "texture coordinates", "memory", "disk"):
         assert f"\n{name} " in f"\n{said}"
     lines = [line for line in said.splitlines() if "->" not in line]
@@ -133,11 +146,13 @@ def test_missing_packages_are_named_and_are_no_fault(capsys, monkeypatch):
 
 def test_a_failed_check_ends_with_what_to_do(capsys, monkeypatch):
     monkeypatch.setattr(_core, "instruction_set", lambda: "avx512")
-    spoil(monkeypatch, "srgb_to_linear", off)
-    assert main(["doctor"]) == FAILED
+    with Spoilt("srgb_to_linear"):
+        assert main(["doctor"]) == FAILED
     said = capsys.readouterr().out
-    assert f"1 of {len(OPERATORS)} operators fail" in said
-    assert "  srgb_to_linear        found 1.01, expected 1 (The curve of IEC 61966-2-1 at three points.)" in said
+    assert f"1 of {len(self_test.answers())} operators fail" in said
+    known = self_test.answers()["srgb_to_linear"]["output 0"][0]
+    assert f"  srgb_to_linear        found {1.01 * known:.3g}" in said
+    assert f", expected {known:.6g} (a weighted sum over its output 0)" in said
     advice = [line.split("-> ")[1] for line in said.split("operators fail")[1].splitlines() if "-> " in line]
     assert "pip install --force-reinstall" in advice[0] and "SPLITNERF_ISA=avx2" in advice[1] and "report" in advice[2]
 
