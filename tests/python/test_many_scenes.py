@@ -14,15 +14,14 @@ import pytest
 from test_files import HOLDS
 from tiny_runs import as_options
 
-from splitnerf.cli import BAD_INPUT, FAILED, build_parser, main
+from splitnerf.cli import BAD_INPUT, build_parser, main
 from splitnerf.errors import InputError
 from splitnerf.files import LOCK, is_locked, remove_partial
 from splitnerf_tools.batch import child
 from splitnerf_tools.batch.child import Outcome, Work, train_scene
-from splitnerf_tools.batch.cluster import LONGEST_FOLDER, Share, n_at_once, own_folder, share_of
-from splitnerf_tools.batch.job import Batch, Told, Watch, run_batch
-from splitnerf_tools.batch.scenes import Scene, asked_scenes, fingerprint, keep_scenes, known_scenes, scene_name
-from splitnerf_tools.batch.table import Rows, markdown
+from splitnerf_tools.batch.cluster import LONGEST_FOLDER, Share, own_folder, share_of
+from splitnerf_tools.batch.job import Batch, run_batch
+from splitnerf_tools.batch.scenes import Rows, Scene, asked_scenes, keep_scenes, known_scenes, markdown, scene_name
 from splitnerf_tools.commands.batch import given_options
 
 GB = 1e9
@@ -48,11 +47,11 @@ def test_two_folders_of_one_name_are_two_scenes_and_stay_so(tmp_path):
     """Whatever the order of a later call, and whatever is added to it."""
     first = [Path("/a/chair"), Path("/b/chair"), Path("/b/../a/chair/"), Path("/c/Chair")]
     known: list[Scene] = []
-    assert [s.name for s in asked_scenes(known, first, [])] == ["chair", "chair-2", "Chair-3"]
+    assert [s.name for s in asked_scenes(known, first)] == ["chair", "chair-2", "Chair-3"]
     keep_scenes(tmp_path, known)
     again = known_scenes(tmp_path)
     assert again == known
-    asked = asked_scenes(again, [Path("/d/chair"), Path("/c/Chair"), Path("/b/chair")], [])
+    asked = asked_scenes(again, [Path("/d/chair"), Path("/c/Chair"), Path("/b/chair")])
     assert [(s.name, s.data) for s in asked] == [("chair-4", "/d/chair"), ("Chair-3", "/c/Chair"), ("chair-2", "/b/chair")]
     assert [s.name for s in again] == ["chair", "chair-2", "Chair-3", "chair-4"]
 
@@ -128,17 +127,14 @@ NOTHING_ASKED = dict(cores=None, gpus=None, memory=None)
 
 
 @pytest.mark.parametrize(
-    "machines, n_scenes, share, at_once",
+    "machines, n_scenes, share",
     [
-        ([LAPTOP], 6, Share(1, 0, 4), 1),  # for want of memory
-        ([{**LAPTOP, "memory": 9 * GB}], 6, Share(1, 0, 4), 2), ([LAPTOP], 1, Share(2, 0, 4), 1),
-        ([{"CPU": 2.0, "memory": 3 * GB}], 6, Share(1, 0, 3), 1),
-        ([NODE, NODE], 100, Share(1, 0.25, 4), 16),  # eight trainings on each machine's two GPUs
-        ([NODE, NODE], 2, Share(16, 0.25, 4), 2), ([LAPTOP, NODE], 3, Share(6, 0.25, 4), 2),
+        ([LAPTOP], 6, Share(1, 0, 4)), ([LAPTOP], 1, Share(2, 0, 4)), ([{"CPU": 2.0, "memory": 3 * GB}], 6, Share(1, 0, 3)),
+        ([NODE, NODE], 100, Share(1, 0.25, 4)), ([NODE, NODE], 2, Share(16, 0.25, 4)), ([LAPTOP, NODE], 3, Share(6, 0.25, 4)),
     ],
 )  # fmt: skip
-def test_scenes_share_the_machines(machines, n_scenes, share, at_once):
-    assert share_of(machines, n_scenes, **NOTHING_ASKED) == share and n_at_once(machines, share) == at_once
+def test_scenes_share_the_machines(machines, n_scenes, share):
+    assert share_of(machines, n_scenes, **NOTHING_ASKED) == share
 
 
 def test_a_share_is_what_the_user_says():
@@ -152,9 +148,9 @@ def test_a_share_is_what_the_user_says():
 
 @pytest.mark.parametrize("asked", [dict(cores=3), dict(gpus=1), dict(memory=7)])
 def test_more_than_a_machine_has_is_refused(asked):
-    with pytest.raises(InputError, match=f"--{next(iter(asked))}-per-scene .: no machine offers as much; the largest offers"):
+    with pytest.raises(InputError, match="no machine offers .*; ask for less by --cores-per-scene"):
         share_of([LAPTOP], 1, **NOTHING_ASKED | asked)
-    with pytest.raises(InputError, match="together"):  # one has the cores, the other the GPUs
+    with pytest.raises(InputError, match="no machine offers 2 cores, 1 GPU and 1 GB"):  # one has the cores, the other the GPUs
         share_of([{**NODE, "GPU": 0.0}, {**NODE, "CPU": 1.0}], 1, cores=2, gpus=1, memory=1)
 
 
@@ -172,8 +168,8 @@ def test_the_folder_of_sockets_has_a_short_name(tmp_path, monkeypatch):
 # ---- the table ----
 
 ENDED = [
-    Scene("chair", "/a/chair", [], "done", 300, 4.04, {"views": 34.251, "normals": 6.08, "light": 14.5}),
-    Scene("x" * 60, "/a/x|`<b>\n", [], "refused", None, 0.0, {}, "/a/x|`<b>\n: is \x1b[31mdamaged"),
+    Scene("chair", "/a/chair", "done", 300, 4.04, {"views": 34.251, "normals": 6.08, "light": 14.5}),
+    Scene("x" * 60, "/a/x|`<b>\n", "refused", None, 0.0, {}, "/a/x|`<b>\n: is \x1b[31mdamaged"),
 ]
 
 
@@ -348,17 +344,14 @@ class PretendRay:
         self.cancelled.append(reference)
 
 
-def batch_of(tmp_path: Path, ends: dict[str, list], known: list[Scene] | None = None, **changes) -> tuple:
-    """A batch that ran with a pretended Ray; rows and notes that were told, and whether all came to an end."""
-    known = [] if known is None else known
-    asked = asked_scenes(known, [Path(data) for data in ends], ["--steps=4"])
-    batch = Batch(tmp_path, known, asked, ["--steps=4"], **{"retries": 3, "again": False} | changes)
-    rows, notes, shares = [], [], []
-    told = Told(lambda scene: rows.append((scene.name, scene.state)), notes.append, lambda share, text: shares.append(share))
+def batch_of(tmp_path: Path, ends: dict[str, list], retries: int = 3) -> tuple:
+    """A batch that ran with a pretended Ray; its rows and notes, and whether all came to an end."""
+    known, rows, notes = known_scenes(tmp_path), [], []
+    asked = asked_scenes(known, [Path(data) for data in ends])
+    row = lambda scene: rows.append((scene.name, scene.state))  # noqa: E731
+    batch = Batch(tmp_path, known, asked, ["--steps=4"], retries, row, notes.append)
     ray = PretendRay({data: list(end) for data, end in ends.items()})
-    ended = run_batch(ray, batch, batch.left(), Share(1, 0, 4), told)
-    assert all(0 <= share <= 1 for share in shares)
-    return batch, ray, rows, notes, ended
+    return batch, ray, rows, notes, run_batch(ray, batch, Share(1, 0, 4))
 
 
 KILLED, REFUSED, BROKE = Outcome(-9, "was killed by SIGKILL", False), Outcome(2, "bad", False), Outcome(1, "loss is nan", False)
@@ -388,7 +381,7 @@ def test_only_killed_scenes_are_tried_again(tmp_path):
     ]  # fmt: skip
     assert [note[-11:] for note in notes] == ["retry 1 of 3"[1:], "retry 1 of 3"[1:], "retry 2 of 3"[1:]]
     found = {scene.name: scene for scene in known_scenes(tmp_path)}
-    assert found["a"].attempts == 3 and found["a"].minutes == 2 and found["a"].steps == 4 and found["a"].scores == {"views": 30.0}
+    assert found["a"].minutes == 2 and found["a"].steps == 4 and found["a"].scores == {"views": 30.0}
     assert found["e"].error == "loss is nan" and "| e | failed |" in (tmp_path / "batch.md").read_text()
 
 
@@ -404,58 +397,8 @@ def test_an_interrupt_cancels_all_and_waits_for_them(tmp_path):
     finish_run(tmp_path / "b")
     batch, ray, rows, notes, ended = batch_of(tmp_path, {"/a": [Outcome(0, "", False)], "/b": [KeyboardInterrupt], "/c": [LOST]})
     assert not ended and rows == [("a", "done"), ("b", "stopped"), ("c", "waiting")] and len(ray.cancelled) == 2
-    assert [scene.name for scene in batch.left()] == ["b", "c"]
-
-
-def test_a_second_call_leaves_alone_what_stands(tmp_path):
-    """What is finished with these options, and what was refused and has not changed since."""
-    data = tmp_path / "data"
-    data.mkdir()
-    (data / "transforms.json").write_text("{")
-    finish_run(tmp_path / "a")
-    ends = {"/a": [Outcome(0, "", False)], str(data): [REFUSED], "/e": [BROKE]}
-    batch = batch_of(tmp_path, ends)[0]
-    named = lambda scenes: [scene.name for scene in scenes]  # noqa: E731
-    assert named(batch.left()) == ["e"]
-    assert named(Batch(tmp_path, batch.scenes, batch.asked, ["--steps=4"], 3, True).left()) == ["data", "e"]
-    assert named(Batch(tmp_path, batch.scenes, batch.asked, ["--steps=5"], 3, False).left()) == ["a", "data", "e"]
-    before = fingerprint(str(data))
-    (data / "transforms.json").write_text("{}")
-    assert fingerprint(str(data)) != before and named(batch.left()) == ["data", "e"]
-    (tmp_path / "a/report.html").unlink()
-    assert named(batch.left()) == ["a", "data", "e"]
-
-
-def test_the_table_alone_needs_no_ray(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "ray", None)
-    out = tmp_path / "out"
-    finish_run(out / "a")
-    keep_scenes(out, [Scene("a", "/a", ["--steps=4"], "done", 4, 2.0, {"views": 30.0})])
-    keep_scenes(out, [*known_scenes(out), Scene("b", str(tmp_path / "b"), ["--steps=4"], "refused", error="b: bad", fingerprint=fingerprint("/none"))])
-    assert main(["batch", "/a", "--out", str(out), "--steps", "4"]) == 0
-    assert main(["batch", "/a", str(tmp_path / "b"), "--out", str(out), "--steps", "4"]) == FAILED
-    said = capsys.readouterr()
-    assert said.err == "" and said.out.count("a      done           4     2.0   30.00") == 2
-    assert "b      refused        -       -  b: bad" in said.out and "1 done, 1 refused (PSNR in dB" in said.out
-
-
-def test_progress_is_that_of_the_runs_that_have_begun(tmp_path):
-    batch = Batch(tmp_path, [], [Scene(name, f"/{name}", []) for name in "abcd"], [], 3, False)
-    watch = Watch(batch)
-    for name, share in (("b", 0.5), ("c", 1.0), ("d", 1.0)):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "metrics.jsonl").write_text(f'{{"step": 9, "progress": {share}}}\n{{"half')
-    assert watch.look(batch.asked[1:]) == (0.25, "3 waiting")  # a is done; the lines are of an earlier call
-    for name in "bc":
-        (tmp_path / name / LOCK).touch()
-    share, text = watch.look(batch.asked[1:])
-    assert share == pytest.approx((1 + 0.8 * 1.5) / 4) and text == "b 50%, c refinement, 1 waiting"
-    many = Batch(tmp_path, [], [Scene(20 * "x" + str(i), "/", []) for i in range(6)], [], 3, False)
-    for scene in many.asked:
-        (tmp_path / scene.name).mkdir()
-        (tmp_path / scene.name / LOCK).touch()
-    share, text = Watch(many).look(many.asked)
-    assert text.split(", ") == 4 * [15 * "x" + "~ 0%"] + ["2 more at work"]
+    ends = {"/a": [Outcome(0, "", False)], "/b": [REFUSED], "/c": [Outcome(0, "", False)]}
+    assert batch_of(tmp_path, ends)[2] == [("a", "done"), ("b", "refused"), ("c", "done")]  # a second call
 
 
 def test_a_batch_is_not_written_into_data(data, capsys):

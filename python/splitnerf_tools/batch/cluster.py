@@ -74,31 +74,20 @@ def share_of(
     Raises:
         InputError: No machine has as much.
     """
-    totals = [[machine.get(key, 0.0) for machine in machines] for key in ("CPU", "GPU", "memory")]
-    most_cores, most_gpus, most_memory = (max(values, default=0.0) for values in totals)
+    most = {key: max((machine.get(key, 0.0) for machine in machines), default=0.0) for key in ("CPU", "GPU", "memory")}
     if cores is None:
-        cores = min(most_cores, max(1.0, sum(totals[0]) // max(1, n_scenes)))
+        cores = min(most["CPU"], max(1.0, sum(machine["CPU"] for machine in machines) // max(1, n_scenes)))
     if gpus is None:
-        gpus = 0.0 if most_gpus == 0 else 1.0 if whole_gpu else GPU
+        gpus = 0.0 if most["GPU"] == 0 else 1.0 if whole_gpu else GPU
     if memory is None:
-        memory = min(MEMORY if photos is None else TRAINING + photos, most_memory / GB)
+        memory = min(MEMORY if photos is None else TRAINING + photos, most["memory"] / GB)
+    needs = {"CPU": cores, "GPU": gpus, "memory": memory * GB}
     share = Share(cores, gpus, memory)
-    needs = (("cores", cores, "CPU", "cores"), ("gpus", gpus, "GPU", "GPUs"), ("memory", memory * GB, "memory", "GB"))
-    for (option, need, _, unit), most in zip(needs, (most_cores, most_gpus, most_memory)):
-        if need > most:
-            scale = GB if option == "memory" else 1.0
-            raise InputError(
-                f"--{option}-per-scene {need / scale:g}: no machine offers as much; the largest offers {most / scale:.3g} {unit}"
-            )
-    if not any(all(need <= machine.get(key, 0.0) for _, need, key, _ in needs) for machine in machines):
-        raise InputError(f"no machine offers {share} together; ask for less by --cores-per-scene, --gpus-per-scene or --memory-per-scene")
+    if not any(all(need <= machine.get(key, 0.0) for key, need in needs.items()) for machine in machines):
+        raise InputError(
+            f"no machine offers {share}; ask for less by --cores-per-scene, --gpus-per-scene or --memory-per-scene"
+        )
     return share
-
-
-def n_at_once(machines: Sequence[Mapping[str, float]], share: Share) -> int:
-    """How many scenes these machines hold at a time."""
-    needs = {"CPU": share.cores, "GPU": share.gpus, "memory": share.memory * GB}
-    return sum(min(int(machine.get(key, 0.0) / need + 1e-6) for key, need in needs.items() if need > 0) for machine in machines)
 
 
 @contextmanager

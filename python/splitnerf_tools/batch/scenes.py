@@ -1,8 +1,7 @@
-"""The scenes of a batch: their names, what became of them, and the file that keeps it."""
+"""The scenes of a batch: their names, what became of them, the file that keeps it, and the table."""
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 from collections.abc import Iterable, Sequence
@@ -10,12 +9,21 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 from splitnerf.data.json_files import read_json, write_json
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, plain
+from splitnerf.files import atomic_path
 
 STATE, TABLE, LOGS = "batch.json", "batch.md", "logs"  # in the batch's folder, beside the runs
 FORMAT = 1
 WAITING, DONE, FAILED, REFUSED, STOPPED = "waiting", "done", "failed", "refused", "stopped"
 MOST_LETTERS = 80  # of a name
+LONGEST = 28  # letters of a name on the terminal
+# Title, keys in evaluation.json, format.
+COLUMNS = (
+    ("views", ("novel_view", "psnr"), "{:.2f}"), ("relit", ("relight", "psnr"), "{:.2f}"),
+    ("albedo", ("albedo", "psnr"), "{:.2f}"), ("normals", ("normal_mae_deg",), "{:.1f}"),
+    ("light", ("light_psnr",), "{:.2f}"),
+)  # fmt: skip
+UNITS = "PSNR in dB, normals in degrees"
 
 
 @dataclass
@@ -25,42 +33,51 @@ class Scene:
     Attributes:
         name: Of its run, in the batch's folder.
         data: Its folder, an absolute path.
-        options: What `splitnerf train` was given.
         state: One of "waiting", "done", "failed", "refused" (bad input) and "stopped".
         steps: Optimiser steps; None before the first.
         minutes: Time of training, and of the refinement where the scene is done.
-        scores: Scores by name, see :data:`splitnerf_tools.batch.table.COLUMNS`.
+        scores: Scores by the titles of :data:`COLUMNS`, those that there are.
         error: Why it failed, one line.
-        attempts: How many processes it took.
-        fingerprint: Of the files of a scene that was refused.
     """
 
     name: str
     data: str
-    options: list[str]
     state: str = WAITING
     steps: int | None = None
     minutes: float = 0.0
     scores: dict[str, float] = field(default_factory=dict)
     error: str = ""
-    attempts: int = 0
-    fingerprint: str = ""
 
-    def begin(self, options: Sequence[str]) -> None:
-        """Forgets what became of it."""
-        self.options, self.state, self.error, self.fingerprint = list(options), WAITING, "", ""
-        self.steps, self.minutes, self.scores, self.attempts = None, 0.0, {}, 0
+    def read_scores(self, run: Path) -> None:
+        """Takes scores and minutes from a finished run."""
+        try:
+            evaluation = read_json(run / "evaluation.json", "novel_view")
+        except InputError:
+            return
+        for title, keys, _ in COLUMNS:
+            value = evaluation
+            for key in keys:
+                value = value.get(key) if isinstance(value, dict) else None
+            if isinstance(value, (int, float)):
+                self.scores[title] = float(value)
+        self.minutes = evaluation.get("seconds", 60 * self.minutes) / 60
+
+    def cells(self) -> list[str]:
+        """The columns of the scene's row after its name: state, steps, minutes and scores; '-' where there is none."""
+        scores = [text.format(self.scores[title]) if title in self.scores else "-" for title, _, text in COLUMNS]
+        minutes = f"{self.minutes:.1f}" if self.minutes > 0 else "-"
+        return [self.state, "-" if self.steps is None else str(self.steps), minutes, *scores]
 
 
 def scene_name(data: str, taken: Iterable[str]) -> str:
-    """A name for a scene's run: that of its folder, without what a file system, a shell or a terminal takes amiss, and
+    """A name for a scene's run: that of its folder, without what is unsafe in a file system, a shell or a terminal, and
     with a number where it is taken. Case does not tell names apart."""
-    plain = re.sub(r"[^\w.+=@-]+", "_", os.path.basename(data), flags=re.ASCII).lstrip(".-")[:MOST_LETTERS] or "scene"
+    safe = re.sub(r"[^\w.+=@-]+", "_", os.path.basename(data), flags=re.ASCII).lstrip(".-")[:MOST_LETTERS] or "scene"
     own = {STATE, TABLE, LOGS, "lock", "ray"}  # logs/ray.log is Ray's
     used = {name.lower() for name in (*taken, *own)}
-    name, number = plain, 2
+    name, number = safe, 2
     while name.lower() in used:
-        name, number = f"{plain}-{number}", number + 1
+        name, number = f"{safe}-{number}", number + 1
     return name
 
 
@@ -83,34 +100,55 @@ def known_scenes(out: Path) -> list[Scene]:
         raise InputError(f"{path}: is damaged; remove it, the runs beside it stay and are gone on with") from None
 
 
-def asked_scenes(known: list[Scene], folders: Sequence[Path], options: Sequence[str]) -> list[Scene]:
+def asked_scenes(known: list[Scene], folders: Sequence[Path]) -> list[Scene]:
     """The scenes of these folders, each once; new ones join the known, which keep their names."""
     by_data = {scene.data: scene for scene in known}
-    asked = {}
-    for folder in folders:
-        data = os.path.abspath(folder)
+    for data in map(os.path.abspath, folders):
         if data not in by_data:
-            by_data[data] = Scene(scene_name(data, (scene.name for scene in known)), data, list(options))
+            by_data[data] = Scene(scene_name(data, (scene.name for scene in known)), data)
             known.append(by_data[data])
-        asked[data] = by_data[data]
-    return list(asked.values())
+    return list({data: by_data[data] for data in map(os.path.abspath, folders)}.values())
 
 
 def keep_scenes(out: Path, scenes: Sequence[Scene]) -> None:
-    """Writes what became of the scenes."""
+    """Writes what became of the scenes, and the table."""
     write_json(out / STATE, {"format": FORMAT, "scenes": [asdict(scene) for scene in scenes]})
+    with atomic_path(out / TABLE) as temporary:
+        temporary.write_text(markdown(scenes), encoding="utf-8", errors="backslashreplace")
 
 
-def fingerprint(data: str) -> str:
-    """A number that changes with the names, the sizes or the times of a folder's files."""
-    seen = hashlib.sha256()
-    for folder, folders, files in os.walk(data):
-        folders.sort()
-        for name in sorted(files):
-            path = os.path.join(folder, name)
-            try:
-                status = os.stat(path)
-            except OSError:
-                continue
-            seen.update(f"{os.path.relpath(path, data)!r} {status.st_size} {status.st_mtime_ns}\n".encode())
-    return seen.hexdigest()
+class Rows:
+    """The rows of the terminal, as wide as these scenes need it."""
+
+    def __init__(self, scenes: Sequence[Scene]):
+        self._width = max([5, *(min(len(scene.name), LONGEST) for scene in scenes)])
+
+    def head(self) -> str:
+        return self._row("scene", ["state", "steps", "minutes", *(title for title, *_ in COLUMNS)])
+
+    def row(self, scene: Scene) -> str:
+        """A scene's row; why it failed stands in the place of its scores."""
+        name = scene.name if len(scene.name) <= LONGEST else scene.name[: LONGEST - 1] + "~"
+        if scene.state == DONE or not scene.error:
+            return self._row(name, scene.cells())
+        return f"{self._row(name, scene.cells()[:3])}  {plain(scene.error)}"
+
+    def _row(self, name: str, values: list[str]) -> str:
+        return f"{name:{self._width}}  {values[0]:8}" + "".join(f"{value:>8}" for value in values[1:])
+
+
+def markdown(scenes: Sequence[Scene]) -> str:
+    """The table of all scenes, with links to the reports of those that are done."""
+    head = ["scene", "state", "steps", "minutes", *(title for title, *_ in COLUMNS), "error", "data"]
+    lines = [head, ["---", "---", *["---:"] * (2 + len(COLUMNS)), "---", "---"]]
+    for scene in scenes:
+        name = f"[{scene.name}]({scene.name}/report.html)" if scene.state == DONE else scene.name
+        lines.append([name, *scene.cells(), _cell(scene.error), _cell(scene.data)])
+    table = "".join("| " + " | ".join(line) + " |\n" for line in lines)
+    return f"{table}\n{UNITS}.\n"
+
+
+def _cell(text: str) -> str:
+    """A text that cannot end its cell, nor be taken for Markdown or HTML."""
+    text = plain(text).replace("&", "&amp;").replace("<", "&lt;")
+    return "".join("\\" + c if c in "\\|`*_[]" else c for c in text)
