@@ -122,9 +122,35 @@ def test_commands_in_the_text_have_the_options_that_they_name(page):
         assert {word.partition("=")[0] for word in words if word.startswith("--")} <= known, words
 
 
-def test_links_of_the_readme_lead_to_files():
-    links = re.findall(r"\]\(([^)#]+)[^)]*\)", (ROOT / "README.md").read_text())
-    assert links and all((ROOT / link).exists() for link in links if "://" not in link), links
+def anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_to_files_and_headings(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    for link, anchor in re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)\)", text):
+        if "://" in link:
+            continue
+        target = page.parent / link if link else page
+        assert target.exists(), link
+        assert not anchor or target.suffix != ".md" or anchor in anchors(target), f"{link}#{anchor}"
+
+
+def test_the_method_names_tests_and_formulas_that_exist():
+    text = (ROOT / "docs" / "method.md").read_text()
+    tests = re.findall(r"`(test_\w+)(?:::|\.py)(\w*)`", text)
+    assert len(tests) > 20
+    for name, function in tests:
+        assert f"def {function}" in (ROOT / "tests" / "python" / f"{name}.py").read_text(), (name, function)
+    cpp = "\n".join(path.read_text() for path in (ROOT / "tests" / "cpp").glob("*.cpp"))
+    for suite, name in re.findall(r"`(?!Suite)([A-Z]\w+)\.([A-Z]\w+)`", text):
+        assert re.search(rf"TEST\w*\({suite}, {name}\)", cpp), (suite, name)
+    for header, functions in re.findall(r"`(\w+\.(?:h|cpp)): ([\w, ]+)`", text):
+        sources = "".join(path.read_text() for path in (ROOT / "cpp").rglob(header))
+        assert all(name in sources for name in functions.split(", ")), (header, functions)
 
 
 def test_the_reference_holds_every_operator():

@@ -22,12 +22,6 @@ def test_what_a_page_shows_of_an_example_is_in_it():
         assert wanted in [[re.sub(r"^\)  # fmt: skip$", ")", line) for line in run] for run in runs], (name, wanted[0])
 
 
-def test_the_pages_link_to_files():
-    for page in ("own_code.md", "other_programs.md"):
-        links = re.findall(r"\]\(([^)#:]+)[^):]*\)", (ROOT / "docs" / page).read_text())
-        assert links and all((ROOT / "docs" / link).exists() for link in links), (page, links)
-
-
 def test_the_camera_that_a_page_gives_looks_at_the_front(tmp_path):
     (text,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "other_programs.md").read_text(), re.DOTALL)
     (tmp_path / "camera.json").write_text(text)
