@@ -59,7 +59,7 @@ def line(found: Inspection, name: str):
 def test_data_without_fault_raise_no_suspicion(tmp_path):
     found = Photos().inspected(tmp_path)
     assert [finding.advice for finding in found.findings if finding.advice] == []
-    assert suspects(found) == {} and found.fit.shift is None
+    assert suspects(found) == {}
     assert np.nanmax(np.abs(found.brightness)) < 0.01
 
 
@@ -98,28 +98,25 @@ def test_a_mask_beside_its_object_is_found(tmp_path):
     photos = Photos()
     photos.alphas[7] = np.roll(photos.alphas[7], 15, axis=1)
     found = photos.inspected(tmp_path)
-    assert suspects(found)["masks against poses"] == [7] and found.fit.shift is None
+    assert suspects(found)["masks against poses"] == [7]
 
 
 @pytest.mark.parametrize("late", [5, 12, 17])
-def test_a_moved_object_is_found_with_its_shift(tmp_path, late):
+def test_the_photos_of_a_moved_object_are_found(tmp_path, late):
     """In the last photos it stands elsewhere; where those are most, the first ones are said to differ. One that looks
     along the shift may fit all the same."""
     shift = np.array([0.3, -0.3, 0.0])
     found = Photos(offsets={i: shift for i in range(COUNT - late, COUNT)}).inspected(tmp_path)
     first, last = set(range(COUNT - late)), set(range(COUNT - late, COUNT))
-    moved = set(suspects(found)["object moved"])
+    moved = set(suspects(found)["masks against poses"])
     group = last if moved <= last else first
     assert moved <= group and 0.8 * len(group) <= len(moved) <= COUNT / 2
-    scale = np.cbrt(np.linalg.det(load_dataset(tmp_path, reading=ALL).box_from_world[:3, :3]))
-    np.testing.assert_allclose(found.fit.shift / scale, shift if group == last else -shift, atol=0.08)
 
 
 def test_copies_of_photos_and_of_poses_are_told_apart(tmp_path):
     photos = Photos()
     photos.alphas[3], photos.poses[20] = photos.alphas[2], photos.poses[19]
     photos.alphas[11], photos.poses[11] = photos.alphas[10], photos.poses[10]
-    photos.linear[11] = photos.linear[11] * 1.02  # saved again: each byte is another
     found = suspects(photos.inspected(tmp_path))["duplicate photos"]
     reasons = line(photos.inspected(tmp_path), "duplicate photos").suspects
     assert found == [2, 3, 10, 11, 19, 20]
@@ -190,7 +187,7 @@ def test_held_out_photos_are_looked_at_too(tmp_path, capsys):
     assert "08.png" in printed and "held out · <b>brightness +1" in (tmp_path / "page.html").read_text()
 
 
-@pytest.mark.parametrize("data, out, said", [("absent", "page.html", "no such folder"), ("data", "page.txt", "no page")])
+@pytest.mark.parametrize("data, out, said", [("absent", "page.html", "no such folder"), ("data", "page.txt", "not a page")])
 def test_bad_input_is_refused(tmp_path, capsys, data, out, said):
     Photos().write(tmp_path / "data")
     assert main(["inspect", str(tmp_path / data), "--out", str(tmp_path / out)]) == BAD_INPUT

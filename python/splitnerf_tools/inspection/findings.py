@@ -92,7 +92,6 @@ def inspect(train: Dataset, test: Dataset | None, reading: Reading) -> Inspectio
         _shares(views),
         _cut(views),
         _agreement(views, fit),
-        _moved(views, fit),
         _duplicates(views, fit),
         _brightness(views, brightness),
         _clipped(views),
@@ -159,20 +158,11 @@ def _agreement(views: Sequence[View], fit: Fit) -> Finding:
     suspects = {i: f"mask fits {fit.agreement[i]:.2f}" for i in fit.outliers}
     advice = ""
     if suspects:
-        advice = f"look at the masks and poses of {_named(views, suspects)}"
+        advice = f"look at the masks and poses of {_named(views, suspects)}; the object may have moved"
     elif len(views) >= ENOUGH and np.median(fit.agreement) < ROUGH:
         advice = "masks and poses fit badly everywhere: are the poses, the lens and the masks those of these photos?"
     value = f"intersection over union with the others' hull {_range(fit.agreement, '.2f')}"
     return Finding("masks against poses", f"{value}, {len(suspects) or 'no'} outliers", advice, suspects)
-
-
-def _moved(views: Sequence[View], fit: Fit) -> Finding:
-    if fit.shift is None:
-        return Finding("object moved", "no")
-    suspects = dict.fromkeys(fit.outliers, "object elsewhere")
-    value = f"by {np.linalg.norm(fit.shift) / (2 * fit.radius):.0%} of its size, in {len(suspects)} photos"
-    advice = f"leave them or the others out, or repair their poses: {_named(views, suspects)}"
-    return Finding("object moved", value, advice, suspects)
 
 
 def _duplicates(views: Sequence[View], fit: Fit) -> Finding:

@@ -21,7 +21,7 @@ MOST, NEARLY_ALL = 0.75, 0.95  # of the photos that agree, for a first hull and 
 SEEN = 0.5  # of the photos that see the best seen cell, how many must see a cell of the hull
 LEAST_DROP, DROP_DEVIATIONS = 0.15, 5.0  # of an intersection over union below the median that is an outlier
 BETTER_HALF = 0.05  # by which half of the photos must agree better among themselves than all
-FEW, EXPLAINED = 3, 0.5  # photos of a moved object, and the part of the misfit that one shift must explain
+ENOUGH = 12  # photos whose halves are looked at
 
 
 @dataclass
@@ -35,7 +35,6 @@ class Fit:
         outlines: [n] of [h, w] bool, that outline, filled.
         outliers: Numbers of the views whose mask disagrees with the others.
         inside: Numbers of the views whose camera stands in the hull of the others.
-        shift: [3] by which the object of the outliers has moved; None where no one shift explains them.
     """
 
     cells: np.ndarray
@@ -44,7 +43,6 @@ class Fit:
     outlines: list[np.ndarray]
     outliers: list[int]
     inside: list[int]
-    shift: np.ndarray | None
 
     @property
     def centre(self) -> np.ndarray:
@@ -70,7 +68,7 @@ def fit_masks(views: Sequence[View]) -> Fit | None:
     everyone, n = np.arange(len(views)), len(views)
     best = votes.agreement(everyone, MOST)
     members, quality = everyone, np.median(best)
-    for half in (everyone[: n // 2], everyone[n // 2 :]) if n >= 4 * FEW else ():
+    for half in (everyone[: n // 2], everyone[n // 2 :]) if n >= ENOUGH else ():
         values = votes.agreement(half, MOST)
         if np.median(values[half]) > quality + BETTER_HALF:
             best, members, quality = values, half, np.median(values[half])
@@ -82,9 +80,7 @@ def fit_masks(views: Sequence[View]) -> Fit | None:
         return None
     least = _least(agreement[members])
     outliers = [int(i) for i in np.argsort(agreement) if agreement[i] < least]
-    fit = Fit(cells, votes.cell, agreement, outlines, outliers, _cameras_inside(votes, members), None)
-    fit.shift = _shift(votes, fit, members)
-    return fit
+    return Fit(cells, votes.cell, agreement, outlines, outliers, _cameras_inside(votes, members))
 
 
 class _Votes:
@@ -123,11 +119,11 @@ class _Votes:
         seen, inside = self.seen[chosen].sum(0, dtype=np.int32), self.inside[chosen].sum(0, dtype=np.int32)
         return (seen > 0) & (inside >= share * seen) & (seen >= SEEN * seen.max(initial=0))
 
-    def outline(self, index: int, chosen: np.ndarray, shift: np.ndarray | float = 0.0) -> np.ndarray:
-        """[h, w] bool, what a view shows of chosen cells, moved by a shift."""
+    def outline(self, index: int, chosen: np.ndarray) -> np.ndarray:
+        """[h, w] bool, what a view shows of chosen cells."""
         view = self.views[index]
         filled = np.zeros(view.mask.shape, bool)
-        local = (self.cells[chosen] + shift - view.place) @ view.pose[:3, :3]
+        local = (self.cells[chosen] - view.place) @ view.pose[:3, :3]
         local = local[-local[:, 2] > self.cell]
         if len(local) == 0:
             return filled
@@ -168,27 +164,3 @@ def _cameras_inside(votes: _Votes, members: np.ndarray) -> list[int]:
     seen = seen.sum(0)  # a camera does not see its own place
     enclosed = (seen > 0) & (seen >= SEEN * (len(members) - 1)) & (inside >= NEARLY_ALL * seen)
     return [int(i) for i in np.flatnonzero(enclosed)]
-
-
-def _shift(votes: _Votes, fit: Fit, members: np.ndarray) -> np.ndarray | None:
-    """The shift [3] of the hull that brings its outlines to where the outliers' masks are, in the least squares of the
-    distances between their middles; None where it does not explain the misfit or is smaller than two cells."""
-    if len(fit.outliers) < FEW:
-        return None
-    rows, targets = [], []
-    for i in fit.outliers:
-        view = votes.views[i]
-        if not view.mask.any() or not fit.outlines[i].any():
-            continue
-        down, right = np.subtract(*(ndimage.center_of_mass(mask) for mask in (view.mask, fit.outlines[i])))
-        depth = (fit.centre - view.place) @ -view.pose[:3, 2]
-        rows += [view.pose[:3, 0], view.pose[:3, 1]]
-        targets += [right * depth / view.intrinsics[0], -down * depth / view.intrinsics[1]]
-    if len(rows) < 2 * FEW:
-        return None
-    shift = np.linalg.lstsq(np.array(rows), np.array(targets), rcond=1e-3)[0]
-    chosen = votes.hull(members, NEARLY_ALL)
-    moved = [_overlap(votes.views[i], votes.outline(i, chosen, shift)) for i in fit.outliers]
-    before, others = np.median(fit.agreement[fit.outliers]), np.median(fit.agreement[members])
-    explained = np.median(moved) - before >= EXPLAINED * (others - before)
-    return shift if explained and np.linalg.norm(shift) > 2 * fit.cell else None
