@@ -34,6 +34,7 @@ from splitnerf.render.renderer import render_maps
 from splitnerf.render.seen import Cameras, seen_vertices
 
 FORMATS = ("glb", "ply", "obj", "usdz")
+ENVIRONMENT_ROWS = 128  # of the image of the light
 
 
 @dataclass(frozen=True)
@@ -91,8 +92,8 @@ def write_assets(
     surface = surface_of(model)
     with Progress(0.0, leave=False, at_once=True) as bar:
         bar.show(0.0, f"export, surface on a grid of {resolution}^3")
-        vertices, faces, n_dropped = drop_floaters_and_cavities(*extract_mesh(surface.sdf, c.surface.box, resolution))
-        spacing = 2.0 * c.surface.box / (resolution - 1)
+        vertices, faces, n_dropped = drop_floaters_and_cavities(*extract_mesh(surface.sdf, c.constants.box, resolution))
+        spacing = 2.0 * c.constants.box / (resolution - 1)
         seen = seen_vertices(vertices, faces, cameras, 0.25 * spacing)
         vertices = capped(vertices, faces, seen)
         world_from_box = np.linalg.inv(box_from_world)
@@ -103,7 +104,7 @@ def write_assets(
         if set(formats) - {"ply"}:
             textured = textured_asset(
                 "object", vertices, faces, surface, n_faces=n_faces, texture_size=texture_size or c.export.texture_size,
-                spacing=spacing, occlusion_offset=c.occlusion.offset, on_surface=seen,
+                spacing=spacing, occlusion_offset=c.constants.occlusion_offset, on_surface=seen,
                 tell=lambda share, part: bar.show(0.1 + 0.8 * share, f"export, {part}"),
             )  # fmt: skip
             bar.show(0.9, "export, files")
@@ -115,7 +116,7 @@ def write_assets(
             if "usdz" in formats:
                 write_usdz(out / "mesh.usdz", asset, textured.occlusion)
             exported = Exported(mesh, len(asset.triangles), textured.watertight, n_dropped)
-        write_environment(out, model.light.panorama(c.export.environment_height).cpu().numpy())
+        write_environment(out, model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy())
     return exported
 
 
@@ -161,7 +162,7 @@ def evaluate_scene(
     if free_exposure:
         test = exposed_like(test, predictions)
     truth = load_scene_truth(test.root, test.origin)
-    light = model.light.panorama(model.config.export.environment_height).cpu().numpy()
+    light = model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy()
     result = evaluate_maps(
         predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1),
         relight=relight, distance=distance,

@@ -97,7 +97,7 @@ scene=$(tail -n 1 "$work/data.log") failures=0
 for name in "$@"; do
   case $name in
     step) part step "$run_python" tests/bench/gpu_step.py "$scene" --device $device --steps 12 --out "$out" "${small[@]}" ;;
-    steady) train steady fast --until $until --page "$out/steady.md" --set surface.levels_open_by=0 --set mesh.every=0.02 ;;
+    steady) train steady fast --until $until --page "$out/steady.md" --set levels_open_by=0 --set mesh.every=0.02 ;;
     operators) part operators "$run_python" tests/bench/gpu_ops.py "$scene" --out "$out" --device $device --steps $before "${small[@]}" ;;
     paper) train paper paper --until $until_paper --profiled 10 --page "$out/paper.md" --set mesh.every=1.0 ;;
     fast) train fast fast --set run.max_minutes="$(awk "BEGIN { print ($seconds - 25) / 60 }")" ;;

@@ -243,7 +243,7 @@ class CheckpointReader(Reader):
     def corpus(self) -> list[bytes]:
         config = Config().replace({
             "n_levels": 2, "log2_table_size": 4, "base_resolution": 2, "light_resolution": 16, "grid_resolution": 2,
-            "surface.width": 4, "materials.width": 4, "materials.layers": 1, "start_levels": 2,
+            "constants.surface_width": 4, "constants.materials_width": 4, "start_levels": 2,
         })  # fmt: skip
         model = SceneModel(config)
         optimiser = make_optimiser(model, config)

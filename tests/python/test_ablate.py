@@ -17,7 +17,7 @@ from splitnerf_tools.demo.scene import write_demo_dataset
 
 SMALL = [
     "n_levels=2", "log2_table_size=8", "target_samples=256", "initial_rays=32", "grid_resolution=16", "light_resolution=16",
-    "light_queries=8", "eikonal_points=16", "mesh_resolution=16", "export_resolution=16", "export_environment_height=16",
+    "light_queries=8", "eikonal_points=16", "mesh_resolution=16", "export_resolution=16",
     "export_faces=200", "export_texture_size=32", "refinement.enabled=false",
 ]  # fmt: skip
 
@@ -126,4 +126,4 @@ def test_it_runs_and_goes_on(tmp_path, capsys):
     assert main([*command, "--set", "mask_weight=0.5"]) == BAD_INPUT
     assert "other settings" in capsys.readouterr().err
     assert main(["ablate", "--list"]) == DONE
-    assert "no metal regulariser: losses.metal_regulariser = False" in capsys.readouterr().out
+    assert "no metal regulariser: losses.metal_weight = 0.0" in capsys.readouterr().out

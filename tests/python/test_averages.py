@@ -31,8 +31,8 @@ def seeded() -> torch.Generator:
 def averaging(dataset: Dataset, factor: float, **settings) -> Config:
     """Settings by which photos are averaged down by a factor, which is rounded down."""
     config = tiny(**settings)
-    s, distance = config.surface, np.linalg.norm(dataset.poses[0, :3, 3])
-    cell = 2 * s.box / s.finest_cells
+    distance = np.linalg.norm(dataset.poses[0, :3, 3])
+    cell = 2 * config.constants.box / config.finest_cells
     return config.replace({"pixel_cells": float(factor * 1.0001 * distance / dataset.intrinsics[0, 0] / cell)})
 
 
@@ -44,7 +44,7 @@ def far(dataset: Dataset) -> Dataset:
 
 def source_of(dataset: Dataset, config: Config) -> PixelSource:
     photos = training_photos(dataset, config)
-    return PixelSource(photos, config.sampling.foreground_share, seeded(), config.losses.edge_pixels)
+    return PixelSource(photos, config.constants.foreground_share, seeded(), config.losses.edge_pixels)
 
 
 def weights(trained: loop.TrainedScene) -> torch.Tensor:
@@ -101,10 +101,10 @@ def test_a_pixel_is_at_most_as_wide_as_the_setting_says(wanted, factor, data):
     config = averaging(dataset, wanted)
     photos = training_photos(dataset, config)
     assert averaging_factor(dataset, config) == factor and photos.height == 24 // factor
-    s = config.surface
-    cells = math.floor(s.base_resolution * s.growth ** (s.n_levels - 1))
+    s, box = config.surface, config.constants.box
+    cells = math.floor(config.finest_cells)
     distance = np.linalg.norm(dataset.poses[0, :3, 3])
-    width = distance / photos.intrinsics[0, 0] / (2 * s.box / cells)
+    width = distance / photos.intrinsics[0, 0] / (2 * box / cells)
     assert factor == 1 or width <= config.sampling.pixel_cells
     finer = config.replace({"growth": s.growth * 2 ** (1 / (s.n_levels - 1))})
     assert averaging_factor(dataset, finer) == max(1, factor // 2) or wanted == 9.0
@@ -121,11 +121,11 @@ def test_cameras_at_the_middle_see_pixels_as_those_at_the_edge_of_the_box(data, 
     """At a distance of 0 a pixel has no width."""
     dataset = load_dataset(data)
     config = tiny(pixel_cells=shown)
-    s = config.surface
-    dataset.intrinsics[:, 0] = s.box / (shown / factor * 2 * s.box / s.finest_cells) if shown else 1.0
-    for distance in (s.box, 0.1, 0.0):
+    box = config.constants.box
+    dataset.intrinsics[:, 0] = box / (shown / factor * 2 * box / config.finest_cells) if shown else 1.0
+    for distance in (box, 0.1, 0.0):
         dataset.poses[:, :3, 3] = [0, 0, distance * 1.0001]
-        assert averaging_factor(dataset, config) == (factor if distance < s.box else max(1, factor - 1))
+        assert averaging_factor(dataset, config) == (factor if distance < box else max(1, factor - 1))
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])

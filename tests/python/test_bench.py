@@ -26,7 +26,7 @@ from splitnerf_tools.demo.scene import write_demo_dataset
 
 SMALL = [
     "n_levels=2", "log2_table_size=8", "initial_rays=32", "grid_resolution=16", "light_resolution=16", "light_queries=8",
-    "eikonal_points=16", "mesh_resolution=16", "export_resolution=16", "export_environment_height=16", "export_faces=200",
+    "eikonal_points=16", "mesh_resolution=16", "export_resolution=16", "export_faces=200",
     "export_texture_size=32", "refinement.enabled=false",
 ]  # fmt: skip
 

@@ -31,7 +31,7 @@ from splitnerf.training.schedule import make_optimiser
 def written(data, tmp_path_factory) -> bytes:
     """The checkpoint of a run of 2 steps with the seed 5."""
     run = tmp_path_factory.mktemp("written")
-    trainer.train(load_dataset(data), tiny(steps=2, seed=5, weight_decay=0.02), run)
+    trainer.train(load_dataset(data), tiny(steps=2, seed=5), run)
     return (run / "checkpoint.pt").read_bytes()
 
 
@@ -141,7 +141,7 @@ def gaps(texels: torch.Tensor) -> torch.Tensor:
 ALLOWED = {
     "the most rays": lambda c: c.update(n_rays=8192),
     "more rays at first than later": lambda c: c.update(
-        n_rays=20000, config=c["config"] | {"sampling": c["config"]["sampling"] | {"initial_rays": 20000}}
+        n_rays=20000, config=c["config"] | {"constants": c["config"]["constants"] | {"initial_rays": 20000}}
     ),
     "parameters whose sum is too large": lambda c: c["model"]["light.texels"].fill_(3e38),
     "the largest progress": lambda c: c.update(meshed_at=1.0, previewed_at=1.0, seconds=0.0, step=0),
@@ -258,7 +258,7 @@ def test_what_no_run_writes_is_refused(content, tmp_path, case):
 
 
 def test_moments_come_back_and_rates_are_those_of_the_settings(content):
-    settings = tiny(learning_rate=0.07, weight_decay=0.5)
+    settings = tiny(learning_rate=0.07)
     optimiser = make_optimiser(SceneModel(settings), settings)
     fresh = [{key: x for key, x in group.items() if key != "params"} for group in optimiser.param_groups]
     restore_optimiser(optimiser, content, Path("checkpoint.pt"))

@@ -293,7 +293,7 @@ def test_settings_that_no_longer_fit_are_named(data, begun):
 
 @pytest.mark.parametrize("settings", [
     {"learning_rate": float("nan")}, {"learning_rate": float("inf")}, {"learning_rate": 10**400}, {"n_levels": 0},
-    {"n_levels": 33}, {"n_features": 3}, {"log2_table_size": 60}, {"seed": 1 << 70}, {"target_samples": 1 << 40},
+    {"n_levels": 33}, {"log2_table_size": 60}, {"seed": 1 << 70}, {"target_samples": 1 << 40},
     {"growth": 0.5},
 ])  # fmt: skip
 def test_settings_beyond_reason(settings):

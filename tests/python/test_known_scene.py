@@ -98,7 +98,7 @@ def result(tmp_path_factory) -> Result:
     (root / "transforms_train.json").write_text(json.dumps({"camera_angle_x": ANGLE, "frames": frames}))
     config = tiny(
         steps=360, warmup_steps=20, target_samples=2048, max_rays=256, log2_table_size=12, export_resolution=48, export_faces=1500,
-        export_texture_size=128, export_environment_height=32, preview_every=2.0, mesh_every=0.5,
+        export_texture_size=128, preview_every=2.0, mesh_every=0.5,
     )  # fmt: skip
     dataset = load_dataset(root)
     trained = train(dataset, config, root)

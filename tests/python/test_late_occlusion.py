@@ -19,7 +19,7 @@ from splitnerf.render.renderer import RenderedRays, find_samples, render_rays
 from splitnerf.training import late_occlusion, losses
 from splitnerf.training.late_occlusion import LateOcclusion, one_of_each_run
 
-ALL = {"occlusion_share": 1.0, "occlusion_rays": 8, "occlusion.environment_height": 8, "sphere_radius": 0.6, "min_step": 0.05}
+ALL = {"occlusion_share": 1.0, "occlusion_rays": 8, "constants.occlusion_environment_height": 8, "sphere_radius": 0.6, "min_step": 0.05}
 
 
 def generator() -> torch.Generator:
@@ -74,7 +74,7 @@ def hand(monkeypatch) -> list[tuple[Future, tuple]]:
     "settings",
     [
         {}, {"occlusion_directional": True, "occlusion_channels": 3},
-        {"normals": "analytic", "materials.inputs": "grid", "losses.occlusion_form": "smooth_l1"},
+        {"normals": "analytic", "materials.inputs": "grid"},
     ],
 )  # fmt: skip
 def test_of_a_model_that_stands_still_it_is_the_loss_of_the_step(hand, settings):

@@ -13,7 +13,7 @@ from tiny_runs import tiny
 from splitnerf.fields.light import LightSamples
 from splitnerf.training import losses
 
-LOOSE = {"light_noise": 0.0, "light_lobe_below": 0.0, "losses.light_form": "square"}
+LOOSE = {"light_noise": 0.0, "light_lobe_below": 0.0, "constants.light_form": "square"}
 
 
 def generator(seed: int = 0) -> torch.Generator:
@@ -105,7 +105,7 @@ def test_the_error_of_the_light_has_its_form(form, expected):
     def light(directions, roughness):
         return 1.0 + 0.5 * (roughness > 0).float().expand(-1, 3)
 
-    config = tiny(light_queries=64, **LOOSE | {"losses.light_form": form})
+    config = tiny(light_queries=64, **LOOSE | {"constants.light_form": form})
     assert losses.light_loss(light, config, generator(), 0).item() == pytest.approx(expected, rel=1e-3)
 
 
@@ -176,14 +176,10 @@ def test_occlusion_is_traced_for_its_share_as_it_is_set(monkeypatch, channels):
     ray.positions = ray.normals = ray.points.lobe_dirs = torch.zeros(n, 3)
     ray.sdf, ray.points.roughness = torch.zeros(n), torch.ones(n, 1)
     ray.points.occlusion_d, ray.points.occlusion_s = torch.full((n, channels), 0.6), torch.full((n, channels), 0.2)
-    config = tiny(
-        occlusion_share=0.2, occlusion_channels=channels, occlusion_offset=0.037, occlusion_rays=5, **{"losses.occlusion_form": "square"}
-    )
+    config = tiny(occlusion_share=0.2, occlusion_channels=channels, occlusion_offset=0.037, occlusion_rays=5)
     loss = losses.occlusion_loss(ray, None, None, config, generator(), 9)
     assert loss.item() == pytest.approx(0.1, rel=1e-4) and asked.pop("n") == pytest.approx(0.2 * n, rel=0.15)
-    assert asked == dict(
-        n_diffuse_rays=5, n_specular_rays=5, offset=0.037, along_ray=False, seed=9, n_channels=channels
-    )
+    assert asked == dict(n_diffuse_rays=5, n_specular_rays=5, offset=0.037, seed=9, n_channels=channels)
 
 
 def occlusion_rays(n: int) -> SimpleNamespace:
@@ -200,9 +196,8 @@ def occlusion_rays(n: int) -> SimpleNamespace:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(("form", "factor"), [("square", 1.0), ("smooth_l1", 0.5)])
-def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch, form, factor):
-    """About 60 of 200, drawn by the run's own generator: w (.002^2 + .004^2) i^2 over the sum of w; half by smooth_l1."""
+def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch):
+    """About 60 of 200, drawn by the run's own generator: w (0.002^2 + 0.004^2) i^2 over the sum of w."""
     asked = []
 
     def factors(scene, positions, normals, lobes, roughness, environment, **_):
@@ -210,7 +205,7 @@ def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch, form, facto
         return torch.full((len(positions), 1), 0.5), torch.full((len(positions), 1), 0.5)
 
     monkeypatch.setattr(losses, "occlusion_factors", factors)
-    config = tiny(occlusion_share=0.3, occlusion_channels=1, **{"losses.occlusion_form": form})
+    config = tiny(occlusion_share=0.3, occlusion_channels=1)
     found = []
     for seed in range(2):
         torch.manual_seed(seed)
@@ -220,7 +215,7 @@ def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch, form, facto
     for part, own in ((positions, [0.0, 0.0, 0.0]), (normals, [0.0, 0.5, 0.0]), (lobes, [0.0, 0.0, 0.5])):
         assert torch.equal(part, number[:, None] + torch.tensor(own))
     w = 1.0 + number
-    expected = factor * (w @ ((0.002**2 + 0.004**2) * number.square()) / w.sum()).item()
+    expected = (w @ ((0.002**2 + 0.004**2) * number.square()) / w.sum()).item()
     assert found[0] == found[1] == pytest.approx(expected, rel=1e-4)
 
 
@@ -298,7 +293,7 @@ def test_factors_are_drawn_to_the_traced_ones_and_diffuse_light_to_grey(monkeypa
     monkeypatch.setattr(losses, "occlusion_factors", lambda *args, **_: (torch.full((4, 1), 0.5),) * 2)
     ray = occlusion_rays(4)
     factors = [x.requires_grad_() for x in (ray.points.occlusion_d, ray.points.occlusion_s)]
-    config = tiny(occlusion_share=1.1, occlusion_channels=1, **{"losses.occlusion_form": "square"})
+    config = tiny(occlusion_share=1.1, occlusion_channels=1)
     losses.occlusion_loss(ray, None, None, config, generator(), 0).backward()
     for factor in factors:
         expected = 2 * ray.shares * (factor[:, 0].detach() - 0.5) / ray.shares.sum()

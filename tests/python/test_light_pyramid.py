@@ -246,8 +246,7 @@ def test_settings_choose_the_light_and_its_rate():
         {
             "light.kind": "pyramid",
             "light.resolution": 16,
-            "optimiser.light_learning_rate": 0.03,
-            "optimiser.warmup_steps": 0,
+            "constants.warmup_steps": 0,
         }
     )
     model = SceneModel(config)
@@ -255,9 +254,7 @@ def test_settings_choose_the_light_and_its_rate():
     optimiser = make_optimiser(model, config)
     set_learning_rate(optimiser, config, 0, 0.0)
     rates = {id(p): group["lr"] for group in optimiser.param_groups for p in group["params"]}
-    assert (
-        rates[id(model.light.texels)] == 0.03 and rates[id(model.variance)] == config.optimiser.variance_learning_rate
-    )
+    assert rates[id(model.light.texels)] == 0.02 and rates[id(model.variance)] == 0.001
     assert len(rates) == len(list(model.parameters()))
     with pytest.raises(InputError, match="light.kind must be one of mlp, pyramid"):
         Config().replace({"light.kind": "cube"})

@@ -39,10 +39,10 @@ def test_occlusion_loss_is_the_weighted_square_of_what_is_off(monkeypatch):
     loss = losses.occlusion_loss(ray, None, None, config, torch.Generator().manual_seed(0), 0)
     assert loss.item() == pytest.approx(0.75 * 0.1 + 0.25 * 0.04)
     torch.testing.assert_close(asked["args"][1], torch.tensor([[1.0, 1.0, 0.9], [1.0, 1.0, 1.0]]))  # onto the surface
-    assert torch.equal(asked["args"][3], ray.points.lobe_dirs) and not asked["along_ray"]
-    published = config.replace({"occlusion_directional": False, "occlusion_ray_start": "ray"})
+    assert torch.equal(asked["args"][3], ray.points.lobe_dirs)
+    published = config.replace({"occlusion_directional": False})
     losses.occlusion_loss(ray, None, None, published, torch.Generator().manual_seed(0), 0)
-    assert torch.equal(asked["args"][3], ray.normals) and asked["along_ray"]
+    assert torch.equal(asked["args"][3], ray.normals)
 
 
 def test_the_sets_of_light_directions():

@@ -6,7 +6,6 @@ import math
 import signal
 import threading
 import time
-from contextlib import nullcontext
 from types import SimpleNamespace
 
 import pytest
@@ -106,7 +105,7 @@ def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkey
 
     monkeypatch.setattr(loop.Training, "__init__", noted)
     config = tiny(
-        steps=20, mesh_every=0.2, preview_every=2.0, **{"occlusion.kind": "mlp", "shading.method": "split", "occlusion.environment_height": 12}, occlusion_rays=4
+        steps=20, mesh_every=0.2, preview_every=2.0, **{"occlusion.kind": "mlp", "shading.method": "split", "constants.occlusion_environment_height": 12}, occlusion_rays=4
     )
     loop.train(load_dataset(data), config, tmp_path)
     assert heights == [(4, 12), (16, 12)] and training["it"].environment.shape == (12, 24, 3)
@@ -335,13 +334,11 @@ def test_parameters_are_checked_before_a_mesh_and_before_they_are_saved(data, tm
 
 
 @pytest.mark.parametrize("on", [False, True])
-def test_a_run_adds_and_multiplies_as_it_is_set(data, tmp_path, monkeypatch, on):
-    cores = []
-    monkeypatch.setattr(loop, "tensor_cores", lambda on: cores.append(on) or nullcontext())
+def test_a_run_repeats_its_bits_as_it_is_set(data, tmp_path, monkeypatch, on):
     order = calls(monkeypatch, loop.Training, "advance", lambda *_: torch.are_deterministic_algorithms_enabled())
-    config = tiny(steps=2, tensor_cores=not on, deterministic=on, **PLAIN)
+    config = tiny(steps=2, deterministic=on, **PLAIN)
     loop.train(load_dataset(data), config, tmp_path)
-    assert cores == [not on] and order == [on, on]
+    assert order == [on, on]
 
 
 def test_bits_repeat_on_the_cpu_alone(data, tmp_path):

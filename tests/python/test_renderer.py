@@ -10,6 +10,7 @@ from test_views import LENS, POSE, RADIUS, Given, ball
 from splitnerf.fields import LightMlp, Occlusion
 from splitnerf.fields.sdf import SdfSample
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED
+from splitnerf.render import renderer
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import ProbePoints, RenderedRays, find_samples, render_rays, render_view
 
@@ -107,8 +108,9 @@ def test_a_ray_ends_where_little_light_is_left(sample_above):
 
 
 @pytest.mark.parametrize("sample_above", [0.0, 1e-3])
-def test_a_ray_is_asked_at_no_more_points_than_are_allowed(sample_above):
-    model, _ = ball(**{"sampling.min_weight": sample_above}, max_samples_per_ray=3)
+def test_a_ray_is_evaluated_at_no_more_points_than_are_allowed(monkeypatch, sample_above):
+    monkeypatch.setattr(renderer, "MAX_SAMPLES_PER_RAY", 3)
+    model, _ = ball(**{"sampling.min_weight": sample_above})
     assert find_samples(model, FULL, *oblique()).evaluated.max() == 3
 
 

@@ -371,7 +371,7 @@ def sphere_model() -> tuple[SceneModel, OccupancyGrid]:
     """The untouched model with an exact sphere, sharp, under constant white light."""
     torch.manual_seed(0)
     model = SceneModel(
-        preset("cpu").replace({"n_levels": 4, "start_levels": 4, "log2_table_size": 10, "surface.width": 512})
+        preset("cpu").replace({"n_levels": 4, "start_levels": 4, "log2_table_size": 10, "constants.surface_width": 512})
     )
     field = model.sdf_field
     with torch.no_grad():

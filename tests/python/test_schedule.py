@@ -14,11 +14,10 @@ from splitnerf.config import Config, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.render.model import SceneModel
 from splitnerf.training import loop as trainer
+from splitnerf.training import schedule as optimiser_module
 from splitnerf.training import step as step_module
 from splitnerf.training.schedule import make_optimiser, set_learning_rate
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period, next_ray_count
-
-RATES = {"learning_rate": 0.01, "variance_learning_rate": 0.001, "light_learning_rate": 0.02}
 
 
 def one_parameter(rate: float = 1.0) -> torch.optim.Optimizer:
@@ -73,7 +72,7 @@ def test_warm_ups_at_the_bounds(warmup, steps, expected):
 @pytest.mark.parametrize("light", ["pyramid", "mlp"])
 def test_each_part_has_its_rate_and_its_decay(light, sparse):
     """The sharpness and the light's texels have rates of their own and no decay, all else the common ones; none is left out."""
-    settings = RATES | {"weight_decay": 0.03, "light.kind": light, "shading.method": "split", "sparse_steps": sparse}
+    settings = {"light.kind": light, "shading.method": "split", "sparse_steps": sparse}
     model = SceneModel(tiny(**settings))
     optimiser = make_optimiser(model, tiny(**settings))
     rates, decays, sparsely = {}, {}, {}
@@ -84,17 +83,18 @@ def test_each_part_has_its_rate_and_its_decay(light, sparse):
             sparsely[id(parameter)] = group["sparse"]
             assert group["betas"] == (0.9, 0.99) and group["eps"] == 1e-15
     for name, parameter in model.named_parameters():
-        own = {"variance": (0.001, 0.0), "light.texels": (0.02, 0.0)}.get(name, (0.01, 0.03))
+        own = {"variance": (0.001, 0.0), "light.texels": (0.02, 0.0)}.get(name, (0.01, 0.01))
         assert (rates[id(parameter)], decays[id(parameter)]) == own, name
         assert sparsely[id(parameter)] == (sparse and name == "sdf_field.grid.table"), name
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float16"])
 @pytest.mark.parametrize("sparse", [False, True])
-def test_sparse_steps_leave_entries_without_a_gradient_alone(sparse, dtype):
+def test_sparse_steps_leave_entries_without_a_gradient_alone(monkeypatch, sparse, dtype):
     """A step moves the one entry that has a gradient; others decay, lr wd of themselves, but not with sparse steps. What is read
     of a table of 16 bits is that of the table as it stands after the step."""
-    config = tiny(sparse_steps=sparse, table_dtype=dtype, learning_rate=0.01, weight_decay=0.5)
+    monkeypatch.setattr(optimiser_module, "WEIGHT_DECAY", 0.5)
+    config = tiny(sparse_steps=sparse, table_dtype=dtype)
     model = SceneModel(config)
     grid = model.sdf_field.grid
     with torch.no_grad():
@@ -111,7 +111,7 @@ def test_sparse_steps_leave_entries_without_a_gradient_alone(sparse, dtype):
 
 
 def test_all_rates_follow_one_factor():
-    config = tiny(steps=100, warmup_steps=10, final_learning_rate=0.25, **RATES)
+    config = tiny(steps=100, warmup_steps=10, final_learning_rate=0.25)
     optimiser = make_optimiser(SceneModel(config), config)
     full = [group["lr"] for group in optimiser.param_groups]
     for step in (0, 99, 55, 3):  # in any order: nothing adds up

@@ -177,7 +177,7 @@ class Steps(torch.nn.Module):
 )
 def test_the_light_loss_is_the_mean_over_queries_of_the_sum_over_channels(form, expected):
     """Eq. (11): the mean over s of |g(s) - gbar(s)|^2, a vector's length: off by (.1, -.2, 2) costs .01 + .04 + 4."""
-    config = tiny(**{"light.kind": "mlp", "shading.method": "split", "losses.light_form": form}, light_noise=0.0, light_lobe_below=0.0)
+    config = tiny(**{"light.kind": "mlp", "shading.method": "split", "constants.light_form": form}, light_noise=0.0, light_lobe_below=0.0)
     for n_queries in (16, 64):
         found = losses.light_loss(Steps([0.1, -0.2, 2.0]), config.replace({"light_queries": n_queries}), generator(), 0)
         assert found.item() == pytest.approx(expected, rel=1e-4)

@@ -361,7 +361,6 @@ def test_the_paper_preset_takes_steps(data, tmp_path):
     settings = dict(
         target_samples=2048, initial_rays=32, light_samples=128, light_queries=64, mesh_resolution=32, export_resolution=32,
         grid_resolution=32, log2_table_size=14, mesh_every=0.3, preview_every=1.0, export_texture_size=64, export_faces=500,
-        export_environment_height=16,
     )  # fmt: skip
     command = ["train", str(data), "--out", str(run), "--preset", "paper", "--steps", "6", "--downscale", "2"]
     assert main([*command, *as_options(settings)]) == DONE

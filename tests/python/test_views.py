@@ -38,7 +38,7 @@ class Given(torch.nn.Module):
 def ball(**settings: object) -> tuple[SceneModel, torch.Tensor]:
     """A model whose field is a ball, nearly, under constant light of 1, and its cells."""
     torch.manual_seed(0)
-    model = SceneModel(tiny(start_levels=4, **{"surface.width": 512}, sphere_radius=RADIUS, **{"shading.method": "split"}, **settings))
+    model = SceneModel(tiny(start_levels=4, **{"constants.surface_width": 512}, sphere_radius=RADIUS, **{"shading.method": "split"}, **settings))
     with torch.no_grad():
         model.variance.fill_(0.5)
         model.light.texels.zero_()
@@ -196,22 +196,22 @@ def test_a_model_begins_as_it_is_set():
 
 
 def test_parts_are_as_large_as_they_are_set():
-    surface = {"n_levels": 3, "n_features": 4, "base_resolution": 5, "growth": 1.7, "log2_table_size": 9, "width": 24, "outputs": 7, "box": 1.3}
-    materials = {"width": 20, "layers": 3}
-    light = {"kind": "mlp", "width": 12, "layers": 4, "direction_frequencies": 5, "roughness_frequencies": 2, "activation": "exp"}
-    occlusion = {"kind": "mlp", "width": 18, "layers": 1, "channels": 3, "directional": False}
-    parts = {"surface": surface, "materials": materials, "light": light, "occlusion": occlusion}
-    settings = {f"{part}.{key}": value for part, values in parts.items() for key, value in values.items()}
-    for inputs, n_inputs in (("outputs", 7), ("grid", 7 + 3 + 12)):
+    settings = {
+        "n_levels": 3, "base_resolution": 5, "growth": 1.7, "log2_table_size": 9, "surface_width": 24, "box": 1.3,
+        "materials_width": 20, "light.kind": "mlp", "light_width": 12, "light_layers": 4, "direction_frequencies": 5,
+        "roughness_frequencies": 2, "light_activation": "exp", "occlusion.kind": "mlp", "occlusion_width": 18,
+        "occlusion.channels": 3, "directional": False,
+    }  # fmt: skip
+    for inputs, n_inputs in (("outputs", 13), ("grid", 13 + 3 + 6)):
         model = SceneModel(tiny(**{"shading.method": "split"}).replace(settings | {"materials.inputs": inputs}))
         spec = model.sdf_field.grid.spec
-        assert (spec.n_levels, spec.n_features, spec.base_resolution, spec.growth, spec.log2_table_size) == (3, 4, 5, 1.7, 9)
-        assert model.sdf_field.hidden_direction.shape == (24, 15) and model.sdf_field.out_direction.shape == (7, 24)
+        assert (spec.n_levels, spec.n_features, spec.base_resolution, spec.growth, spec.log2_table_size) == (3, 2, 5, 1.7, 9)
+        assert model.sdf_field.hidden_direction.shape == (24, 9) and model.sdf_field.out_direction.shape == (13, 24)
         assert model.sdf_field.box == 1.3
-        assert [tuple(p.shape) for p in model.material.net.parameters() if p.dim() == 2] == [(20, n_inputs), (20, 20), (20, 20), (5, 20)]
+        assert [tuple(p.shape) for p in model.material.net.parameters() if p.dim() == 2] == [(20, n_inputs), (20, 20), (5, 20)]
         assert [tuple(p.shape) for p in model.light.hidden.parameters() if p.dim() == 2] == [(12, 34)] + [(12, 12)] * 3
         assert len(model.light.roughness_scales) == 2 and model.light.activation == "exp"
-        assert [tuple(p.shape) for p in model.occlusion.net.parameters() if p.dim() == 2] == [(18, n_inputs), (6, 18)]
+        assert [tuple(p.shape) for p in model.occlusion.net.parameters() if p.dim() == 2] == [(18, n_inputs), (18, 18), (6, 18)]
         assert not model.occlusion.directional and model.variance.requires_grad
     assert SceneModel(tiny(light_resolution=32)).light.resolution == 32
     nothing = SceneModel(tiny(**{"shading.method": "split"}).replace({"occlusion.kind": "off", "occlusion.channels": 3})).occlusion

@@ -16,35 +16,30 @@ else:
 # source. Shares of the run stand for 20,000 steps.
 PAPER = dict(
     run=dict(preset="paper", steps=20000),
-    surface=dict(
-        n_levels=16, base_resolution=32, growth=1.3195079, log2_table_size=19, start_levels=4, levels_open_by=0.6,
-        start="sphere", sphere_radius=0.5, normals="finite_difference", cos_anneal_by=1.0,
-    ),
-    materials=dict(width=256, initial_roughness=0.5, min_roughness=0.0, inputs="outputs"),
-    light=dict(
-        kind="mlp", width=256, layers=5, direction_frequencies=10, roughness_frequencies=5, activation="softplus"
-    ),
+    surface=dict(n_levels=16, growth=1.3195079, log2_table_size=19, start="sphere", normals="finite_difference"),
+    materials=dict(inputs="outputs"),
+    light=dict(kind="mlp"),
     shading=dict(method="split", fresnel="paper", query="reflection", compensate=False, compositing="srgb"),
-    occlusion=dict(
-        kind="mlp", channels=1, directional=False, width=256, rays=64, environment_height=128, indirect=False
-    ),
+    occlusion=dict(kind="mlp", channels=1, directional=False, indirect=False),
     mesh=dict(resolution=512, background=True),
-    sampling=dict(
-        initial_rays=256, target_samples=262144, step_scale=0.0, min_step=3**0.5 * 3 / 1024, min_transmittance=0.0,
-        min_weight=0.0, shades_per_ray=0, occupancy="average", grid_resolution=128, grid_every=16, hull_until=0.0,
-        pixel_cells=0.0, foreground_share=0.0,
-    ),
+    sampling=dict(target_samples=262144, min_weight=0.0, occupancy="average", grid_resolution=128, pixel_cells=0.0),
     losses=dict(
         colour_weight=10.0, eikonal_weight=0.1, light_weight=10.0, occlusion_weight=0.01, metal_weight=0.001, mask_weight=0.0,
-        light_form="square", light_set="uniform", light_samples=8129, light_noise=0.0, light_queries=8129,
-        light_lobe_below=0.0, eikonal_points=0,
         # beyond the paper
         edge_pixels=0, neutral_weight=0.0, light_prior_weight=0.0, seen_weight=0.0, entropy_weight=0.0, binary_metal_weight=0.0,
         dark_metal_weight=0.0, smoothness_weight=0.0,
     ),
-    optimiser=dict(warmup_steps=500, final_learning_rate=0.1),
     refinement=dict(enabled=False),
     export=dict(resolution=512),
+    constants=dict(
+        base_resolution=32, levels_open_by=0.6, sphere_radius=0.5, cos_anneal_by=1.0, materials_width=256,
+        initial_roughness=0.5, min_roughness=0.0, light_width=256, light_layers=5, direction_frequencies=10,
+        roughness_frequencies=5, light_activation="softplus", occlusion_width=256, occlusion_rays=64,
+        occlusion_environment_height=128, initial_rays=256, step_scale=0.0, min_step=3**0.5 * 3 / 1024, min_transmittance=0.0,
+        shades_per_ray=0, grid_every=16, hull_until=0.0, foreground_share=0.0, light_form="square", light_set="uniform",
+        light_samples=8129, light_noise=0.0, light_queries=8129, light_lobe_below=0.0, eikonal_points=0, warmup_steps=500,
+        final_learning_rate=0.1,
+    ),
 )  # fmt: skip
 
 # The CPU's method with the samples, the levels and the meshes of a GPU.
@@ -52,11 +47,13 @@ FAST = dict(
     run=dict(preset="fast", steps=20000, cuda_graphs=True),
     surface=dict(n_levels=16, growth=1.3195079, log2_table_size=19, table_dtype="float16"),  # 16 to 1024 cells
     mesh=dict(resolution=192, background=True),
-    sampling=dict(initial_rays=4096, max_rays=16384, target_samples=32768, grid_resolution=128),
-    losses=dict(eikonal_points=2048, smoothness_points=4096, neutral_queries=1024, entropy_points=1024),
-    optimiser=dict(sparse_steps=True, warmup_steps=200),
+    sampling=dict(max_rays=16384, target_samples=32768, grid_resolution=128),
     export=dict(texture_size=2048),
-)
+    constants=dict(
+        initial_rays=4096, eikonal_points=2048, smoothness_points=4096, neutral_queries=1024, entropy_points=1024,
+        sparse_steps=True, warmup_steps=200,
+    ),
+)  # fmt: skip
 
 PRESETS: dict[str, dict] = {"cpu": {}, "fast": FAST, "paper": PAPER}
 

@@ -6,28 +6,13 @@ import dataclasses
 import difflib
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import tomli_w
 
-from splitnerf.config.groups import (
-    Data,
-    Export,
-    Exposure,
-    Light,
-    Losses,
-    Materials,
-    Mesh,
-    Occlusion,
-    Optimiser,
-    Refinement,
-    Run,
-    Sampling,
-    Separation,
-    Shading,
-    Surface,
-)
+from splitnerf.config import groups
+from splitnerf.config.constants import Constants
 from splitnerf.config.setting import LARGEST_FLOAT
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -51,21 +36,21 @@ class Config:
         InputError: A value is of another type or out of its range, or values exclude each other.
     """
 
-    run: Run = field(default_factory=Run)
-    data: Data = field(default_factory=Data)
-    exposure: Exposure = field(default_factory=Exposure)
-    separation: Separation = field(default_factory=Separation)
-    surface: Surface = field(default_factory=Surface)
-    materials: Materials = field(default_factory=Materials)
-    light: Light = field(default_factory=Light)
-    shading: Shading = field(default_factory=Shading)
-    occlusion: Occlusion = field(default_factory=Occlusion)
-    mesh: Mesh = field(default_factory=Mesh)
-    sampling: Sampling = field(default_factory=Sampling)
-    losses: Losses = field(default_factory=Losses)
-    optimiser: Optimiser = field(default_factory=Optimiser)
-    refinement: Refinement = field(default_factory=Refinement)
-    export: Export = field(default_factory=Export)
+    run: groups.Run = groups.Run()
+    data: groups.Data = groups.Data()
+    exposure: groups.Exposure = groups.Exposure()
+    separation: groups.Separation = groups.Separation()
+    surface: groups.Surface = groups.Surface()
+    materials: groups.Materials = groups.Materials()
+    light: groups.Light = groups.Light()
+    shading: groups.Shading = groups.Shading()
+    occlusion: groups.Occlusion = groups.Occlusion()
+    mesh: groups.Mesh = groups.Mesh()
+    sampling: groups.Sampling = groups.Sampling()
+    losses: groups.Losses = groups.Losses()
+    refinement: groups.Refinement = groups.Refinement()
+    export: groups.Export = groups.Export()
+    constants: Constants = Constants()
 
     def __post_init__(self) -> None:
         for group, kind in GROUPS.items():
@@ -85,6 +70,11 @@ class Config:
         """The value of a setting by its name, or by a short one, see :data:`SHORT_NAMES`."""
         group, _, key = SHORT_NAMES.get(name, name).partition(".")
         return getattr(getattr(self, group), key)
+
+    @property
+    def finest_cells(self) -> float:
+        """The cells along an edge of the hash grid's finest level, which the grid rounds down."""
+        return self.constants.base_resolution * self.surface.growth ** (self.surface.n_levels - 1)
 
     @property
     def reading(self) -> Reading:
@@ -139,7 +129,7 @@ class Config:
             raise InputError(f"{path}: {error}") from None
 
 
-GROUPS = {group.name: group.default_factory for group in dataclasses.fields(Config)}
+GROUPS = {group.name: type(group.default) for group in dataclasses.fields(Config)}
 FIELDS = {f"{group}.{known.name}": known for group, kind in GROUPS.items() for known in dataclasses.fields(kind)}
 _GROUPS_OF = {known.name: [group for group in GROUPS if f"{group}.{known.name}" in FIELDS] for known in FIELDS.values()}
 SHORT_NAMES = {name.replace(".", "_"): name for name in FIELDS} | {
@@ -153,9 +143,9 @@ RULES = (
     (
         lambda c: c.shading.method == "summed" and not (
             c.occlusion.kind == "bits" and c.shading.compositing == "linear" and c.shading.fresnel == "exact"
-            and c.occlusion.directions >= SUMMED_DIRECTIONS
+            and c.constants.occlusion_directions >= SUMMED_DIRECTIONS
         ),
-        f"shading.method = summed needs occlusion.kind = bits with at least {SUMMED_DIRECTIONS} occlusion.directions, "
+        f"shading.method = summed needs occlusion.kind = bits with at least {SUMMED_DIRECTIONS} constants.occlusion_directions, "
         "shading.compositing = linear and shading.fresnel = exact; set shading.method=split",
     ),
     (
@@ -163,7 +153,7 @@ RULES = (
         "exposure.refine = yes needs shading.compositing = linear; set exposure.refine=no",
     ),
     (
-        lambda c: c.surface.finest_cells >= MOST_CELLS,
+        lambda c: c.finest_cells >= MOST_CELLS,
         f"a level of the hash grid needs fewer than {MOST_CELLS} cells along an edge; lower surface.growth",
     ),
     (
@@ -173,10 +163,10 @@ RULES = (
     (
         lambda c: c.run.cuda_graphs and (
             c.occlusion.kind == "mlp" or c.light.kind == "mlp" or c.surface.normals != "analytic"
-            or c.losses.entropy_points == 1
+            or c.constants.entropy_points == 1
         ),
         "run.cuda_graphs needs light.kind = pyramid, occlusion.kind = bits or off, surface.normals = analytic and "
-        "more than one of losses.entropy_points; set run.cuda_graphs=false",
+        "more than one of constants.entropy_points; set run.cuda_graphs=false",
     ),
 )  # fmt: skip
 

@@ -10,11 +10,11 @@ def settings_table(config: Config) -> str:
     rows = {
         name: (f"{name} = {_shown(config[name])}", f"{known.metadata['limits']}".removeprefix("in "),
                known.metadata["unit"], known.metadata["meaning"])
-        for name, known in FIELDS.items()
+        for name, known in FIELDS.items() if known.metadata["meaning"]
     }  # fmt: skip
     widths = [max(len(row[i]) for row in rows.values()) for i in range(3)]
     lines = []
-    for group, kind in GROUPS.items():
+    for group, kind in list(GROUPS.items())[:-1]:  # the last one is the record of the method
         lines += ["", f"[{group}] {kind.__doc__.splitlines()[0]}"]
         for name, row in rows.items():
             if name.startswith(f"{group}."):

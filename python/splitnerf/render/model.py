@@ -27,6 +27,9 @@ from splitnerf.fields.occlusion import TracedBits
 from splitnerf.fields.sdf import SdfSample
 from splitnerf.ops import HashGridSpec, light_queries, sharpness, split_sum_shade, summed_correction, take_rows, wide_lobes
 
+N_FEATURES = 2  # of a level of the hash grid
+N_OUTPUTS = 13  # of the surface's network, the distance among them
+HEAD_LAYERS = 2  # hidden layers of the networks of material and occlusion
 START_BOUNCES = 3  # bounces of indirect light on a new mesh
 SUMMED_BAND = 0.15  # width in roughness of the transition from the split sum to the sum over directions
 
@@ -68,8 +71,8 @@ def make_light(config: Config) -> Light:
     if config.light.kind == "pyramid":
         return LightPyramid(config.light.resolution)
     return LightMlp(
-        config.light.width, config.light.layers, config.light.direction_frequencies,
-        config.light.roughness_frequencies, config.light.activation,
+        config.constants.light_width, config.constants.light_layers, config.constants.direction_frequencies,
+        config.constants.roughness_frequencies, config.constants.light_activation,
     )  # fmt: skip
 
 
@@ -78,15 +81,15 @@ def make_occlusion(config: Config, n_inputs: int) -> OcclusionModel:
     c = config
     if c.occlusion.kind == "mlp":
         return OcclusionHead(
-            n_inputs, c.occlusion.width, c.occlusion.layers, c.occlusion.channels, c.occlusion.directional
+            n_inputs, c.constants.occlusion_width, HEAD_LAYERS, c.occlusion.channels, c.occlusion.directional
         )
     if c.occlusion.kind == "bits":
         return VisibilityBits(
-            c.occlusion.directions,
-            c.occlusion.offset,
+            c.constants.occlusion_directions,
+            c.constants.occlusion_offset,
             c.occlusion.channels,
             c.occlusion.indirect,
-            c.occlusion.open_below,
+            c.constants.open_below,
         )
     return NoOcclusion(c.occlusion.channels)
 
@@ -103,26 +106,26 @@ class SceneModel(nn.Module):
         self.config = config
         spec = HashGridSpec(
             config.surface.n_levels,
-            config.surface.n_features,
-            config.surface.base_resolution,
+            N_FEATURES,
+            config.constants.base_resolution,
             config.surface.growth,
             config.surface.log2_table_size,
         )
         dtype = None if config.surface.table_dtype == "float32" else getattr(torch, config.surface.table_dtype)
         self.sdf_field = SdfField(
-            spec, config.surface.box, config.surface.width, config.surface.outputs, config.surface.sphere_radius, dtype
+            spec, config.constants.box, config.constants.surface_width, N_OUTPUTS, config.constants.sphere_radius, dtype
         )
-        n_inputs = config.surface.outputs + (3 + spec.n_outputs if config.materials.inputs == "grid" else 0)
+        n_inputs = N_OUTPUTS + (3 + spec.n_outputs if config.materials.inputs == "grid" else 0)
         self.material = MaterialHead(
             n_inputs,
-            config.materials.width,
-            config.materials.layers,
-            config.materials.initial_roughness,
-            config.materials.min_roughness,
+            config.constants.materials_width,
+            HEAD_LAYERS,
+            config.constants.initial_roughness,
+            config.constants.min_roughness,
         )
         self.occlusion = make_occlusion(config, n_inputs)
         self.light = make_light(config)
-        self.variance = nn.Parameter(torch.tensor(config.surface.initial_variance))
+        self.variance = nn.Parameter(torch.tensor(config.constants.initial_variance))
 
     @property
     def device(self) -> torch.device:
@@ -142,9 +145,9 @@ class SceneModel(nn.Module):
     def open_levels(self, progress: float) -> None:
         """Opens the hash-grid levels of this progress: one after the other until ``levels_open_by`` of the run."""
         c = self.config
-        share = min(1.0, progress / c.surface.levels_open_by) if c.surface.levels_open_by > 0 else 1.0
+        share = min(1.0, progress / c.constants.levels_open_by) if c.constants.levels_open_by > 0 else 1.0
         self.sdf_field.grid.n_active = min(
-            c.surface.n_levels, c.surface.start_levels + int(share * (c.surface.n_levels - c.surface.start_levels))
+            c.surface.n_levels, c.constants.start_levels + int(share * (c.surface.n_levels - c.constants.start_levels))
         )
 
     def surface(self, positions: Tensor) -> SdfSample:

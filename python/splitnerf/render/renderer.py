@@ -28,6 +28,7 @@ from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ, OccupancyGrid
 from splitnerf.render.rays import image_rays
 
+MAX_SAMPLES_PER_RAY = 1024
 MIN_OPACITY = 1e-4
 PHASES = 1024.0
 SURFACE_GAP = 2.5  # in steps; two samples farther apart may lie on two surfaces
@@ -134,8 +135,8 @@ class RenderedRays:
 def sample_step(config: Config, s: float) -> float:
     """Length of a sample in scene units: proportional to the width 1/s of the density, within the configured bounds."""
     return min(
-        max(config.sampling.step_scale / s, config.sampling.min_step),
-        max(config.sampling.max_step, config.sampling.min_step),
+        max(config.constants.step_scale / s, config.constants.min_step),
+        max(config.constants.max_step, config.constants.min_step),
     )
 
 
@@ -169,14 +170,14 @@ def find_samples(
     c, s = model.config, model.s_value if s is None else s
     step = sample_step(c, s)
     if c.sampling.min_weight == 0:
-        packed = march_rays(rays_o, rays_d, jitter, cells, c.surface.box, step, c.sampling.max_samples_per_ray)
+        packed = march_rays(rays_o, rays_d, jitter, cells, c.constants.box, step, MAX_SAMPLES_PER_RAY)
         evaluated, n_found = packed.offsets.diff(), packed.offsets[-1]
     else:
         packed, evaluated, n_found = sample_rays(
             rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=s, anneal=anneal,
-            min_weight=c.sampling.min_weight, min_transmittance=c.sampling.min_transmittance,
+            min_weight=c.sampling.min_weight, min_transmittance=c.constants.min_transmittance,
             reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
-            max_samples=c.sampling.max_samples_per_ray, room=capacity,
+            max_samples=MAX_SAMPLES_PER_RAY, room=capacity,
         )  # fmt: skip
     probes = ProbePoints(rays_o[:0], jitter[:0], rays_o[:0]) if probes is None else probes
     positions, directions, beside = place_samples(rays_o, rays_d, packed, *probes, capacity)
@@ -216,7 +217,7 @@ def render_rays(
         samples.offsets,
         step=step,
         anneal=found.anneal,
-        min_transmittance=c.sampling.min_transmittance,
+        min_transmittance=c.constants.min_transmittance,
         n_samples=n,
         hand_on=True,
     )

@@ -76,8 +76,8 @@ def draw_numbers(generator: torch.Generator, counts: list[int]) -> list[Tensor]:
 
 def probe_counts(config: Config) -> tuple[int, int]:
     """How many numbers :func:`make_probes` takes as `chosen` and as `random`."""
-    n_beside = config.losses.smoothness_points if config.losses.smoothness_weight else 0
-    return n_beside, 3 * config.losses.eikonal_points + 4 * n_beside
+    n_beside = config.constants.smoothness_points if config.losses.smoothness_weight else 0
+    return n_beside, 3 * config.constants.eikonal_points + 4 * n_beside
 
 
 def make_probes(config: Config, chosen: Tensor, random: Tensor) -> ProbePoints:
@@ -87,5 +87,5 @@ def make_probes(config: Config, chosen: Tensor, random: Tensor) -> ProbePoints:
         chosen, random: Numbers in [0, 1), as many as :func:`probe_counts` says.
     """
     c = config
-    anywhere, shifts = probe_points(random, c.losses.eikonal_points, c.surface.box, c.losses.smoothness_radius)
+    anywhere, shifts = probe_points(random, c.constants.eikonal_points, c.constants.box, c.constants.smoothness_radius)
     return ProbePoints(anywhere, chosen, shifts)

@@ -12,6 +12,7 @@ from splitnerf.config import Config
 from splitnerf.data.tensor_files import check_tensor, read_tensors, write_tensors
 from splitnerf.errors import InputError
 from splitnerf.ops.hash_grid import HashGridSpec
+from splitnerf.render.model import N_FEATURES
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.seen import Cameras
 from splitnerf.training.start import StartShape
@@ -138,9 +139,9 @@ def _check_content(content: dict) -> None:
             raise ValueError("start is of another type")
         for name in ("distance", "trust"):
             check_tensor(f"start's {name}", start.get(name), (config.sampling.grid_resolution,) * 3, torch.float32)
-        if len(StartShape(start["distance"], start["trust"], config.surface.box).near) == 0:
+        if len(StartShape(start["distance"], start["trust"], config.constants.box).near) == 0:
             raise ValueError("start has no surface")
-    if not 1 <= content["n_rays"] <= max(config.sampling.initial_rays, config.sampling.max_rays):
+    if not 1 <= content["n_rays"] <= max(config.constants.initial_rays, config.sampling.max_rays):
         raise ValueError(f"n_rays is {content['n_rays']}")
     for name, parameter in content["model"].items():
         check_tensor(f"parameter {name}", parameter, None, torch.float32)
@@ -185,14 +186,14 @@ def _check_cameras(cameras: object) -> None:
 def _check_light(config: Config, content: dict) -> None:
     """Raises ValueError where the cached light, stored in addition to the parameters, does not fit the settings."""
     check_tensor("light_noise", content.get("light_noise"), (2,), torch.float64)
-    height, cached = config.occlusion.environment_height, content.get("occlusion_light")
+    height, cached = config.constants.occlusion_environment_height, content.get("occlusion_light")
     if content.get("environment") is not None:
         check_tensor("environment", content["environment"], (height, 2 * height, 3), torch.float32)
     has_mesh = content.get("mesh_vertices") is not None
     if not isinstance(cached, dict) or cached.keys() != (CACHED_LIGHT if config.occlusion.kind == "bits" else set()):
         raise ValueError("occlusion_light is missing or of another kind")
     if cached:
-        _check_bits(cached, config.occlusion.directions, len(content["mesh_vertices"]) if has_mesh else 0)
+        _check_bits(cached, config.constants.occlusion_directions, len(content["mesh_vertices"]) if has_mesh else 0)
 
 
 def _check_bits(cached: dict, k: int, n_vertices: int) -> None:
@@ -214,9 +215,9 @@ def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:
     """Raises ValueError where the settings need larger tensors than the file holds; the model is allocated next."""
     c = config
     grid = HashGridSpec(
-        c.surface.n_levels, c.surface.n_features, c.surface.base_resolution, c.surface.growth, c.surface.log2_table_size
+        c.surface.n_levels, N_FEATURES, c.constants.base_resolution, c.surface.growth, c.surface.log2_table_size
     )
-    sizes = {"sdf_field.grid.table": grid.n_entries * c.surface.n_features}
+    sizes = {"sdf_field.grid.table": grid.n_entries * N_FEATURES}
     if c.light.kind == "pyramid":
         sizes["light.texels"] = 3 * sum(4**k for k in range(2, c.light.resolution.bit_length()))
     for name, size in sizes.items():

@@ -108,7 +108,7 @@ class GraphedStep(RoomyStep):
         return (
             model.sdf_field.grid.n_active,
             since,
-            progress >= c.losses.priors_from,
+            progress >= c.constants.priors_from,
             self.start is not None and progress < HELD_UNTIL,
             self.mesh.made_at,
             model.occlusion.ready,

@@ -86,7 +86,7 @@ class LateOcclusion:
     @torch.no_grad()
     def _ask(self, ray: RenderedRays, scene: MeshScene, environment: Tensor, seed: int) -> Lesson | None:
         c = self.model.config
-        chosen = one_of_each_run(len(ray.shaded), c.occlusion.share, self.generator)
+        chosen = one_of_each_run(len(ray.shaded), c.constants.occlusion_share, self.generator)
         if len(chosen) == 0:
             return None
         points = occlusion_points(ray, chosen, c)

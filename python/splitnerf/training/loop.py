@@ -136,14 +136,14 @@ class Training:
         torch.manual_seed(c.run.seed)
         self.generator = torch.Generator(device).manual_seed(c.run.seed)
         self.photos = training_photos(dataset, c)
-        self.source = source = PixelSource(self.photos, c.sampling.foreground_share, self.generator, c.losses.edge_pixels)
+        self.source = source = PixelSource(self.photos, c.constants.foreground_share, self.generator, c.losses.edge_pixels)
         self.exposures = PhotoExposures(dataset, c, device)
         self.model = SceneModel(c).to(device)
         self.optimiser = make_optimiser(self.model, c)
         self.hull = None
-        if c.sampling.hull_until > 0 or c.surface.start == "stereo":
+        if c.constants.hull_until > 0 or c.surface.start == "stereo":
             lenses = source.intrinsics / source.hull_factor
-            self.hull = visual_hull(c.sampling.grid_resolution, c.surface.box, source.possible, source.poses, lenses)
+            self.hull = visual_hull(c.sampling.grid_resolution, c.constants.box, source.possible, source.poses, lenses)
         self.grid = make_grid(c, self.hull, device)
         self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
         step = Step if device.type == "cpu" else GraphedStep if c.run.cuda_graphs else RoomyStep
@@ -152,7 +152,7 @@ class Training:
         self.watch = GradientWatch(self.model.parameters())
         self.light: EvaluatedLight | None = None  # evaluated; None after its parameters moved
         self.environment: Tensor | None = None  # the light that weighs traced occlusion
-        self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.sampling.initial_rays, 0.0
+        self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.constants.initial_rays, 0.0
         self.psnr_mean: float | None = None
         self.unread: deque[PastStep] = deque()
         self.unlogged: dict[str, object] | None = None  # the line of the last step read, while metrics.jsonl lacks it
@@ -182,7 +182,7 @@ class Training:
             self.exposures.restore(content["exposures"])
         if content.get("start") is not None:
             tensors = {name: x.to(self.grid.device) for name, x in content["start"].items()}
-            self.take_step.start = StartShape(box=self.config.surface.box, **tensors)
+            self.take_step.start = StartShape(box=self.config.constants.box, **tensors)
         self.model.open_levels(self.progress)
         self.mesh.restore(content)
         if content["occlusion_light"]:
@@ -205,7 +205,7 @@ class Training:
         self.observers.began(self)
         with (
             Interrupt() as interrupt, Progress(self.progress) as bar, same_bits(c.run.deterministic),
-            tensor_cores(c.run.tensor_cores), spare_processors(self.model.device), self.take_step.stream(),
+            tensor_cores(True), spare_processors(self.model.device), self.take_step.stream(),
         ):  # fmt: skip
             if self.step:
                 interrupt.attempt(self.preview_if_due)  # that an interruption left out
@@ -270,8 +270,8 @@ class Training:
         c, model, step, progress = self.config, self.model, self.step, self.progress
         model.open_levels(progress)
         set_learning_rate(self.optimiser, c, step, progress)
-        if self.first or step % c.sampling.grid_every == 0:
-            use_hull = progress < c.sampling.hull_until
+        if self.first or step % c.constants.grid_every == 0:
+            use_hull = progress < c.constants.hull_until
             self.update_grid(self.take_step.s, first=self.first, step=step, use_hull=use_hull)
         if model.occlusion.needs_mesh and progress - self.mesh.asked_at >= c.mesh.every:
             check_state(step, model, self.optimiser)
@@ -283,10 +283,10 @@ class Training:
             return
         if c.occlusion.kind == "mlp" and c.losses.occlusion_weight > 0:
             if self.environment is None or step % ENVIRONMENT_EVERY == 0:
-                self.environment = model.light.panorama(c.occlusion.environment_height)
+                self.environment = model.light.panorama(c.constants.occlusion_environment_height)
         if step % ENVIRONMENT_EVERY == 0:
             model.occlusion.set_light(self.light)
-        if c.occlusion.indirect and step % c.occlusion.indirect_every == 0:
+        if c.occlusion.indirect and step % c.constants.indirect_every == 0:
             model.refresh_indirect(self.light)
 
     def update_grid(self, s: float | None = None, **how: int | bool) -> None:

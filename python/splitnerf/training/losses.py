@@ -96,19 +96,19 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     """
     c = config
     n_sets, n = (
-        (2, light.loss_samples.count(c.losses.light_noise, c.losses.light_samples))
-        if c.losses.light_noise > 0
-        else (1, c.losses.light_samples)
+        (2, light.loss_samples.count(c.constants.light_noise, c.constants.light_samples))
+        if c.constants.light_noise > 0
+        else (1, c.constants.light_samples)
     )
     draw = {"generator": generator, "device": generator.device}
-    queries = F.normalize(torch.randn(c.losses.light_queries, 3, **draw), dim=1)
+    queries = F.normalize(torch.randn(c.constants.light_queries, 3, **draw), dim=1)
     directions = torch.cat([light_directions(c, n // n_sets, queries, generator) for _ in range(n_sets)])
     roughness = torch.ones_like(queries[:, :1])
-    roughness[: c.losses.light_queries // 2] = (
-        torch.rand(c.losses.light_queries // 2, 1, **draw).sort(0).values
+    roughness[: c.constants.light_queries // 2] = (
+        torch.rand(c.constants.light_queries // 2, 1, **draw).sort(0).values
     )  # narrow lobes first
-    n_narrow = int((roughness < c.losses.light_lobe_below).sum()) if c.losses.light_lobe_below > 0 else 0
-    own = sample_ggx_lobe(queries[:n_narrow], roughness[:n_narrow], c.losses.light_lobe_samples, seed).reshape(-1, 3)
+    n_narrow = int((roughness < c.constants.light_lobe_below).sum()) if c.constants.light_lobe_below > 0 else 0
+    own = sample_ggx_lobe(queries[:n_narrow], roughness[:n_narrow], c.constants.light_lobe_samples, seed).reshape(-1, 3)
     asked = torch.cat([directions, own, queries])
     g = light(asked, torch.cat([roughness.new_zeros(len(directions) + len(own), 1), roughness]))
     shared, lobes, prefiltered = g.split([len(directions), len(own), len(queries)])
@@ -116,19 +116,19 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
         prefilter_light(queries[n_narrow:], roughness[n_narrow:], *part)
         for part in zip(directions.chunk(n_sets), shared.chunk(n_sets))
     ])  # fmt: skip
-    error = prefiltered - torch.cat([lobes.view(n_narrow, c.losses.light_lobe_samples, 3).mean(1), sums.mean(0)])
+    error = prefiltered - torch.cat([lobes.view(n_narrow, c.constants.light_lobe_samples, 3).mean(1), sums.mean(0)])
     if n_sets == 2:
         noise = ((sums[0] - sums[1]) / 2).square().sum().item()
         light.loss_samples.learn(noise, error[n_narrow:].square().sum().item(), n)
-    return penalty(error, c.losses.light_form).sum(-1).mean()
+    return penalty(error, c.constants.light_form).sum(-1).mean()
 
 
 def light_directions(config: Config, n: int, queries: Tensor, generator: torch.Generator) -> Tensor:
     """The n directions [n, 3] that the light loss integrates over, with ``uniform_and_queries`` more."""
-    if config.losses.light_set == "fibonacci":
+    if config.constants.light_set == "fibonacci":
         return fibonacci_directions(n, generator)
     uniform = F.normalize(torch.randn(n, 3, generator=generator, device=generator.device), dim=1)
-    return torch.cat([uniform, queries]) if config.losses.light_set == "uniform_and_queries" else uniform
+    return torch.cat([uniform, queries]) if config.constants.light_set == "uniform_and_queries" else uniform
 
 
 def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.Generator) -> Tensor:
@@ -138,7 +138,7 @@ def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.G
     light without colour where the images allow it.
     """
     normals = F.normalize(
-        torch.randn(config.losses.neutral_queries, 3, generator=generator, device=generator.device), dim=1
+        torch.randn(config.constants.neutral_queries, 3, generator=generator, device=generator.device), dim=1
     )
     return log_chroma(light(normals, torch.ones_like(normals[:, :1])))
 
@@ -193,11 +193,11 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
     if len(weights) == 0:
         return weights.new_zeros(())
     weights = weights.nan_to_num(0.0, 0.0, 0.0) + 1e-12  # a loss that is not finite is reported by the loss itself
-    chosen = torch.multinomial(weights, c.losses.entropy_points, replacement=True, generator=generator)
+    chosen = torch.multinomial(weights, c.constants.entropy_points, replacement=True, generator=generator)
     taken = points.albedo, points.roughness, points.metallic
     albedo, roughness, metallic = (x.index_select(0, chosen) for x in taken)
-    gloss = torch.cat([roughness, metallic], dim=1) / c.losses.gloss_width
-    x = torch.cat([torch.log(albedo + ALBEDO_FLOOR) / c.losses.albedo_width, gloss], dim=1)
+    gloss = torch.cat([roughness, metallic], dim=1) / c.constants.gloss_width
+    x = torch.cat([torch.log(albedo + ALBEDO_FLOOR) / c.constants.albedo_width, gloss], dim=1)
     return quadratic_entropy(x)
 
 
@@ -226,7 +226,7 @@ def occlusion_loss(
     Source: SplitNeRF Eq. (12)-(16).
     """
     random = torch.rand(len(ray.shaded), generator=generator, device=generator.device)
-    chosen = (random < config.occlusion.share).nonzero().squeeze(1)
+    chosen = (random < config.constants.occlusion_share).nonzero().squeeze(1)
     if len(chosen) == 0:
         return ray.shares.new_zeros(())
     truth = traced_factors(scene, occlusion_points(ray, chosen, config), environment, config, seed)
@@ -248,10 +248,10 @@ def traced_factors(
     scene: MeshScene, points: OcclusionPoints, environment: Tensor, config: Config, seed: int
 ) -> tuple[Tensor, Tensor]:
     """The factors o_d and o_s of points, see :func:`splitnerf.ops.occlusion_factors`."""
-    c = config.occlusion
+    n_rays, offset = config.constants.occlusion_rays, config.constants.occlusion_offset
     return occlusion_factors(
-        scene, *points, environment, n_diffuse_rays=c.rays, n_specular_rays=c.rays, offset=c.offset,
-        along_ray=c.ray_start == "ray", seed=seed, n_channels=c.channels,
+        scene, *points, environment, n_diffuse_rays=n_rays, n_specular_rays=n_rays, offset=offset, seed=seed,
+        n_channels=config.occlusion.channels,
     )  # fmt: skip
 
 
@@ -262,5 +262,5 @@ def occlusion_error(
 
     Source: SplitNeRF Eq. (16).
     """
-    error_d, error_s = (penalty(ours - traced, config.losses.occlusion_form) for ours, traced in zip(predicted, truth))
+    error_d, error_s = ((ours - traced).square() for ours, traced in zip(predicted, truth))
     return shares @ (error_d + error_s).sum(1) / (shares.sum().clamp(min=1e-8) * config.occlusion.channels)

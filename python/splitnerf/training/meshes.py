@@ -114,7 +114,7 @@ def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
         RuntimeError: The field is not finite.
     """
     try:
-        vertices, faces = extract_mesh(distances(network), model.config.surface.box, model.config.mesh.resolution)
+        vertices, faces = extract_mesh(distances(network), model.config.constants.box, model.config.mesh.resolution)
     except EmptyMesh:
         return None
     return traced(model, torch.from_numpy(vertices), torch.from_numpy(faces))

@@ -7,6 +7,8 @@ from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
 
 FEWEST, MOST = 0.9, 1.05  # shares of the sample budget between which the ray count stays; a step has room for 1.15
+VARIANCE_RATE, LIGHT_RATE = 0.001, 0.02  # of the surface's sharpness and of the pyramid's texels
+WEIGHT_DECAY = 0.01
 RAY_UNITS = 16  # `cuda_graphs` uses this many ray counts between one power of 2 and the next
 
 
@@ -18,12 +20,12 @@ def progress_of(config: Config, step: int, seconds: float) -> float:
 
 def cosine_anneal(config: Config, progress: float) -> float:
     """The annealing of the cosine at this progress: 0 at the start, 1 from ``cos_anneal_by`` of the run on."""
-    return min(1.0, progress / config.surface.cos_anneal_by) if config.surface.cos_anneal_by > 0 else 1.0
+    return min(1.0, progress / config.constants.cos_anneal_by) if config.constants.cos_anneal_by > 0 else 1.0
 
 
 def light_period(config: Config) -> int:
     """The number of steps that share one evaluation of the light's maps."""
-    return config.optimiser.light_step_every if config.light.kind == "pyramid" else 1
+    return config.constants.light_step_every if config.light.kind == "pyramid" else 1
 
 
 def light_moves(config: Config, step: int) -> bool:
@@ -46,12 +48,12 @@ def make_optimiser(model: SceneModel, config: Config) -> AdamW:
     """AdamW with the released code's settings; sharpness and light texels have their own rates and no decay."""
     c, grid = config, model.sdf_field.grid
     texels = [model.light.texels] if c.light.kind == "pyramid" else []
-    table = [grid.table] if c.optimiser.sparse_steps else []
+    table = [grid.table] if c.constants.sparse_steps else []
     apart = {id(p) for p in [model.variance, *texels, *table]}
     groups = [
-        ([p for p in model.parameters() if id(p) not in apart], c.optimiser.learning_rate, c.optimiser.weight_decay),
-        ([model.variance], c.optimiser.variance_learning_rate, 0.0), (texels, c.optimiser.light_learning_rate, 0.0),
-        (table, c.optimiser.learning_rate, c.optimiser.weight_decay),
+        ([p for p in model.parameters() if id(p) not in apart], c.constants.learning_rate, WEIGHT_DECAY),
+        ([model.variance], VARIANCE_RATE, 0.0), (texels, LIGHT_RATE, 0.0),
+        (table, c.constants.learning_rate, WEIGHT_DECAY),
     ]  # fmt: skip
     groups = [
         {"params": params, "rate": rate, "lr": rate, "weight_decay": decay, "sparse": params is table}
@@ -64,10 +66,10 @@ def make_optimiser(model: SceneModel, config: Config) -> AdamW:
 
 def set_learning_rate(optimiser: AdamW, config: Config, step: int, progress: float) -> None:
     """Linear warm-up over ``warmup_steps``, then exponential decay to ``final_learning_rate`` at the end."""
-    warmup = min(config.optimiser.warmup_steps / config.run.steps, 0.5)
+    warmup = min(config.constants.warmup_steps / config.run.steps, 0.5)
     decayed = max(0.0, (progress - warmup) / (1.0 - warmup))
     factor = (
-        min(1.0, (step + 1) / max(1, config.optimiser.warmup_steps)) * config.optimiser.final_learning_rate**decayed
+        min(1.0, (step + 1) / max(1, config.constants.warmup_steps)) * config.constants.final_learning_rate**decayed
     )
     for group in optimiser.param_groups:
         group["lr"] = group["rate"] * factor

@@ -105,7 +105,7 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
     """
     if not hull.any():
         return None
-    box, sizes = config.surface.box, {edge: grey_photos(photos, hull.device, edge) for edge in (FIRST_EDGE, EDGE)}
+    box, sizes = config.constants.box, {edge: grey_photos(photos, hull.device, edge) for edge in (FIRST_EDGE, EDGE)}
     depths, scores, margins = depth_maps(sizes[FIRST_EDGE], hull, box)
     spread = sizes[FIRST_EDGE].spread()
     if (margins > MARGIN).sum() <= CLEAR_SHARE * spread.masks.sum():

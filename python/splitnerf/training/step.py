@@ -105,7 +105,7 @@ class Step:
         """Renders found samples and takes the gradients; for ``capacity`` see
         :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
-        ray = render_rays(self.model, light, found, shades_per_ray=c.sampling.shades_per_ray, capacity=capacity)
+        ray = render_rays(self.model, light, found, shades_per_ray=c.constants.shades_per_ray, capacity=capacity)
         terms = loss_terms(
             self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen, self.late
         )
@@ -151,7 +151,7 @@ def loss_terms(
     Source: SplitNeRF Eq. (3), (11), (18) and the losses named in :mod:`splitnerf.training.losses`.
     """
     c, w, terms = model.config, model.config.losses, Terms()
-    has_priors = progress >= w.priors_from
+    has_priors = progress >= c.constants.priors_from
     # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
     terms.add(
         {"colour": CHANNELS * w.colour_weight, "mask": w.mask_weight or None},
@@ -165,17 +165,17 @@ def loss_terms(
     )
     terms.add(
         {
-            "metal": w.metal_weight if w.metal_regulariser else None,
+            "metal": w.metal_weight or None,
             "binary_metal": (has_priors and w.binary_metal_weight) or None,
             "dark_metal": w.dark_metal_weight or None,
         },
         material_losses(
-            ray.points.albedo.detach(), ray.points.metallic, ray.shares, smooth_l1=w.metal_form == "smooth_l1"
+            ray.points.albedo.detach(), ray.points.metallic, ray.shares
         ),
     )
     if has_priors and w.entropy_weight:
         terms.add({"entropy": w.entropy_weight}, losses.material_entropy_loss(ray, c, generator))
-    if model.light.needs_consistency_loss and w.light_weight and step % w.light_every == 0:
+    if model.light.needs_consistency_loss and w.light_weight:
         terms.add({"light": w.light_weight}, losses.light_loss(model.light, c, generator, step))
     if light_moves(c, step):  # once for all steps since the light last moved
         since = step % light_period(c) + 1

@@ -19,7 +19,7 @@ SUMMED: dict[str, object] = {"shading.method": "summed", "occlusion.kind": "bits
 PAPER: dict[str, dict[str, object]] = {
     "no occlusion averaging": {"occlusion.channels": 3},
     "split sum, occlusion by MLP, no occlusion loss": BY_MLP | {"losses.occlusion_weight": 0.0},
-    "no metal regulariser": {"losses.metal_regulariser": False},
+    "no metal regulariser": {"losses.metal_weight": 0.0},
     "mip-map light": {"light.kind": "pyramid"},
 }
 SWITCHES: dict[str, dict[str, object]] = {
@@ -45,7 +45,7 @@ SWITCHES: dict[str, dict[str, object]] = {
     "no material entropy": {"losses.entropy_weight": 0.0},
     "dark metals allowed": {"losses.dark_metal_weight": 0.0},
     "metals by halves": {"losses.binary_metal_weight": 0.0},
-    "no metal loss at all": {"losses.metal_regulariser": False, "losses.binary_metal_weight": 0.0, "losses.dark_metal_weight": 0.0},
+    "no metal loss at all": {"losses.metal_weight": 0.0, "losses.binary_metal_weight": 0.0, "losses.dark_metal_weight": 0.0},
 }
 # The references of rows that differ from the full method in more settings than the one that they are named after.
 REFERENCES = {

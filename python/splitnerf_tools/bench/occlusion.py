@@ -105,7 +105,7 @@ def error_charts(light_name: str, points: Points, quick: bool, rounds: int) -> l
     with torch.no_grad():
         errors = {key: [rms(a - b) for a, b in zip(call(), true)] for key, call in calls.items()}
         times = interleaved(calls, rounds)
-    cost, default = f"ms for {len(points.positions)} points, both factors", f"k = {preset('cpu').occlusion.directions}"
+    cost, default = f"ms for {len(points.positions)} points, both factors", f"k = {preset('cpu').constants.occlusion_directions}"
     return [
         chart_of(
             f"{factor}, {light_name} light", cost, "RMS error", times, {key: pair[k] for key, pair in errors.items()},
@@ -146,7 +146,7 @@ def independent(points: Points, n: int) -> tuple[Tensor, Tensor]:
 
 def ray_rates(name: str, points: Points, quick: bool, rounds: int) -> tuple[list[str], list[list[object]]]:
     """Mrays/s of our factors, with the making and summing of rays, beside tracers that get rays of the same lobes."""
-    n, half = len(points.positions), preset("cpu").occlusion.rays
+    n, half = len(points.positions), preset("cpu").constants.occlusion_rays
     cosine = F.normalize(points.normals[:, None] + F.normalize(torch.randn(n, half, 3), dim=-1), dim=-1)
     lobes = sample_ggx_lobe(points.axes, points.roughness, half, seed=0)
     directions = torch.cat([cosine, lobes], dim=1).reshape(-1, 3)

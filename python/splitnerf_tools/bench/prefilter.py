@@ -189,10 +189,10 @@ def run(quick: bool, rounds: int) -> Result:
 def defaults(config: Config, rho: float) -> list[tuple[str, str]]:
     """The library's defaults at a roughness: the pyramid, and the consistency loss's estimate for `light.kind =
     mlp`."""
-    narrow = ("own lobe", f"n = {config.losses.light_lobe_samples}")
-    wide = ("Fibonacci", f"n = {config.losses.light_samples}")
+    narrow = ("own lobe", f"n = {config.constants.light_lobe_samples}")
+    wide = ("Fibonacci", f"n = {config.constants.light_samples}")
     resolution = f"{config.light.resolution} x {config.light.resolution}"
-    return [("pyramid", resolution), narrow if rho < config.losses.light_lobe_below else wide]
+    return [("pyramid", resolution), narrow if rho < config.constants.light_lobe_below else wide]
 
 
 def relative_rms(estimates: list[Tensor], true: Tensor) -> float:

@@ -35,7 +35,7 @@ def training_asset(model: SceneModel, world_from_box: np.ndarray, resolution: in
         RuntimeError: A field is not finite.
     """
     surface = surface_of(model)
-    vertices, faces = extract_mesh(surface.sdf, model.config.surface.box, resolution)
+    vertices, faces = extract_mesh(surface.sdf, model.config.constants.box, resolution)
     albedo, roughness, metallic, normals = surface_materials(surface, vertices)
     pairs = np.clip(np.column_stack([roughness, metallic]), 0, 1)
     return Asset(
