@@ -199,7 +199,7 @@ def test_six_scenes_of_which_one_is_killed_and_one_damaged(data, tmp_path, call)
     words = (*scenes, "--out", out, "--steps", 400, "--set", "checkpoint_minutes=0.01")
     first = call(*words)
     os.kill(first.wait_until(lambda: worker_of(out / "ball")), signal.SIGKILL)
-    first.wait_until(lambda: "splitnerf: note: ball: its worker was killed; it goes on from its last checkpoint" in first.err)
+    first.wait_until(lambda: "splitnerf: note: ball: its worker was killed; it continues from its last checkpoint" in first.err)
     first.wait_until(lambda: sum((out / scene.name / "mesh.glb").exists() for scene in good) >= 2)
     first.program.send_signal(signal.SIGINT)
     assert first.end() == INTERRUPTED and "stopped; to continue, repeat the command." in first.out

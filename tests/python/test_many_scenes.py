@@ -21,7 +21,7 @@ from splitnerf_tools.batch import child
 from splitnerf_tools.batch.child import Outcome, Work, train_scene
 from splitnerf_tools.batch.cluster import LONGEST_FOLDER, Share, own_folder, share_of
 from splitnerf_tools.batch.job import Batch, run_batch
-from splitnerf_tools.batch.scenes import Rows, Scene, asked_scenes, keep_scenes, known_scenes, markdown, scene_name
+from splitnerf_tools.batch.scenes import Rows, Scene, requested_scenes, keep_scenes, known_scenes, markdown, scene_name
 from splitnerf_tools.commands.batch import given_options
 
 GB = 1e9
@@ -47,11 +47,11 @@ def test_two_folders_of_one_name_are_two_scenes_and_stay_so(tmp_path):
     """Whatever the order of a later call, and whatever is added to it."""
     first = [Path("/a/chair"), Path("/b/chair"), Path("/b/../a/chair/"), Path("/c/Chair")]
     known: list[Scene] = []
-    assert [s.name for s in asked_scenes(known, first)] == ["chair", "chair-2", "Chair-3"]
+    assert [s.name for s in requested_scenes(known, first)] == ["chair", "chair-2", "Chair-3"]
     keep_scenes(tmp_path, known)
     again = known_scenes(tmp_path)
     assert again == known
-    asked = asked_scenes(again, [Path("/d/chair"), Path("/c/Chair"), Path("/b/chair")])
+    asked = requested_scenes(again, [Path("/d/chair"), Path("/c/Chair"), Path("/b/chair")])
     assert [(s.name, s.data) for s in asked] == [("chair-4", "/d/chair"), ("Chair-3", "/c/Chair"), ("chair-2", "/b/chair")]
     assert [s.name for s in again] == ["chair", "chair-2", "Chair-3", "chair-4"]
 
@@ -148,7 +148,7 @@ def test_a_share_is_what_the_user_says():
 
 @pytest.mark.parametrize("asked", [dict(cores=3), dict(gpus=1), dict(memory=7)])
 def test_more_than_a_machine_has_is_refused(asked):
-    with pytest.raises(InputError, match="no machine offers .*; ask for less by --cores-per-scene"):
+    with pytest.raises(InputError, match="no machine offers .*; request less by --cores-per-scene"):
         share_of([LAPTOP], 1, **NOTHING_ASKED | asked)
     with pytest.raises(InputError, match="no machine offers 2 cores, 1 GPU and 1 GB"):  # one has the cores, the other the GPUs
         share_of([{**NODE, "GPU": 0.0}, {**NODE, "CPU": 1.0}], 1, cores=2, gpus=1, memory=1)
@@ -217,7 +217,7 @@ def test_a_damaged_scene_is_refused_with_its_last_word(tmp_path):
 )  # fmt: skip
 def test_the_last_word_says_why(tmp_path, said, code, error):
     (tmp_path / "log").write_text("splitnerf: of an earlier one\n" + said)
-    assert child.last_word(tmp_path / "log", 29, code) == error
+    assert child.failure_line(tmp_path / "log", 29, code) == error
 
 
 def test_a_run_in_use_is_waited_for_and_then_left_alone(tmp_path, monkeypatch):
@@ -347,7 +347,7 @@ class PretendRay:
 def batch_of(tmp_path: Path, ends: dict[str, list], retries: int = 3) -> tuple:
     """A batch that ran with a pretended Ray; its rows and notes, and whether all came to an end."""
     known, rows, notes = known_scenes(tmp_path), [], []
-    asked = asked_scenes(known, [Path(data) for data in ends])
+    asked = requested_scenes(known, [Path(data) for data in ends])
     row = lambda scene: rows.append((scene.name, scene.state))  # noqa: E731
     batch = Batch(tmp_path, known, asked, ["--steps=4"], retries, row, notes.append)
     ray = PretendRay({data: list(end) for data, end in ends.items()})
@@ -389,7 +389,7 @@ def test_retries_come_to_an_end(tmp_path):
     memory = ERRORS.OutOfMemoryError()
     batch, ray, rows, notes, ended = batch_of(tmp_path, {"/a": [LOST, LOST, memory]}, retries=2)
     assert ended and rows == [("a", "failed")] and len(notes) == 2
-    assert batch.scenes[0].error == "was ended for want of memory (--memory-per-scene)"
+    assert batch.scenes[0].error == "ran out of memory (--memory-per-scene)"
 
 
 def test_an_interrupt_cancels_all_and_waits_for_them(tmp_path):

@@ -1,7 +1,8 @@
-"""A scene's training as a process of its own, where Ray placed it. Imports neither torch nor Ray: a worker stays small.
+"""A scene's training as a process of its own, where Ray placed it. Imports neither torch nor Ray, so that a worker
+stays small.
 
-As a program (``python -m splitnerf_tools.batch.child PARENT COMMAND...``) it becomes the command, which the system then asks to end
-when its parent ends, however that ends.
+As a program (``python -m splitnerf_tools.batch.child PARENT COMMAND...``) it becomes the command, which receives
+SIGTERM when its parent ends, however that ends.
 """
 
 from __future__ import annotations
@@ -19,19 +20,19 @@ from splitnerf.errors import plain
 from splitnerf.files import is_locked
 
 PR_SET_PDEATHSIG = 1  # of Linux's prctl
-POLL, TIMEOUT = 0.2, 120.0  # seconds: between looks at the process, and for an earlier one to leave the folder
+POLL, TIMEOUT = 0.2, 120.0  # seconds: between polls of the process, and for an earlier one to leave the folder
 MOST_WORDS = 500  # letters of an error
 
 
 class Work(NamedTuple):
-    """What a worker needs to know.
+    """The task of a worker.
 
     Attributes:
         data: The scene's folder.
         run: The folder of its run.
-        options: Of `splitnerf train`.
-        threads: Of the process.
-        log: The file that its words are added to.
+        options: The options of `splitnerf train`.
+        threads: The number of threads of the process.
+        log: The file that its output is appended to.
     """
 
     data: str
@@ -46,8 +47,8 @@ class Outcome(NamedTuple):
 
     Attributes:
         code: Its exit code; negative, the signal that killed it. None where it was not started.
-        error: Its last word where it failed, one line.
-        stopped: Whether it was asked to end.
+        error: One line with the reason of a failure.
+        stopped: Whether it was interrupted.
     """
 
     code: int | None
@@ -58,13 +59,13 @@ class Outcome(NamedTuple):
 def train_scene(work: Work) -> Outcome:
     """Runs ``splitnerf train DATA --out RUN --resume auto`` to its end.
 
-    KeyboardInterrupt, by which Ray cancels a task, asks it to save its state and waits for that.
+    KeyboardInterrupt, by which Ray cancels a task, makes it save its state, and is waited for.
     """
     stopped = False
     if not _free(Path(work.run)):
         return Outcome(None, f"{work.run}: is in use by another program", False)
     command = [sys.executable, "-m", "splitnerf", "train", work.data, "--out", work.run, "--resume", "auto", *work.options]
-    hidden = ("RAY_AUTH_TOKEN", "RAY_AUTH_MODE")  # of no use there
+    hidden = ("RAY_AUTH_TOKEN", "RAY_AUTH_MODE")  # not needed there
     environment = {key: value for key, value in os.environ.items() if key not in hidden}
     environment |= {"OMP_NUM_THREADS": str(work.threads), "PYTHONUNBUFFERED": "1"}
     os.makedirs(os.path.dirname(work.log), exist_ok=True)
@@ -85,11 +86,11 @@ def train_scene(work: Work) -> Outcome:
             child.wait()
             if not stopped:
                 raise
-    return Outcome(child.returncode, last_word(Path(work.log), begin, child.returncode), stopped)
+    return Outcome(child.returncode, failure_line(Path(work.log), begin, child.returncode), stopped)
 
 
-def last_word(log: Path, begin: int, code: int) -> str:
-    """Why a process failed, by what it wrote into a log from a byte on; empty where it did not."""
+def failure_line(log: Path, begin: int, code: int) -> str:
+    """The reason of a failure, from the log from a byte on; empty where there was none."""
     if code == 0:
         return ""
     if code < 0:
@@ -102,7 +103,7 @@ def last_word(log: Path, begin: int, code: int) -> str:
 
 
 def _free(run: Path) -> bool:
-    """Waits for an earlier process to leave a run's folder: one whose worker was killed saves its state."""
+    """Waits for an earlier process to leave a run's folder; one whose worker was killed still saves its state."""
     until = time.monotonic() + TIMEOUT
     while is_locked(run):
         if time.monotonic() > until:
@@ -112,8 +113,8 @@ def _free(run: Path) -> bool:
 
 
 def become(parent: int, command: list[str]) -> None:
-    """Becomes a command that is asked to end (SIGTERM) when the parent of this process ends. Other systems than Linux cannot do
-    that; there it goes on to its own end."""
+    """Becomes a command that receives SIGTERM when the parent of this process ends. On systems other than Linux it runs
+    to its own end."""
     signal.pthread_sigmask(signal.SIG_SETMASK, [])  # Ray blocks Ctrl-C in its own
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -1,4 +1,4 @@
-"""Ray, here or on a cluster: how it is started, and which share of a machine a scene gets."""
+"""Ray, here or on a cluster: its start, and the share of a machine for a scene."""
 
 from __future__ import annotations
 
@@ -24,20 +24,22 @@ from splitnerf_tools.doctor.machine import GIB, TRAINING_GIB, processors
 GB = 1e9
 TRAINING = TRAINING_GIB * GIB / GB  # GB of memory of a training without its photos
 MEMORY = 4.0  # GB of a scene, photos included
-GPU = 0.25  # of a scene: four at once made a third more steps together than one alone did on an H100, see docs/cuda.md
+GPU = 0.25  # of a scene: four at once made a third more steps than one alone on an H100, see docs/cuda.md
 TIMEOUT = 10.0  # seconds for a cluster to answer
 OBJECT_STORE = 100 << 20  # bytes; results are small
 SHARE_OF_FREE = 0.9  # of the free memory of this machine, for the scenes
-LONGEST_FOLDER = 37  # letters of the folder of Ray's own: its sockets' paths have 64 more, and a system allows 103
-# Read when Ray is imported: no report of its use, sockets on 127.0.0.1 alone, and answers to those alone who have the token.
+LONGEST_FOLDER = 37  # letters of Ray's folder: its sockets' paths have 64 more, and the system allows 103
+# Read when Ray is imported: no report of its use, sockets on 127.0.0.1 alone, and answers to those alone who have the
+# token.
 NO_REPORT = {"RAY_USAGE_STATS_ENABLED": "0"}
 ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
-NO_KILL = {"RAY_kill_child_processes_on_worker_exit": "false"}  # they save their state, see splitnerf_tools.batch.child.become
+# they save their state, see splitnerf_tools.batch.child.become
+NO_KILL = {"RAY_kill_child_processes_on_worker_exit": "false"}
 
 
 @dataclass(frozen=True)
 class Share:
-    """What a scene gets of a machine: cores and GPUs, which may be fractions, and GB of memory."""
+    """The share of a machine for a scene: cores and GPUs, which may be fractions, and GB of memory."""
 
     cores: float
     gpus: float
@@ -45,12 +47,12 @@ class Share:
 
     @property
     def threads(self) -> int:
-        """Of a training."""
+        """The number of threads of a training."""
         return max(1, int(self.cores))
 
     @property
     def photos(self) -> float:
-        """GB of its memory that its photos may take; more are read from a file."""
+        """GB of memory for its photos; more are read from a file."""
         return max(self.memory - TRAINING, self.memory / 4)
 
     def __str__(self) -> str:
@@ -65,14 +67,14 @@ def share_of(
     """The share of each of some scenes.
 
     Args:
-        machines: What Ray says that each has: "CPU", "GPU", "memory" in bytes.
+        machines: The resources of each by Ray: "CPU", "GPU", "memory" in bytes.
         n_scenes: The number of scenes; cores are divided among them, and each gets at least one.
-        cores, gpus, memory: What the user asks for, memory in GB; None for what a training needs.
-        photos: GB that the photos of a scene may take; None for what its memory leaves.
+        cores, gpus, memory: The requests of the user, memory in GB; None for the needs of a training.
+        photos: GB for the photos of a scene; None for the rest of its memory.
         whole_gpu: Whether a training fills a GPU.
 
     Raises:
-        InputError: No machine has as much.
+        InputError: No machine has that much.
     """
     most = {key: max((machine.get(key, 0.0) for machine in machines), default=0.0) for key in ("CPU", "GPU", "memory")}
     if cores is None:
@@ -85,7 +87,7 @@ def share_of(
     share = Share(cores, gpus, memory)
     if not any(all(need <= machine.get(key, 0.0) for key, need in needs.items()) for machine in machines):
         raise InputError(
-            f"no machine offers {share}; ask for less by --cores-per-scene, --gpus-per-scene or --memory-per-scene"
+            f"no machine offers {share}; request less by --cores-per-scene, --gpus-per-scene or --memory-per-scene"
         )
     return share
 
@@ -94,10 +96,10 @@ def share_of(
 def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
     """Ray, connected to a cluster, or started on this machine and ended with the block.
 
-    What Ray says goes into a file of the batch's logs. Signals to end raise KeyboardInterrupt within the block.
+    Ray's output goes into a file of the batch's logs. Signals to end raise KeyboardInterrupt within the block.
 
     Args:
-        address: Of the cluster's head; None for this machine.
+        address: The address of the cluster's head; None for this machine.
         out: The batch's folder.
 
     Raises:
@@ -106,7 +108,8 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
     if find_spec("ray") is None:
         raise InputError("batch needs the package ray: pip install 'splitnerf[batch]'")
     os.environ.update(NO_REPORT if address else NO_REPORT | ALONE | NO_KILL | {"RAY_AUTH_TOKEN": secrets.token_hex(32)})
-    if address and Path("~/.ray/auth_token").expanduser().is_file():  # `ray start` wrote it, and its cluster asks for it
+    # `ray start` wrote it, and its cluster asks for it
+    if address and Path("~/.ray/auth_token").expanduser().is_file():
         os.environ.setdefault("RAY_AUTH_MODE", "token")
     import ray
 
@@ -124,7 +127,7 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
                             logging_level="error", log_to_driver=False, _temp_dir=own,
                             _memory=int(SHARE_OF_FREE * memory_bytes()[1]),
                         )  # fmt: skip
-                with ended_by_signals():  # Ray put one of its own in the place of SIGTERM's
+                with ended_by_signals():  # Ray replaced the handler of SIGTERM
                     yield ray
             finally:
                 ray.shutdown()
@@ -133,13 +136,13 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
 
 
 def machines_of(ray: ModuleType) -> list[dict[str, float]]:
-    """What each machine of Ray's has."""
+    """The resources of each machine of Ray."""
     return [node["Resources"] for node in ray.nodes() if node["Alive"] and node["Resources"].get("CPU")]
 
 
 @contextmanager
 def _compiled_words_to(log: TextIO) -> Iterator[None]:
-    """Within the block standard error is a file, for compiled code too, which knows nothing of Python's streams."""
+    """Redirects standard error to a file within the block, for compiled code too."""
     kept = os.dup(2)
     os.dup2(log.fileno(), 2)
     try:
@@ -161,7 +164,7 @@ def _connect(ray: ModuleType, address: str) -> None:
 
 
 def own_folder() -> str:
-    """A folder for Ray's sockets and logs that no other user reads, with a short name."""
+    """A private folder with a short name for Ray's sockets and logs."""
     place = tempfile.gettempdir()
     if len(place) > LONGEST_FOLDER - len("/sn-12345678"):
         place = "/tmp"

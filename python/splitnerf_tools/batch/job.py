@@ -14,27 +14,27 @@ from splitnerf_tools.batch.child import Outcome, Work, train_scene
 from splitnerf_tools.batch.cluster import GB, Share
 from splitnerf_tools.batch.scenes import DONE, FAILED, LOGS, REFUSED, STOPPED, WAITING, Scene, keep_scenes
 
-LOOK = 1.0  # seconds between looks at the tasks
+LOOK = 1.0  # seconds between polls of the tasks
 REFUSAL, INTERRUPTION = 2, 130  # exit codes of the command line
 
 
 @dataclass(frozen=True)
 class Batch:
-    """What a call is to do.
+    """The plan of a call.
 
     Attributes:
         out: The batch's folder.
-        scenes: All scenes that the folder knows.
-        asked: Those of this call.
-        options: Of `splitnerf train`.
-        retries: How often a scene whose process was killed is begun again.
+        scenes: All scenes of the folder.
+        requested: The scenes of this call.
+        options: The options of `splitnerf train`.
+        retries: How often a scene whose process was killed is restarted.
         row: Called with each scene that ended.
-        note: Called with a line on what happened to a scene.
+        note: Called with a line on an event.
     """
 
     out: Path
     scenes: list[Scene]
-    asked: list[Scene]
+    requested: list[Scene]
     options: list[str]
     retries: int
     row: Callable[[Scene], None]
@@ -66,14 +66,14 @@ def run_batch(ray: ModuleType, batch: Batch, share: Share) -> bool:
         killed = not outcome.stopped and outcome.code is not None and (outcome.code < 0 or outcome.code == INTERRUPTION)
         if killed and not stopping and attempt <= batch.retries:
             retry = f"retry {attempt} of {batch.retries}"
-            batch.note(f"{scene.name}: {outcome.error}; it goes on from its last checkpoint, {retry}")
+            batch.note(f"{scene.name}: {outcome.error}; it continues from its last checkpoint, {retry}")
             return begin(scene, attempt + 1)
         conclude(scene, batch.out / scene.name, outcome, stopping)
         keep_scenes(batch.out, batch.scenes)
         batch.row(scene)
 
     try:
-        for scene in batch.asked:
+        for scene in batch.requested:
             scene.state, scene.error, scene.scores = WAITING, "", {}
             begin(scene)
         keep_scenes(batch.out, batch.scenes)
@@ -92,14 +92,14 @@ def run_batch(ray: ModuleType, batch: Batch, share: Share) -> bool:
 
 
 def outcome_of(ray: ModuleType, reference: object) -> Outcome:
-    """What a task found; where Ray lost it, as if its process had been killed."""
+    """The outcome of a task; a task that Ray lost counts as killed."""
     errors = ray.exceptions
     try:
         return ray.get(reference)
     except errors.TaskCancelledError:
         return Outcome(None, "", True)
     except errors.OutOfMemoryError:
-        return Outcome(-signal.SIGKILL, "was ended for want of memory (--memory-per-scene)", False)
+        return Outcome(-signal.SIGKILL, "ran out of memory (--memory-per-scene)", False)
     except (errors.WorkerCrashedError, errors.NodeDiedError, errors.ObjectLostError):
         return Outcome(-signal.SIGKILL, "its worker was killed", False)
     except errors.RayError as error:  # of the task itself: the machine lacks the package, or cannot write
@@ -108,7 +108,7 @@ def outcome_of(ray: ModuleType, reference: object) -> Outcome:
 
 
 def conclude(scene: Scene, run: Path, outcome: Outcome, stopping: bool) -> None:
-    """Puts down what became of a scene."""
+    """Records the outcome of a scene."""
     last = (read_metrics(run / METRICS) or [{}])[-1]
     scene.steps, scene.minutes = last.get("step"), last.get("seconds", 0.0) / 60
     if outcome.code == 0:

@@ -1,4 +1,4 @@
-"""The scenes of a batch: their names, what became of them, the file that keeps it, and the table."""
+"""The scenes of a batch: names, outcomes, the file that stores them, and the table."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ UNITS = "PSNR in dB, normals in degrees"
 
 @dataclass
 class Scene:
-    """A scene and what became of it.
+    """A scene and its outcome.
 
     Attributes:
-        name: Of its run, in the batch's folder.
+        name: The name of its run, in the batch's folder.
         data: Its folder, an absolute path.
         state: One of "waiting", "done", "failed", "refused" (bad input) and "stopped".
         steps: Optimiser steps; None before the first.
         minutes: Time of training, and of the refinement where the scene is done.
-        scores: Scores by the titles of :data:`COLUMNS`, those that there are.
-        error: Why it failed, one line.
+        scores: Scores by the titles of :data:`COLUMNS`, as far as known.
+        error: The reason of a failure, one line.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Scene:
 
 def scene_name(data: str, taken: Iterable[str]) -> str:
     """A name for a scene's run: that of its folder, without what is unsafe in a file system, a shell or a terminal, and
-    with a number where it is taken. Case does not tell names apart."""
+    with a number where it is taken. Names that differ by case only are equal."""
     safe = re.sub(r"[^\w.+=@-]+", "_", os.path.basename(data), flags=re.ASCII).lstrip(".-")[:MOST_LETTERS] or "scene"
     own = {STATE, TABLE, LOGS, "lock", "ray"}  # logs/ray.log is Ray's
     used = {name.lower() for name in (*taken, *own)}
@@ -82,10 +82,10 @@ def scene_name(data: str, taken: Iterable[str]) -> str:
 
 
 def known_scenes(out: Path) -> list[Scene]:
-    """The scenes of earlier calls; none where there was none.
+    """The scenes of earlier calls.
 
     Raises:
-        InputError: The file that keeps them cannot be read.
+        InputError: The file that stores them cannot be read.
     """
     path = out / STATE
     if not path.exists():
@@ -97,10 +97,10 @@ def known_scenes(out: Path) -> list[Scene]:
     try:
         return [Scene(**{key: entry[key] for key in names}) for entry in content["scenes"]]
     except (KeyError, TypeError):
-        raise InputError(f"{path}: is damaged; remove it, the runs beside it stay and are gone on with") from None
+        raise InputError(f"{path}: is damaged; remove it: the runs stay and are continued") from None
 
 
-def asked_scenes(known: list[Scene], folders: Sequence[Path]) -> list[Scene]:
+def requested_scenes(known: list[Scene], folders: Sequence[Path]) -> list[Scene]:
     """The scenes of these folders, each once; new ones join the known, which keep their names."""
     by_data = {scene.data: scene for scene in known}
     for data in map(os.path.abspath, folders):
@@ -111,7 +111,7 @@ def asked_scenes(known: list[Scene], folders: Sequence[Path]) -> list[Scene]:
 
 
 def keep_scenes(out: Path, scenes: Sequence[Scene]) -> None:
-    """Writes what became of the scenes, and the table."""
+    """Writes the outcomes and the table."""
     write_json(out / STATE, {"format": FORMAT, "scenes": [asdict(scene) for scene in scenes]})
     with atomic_path(out / TABLE) as temporary:
         temporary.write_text(markdown(scenes), encoding="utf-8", errors="backslashreplace")
@@ -127,7 +127,7 @@ class Rows:
         return self._row("scene", ["state", "steps", "minutes", *(title for title, *_ in COLUMNS)])
 
     def row(self, scene: Scene) -> str:
-        """A scene's row; why it failed stands in the place of its scores."""
+        """A scene's row; the reason of a failure replaces its scores."""
         name = scene.name if len(scene.name) <= LONGEST else scene.name[: LONGEST - 1] + "~"
         if scene.state == DONE or not scene.error:
             return self._row(name, scene.cells())
@@ -149,6 +149,6 @@ def markdown(scenes: Sequence[Scene]) -> str:
 
 
 def _cell(text: str) -> str:
-    """A text that cannot end its cell, nor be taken for Markdown or HTML."""
+    """A text escaped for a cell of a Markdown table."""
     text = plain(text).replace("&", "&amp;").replace("<", "&lt;")
     return "".join("\\" + c if c in "\\|`*_[]" else c for c in text)

@@ -24,7 +24,7 @@ SETTLING = 0.004  # seconds of pause before each measurement, since threads of t
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds of one call: the median of the rounds, and the quartiles beside it."""
+    """Seconds of one call: the median of the rounds, and the quartiles."""
 
     seconds: float
     low: float

@@ -1,4 +1,4 @@
-"""The hash grid encoding: throughput forward and backward, beside plain torch and Dr.Jit, and the machine's gathers."""
+"""The hash grid encoding: throughput forward and backward, with plain torch, Dr.Jit and the machine's gathers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Normals of a distance field: the analytic gradient beside finite differences, time against angle.
+"""Normals of a distance field: the analytic gradient and finite differences, time against angle.
 
 The field is fitted to a surface with known normals, so that two errors can be measured: that against the field's own
 gradient in float64, and that against the fitted surface.

@@ -1,4 +1,4 @@
-"""Occlusion factors: rays or bits against error, and rays a second beside other tracers."""
+"""Occlusion factors: rays or bits against error, and rays a second with other tracers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The path tracer: time against error, beside Mitsuba 3, on one textured asset.
+"""The path tracer: time against error, with Mitsuba 3, on one textured asset.
 
 Both trace the same triangles, textures (base colour, roughness, metallic; no normal map), light and camera, with
 next-event estimation, multiple importance sampling and paths of up to 5 scattering events. Mitsuba's BSDF is

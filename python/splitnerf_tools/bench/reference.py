@@ -176,8 +176,9 @@ def split_sum_shade(
     normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d, lut, mode, compensate,
     indirect_s=None, indirect_d=None,
 ) -> Tensor:  # fmt: skip
-    """(1 - metallic) kept albedo (o_d L_d + I_d) + E (o_s L_s + I_s). Mode exact: E of metal and dielectric, mixed, and the
-    dielectric's 1 - E; paper and code: E = F F1 + F2 and 1 - F. Without `diffuse`, `specular` holds L_s of all and then L_d."""
+    """(1 - metallic) kept albedo (o_d L_d + I_d) + E (o_s L_s + I_s). Mode exact: E of metal and dielectric, mixed, and
+    the dielectric's 1 - E; paper and code: E = F F1 + F2 and 1 - F. Without `diffuse`, `specular` holds L_s of all and
+    then L_d."""
     _, cosine = facing(normals, view_dirs)
     f1, f2, _, layer = brdf_table(lut, cosine, roughness).split(1, 1)
     if mode:
@@ -198,8 +199,8 @@ def split_sum_shade(
 def shade_sums(
     normals, view_dirs, albedo, roughness, metallic, sums, lut, compensate, other=None, share=None
 ) -> Tensor:
-    """Radiance reflected from sums [n, 4, 3] over the light: of the lobe, with Schlick's factor (1 - v.h)^5, of the diffuse
-    light, and with the exact Fresnel factor. With `other` its difference to that radiance, times `share`."""
+    """Radiance reflected from sums [n, 4, 3] over the light: of the lobe, with Schlick's factor (1 - v.h)^5, of the
+    diffuse light, and with the exact Fresnel factor. With `other` its difference to that radiance, times `share`."""
     specular, grazing, diffuse, dielectric = sums.unbind(1)
     _, cosine = facing(normals, view_dirs)
     f1, f2, _, layer = brdf_table(lut, cosine, roughness).split(1, 1)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def training_options() -> argparse.ArgumentParser:
-    """The options that go to each scene's `splitnerf train`."""
+    """The options of each scene's `splitnerf train`."""
     parser = argparse.ArgumentParser(add_help=False)
     group = parser.add_argument_group("options of each scene's `splitnerf train`")
     add_training_options(group)
@@ -54,15 +54,15 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.files import locked
     from splitnerf_tools.batch.cluster import machines_of, ray_on, share_of
     from splitnerf_tools.batch.job import Batch, run_batch
-    from splitnerf_tools.batch.scenes import LOGS, TABLE, UNITS, Rows, asked_scenes, known_scenes
+    from splitnerf_tools.batch.scenes import LOGS, TABLE, UNITS, Rows, requested_scenes, known_scenes
     from splitnerf_tools.batch.scenes import DONE as SCENE_DONE
 
     check_usage(args)
     refuse_data(args.out)
     with locked(args.out):
         known = known_scenes(args.out)
-        asked = asked_scenes(known, args.scenes)
-        rows, out, err = Rows(asked), sys.stdout, sys.stderr  # Ray's words go elsewhere, see ray_on
+        requested = requested_scenes(known, args.scenes)
+        rows, out, err = Rows(requested), sys.stdout, sys.stderr  # Ray's output goes elsewhere, see ray_on
 
         def note(text: str) -> None:
             print(f"splitnerf: note: {escaped(text)}", file=err, flush=True)
@@ -70,28 +70,28 @@ def run(args: argparse.Namespace) -> int:
         def row(scene: Scene) -> None:
             print(escaped(rows.row(scene)), file=out, flush=True)
 
-        batch = Batch(args.out, known, asked, given_options(args), args.retries, row, note)
+        batch = Batch(args.out, known, requested, given_options(args), args.retries, row, note)
         with ray_on(args.address, args.out) as ray:
             share = share_of(
-                machines_of(ray), len(asked), cores=args.cores_per_scene, gpus=args.gpus_per_scene,
+                machines_of(ray), len(requested), cores=args.cores_per_scene, gpus=args.gpus_per_scene,
                 memory=args.memory_per_scene, photos=args.max_memory, whole_gpu=args.preset == "paper",
             )  # fmt: skip
-            note(f"{len(asked)} scenes, {share} each")
+            note(f"{len(requested)} scenes, {share} each")
             print(rows.head(), file=out, flush=True)
             all_ended = run_batch(ray, batch, share)
-    counts = Counter(scene.state for scene in asked)
+    counts = Counter(scene.state for scene in requested)
     print(f"{', '.join(f'{count} {state}' for state, count in counts.items())} ({UNITS}); table: {args.out / TABLE}")
     if not all_ended:
         print("stopped; to continue, repeat the command.")
         return INTERRUPTED
-    if counts[SCENE_DONE] == len(asked):
+    if counts[SCENE_DONE] == len(requested):
         return DONE
     print(f"what each scene said: {args.out / LOGS}")
     return FAILED
 
 
 def check_usage(args: argparse.Namespace) -> None:
-    """Raises InputError where an option makes no sense, before a scene begins."""
+    """Raises InputError where an option is invalid, before a scene begins."""
     from splitnerf.config import preset
 
     for name in ("cores_per_scene", "memory_per_scene"):

@@ -1,4 +1,4 @@
-"""The 3D view's asset: the GLB as it is, or with smaller textures where it would make the page large."""
+"""The asset of the 3D view: the GLB as it is, or with smaller textures to limit the page."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def asset_section(path: Path | None) -> dict | None:
 
 
 def fitted(path: Path, most_bytes: int) -> tuple[bytes | None, str]:
-    """The bytes of a GLB, at most so many, and a line about what was changed: textures whose longer side has more pixels than
-    2048, 1024, 512 or 256 are averaged down, as far as is needed. None where even the last does not help.
+    """The bytes of a GLB, at most so many, and a line about what was changed: textures whose longer side has more
+    pixels than 2048, 1024, 512 or 256 are averaged down, as far as is needed. None where even the last does not help.
 
     Raises:
         InputError: It is no GLB.
@@ -77,7 +77,8 @@ def with_smaller_textures(document: Document, side: int) -> bytes:
 
 
 def smaller_image(content: bytes, side: int) -> bytes | None:
-    """An encoded image as a PNG of at most `side` pixels a side, by averages of whole blocks; None where it is so already."""
+    """An encoded image as a PNG of at most `side` pixels a side, by averages of whole blocks; None where it is so
+    already."""
     with Image.open(io.BytesIO(content)) as image:
         factor = math.ceil(max(image.size) / side)
         if factor == 1:

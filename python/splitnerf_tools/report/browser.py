@@ -1,4 +1,4 @@
-"""What the scripts of pages read: JSON, packed bytes, pictures of 16-bit floats, and what three.js is told of an asset."""
+"""Data for the scripts of pages: JSON, packed bytes, pictures of 16-bit floats, and the first camera."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ BRIGHTEST_HALF = float(np.finfo(np.float16).max)
 
 
 def script_json(content: object) -> Markup:
-    """JSON that may stand in an element of a page: no text in it ends the element, and what is not finite is null."""
+    """JSON that is safe in an element of a page: no text in it ends the element, and numbers that are not finite are
+    null."""
     return htmlsafe_json_dumps(_finite(content), dumps=partial(json.dumps, allow_nan=False, separators=(",", ":")))
 
 
@@ -29,8 +30,8 @@ def packed(content: bytes) -> str:
 
 
 def as_halves(pixels: np.ndarray) -> tuple[int, int, bytes]:
-    """(width, height, float16 RGBA, row by row from the top) of [h, w, 3 | 4]; a fourth channel that is missing is 1, and what
-    halves cannot hold becomes their largest number, 65504."""
+    """(width, height, float16 RGBA, row by row from the top) of [h, w, 3 | 4]; a fourth channel that is missing is 1,
+    and what halves cannot hold becomes their largest number, 65504."""
     if pixels.shape[2] == 3:
         pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
     return pixels.shape[1], pixels.shape[0], np.minimum(pixels, BRIGHTEST_HALF).astype("<f2").tobytes()

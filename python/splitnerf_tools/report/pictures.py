@@ -1,4 +1,4 @@
-"""Pictures as they stand in the page."""
+"""Pictures within the page."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ WEBP_EFFORT = 30  # of 100
 
 
 def data_uri(pixels: np.ndarray) -> Markup:
-    """The picture [H, W, 1 | 3 | 4] within the page: as a PNG, or of more than 200 x 200 pixels as a WebP without loss, a third
-    of a PNG's size."""
+    """Encodes an image [H, W, 1 | 3 | 4] as a data URI: PNG, or lossless WebP above 200 x 200 pixels, a third of its
+    size."""
     if pixels.shape[0] * pixels.shape[1] <= SMALL or not features.check("webp"):
         return _uri("png", encode_png(pixels))
     codes, file = to_uint8(pixels), io.BytesIO()

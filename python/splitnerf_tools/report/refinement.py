@@ -1,4 +1,4 @@
-"""The report's section on the refinement: what it changed."""
+"""The report's section on the changes by the refinement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report of a run: what it delivers beside the truth."""
+"""The report of a run: its result compared with the truth."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ROUGHNESS = (0.0, 0.25, 0.5, 1.0)  # of the light's panels
 
 
 def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings: dict[str, float]) -> None:
-    """report.html: maps beside the truth, what the refinement changed, the light, curves and settings."""
+    """Writes report.html: maps and truth, the changes by the refinement, the light, curves and settings."""
     views, predictions, truths = evaluated.dataset, evaluated.predictions, evaluated.truths
     shown = spread(range(len(views)), REPORT_VIEWS)
     pages = []
@@ -58,7 +58,7 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
 
 
 def refinement_page(run: Path, views: Dataset, predictions: list[dict], shown: list[int], scores: dict) -> dict | None:
-    """What the report shows of the refinement, see :func:`splitnerf_tools.report.write_report`; None where a file
+    """The report's data on the refinement, see :func:`splitnerf_tools.report.write_report`; None where a file
     that it shows is gone."""
     source = run / TRAINED
     if not all((folder / name).is_file() for folder in (source, run) for name in ASSET_FILES[:2]):
@@ -95,7 +95,7 @@ def headline(evaluation: dict) -> dict[str, float]:
 
 @torch.no_grad()
 def light_panels(model: SceneModel, height: int = 64, n_samples: int = 8192) -> list[dict]:
-    """g(w, rho) beside its Monte Carlo estimate from g(w, 0), as [height, 2 height, 3] maps."""
+    """g(w, rho) and its Monte Carlo estimate from g(w, 0), as [height, 2 height, 3] maps."""
     sources = fibonacci_directions(n_samples, torch.Generator(model.device).manual_seed(0))
     maps = model.light.evaluate()
     light = torch.cat([maps(d, torch.zeros_like(d[:, :1])) for d in sources.split(1 << 15)])

@@ -27,7 +27,7 @@ MOST_PIXELS = 512  # of a picture's longer side
 
 
 def comparison(left: str, right: str, kind: str) -> dict:
-    """What the page needs to compare two pictures by their names."""
+    """The page's data to compare two pictures, by their names."""
     return {"left": left, "right": right, "kind": kind, "largest": LARGEST_ERRORS[kind]}
 
 

@@ -1,4 +1,5 @@
-"""Writes rendered views as a dataset, in the layouts that hold full truth; all others are in :mod:`splitnerf_tools.synth.layouts`.
+"""Writes rendered views as a dataset, in the layouts that hold full truth; all others are in
+:mod:`splitnerf_tools.synth.layouts`.
 
 Layouts:
     blender     `transforms_{train,test}.json`, `{train,test}/r_000.png`; for test views also `_albedo.png`, `_orm.png`
@@ -7,8 +8,8 @@ Layouts:
                 `albedo.png`, `normal.png` and `rgba_<map>.png`.
     tensoir     the same, with truth for the train views too.
 
-In the dataset's folder of each: `light.hdr`, `relight_<map>.hdr`, `mesh.ply`. Colours are sRGB with straight alpha (but the
-albedo of nerfactor and tensoir is linear), normals world space without the normal map.
+In the dataset's folder of each: `light.hdr`, `relight_<map>.hdr`, `mesh.ply`. Colours are sRGB with straight alpha (but
+the albedo of nerfactor and tensoir is linear), normals world space without the normal map.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ Maps = dict[str, np.ndarray]
 
 
 class Writer(Protocol):
-    """What a layout's class takes, see :class:`SceneWriter`; `close` writes the files that name the views, last.
+    """The interface of a layout's class, see :class:`SceneWriter`; `close` writes the files that name the views, last.
 
     Attributes:
         root: The folder to train on.

@@ -1,4 +1,4 @@
-"""How rendered views are written: a class a layout, each a :class:`splitnerf_tools.synth.writer.Writer`."""
+"""Writers of rendered views: a class for each layout, each a :class:`splitnerf_tools.synth.writer.Writer`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the writers of photographed sets share: RGB photos before black, masks beside them, poses as motions."""
+"""Shared by the writers of photographed sets: RGB photos over black, mask files, poses as world-to-camera matrices."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ OBJECT = "asset"  # the name of the object in folders
 
 
 class PhotoWriter:
-    """A writer of one of these sets; `light.hdr` and `mesh.ply` in the data's folder are the truth, which no set has there.
+    """A writer of one of these sets; `light.hdr` and `mesh.ply` in the data's folder are the truth, which the sets do
+    not have.
 
     Args:
         out: The folder that holds all; made where it is missing.
@@ -35,8 +36,8 @@ class PhotoWriter:
         self._lights: dict[str, np.ndarray] = {}  # that photos are rendered with, by name, "" for that of the training
 
     def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
-        """Takes a light and returns the one to render with: that of the training as `light.hdr` stores it; one of a name as it is,
-        which the set's own file may round."""
+        """Takes a light and returns the one to render with: that of the training as `light.hdr` stores it; one of a
+        name as it is, which the set's own file may round."""
         if name is None:
             write_image(self.root / "light.hdr", environment)
             environment = read_hdr(self.root / "light.hdr")
@@ -64,7 +65,7 @@ def motion_of(pose: np.ndarray) -> np.ndarray:
 
 
 def srgb_photo(maps: Maps) -> np.ndarray:
-    """[H, W, 3] the photo before black."""
+    """[H, W, 3] the photo over black."""
     return linear_to_srgb(maps["radiance"])
 
 

@@ -1,4 +1,4 @@
-"""Writes the form of Shiny Blender: NeRF-Blender's, with normals and coverage beside the test images."""
+"""Writes the form of Shiny Blender: NeRF-Blender's, with files of normals and coverage for the test images."""
 
 from __future__ import annotations
 
