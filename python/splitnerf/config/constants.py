@@ -25,7 +25,7 @@ class Constants:
     surface_width: int = number(64, at_least=1, at_most=1024)  # neurons of a hidden layer; and so below
     sphere_radius: float = number(0.7, at_most=FARTHEST)  # of the networks at the start
     initial_variance: float = number(0.3)  # v, where s = exp(10 v) is the sharpness of the surface
-    cos_anneal_by: float = number(0.4)  # from when on alphas follow the slope of the distance
+    cos_anneal_by: float = number(0.4)  # from then on alphas follow the slope of the distance
     # materials
     materials_width: int = number(64, at_least=1, at_most=1024)
     initial_roughness: float = number(0.3)
@@ -43,7 +43,7 @@ class Constants:
     occlusion_environment_height: int = number(32, at_least=1, at_most=1 << 13)  # rows of the light that weighs them
     occlusion_offset: float = number(0.0125, at_most=FARTHEST)  # from the surface to the start of a ray
     occlusion_directions: int = number(256, at_least=64, at_most=1024, multiple_of=32)
-    open_below: float = number(0.02)  # where no vertex has a larger blocked share, occlusion is left out
+    open_below: float = number(0.02)  # if no vertex has a larger blocked share, occlusion is skipped
     indirect_every: int = number(200, at_least=1)  # steps
     # samples
     initial_rays: int = number(1024, at_least=1, at_most=1 << 20)
@@ -56,14 +56,14 @@ class Constants:
     hull_until: float = number(0.1)  # before, the masks' visual hull is sampled
     foreground_share: float = number(0.85)  # of the rays, drawn near the masks
     # losses
-    priors_from: float = number(0.5)  # from when on the priors of materials count
+    priors_from: float = number(0.5)  # from then on the priors of materials count
     entropy_points: int = number(384, at_least=1, at_most=1 << 16)
     albedo_width: float = number(0.6, above=0)  # difference of log albedos that counts as one
     gloss_width: float = number(0.2, above=0)  # of roughness and metallic, likewise
     neutral_queries: int = number(256, at_least=1, at_most=1 << 20)  # normals
     smoothness_points: int = number(512, at_most=1 << 20, at_least=1)
     smoothness_radius: float = number(0.02)  # standard deviation of a neighbour's offset
-    eikonal_points: int = number(256, at_most=1 << 20)  # uniform in the box, beside the rays' samples
+    eikonal_points: int = number(256, at_most=1 << 20)  # uniform in the box, in addition to the rays' samples
     # consistency of the light as an MLP
     light_form: str = number("smooth_l1", choices=("square", "smooth_l1"))  # square: the paper; else the released code
     light_set: str = number("fibonacci", choices=("fibonacci", "uniform", "uniform_and_queries"))  # likewise

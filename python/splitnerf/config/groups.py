@@ -19,27 +19,27 @@ OF_RUN = "share of the run"
 
 @dataclass(frozen=True)
 class Run:
-    """How long a run takes, what it repeats, what it keeps while it goes on."""
+    """Length, reproducibility and saved state of a run."""
 
     preset: str = setting("cpu", "name of the preset that the settings started from")
     seed: int = setting(0, "seed of all random numbers", at_least=-LARGEST_SEED, at_most=LARGEST_SEED)
     steps: int = setting(6000, "optimiser steps of the whole run", unit="steps", at_least=1, at_most=10**9)
     max_minutes: float = setting(0.0, "time of training and refinement; 0: steps and sweeps end them", unit="minutes")
     deterministic: bool = setting(False, "the same bits in two runs on one machine with one number of threads")
-    cuda_graphs: bool = setting(False, "a GPU's launches of a step recorded and repeated; rays change in number seldom")
+    cuda_graphs: bool = setting(False, "launches of a step on a GPU recorded and replayed; the number of rays then changes seldom")
     preview_every: float = setting(0.1, "time between two previews", unit=OF_RUN)
     checkpoint_minutes: float = setting(2.0, "time between two checkpoints", unit="minutes")
 
 
 @dataclass(frozen=True)
 class Data:
-    """How the photos are read where they leave it open."""
+    """Reading of the photos, where the data do not state it."""
 
     eval_mode: str = setting(
-        "auto", "what is held out for testing; auto: what the data say, else a fraction", choices=EVAL_MODES
+        "auto", "what is held out for testing; auto: as the data state, else a fraction", choices=EVAL_MODES
     )
     mask_kind: str = setting(
-        "auto", "mask files: white is the object, or black is to be ignored; auto: as they look", choices=MASK_KINDS
+        "auto", "mask files: white is the object, or black is to be ignored; auto: detected", choices=MASK_KINDS
     )
     max_memory: float = setting(
         0.0, "memory that the photos may take, more are read from a file; 0: half of what is available", unit="GB"
@@ -61,7 +61,7 @@ class Exposure:
 class Separation:
     """How the object is found in photos that have no masks."""
 
-    share: float = setting(0.15, "part of run.max_minutes that it takes", unit=OF_RUN, above=0, below=1)
+    share: float = setting(0.15, "share of run.max_minutes for this search", unit=OF_RUN, above=0, below=1)
     steps: int = setting(6000, "optimiser steps where no minutes end the run", unit="steps", at_least=1)
 
 
@@ -77,7 +77,7 @@ class Surface:
         16, "binary logarithm of the entries of a level's hash table", at_least=1, at_most=24
     )
     table_dtype: str = setting(
-        "float32", "numbers as which the hash table is read; it is trained in float32",
+        "float32", "number format in which the hash table is read; it is trained in float32",
         choices=("float32", "float16", "bfloat16"),
     )  # fmt: skip
     start: str = setting(
@@ -95,7 +95,7 @@ class Materials:
     """The network of albedo, roughness and metallic."""
 
     inputs: str = setting(
-        "grid", "what the networks of material and occlusion read; outputs: the surface's outputs (the paper); grid: "
+        "grid", "inputs of the networks of material and occlusion; outputs: the surface's outputs (the paper); grid: "
         "the hash features as well", choices=("outputs", "grid"),
     )  # fmt: skip
 
@@ -112,7 +112,7 @@ class Light:
 
 @dataclass(frozen=True)
 class Shading:
-    """From material and light to the colour of a pixel."""
+    """The colour of a pixel from material and light."""
 
     method: str = setting(
         "summed",
@@ -137,7 +137,7 @@ class Shading:
 
 @dataclass(frozen=True)
 class Occlusion:
-    """What the object hides of the light, and what it reflects onto itself."""
+    """Occlusion of the light by the object, and interreflection."""
 
     kind: str = setting(
         "bits", "mlp: a network that learns traced factors (the paper); bits: visibility cached on the mesh; off: none",
@@ -159,7 +159,7 @@ class Mesh:
         96, "nodes of marching cubes along an edge", unit="nodes", at_least=MIN_EXPORT_SIZE, at_most=2048
     )
     background: bool = setting(
-        False, "meshes made by a thread of their own, while training goes on with the one before"
+        False, "meshes made in a background thread, while training continues with the last one"
     )
 
 
@@ -185,7 +185,7 @@ class Sampling:
 
 @dataclass(frozen=True)
 class Losses:
-    """Weights of the loss's terms, and what these terms compare."""
+    """Weights and widths of the loss's terms."""
 
     colour_weight: float = setting(10.0 / 3.0, "weight of the squared error of colours, summed over channels")
     light_weight: float = setting(1.0, "weight of the light's consistency (of the MLP)")
@@ -193,7 +193,7 @@ class Losses:
     eikonal_weight: float = setting(0.3, "weight of |gradient of the distance| = 1")
     metal_weight: float = setting(0.0001, "weight of metallic squared")
     binary_metal_weight: float = setting(0.003, "weight of metallic between 0 and 1, from half of the run")
-    dark_metal_weight: float = setting(0.002, "weight of metals that reflect less than any does")
+    dark_metal_weight: float = setting(0.002, "weight of metals darker than real ones")
     mask_weight: float = setting(1.0, "weight of the masks")
     edge_pixels: int = setting(
         2, "width of the band at mask edges where colours are compared including the background; 0 turns it off. Only for "
@@ -203,7 +203,7 @@ class Losses:
     light_prior_weight: float = setting(0.001, "weight of the distance to a smooth and grey light (of the pyramid)")
     entropy_weight: float = setting(0.002, "weight of the materials' quadratic entropy, from half of the run")
     seen_weight: float = setting(0.02, "weight of the distance to the light that photos show around the object")
-    smoothness_weight: float = setting(0.01, "weight of how far normals of neighbouring surface points are apart")
+    smoothness_weight: float = setting(0.01, "weight of the difference of normals of neighbouring surface points")
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,7 @@ class Refinement:
     """Refinement: the exported asset and its light are fitted to the photos."""
 
     enabled: bool = setting(True, "whether there is a refinement")
-    share: float = setting(0.2, "share of run.max_minutes that it gets, training the rest", unit=OF_RUN, below=1.0)
+    share: float = setting(0.2, "share of run.max_minutes for the refinement; training gets the rest", unit=OF_RUN, below=1.0)
     sweeps: int = setting(16, "Gauss-Newton steps of the refinement where no minutes end it", unit="steps", at_least=1)
 
 

@@ -1,4 +1,4 @@
-"""One setting: its default, what it means, its unit, and the values that it may take."""
+"""One setting: its default, meaning, unit and allowed values."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ class Config:
 
     @property
     def reading(self) -> Reading:
-        """How the run reads its data."""
+        """The options for reading the data."""
         return Reading(self.data.eval_mode, self.data.mask_kind, max_memory=self.data.max_memory)
 
     @property
@@ -135,10 +135,10 @@ _GROUPS_OF = {known.name: [group for group in GROUPS if f"{group}.{known.name}" 
 SHORT_NAMES = {name.replace(".", "_"): name for name in FIELDS} | {
     key: f"{groups[0]}.{key}" for key, groups in _GROUPS_OF.items() if len(groups) == 1 or groups[0] == "run"
 }
-"""What settings may be called, too: `light_resolution` for `light.resolution`; and by the name in the group alone where no other group
+"""Short names of settings: `light_resolution` for `light.resolution`; and by the name in the group alone where no other group
 has it, or the group is `run`: `n_levels` for `surface.n_levels`."""
 
-# Settings that exclude each other: when, and what to say.
+# Settings that exclude each other: the condition and the message.
 RULES = (
     (
         lambda c: c.shading.method == "summed" and not (
