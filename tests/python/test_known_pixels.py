@@ -248,7 +248,7 @@ def test_refinement_reads_known_pixels_only(half_known):
 
 
 def test_scores_are_over_known_pixels(half_known):
-    """A prediction that is right where a photo knows anything, and wrong by .1 elsewhere."""
+    """A prediction that is right where a photo knows anything, and wrong by 0.1 elsewhere."""
     data = half_known
     predictions = [
         {"rgb": np.where(k[..., None], i[..., :3], 0.6), "alpha": np.where(k, i[..., 3], 1.0)}

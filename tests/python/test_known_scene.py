@@ -126,7 +126,7 @@ def sphere_through(points: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def test_the_ball_is_where_it_is_and_as_large(result):
-    """Closer than half a pixel, which is .05 of the world's units there and moves the ball by half of that up or down."""
+    """Closer than half a pixel, which is 0.05 of the world's units there and moves the ball by half of that up or down."""
     centre, radius = sphere_through(z_up(result.vertices))
     np.testing.assert_allclose(centre, CENTRE, atol=0.012)
     assert radius == pytest.approx(RADIUS, abs=0.015)
@@ -139,7 +139,7 @@ def test_its_red_side_is_red_and_its_blue_side_blue(result):
 
 
 def test_the_lamp_shines_from_where_it_is(result):
-    """The mean direction of the recovered light by its power, u = .5 - atan2(y, x) / (2 pi) and v = acos(z) / pi."""
+    """The mean direction of the recovered light by its power, u = 0.5 - atan2(y, x) / (2 pi) and v = acos(z) / pi."""
     height, width = result.light.shape[:2]
     v, u = (np.mgrid[:height, :width] + 0.5) / np.array([height, width])[:, None, None]
     azimuth, polar = 2 * np.pi * (0.5 - u), np.pi * v

@@ -34,7 +34,7 @@ class Slope:
 
 @pytest.fixture
 def sharp_or_diffuse(monkeypatch):
-    """Roughness that is drawn is below .05: all queries are nearly mirrors or at 1."""
+    """Roughness that is drawn is below 0.05: all queries are nearly mirrors or at 1."""
     rand = torch.rand
     monkeypatch.setattr(torch, "rand", lambda *size, **kwargs: 0.05 * rand(*size, **kwargs))
 
@@ -61,7 +61,7 @@ def test_noise_is_what_a_consistent_light_is_off_by(sharp_or_diffuse):
 
 
 def test_half_of_the_queries_are_diffuse_and_the_set_is_as_large_as_set():
-    """16 of 32 at 1; 128 shared directions in one set or two, and 8 more of each lobe narrower than .4."""
+    """16 of 32 at 1; 128 shared directions in one set or two, and 8 more of each lobe narrower than 0.4."""
     for settings, n_shared in ((LOOSE, 128), (LOOSE | {"light_noise": 0.2}, 128)):
         light = Slope()
         losses.light_loss(light, tiny(light_samples=128, light_queries=32, **settings), generator(), 0)
@@ -164,7 +164,7 @@ def test_materials_differ_in_being_metal_as_well(monkeypatch):
 
 @pytest.mark.parametrize("channels", [1, 3])
 def test_occlusion_is_traced_for_its_share_as_it_is_set(monkeypatch, channels):
-    """A fifth of the samples, off the surface by the offset, by the step's seed; all off by .1 and .3 cost .1 in each channel."""
+    """A fifth of the samples, off the surface by the offset, by the step's seed; all off by 0.1 and 0.3 cost 0.1 in each channel."""
     asked, n = {}, 2000
 
     def factors(scene, positions, *args, **kwargs):
@@ -183,7 +183,7 @@ def test_occlusion_is_traced_for_its_share_as_it_is_set(monkeypatch, channels):
 
 
 def occlusion_rays(n: int) -> SimpleNamespace:
-    """Samples whose number stands in all that belongs to them; factors are off .5 by .002 and -.004 of it."""
+    """Samples whose number stands in all that belongs to them; factors are off 0.5 by 0.002 and -0.004 of it."""
     number = torch.arange(float(n))
     column = number[:, None]
     points = SimpleNamespace(

@@ -23,7 +23,7 @@ def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
 
 
 def test_occlusion_loss_is_the_weighted_square_of_what_is_off(monkeypatch):
-    """Eq. (16) with known factors: w (.1^2 + .3^2) and w (.2^2 + 0), w normalised."""
+    """Eq. (16) with known factors: w (0.1^2 + 0.3^2) and w (0.2^2 + 0), w normalised."""
     config = Config().replace({"occlusion_share": 1.1, "occlusion_channels": 1})
     truth = torch.tensor([[0.5], [0.5]]), torch.tensor([[0.2], [1.0]])
     asked = {}
@@ -72,14 +72,14 @@ def test_neutral_light_loss_measures_chroma_alone():
     assert losses.neutral_light_loss(Sky([3.0, 3.0, 3.0], 0.0), config, generator).item() == pytest.approx(
         0.0, abs=1e-9
     )
-    coloured = Sky([math.exp(0.5), 1.0, math.exp(-0.5)], 0.0)  # the same from everywhere: (.5^2 + 0 + .5^2) / 3
+    coloured = Sky([math.exp(0.5), 1.0, math.exp(-0.5)], 0.0)  # the same from everywhere: (0.5^2 + 0 + 0.5^2) / 3
     assert losses.neutral_light_loss(coloured, config, generator).item() == pytest.approx(0.5 / 3, rel=1e-4)
     tinted = losses.neutral_light_loss(Sky([1.0, 1.0, 1.0], 0.6), config, generator).item()
     assert tinted == pytest.approx(2.0 / 3.0 * 0.36 / 3.0, rel=0.03)
 
 
 def test_the_lights_prior_costs_a_texel_what_its_level_is_worth():
-    """A light of one colour is free; a texel costs log(1 + d^2 / (3 s^2)) of its level's texels, s .5 in grey and .2 in colour."""
+    """A light of one colour is free; a texel costs log(1 + d^2 / (3 s^2)) of its level's texels, s 0.5 in grey and 0.2 in colour."""
     light = LightPyramid(16)
     assert losses.light_prior_loss(light).item() == pytest.approx(0.0, abs=1e-12)
     with torch.no_grad():

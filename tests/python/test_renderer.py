@@ -172,7 +172,7 @@ def test_values_of_shaded_samples_are_those_of_their_places():
 
 
 class Slabs(torch.nn.Module):
-    """Two thin walls across x, at +-.5, that let a part of the light through."""
+    """Two thin walls across x, at +-0.5, that let a part of the light through."""
 
     def forward(self, positions: torch.Tensor) -> SdfSample:
         x = positions[:, 0]

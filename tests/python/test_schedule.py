@@ -52,7 +52,7 @@ def test_the_rate_then_decays_exponentially_to_its_last_value():
 
 
 def test_the_papers_rate():
-    """500 steps of warm-up, then exponentially to a tenth at 20,000; .01, and .001 for the sharpness."""
+    """500 steps of warm-up, then exponentially to a tenth at 20,000; 0.01, and 0.001 for the sharpness."""
     config = preset("paper")
     assert factor(config, 0) == pytest.approx(1 / 500) and factor(config, 499) == 1.0
     assert factor(config, 10_250) == pytest.approx(0.1**0.5) and factor(config, 20_000) == pytest.approx(0.1)
@@ -167,7 +167,7 @@ def converged(n_rays: int, per_ray: float, config: Config) -> list[int]:
 
 @pytest.mark.parametrize("per_ray", [1.7, 30.0, 130.0])
 def test_rays_are_as_many_as_fill_the_budget(per_ray):
-    """In the end budget / samples a ray; on the way there by a factor of 1.25 up and .8 down at most."""
+    """In the end budget / samples a ray; on the way there by a factor of 1.25 up and 0.8 down at most."""
     config = Config().replace({"target_samples": 30_000, "max_rays": 100_000})
     for start in (64, 50_000):
         counts = converged(start, per_ray, config)

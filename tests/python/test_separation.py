@@ -68,7 +68,7 @@ class TestField:
         assert ((found > edges[0, 39]) & (found < edges[0, 42])).sum() > 28
 
     def test_spread_of_two_weights(self):
-        """Halves that fill [0, .1] and [.8, 1]: 2 w1 w2 .85 + (w1^2 .1 + w2^2 .2) / 3."""
+        """Halves that fill [0, 0.1] and [0.8, 1]: 2 w1 w2 0.85 + (w1^2 0.1 + w2^2 0.2) / 3."""
         loss = spread_loss(rendered([0.5, 0.0, 0.5], [0.0, 0.1, 0.8, 1.0]))
         assert float(loss) == pytest.approx(0.5 * 0.85 + 0.25 * 0.3 / 3)
 
@@ -100,7 +100,7 @@ class TestField:
 class TestRegion:
     @pytest.fixture
     def points(self):
-        """A ball of radius .3 that stands on a floor, and a post at its edge."""
+        """A ball of radius 0.3 that stands on a floor, and a post at its edge."""
         random = np.random.default_rng(0)
         ball = random.normal(size=(6000, 3))
         ball = 0.3 * ball / np.linalg.norm(ball, axis=1, keepdims=True)
@@ -358,7 +358,7 @@ class TestFoot:
         assert not foot.holds(self.over(0.2, 0.0)).any()
 
     def test_below_an_overhang_points_decide_by_their_height(self):
-        """No photo shows the table within .3 from above; the object hangs over it."""
+        """No photo shows the table within 0.3 from above; the object hangs over it."""
         points, colours, _ = self.scene(0.0, 0.003)
         shown = np.linalg.norm(points @ self.TABLE.axes.T, axis=1) > 0.3
         random = np.random.default_rng(1)
@@ -432,7 +432,7 @@ class TestOutline:
 
 class TestMirrors:
     def region(self, table: Table | None = None) -> Region:
-        """A slab of solid cells at x = 0, |y| < .8, .2 < z < .9."""
+        """A slab of solid cells at x = 0, |y| < 0.8, 0.2 < z < 0.9."""
         centres = ((np.indices((CELLS,) * 3) + 0.5) * (2 / CELLS) - 1) * 1.6
         solid = (np.abs(centres[0]) < 0.03) & (np.abs(centres[1]) < 0.8) & (centres[2] > 0.2) & (centres[2] < 0.9)
         return Region(solid, table, None, solid)

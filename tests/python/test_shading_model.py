@@ -176,7 +176,7 @@ class Steps(torch.nn.Module):
     ("form", "expected"), [("square", 0.1**2 + 0.2**2 + 2.0**2), ("smooth_l1", 0.005 + 0.02 + 1.5)]
 )
 def test_the_light_loss_is_the_mean_over_queries_of_the_sum_over_channels(form, expected):
-    """Eq. (11): the mean over s of |g(s) - gbar(s)|^2, a vector's length: off by (.1, -.2, 2) costs .01 + .04 + 4."""
+    """Eq. (11): the mean over s of |g(s) - gbar(s)|^2, a vector's length: off by (0.1, -0.2, 2) costs 0.01 + 0.04 + 4."""
     config = tiny(**{"light.kind": "mlp", "shading.method": "split", "constants.light_form": form}, light_noise=0.0, light_lobe_below=0.0)
     for n_queries in (16, 64):
         found = losses.light_loss(Steps([0.1, -0.2, 2.0]), config.replace({"light_queries": n_queries}), generator(), 0)
@@ -202,7 +202,7 @@ def test_the_mlp_light_hears_the_roughness(activation):
 
 
 def test_the_mlp_light_learns_a_lamp_that_fades_with_roughness():
-    """Two levels, 2 where sharp and .5 where rough: a light that is deaf to roughness stays at their mean, 1.25."""
+    """Two levels, 2 where sharp and 0.5 where rough: a light that is deaf to roughness stays at their mean, 1.25."""
     torch.manual_seed(0)
     light = LightMlp(width=16, n_layers=2, direction_frequencies=2, roughness_frequencies=3)
     optimiser = torch.optim.Adam(light.parameters(), lr=0.02)

@@ -1,4 +1,5 @@
-"""The constants of a preset: numbers of the method that nobody tunes for a scene. Units as in :mod:`splitnerf.config.groups`."""
+"""The constants of a preset: numbers of the method that nobody tunes for a scene. Units as in
+:mod:`splitnerf.config.groups`."""
 
 from __future__ import annotations
 

@@ -100,7 +100,8 @@ class Config:
         """A copy with some settings changed.
 
         Args:
-            settings: Values by ``group.name`` or by a short name, see :data:`SHORT_NAMES`, or a table of values by group.
+            settings: Values by ``group.name`` or by a short name, see :data:`SHORT_NAMES`, or a table of values by
+                group.
 
         Raises:
             InputError: A name is unknown, or a value is not allowed.

@@ -1,4 +1,4 @@
-"""The photos that training draws rays from: averages of large ones."""
+"""The photos from which training draws rays: averages of large photos."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ LEAST_EDGE = 8  # pixels along the shorter edge of an average
 def training_photos(dataset: Dataset, config: Config) -> Dataset:
     """The photos themselves, or averages by the largest whole factor that `sampling.pixel_cells` allows.
 
-    A pixel of an average is the mean of its block in linear light: what a smaller photo would show, also along the masks'
-    edges. Detail finer than the fields' cells is noise to them. The mean of a block has less of it than one pixel has, and a
-    step costs the same.
+    A pixel of an average is the mean of its block in linear light, as in a smaller photo, also along the masks' edges.
+    Detail finer than the fields' cells is noise to them; the mean of a block has less of it than a pixel, at the same
+    cost of a step.
 
     Args:
         dataset: The train split.
@@ -34,10 +34,10 @@ def training_photos(dataset: Dataset, config: Config) -> Dataset:
 
 
 def averaging_factor(dataset: Dataset, config: Config) -> int:
-    """The whole factor by which photos are averaged down for training; 1: not at all.
+    """The integer factor by which photos are averaged down for training; 1: none.
 
-    The width of a pixel is that at the middle of the scene's box, or where the box ends for cameras within it, as a median over
-    the photos.
+    The width of a pixel is that at the middle of the scene's box, or where the box ends for cameras within it, as a
+    median over the photos.
     """
     box, most = config.constants.box, max(1, min(dataset.height, dataset.width) // LEAST_EDGE)
     pixel = pixel_width(dataset.poses, dataset.intrinsics, np.zeros(3), nearest=box)

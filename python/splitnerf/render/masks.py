@@ -1,4 +1,4 @@
-"""Masks of many large photos: widened, and as runs of pixels."""
+"""Masks of many large photos: dilation, and runs of pixels."""
 
 from __future__ import annotations
 

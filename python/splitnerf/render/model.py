@@ -61,8 +61,8 @@ class ShadedPoints(NamedTuple):
 
 
 def on_surface(positions: Tensor, normals: Tensor, sdf: Tensor) -> Tensor:
-    """Points [n, 3] moved along their unit normals [n, 3] by their signed distances [n] on to the surface, scene units; no
-    gradient."""
+    """Points [n, 3] moved along their unit normals [n, 3] by their signed distances [n] on to the surface, scene units;
+    no gradient."""
     return torch.addcmul(positions.detach(), normals.detach(), sdf.detach()[:, None], value=-1.0)
 
 
@@ -139,7 +139,7 @@ class SceneModel(nn.Module):
 
     @property
     def s_value(self) -> float:
-        """:attr:`s` as a number, worked out on the CPU."""
+        """:attr:`s` as a number, computed on the CPU."""
         return float(sharpness(self.variance.detach().cpu()))
 
     def open_levels(self, progress: float) -> None:
@@ -157,8 +157,8 @@ class SceneModel(nn.Module):
         return self.sdf_field.sample_finite_difference(positions)
 
     def head_inputs(self, positions: Tensor, outputs: Tensor, features: Tensor) -> list[Tensor]:
-        """What the material and occlusion heads read, joined by columns: by the setting ``materials.inputs`` the SDF's outputs
-        alone, or with positions and hash features."""
+        """The inputs of the material and occlusion heads, concatenated: by the setting ``materials.inputs`` the SDF's
+        outputs alone, or with positions and hash features."""
         return [outputs] if self.config.materials.inputs == "outputs" else [outputs, positions, features]
 
     def evaluate_light(self) -> EvaluatedLight:
@@ -209,7 +209,8 @@ class SceneModel(nn.Module):
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
         """The difference between the radiance by quadrature and that by the split sum.
 
-        The quadrature sums BRDF times light over the directions of the visibility bits. It replaces the split sum with a
+        The quadrature sums BRDF times light over the directions of the visibility bits. It replaces the split sum with
+        a
         smooth transition in roughness, where the directions resolve the lobe: with 256 directions the transition is
         from roughness 0.3 to 0.45. Narrower lobes are not corrected.
 

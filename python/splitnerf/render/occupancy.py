@@ -18,7 +18,7 @@ from splitnerf.render.rays import projected
 DENSITY_CUTOFF = 7.0  # where |f| > cutoff / s, the NeuS density is below e^-7 of its peak
 LIPSCHITZ = 1.25  # bound on |grad f|; the eikonal loss keeps it in practice
 REFRESHED_SHARE = 0.1  # share of the cells far from the surface that an update evaluates
-ROOM_FOR_NEAR = 1.1  # by how much the bound may grow from one update to the next on a GPU, as the sharpness falls
+NEAR_MARGIN = 1.1  # growth of the bound from one update to the next on a GPU, as the sharpness falls
 WRONG_MASKS = 0.03  # share of the views that may miss a cell of the visual hull
 DECAY, MIN_CELL_OPACITY, ALL_CELLS_UNTIL = 0.95, 1e-3, 256
 
@@ -47,7 +47,8 @@ class OccupancyGrid:
         self.half_diagonal = math.sqrt(3.0) * box / resolution
         self.values = torch.zeros(resolution**3, device=device)
         self.cells = torch.full((resolution,) * 3, CELL_OCCUPIED, dtype=torch.uint8, device=device)
-        self._n_near: tuple[Tensor, Callable[[], None]] | None = None  # room for those near the surface, on its way from a GPU
+        # the capacity for cells near the surface, being fetched from a GPU
+        self._n_near: tuple[Tensor, Callable[[], None]] | None = None
 
     def centres(self) -> Tensor:
         """[r^3, 3] cell centres, scene units."""
@@ -74,15 +75,15 @@ class OccupancyGrid:
             due = self._due(self.values.abs() < 2.0 * bound)
         self.values[due] = evaluate(sdf, self.centres()[due])
         if self.values.device.type == "cuda":
-            self._n_near = start_fetching((self.values.abs() < 2.0 * ROOM_FOR_NEAR * bound).sum())
+            self._n_near = start_fetching((self.values.abs() < 2.0 * NEAR_MARGIN * bound).sum())
         cells = torch.full_like(self.values, CELL_OCCUPIED, dtype=torch.uint8)
         cells[self.values > bound] = CELL_EMPTY
         cells[self.values < -bound] = CELL_OPAQUE
         self._set(cells, use_hull)
 
     def _due(self, near: Tensor) -> Tensor:
-        """The cells of a mask, and a random tenth of all. On a GPU the host waits for no count: the update before has
-        counted, with a wider bound, and the first cell fills up what is left."""
+        """The cells of a mask, and a random tenth of all. On a GPU the host waits for no count: the last update has
+        counted with a wider bound, and the first cell is the padding."""
         if self._n_near is None:
             return (near | (torch.rand_like(self.values) < REFRESHED_SHARE)).nonzero().squeeze(1)
         count, wait = self._n_near
@@ -97,7 +98,7 @@ class OccupancyGrid:
 
 
 class AveragedGrid(OccupancyGrid):
-    """The released code's grid: a cell is occupied while the decaying maximum of its opacity exceeds min(mean, .001).
+    """The released code's grid: a cell is occupied while the decaying maximum of its opacity exceeds min(mean, 0.001).
 
     It gives no guarantee: a cell may become empty when its random point misses a thin part. The opacity of a cell is
     that of one sample whose ray meets the surface head-on.
@@ -147,8 +148,8 @@ def evaluate(sdf: Callable[[Tensor], Tensor], points: Tensor) -> Tensor:
 
 
 def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intrinsics: Tensor) -> Tensor:
-    """[r, r, r] bool: the cells whose centre, within about a cell, projects into the mask of every view that sees it, but for a
-    few (:data:`WRONG_MASKS`): one mask that is cut short must not cut the object.
+    """[r, r, r] bool: the cells whose centre, within about a cell, projects into the mask of every view that sees it,
+    except for a few (:data:`WRONG_MASKS`): one mask that is cut short must not cut the object.
 
     Args:
         resolution: Cells along an edge.

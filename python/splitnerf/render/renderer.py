@@ -51,8 +51,8 @@ class ProbePoints(NamedTuple):
 class FoundSamples(NamedTuple):
     """The samples of a batch of rays, with all values that depend on their positions alone.
 
-    The samples behind those of the last ray are padding: they belong to no ray, and their `positions` repeat those of the
-    first samples, so that the field is finite there.
+    The samples behind those of the last ray are padding: they belong to no ray, and their `positions` repeat those of
+    the first samples, so that the field is finite there.
 
     Attributes:
         packed: The distances of the samples along their rays.
@@ -92,8 +92,8 @@ class RenderedRays:
         evaluated, n_found: See :class:`FoundSamples`.
         weights: [n] rendering weights.
         values: [n, 3] composited values: radiance of the split sum, linear or sRGB by the setting `compositing`. With
-            `shading.method = summed`, `mean` also contains the quadrature correction at each ray's heaviest sample, by the
-            share of the weight that the sample's segment carries.
+            `shading.method = summed`, `mean` also contains the quadrature correction at each ray's heaviest sample, by
+            the share of the weight that the sample's segment carries.
         gradients: [n + k + m, 3] d sdf / d position at all samples and probes.
         anywhere: [k] signed distances at the probes that belong to no sample, scene units.
         beside: [m] int64, the samples whose neighbours the last m gradients belong to.
@@ -162,8 +162,8 @@ def find_samples(
         jitter: [n_rays] in [0, 1), offsets of the samples as shares of a sample's length.
         anneal: The annealing of the cosine: 0 at the start of a training, 1 when done.
         probes: Additional points at which the field will be evaluated, or None.
-        capacity: The number of samples in the result, if positive: padding fills it up, and what exceeds it is left out. Where
-            ``sampling.min_weight`` is 0, nothing is left out.
+        capacity: The number of samples in the result, if positive: padding fills it up, and what exceeds it is left
+            out. Where ``sampling.min_weight`` is 0, nothing is left out.
         phase: [n_rays] in [0, 1), see :class:`FoundSamples`; None: the last digits of `jitter`.
         s: The sharpness of the density; None: the model's own, for which the host waits.
     """
