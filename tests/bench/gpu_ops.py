@@ -25,7 +25,6 @@ from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves, tree_map
 
-from splitnerf_tools.bench import reference
 from splitnerf_tools.bench.provenance import header, provenance
 from splitnerf.config import parse_setting, preset
 from splitnerf.data.dataset import load_dataset
@@ -33,6 +32,7 @@ from splitnerf.devices import tensor_cores
 from splitnerf.training.loop import Training
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "python"), str(Path(__file__).parents[1])]
+import reference  # noqa: E402
 from op_cases import ROUNDED_ALIKE, truth  # noqa: E402
 from op_checks import as_tuple  # noqa: E402
 

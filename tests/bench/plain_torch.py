@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import statistics
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -38,7 +39,9 @@ from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training import loop as training
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.workflow import load_run, load_splits
-from splitnerf_tools.bench import reference
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+import reference  # noqa: E402
 
 # ---- field ----
 

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from bench import tables
+from bench import operators, shading, split_sum, tables
 from torch.nn import functional as F
 
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.errors import CheckFailed
 from splitnerf.fields import SdfField
-from splitnerf_tools.bench import charts, harness, normals, path_tracer, provenance, shading, split_sum, whole
+from splitnerf_tools.bench import charts, harness, normals, path_tracer, provenance, whole
 from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv, write_result
 from splitnerf_tools.bench.harness import interleaved
 from splitnerf_tools.bench.lights import MapLight, octahedral_directions, pyramid_of
@@ -187,11 +187,15 @@ class TestLights:
             assert lobe_integral(torch.tensor([[rho]])).item() == pytest.approx(expected, rel=1e-3)
 
 
-def test_the_command_writes_tables_and_pictures(tmp_path, monkeypatch, capsys):
+def test_pages_and_pictures_are_written(tmp_path, monkeypatch, capsys):
+    """By the command, and by the program of what only pages need."""
     pytest.importorskip("matplotlib")
     monkeypatch.setenv("SPLITNERF_DATA", str(tmp_path / "none"))
-    assert main(["bench", "shading", "--quick", "--out", str(tmp_path / "out")]) == DONE
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"shading.md", "shading.csv", "shading.png"}
+    assert main(["bench", "normals", "--quick", "--out", str(tmp_path / "out")]) == DONE
+    monkeypatch.setattr(sys, "argv", ["operators.py", "shading", "--quick", "--out", str(tmp_path / "out")])
+    operators.main()
+    names = {f"{name}.{end}" for name in ("normals", "shading") for end in ("md", "csv", "png")}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names
     assert "as fast as torch eager" in capsys.readouterr().out
 
 

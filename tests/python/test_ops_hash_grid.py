@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 import torch
 from op_cases import HASH_SPEC, hash_gradients, hash_inputs
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, grad_leaves, lib
 
 from splitnerf.ops import HashGrid, HashGridSpec, growth_for, hash_encode, hash_encode_jacobian
-from splitnerf_tools.bench import reference
 
 
 @pytest.mark.parametrize("device", DEVICES)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 import torch
 from op_cases import prefilter_backward_inputs, prefilter_inputs
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 
 from splitnerf.ops import fibonacci_directions, prefilter_light, sample_ggx_lobe
-from splitnerf_tools.bench import reference
 
 
 @pytest.mark.parametrize("device", DEVICES)

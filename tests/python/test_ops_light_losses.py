@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import pytest
+import reference
 import torch
 from op_cases import CASES, rand
 from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 
 from splitnerf.ops import light_prior, log_chroma
-from splitnerf_tools.bench import reference
 
 SIZES = [16, 64, 256]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+import reference
 import torch
 from op_cases import CASES, field_gradients, pixel_inputs, rand
 from op_checks import check_error, check_no_gradient, check_op, generator, grad_leaves, lib
@@ -12,7 +13,6 @@ from op_checks import check_error, check_no_gradient, check_op, generator, grad_
 from splitnerf.ops import (
     gradient_losses, linear_to_srgb, material_losses, pixel_losses, quadratic_entropy, srgb_to_linear,
 )  # fmt: skip
-from splitnerf_tools.bench import reference
 
 
 def same_as(ours: tuple, theirs: tuple, leaves: tuple, twins: tuple) -> None:

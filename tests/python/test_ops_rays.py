@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 import torch
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib
 from ray_inputs import OFFSETS, composite_inputs, march_inputs, neus_inputs, packed_samples, surface_case, surface_inputs
@@ -17,7 +18,6 @@ from splitnerf.ops import (
     spread_samples,
     surface_weights,
 )
-from splitnerf_tools.bench import reference
 
 # ---- march_rays ----
 

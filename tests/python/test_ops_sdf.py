@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+import reference
 import torch
 from op_cases import (
     BOX,
@@ -27,7 +28,6 @@ from splitnerf.ops import (
     sdf_values,
     surface_weights,
 )
-from splitnerf_tools.bench import reference
 
 
 def depth_between(f, f_next, s: float):

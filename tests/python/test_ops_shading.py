@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
+import reference
 import torch
 from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib, unit
 from shading_inputs import indirect_inputs, query_inputs, split_sum_inputs
 
 from splitnerf.ops import brdf_lut, light_queries, query_direction, split_sum_shade
-from splitnerf_tools.bench import reference
 
 MODES = [(mode, compensate, channels) for mode in range(3) for compensate in (False, True) for channels in (1, 3)]
 

@@ -6,7 +6,9 @@ import inspect
 
 import numpy as np
 import pytest
+import reference
 import torch
+from bench.hash_grid import SPEC
 from op_cases import (
     CASES,
     cached_visibility_inputs,
@@ -21,8 +23,6 @@ from op_cases import (
 from op_checks import as_tuple, generator, grad_leaves, lib
 from shading_inputs import mixed_sums_inputs, split_sum_inputs
 
-from splitnerf_tools.bench import reference
-from splitnerf_tools.bench.hash_grid import SPEC
 
 # The inputs of each operator to which there is a gradient.
 DIFFERENTIABLE = {

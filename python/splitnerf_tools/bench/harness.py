@@ -136,11 +136,11 @@ def chart_of(
     return Chart(title, cost, error, points)
 
 
-def run_benchmarks(names: Sequence[str], quick: bool, out: Path, show: Callable[[str], None]) -> list[Path]:
+def run_benchmarks(modules: Sequence[str], quick: bool, out: Path, show: Callable[[str], None]) -> list[Path]:
     """Checks and times the operators, writes the charts, and shows the findings as they come.
 
     Args:
-        names: The names of modules in this package, each with ``run(quick, rounds)``.
+        modules: The names of modules, each with ``run(quick, rounds)``.
         quick: Whether to use small inputs and few rounds, which takes minutes in all.
         out: The folder of the results; created if missing.
         show: A function called with each line.
@@ -150,8 +150,8 @@ def run_benchmarks(names: Sequence[str], quick: bool, out: Path, show: Callable[
         InputError: matplotlib is missing.
     """
     files = []
-    for name in names:
-        result = importlib.import_module(f"splitnerf_tools.bench.{name}").run(quick, QUICK_ROUNDS if quick else ROUNDS)
+    for module in modules:
+        result = importlib.import_module(module).run(quick, QUICK_ROUNDS if quick else ROUNDS)
         files += write_result(result, out)
         show(result.title)
         for finding in result.findings:

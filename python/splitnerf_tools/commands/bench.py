@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import tempfile
 from pathlib import Path
 
 from splitnerf.cli.exit_codes import DONE, INTERRUPTED
@@ -13,10 +12,7 @@ from splitnerf.errors import InputError
 # Modules of splitnerf_tools.bench, each with run(quick, rounds), and what they compare.
 OPERATORS = {
     "prefilter": "estimators of the light's integral over a lobe: time against error",
-    "split_sum": "the split sum and its table against the integral: error alone",
-    "hash_grid": "the encoding against plain torch, Dr.Jit and the machine's gathers",
     "normals": "analytic normals against finite differences: time against angle",
-    "shading": "split-sum shading and the light's integral against plain and compiled torch",
     "occlusion": "traced rays against cached bits, and against Open3D, trimesh and Mitsuba",
     "path_tracer": "error against time, with Mitsuba",
 }
@@ -25,8 +21,8 @@ OPERATORS = {
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "bench", help="measure run time against error",
-        description=f"Without BENCHMARK: {', '.join(OPERATORS)}. Each checks the operators, times them and plain "
-        "torch and the peers that are installed (drjit, open3d, mitsuba), and writes a page, a CSV file and a picture. "
+        description=f"Without BENCHMARK: {', '.join(OPERATORS)}. Each checks the operators, times them and "
+        "the peers that are installed (drjit, open3d, mitsuba), and writes a page, a CSV file and a picture. "
         "Measured maps and meshes are taken from the folder SPLITNERF_DATA, else procedural ones.",
     )  # fmt: skip
     add_quick(parser, default=False)
@@ -37,27 +33,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         operator = benchmarks.add_parser(name, help=what, description=f"Measures {what}.")
         add_quick(operator)
         add_out(operator)
-    add_skip(benchmarks)
     add_whole(benchmarks)
-
-
-def add_skip(benchmarks: argparse._SubParsersAction) -> None:
-    skip = benchmarks.add_parser(
-        "skip", help="what it is worth to leave out what a scene does not need",
-        description="Trains on DATA without any skip, with one at a time, and with all, for M minutes and for as many steps as "
-        "the first run made, and prints steps a second as a ratio, and the PSNR of novel views at equal steps and time.",
-    )  # fmt: skip
-    skip.add_argument("--data", type=Path, required=True, metavar="DATA")
-    skip.add_argument("--minutes", type=float, default=3.0, metavar="M", help="training time of each run (default: 3)")
-    skip.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
-    skip.add_argument(
-        "--against", type=Path, metavar="SPLITNERF", help="the program of another build, for the first line"
-    )
-    skip.add_argument("--out", type=Path, metavar="OUT", help="keep the runs (default: a folder that is removed)")
-    skip.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all runs"
-    )
-    skip.set_defaults(execute=run_skip)
 
 
 def add_whole(benchmarks: argparse._SubParsersAction) -> None:
@@ -98,37 +74,15 @@ def default_folder() -> Path:
 def run_operators(args: argparse.Namespace) -> int:
     from splitnerf_tools.bench.harness import run_benchmarks
 
-    names = [args.benchmark] if args.benchmark else list(OPERATORS)
-    for path in run_benchmarks(names, args.quick, args.out or default_folder(), print_now):
+    names = [args.benchmark] if args.benchmark else OPERATORS
+    modules = [f"splitnerf_tools.bench.{name}" for name in names]
+    for path in run_benchmarks(modules, args.quick, args.out or default_folder(), print_now):
         print(path)
     return DONE
 
 
 def print_now(line: str) -> None:
     print(line, flush=True)
-
-
-def run_skip(args: argparse.Namespace) -> int:
-    from splitnerf.config import parse_setting, preset
-    from splitnerf.workflow import load_splits
-    from splitnerf_tools.bench.skip import run_other, skip_table
-
-    if args.minutes <= 0:
-        raise InputError(f"--minutes must be positive, got {args.minutes}")
-    if args.out is not None and args.out.exists() and any(args.out.iterdir()):
-        raise InputError(f"{args.out}: is not empty; give another --out")
-    full = preset("cpu").replace({"refinement.enabled": False} | dict(parse_setting(text) for text in args.settings))
-    training, test = load_splits(args.data, args.downscale)
-    if test is None:
-        raise InputError(f"{args.data}: has no test views to score")
-    with tempfile.TemporaryDirectory() as temporary:
-        out = args.out or Path(temporary)
-        out.mkdir(parents=True, exist_ok=True)
-        other = None
-        if args.against is not None:
-            other = lambda: run_other(args.against, args.data, args.minutes, args.downscale, out / "against")  # noqa: E731
-        skip_table(full, args.minutes, training, test, out, other, print_now)
-    return DONE
 
 
 def run_whole(args: argparse.Namespace) -> int:

@@ -6,15 +6,15 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+import reference
 import torch
 from torch import Tensor
 
 from splitnerf import _core
 from splitnerf.ops import HashGridSpec, hash_encode
-from splitnerf_tools.bench import reference
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients
-from splitnerf_tools.bench.peers import DrJitHashGrid, drjit_ready
+from splitnerf_tools.bench.peers import drjit_ready
 
 SPEC = HashGridSpec(n_levels=16, n_features=2, base_resolution=32, growth=1.3195079, log2_table_size=19)
 TOLERANCE = 1e-3  # difference between ours and plain torch, relative to the largest value
@@ -86,3 +86,41 @@ def run(quick: bool, rounds: int) -> Result:
 def relative(a: Tensor, true: Tensor) -> float:
     """The largest difference, relative to the largest true value."""
     return float((a.double() - true).abs().max() / true.abs().max())
+
+
+class DrJitHashGrid:
+    """Dr.Jit's encoding of a grid of the same shape, with a random table of its own.
+
+    Its nodes are shifted by half a cell, so that its features differ from ours and only times can be compared.
+
+    Args:
+        spec: The shape of the grid.
+        storage: The type of table and features, ``Float16`` or ``Float32``.
+        positions: [n, 3] points in [0, 1].
+        cotangent: [n, C] gradient of the features.
+    """
+
+    def __init__(self, spec: HashGridSpec, storage: str, positions: Tensor, cotangent: Tensor):
+        import drjit
+        from drjit.llvm import ad
+        from drjit.nn import HashGridEncoding
+
+        self.drjit, kind = drjit, getattr(ad, storage)
+        self.grid = HashGridEncoding(
+            kind, 3, n_levels=spec.n_levels, n_features_per_level=spec.n_features, hashmap_size=2**spec.log2_table_size,
+            base_resolution=spec.base_resolution, per_level_scale=spec.growth, init_scale=0.1,
+        )  # fmt: skip
+        self.positions = ad.ArrayXf(positions.T.contiguous().numpy())
+        self.cotangent = [kind(column.numpy()) for column in cotangent.T.contiguous()]
+        drjit.eval(self.positions, self.cotangent, self.grid.data)
+
+    def forward_backward(self) -> None:
+        """Features, and the gradient to the table."""
+        dr = self.drjit
+        dr.enable_grad(self.grid.data)
+        dr.set_grad(self.grid.data, 0)
+        features = self.grid(self.positions)
+        dr.backward(dr.sum(sum(f * g for f, g in zip(features, self.cotangent))))
+        dr.eval(*features, dr.grad(self.grid.data))
+        dr.sync_thread()
+        dr.disable_grad(self.grid.data)

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import reference
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.notes import note
 from splitnerf.ops import brdf_lut, fibonacci_directions, prefilter_light, split_sum_shade
-from splitnerf_tools.bench import reference
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients
 
