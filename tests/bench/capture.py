@@ -1,9 +1,11 @@
-"""What limits an asset from photographs: data that `splitnerf prepare` would make if it knew a part of the truth.
+"""Data that `splitnerf prepare` would make if a part of the truth were known, to find what limits an asset from
+photographs.
 
     python tests/bench/capture.py CAPTURE DATA OUT {cameras,masks,exposures,all}
 
-CAPTURE holds photos/ and truth/ (cameras.json, masks/); DATA is what `splitnerf prepare CAPTURE/photos` wrote, whose features
-and matches are used again. OUT gets data in which the named part is the truth; the steps after it follow as they do there.
+CAPTURE holds photos/ and truth/ (cameras.json, masks/); DATA is the output of `splitnerf prepare CAPTURE/photos`, whose
+features and matches are used again. OUT gets data in which the named part is the truth; the later steps are those of
+prepare.
 """
 
 from __future__ import annotations

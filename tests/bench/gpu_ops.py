@@ -1,12 +1,14 @@
-"""Times every operator of a training step with that step's own inputs, and compares its results with the CPU's in float64.
+"""Times every operator of a training step with that step's own inputs, and compares its results with the CPU's in
+float64.
 
     python tests/bench/gpu_ops.py DATA --out DIR [--device cuda] [--preset fast] [--steps 200] [--set KEY=VALUE ...]
 
-Trains some steps without graphs, makes a mesh, and records what the operators of one more step are called with; of several calls of an
-operator the largest. Times are medians: of one call with the L2 cache filled with something else before and the stream kept busy until
-the call is queued ("cold"), and of a call in a graph of ten. Where the package has the operator as torch code, that is timed in a graph
-as well. The share is the time that the copy of as many bytes as inputs and results have takes, over the cold time; of a table of which
-few numbers are read it is too large. Writes ops.md. With --device cpu it is a rehearsal, whose times say nothing.
+Trains some steps without graphs, makes a mesh, and records the inputs of the operators of one more step; of several
+calls of an operator the largest. Times are medians: of one call with the L2 cache filled with something else before and
+the stream kept busy until the call is queued ("cold"), and of a call in a graph of ten. Where the package has the
+operator as torch code, that is timed in a graph as well. The share is the time that the copy of as many bytes as inputs
+and results have takes, over the cold time; of a table of which few numbers are read it is too large. Writes ops.md.
+With --device cpu it is a rehearsal, whose times are meaningless.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ from op_checks import as_tuple  # noqa: E402
 from bench.gpu_train import Silence  # noqa: E402
 
 SOURCES = ("cpp", "python/splitnerf/ops")
-FACTOR, FLOOR = 10.0, 1e-5  # an operator may be so many times as far from the truth as the CPU in float32 is, and so much more
+# an operator may be so many times as far from the truth as the CPU in float32 is, and so much more
+FACTOR, FLOOR = 10.0, 1e-5
 HEAD = ("operator", "ms, cold (quartiles)", "ms in a graph", "torch's", "GB/s", "share", "error", "")
 HALVES = (torch.float16, torch.bfloat16)
 Call = tuple[Callable, tuple]
@@ -187,7 +190,8 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=0.1, help="of one measurement (default: 0.1)")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings")
     args = parser.parse_args()
-    config = preset(args.preset).replace({"open_below": 0.0} | dict(map(parse_setting, args.settings)))  # all caches are read
+    # all caches are read
+    config = preset(args.preset).replace({"open_below": 0.0} | dict(map(parse_setting, args.settings)))
     calls, clock = calls_of_a_step(args.data, config, args.device, args.steps), Clock(args.device, args.seconds)
     source = torch.rand((1 << 29) if args.device == "cuda" else (1 << 16), device=args.device)
     target = torch.empty_like(source)

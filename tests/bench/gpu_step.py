@@ -1,15 +1,17 @@
-"""One training step on a GPU beside the same step on the CPU: every term of the loss, every gradient; then graph against eager.
+"""Compares a training step on a GPU with the same step on the CPU: every term of the loss and gradient; then graph with
+eager.
 
     python tests/bench/gpu_step.py DATA [--device cuda] [--preset fast] [--steps 30] [--out DIR] [--set KEY=VALUE ...]
 
-The CPU trains some steps and makes a mesh. Its checkpoint is the model of all runs, its batch and samples are copied, and its
-random draws are recorded and given to the others. So only roundings differ. Three runs are made: on the device and on the CPU in
-float32, and on the CPU in float64, the truth. An error is the root mean square of a difference over that of the truth; those of
-the table and of the light's texels are taken for each level. The device may be :data:`FACTOR` times as far from the truth as the
-CPU's float32 is, and :data:`FLOOR` more. On a GPU the step is also taken with the matrix products that training takes (TF32, with
-limits of their own), and as a CUDA graph, which is held against the eager step with the same capacity: also one that is recorded after all graphs were dropped,
-after a step without room, and after another mesh. With --device cpu the
-program tries itself. Prints the worst, writes step.md; exit code 1: something is beyond its limit.
+The CPU trains some steps and makes a mesh. Its checkpoint is the model of all runs, its batch and samples are copied,
+and its random draws are recorded and given to the others. So only roundings differ. Three runs are made: on the device
+and on the CPU in float32, and on the CPU in float64, the truth. An error is the root mean square of a difference over
+that of the truth; those of the table and of the light's texels are taken for each level. The error of the device may be
+:data:`FACTOR` times that of float32 on the CPU, plus :data:`FLOOR`. On a GPU the step is also taken with the matrix
+products that training takes (TF32, with limits of their own), and as a CUDA graph, which is compared with the eager
+step of the same capacity: also a graph that is recorded after all graphs were dropped, after a step beyond its
+capacity, and after another mesh. --device cpu is a rehearsal. Prints the worst errors and writes step.md; exit code 1:
+an error is beyond its limit.
 """
 
 from __future__ import annotations
@@ -55,7 +57,8 @@ DRAWS = (torch.rand, torch.randn, torch.randint, torch.multinomial)
 
 
 class SameDraws(TorchFunctionMode):
-    """Records the random numbers of the first run that begins with :meth:`again`, and gives later runs copies of them."""
+    """Records the random numbers of the first run that begins with :meth:`again`, and gives later runs copies of
+    them."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -78,7 +81,8 @@ class SameDraws(TorchFunctionMode):
 
 
 class Doubles(TorchFunctionMode):
-    """Where a call is given float64 and float32, the float32 tensors become float64; but the split sum's table stays."""
+    """Where a call is given float64 and float32, the float32 tensors become float64; but the split sum's table
+    stays."""
 
     def __torch_function__(self, func, types, args=(), kwargs=None):
         kwargs = kwargs or {}
@@ -106,7 +110,8 @@ class Silence:
 
 
 class Work(NamedTuple):
-    """What all runs are given: the number of the step, its rays and samples on the CPU, and the light that weighs occlusion."""
+    """What all runs are given: the number of the step, its rays and samples on the CPU, and the light that weighs
+    occlusion."""
 
     step: int
     batch: Batch
@@ -115,7 +120,8 @@ class Work(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What a run gives, on the CPU: terms of the loss, gradients (None: none was taken), the shaded samples' numbers."""
+    """What a run gives, on the CPU: terms of the loss, gradients (None: none was taken), the shaded samples'
+    numbers."""
 
     terms: dict[str, Tensor]
     gradients: dict[str, Tensor | None]
@@ -166,7 +172,8 @@ def restored(dataset: Dataset, config: Config, run: Path, device: str) -> Traini
 
 
 def in_float64(dataset: Dataset, config: Config, run: Path) -> Training:
-    """The same training on the CPU with the same numbers in float64: those of a table in 16 bits are what that holds."""
+    """The same training on the CPU with the same numbers in float64: those of a table in 16 bits are what that
+    holds."""
     stored = restored(dataset, config, run, "cpu").model.sdf_field.grid.stored()
     training = restored(dataset, config.replace({"table_dtype": "float32"}), run, "cpu")
     training.model.double()
@@ -205,7 +212,8 @@ def collected(training: Training, ray, terms) -> Answer:
 
 
 def parts_of(training: Training, gradients: dict[str, Tensor | None]) -> dict[str, Tensor | None]:
-    """The gradients, those of the table and of the light's texels level by level: coarse levels have few of the numbers."""
+    """The gradients, those of the table and of the light's texels level by level: coarse levels have few of the
+    numbers."""
     model, parts = training.model, dict(gradients)
     spec = model.sdf_field.grid.spec
     levels = {"sdf_field.grid.table": [n for _, _, n, _ in spec.levels()]}

@@ -1,11 +1,13 @@
 """Trains and scores without an export, or looks at a training's steady state.
 
     python tests/bench/gpu_train.py DATA --out RUN --preset fast --steps 20000 [--set KEY=VALUE] [--views 8]
-    python tests/bench/gpu_train.py DATA --out RUN --preset fast --steps 20000 --until 1500 --page steady.md [--profiled 20]
+    python tests/bench/gpu_train.py DATA --out RUN --preset fast --steps 20000 --until 1500 --page steady.md [--profiled
+    20]
 
-The first trains with the schedule of so many steps and scores some test views; its last line says steps, seconds, memory and the main
-scores, and RUN/training.json holds all of them. The second ends at a step. It says how long a step took over the last two thirds of
-the steps before it, and then profiles some steps: the kernels by their own time, and how long the device was busy.
+The first trains with the schedule of so many steps and scores some test views; its last line says steps, seconds,
+memory and the main scores, and RUN/training.json holds all of them. The second ends at a step. It says how long a step
+took over the last two thirds of the steps before it, and then profiles some steps: the kernels by their own time, and
+how long the device was busy.
 """
 
 from __future__ import annotations

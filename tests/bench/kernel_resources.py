@@ -1,10 +1,10 @@
-"""What the CUDA kernels of a training step take, as the compiler says: registers, stack, spills and static shared memory.
+"""Resources of the CUDA kernels of a training step by the compiler: registers, stack, spills and static shared memory.
 
     python tests/bench/kernel_resources.py            prints the table of the present sources
     python tests/bench/kernel_resources.py --write    renews tests/cuda/kernel_resources.tsv
 
-Kernels in float64, and those for other than two features a level, stand in no step and are left out. Takes a minute of one core, nvcc
-and no GPU. tests/python/test_kernel_resources.py holds the sources against the table.
+Kernels in float64, and those for other than two features a level, are in no step and are left out. Takes a minute of
+one core, nvcc and no GPU. tests/python/test_kernel_resources.py compares the sources with the table.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ NUMBERS = {  # columns of the table, and where the compiler says them
 
 
 class Kernel(NamedTuple):
-    """A line of the table: the names of the source and of the kernel, or of the body that it runs; the columns of `NUMBERS`."""
+    """A line of the table: the names of the source and of the kernel, or of the body that it runs; the columns of
+    `NUMBERS`."""
 
     source: str
     name: str
@@ -69,7 +70,8 @@ def sources() -> list[Path]:
 
 
 def compiler_says(source: Path, folder: Path) -> str:
-    """What ptxas says of a source's kernels; that of a header of bodies is written into the folder first, as the build does."""
+    """What ptxas says of a source's kernels; that of a header of bodies is written into the folder first, as the build
+    does."""
     file = source
     if source.parent == BODIES:
         file = folder / f"bodies_{source.name}.cu"

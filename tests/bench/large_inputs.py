@@ -1,8 +1,8 @@
-"""What many large photos cost: the time to the first step, the memory, the file, and the time of a step.
+"""The cost of many large photos: the time to the first step, the memory, the file, and the time of a step.
 
     python tests/bench/large_inputs.py [--photos 100 300 1000] [--max-memory GB ...] [--folder DIR] [--out PAGE]
 
-Each row is a `splitnerf train` of its own on photos of 12 megapixels, JPEG with masks, of a striped ball that looks the same
+Each row is one `splitnerf train` on photos of 12 megapixels, JPEG with masks, of a striped ball that looks the same
 from all sides; it is ended after STEPS steps. The memory is the process's largest resident set before the end.
 """
 

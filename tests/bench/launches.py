@@ -1,12 +1,12 @@
-"""What a training step asks of a GPU, counted on the CPU: launches, by operator and by the line that calls.
+"""Launches of a training step on a GPU, counted on the CPU, by operator and by calling line.
 
     python tests/bench/launches.py [--steps 20] [--preset fast] [--set KEY=VALUE ...]
 
-Trains the demo scene with tiny sizes, without graphs, and counts the calls that reach a device in some steps, forward, backward and
-optimiser: an operator of torch is one launch unless it only looks at a tensor anew or allocates; one of ours is as many as its launcher
-in cpp/cuda/ makes. What works on tensors that a GPU's training keeps on the CPU is left out: the optimiser's counts of steps, and the
-sharpness as a number. The time of as many steps without counting is the host's own and that of tiny kernels on the CPU. How often a step
-waits for the GPU is counted by tests/python/test_device.py.
+Trains the demo scene with tiny sizes, without graphs, and counts the calls that reach a device in some steps, forward,
+backward and optimiser: an operator of torch is one launch unless it is a view or an allocation; one of ours is as many
+as its launcher in cpp/cuda/ makes. Calls on tensors that a GPU's training keeps on the CPU are left out: the
+optimiser's counts of steps, and the sharpness as a number. The time of as many steps without counting is the host's own
+and that of tiny kernels on the CPU. How often a step waits for the GPU is counted by tests/python/test_device.py.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ NO_LAUNCH = {
     "empty", "empty_like", "empty_strided", "new_empty", "new_empty_strided", "_unsafe_view", "_reshape_alias", "lift_fresh",
     "_local_scalar_dense", "_record_function_enter_new", "_record_function_exit",
 }  # fmt: skip
-ON_THE_HOST = {"_foreach_add_": "_step", "sharpness": "s_value"}  # operators, and the functions whose calls are the CPU's
+# operators, and the functions whose calls are the CPU's
+ON_THE_HOST = {"_foreach_add_": "_step", "sharpness": "s_value"}
 PACKAGE = "/python/splitnerf/"
 SMALL = dict(
     n_levels=4, log2_table_size=10, target_samples=2048, initial_rays=64, max_rays=256, grid_resolution=16, light_resolution=16,
@@ -121,7 +122,8 @@ def measured(config, folder: Path, steps: int) -> tuple[Launches, float]:
     begin = time.perf_counter()
     advance(steps)
     seconds = time.perf_counter() - begin
-    with patch.object(heads, "is_fused", lambda features, width: width <= heads.FUSED_WIDTH), Launches() as counted:  # as on a GPU
+    # as on a GPU
+    with patch.object(heads, "is_fused", lambda features, width: width <= heads.FUSED_WIDTH), Launches() as counted:
         advance(steps)
     return counted, seconds
 

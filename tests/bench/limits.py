@@ -2,11 +2,11 @@
 
     python tests/bench/limits.py RUN SCENE [--views 2] [--spp 32] [--texture 2048] [--downscale 1] [--out table.md]
 
-RUN is a run's folder or a GLB file with the recovered light beside it; SCENE a dataset with the truth as asset.glb,
+RUN is a run's folder or a GLB file with the recovered light in its folder; SCENE a dataset with the truth as asset.glb,
 light.hdr and relit test views. With --out the scene's table is appended to a page, which is made where it is missing.
 
 The first and the last row are the files as they are; between them parts come from the nearest points of the other
-surface (tests/bench/swap.py). `all true` is what noise and the data's own renderer leave of the truth itself.
+surface (tests/bench/swap.py). `all true` is the limit by noise and by the data's own renderer.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""How much a rendering changes where the table becomes a part of the distant light, and where there is no table.
+"""The change of a rendering when the table becomes a part of the distant light, and when there is no table.
 
     python tests/bench/near_table.py CAPTURE OUT [--samples 64] [--threads N]
 
-CAPTURE holds truth/: asset.glb, table.jpg, light.hdr, cameras.json (object_min, object_max, table_radius, each frame's exposure) and
-scene/transforms_test.json. OUT gets the environment that the object's middle sees (seen.exr), the views as EXR, and a sheet.
-Prints the PSNR of the views over white, in sRGB at the capture's exposure, and the relative root mean square of the radiance on
-the object. Needs bpy 5 (`splitnerf[blender]`).
+CAPTURE holds truth/: asset.glb, table.jpg, light.hdr, cameras.json (object_min, object_max, table_radius, each frame's
+exposure) and scene/transforms_test.json. OUT gets the environment that the object's middle sees (seen.exr), the views
+as EXR, and a sheet. Prints the PSNR of the views over white, in sRGB at the capture's exposure, and the relative root
+mean square of the radiance on the object. Needs bpy 5 (`splitnerf[blender]`).
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""The training step beside one in plain torch: same networks, losses and schedule, each operator as torch code.
+"""The training step compared with one in plain torch: same networks, losses and schedule, each operator as torch code.
 
     python tests/bench/plain_torch.py DATA [--steps 60] [--from RUN] [--downscale 1] [--set KEY=VALUE ...]
 
-Runs `splitnerf train` on DATA (or goes on from the checkpoint of RUN) twice for the same number of steps: as it is, and
-with every operator of a step replaced by the torch code that one would write without this library: hash grid by indexing,
-normals by a second pass of autograd, all samples of the occupied cells, padded rays and a cumulative sum of depths, tables and
-maps by gather, vertices found among all, and AdamW unfused. What happens a few times in a run alone (marching cubes,
-tracing the bits) stays. Prints milliseconds a step of both and their ratio; before that, how far the results of the
-replacements are from the operators', so that both do the same work.
+Runs `splitnerf train` on DATA (or continues from the checkpoint of RUN) twice for the same number of steps: as it is,
+and with every operator of a step replaced by the torch code that one would write without this library: hash grid by
+indexing, normals by a second pass of autograd, all samples of the occupied cells, padded rays and a cumulative sum of
+depths, tables and maps by gather, vertices found among all, and AdamW unfused. What happens only a few times in a run
+(marching cubes, tracing the bits) stays. Prints milliseconds a step of both and their ratio; before that, how far the
+results of the replacements are from the operators', so that both do the same work.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ def spread_samples(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_
 
 
 class Replacement:
-    """A function in the place of an operator. Arguments that the operator would hand on are returned as they are: torch adds up
-    their gradients."""
+    """A function in the place of an operator. Arguments that the operator would hand on are returned as they are: torch
+    adds up their gradients."""
 
     def __init__(self, name: str, function: Callable):
         self.function, self.handed_on = function, HANDED_ON.get(name, ())

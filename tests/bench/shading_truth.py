@@ -161,8 +161,8 @@ class TrueScene(SceneModel):
 
 
 def shaded_view(model: TrueScene, renderer: AssetRenderer, view: dict, seed: int) -> tuple[Tensor, Tensor]:
-    """[H, W, 3] mean radiance of a pixel's first hits as training shades them, and [H, W, 3] mean roughness, metallic and
-    share of hits from behind, which no closed surface has."""
+    """[H, W, 3] mean radiance of a pixel's first hits as training shades them, and [H, W, 3] mean roughness, metallic
+    and share of hits from behind, which no closed surface has."""
     h, w = view["height"], view["width"]
     origins, directions = image_rays(torch.from_numpy(view["pose"]).float(), torch.tensor(view["intrinsics"]), h, w)
     total, maps, hits = torch.zeros(h * w, 3), torch.zeros(h * w, 3), torch.zeros(h * w, 1)

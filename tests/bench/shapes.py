@@ -1,10 +1,10 @@
-"""What training makes of the built-in hollow shapes: docs/benchmarks/shapes.csv and shapes.md.
+"""Reconstructions of the built-in hollow shapes: docs/benchmarks/shapes.csv and shapes.md.
 
     python tests/bench/shapes.py WORK [--only mug bowl] [--materials glossy] [--minutes 4] [--light MAP.hdr] [--again]
 
 Renders each shape in each material into WORK, trains on it with `splitnerf train`, and takes the scores that training
-writes at its end. Rows that are there with the same minutes and images are left as they are, so that an interrupted
-table goes on; --again makes them and their data anew. A run that fails leaves no row, and the next one begins.
+writes at its end. Existing rows with the same minutes and images are kept, so that an interrupted
+table continues; --again makes them and their data anew. A run that fails leaves no row, and the next one begins.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
     python tests/bench/tables.py        (make tables)
 
-The head of a table says at which commit it was made and which sources it measures (splitnerf_tools.bench.provenance); pages
-of docs/benchmarks without such a head are unknown.
+The head of a table says at which commit it was made and which sources it measures (splitnerf_tools.bench.provenance);
+pages of docs/benchmarks without such a head are unknown.
 """
 
 from __future__ import annotations
