@@ -115,6 +115,8 @@ def test_mesh_is_light_closed_and_on_the_surface(baked):
     welded.merge_vertices(merge_tex=True, merge_norm=True)
     assert welded.is_watertight and welded.volume > 0
     assert (baked.occlusion > 0.8).all()  # next to convex
+    material = asset.materials[0]  # a factor multiplies its texture
+    assert material.roughness == material.metallic == 1.0 and tuple(material.albedo) == (1.0, 1.0, 1.0)
 
 
 def test_charts_do_not_overlap_and_keep_their_distance():
@@ -184,7 +186,8 @@ def test_tangent_space_is_undone_by_its_decoder(sign):
     bitangents = tangents[:, 3:] * np.cross(normals, tangents[:, :3])
     decoded = local[:, :1] * tangents[:, :3] + local[:, 1:2] * bitangents + local[:, 2:] * normals
     assert angle(decoded, world).max() < 1e-2
-    assert (to_tangent_space(-normals, normals, tangents)[:, 2] > 0).all()
+    raised = to_tangent_space(-0.01 * normals, normals, tangents)
+    assert (raised[:, 2] > 0).all() and np.linalg.norm(raised, axis=1) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_points_move_onto_the_level_set_and_never_away():
@@ -208,13 +211,6 @@ def test_points_move_onto_the_level_set_and_never_away():
     assert np.array_equal(
         to_level_set(squares, points, 0.2, across / np.linalg.norm(across, axis=1, keepdims=True)), points
     )
-
-
-def test_a_distance_out_of_reach_is_covered_as_far_as_it_goes():
-    """Though the first step would land on the surface."""
-    points = np.float32([[0.85, 0, 0], [0, 0.76, 0]])
-    moved = to_level_set(surface_of(lambda x: x.norm(dim=1) - 0.8), points, 0.02)
-    assert moved == pytest.approx(np.float32([[0.83, 0, 0], [0, 0.78, 0]]), abs=1e-6)
 
 
 def test_steps_that_lead_astray_are_not_taken():

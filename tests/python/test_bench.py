@@ -17,10 +17,10 @@ from torch.nn import functional as F
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.errors import CheckFailed
 from splitnerf.fields import SdfField
-from splitnerf_tools.bench import charts, harness, normals, path_tracer, provenance, whole
-from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv, write_result
+from splitnerf_tools.bench import harness, normals, path_tracer, provenance, whole
+from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv
 from splitnerf_tools.bench.harness import interleaved
-from splitnerf_tools.bench.lights import MapLight, octahedral_directions, pyramid_of
+from splitnerf_tools.bench.lights import MapLight, pyramid_of
 from splitnerf_tools.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
 from splitnerf_tools.demo.scene import write_demo_dataset
 
@@ -54,20 +54,6 @@ def test_files_mark_the_front_and_the_default(tmp_path):
         assert any(line.startswith(f"# {fact}: ") for line in heads) and f"; {fact} " in f"; {text}".replace("\n", "; ")
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     assert [row["on_front"] for row in rows] == ["1", "1", "0", "1"] and rows[3]["default"] == "1"
-
-
-def test_a_result_becomes_a_picture(tmp_path):
-    pytest.importorskip("matplotlib")
-    files = write_result(Result("work", "Work", (), [], [CHART]), tmp_path)
-    assert [path.name for path in files] == ["work.md", "work.csv", "work.png"]
-    assert (tmp_path / "work.png").read_bytes()[:4] == b"\x89PNG"
-
-
-def test_the_machine_is_named(tmp_path):
-    file = tmp_path / "cpuinfo"
-    file.write_text("processor : 0\nmodel name\t: Some CPU @ 2 GHz\n")
-    assert provenance.processor_name(file) == "Some CPU @ 2 GHz"
-    assert provenance.processor_name(tmp_path / "none")
 
 
 class TestTables:
@@ -172,11 +158,6 @@ class TestLights:
                 torch.testing.assert_close(estimate, torch.full((30, 3), 2.0), rtol=1e-3, atol=0)
         assert torch.allclose(pyramid_of(light, 16)(axes, roughness), torch.full((30, 3), 2.0), rtol=1e-3)
 
-    def test_octahedral_texels_are_unit_and_their_centre_is_the_pole(self):
-        d = octahedral_directions(9)
-        np.testing.assert_allclose(np.linalg.norm(d, axis=1), 1.0)
-        np.testing.assert_allclose(d[4 * 9 + 4], [0, 0, 1], atol=1e-12)
-
     def test_the_lobes_integral(self):
         """By quadrature over the cosine."""
         c = (torch.arange(200000, dtype=torch.float64) + 0.5) / 200000
@@ -250,13 +231,6 @@ class TestSplitSum:
         assert 0 < errors[split_sum.NOISE] < 0.01
 
 
-def test_an_axis_of_errors_spans_a_decade():
-    low, high = charts.error_range(Chart("equal", "ms", "error", [point("a", 1, 2e-7), point("b", 2, 2.2e-7)]))
-    assert high / low == pytest.approx(10) and low < 2e-7 and high > 2.2e-7
-    low, high = charts.error_range(Chart("apart", "ms", "error", [point("a", 1, 1e-7), point("b", 2, 1e-2)]))
-    assert low < 1e-7 and high > 1e-2
-
-
 class TestNormals:
     def test_points_lie_on_the_surface(self):
         x = normals.on_surface(200)
@@ -287,14 +261,6 @@ class TestNormals:
         assert errors["analytic", ""] < 1e-2 < errors["finite differences", "eps = 0.01 cells"] < 1
         assert errors["finite differences", "eps = 1 cells"] > 1
         assert [p.series for p in training.points if p.default] == ["analytic"]
-
-    def test_both_ways_have_gradients(self):
-        field = SdfField(normals.SPEC, normals.BOX)
-        x = torch.rand(20, 3) - 0.5
-        for way in (normals.analytic, lambda f, p: normals.finite_differences(f, p, 1.0)):
-            assert normals.timed(way, field, x, training=False)().shape == (20, 3)
-            assert any(g is not None and g.abs().max() > 0 for g in normals.timed(way, field, x, training=True)())
-
 
 def test_the_path_tracer_converges(tmp_path, monkeypatch):
     """At least with the root of its samples; a lattice of them does better."""

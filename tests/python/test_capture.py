@@ -36,7 +36,6 @@ from splitnerf_tools.capture.surroundings import FAINT, HEIGHT, Shot, surroundin
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
 from splitnerf_tools.capture.video import write_frames
 from splitnerf_tools.capture.world import CAMERA_DISTANCE, World, settle
-from splitnerf_tools.commands.prepare import STEPS, overall
 
 
 PLAIN = Lens(320, 240, 320.0, 320.0, 160.0, 120.0, 0.0, 0.0, 0.0, 0.0)
@@ -192,21 +191,6 @@ def test_given_masks_may_be_black_on_the_object(tmp_path, capsys, inverted):
     (tmp_path / f"{world.scene.names[3]}.png").unlink()
     with pytest.raises(InputError, match="has no mask p_03.png"):
         given_masks(world, tmp_path, 0)
-
-
-def test_missing_packages_are_named(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr("splitnerf_tools.commands.prepare.find_spec", lambda name: None)
-    assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "data")]) == 2
-    assert "splitnerf[photos]" in capsys.readouterr().err
-
-
-def test_an_interrupted_call_says_how_to_go_on(tmp_path, monkeypatch, capsys):
-    def interrupted(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(capture_job, "prepare", interrupted)
-    assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "data")]) == 130
-    assert "the same command continues" in capsys.readouterr().err
 
 
 def test_sigterm_ends_it_without_a_stack_trace(tmp_path):
@@ -388,13 +372,6 @@ def test_data_whose_masks_are_not_found_are_not_left(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="nothing stands out"):
         capture_job.write_data(world, exposures, photos, tmp_path, PrepareSettings(), lambda step, share: None)
     assert not (tmp_path / "transforms.json").exists()
-
-
-@pytest.mark.parametrize("given", [False, True])
-def test_the_bar_grows_to_its_end(given):
-    shares = [overall(step, share, given) for step in STEPS for share in (0.0, 0.5, 1.0)]
-    assert shares[0] == 0 and shares[-1] == pytest.approx(1) and shares == sorted(shares)
-    assert overall("masks", 0.0, given) > (0.8 if given else 0.0) and overall("masks", 0.0, False) < 0.5
 
 
 @pytest.mark.parametrize("placed, told", [("abcdefghi", False), ("abcdefg", True)])

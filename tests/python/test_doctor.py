@@ -7,7 +7,6 @@ import math
 import os
 import shutil
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from pretend_gpu import pretend_gpu
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves
 
-from splitnerf import _core, devices, memory
+from splitnerf import _core, devices
 from splitnerf.cli import main
 from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED
 from splitnerf.cli.train import device_for
@@ -131,19 +130,6 @@ def test_all_is_well_here(capsys):
     assert all(line[23] == " " and line[24] != " " for line in lines)  # values stand below each other
 
 
-def test_missing_packages_are_named_and_are_no_fault(capsys, monkeypatch):
-    monkeypatch.setattr(machine, "find_spec", lambda name: None)
-    monkeypatch.setattr("splitnerf_tools.commands.doctor.self_test", lambda device: True)
-    assert main(["doctor"]) == DONE
-    said = capsys.readouterr().out
-    for package in machine.PACKAGES:
-        assert f"{package.name:24}missing: {package.brings} (pip install 'splitnerf[{package.extra}]')\n" in said
-    monkeypatch.setattr(machine, "find_spec", lambda name: name)
-    assert main(["doctor"]) == DONE
-    said = capsys.readouterr().out
-    assert "missing" not in said and all(f"{p.name:24}there: {p.brings}\n" in said for p in machine.PACKAGES)
-
-
 def test_a_failed_check_ends_with_what_to_do(capsys, monkeypatch):
     monkeypatch.setattr(_core, "instruction_set", lambda: "avx512")
     with Spoilt("srgb_to_linear"):
@@ -249,20 +235,6 @@ def test_one_processor(monkeypatch, tmp_path, capsys):
     assert "has one processor" in capsys.readouterr().err and not (tmp_path / "run").exists()
     with pytest.raises(InputError, match="has one processor"):
         unwrap(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), 64)
-
-
-def test_little_memory_and_disk(monkeypatch, tmp_path):
-    total, free = machine.memory_bytes()
-    assert 0 < free <= total
-    limits = {"memory.max": [str(2 * 2**30)], "memory.stat": ["anon", str(2**29)]}
-    monkeypatch.setattr(memory, "control_group", limits.get)
-    assert machine.memory_bytes()[0] == min(total, 2 * 2**30) and machine.memory_bytes()[1] <= 1.5 * 2**30
-    assert machine.memory().advice == "close other programs"
-    monkeypatch.setattr(machine, "memory_bytes", lambda: (64 * 2**30, 32 * 2**30))
-    assert machine.memory().advice == "" and machine.memory().value.startswith("64.0 GiB, 32.0 GiB free")
-    assert "photos up to 50% of what is free" in machine.memory().value
-    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=2**20))
-    assert "--out" in machine.disk(tmp_path).advice
 
 
 class TestChoice:

@@ -56,6 +56,7 @@ def parse_glb(path):
     for name, index in (primitive["attributes"] | {"indices": primitive["indices"]}).items():
         accessor = document["accessors"][index]
         view = document["bufferViews"][accessor["bufferView"]]
+        assert view["target"] == (34963 if name == "indices" else 34962)
         dtype = {5126: "<f4", 5123: "<u2", 5125: "<u4"}[accessor["componentType"]]
         values = np.frombuffer(binary, dtype, view["byteLength"] // np.dtype(dtype).itemsize, view["byteOffset"])
         arrays[name] = values.reshape(accessor["count"], -1)
@@ -169,33 +170,23 @@ def test_bad_assets_write_nothing(tmp_path, asset, write):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("flip", [False, True])
-def test_faces_of_a_ply_point_outward_whatever_came_in(tmp_path, ball, flip):
-    vertices, faces, _, _ = ball
-    write_mesh_ply(tmp_path / "a.ply", vertices, faces[:, ::-1] if flip else faces)
-    assert trimesh.load(tmp_path / "a.ply", force="mesh").volume > 20
-
-
-@pytest.mark.parametrize("flip", [False, True])
-def test_winding_of_an_open_mesh_does_not_depend_on_where_it_stands(tmp_path, ball, flip):
-    vertices, faces, _, _ = ball
-    faces = faces[vertices[faces].mean(axis=1)[:, 0] > -0.5]
-    moved = vertices + [-100, 50, 30]
-    write_mesh_ply(tmp_path / "a.ply", moved, faces[:, ::-1] if flip else faces)
-    mesh = trimesh.load(tmp_path / "a.ply", process=False)
-    outward = mesh.triangles_center - [-100, 50, 30]
-    assert ((mesh.face_normals * outward).sum(axis=1) > 0).all()
-
-
-def test_ply_keeps_the_frame_and_encodes_colours(tmp_path, ball):
-    vertices, faces, _, albedo = ball
-    write_mesh_ply(tmp_path / "a.ply", vertices, faces, albedo)
-    mesh = trimesh.load(tmp_path / "a.ply", process=False)
-    assert mesh.vertices == pytest.approx(vertices, abs=1e-6)
-    assert mesh.visual.vertex_colors[:, :3] / 255 == pytest.approx(linear_to_srgb(albedo), abs=0.5 / 255 + 1e-6)
-
-
 CAMERAS = Cameras(torch.eye(4)[None], torch.tensor([[8.0, 8, 8, 8]]), torch.tensor([16, 16]))
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("is_open", [False, True])
+def test_a_ply_points_outward_in_its_frame_with_encoded_colours(tmp_path, ball, flip, is_open):
+    """Whatever the winding of the faces that came, and wherever the mesh stands."""
+    vertices, faces, _, albedo = ball
+    faces = faces[vertices[faces].mean(axis=1)[:, 0] > -0.5] if is_open else faces
+    place = [-100, 50, 30]
+    write_mesh_ply(tmp_path / "a.ply", vertices + place, faces[:, ::-1] if flip else faces, albedo)
+    mesh = trimesh.load(tmp_path / "a.ply", process=False)
+    assert mesh.vertices == pytest.approx(vertices + place, abs=1e-5)
+    assert ((mesh.face_normals * (mesh.triangles_center - place)).sum(axis=1) > 0).all()
+    assert mesh.visual.vertex_colors[:, :3] / 255 == pytest.approx(linear_to_srgb(albedo), abs=0.5 / 255 + 1e-6)
+    with pytest.raises(RuntimeError, match="colors must be finite"):
+        write_mesh_ply(tmp_path / "a.ply", vertices, faces, albedo * np.nan)
+
+
 BAD_MESHES = {
     "empty": (np.zeros((0, 3)), np.zeros((0, 3), int)),
     "no faces": (np.eye(3), np.zeros((0, 3), int)),
@@ -215,12 +206,6 @@ def test_degenerate_mesh_writes_nothing(tmp_path, case):
     assert not list(tmp_path.iterdir())
 
 
-def test_bad_colours_are_named(tmp_path, ball):
-    vertices, faces, _, albedo = ball
-    with pytest.raises(RuntimeError, match="colors must be finite"):
-        write_mesh_ply(tmp_path / "a.ply", vertices, faces, albedo * np.nan)
-
-
 def test_environment_keeps_rows_and_columns(tmp_path):
     radiance = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
     radiance[0, 4] = [100, 50, 25]
@@ -229,19 +214,12 @@ def test_environment_keeps_rows_and_columns(tmp_path):
     assert read_hdr(exr) == pytest.approx(radiance, rel=1e-3)
     assert np.abs(read_hdr(hdr) - radiance).max() <= 100 / 128
     assert np.unravel_index(read_hdr(hdr)[..., 0].argmax(), (8, 16)) == (0, 4)
-
-
-def test_environment_brighter_than_half_is_stored_as_float(tmp_path):
-    radiance = np.full((2, 4, 3), 1e6, np.float32)
-    exr, _ = write_environment(tmp_path, radiance)
-    assert np.array_equal(read_hdr(exr), radiance)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -1.0])
-def test_bad_environment_writes_nothing(tmp_path, value):
-    with pytest.raises(ValueError, match="finite and not negative"):
-        write_environment(tmp_path, np.full((2, 4, 3), value))
-    assert not list(tmp_path.iterdir())
+    bright = np.full((2, 4, 3), 1e6, np.float32)  # beyond halves
+    assert np.array_equal(read_hdr(write_environment(tmp_path, bright)[0]), bright)
+    for value in (np.nan, np.inf, -1.0):
+        with pytest.raises(ValueError, match="finite and not negative"):
+            write_environment(tmp_path / "none", np.full((2, 4, 3), value))
+    assert not (tmp_path / "none").exists()
 
 
 def save_run(run, **state):

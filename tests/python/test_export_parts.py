@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-import struct
 
 import numpy as np
 import pytest
@@ -14,8 +12,7 @@ import trimesh
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.export import bake, maps
-from splitnerf.export.bake import UnwrappedMesh, bake_occlusion, rasterise, to_tangent_space
-from splitnerf.export.glb import write_glb
+from splitnerf.export.bake import UnwrappedMesh, bake_occlusion
 from splitnerf.export.maps import encode_maps
 from splitnerf.export.surface import Surface
 from splitnerf.export.textured import textured_asset, vertex_normals
@@ -26,14 +23,6 @@ def square() -> UnwrappedMesh:
     vertices = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     faces, normals, uv = np.int32([[0, 1, 2], [0, 2, 3]]), np.float32([[0, 0, 1]] * 4), vertices[:, :2].copy()
     return UnwrappedMesh(vertices, faces, normals, vertex_tangents(vertices, faces, normals, uv), uv)
-
-
-def test_strips_of_a_raster_make_the_whole(monkeypatch):
-    uv, faces = np.float32([[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]]), np.int32([[0, 1, 2]])
-    whole = rasterise(uv, faces, 64)
-    monkeypatch.setattr(bake, "BAND", 64 * 7)
-    strips = rasterise(uv, faces, 64)
-    assert np.array_equal(whole.index, strips.index) and np.array_equal(whole.weights, strips.weights)
 
 
 def test_a_bake_in_bands_is_the_whole_one(monkeypatch):
@@ -66,35 +55,14 @@ def test_maps_encoded_in_bands_are_the_whole_ones(monkeypatch):
 def test_occlusion_baked_small_stands_where_it_belongs(monkeypatch):
     """A share that is x at x: at each texel's centre, but for the outer ones, which repeat what is next to them."""
 
-    def factors(scene, points, *args, **kwargs):
+    def factors(scene, points, normals, *args, offset, **kwargs):
+        assert (normals == torch.tensor([0.0, 0.0, 1.0])).all() and offset == 0.037  # traced off the surface along its normal
         return points[:, :1], None
 
     monkeypatch.setattr(bake, "occlusion_factors", factors)
-    found = bake_occlusion(square(), 64, 0.01)
+    found = bake_occlusion(square(), 64, 0.037)
     x = (np.arange(64) + 0.5) / 64
     np.testing.assert_allclose(found[:, 2:-2], np.broadcast_to(x[2:-2], (64, 60)), atol=1e-3)
-
-
-def test_occlusion_is_traced_off_the_surface_along_its_normal(monkeypatch):
-    asked = {}
-    factors = bake.occlusion_factors
-
-    def noted(scene, points, normals, *args, **kwargs):
-        asked.update(normals=normals, **kwargs)
-        return factors(scene, points, normals, *args, **kwargs)
-
-    monkeypatch.setattr(bake, "occlusion_factors", noted)
-    assert (bake_occlusion(square(), 32, 0.037) == 1).all() and asked["offset"] == 0.037
-    assert (asked["normals"] == torch.tensor([0.0, 0.0, 1.0])).all()
-
-
-def test_raised_normals_are_of_length_one():
-    normals = np.float32([[0, 0, 1]] * 3)
-    tangents = np.float32([[1, 0, 0, 1]] * 3)
-    world = np.float32([[0, 0, -1], [0.8, 0, -0.6], [1, 0, 0]])
-    local = to_tangent_space(world, normals, tangents)
-    assert np.linalg.norm(local, axis=1) == pytest.approx(1.0, abs=1e-6) and (local[:, 2] > 0).all()
-    np.testing.assert_allclose(to_tangent_space(0.01 * world, normals, tangents), local, atol=1e-6)
 
 
 def test_charts_between_the_texels_are_refused():
@@ -150,18 +118,6 @@ def test_normals_are_those_of_the_places_that_vertices_move_to():
     np.testing.assert_allclose(found.normals, found.vertices / 0.8, atol=2e-3)
 
 
-def test_textures_stand_without_factors():
-    """A factor multiplies its texture: both are 1. The offset of occlusion's rays is handed on."""
-    mesh = trimesh.creation.icosphere(2, 0.8)
-    found = textured_asset(
-        "ball", np.float32(mesh.vertices), np.int32(mesh.faces), ball(), n_faces=0, texture_size=64, spacing=0.05,
-        occlusion_offset=0.01,
-    )  # fmt: skip
-    material = found.asset.materials[0]
-    assert material.roughness == material.metallic == 1.0 and tuple(material.albedo) == (1.0, 1.0, 1.0)
-    assert found.watertight and np.abs(np.linalg.norm(found.asset.vertices, axis=1) - 0.8).max() < 1e-4
-
-
 def textured() -> Asset:
     mesh = square()
     texture = np.full((4, 4, 2), 0.25, np.float32)
@@ -176,16 +132,3 @@ def test_without_occlusion_all_is_open_and_what_is_not_finite_is_refused():
     asset.materials[0].roughness_metallic_texture[0, 0, 0] = np.nan
     with pytest.raises(RuntimeError, match="finite"):
         encode_maps("a", asset, None)
-
-
-def test_buffers_of_a_glb_say_what_they_are_for(tmp_path):
-    """34963 for indices, 34962 for vertices."""
-    write_glb(tmp_path / "a.glb", textured())
-    content = (tmp_path / "a.glb").read_bytes()
-    document = json.loads(content[20 : 20 + struct.unpack("<I", content[12:16])[0]])
-    primitive = document["meshes"][0]["primitives"][0]
-
-    def target(accessor: int) -> int:
-        return document["bufferViews"][document["accessors"][accessor]["bufferView"]]["target"]
-
-    assert target(primitive["indices"]) == 34963 and {target(a) for a in primitive["attributes"].values()} == {34962}

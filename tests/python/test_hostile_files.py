@@ -19,7 +19,6 @@ from tiny_runs import tiny
 
 from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint
-from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image
@@ -131,6 +130,7 @@ def parts_by_word(gltf: Gltf) -> None:
 @pytest.mark.parametrize(("change", "message"), [
     (zeros_without_end, "unpacks to more"), (one_vertex_for_all, "unpacks to more|byteStride"),
     (many_instances, "unpacks to more"), (parts_by_word, "not valid glTF"),
+    (lambda g: g.json["bufferViews"][0].update(byteStride=0), "byteStride"),
     (lambda g: g.json["buffers"].append({"uri": "x" * 5000, "byteLength": 4}), None),
 ])  # fmt: skip
 def test_assets_that_unpack_without_end(tmp_path, change, message):
@@ -143,13 +143,6 @@ def test_assets_that_unpack_without_end(tmp_path, change, message):
     else:
         with pytest.raises(InputError, match=message):
             read_asset(path)
-
-
-def test_a_stride_shorter_than_what_it_parts(tmp_path):
-    gltf = triangle()
-    gltf.json["bufferViews"][0]["byteStride"] = 0
-    with pytest.raises(InputError, match="byteStride"):
-        read_asset(gltf.write(tmp_path / "asset.glb"))
 
 
 def repack(path: Path, change=lambda pickled: pickled, **options) -> None:
@@ -289,13 +282,3 @@ def test_settings_that_no_longer_fit_are_named(data, begun):
     for settings in ({"n_levels": 5}, {"grid_resolution": 20}):
         with pytest.raises(InputError, match="checkpoint.pt: its .* does not fit the settings"):
             trainer.train(load_dataset(data), tiny(steps=12, **settings), begun[0], resume=True)
-
-
-@pytest.mark.parametrize("settings", [
-    {"learning_rate": float("nan")}, {"learning_rate": float("inf")}, {"learning_rate": 10**400}, {"n_levels": 0},
-    {"n_levels": 33}, {"log2_table_size": 60}, {"seed": 1 << 70}, {"target_samples": 1 << 40},
-    {"growth": 0.5},
-])  # fmt: skip
-def test_settings_beyond_reason(settings):
-    with pytest.raises(InputError, match=next(iter(settings))):
-        Config().replace(settings)

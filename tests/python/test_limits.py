@@ -112,14 +112,6 @@ def test_the_table_has_the_ceiling_and_mends_one_part_at_a_time(files, tmp_path,
     assert ours["relit"] < ceiling["relit"] - 3
 
 
-def test_tables_are_appended_under_one_introduction(tmp_path, monkeypatch):
-    monkeypatch.setattr(limits, "section", lambda run, scene, *_: f"## {scene.name}\n")
-    for name in ("first", "second"):
-        monkeypatch.setattr("sys.argv", ["limits.py", "run", name, "--out", str(tmp_path / "page.md")])
-        limits.main()
-    assert (tmp_path / "page.md").read_text() == limits.INTRODUCTION + "\n## first\n\n## second\n"
-
-
 def test_true_albedo_is_found_on_every_texel(files):
     run, data = files
     ours, truth = read_asset(run / "mesh.glb"), read_asset(data / "asset.glb")

@@ -15,10 +15,9 @@ import pytest
 import torch
 from looking_at import serving
 from test_train import flat, same
-from tiny_runs import as_options, tiny
+from tiny_runs import tiny
 from viewer_server import ask, error_of, halves, triangle
 
-from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
@@ -272,17 +271,6 @@ def test_a_viewer_without_a_run_has_no_buttons(tmp_path):
             assert heard() == {"ended": None}
 
 
-def test_the_command_prints_the_address_and_refuses_a_port_in_use(data, tmp_path, capsys):
-    small = as_options({"steps": 8})
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = str(taken.getsockname()[1])
-        assert main(["train", str(data), "--out", str(tmp_path / "mine"), "--view", port, *small]) == BAD_INPUT
-    assert "cannot be listened at" in capsys.readouterr().err and not (tmp_path / "mine").exists()
-    with pytest.raises(SystemExit) as refused:
-        main(["train", "--view", str(data)])
-    assert refused.value.code == BAD_INPUT and "give DATA before --view" in capsys.readouterr().err
-
-
 def test_a_failure_is_told(capsys):
     with pytest.raises(RuntimeError), training_page("mine", 0) as live:
         raise RuntimeError
@@ -320,11 +308,3 @@ def test_a_delivered_asset_that_cannot_be_read_is_said(error, stepped, tmp_path,
     status, _, content = ask(stepped.server, "scene.json")
     assert status == 200 and f"{tmp_path}: cannot be shown ({type(error).__name__}" in json.loads(content)["problems"][0]
     assert stepped.live.events.state["version"] == 0  # pages wait for no newer one
-
-
-def test_a_light_that_finds_no_memory_does_not_end_the_training(stepped, monkeypatch):
-    def panorama(*_):
-        raise torch.OutOfMemoryError("no memory")
-
-    monkeypatch.setattr(stepped.training.model.light, "panorama", panorama)
-    assert stepped.live._update_asset(stepped.training) == 0

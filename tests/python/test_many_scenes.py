@@ -19,9 +19,9 @@ from splitnerf.errors import InputError
 from splitnerf.files import LOCK, is_locked, remove_partial
 from splitnerf_tools.batch import child
 from splitnerf_tools.batch.child import Outcome, Work, train_scene
-from splitnerf_tools.batch.cluster import LONGEST_FOLDER, Share, own_folder, share_of
+from splitnerf_tools.batch.cluster import Share, share_of
 from splitnerf_tools.batch.job import Batch, run_batch
-from splitnerf_tools.batch.scenes import Rows, Scene, requested_scenes, keep_scenes, known_scenes, markdown, scene_name
+from splitnerf_tools.batch.scenes import Scene, requested_scenes, keep_scenes, known_scenes, markdown, scene_name
 from splitnerf_tools.commands.batch import given_options
 
 GB = 1e9
@@ -154,33 +154,12 @@ def test_more_than_a_machine_has_is_refused(asked):
         share_of([{**NODE, "GPU": 0.0}, {**NODE, "CPU": 1.0}], 1, cores=2, gpus=1, memory=1)
 
 
-def test_the_folder_of_sockets_has_a_short_name(tmp_path, monkeypatch):
-    deep = tmp_path / ("x" * 90)
-    deep.mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(deep))
-    own = Path(own_folder())
-    try:
-        assert len(str(own)) <= LONGEST_FOLDER and own.stat().st_mode & 0o077 == 0
-    finally:
-        own.rmdir()
-
-
 # ---- the table ----
 
 ENDED = [
     Scene("chair", "/a/chair", "done", 300, 4.04, {"views": 34.251, "normals": 6.08, "light": 14.5}),
     Scene("x" * 60, "/a/x|`<b>\n", "refused", None, 0.0, {}, "/a/x|`<b>\n: is \x1b[31mdamaged"),
 ]
-
-
-def test_rows_of_the_terminal_stand_under_their_head():
-    rows = Rows(ENDED)
-    head, chair, damaged = rows.head(), *map(rows.row, ENDED)
-    assert len(head) == len(chair) and "\x1b" not in damaged and len(damaged.splitlines()) == 1
-    for title, value in (("state", "done"), ("steps", "300"), ("minutes", "4.0"), ("views", "34.25"), ("light", "14.50")):
-        at = head.index(title) if title == "state" else head.index(title) + len(title) - len(value)
-        assert chair[at:].startswith(value), title
-    assert damaged.startswith("x" * 27 + "~  refused") and damaged.endswith(r"is \x1b[31mdamaged")
 
 
 def test_markdown_has_a_row_a_scene_whatever_its_words():

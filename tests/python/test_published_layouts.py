@@ -154,39 +154,6 @@ def test_radiance_a_little_below_0_is_noise(tmp_path):
             load_photo(frame, 1, "object")
 
 
-def damaged(scene: Written, name: str) -> tuple:
-    """A file of the set and what to write into it."""
-    return {
-        "stanford-orb": ("transforms_train.json", b'{"frames": [7]}', "list of objects"),
-        "nerfactor": ("train_000/metadata.json", b"{}", "missing key"),
-    }.get(name)
-
-
-def test_damage_is_one_line(written, capsys):
-    name, scene = written
-    case = damaged(scene, name)
-    if case is None:
-        return
-    path, content, message = scene.root / case[0], case[1], case[2]
-    whole = path.read_bytes()
-    path.write_bytes(content)
-    try:
-        with pytest.raises(InputError, match=message) as caught:
-            read_frames(scene.root, "train", Reading("all"))
-        assert len(str(caught.value).splitlines()) == 1 and str(path) in str(caught.value)
-    finally:
-        path.write_bytes(whole)
-
-
-def test_a_scene_that_leads_out_of_the_folder_is_refused(tmp_path):
-    (tmp_path / "train_mask").mkdir()
-    frame = {"scene_name": "../other", "file_path": "test/0000", "transform_matrix": np.eye(4).tolist()}
-    for name in ("train", "novel"):
-        (tmp_path / f"transforms_{name}.json").write_text(json.dumps({"frames": [frame]}))
-    with pytest.raises(InputError, match="'scene_name' of frame 0 is no folder's name"):
-        stanford_orb.relit(tmp_path, {})
-
-
 def test_a_layout_without_other_lights_refuses_them(tmp_path, capsys):
     write_image(tmp_path / "a.exr", patches())
     map_path = str(tmp_path / "a.exr")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -17,8 +15,6 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.published import nerfactor, shiny, stanford_orb, tensoir
 from splitnerf.evaluate.published.common import Delivered
 from splitnerf.evaluate.published.folders import FolderTruth
-from splitnerf.evaluate.published.table import PROTOCOLS, published, table
-from splitnerf_tools.synth.layouts import LAYOUTS
 
 SIDE = 24
 RANDOM = np.random.default_rng(5)
@@ -142,25 +138,3 @@ def test_albedo_is_scaled_before_relighting():
     plain, textured = Delivered(asset, None, np.zeros(3), 1).with_albedo(np.array([2.0, 0.5, 3.0])).asset.materials
     assert plain.albedo == pytest.approx((0.4, 0.2, 1.0))
     assert textured.albedo == (1, 1, 1) and textured.albedo_texture[0, 0] == pytest.approx([0.4, 0.2, 1.0])
-
-
-def test_the_command_line_knows_all_protocols_and_layouts():
-    choices = {a.dest: a.choices for name in ("evaluate", "synth") for a in parser_of(name)._actions if a.choices}
-    assert tuple(choices["protocol"]) == tuple(PROTOCOLS) and tuple(choices["layout"]) == LAYOUTS
-
-
-def parser_of(name: str) -> argparse.ArgumentParser:
-    commands = argparse.ArgumentParser().add_subparsers()
-    import_module(f"splitnerf.cli.{name}").add_parser(commands)
-    return commands.choices[name]
-
-
-def test_published_numbers_fit_their_tables():
-    for name, protocol in PROTOCOLS.items():
-        keys = {key for key, _, _ in protocol.COLUMNS}
-        content = published(name)
-        assert all(set(row) <= keys | {"method"} for row in content["rows"])
-        assert bool(content["rows"]) == bool(content["source"]) == bool(content["date"])
-    text = table("stanford-orb", {"psnr_h": 20.0, "psnr_l": None}, "mine").splitlines()
-    assert text[0].split("  ")[-1] == "relit, PSNR-L" and "normals" not in text[0]
-    assert text[1].split() == ["mine", "20.00", "-"] and text[2].split() == ["DiffReg-PBIR", "27.22", "34.98"]

@@ -10,8 +10,7 @@ import pytest
 import trimesh
 from published_scenes import write_set
 
-from splitnerf.cli import BAD_INPUT, DONE, main
-from splitnerf.data.images import write_image
+from splitnerf.cli import DONE, main
 
 BEST = {  # layout: what the truth, path traced, must score at least, by key
     "stanford-orb": {"psnr_h": 25, "psnr_l": 32, "view_psnr_l": 32},
@@ -58,25 +57,3 @@ def test_the_truth_scores_nearly_perfectly_by_the_protocol_of_its_set(layout, tm
     for key, most in ERRORS.get(layout, {}).items():
         assert scores[key] < most, (key, scores)
     assert ("DiffReg-PBIR" in shown) == (layout == "stanford-orb") and f"scores: {tmp_path / 'scores.json'}" in shown
-
-
-@pytest.mark.parametrize(("options", "message"), [
-    (["--protocol", "nerfactor"], "--protocol needs --data"),
-    (["--protocol", "nerfactor", "--data", "D"], "does not look like nerfactor's data"),
-    (["--protocol", "shiny", "--data", "D", "--lights", "low"], "--lights cannot be used with --protocol"),
-    (["--protocol", "nerfactor", "--data", "D", "--views", "3"], "--views cannot be used with --protocol nerfactor"),
-    (["--protocol", "nerfactor", "--data", "D", "--downscale", "2"], "--downscale cannot be used with --protocol"),
-    (["--data", "D", "--truth", "D"], "--truth needs --protocol"),
-])  # fmt: skip
-def test_options_that_do_not_fit(options, message, tmp_path, capsys):
-    (tmp_path / "a.glb").write_bytes(b"glTF")
-    options = [str(tmp_path) if option == "D" else option for option in options]
-    assert main(["evaluate", str(tmp_path / "a.glb"), *options]) == BAD_INPUT
-    assert message in capsys.readouterr().err
-
-
-def test_another_file_is_not_replaced_by_scores(tmp_path, capsys):
-    write_image(tmp_path / "a.png", np.zeros((2, 2)))
-    options = ["--protocol", "nerfactor", "--data", str(tmp_path), "--out", str(tmp_path / "a.png")]
-    assert main(["evaluate", str(tmp_path / "a.glb"), *options]) == BAD_INPUT
-    assert "is not an earlier result" in capsys.readouterr().err
