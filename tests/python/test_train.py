@@ -5,9 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -15,9 +12,8 @@ import torch
 from tiny_runs import SMALL, as_options, tiny, train
 
 from splitnerf.training.checkpoint import config_of, load_checkpoint
-from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
+from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
-from splitnerf.errors import InputError
 
 
 def test_a_run_holds_every_file(data, tmp_path, capsys):
@@ -36,16 +32,9 @@ def test_a_run_holds_every_file(data, tmp_path, capsys):
     assert "PSNR" in said and " s on the CPU\n" in said
 
 
-def test_the_error_falls(data, tmp_path):
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "120") == DONE
-    psnr = [json.loads(line)["psnr"] for line in (run / "metrics.jsonl").read_text().splitlines()]
-    assert psnr[-1] > psnr[0] + 2.0
-
-
-@pytest.mark.parametrize("settings", [{"sparse_steps": True}, {"table_dtype": "bfloat16"},
+@pytest.mark.parametrize("settings", [{}, {"sparse_steps": True}, {"table_dtype": "bfloat16"},
                                       {"sparse_steps": True, "table_dtype": "float16"}])  # fmt: skip
-def test_the_error_falls_with_other_steps_and_tables(data, tmp_path, settings):
+def test_the_error_falls_whatever_steps_and_tables(data, tmp_path, settings):
     """And the copy that is read is that of the table as it was trained."""
     from splitnerf.data.dataset import load_dataset
     from splitnerf.ops.hash_grid import rounded
@@ -98,24 +87,6 @@ def test_without_a_mesh_nothing_is_occluded():
         up = torch.tensor([[0.0, 0.0, 1.0]]).expand(5, 3)
         shaded = model.shade(model.evaluate_light(), points, field.outputs, field.features, up, up)
         assert (shaded.occlusion_d == 1).all() and (shaded.occlusion_s == 1).all() and shaded.radiance.isfinite().all()
-
-
-@pytest.mark.parametrize("settings", [
-    {"occlusion.kind": "bits", "occlusion_directions": 250}, {"occlusion.kind": "bits", "occlusion_directions": 2048},
-    {"indirect_every": 0},
-])  # fmt: skip
-def test_settings_of_the_bits_are_checked(settings):
-    with pytest.raises(InputError, match="occlusion.directions|occlusion.indirect_every"):
-        preset("cpu").replace(settings)
-
-
-def test_one_seed_gives_one_result(data, tmp_path):
-    states = []
-    for name in "ab":
-        assert train(data, tmp_path / name, "--steps", "12", "--seed", "3") == DONE
-        states.append(load_checkpoint(tmp_path / name / "checkpoint.pt")["model"])
-    for key, value in states[0].items():
-        assert torch.equal(value, states[1][key]), key
 
 
 def test_a_deterministic_run_can_be_repeated_bit_by_bit(data, tmp_path):
@@ -229,50 +200,6 @@ def _stop_after(steps: int, run) -> None:
     raise KeyboardInterrupt
 
 
-def test_ctrl_c_saves_and_exits_with_130(data, tmp_path):
-    run = tmp_path / "run"
-    command = [
-        sys.executable,
-        "-m",
-        "splitnerf.train",
-        str(data),
-        "--out",
-        str(run),
-        *as_options(SMALL),
-        "--steps",
-        "100000",
-    ]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 120
-    while not ((run / "metrics.jsonl").exists() and (run / "metrics.jsonl").stat().st_size):
-        assert process.poll() is None and time.monotonic() < deadline, process.communicate()
-        time.sleep(0.1)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert process.returncode == INTERRUPTED, err
-    assert "--resume" in out
-    step = load_checkpoint(run / "checkpoint.pt")["step"]
-    assert step > 0
-    assert main(["train", str(data), "--out", str(run), "--resume", "--steps", str(step + 5)]) == DONE
-
-
-def test_a_full_disk_keeps_the_last_checkpoint(data, tmp_path):
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "5") == DONE
-    before = (run / "checkpoint.pt").read_bytes()
-    limited = (
-        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000));"
-        "from splitnerf.cli import main; sys.exit(main(sys.argv[1:]))"
-    )
-    command = [sys.executable, "-c", limited, "train", str(data), "--out", str(run), "--resume", "--steps", "10"]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert result.returncode == FAILED, result.stderr
-    assert "checkpoint" in result.stderr.splitlines()[-1]
-    assert (run / "checkpoint.pt").read_bytes() == before
-    assert not list(run.glob(".checkpoint*"))
-
-
 def test_an_existing_run_is_not_written_over(data, tmp_path, capsys):
     run = tmp_path / "run"
     assert train(data, run, "--steps", "2") == DONE
@@ -290,21 +217,6 @@ def test_a_deterministic_run_goes_on_where_it_began(data, tmp_path, monkeypatch)
     assert train(data, run, "--steps", "4", "--deterministic") == DONE
     monkeypatch.setattr("splitnerf.devices.fit_device", lambda test: ("cuda", "it is fit"))
     assert main(["train", str(data), "--out", str(run), "--resume", "--steps", "6"]) == DONE
-
-
-def test_resume_from_another_scene_is_refused(data, other_data, tmp_path, capsys):
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "2") == DONE
-    assert main(["train", str(other_data), "--out", str(run), "--resume", "--steps", "4"]) == BAD_INPUT
-    assert "other images" in capsys.readouterr().err
-
-
-def test_bad_data_writes_nothing(tmp_path, capsys):
-    run = tmp_path / "run"
-    assert main(["train", str(tmp_path / "nowhere"), "--out", str(run)]) == BAD_INPUT
-    error = capsys.readouterr().err
-    assert "nowhere" in error and len(error.splitlines()) == 1
-    assert not run.exists()
 
 
 @pytest.mark.parametrize(
@@ -325,19 +237,6 @@ def test_bad_options_exit_with_2(data, tmp_path, capsys, options, word):
     assert main(["train", str(data), "--out", str(tmp_path / "run"), *options]) == BAD_INPUT
     assert word in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
-
-
-def test_a_checkpoint_cannot_run_code(data, tmp_path, capsys):
-    class Payload:
-        def __reduce__(self):
-            return os.system, ("touch " + str(tmp_path / "owned"),)
-
-    run = tmp_path / "run"
-    run.mkdir()
-    torch.save({"format": 1, "model": Payload()}, run / "checkpoint.pt")
-    assert main(["train", str(data), "--out", str(run), "--resume"]) == BAD_INPUT
-    assert "checkpoint.pt" in capsys.readouterr().err
-    assert not (tmp_path / "owned").exists()
 
 
 def test_evaluate_repeats_the_result_of_training(data_with_mesh, tmp_path):
@@ -366,12 +265,3 @@ def test_the_paper_preset_takes_steps(data, tmp_path):
     assert main([*command, *as_options(settings)]) == DONE
     assert (run / "evaluation.json").stat().st_size > 0 and list((run / "previews").iterdir())
     assert Config.read(run / "config.toml").shading.fresnel == "paper"
-
-
-def test_a_config_survives_its_file(tmp_path):
-    config = preset("paper").replace({"seed": 5})
-    config.write(tmp_path / "config.toml")
-    assert Config.read(tmp_path / "config.toml") == config
-    (tmp_path / "config.toml").write_text("steps = [")
-    with pytest.raises(InputError, match="config.toml"):
-        Config.read(tmp_path / "config.toml")
