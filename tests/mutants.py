@@ -35,7 +35,7 @@ TESTS = {
     "render/rays.py": "test_pixel_rays.py",
     "training/checkpoint.py": "test_checkpoint.py test_hostile_files.py",
     "training/finite.py": "test_finite.py",
-    "training/graphs.py": "test_graph_rules.py test_graphs.py",
+    "training/gpu_step.py": "test_graph_rules.py test_graphs.py test_finite.py",
     "training/batches.py": "test_batches.py",
     "training/loop.py": "test_refreshes.py test_schedule.py test_finite.py",
     "training/late_occlusion.py": "test_late_occlusion.py test_device.py",
@@ -43,7 +43,7 @@ TESTS = {
     "training/meshes.py": "test_meshes.py",
     "progress.py": "test_progress.py",
     "training/schedule.py": "test_schedule.py",
-    "training/step.py": "test_loss_terms.py test_correction.py test_schedule.py test_train.py",
+    "training/step.py": "test_finite.py test_correction.py test_schedule.py test_train.py",
 }
 # Of each kind of operator one replacement is enough; a bar stands in annotations, which nobody evaluates.
 LEFT_OUT = [r"core/ReplaceBinaryOperator_(?!Add_Sub|Sub_Add|Mul_Div|Div_Mul|Pow_Mul|FloorDiv_Div|Mod_Mul|MatMul_Mul)",

@@ -37,11 +37,9 @@ from splitnerf.devices import tensor_cores
 from splitnerf.fields import LightPyramid
 from splitnerf.render.renderer import FoundSamples
 from splitnerf.training.batches import Batch, draw_batch
+from splitnerf.training.gpu_step import SAMPLE_SLACK, in_units
 from splitnerf.training.loop import Training
-from splitnerf.training.numbers import PastStep
-from splitnerf.training.room import SAMPLE_SLACK, round_up
 from splitnerf.training.schedule import light_moves
-from splitnerf.training.step import Room
 from splitnerf_tools.bench.provenance import header, provenance
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -283,21 +281,21 @@ class Graphed:
     def __init__(self, training: Training, work: Work):
         self.training, self.work, self.step = training, work, training.take_step
         self.batch = on(training.model.device, work.batch)
-        self.step.sample_room = round_up(SAMPLE_SLACK * len(work.found.directions))
+        self.step.sample_capacity = in_units(SAMPLE_SLACK * len(work.found.directions))
 
     def taken(self, batch: Batch | None = None, fits: bool = True) -> Answer:
-        """One step. Raises RuntimeError where its results have room and should not, or the other way round."""
+        """One step. Raises RuntimeError where its results fit and should not, or the other way round."""
         training, step = self.training, self.step
         training.generator.manual_seed(1)
         training.optimiser.zero_grad(set_to_none=True)
         light = training.model.evaluate_light()
-        ray, terms = step(batch or self.batch, light, None, self.work.step, PROGRESS)
+        ray, terms = step.gradients(batch or self.batch, light, None, self.work.step, PROGRESS)
         light.backward()
-        n_shaded, _, n_segments = ray.sizes.tolist()
-        counts, room = Room(int(ray.n_found), n_shaded, n_segments), step.room
-        past = PastStep.of(1, batch or self.batch, ray, terms, room, training.watch.gradients())
-        if not bool(past.allowed) == fits == step.settle(counts, room, training.model.s_value):
-            raise RuntimeError(f"{counts} and {room}: the device says {bool(past.allowed)}, and it should be {fits}")
+        pending = step.fetch(1, batch or self.batch, ray, terms)
+        step.last, allowed = pending.read(), bool(pending.allowed)
+        step.s = training.model.s_value
+        if not allowed == fits == step.judge(step.last):
+            raise RuntimeError(f"{step.last.counts} and {step.capacity}: the device says {allowed}, and it should be {fits}")
         return collected(training, ray, terms)
 
     def replayed(self, n: int) -> Answer:
@@ -320,7 +318,7 @@ class Graphed:
 
     def answers(self) -> Iterator[tuple[str, Answer, Answer]]:
         """What graphs may do wrong: its name, the step without a graph, and the replay."""
-        with self.step.stream():
+        with self.step.running():
             self.taken()  # without room
             eager = self.taken()
             yield "graph against eager", eager, self.replayed(3)

@@ -25,8 +25,8 @@ from torch.utils._python_dispatch import TorchDispatchMode
 from splitnerf.config import parse_setting, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.fields import heads
+from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.loop import Training
-from splitnerf.training.room import RoomyStep
 from splitnerf_tools.bench.provenance import header, provenance
 from splitnerf_tools.demo.scene import write_demo_dataset
 
@@ -107,8 +107,8 @@ def measured(config, folder: Path, steps: int) -> tuple[Launches, float]:
     """The counts of `steps` steps, and the seconds of as many before them."""
     write_demo_dataset(folder / "data", size=32, n_train=6, n_test=2, spp=4)
     training = Training(load_dataset(folder / "data"), config, folder, torch.device("cpu"))
-    of_a_step = training.model, training.grid, training.mesh, training.generator
-    training.take_step, training.reads_late = RoomyStep(*of_a_step), 1  # as on a GPU
+    of_a_step = training.model, training.grid, training.mesh, training.generator, training.optimiser, training.exposures
+    training.take_step = GpuStep(*of_a_step)
 
     def advance(n: int) -> None:
         for _ in range(n):

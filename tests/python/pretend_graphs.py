@@ -17,7 +17,7 @@ from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode, _disable_current_modes
 from torch.utils._pytree import tree_iter
 
-from splitnerf.training import graphs, loop
+from splitnerf.training import gpu_step, loop
 
 REFUSED = (
     "_local_scalar_dense",
@@ -130,7 +130,7 @@ class PretendGraph(TorchDispatchMode):
 def record(
     function: Callable[[], Any], pool: int | None, generator: torch.Generator, pools: Pools | None = None
 ) -> tuple[PretendGraph, Any]:
-    """As :func:`splitnerf.training.graphs.record`; without pools a pool is never refused."""
+    """As :func:`splitnerf.training.gpu_step.record`; without pools a pool is never refused."""
     if pools is not None:
         pools.begin(pool)
     graph = PretendGraph(generator, pools, pool)
@@ -153,7 +153,7 @@ def graphs_on_the_cpu(monkeypatch) -> dict[str, int]:
     """Trainings on the CPU take graphed steps from now on; returns how many they recorded, replayed, and took without a graph
     (`called`), as it goes on."""
     used = {"recorded": 0, "replayed": 0, "called": 0}
-    differentiate, replay, pools = graphs.GraphedStep.differentiate, PretendGraph.replay, Pools()
+    differentiate, replay, pools = gpu_step.GpuStep.differentiate, PretendGraph.replay, Pools()
 
     def counted_record(*arguments):
         used["recorded"] += 1
@@ -169,9 +169,9 @@ def graphs_on_the_cpu(monkeypatch) -> dict[str, int]:
         return differentiate(*arguments)
 
     monkeypatch.setattr(PretendGraph, "replay", counted_replay)
-    monkeypatch.setattr(graphs.GraphedStep, "differentiate", counted_differentiate)
-    monkeypatch.setattr(graphs, "record", counted_record)
-    monkeypatch.setattr(loop, "Step", graphs.GraphedStep)
+    monkeypatch.setattr(gpu_step.GpuStep, "differentiate", counted_differentiate)
+    monkeypatch.setattr(gpu_step, "record", counted_record)
+    monkeypatch.setattr(loop, "Step", gpu_step.GpuStep)
     monkeypatch.setattr(torch.cuda, "Stream", NoStream)
     monkeypatch.setattr(torch.cuda, "graph_pool_handle", pools.handle)
     monkeypatch.setattr(torch.cuda, "current_stream", lambda device: NoStream())

@@ -17,7 +17,7 @@ from splitnerf.render.occupancy import make_grid
 from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training.batches import Batch, draw_numbers, make_probes, probe_counts
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.step import Room, Step
+from splitnerf.training.step import Step
 
 
 def bowl() -> trimesh.Trimesh:
@@ -180,18 +180,18 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     batch = Batch(*rays, *pixels, jitter, jitter, *photo, probes)
     gradients = []
     for _ in range(2):
-        ray, _ = step(batch, model.evaluate_light(), None, 1, 0.0)
+        ray, _ = step.gradients(batch, model.evaluate_light(), None, 1, 0.0)
         gradients.append(model.sdf_field.hidden_direction.grad.clone())
     torch.testing.assert_close(*gradients)
     n = len(ray.weights)
     assert len(ray.beside) == 40 and len(ray.gradients) == n + 30 + 40
     assert len(ray.shaded) < 0.5 * n
-    assert step.settle(Room(1e9, 1e9, 1e9), step.room, 20.0)  # it has no limit
+    assert step.capacity.of_shading is None  # it has no limit
     entropies = []
     for seed in range(2):
         torch.manual_seed(seed)
         step = Step(model, grid, SurfaceMesh(model), generator(3))
-        entropies.append(step(batch, model.evaluate_light(), None, 1, 0.9)[1]["entropy"].value.item())
+        entropies.append(step.gradients(batch, model.evaluate_light(), None, 1, 0.9)[1]["entropy"].value.item())
     assert entropies[0] == entropies[1] > 0
 
 

@@ -11,13 +11,14 @@ import torch
 from pretend_gpu import GPU, GpuTensor, pretend_gpu
 from tiny_runs import tiny
 
-from splitnerf.training import losses, numbers
+from splitnerf.training import losses
 from splitnerf.training import loop as trainer
+from splitnerf.training import step as steps
 from splitnerf.devices import in_background
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.room import RoomyStep
-from splitnerf.training.step import Room
+from splitnerf.training.gpu_step import GpuStep
+from splitnerf.training.step import Capacity
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
@@ -89,13 +90,13 @@ def test_steps_stay_on_the_gpu_and_all_waits_for_it_are_known(data, tmp_path, mo
         seen[training.step] = gpu.waits.copy(), training.mesh.made_at
         advance(training, bar)
 
-    for cached in (losses._stored_seed, numbers._limits):
+    for cached in (losses._stored_seed, steps._limits):
         cached.cache_clear()
     monkeypatch.setattr(occupancy, "ALL_CELLS_UNTIL", 20)
     monkeypatch.setattr(trainer.Training, "advance", watched)
     monkeypatch.setattr(SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True))  # takes its mesh at once
     settings = {"min_step": 0.03} if name == "paper" else {"target_samples": 4608}  # so that samples have room
-    config = tiny(name, steps=250, mesh_every=0.5, preview_every=1.0, **{"mesh.background": True}, indirect_every=50, **settings)
+    config = tiny(name, steps=250, mesh_every=0.5, preview_every=1.0, checkpoint_minutes=1e3, **{"mesh.background": True}, indirect_every=50, **settings)
     with pretend_gpu(monkeypatch) as gpu:
         trained = trainer.train(load_dataset(data), config, tmp_path, device="cuda")
         assert trained.finished and trained.model.device == GPU and trained.grid.cells.device == GPU
@@ -143,13 +144,13 @@ def test_a_gpu_shades_a_million_emitters_at_a_time(monkeypatch, device):
 
 @pytest.mark.parametrize(("name", "pads"), [("fast", True), ("paper", False)])
 def test_padding_is_computed_only_where_it_saves_a_wait(data, tmp_path, monkeypatch, name, pads):
-    asked, differentiate = [], RoomyStep.differentiate
+    asked, differentiate = [], GpuStep.differentiate
 
     def watched(taken, batch, found, light, environment, step, progress, capacity):
-        asked.append((len(found.directions) > found.n_found.item(), capacity is not None, taken.room == Room()))
+        asked.append((len(found.directions) > found.n_found.item(), capacity is not None, taken.capacity == Capacity()))
         return differentiate(taken, batch, found, light, environment, step, progress, capacity)
 
-    monkeypatch.setattr(RoomyStep, "differentiate", watched)
+    monkeypatch.setattr(GpuStep, "differentiate", watched)
     with pretend_gpu(monkeypatch):
         trainer.train(load_dataset(data), tiny(name, steps=12, target_samples=4608, min_step=0.03), tmp_path, device="cuda")
     assert asked[0] == (False, False, True) and set(asked[4:]) == {(pads, pads, not pads)}

@@ -18,8 +18,10 @@ from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, FAILED
 from splitnerf.data.dataset import load_dataset
-from splitnerf.ops import AdamW, step_numbers
-from splitnerf.training.finite import MOST_SKIPPED, Diverged, GradientWatch, check_state, explain_loss, first_not_finite
+from splitnerf.training import gpu_step
+from splitnerf.training.finite import Diverged, check_state, explain_loss, first_not_finite
+from splitnerf.training.gpu_step import GpuStep
+from splitnerf.training.step import MOST_SKIPPED, Capacity, Step, StepNumbers
 
 
 def goes_on(data: Path, run: Path, before: bytes) -> None:
@@ -49,20 +51,14 @@ def test_an_image_with_a_bad_pixel_is_refused_and_named(data, tmp_path, capsys, 
     assert not (tmp_path / "run").exists()
 
 
-@pytest.fixture(params=[0, 1])
-def late(request, monkeypatch) -> int:
-    """Runs read the numbers of a step so many steps later, as those on a GPU do."""
-    begin = trainer.Training.__init__
-
-    def reads_late(self, *arguments, **named):
-        begin(self, *arguments, **named)
-        self.reads_late = request.param
-
-    monkeypatch.setattr(trainer.Training, "__init__", reads_late)
+@pytest.fixture(params=[Step, GpuStep])
+def kind(request, monkeypatch) -> type[Step]:
+    """Runs take steps of this kind; those of a GPU are read late."""
+    monkeypatch.setattr(trainer, "Step", request.param)
     return request.param
 
 
-def test_a_nan_pixel_stops_the_run_and_is_named(data, begun, late):
+def test_a_nan_pixel_stops_the_run_and_is_named(data, begun, kind):
     """The image came another way than through the reader."""
     run, before = begun
     dataset = load_dataset(data)
@@ -123,23 +119,22 @@ def test_a_learning_rate_of_a_thousand_loses_no_checkpoint(data, begun, capsys):
     goes_on(data, run, before)
 
 
-def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path, monkeypatch, capsys, late):
-    gradients, step, steps, moved = trainer.GradientWatch.gradients, AdamW.step, itertools.count(), []
+def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path, monkeypatch, capsys, kind):
+    fetch, advance, steps, moved = kind.fetch, trainer.Training.advance, itertools.count(), []
 
-    def planting(watch):
+    def planting(step, *arguments):
         now = next(steps)
         if now in (3, 5, 6):
-            watch.parameters[0].grad.view(-1)[0] = {3: torch.nan, 5: 1e30, 6: 2e18}[now]
-        return gradients(watch)
+            next(step.model.parameters()).grad.view(-1)[0] = {3: torch.nan, 5: 1e30, 6: 2e18}[now]
+        return fetch(step, *arguments)
 
-    def watched(optimiser, allowed):
-        params = [p for group in optimiser.param_groups for p in group["params"]]
-        before = [p.detach().clone() for p in params]
-        step(optimiser, allowed=allowed)
-        moved.append(not all(torch.equal(a, b) for a, b in zip(params, before)))
+    def watched(training, bar):
+        before = [p.detach().clone() for p in training.model.parameters()]
+        advance(training, bar)
+        moved.append(not all(torch.equal(a, b) for a, b in zip(training.model.parameters(), before)))
 
-    monkeypatch.setattr(trainer.GradientWatch, "gradients", planting)
-    monkeypatch.setattr(AdamW, "step", watched)
+    monkeypatch.setattr(kind, "fetch", planting)
+    monkeypatch.setattr(trainer.Training, "advance", watched)
     trained = trainer.train(load_dataset(data), tiny(steps=8), tmp_path)
     assert [i for i, any_moved in enumerate(moved) if not any_moved] == [3, 5, 6]
     assert all(p.isfinite().all() for p in trained.model.parameters())
@@ -150,52 +145,60 @@ def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path,
 
 
 def test_numbers_that_are_read_late_are_those_of_their_step(data, tmp_path, monkeypatch):
-    """Only the number of rays follows later, and what a line tells of its time and of the mesh is of when it is written."""
+    """Only the number of rays follows later, and what a line tells of its time and of the mesh is of when it is written.
+    Where all samples are found no step has a capacity, and with the model's own sharpness the bits of all are equal."""
     monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 64)
-    written, begin = [], trainer.Training.__init__
-    for late in (0, 1, 3):
-
-        def reads_late(self, *arguments, late=late, **named):
-            begin(self, *arguments, **named)
-            self.reads_late = late
-
-        monkeypatch.setattr(trainer.Training, "__init__", reads_late)
-        (tmp_path / str(late)).mkdir()
-        trainer.train(load_dataset(data), tiny(steps=41), tmp_path / str(late))
-        written.append([line | dict.fromkeys(("seconds", "progress", "is_unoccluded")) for line in lines_of(tmp_path / str(late))])
+    monkeypatch.setattr(GpuStep, "s", property(lambda step: None, lambda step, s: None))
+    written, waiting, fetch = [], [], GpuStep.fetch
+    monkeypatch.setattr(GpuStep, "fetch", lambda step, *rest: waiting.append(len(step._pending)) or fetch(step, *rest))
+    for i, (kind, every) in enumerate([(Step, 1), (GpuStep, 1), (GpuStep, 16)]):
+        monkeypatch.setattr(trainer, "Step", kind)
+        monkeypatch.setattr(gpu_step, "READ_EVERY", every)
+        (tmp_path / str(i)).mkdir()
+        trainer.train(load_dataset(data), tiny(steps=41, **{"sampling.min_weight": 0.0}), tmp_path / str(i))
+        written.append([line | dict.fromkeys(("seconds", "progress", "is_unoccluded")) for line in lines_of(tmp_path / str(i))])
     assert [line["step"] for line in written[0]] == [*range(1, 21), 40, 41]
     assert written[1] == written[0] and written[2] == written[0]
+    assert max(waiting[:41]) == 1 and max(waiting[41:]) == 16
 
 
-def norm_of(watch: GradientWatch) -> float:
-    """The norm of all gradients, as a step's numbers hold it."""
+def step_of(*gradients: list[float] | None) -> Step:
+    """A step of a model whose parameters have these gradients."""
+    parameters = [torch.zeros(3, requires_grad=True) for _ in gradients]
+    for parameter, gradient in zip(parameters, gradients):
+        parameter.grad = None if gradient is None else torch.tensor(gradient)
+    return Step(SimpleNamespace(parameters=lambda: parameters), None, None, None)
+
+
+def numbers_of(step: Step) -> StepNumbers:
+    """The numbers of a step without terms and samples."""
     none = torch.zeros(0, dtype=torch.int64)
-    numbers, _ = step_numbers(watch.gradients(), [], [], none, torch.tensor(1.0), torch.full((3,), torch.inf))
-    return numbers[0].item()
+    ray = SimpleNamespace(n_found=none.sum(), sizes=torch.zeros(3, dtype=torch.int64), evaluated=none, s=torch.ones(()), mean=none)
+    return step.fetch(1, SimpleNamespace(target=none), ray, {}).read()
+
+
+def with_norm(norm: float, step: int = 1) -> StepNumbers:
+    return StepNumbers(step, 1, {}, {}, norm, Capacity(0, 0, 0), 1.0, 0.0)
 
 
 def test_large_gradients_that_cancel_are_seen():
-    parameters = [torch.zeros(3, requires_grad=True) for _ in range(2)]
-    watch = trainer.GradientWatch(parameters)
-    for parameter, value in zip(parameters, (1e30, -1e30)):
-        parameter.grad = torch.full((3,), value)
-    assert not watch.allows(0, norm_of(watch)) and watch.skipped == 1
-    for parameter in parameters:
-        parameter.grad = torch.full((3,), -1e17)
-    assert watch.allows(1, norm_of(watch))
+    step = step_of([1e30] * 3, [-1e30] * 3)
+    assert not step.judge(numbers_of(step)) and step.skipped == 1
+    small = step_of([-1e17] * 3, [-1e17] * 3)
+    assert small.judge(numbers_of(small))
 
 
-def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch, late):
+def test_ten_bad_gradients_in_a_row_stop_the_run(data, begun, monkeypatch, kind):
     run, before = begun
-    original, steps = trainer.GradientWatch.gradients, itertools.count(8)  # the run stands at step 8
+    fetch, steps = kind.fetch, itertools.count(8)  # the run stands at step 8
 
-    def planting(watch):
+    def planting(step, *arguments):
         if next(steps) > 12:
-            watch.parameters[0].grad.view(-1)[0] = torch.inf
-        return original(watch)
+            next(step.model.parameters()).grad.view(-1)[0] = torch.inf
+        return fetch(step, *arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(trainer.GradientWatch, "gradients", planting)
+        patch.setattr(kind, "fetch", planting)
         with pytest.raises(Diverged, match=f"step {12 + MOST_SKIPPED}: .*{MOST_SKIPPED} steps in a row"):
             trainer.train(load_dataset(data), tiny(steps=60), run, resume=True)
     goes_on(data, run, before)
@@ -209,30 +212,28 @@ def test_the_first_that_is_not_finite_is_found():
 
 def test_the_norm_is_that_of_all_gradients():
     """Of either sign and of any parameter, 3^2 + 4^2 + 7^2 + 6^2 = 110; one without a gradient counts as none."""
-    parameters = [torch.zeros(2, requires_grad=True) for _ in range(3)]
-    watch = GradientWatch(parameters)
-    for parameter, gradient in ((parameters[0], [3.0, 4.0]), (parameters[2], [-7.0, 6.0])):
-        parameter.grad = torch.tensor(gradient)
-    assert norm_of(watch) == pytest.approx(110**0.5)
+    assert numbers_of(step_of([3.0, 0.0, 4.0], None, [-7.0, 6.0, 0.0])).gradient_norm == pytest.approx(110**0.5)
 
 
 def test_a_gradient_may_be_taken_if_its_square_is_a_number(capsys):
-    watch = GradientWatch([])
-    assert watch.allows(0, 9e17) and watch.skipped == 0
+    step = step_of()
+    assert step.judge(with_norm(9e17)) and step.skipped == 0
     for bad in (2e19, torch.inf, torch.nan):  # in single precision the square of the first is infinite
-        assert not watch.allows(7, bad)
-    assert watch.skipped == 3 and capsys.readouterr().err.count("step 7: ") == 3
+        assert not step.judge(with_norm(bad, 8))
+    assert step.skipped == 3 and capsys.readouterr().err.count("step 7: ") == 3
 
 
 def test_nine_bad_gradients_in_a_row_are_borne_as_often_as_they_come():
-    watch = GradientWatch([])
+    """Steps whose results exceed their capacity are counted, and neither bad nor good."""
+    step = step_of()
     for _ in range(3):
-        assert [watch.allows(0, torch.nan) for _ in range(9)] == [False] * 9 and watch.allows(0, 1.0)
-    assert watch.skipped == 27
+        assert [step.judge(with_norm(torch.nan)) for _ in range(9)] == [False] * 9 and step.judge(with_norm(1.0))
+    assert not step.judge(with_norm(1.0)._replace(complete=False)) and step.skipped == 28
     with pytest.raises(Diverged, match="step 5: .*10 steps in a row"):
-        for _ in range(10):
-            watch.allows(5, torch.nan)
-    assert watch.skipped == 37
+        for i in range(10):
+            step.judge(with_norm(torch.nan, 6))
+            assert i < 9 and not step.judge(with_norm(1.0)._replace(complete=False))
+    assert step.skipped == 28 + 9 + 10
 
 
 @pytest.fixture
@@ -290,7 +291,7 @@ def test_the_first_bad_input_is_named_in_order_of_the_data_flow():
         ray = SimpleNamespace(**of("rendered "), points=SimpleNamespace(_asdict=lambda: shaded))
         dataset = SimpleNamespace(frame_names=["a", "b"], **arrays)
         terms = {"colour": 1.0, "mask": torch.inf, "metal": torch.nan}
-        return str(explain_loss(8, terms, dataset, SimpleNamespace(**of("rays' ")), model, ray))
+        return str(explain_loss(8, terms, dataset, model, SimpleNamespace(**of("rays' ")), ray))
 
     for i, name in enumerate(names):
         message = f"step 8: the loss is not finite (mask, metal); first not finite: {name} (3 of 3 values); "

@@ -12,7 +12,7 @@ from tiny_runs import as_options, tiny
 
 from splitnerf.data.dataset import load_dataset
 from splitnerf.render import model as rendering
-from splitnerf.training import step as steps
+from splitnerf.training import losses
 
 SETTINGS = gpu_step.ALWAYS | {"steps": 100, "table_dtype": "float16", "seed": 2}
 
@@ -90,14 +90,14 @@ def test_a_dropped_gradient_is_found(prepared, there, monkeypatch):
 
 
 def test_a_term_too_many_and_one_too_few_are_found(prepared, there, monkeypatch):
-    terms_of = steps.loss_terms
+    terms_of = losses.loss_terms
 
     def others(*arguments):
         terms = terms_of(*arguments)
         terms["more"] = terms.pop("mask")
         return terms
 
-    monkeypatch.setattr(steps, "loss_terms", others)
+    monkeypatch.setattr(losses, "loss_terms", others)
     assert wrong(prepared, there) == {"loss, mask", "loss, more"}
 
 
@@ -121,9 +121,9 @@ def test_on_a_gpu_that_is_none(prepared, monkeypatch):
 def test_a_graph_is_held_against_the_eager_step(prepared, monkeypatch):
     dataset, config, run, _, work, _, _ = prepared
     used = graphs_on_the_cpu(monkeypatch)
-    there = gpu_step.restored(dataset, config, run, "cpu")
+    there = gpu_step.restored(dataset, config.replace({"cuda_graphs": True}), run, "cpu")
     answers = list(gpu_step.Graphed(there, work).answers())
-    assert used["recorded"] >= 3 and used["replayed"] >= 10 and there.take_step.n_discarded == 1
+    assert used["recorded"] >= 3 and used["replayed"] >= 10 and there.take_step.skipped == 1
     for name, eager, replayed in answers:
         rows = [Row(x, 0.0, 0.0, 1e-5) for x in names_of(there, eager)]
         found = gpu_step.against_eager(there, eager, replayed, rows)

@@ -15,10 +15,9 @@ from tiny_runs import tiny
 from torch import Tensor
 
 from splitnerf.render.model import SceneModel
-from splitnerf.training import graphs
-from splitnerf.training.graphs import GraphedStep
-from splitnerf.training.room import round_up
-from splitnerf.training.step import Room
+from splitnerf.training import gpu_step
+from splitnerf.training.gpu_step import GpuStep, in_units
+from splitnerf.training.step import Capacity, StepNumbers
 
 LIGHT_PERIOD = 4
 PRIORS_FROM = 0.5
@@ -37,7 +36,7 @@ class Found(NamedTuple):
     number: Tensor
 
 
-class Fake(GraphedStep):
+class Fake(GpuStep):
     """Finds what it is told, and takes the gradient of something simple of each of a step's inputs."""
 
     def __init__(self, model: SceneModel):
@@ -63,6 +62,11 @@ class Fake(GraphedStep):
         value.backward()
         return value.detach(), {"value": value.detach()}
 
+    def counted(self, *counts: float) -> bool:
+        """Reads the counts of the last step; returns whether it was complete."""
+        self.last = StepNumbers(1, 5, {}, {}, 0.0, Capacity(self.n_found, *counts), 20.0, 0.0)
+        return self.capacity.holds(self.last.counts)
+
     def taken(
         self,
         n_rays: int = 5,
@@ -75,23 +79,23 @@ class Fake(GraphedStep):
         """One step and its counts; returns what it gave, how it was taken, and whether it was complete."""
         before, known = len(self.calls), list(self._graphs.values())
         light = self.model.evaluate_light() if light is None else light
-        result = self(Rays(torch.full((n_rays, 3), target)), light, None, step, progress)
+        result = self.gradients(Rays(torch.full((n_rays, 3), target)), light, None, step, progress)
         is_new = any(all(graph is not other for other in known) for graph in self._graphs.values())
         how = "recorded" if is_new else "called" if len(self.calls) > before else "repeated"
-        complete = self.settle(Room(self.n_found, *counts), self.room, 20.0) if counts else None
+        complete = self.counted(*counts) if counts else None
         return SimpleNamespace(value=result[0].item(), how=how, room=self.calls[-1], complete=complete)
 
 
 @pytest.fixture
 def step(monkeypatch) -> Fake:
     pools = pretend_graphs.Pools()
-    monkeypatch.setattr(graphs, "record", functools.partial(pretend_graphs.record, pools=pools))
+    monkeypatch.setattr(gpu_step, "record", functools.partial(pretend_graphs.record, pools=pools))
     monkeypatch.setattr(torch.cuda, "Stream", NoStream)
     monkeypatch.setattr(torch.cuda, "graph_pool_handle", pools.handle)
     torch.manual_seed(0)
     config = tiny(
         target_samples=1000, light_step_every=LIGHT_PERIOD, priors_from=PRIORS_FROM, **{"shading.method": "summed"},
-        table_dtype="float16", steps=100,
+        table_dtype="float16", steps=100, cuda_graphs=True,
     )  # fmt: skip
     return Fake(SceneModel(config))
 
@@ -106,7 +110,7 @@ def ways(taker: Fake, n: int, **settings) -> list[str]:
 
 def test_a_step_is_called_and_then_recorded_and_then_repeated(step, monkeypatch):
     """The first has room for all there is; the first with a room is called too, so that its kernels are loaded."""
-    assert step.sample_room == PADDED
+    assert step.sample_capacity == PADDED
     replays, replay = [], pretend_graphs.PretendGraph.replay
     monkeypatch.setattr(pretend_graphs.PretendGraph, "replay", lambda self: replays.append(self) or replay(self))
     assert ways(step, 5) == ["called", "called", "recorded", "repeated", "repeated"]
@@ -124,8 +128,8 @@ def test_samples_without_room_are_not_complete_and_the_next_step_has_no_limit(st
     ways(step, 3)
     step.n_found = PADDED + 1
     cut = step.taken()
-    assert cut.how == "repeated" and cut.complete is False and step.n_discarded == 1
-    assert ways(step, 3) == ["called"] * 3 and step.calls[-3:] == [None] * 3 and step.n_discarded == 1
+    assert cut.how == "repeated" and cut.complete is False
+    assert ways(step, 3) == ["called"] * 3 and step.calls[-3:] == [None] * 3
     step.n_found = PADDED
     assert ways(step, 3) == ["called", "repeated", "repeated"] and step.calls[-1] is None
 
@@ -179,17 +183,17 @@ def test_a_graph_with_too_little_room_is_recorded_anew_before_it_fails(step):
 def test_what_exceeds_its_room_is_not_complete_and_one_graph_is_recorded_anew(step, counts):
     """With more room: that of the key, although no other is left. Others stay as they are."""
     assert step.taken(counts=(1e9, 1e9)).complete  # the first step has no limit
-    step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
+    step.counted(*COUNTS)
     ways(step, 2)
-    assert step.taken(counts=(1280.0, 512.0)).complete is True and step.n_discarded == 0
-    step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
+    assert step.taken(counts=(1280.0, 512.0)).complete is True
+    step.counted(*COUNTS)
     assert ways(step, 2, n_rays=6) == ["called", "recorded"]
-    assert step.taken(counts=counts).complete is False and step.n_discarded == 1 and len(step._graphs) == 2
-    step.settle(Room(PADDED, *COUNTS), Room(), 20.0)
+    assert step.taken(counts=counts).complete is False and len(step._graphs) == 2
+    step.counted(*COUNTS)
     assert ways(step, 2) == ["repeated"] * 2 and ways(step, 1, n_rays=6) == ["repeated"]
-    assert step.taken(counts=counts).complete is False and step.n_discarded == 2
+    assert step.taken(counts=counts).complete is False
     again = step.taken()
-    assert again.how == "recorded" and again.complete and step.calls[-1] == tuple(round_up(1.25 * n) for n in counts)
+    assert again.how == "recorded" and again.complete and step.calls[-1] == tuple(in_units(1.25 * n) for n in counts)
     assert ways(step, 1, n_rays=6) == ["repeated"]
 
 
@@ -276,15 +280,15 @@ def test_the_copy_of_16_bits_is_made_outside_of_a_graph(step):
 
 @pytest.mark.parametrize(("n", "rounded"), [(0, 0), (1, 256), (256, 256), (256.9, 256), (257, 512), (1150, 1280)])
 def test_capacities_come_in_units(n, rounded):
-    assert round_up(n) == rounded
+    assert in_units(n) == rounded
 
 
-def test_room_is_room_for_all():
-    room = Room(5, 10, 20)
-    assert room.holds(Room(5, 10, 20)) and room.holds(Room(0, 0, 0)) and Room().holds(Room(1e9, 1e9, 1e9))
-    assert not any(room.holds(more) for more in (Room(6, 10, 20), Room(5, 11, 20), Room(5, 10, 21)))
-    assert Room(5.5, 11, 22).holds(room, slack=1.1) and not Room(5.5, 11, 22).holds(Room(5, 10, 20.1), slack=1.1)
-    assert Room().of_shading is None and room.of_shading == (10, 20)
+def test_a_capacity_holds_all_or_not():
+    capacity = Capacity(5, 10, 20)
+    assert capacity.holds(Capacity(5, 10, 20)) and capacity.holds(Capacity(0, 0, 0)) and Capacity().holds(Capacity(1e9, 1e9, 1e9))
+    assert not any(capacity.holds(more) for more in (Capacity(6, 10, 20), Capacity(5, 11, 20), Capacity(5, 10, 21)))
+    assert Capacity(5.5, 11, 22).holds(capacity, slack=1.1) and not Capacity(5.5, 11, 22).holds(Capacity(5, 10, 20.1), slack=1.1)
+    assert Capacity().of_shading is None and capacity.of_shading == (10, 20)
 
 
 # ---- the recording itself ----
@@ -324,7 +328,7 @@ def work(monkeypatch):
 def test_nothing_is_collected_while_recording(work, collects):
     (gc.enable if collects else gc.disable)()
     seen = []
-    graph, result = graphs.record(
+    graph, result = gpu_step.record(
         lambda: seen.append((gc.isenabled(), list(work.last.asked))) or "result", "pool", "generator"
     )
     begun = [("generator", "generator"), ("begin", {"pool": "pool", "capture_error_mode": "thread_local"})]
@@ -339,7 +343,7 @@ def test_a_recording_that_does_not_begin_leaves_the_collection_on(work, monkeypa
     monkeypatch.setattr(work, "capture_begin", refused)
     gc.enable()
     with pytest.raises(RuntimeError, match="no recording now"):
-        graphs.record(lambda: None, None, None)
+        gpu_step.record(lambda: None, None, None)
     assert gc.isenabled()
 
 
@@ -352,7 +356,7 @@ def test_the_first_error_of_a_recording_is_told_and_the_recording_ends(work, mon
         raise ZeroDivisionError("first")
 
     with pytest.raises(ZeroDivisionError, match="first"):
-        graphs.record(fails, None, None)
+        gpu_step.record(fails, None, None)
     assert work.last.asked[-1] == "end" and work.last.asked.count("end") == 1 and gc.isenabled()
 
 
@@ -380,11 +384,11 @@ def test_work_waits_for_what_came_before_and_what_comes_after_for_it(step, monke
     monkeypatch.setattr(torch.cuda, "current_stream", lambda device: Stream("theirs"))
     monkeypatch.setattr(torch.cuda, "stream", Within)
     expected = ["ours waits for theirs", "in ours", "work", "out of ours", "theirs waits for ours"]
-    with step.stream():
+    with step.running():
         events.append("work")
     assert events == expected
     events.clear()
-    with pytest.raises(ValueError), step.stream():
+    with pytest.raises(ValueError), step.running():
         events.append("work")
         raise ValueError
     assert events == expected

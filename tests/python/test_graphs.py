@@ -16,7 +16,7 @@ from test_start import shape_of_ball
 from tiny_runs import lines_of, tiny
 
 from splitnerf.ops import AdamW
-from splitnerf.training import graphs, room
+from splitnerf.training import gpu_step
 from splitnerf.training import loop as trainer
 from splitnerf.training.batches import draw_batch
 from splitnerf.training.checkpoint import load_checkpoint
@@ -24,7 +24,7 @@ from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
 from splitnerf.fields import VisibilityBits
-from splitnerf.training.graphs import GraphedStep
+from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.render.model import SceneModel
 from splitnerf.render.rays import PixelSource
@@ -57,7 +57,7 @@ def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, rec
         called.append(lambda: outputs.__setitem__(slice(None), function()))
         return SimpleNamespace(replay=called[-1]), outputs
 
-    monkeypatch.setattr(graphs, "record", call)
+    monkeypatch.setattr(gpu_step, "record", call)
     trainer.train(load_dataset(data), config, tmp_path / "called")
     assert len(called) == recording["recorded"]
     for ours, theirs in zip(lines_of(tmp_path / "recorded"), lines_of(tmp_path / "called"), strict=True):
@@ -72,7 +72,7 @@ class Taken(NamedTuple):
     launches: int
     n_rays: int
     n_kinds: int
-    n_discarded: int
+    skipped: int
     made_at: float
 
 
@@ -98,8 +98,8 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
         advance(training, bar)
         outside, taken = launches.launches.total() - inside["launches"] - outside, training.take_step
         how = next(way for way in ("recorded", "called", "replayed") if used[way] > before[way])
-        n_rays = len(training.unread[-1].batch.target)
-        steps.append(Taken(how, outside, n_rays, len(taken._seen), taken.n_discarded, training.mesh.made_at))
+        n_rays = len(taken.newest[0].target)
+        steps.append(Taken(how, outside, n_rays, len(taken._with_kernels), taken.skipped, training.mesh.made_at))
 
     def leaving(bits, traced):
         old = bits.cache
@@ -108,7 +108,7 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
             x.fill_(torch.nan)
 
     with monkeypatch.context() as patch:
-        patch.setattr(graphs, "record", apart(graphs.record))
+        patch.setattr(gpu_step, "record", apart(gpu_step.record))
         patch.setattr(pretend_graphs.PretendGraph, "replay", apart(pretend_graphs.PretendGraph.replay))
         patch.setattr(trainer.Training, "advance", watched)
         patch.setattr(SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True))  # which step takes it is no chance
@@ -137,20 +137,21 @@ def test_a_surface_that_is_held_near_its_start_gets_the_same_bits_from_graphs(da
     runs = []
     for name in ("recorded", "called"):
         runs.append(schedule_of_a_gpu(data, tmp_path / name, monkeypatch, recording, **{"surface.start": "stereo"})[0])
-        monkeypatch.setattr(graphs, "record", called)
+        monkeypatch.setattr(gpu_step, "record", called)
     assert recording["replayed"] > 50
     for a, b in zip(*(run.model.parameters() for run in runs), strict=True):
         assert torch.equal(a, b)
 
 
 def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeypatch, recording):
-    """Numbers are read a step late; levels open, meshes are swapped, priors begin, the light moves. Twice, when the surface blurs and
-    when the grid follows, steps find more samples than they have room for; the first time also the one on its way. Called in place of
+    """Numbers are read late; levels open, meshes are swapped, priors begin, the light moves. When the surface blurs, a step and
+    the one on its way find more samples than their capacity: they move nothing, and the next has no limit. Called in place of
     recorded it gives the same bits."""
     trained, steps = schedule_of_a_gpu(data, tmp_path / "recorded", monkeypatch, recording)
     assert trained.finished and all(p.isfinite().all() for p in trained.model.parameters())
-    assert [step.how for step in steps[57:62]] == ["replayed"] * 4 + ["called"]  # numbers 59 and 60 have no room
-    assert [steps[i].n_discarded for i in (57, 59, 60, 61, 62, 159)] == [0, 0, 1, 2, 2, 3]
+    at = next(i for i, step in enumerate(steps) if step.skipped)  # the first step that read of one that was not complete
+    assert 57 < at <= 57 + gpu_step.READ_EVERY and [step.how for step in steps[at : at + 2]] == ["recorded", "called"]
+    assert [steps[i].skipped for i in (at - 1, at, at + 1, 159)] == [0, 1, 2, 2]
     assert len({step.made_at for step in steps}) == 10 and len(steps) == 160
     replayed = [step.launches for step in steps if step.how == "replayed"]
     rays = [step.n_rays for step in steps]
@@ -159,7 +160,7 @@ def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeyp
     assert recording["recorded"] <= steps[-1].n_kinds and recording["called"] <= steps[-1].n_kinds + 15
     assert len(replayed) > 70 and max(replayed) <= 50 and statistics.median(replayed) <= 30
 
-    monkeypatch.setattr(graphs, "record", called)
+    monkeypatch.setattr(gpu_step, "record", called)
     other, _ = schedule_of_a_gpu(data, tmp_path / "called", monkeypatch, recording)
     for a, b in zip(trained.model.parameters(), other.model.parameters(), strict=True):
         assert torch.equal(a, b)
@@ -212,10 +213,10 @@ def test_a_capacity_changes_roundings_alone(data):
 
 def test_a_step_that_exceeds_its_room_moves_nothing(data, tmp_path, monkeypatch, recording):
     """Nor does it count."""
-    monkeypatch.setattr(room, "SHADING_SLACK", 0.2)
-    monkeypatch.setattr(room, "UNIT", 1)
-    complete, settle, moved, step = [], GraphedStep.settle, [], AdamW.step
-    monkeypatch.setattr(GraphedStep, "settle", lambda self, *told: complete.append(settle(self, *told)) or complete[-1])
+    monkeypatch.setattr(gpu_step, "SHADING_SLACK", 0.2)
+    monkeypatch.setattr(gpu_step, "UNIT", 1)
+    complete, judge, moved, step = [], GpuStep.judge, [], AdamW.step
+    monkeypatch.setattr(GpuStep, "judge", lambda self, numbers: complete.append(judge(self, numbers)) or complete[-1])
 
     def watched(self, allowed):
         params = [p for group in self.param_groups for p in group["params"]]

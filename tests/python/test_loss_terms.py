@@ -13,7 +13,7 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import make_grid
 from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training.batches import Batch, draw_numbers, make_probes, probe_counts
-from splitnerf.training.step import loss_terms
+from splitnerf.training.losses import loss_terms
 
 SMALL = {
     "n_levels": 4, "log2_table_size": 10, "grid_resolution": 16, "constants.materials_width": 16, "occlusion_width": 16, "light_width": 16,

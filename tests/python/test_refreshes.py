@@ -20,9 +20,9 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
 from splitnerf.training import loop, meshes
 from splitnerf.training.finite import Diverged
-from splitnerf.training.losses import Term
 from splitnerf.training.schedule import next_ray_count
-from splitnerf.training.step import Room
+from splitnerf.training.gpu_step import GpuStep
+from splitnerf.training.step import Capacity, StepNumbers
 
 PLAIN = {"occlusion.kind": "off", "shading.method": "split", "preview_every": 2.0}  # nothing is traced, nothing shown
 
@@ -163,12 +163,10 @@ def test_the_number_of_rays_follows_that_of_the_samples(data, tmp_path):
 
 
 def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(data, tmp_path):
-    """Of 50 rays: 600 points looked at, 300 composited, 120 shaded; steps that were skipped, by either reason."""
+    """Of 50 rays: 600 points looked at, 300 composited, 120 shaded; and the steps that were skipped."""
     training = loop.Training(load_dataset(data), tiny(), tmp_path, torch.device("cpu"))
-    training.watch.skipped, training.take_step.n_discarded = 2, 3
-    numbers = loop.StepNumbers({"colour": 0.25}, 0.5, 1.0, Room(300, 120, 40), 20.0, 600)
-    batch = SimpleNamespace(target=torch.zeros(50, 4))
-    line = training.line(SimpleNamespace(step=7, batch=batch, terms={"colour": Term(2.0, torch.tensor(0.0))}), numbers)
+    training.take_step.skipped = 5
+    line = training.line(StepNumbers(7, 50, {"colour": 0.25}, {"colour": 2.0}, 1.0, Capacity(300, 120, 40), 20.0, 600))
     counts = {"rays": 50, "samples_per_ray": 12.0, "kept": 0.5, "shaded": 0.2, "skipped": 5, "step": 7, "s": 20.0}
     expected = counts | {"loss": 0.5, "loss_colour": 0.5}
     assert {name: line[name] for name in expected} == expected
@@ -177,11 +175,19 @@ def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(data, tmp_path):
 @pytest.mark.parametrize("complete", [False, True])
 def test_a_step_without_all_its_samples_leaves_nothing_behind(data, tmp_path, monkeypatch, complete):
     training = loop.Training(load_dataset(data), tiny(**PLAIN), tmp_path, torch.device("cpu"))
-    training.reads_late, training.take_step.room = 1, Room() if complete else Room(samples=0)
+    parts = training.model, training.grid, training.mesh, training.generator, training.optimiser, training.exposures
+    step, differentiate = GpuStep(*parts), GpuStep.differentiate
+    training.take_step = step
+
+    def bounded(self, *arguments):
+        self.capacity = Capacity() if complete else Capacity(samples=0)
+        return differentiate(self, *arguments)
+
+    monkeypatch.setattr(GpuStep, "differentiate", bounded)
     before = {name: value.clone() for name, value in training.model.state_dict().items()}
     training.refresh()
     training.advance(SimpleNamespace(show=lambda *_: None))
-    assert training.psnr_mean is None and len(training.unread) == 1
+    assert training.psnr_mean is None and len(step._pending) == 1
     training.settle()
     moved = [name for name, value in training.model.state_dict().items() if not torch.equal(value, before[name])]
     assert training.step == 1 and bool(moved) == complete and (training.psnr_mean is not None) == complete

@@ -9,7 +9,6 @@ from torch import Tensor, nn
 
 from splitnerf.ops import material_network
 
-
 FUSED_WIDTH = 128  # units of a layer up to which a GPU runs the network as one operator
 
 

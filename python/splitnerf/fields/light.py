@@ -12,7 +12,6 @@ import torch
 from torch import Tensor, nn
 
 from splitnerf import _core
-from splitnerf.ops import clear_unless
 
 SAMPLES_RATE = 0.03  # update rate of the running means that decide the light loss's number of directions
 FEWEST_SAMPLES = 64
@@ -158,12 +157,6 @@ class EvaluatedLight:
         """Drops the accumulated gradients."""
         for leaf in self.leaves:
             leaf.grad = None
-
-    def keep_grad(self, kept: Tensor) -> None:
-        """Makes the accumulated gradients 0 where ``kept``, a [] bool on their device, is false."""
-        grads = [leaf.grad for leaf in self.leaves if leaf.grad is not None]
-        if grads:
-            clear_unless(grads, kept)
 
 
 def leaf_of(value: Tensor) -> Tensor:

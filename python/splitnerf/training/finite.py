@@ -9,14 +9,11 @@ import torch
 from torch import Tensor
 
 from splitnerf.data.dataset import Dataset
-from splitnerf.notes import note
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.batches import Batch
 
-MOST_SKIPPED = 10  # steps in a row
 UNEXPLAINED = "none of what it comes from"
-LARGEST = 1e18  # norm of a gradient; the optimiser squares its values, in single precision
 
 
 class Diverged(RuntimeError):
@@ -27,46 +24,12 @@ class Diverged(RuntimeError):
         - A loss that is not finite stops the run before the parameters move. The message names the loss's terms and
           the first of their inputs that is not finite: images, cameras, parameters, rendered rays.
         - A gradient that is not finite, or too large to be squared, skips the step: parameters and optimiser do not
-          change. A message on stderr tells so, and metrics.jsonl counts such steps as ``skipped``. The tenth in a row
+          change (:meth:`splitnerf.training.step.Step.judge`). A message on stderr says so, and metrics.jsonl counts such steps as ``skipped``. The tenth in a row
           stops the run.
         - Parameters are checked before a mesh is made from them and before they are saved; on the CPU, where nobody waits
           for it, with every line of metrics.jsonl as well. Where one is not finite the run stops and no checkpoint is written.
         - A checkpoint whose numbers are not finite is refused when it is read.
     """
-
-
-class GradientWatch:
-    """Decides whether a step may be taken.
-
-    Attributes:
-        skipped: The number of steps that were skipped so far.
-    """
-
-    def __init__(self, parameters: Iterable[Tensor]):
-        self.parameters = list(parameters)
-        self.skipped = self._in_a_row = 0
-
-    def gradients(self) -> list[Tensor]:
-        """All gradients that there are."""
-        return [p.grad for p in self.parameters if p.grad is not None]
-
-    def allows(self, step: int, norm: float) -> bool:
-        """Whether the step may be taken: the ``norm`` of its gradients is finite, and each of them can be squared.
-
-        Raises:
-            Diverged: Ten steps in a row may not be taken.
-        """
-        if norm < LARGEST:
-            self._in_a_row = 0
-            return True
-        self.skipped, self._in_a_row = self.skipped + 1, self._in_a_row + 1
-        if self._in_a_row == MOST_SKIPPED:
-            raise Diverged(
-                f"step {step}: the gradient was not finite in {MOST_SKIPPED} steps in a row; "
-                "lower --set learning_rate and --resume"
-            )
-        note(f"step {step}: the gradient is not finite; the step is skipped")
-        return False
 
 
 def first_not_finite(values: Iterable[tuple[str, Tensor]]) -> str | None:
@@ -96,7 +59,7 @@ def check_state(step: int, model: SceneModel, optimiser: torch.optim.Optimizer) 
 
 
 def explain_loss(
-    step: int, terms: dict[str, float], dataset: Dataset, batch: Batch, model: SceneModel, ray: RenderedRays
+    step: int, terms: dict[str, float], dataset: Dataset, model: SceneModel, batch: Batch, ray: RenderedRays
 ) -> Diverged:
     """The error for a loss that is not finite: it names the terms and, in order of the data flow, the first bad input.
 
@@ -104,11 +67,12 @@ def explain_loss(
         step: The number of the step.
         terms: The values of the loss's terms by name.
         dataset: The train split.
-        batch, ray: The rays of the step, and their rendering.
         model: The scene.
+        batch, ray: The rays of the step, and their rendering; of one that is read late, those of a step after it, which
+            nothing has moved.
     """
     bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term))
-    found = first_not_finite(_data_flow(dataset, batch, model, ray)) or UNEXPLAINED
+    found = first_not_finite(_data_flow(dataset, model, batch, ray)) or UNEXPLAINED
     return Diverged(
         f"step {step}: the loss is not finite ({bad}); first not finite: {found}; "
         "repair the data, or lower --set learning_rate, and --resume"
@@ -123,7 +87,7 @@ def _state(model: SceneModel, optimiser: torch.optim.Optimizer) -> Iterator[tupl
                 yield f"{key} of {name}", value
 
 
-def _data_flow(dataset: Dataset, batch: Batch, model: SceneModel, ray: RenderedRays) -> Iterator[tuple[str, Tensor]]:
+def _data_flow(dataset: Dataset, model: SceneModel, batch: Batch, ray: RenderedRays) -> Iterator[tuple[str, Tensor]]:
     for i, name in enumerate(dataset.frame_names):
         yield f"image {name}", torch.from_numpy(dataset.images[i])
         yield f"pose of {name}", torch.from_numpy(dataset.poses[i])

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,15 +35,13 @@ from splitnerf.training.checkpoint import (
     restored_grid,
     save_checkpoint,
 )
-from splitnerf.training.exposure import BEGIN, PhotoExposures
-from splitnerf.training.finite import GradientWatch, check_state, explain_loss
-from splitnerf.training.graphs import GraphedStep
+from splitnerf.training.exposure import PhotoExposures
+from splitnerf.training.finite import check_state, explain_loss
+from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.losses import SeenLight
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.metrics import METRICS, add_metrics, keep_metrics, write_preview
-from splitnerf.training.numbers import PastStep, StepNumbers
 from splitnerf.training.observer import Observer, Observers, heed
-from splitnerf.training.room import RoomyStep
 from splitnerf.training.schedule import (
     light_moves,
     light_period,
@@ -54,7 +51,7 @@ from splitnerf.training.schedule import (
     set_learning_rate,
 )
 from splitnerf.training.start import HELD_UNTIL, StartShape, fit_to, start_shape
-from splitnerf.training.step import Step
+from splitnerf.training.step import Step, StepNumbers
 
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps and the last one are all logged
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion
@@ -146,17 +143,14 @@ class Training:
             self.hull = visual_hull(c.sampling.grid_resolution, c.constants.box, source.possible, source.poses, lenses)
         self.grid = make_grid(c, self.hull, device)
         self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
-        step = Step if device.type == "cpu" else GraphedStep if c.run.cuda_graphs else RoomyStep
-        seen = None if dataset.surroundings is None else SeenLight(dataset.surroundings, self.generator.device)
-        self.take_step = step(self.model, self.grid, self.mesh, self.generator, seen)
-        self.watch = GradientWatch(self.model.parameters())
+        step = Step if device.type == "cpu" else GpuStep
+        seen = None if dataset.surroundings is None else SeenLight(dataset.surroundings, device)
+        self.take_step = step(self.model, self.grid, self.mesh, self.generator, self.optimiser, self.exposures, seen)
         self.light: EvaluatedLight | None = None  # evaluated; None after its parameters moved
         self.environment: Tensor | None = None  # the light that weighs traced occlusion
         self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.constants.initial_rays, 0.0
         self.psnr_mean: float | None = None
-        self.unread: deque[PastStep] = deque()
         self.unlogged: dict[str, object] | None = None  # the line of the last step read, while metrics.jsonl lacks it
-        self.reads_late = 0 if device.type == "cpu" else 1  # steps; a GPU goes on while the host reads
         self.started, self.saved_at = time.monotonic(), 0.0  # a time of the clock, and seconds of the run
         self.first = True  # step of the run
         self.stopped = False  # an observer asked to end before the schedule does
@@ -205,7 +199,7 @@ class Training:
         self.observers.began(self)
         with (
             Interrupt() as interrupt, Progress(self.progress) as bar, same_bits(c.run.deterministic),
-            tensor_cores(True), spare_processors(self.model.device), self.take_step.stream(),
+            tensor_cores(True), spare_processors(self.model.device), self.take_step.running(),
         ):  # fmt: skip
             if self.step:
                 interrupt.attempt(self.preview_if_due)  # that an interruption left out
@@ -295,24 +289,14 @@ class Training:
         self.grid.update(self.model.sdf_field.sdf, self.model.s_value if s is None else s, **how)
 
     def advance(self, bar: Progress) -> None:
-        """Makes one step: draws rays, takes gradients, moves parameters; and reads the numbers of a step, on a GPU of the one
-        before."""
-        c, light = self.config, self.light
+        """Makes one step: draws rays, takes gradients, moves parameters."""
+        c = self.config
         batch = draw_batch(self.source, self.n_rays, c, self.exposures.factors)
-        ray, terms = self.take_step(batch, light, self.environment, self.step, self.progress)
+        read = self.take_step(batch, self.light, self.environment, self.step, self.progress)
         if light_moves(c, self.step):
-            light.backward()
             self.light = None
-        past = PastStep.of(self.step + 1, batch, ray, terms, self.take_step.room, self.watch.gradients())
-        if self.reads_late:  # else gradients of results without room would stay in the light
-            light.keep_grad(past.allowed)
-        self.optimiser.step(allowed=past.allowed)
-        past.counted = self.optimiser.counted
-        if self.exposures.learned and self.progress > BEGIN:
-            self.exposures.learn(batch.view, batch.target, ray.mean, ray.opacity, past.allowed)
-        self.unread.append(past)
         self.step, self.first = self.step + 1, False
-        self.settle(bar, self.reads_late)
+        self.settle(read, bar)
 
     def preview_if_due(self) -> None:
         """Writes a preview where the last one is old enough."""
@@ -321,38 +305,33 @@ class Training:
             self.previewed_at = self.progress
             self.observers.previewed(picture, self.step)
 
-    def settle(self, bar: Progress | None = None, left: int = 0) -> None:
-        """Reads the numbers of all steps but the last ones, and does what follows from them.
+    def settle(self, read: Iterable[StepNumbers] | None = None, bar: Progress | None = None) -> None:
+        """Does what follows from the numbers of steps; without `read`, of all that are not read yet.
 
         Raises:
-            Diverged: A loss is not finite, or too many gradients were not.
+            Diverged: A loss is not finite.
         """
-        while len(self.unread) > left:
-            past = self.unread.popleft()
-            numbers = past.read()
-            complete = self.take_step.settle(numbers.counts, past.room, numbers.s)
-            if complete and not math.isfinite(numbers.loss):
-                raise explain_loss(past.step - 1, numbers.values, self.dataset, past.batch, self.model, past.ray)
-            if not complete or not self.watch.allows(past.step - 1, numbers.gradient_norm):
-                self.optimiser.take_back(past.counted)
-            if complete:
+        for numbers in self.take_step.unread() if read is None else read:
+            if numbers.complete:
+                if not math.isfinite(numbers.loss):
+                    newest = self.take_step.newest
+                    raise explain_loss(numbers.step - 1, numbers.values, self.dataset, self.model, *newest)
                 psnr = -10.0 * math.log10(max(numbers.values["colour"], 1e-10))
                 self.psnr_mean = psnr if self.psnr_mean is None else 0.95 * self.psnr_mean + 0.05 * psnr
-            n_rays = len(past.batch.target)
-            if n_rays == self.n_rays:  # else the newest count was chosen while this step was on its way
-                self.n_rays = next_ray_count(n_rays, numbers.counts.samples, self.config)
+            if numbers.n_rays == self.n_rays:  # else the newest count was chosen while this step was on its way
+                self.n_rays = next_ray_count(self.n_rays, numbers.counts.samples, self.config)
             self.seconds = time.monotonic() - self.started
             if bar is not None:
-                bar.show(self.progress, self.told(past.step, numbers.evaluated / n_rays))
-            self.unlogged = self.line(past, numbers)
-            if past.step % LOG_EVERY == 0 or past.step <= LOG_EVERY:
+                bar.show(self.progress, self.told(numbers.step, numbers.evaluated / numbers.n_rays))
+            self.unlogged = self.line(numbers)
+            if numbers.step % LOG_EVERY == 0 or numbers.step <= LOG_EVERY:
                 self.log()
 
     def log(self) -> None:
         """Adds the line of the last step read to metrics.jsonl, if it is not there yet."""
         if self.unlogged is None:
             return
-        if not self.reads_late:
+        if self.model.device.type == "cpu":
             check_state(self.step, self.model, self.optimiser)
         add_metrics(self.run / METRICS, self.unlogged)
         self.observers.logged(self.unlogged)
@@ -363,17 +342,15 @@ class Training:
         psnr = "" if self.psnr_mean is None else f"PSNR {self.psnr_mean:.2f} dB, "
         return f"step {step} {psnr}{samples_per_ray:.1f} samples/ray"
 
-    def line(self, past: PastStep, numbers: StepNumbers) -> dict[str, object]:
+    def line(self, numbers: StepNumbers) -> dict[str, object]:
         """The values of one line of metrics.jsonl, by name."""
-        n_rays, evaluated = len(past.batch.target), max(1, numbers.evaluated)
+        n_rays, evaluated = numbers.n_rays, max(1, numbers.evaluated)
         return {
-            "step": past.step, "seconds": round(self.seconds, 3), "progress": self.progress, "loss": numbers.loss,
-            **{f"loss_{name}": term.weight * numbers.values[name] for name, term in past.terms.items()},
-            "psnr": self.psnr_mean,
-            "rays": n_rays, "samples_per_ray": numbers.evaluated / n_rays,
+            "step": numbers.step, "seconds": round(self.seconds, 3), "progress": self.progress, "loss": numbers.loss,
+            **{f"loss_{name}": weight * numbers.values[name] for name, weight in numbers.weights.items()},
+            "psnr": self.psnr_mean, "rays": n_rays, "samples_per_ray": numbers.evaluated / n_rays,
             "kept": numbers.counts.samples / evaluated, "shaded": numbers.counts.shaded / evaluated,
-            "s": numbers.s, "is_unoccluded": self.model.occlusion.is_unoccluded,
-            "skipped": self.watch.skipped + self.take_step.n_discarded,
+            "s": numbers.s, "is_unoccluded": self.model.occlusion.is_unoccluded, "skipped": self.take_step.skipped,
         }  # fmt: skip
 
     def finish(self) -> None:

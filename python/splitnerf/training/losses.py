@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -18,15 +19,22 @@ from splitnerf.fields import EvaluatedLight, Light, LightPyramid
 from splitnerf.ops import (
     MeshScene,
     fibonacci_directions,
+    gradient_losses,
     light_prior,
     log_chroma,
+    material_losses,
     occlusion_factors,
+    pixel_losses,
     prefilter_light,
     quadratic_entropy,
     sample_ggx_lobe,
 )
+from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
+from splitnerf.training.batches import Batch
+from splitnerf.training.schedule import light_moves, light_period
 
+CHANNELS = 3
 TAILS = 3.0  # degrees of freedom
 SEEN_TEXELS = 1024  # directions in which the light is compared with what photos show, at least
 SEEN_DEVIATION = 0.2  # of the log radiance
@@ -76,6 +84,70 @@ def _stored_seed(weights: tuple[float, ...], shape: torch.Size, device: torch.de
 
 def _seed(weights: tuple[float, ...], values: Tensor) -> Tensor:
     return _stored_seed(weights, values.shape, values.device)
+
+
+def loss_terms(
+    model: SceneModel, light: EvaluatedLight, batch: Batch, ray: RenderedRays, scene: MeshScene | None,
+    environment: Tensor | None, generator: torch.Generator, step: int, progress: float,
+    seen: SeenLight | None = None,
+    late: Callable[[RenderedRays, MeshScene, Tensor, int], Tensor | None] | None = None,
+) -> Terms:  # fmt: skip
+    """The terms of the loss by name; the colour's term comes first.
+
+    Args:
+        model, light: The scene, and its evaluated light.
+        batch, ray: The rays, and their rendering.
+        scene: The surface as a mesh; None before the first mesh.
+        environment: [h, 2h, 3] linear radiance that weighs the traced occlusion; None: no occlusion is traced.
+        generator: Random numbers for the losses' subsets.
+        step, progress: The number of the step, and the training's progress in [0, 1].
+        seen: The light that photos show around the object; None where they show none.
+        late: The occlusion's term from points that were traced beside the training, see
+            :meth:`splitnerf.training.late_occlusion.LateOcclusion.loss`; None: the step traces its own points.
+
+    Source: SplitNeRF Eq. (3), (11), (18) and the losses below.
+    """
+    c, w, terms = model.config, model.config.losses, Terms()
+    has_priors = progress >= c.constants.priors_from
+    # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
+    terms.add(
+        {"colour": CHANNELS * w.colour_weight, "mask": w.mask_weight or None},
+        pixel_losses(
+            ray.mean, ray.opacity, batch.target, batch.background, batch.whole, batch.exposure, linear=ray.linear
+        ),
+    )
+    terms.add(
+        {"eikonal": w.eikonal_weight, "smoothness": w.smoothness_weight or None},
+        gradient_losses(ray.gradients, ray.weights.detach(), ray.beside),
+    )
+    terms.add(
+        {
+            "metal": w.metal_weight or None,
+            "binary_metal": (has_priors and w.binary_metal_weight) or None,
+            "dark_metal": w.dark_metal_weight or None,
+        },
+        material_losses(ray.points.albedo.detach(), ray.points.metallic, ray.shares),
+    )
+    if has_priors and w.entropy_weight:
+        terms.add({"entropy": w.entropy_weight}, material_entropy_loss(ray, c, generator))
+    if model.light.needs_consistency_loss and w.light_weight:
+        terms.add({"light": w.light_weight}, light_loss(model.light, c, generator, step))
+    if light_moves(c, step):  # once for all steps since the light last moved
+        since = step % light_period(c) + 1
+        if w.neutral_weight:
+            terms.add({"neutral": w.neutral_weight * since}, neutral_light_loss(light, c, generator))
+        if w.light_prior_weight and c.light.kind == "pyramid":
+            terms.add({"light_prior": w.light_prior_weight * since}, light_prior_loss(model.light))
+        if seen is not None and w.seen_weight:
+            terms.add({"seen_light": w.seen_weight * since}, seen.loss(light))
+    if environment is not None:
+        if late is None:
+            found = occlusion_loss(ray, scene, environment, c, generator, step)
+        else:
+            found = late(ray, scene, environment, step)
+        if found is not None:
+            terms.add({"occlusion": w.occlusion_weight}, found)
+    return terms
 
 
 def penalty(error: Tensor, form: str) -> Tensor:

@@ -1,31 +1,39 @@
-"""One training step: it renders rays, computes the terms of the loss and takes their gradients."""
+"""One training step: it finds and renders samples, takes the gradients of the losses and moves the parameters."""
 
 from __future__ import annotations
 
+import functools
 import math
-from contextlib import AbstractContextManager, closing, nullcontext
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
+from splitnerf.devices import pinned, start_fetching
 from splitnerf.fields import EvaluatedLight
-from splitnerf.ops import MeshScene, gradient_losses, material_losses, pixel_losses
+from splitnerf.notes import note
+from splitnerf.ops import AdamW, step_numbers
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
 from splitnerf.training import losses
 from splitnerf.training.batches import Batch
+from splitnerf.training.exposure import BEGIN, PhotoExposures
+from splitnerf.training.finite import Diverged
 from splitnerf.training.late_occlusion import LateOcclusion
 from splitnerf.training.losses import Terms
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.schedule import cosine_anneal, light_moves, light_period
+from splitnerf.training.schedule import cosine_anneal, light_moves
 from splitnerf.training.start import HELD_UNTIL, POINTS, SHAPE_WEIGHT, StartShape
 
-CHANNELS = 3
+MOST_SKIPPED = 10  # steps in a row
+LARGEST = 1e18  # norm of a gradient; the optimiser squares its values, in single precision
 
 
-class Room(NamedTuple):
+class Capacity(NamedTuple):
     """How many samples, shaded samples and ray segments there are, or how many there may be."""
 
     samples: float = math.inf
@@ -37,50 +45,186 @@ class Room(NamedTuple):
         """The capacity that :func:`splitnerf.render.renderer.render_rays` takes."""
         return None if math.isinf(self.shaded) else (int(self.shaded), int(self.segments))
 
-    def holds(self, counts: Room, slack: float = 1.0) -> bool:
+    def holds(self, counts: Capacity, slack: float = 1.0) -> bool:
         """Whether it is at least ``slack`` times as large as the counts."""
-        return all(slack * n <= room for n, room in zip(counts, self))
+        return all(slack * n <= capacity for n, capacity in zip(counts, self))
+
+
+class StepNumbers(NamedTuple):
+    """What the host reads of a step, in one copy.
+
+    Attributes:
+        step: Its number, counted from 1.
+        n_rays: The number of its rays.
+        values, weights: The terms of the loss and their weights, by name; the colour's term comes first.
+        gradient_norm: The Euclidean norm of all gradients.
+        counts: The samples found, and those shaded and their segments.
+        s: The sharpness of the density.
+        evaluated: The points evaluated to find the samples.
+        complete: Whether its results did not exceed their capacity.
+    """
+
+    step: int
+    n_rays: int
+    values: dict[str, float]
+    weights: dict[str, float]
+    gradient_norm: float
+    counts: Capacity
+    s: float
+    evaluated: float
+    complete: bool = True
+
+    @property
+    def loss(self) -> float:
+        """The weighted sum of the terms."""
+        return sum(weight * self.values[name] for name, weight in self.weights.items())
+
+
+@dataclass
+class PendingNumbers:
+    """The numbers of a step on their way from its device.
+
+    Attributes:
+        step, n_rays, weights: See :class:`StepNumbers`.
+        capacity: The capacity of its results.
+        allowed: [] bool on the device, whether its loss is a number, its gradient can be squared, and its results did not
+            exceed their capacity.
+        fetched: The numbers on the CPU, and what waits until they are there.
+        counted: The optimiser's counts of steps that this one has raised.
+    """
+
+    step: int
+    n_rays: int
+    weights: dict[str, float]
+    capacity: Capacity
+    allowed: Tensor
+    fetched: tuple[Tensor, Callable[[], None]]
+    counted: Sequence[Tensor] = ()
+
+    def read(self) -> StepNumbers:
+        """The numbers; waits until they are there."""
+        numbers, wait = self.fetched
+        wait()
+        values, (norm, samples, shaded, _, segments, evaluated, s) = (
+            part.tolist() for part in numbers.tensor_split([len(self.weights)])
+        )
+        counts = Capacity(samples, shaded, segments)
+        return StepNumbers(
+            self.step, self.n_rays, dict(zip(self.weights, values)), self.weights, norm, counts, s, evaluated,
+            self.capacity.holds(counts),
+        )  # fmt: skip
 
 
 class Step:
-    """One training step up to the gradients, which it stores at the model's parameters and the light's leaves.
+    """One training step.
 
     Args:
         model, grid, mesh: The scene, its occupancy grid and its newest mesh.
         generator: Random numbers for the losses' subsets.
+        optimiser, exposures: What a step moves; None: it takes gradients alone.
         seen: The light that photos show around the object; None where they show none.
 
     Attributes:
-        room: The room of the last step.
+        capacity: The capacity of the last step's results.
         start: The shape that the run began with, near which the surface is held at first; None: a sphere, which holds nothing.
-        n_discarded: The number of steps whose results had too little room.
+        skipped: The number of steps whose gradients could not be used.
+        newest: The rays of the last step, and their rendering.
+        s: The sharpness as far as it is known without waiting.
+        late: Traces occlusion beside the training; None: each step traces its own points.
     """
 
-    room, n_discarded = Room(), 0
     start: StartShape | None = None
-    s: float | None = None  # the sharpness as far as it is known without waiting
+    newest: tuple[Batch, RenderedRays] | None = None
+    s: float | None = None
+    late: LateOcclusion | None = None
 
     def __init__(
         self, model: SceneModel, grid: OccupancyGrid, mesh: SurfaceMesh, generator: torch.Generator,
-        seen: losses.SeenLight | None = None,
+        optimiser: AdamW | None = None, exposures: PhotoExposures | None = None, seen: losses.SeenLight | None = None,
     ):  # fmt: skip
-        self.model, self.grid, self.mesh, self.generator, self.seen = model, grid, mesh, generator, seen
-        on_cpu, self.late = model.device.type == "cpu", None  # whose threads would only share the time
-        if not on_cpu and model.config.occlusion.kind == "mlp":
-            # How often it draws depends on the CPU's speed: the training's own numbers must not.
-            own = torch.Generator(generator.device).manual_seed(model.config.run.seed)
-            self.late = LateOcclusion(model, own)
+        self.model, self.grid, self.mesh, self.generator = model, grid, mesh, generator
+        self.optimiser, self.exposures, self.seen = optimiser, exposures, seen
+        self.capacity, self.skipped, self._skipped_in_a_row = Capacity(), 0, 0
 
     def __call__(
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
-    ) -> tuple[RenderedRays, Terms]:
-        """Finds the rays' samples, renders them and takes the gradients of the losses.
+    ) -> Iterable[StepNumbers]:
+        """Takes the gradients of a batch and moves the parameters, those of the light where its turn has come.
 
         Args:
             batch: The rays.
-            light: The evaluated light.
+            light: The evaluated light; of no use any more where its parameters moved.
             environment: [h, 2h, 3] linear radiance that weighs the traced occlusion; None: no occlusion is traced.
             step, progress: The number of the step, and the training's progress in [0, 1].
+
+        Returns:
+            The numbers of the steps that are read by now, in their order. Where a loss is not finite nothing has moved.
+
+        Raises:
+            Diverged: The gradients of too many steps in a row are not finite.
+        """
+        numbers = self.begin(batch, light, environment, step, progress).read()
+        if self.judge(numbers):
+            self.optimiser.step()
+            if self.exposures.learned and progress > BEGIN:
+                self.exposures.learn(batch.view, batch.target, self.newest[1].mean, self.newest[1].opacity)
+        return [numbers]
+
+    def unread(self) -> Iterable[StepNumbers]:
+        """Reads the numbers that no call has returned yet."""
+        return []
+
+    def running(self) -> AbstractContextManager[None]:
+        """The context in which steps run."""
+        return nullcontext()
+
+    def begin(
+        self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
+    ) -> PendingNumbers:
+        """Takes all gradients, and starts to fetch the step's numbers."""
+        ray, terms = self.gradients(batch, light, environment, step, progress)
+        if light_moves(self.model.config, step):
+            light.backward()
+        self.newest = batch, ray
+        return self.fetch(step + 1, batch, ray, terms)
+
+    def fetch(self, step: int, batch: Batch, ray: RenderedRays, terms: Terms) -> PendingNumbers:
+        """Starts to fetch the numbers of a step whose gradients are at the parameters."""
+        gradients = [p.grad for p in self.model.parameters() if p.grad is not None]
+        values, counts = [term.value for term in terms.values()], [ray.n_found, ray.sizes]
+        limits = _limits(len(terms), self.capacity, ray.mean.device)
+        numbers, allowed = step_numbers(gradients, values, counts, ray.evaluated, ray.s.detach(), limits)
+        weights = {name: term.weight for name, term in terms.items()}
+        return PendingNumbers(step, len(batch.target), weights, self.capacity, allowed, start_fetching(numbers))
+
+    def judge(self, numbers: StepNumbers) -> bool:
+        """Whether a step's gradients may be used: its results were complete, its loss is a number, and its gradient can
+        be squared. Counts the others.
+
+        Raises:
+            Diverged: The gradients of ten steps in a row may not.
+        """
+        if numbers.complete and not math.isfinite(numbers.loss):
+            return False  # which ends the run
+        if numbers.complete and numbers.gradient_norm < LARGEST:
+            self._skipped_in_a_row = 0
+            return True
+        self.skipped += 1
+        if numbers.complete:
+            self._skipped_in_a_row += 1
+            if self._skipped_in_a_row == MOST_SKIPPED:
+                raise Diverged(
+                    f"step {numbers.step - 1}: the gradient was not finite in {MOST_SKIPPED} steps in a row; "
+                    "lower --set learning_rate and --resume"
+                )
+            note(f"step {numbers.step - 1}: the gradient is not finite; the step is skipped")
+        return False
+
+    def gradients(
+        self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
+    ) -> tuple[RenderedRays, Terms]:
+        """Finds the rays' samples, renders them and stores the gradients of the losses at the model's parameters and the
+        light's leaves; the arguments are those of a call.
 
         Returns:
             The rendered rays, and the terms of the loss by name; the colour's term comes first.
@@ -89,14 +233,11 @@ class Step:
 
     def find(self, batch: Batch, progress: float, capacity: int = 0) -> FoundSamples:
         """The samples of a batch, see :func:`splitnerf.render.renderer.find_samples`."""
-        anneal = cosine_anneal(self.model.config, progress)
-        probes = batch.probes
-        if self.start is not None and progress < HELD_UNTIL:
+        anneal, probes = cosine_anneal(self.model.config, progress), batch.probes
+        if self.is_held(progress):
             drawn = self.start.drawn(POINTS, self.generator)
             probes = probes._replace(anywhere=torch.cat([probes.anywhere, drawn]))
-        return find_samples(
-            self.model, self.grid.cells, *batch.rays, anneal, probes, capacity, batch.phase, self.s
-        )
+        return find_samples(self.model, self.grid.cells, *batch.rays, anneal, probes, capacity, batch.phase, self.s)
 
     def differentiate(
         self, batch: Batch, found: FoundSamples, light: EvaluatedLight, environment: Tensor | None, step: int,
@@ -106,87 +247,27 @@ class Step:
         :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
         ray = render_rays(self.model, light, found, shades_per_ray=c.constants.shades_per_ray, capacity=capacity)
-        terms = loss_terms(
-            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen, self.late
-        )
-        self.hold(terms, ray, found, progress)
+        terms = losses.loss_terms(
+            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen,
+            None if self.late is None else self.late.loss,
+        )  # fmt: skip
+        if self.is_held(progress):
+            terms.add({"start": SHAPE_WEIGHT}, self.start.shape_loss(ray))
+            drawn = found.positions[len(found.directions) :][len(ray.anywhere) - POINTS : len(ray.anywhere)]
+            terms.add({"near_start": SHAPE_WEIGHT}, self.start.left(ray.anywhere[-POINTS:], drawn).mean())
         self.model.zero_grad(set_to_none=True)
         terms.backward()
         return ray, terms
 
-    def hold(self, terms: Terms, ray: RenderedRays, found: FoundSamples, progress: float) -> None:
-        """Adds the terms that hold the surface near the run's start."""
-        if self.start is None or progress >= HELD_UNTIL:
-            return
-        terms.add({"start": SHAPE_WEIGHT}, self.start.shape_loss(ray))
-        drawn = found.positions[len(found.directions) :][len(ray.anywhere) - POINTS : len(ray.anywhere)]
-        terms.add({"near_start": SHAPE_WEIGHT}, self.start.left(ray.anywhere[-POINTS:], drawn).mean())
-
-    def settle(self, counts: Room, room: Room, s: float) -> bool:
-        """Takes in the counts of a step with this room and its sharpness. Returns whether the results may be used."""
-        return room.holds(counts)
-
-    def stream(self) -> AbstractContextManager[None]:
-        """The context in which steps run."""
-        return nullcontext() if self.late is None else closing(self.late)
+    def is_held(self, progress: float) -> bool:
+        """Whether the surface is held near the run's start."""
+        return self.start is not None and progress < HELD_UNTIL
 
 
-def loss_terms(
-    model: SceneModel, light: EvaluatedLight, batch: Batch, ray: RenderedRays, scene: MeshScene | None,
-    environment: Tensor | None, generator: torch.Generator, step: int, progress: float,
-    seen: losses.SeenLight | None = None, late: LateOcclusion | None = None,
-) -> Terms:  # fmt: skip
-    """The terms of the loss by name; the colour's term comes first.
-
-    Args:
-        model, light: The scene, and its evaluated light.
-        batch, ray: The rays, and their rendering.
-        scene: The surface as a mesh; None before the first mesh.
-        environment: [h, 2h, 3] linear radiance that weighs the traced occlusion; None: no occlusion is traced.
-        generator: Random numbers for the losses' subsets.
-        step, progress: The number of the step, and the training's progress in [0, 1].
-        seen: The light that photos show around the object; None where they show none.
-        late: Traces occlusion beside the training; None: the step traces its own points.
-
-    Source: SplitNeRF Eq. (3), (11), (18) and the losses named in :mod:`splitnerf.training.losses`.
-    """
-    c, w, terms = model.config, model.config.losses, Terms()
-    has_priors = progress >= c.constants.priors_from
-    # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
-    terms.add(
-        {"colour": CHANNELS * w.colour_weight, "mask": w.mask_weight or None},
-        pixel_losses(
-            ray.mean, ray.opacity, batch.target, batch.background, batch.whole, batch.exposure, linear=ray.linear
-        ),
-    )
-    terms.add(
-        {"eikonal": w.eikonal_weight, "smoothness": w.smoothness_weight or None},
-        gradient_losses(ray.gradients, ray.weights.detach(), ray.beside),
-    )
-    terms.add(
-        {
-            "metal": w.metal_weight or None,
-            "binary_metal": (has_priors and w.binary_metal_weight) or None,
-            "dark_metal": w.dark_metal_weight or None,
-        },
-        material_losses(
-            ray.points.albedo.detach(), ray.points.metallic, ray.shares
-        ),
-    )
-    if has_priors and w.entropy_weight:
-        terms.add({"entropy": w.entropy_weight}, losses.material_entropy_loss(ray, c, generator))
-    if model.light.needs_consistency_loss and w.light_weight:
-        terms.add({"light": w.light_weight}, losses.light_loss(model.light, c, generator, step))
-    if light_moves(c, step):  # once for all steps since the light last moved
-        since = step % light_period(c) + 1
-        if w.neutral_weight:
-            terms.add({"neutral": w.neutral_weight * since}, losses.neutral_light_loss(light, c, generator))
-        if w.light_prior_weight and c.light.kind == "pyramid":
-            terms.add({"light_prior": w.light_prior_weight * since}, losses.light_prior_loss(model.light))
-        if seen is not None and w.seen_weight:
-            terms.add({"seen_light": w.seen_weight * since}, seen.loss(light))
-    if environment is not None and late is None:
-        terms.add({"occlusion": w.occlusion_weight}, losses.occlusion_loss(ray, scene, environment, c, generator, step))
-    elif environment is not None and (found := late.loss(ray, scene, environment, step)) is not None:
-        terms.add({"occlusion": w.occlusion_weight}, found)
-    return terms
+@functools.lru_cache(maxsize=256)
+def _limits(n_terms: int, capacity: Capacity, device: torch.device) -> Tensor:
+    """What each of a step's numbers must stay below."""
+    counts = capacity.samples + 0.5, capacity.shaded + 0.5, math.inf, capacity.segments + 0.5
+    with torch.inference_mode(False):
+        limits = torch.tensor([math.inf] * n_terms + [LARGEST, *counts, math.inf, math.inf])
+        return pinned(limits, device).to(device, non_blocking=True)
