@@ -120,6 +120,14 @@ def remove_partial(folder: Path) -> None:
         leftover.unlink(missing_ok=True)
 
 
+def is_file(path: Path) -> bool:
+    """Whether a file exists at the path; false for impossible names, such as names that are too long."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
 def reason(error: OSError) -> str:
     """The message of a system error, without its number."""
     return error.strerror or str(error)

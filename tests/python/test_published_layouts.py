@@ -17,7 +17,7 @@ from splitnerf.data.images import read_hdr, write_image
 from splitnerf.data.layouts import neus, stanford_orb, transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
-from splitnerf.data.lit_photos import read_lit_photo
+from splitnerf.data.layouts.lit import read_lit_photo
 from splitnerf.data.photos import load_photo
 from splitnerf.data.reading import Reading
 from splitnerf.data.relit import map_files

@@ -286,7 +286,7 @@ def test_another_state_is_refused(painted, folder, monkeypatch):
         with pytest.raises(OtherState, match=match):
             refine_folder(folder, data, folder, settings, resume=True)
 
-    refused("settings", dataclasses.replace(QUICK, anchor=1.0))
+    refused("settings", dataclasses.replace(QUICK, light_step=1.0))
     content = read_tensors(folder / "refinement.pt")
     for broken in (
         {"vertices": content["vertices"][1:]}, {"vertices": np.nan * content["vertices"]}, {"sweeps": [[1.0]]}, {"outline": [None]},

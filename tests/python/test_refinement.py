@@ -185,12 +185,11 @@ def test_a_balls_albedo_is_found_and_its_roughness_approached(painted, refined):
     np.testing.assert_allclose(result.light, sky(), rtol=1e-5)
 
 
-def test_a_wrong_light_comes_nearer_to_the_true_one(painted):
+def test_a_wrong_light_comes_nearer_to_the_true_one(painted, monkeypatch):
     asset, data = painted
     grey = np.full_like(sky(), 0.8)
-    settings = RefinementSettings(
-        sweeps=8, sweep_share=1.0, pixels=1000, anchor=1e4, directions=16, outline=False
-    )
+    monkeypatch.setattr(fit_module, "ANCHOR", 1e4)
+    settings = RefinementSettings(sweeps=8, sweep_share=1.0, pixels=1000, directions=16, outline=False)
     result = refine(data, asset, grey, settings)
     light, sweeps = result.light, result.sweeps
     cosine = np.sin((np.arange(16) + 0.5) * np.pi / 16)[:, None, None]

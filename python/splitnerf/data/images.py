@@ -19,9 +19,8 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from splitnerf import ops
-from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
-from splitnerf.files import atomic_path
+from splitnerf.files import atomic_path, is_file
 
 JPEG_QUALITY = 95
 SOFTWARE = "SplitNeRF"  # what an EXR says of the program that wrote it

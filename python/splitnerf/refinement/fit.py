@@ -47,6 +47,14 @@ from splitnerf.refinement.unknowns import (
 )
 
 CLAMP_INDIRECT = 10.0
+BOUNCES = 3  # scattering events of interreflection
+KEEP = 0.9  # share of the observations that is kept after a sweep
+# Weights of the prior; three numbers are those of albedo, gloss and normal.
+SMOOTH = 1.0, 2.0, 1.0  # differences of neighbours' steps where a texel is as wide as a pixel; finer texels: more
+FLAT = 0.0, 5.0, 2.0  # differences of neighbours' values; edges cost little
+LIKE_ROUGHNESS = 0.5  # difference of a texel's roughness from the usual one of its colour
+LIKE_METAL = 2.0  # of its metallic from the usual one of its colour and place, where that is metal
+ANCHOR = 0.02  # distance from the start
 SWEEPS_OF_LARGE_STEPS = 4  # afterwards the light's steps are half as large, to average over the noise of sweeps
 SWEEP_PIXELS = 1 << 18  # the most pixels of a sweep: more steps are worth more than more pixels
 LEAST_SWEEPS = 4  # that fit into the minutes of a refinement: a longer sweep gathers fewer pixels
@@ -65,15 +73,6 @@ class RefinementSettings:
         sweep_share: Pixels of a sweep as a share of all, at most SWEEP_PIXELS, and fewer where the minutes are short.
         pixels: Pixels of a batch.
         directions: Directions of a ray's point.
-        bounces: Scattering events of interreflection.
-        keep: Share of the observations that is kept after a sweep.
-        smooth_albedo, smooth_gloss, smooth_normal: Weights of the differences between neighbours' steps where a texel
-            is as wide as a pixel; those of finer texels are larger, so that a step is smooth over a pixel.
-        flat_gloss, flat_normal: Weights of the differences between neighbours' values; edges cost little.
-        like_roughness: Weight of the difference between a texel's roughness and the usual one of its colour.
-        like_metal: Weight of the difference between a texel's metallic and the usual one of its colour and place, where
-            that is metal.
-        anchor: Weight of the distance to the start.
         light_step: Share of the light's first Gauss-Newton step that is taken, less of the later ones; 0 keeps the
             light.
         outline: Whether vertices move first, so that the asset covers the pixels as the masks do.
@@ -85,16 +84,6 @@ class RefinementSettings:
     sweep_share: float = 0.25
     pixels: int = 2048
     directions: int = 12
-    bounces: int = 3
-    keep: float = 0.9
-    smooth_albedo: float = 1.0
-    smooth_gloss: float = 2.0
-    smooth_normal: float = 1.0
-    flat_gloss: float = 5.0
-    flat_normal: float = 2.0
-    like_roughness: float = 0.5
-    like_metal: float = 2.0
-    anchor: float = 0.02
     light_step: float = 0.5
     outline: bool = True
     seed: int = 0
@@ -183,14 +172,14 @@ class Refinement:
         self.random = np.random.default_rng(s.seed)
         self.unknowns = to_unknowns(self.texels.start)
         like = torch.zeros(N_UNKNOWNS)
-        like[ROUGHNESS], like[METALLIC] = s.like_roughness, s.like_metal
+        like[ROUGHNESS], like[METALLIC] = LIKE_ROUGHNESS, LIKE_METAL
         width = self.patch_width = patch_width(dataset, self.texels)
-        smooth = max(1.0, width / PATCH_PIXELS) ** 2 * per_unknown(s.smooth_albedo, s.smooth_gloss, s.smooth_normal)
+        smooth = max(1.0, width / PATCH_PIXELS) ** 2 * per_unknown(*SMOOTH)
         prior = Prior(
             pairs=self.texels.pairs, smooth=smooth,
-            flat=per_unknown(0.0, s.flat_gloss, s.flat_normal), groups=GROUPS, anchor=per_unknown(*[s.anchor] * 3), like=like,
+            flat=per_unknown(*FLAT), groups=GROUPS, anchor=per_unknown(*[ANCHOR] * 3), like=like,
         )  # fmt: skip
-        self.equations = NormalEquations(self.unknowns, prior, s.keep)
+        self.equations = NormalEquations(self.unknowns, prior, KEEP)
         self.n_batches = self.n_sweeps = 0
         self.step_seconds = 0.0  # that the last sweep took after its batches
 
@@ -256,7 +245,7 @@ class Refinement:
         light = self.light.radiance()
         arriving = incoming_light(
             surface, light, samples.positions, samples.geometric, m.normals.detach(), samples.view_dirs,
-            m.albedo.detach(), m.roughness.detach(), m.metallic.detach(), n_directions=s.directions, max_bounces=s.bounces,
+            m.albedo.detach(), m.roughness.detach(), m.metallic.detach(), n_directions=s.directions, max_bounces=BOUNCES,
             clamp_indirect=CLAMP_INDIRECT, seed=s.seed + self.n_batches,
         )  # fmt: skip
         texels, shares = footprints(self.light.height, arriving.directions.view(-1, 3))

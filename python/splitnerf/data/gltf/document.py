@@ -11,8 +11,8 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
+from splitnerf.files import is_file
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}

@@ -14,12 +14,13 @@ import os
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from splitnerf.data.colmap_files import read_cameras, read_images
 from splitnerf.data.layouts.frame import OPENCV_AXES, Frame, checked_pose, listed_image
 from splitnerf.data.lens import read_lens
-from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
+from splitnerf.files import is_file
 from splitnerf.notes import note_once
 
 PLACES = ("sparse", "colmap/sparse")
@@ -84,15 +85,8 @@ def model_files(root: Path) -> tuple[Path, Path] | None:
 def camera_to_world(motion: tuple[float, ...]) -> np.ndarray:
     """[4, 4] with OpenGL axes, of the seven numbers of an image: quaternion (w first) and translation of world to
     camera, OpenCV axes; NaN where the quaternion is 0."""
-    quaternion = np.array(motion[:4]) / (np.abs(motion[:4]).max() or np.nan)
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
-    world_to_camera = np.eye(4)
-    world_to_camera[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
     pose = np.eye(4)
-    pose[:3, :3] = world_to_camera[:3, :3].T
-    pose[:3, 3] = -pose[:3, :3] @ motion[4:]
+    largest = np.abs(motion[:4]).max()
+    rotation = Rotation.from_quat(np.roll(motion[:4], -1) / largest).as_matrix().T if largest > 0 else np.full((3, 3), np.nan)
+    pose[:3, :3], pose[:3, 3] = rotation, -rotation @ motion[4:]
     return pose @ OPENCV_AXES

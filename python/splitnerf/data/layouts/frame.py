@@ -10,8 +10,8 @@ import numpy as np
 
 from splitnerf.data.images import HDR_SUFFIXES, LDR_SUFFIXES
 from splitnerf.data.lens import Distortion
-from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
+from splitnerf.files import is_file
 from splitnerf.notes import note_once
 
 RIGID_TOLERANCE = 1e-3

@@ -1,4 +1,4 @@
-"""Photos of the object in another light than that of the training photos, with that light."""
+"""Photos of the object in another light than that of the training photos: that light, linear radiance and mask."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.environment import MAP_ROWS, read_environment, resize_environment, turn_environment
+from splitnerf.data.images import HDR_SUFFIXES, LDR_SUFFIXES, area_average, read_image, srgb_to_linear
 from splitnerf.data.layouts.frame import Frame
+from splitnerf.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -44,3 +46,35 @@ def _read(path: Path, turn: np.ndarray | None) -> np.ndarray:
     if radiance.shape[0] > MAP_ROWS:
         radiance = resize_environment(radiance, MAP_ROWS, 2 * MAP_ROWS)
     return radiance if turn is None else turn_environment(radiance, turn)
+
+
+def read_lit_photo(frame: Frame, factor: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Reads a frame's photo at an exposure of 1.
+
+    Args:
+        frame: The frame; its photo must be a pinhole's.
+        factor: Linear values and masks are averaged down by this integer.
+
+    Returns:
+        [H, W, 3] float32 linear radiance as the file has it (not multiplied by coverage), and [H, W] float32 the mask in
+        [0, 1]: of the mask's file, else alpha, else 1.
+
+    Raises:
+        InputError: A file is missing or cannot be used.
+    """
+    path = frame.image_path
+    if path.suffix.lower() not in LDR_SUFFIXES + HDR_SUFFIXES:
+        raise InputError(f"{path}: must be PNG, JPEG, EXR or HDR; convert it")
+    pixels = read_image(path)
+    if not np.isfinite(pixels).all():
+        raise InputError(f"{path}: has NaN or infinite pixels; re-export it")
+    colour, mask = pixels[..., :3], np.ones(pixels.shape[:2], np.float32)
+    if path.suffix.lower() not in HDR_SUFFIXES:
+        colour = colour ** np.float32(frame.gamma) if frame.gamma else srgb_to_linear(colour)
+    if frame.mask_path is not None:
+        mask = read_image(frame.mask_path)[..., 0]
+        if mask.shape != pixels.shape[:2]:
+            raise InputError(f"{frame.mask_path}: has another size than {path.name}; make them the same size")
+    elif pixels.shape[2] == 4:
+        mask = pixels[..., 3]
+    return area_average(colour / np.float32(frame.exposure), factor), area_average(mask, factor)

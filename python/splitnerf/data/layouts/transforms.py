@@ -28,9 +28,9 @@ import numpy as np
 from splitnerf.data.json_files import need, read_json
 from splitnerf.data.layouts.frame import Frame, checked_pose, listed_file, listed_image
 from splitnerf.data.lens import RADIAL, TANGENTIAL, Distortion, read_lens
-from splitnerf.data.paths import is_file
 from splitnerf.data.reading import MASK_KINDS
 from splitnerf.errors import InputError
+from splitnerf.files import is_file
 
 SINGLE = "transforms.json"
 SPLITS = {"train": ("train_filenames",), "test": ("test_filenames", "val_filenames")}

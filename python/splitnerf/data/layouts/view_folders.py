@@ -19,8 +19,8 @@ from splitnerf.data.json_files import need, read_json
 from splitnerf.data.layouts.frame import Frame, checked_pose
 from splitnerf.data.layouts.lit import LitView, map_in_world
 from splitnerf.data.lens import read_lens
-from splitnerf.data.paths import is_file
 from splitnerf.errors import InputError
+from splitnerf.files import is_file
 
 METADATA, PHOTO = "metadata.json", "rgba.png"
 SPLITS = ("train", "test")

@@ -16,10 +16,10 @@ from scipy.ndimage import binary_erosion
 from splitnerf.data.images import HDR_SUFFIXES, area_average, linear_to_srgb, read_header
 from splitnerf.data.layouts import stanford_orb as layout
 from splitnerf.data.layouts.frame import Frame
-from splitnerf.data.lit_photos import read_lit_photo
-from splitnerf.data.paths import is_file
+from splitnerf.data.layouts.lit import read_lit_photo
 from splitnerf.data.truth import read_mesh
 from splitnerf.errors import InputError
+from splitnerf.files import is_file
 from splitnerf.evaluate.metrics import lsq_scale, psnr
 from splitnerf.evaluate.published.common import Column, Delivered, Options, Scores, mean_of, nearest, unit
 from splitnerf.progress import tracked
