@@ -179,6 +179,7 @@ def test_a_capacity_changes_roundings_alone(data):
         initial_variance=0.4,
         eikonal_weight=0.0,
         entropy_weight=0.0,
+        shape_priors_until=1.0,
     )
     model = SceneModel(config)
     generator = torch.Generator().manual_seed(0)

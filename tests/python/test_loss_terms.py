@@ -172,6 +172,18 @@ def test_terms_come_when_they_are_due(every_term):
     assert not every_term(**dict.fromkeys(WEIGHTS, 0.0))[0].keys() - {"colour", "eikonal", "occlusion"}
 
 
+def test_priors_of_the_shape_end(rendered):
+    """From their share of the run on a tenth of the weights of distances and masks is left, and no smoothness."""
+    config, batch, ray, _ = rendered
+    config = config.replace({"smoothness_weight": 0.29, "mask_weight": 0.17, "constants.shape_priors_until": 0.7})
+    model = SceneModel(config)
+    before, after = (loss_terms(model, model.light, batch, ray, None, None, generator(5), 0, at) for at in (0.69, 0.7))
+    weights = {name: (before[name].weight, after[name].weight) for name in ("eikonal", "mask", "colour")}
+    assert weights["eikonal"] == pytest.approx((0.1, 0.01)) and weights["mask"] == pytest.approx((0.17, 0.017))
+    assert weights["colour"][0] == weights["colour"][1] and before["smoothness"].weight == 0.29
+    assert "smoothness" not in after
+
+
 def test_terms_that_draw_numbers_draw_others_with_each_step(every_term):
     """By the run's generator, and by the step's number as the seed of what has no generator."""
     for step in (8, 12):

@@ -14,6 +14,7 @@ from splitnerf.config import Config, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.render.model import SceneModel
 from splitnerf.training import loop as trainer
+from splitnerf.training import losses
 from splitnerf.training import schedule as optimiser_module
 from splitnerf.training import step as step_module
 from splitnerf.training.schedule import make_optimiser, set_learning_rate
@@ -232,7 +233,7 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
     rates = recorded(
         monkeypatch, "set_learning_rate", lambda args, *_: [g["lr"] / g["rate"] for g in args[0].param_groups]
     )
-    terms = recorded(monkeypatch, "loss_terms", lambda _, __, result: {k: t.weight for k, t in result.items()}, step_module)
+    terms = recorded(monkeypatch, "loss_terms", lambda _, __, result: {k: t.weight for k, t in result.items()}, losses)
     requested, request = [], trainer.SurfaceMesh.request
     monkeypatch.setattr(
         trainer.SurfaceMesh, "request", lambda self, progress: requested.append(progress) or request(self, progress)

@@ -57,6 +57,7 @@ class Constants:
     hull_until: float = number(0.1)  # before, the masks' visual hull is sampled
     foreground_share: float = number(0.85)  # of the rays, drawn near the masks
     # losses
+    shape_priors_until: float = number(0.7)  # share of the run; later the photos alone move the surface
     priors_from: float = number(0.5)  # from then on the priors of materials count
     entropy_points: int = number(384, at_least=1, at_most=1 << 16)
     albedo_width: float = number(0.6, above=0)  # difference of log albedos that counts as one

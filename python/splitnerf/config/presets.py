@@ -37,8 +37,8 @@ PAPER = dict(
         initial_roughness=0.5, min_roughness=0.0, light_width=256, light_layers=5, direction_frequencies=10,
         roughness_frequencies=5, light_activation="softplus", occlusion_width=256, occlusion_rays=64,
         occlusion_environment_height=128, initial_rays=256, step_scale=0.0, min_step=3**0.5 * 3 / 1024, min_transmittance=0.0,
-        shades_per_ray=0, grid_every=16, hull_until=0.0, foreground_share=0.0, light_form="square", light_set="uniform",
-        light_samples=8129, light_noise=0.0, light_queries=8129, light_lobe_below=0.0, eikonal_points=0, warmup_steps=500,
+        shades_per_ray=0, grid_every=16, hull_until=0.0, foreground_share=0.0, shape_priors_until=1.0, light_form="square",
+        light_set="uniform", light_samples=8129, light_noise=0.0, light_queries=8129, light_lobe_below=0.0, eikonal_points=0, warmup_steps=500,
         final_learning_rate=0.1,
     ),
 )  # fmt: skip

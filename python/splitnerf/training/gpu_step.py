@@ -21,7 +21,7 @@ from splitnerf.training.batches import Batch
 from splitnerf.training.exposure import BEGIN
 from splitnerf.training.late_occlusion import LateOcclusion
 from splitnerf.training.losses import Terms
-from splitnerf.training.schedule import light_moves, light_period
+from splitnerf.training.schedule import has_shape_priors, light_moves, light_period
 from splitnerf.training.step import Capacity, PendingNumbers, Step, StepNumbers
 
 SAMPLE_SLACK = 1.15  # capacity for samples, over the target of a step
@@ -171,7 +171,8 @@ class GpuStep(Step):
         c, model = self.model.config, self.model
         since = step % light_period(c) + 1 if light_moves(c, step) else 0
         return (
-            model.sdf_field.grid.n_active, since, progress >= c.constants.priors_from, self.is_held(progress), self.mesh.made_at,
+            model.sdf_field.grid.n_active, since, progress >= c.constants.priors_from, self.is_held(progress),
+            has_shape_priors(c, progress), self.mesh.made_at,
             model.occlusion.ready,
         )  # fmt: skip
 

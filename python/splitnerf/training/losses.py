@@ -32,9 +32,10 @@ from splitnerf.ops import (
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.batches import Batch
-from splitnerf.training.schedule import light_moves, light_period
+from splitnerf.training.schedule import has_shape_priors, light_moves, light_period
 
 CHANNELS = 3
+KEPT_SHARE = 0.1  # of the weights of distances and masks where shape has no full priors
 TAILS = 3.0  # degrees of freedom
 SEEN_TEXELS = 1024  # directions in which the light is compared with what photos show, at least
 SEEN_DEVIATION = 0.2  # of the log radiance
@@ -108,16 +109,18 @@ def loss_terms(
     Source: SplitNeRF Eq. (3), (11), (18) and the losses below.
     """
     c, w, terms = model.config, model.config.losses, Terms()
+    shapes = has_shape_priors(c, progress)
+    kept = 1.0 if shapes else KEPT_SHARE
     has_priors = progress >= c.constants.priors_from
     # SplitNeRF Eq. (3) sums over the channels; `colour` is their mean.
     terms.add(
-        {"colour": CHANNELS * w.colour_weight, "mask": w.mask_weight or None},
+        {"colour": CHANNELS * w.colour_weight, "mask": kept * w.mask_weight or None},
         pixel_losses(
             ray.mean, ray.opacity, batch.target, batch.background, batch.whole, batch.exposure, linear=ray.linear
         ),
     )
     terms.add(
-        {"eikonal": w.eikonal_weight, "smoothness": w.smoothness_weight or None},
+        {"eikonal": kept * w.eikonal_weight, "smoothness": (shapes and w.smoothness_weight) or None},
         gradient_losses(ray.gradients, ray.weights.detach(), ray.beside),
     )
     terms.add(

@@ -26,7 +26,7 @@ from splitnerf.training.finite import Diverged
 from splitnerf.training.late_occlusion import LateOcclusion
 from splitnerf.training.losses import Terms
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.schedule import cosine_anneal, light_moves
+from splitnerf.training.schedule import cosine_anneal, has_shape_priors, light_moves
 from splitnerf.training.start import HELD_UNTIL, POINTS, SHAPE_WEIGHT, StartShape
 
 MOST_SKIPPED = 10  # steps in a row
@@ -234,6 +234,8 @@ class Step:
     def find(self, batch: Batch, progress: float, capacity: int = 0) -> FoundSamples:
         """The samples of a batch, see :func:`splitnerf.render.renderer.find_samples`."""
         anneal, probes = cosine_anneal(self.model.config, progress), batch.probes
+        if not has_shape_priors(self.model.config, progress):
+            probes = probes._replace(chosen=probes.chosen[:0], shifts=probes.shifts[:0])
         if self.is_held(progress):
             drawn = self.start.drawn(POINTS, self.generator)
             probes = probes._replace(anywhere=torch.cat([probes.anywhere, drawn]))
