@@ -262,6 +262,7 @@ class TestNormals:
         assert errors["finite differences", "eps = 1 cells"] > 1
         assert [p.series for p in training.points if p.default] == ["analytic"]
 
+
 def test_the_path_tracer_converges(tmp_path, monkeypatch):
     """At least with the root of its samples; a lattice of them does better."""
     monkeypatch.setenv("SPLITNERF_DATA", str(tmp_path / "none"))

@@ -12,7 +12,7 @@ from splitnerf.config import preset
 from splitnerf.fields import LightMlp, OcclusionHead, SdfField
 from splitnerf.fields.light import LightSamples
 from splitnerf.fields.occlusion import OcclusionQuery
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec, sharpness
+from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE, HashGridSpec
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import AveragedGrid, OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.rays import image_rays
@@ -34,66 +34,7 @@ def perturbed_field() -> SdfField:
     return field
 
 
-def plane_field(slope: torch.Tensor, edge: bool = False) -> SdfField:
-    """The field slope.x, or |slope.x|, by two hidden units; its grid has nothing to say."""
-    field = SdfField(
-        HashGridSpec(n_levels=3, base_resolution=4, growth=2.0, log2_table_size=8), box=1.5, width=2, n_outputs=1
-    )
-    with torch.no_grad():
-        field.grid.table.zero_()
-        field.hidden_direction.zero_()
-        field.hidden_direction[:, :3] = torch.stack([slope, -slope])
-        field.hidden_length.fill_(slope.norm())
-        field.out_direction.copy_(torch.tensor([[1.0, 1.0 if edge else -1.0]]))
-        field.out_length.fill_(math.sqrt(2.0))
-        field.out_bias.zero_()
-    return field
-
-
 class TestSdf:
-    def test_the_closed_gradient_is_that_of_autograd(self):
-        field = perturbed_field()
-        points = (torch.rand(200, 3) * 2 - 1).requires_grad_()
-        (expected,) = torch.autograd.grad(field.sdf(points).sum(), points)
-        torch.testing.assert_close(field.sample(points.detach()).gradient, expected, rtol=1e-4, atol=1e-5)
-
-    def test_finite_differences_approach_it_where_the_field_is_smooth(self):
-        torch.manual_seed(1)
-        field = SdfField(HashGridSpec(n_levels=3, base_resolution=64, growth=1.5, log2_table_size=10), box=1.5)
-        points = torch.rand(300, 3) * 2 - 1
-        points = points[points.norm(dim=1) > 0.2]
-        exact = torch.nn.functional.normalize(field.sample(points).gradient, dim=1)
-        taps = torch.nn.functional.normalize(field.sample_finite_difference(points).gradient, dim=1)
-        assert (exact * taps).sum(-1).min() > 0.99
-
-    def test_finite_differences_of_a_plane_are_its_slope(self):
-        """f(x) = a.x + b, whatever the step: softplus(a.x) - softplus(-a.x) = a.x."""
-        slope = torch.tensor([0.3, -0.5, 0.8])
-        field = plane_field(slope)
-        for cells in (0.25, 1.0, 3.0):
-            points = torch.rand(50, 3) * 2 - 1
-            found = field.sample_finite_difference(points, cells)
-            torch.testing.assert_close(found.gradient, slope.expand(50, 3), rtol=0, atol=1e-4)
-            torch.testing.assert_close(found.sdf, points @ slope, rtol=0, atol=1e-5)
-
-    def test_taps_lie_one_cell_of_the_finest_open_level_away(self):
-        """Beside an edge, f = |x| as two units, the difference is x / eps up to eps from it and 1 beyond."""
-        field = plane_field(torch.tensor([1.0, 0.0, 0.0]), edge=True)
-        for n_active, resolution in ((1, 4), (2, 8), (3, 16)):  # cells along the box of 3
-            field.grid.n_active = n_active
-            eps = 3.0 / resolution
-            x = torch.tensor([0.3, 0.6, 1.4, 1.7]) * eps
-            points = torch.stack([x, 0.1 + 0 * x, -0.2 + 0 * x], 1)
-            gradient = field.sample_finite_difference(points).gradient
-            assert gradient[:, 0].tolist() == pytest.approx([0.3, 0.6, 1.0, 1.0], abs=0.02)
-            assert gradient[:, 1:].abs().max() < 1e-4
-
-    def test_it_starts_as_a_sphere(self):
-        torch.manual_seed(2)
-        field = SdfField(HashGridSpec(n_levels=4, log2_table_size=10), box=1.5, width=512, radius=0.6)
-        points = torch.nn.functional.normalize(torch.randn(200, 3), dim=1)
-        assert field.sdf(0.3 * points).max() < 0 < field.sdf(1.0 * points).min()
-
     def test_closed_levels_do_not_count(self):
         field = perturbed_field()
         points = torch.rand(50, 3)
@@ -103,10 +44,6 @@ class TestSdf:
             first_closed = field.grid.spec.levels()[2][1]
             field.grid.table[first_closed:] += 1.0
         assert torch.equal(before, field.sdf(points))
-
-    def test_sharpness_is_bounded(self):
-        assert sharpness(torch.tensor(100.0)) == pytest.approx(math.exp(9.0), rel=1e-5)
-        assert sharpness(torch.tensor(0.3)) == pytest.approx(math.exp(3.0), rel=1e-5)
 
 
 LAMP_COSINE = math.cos(math.radians(3.0))
@@ -253,18 +190,6 @@ class TestAveragedGrid:
                 assert old.any() and (grid.cells[old] == CELL_OCCUPIED).any()
         assert not (grid.cells[old] == CELL_OCCUPIED).any() and (grid.cells == CELL_OCCUPIED).any()
 
-    def test_later_half_of_the_cells_are_asked(self):
-        asked = []
-
-        def field(x):
-            asked.append(len(x))
-            return sphere(x)
-
-        grid = AveragedGrid(16, 1.5, 0.01)
-        grid.update(field, 200.0)
-        grid.update(field, 200.0, first=False, step=300)
-        assert asked[0] == 4096 and 1024 < asked[1] < 2048
-
     @pytest.mark.parametrize(("left", "right"), [(0.0, 5.46), (9.4, 10.1), (5.46, 9.4)])
     def test_a_cell_stays_while_its_opacity_exceeds_the_mean_or_a_thousandth(self, left, right):
         """Opacities of a sample across the surface's distance f: 1 - Phi(f - h) / Phi(f + h), of one half of the cells and the
@@ -327,18 +252,6 @@ def orbit(n: int, distance: float = 4.0) -> torch.Tensor:
 
 
 class TestHull:
-    def test_the_hull_of_discs_holds_the_sphere(self):
-        size, focal, distance = 160, 100.0, 4.0
-        y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
-        radius = focal * RADIUS / math.sqrt(distance**2 - RADIUS**2)
-        mask = (((x - 80) ** 2 + (y - 80) ** 2) < radius**2).float()
-        hull = visual_hull(32, 1.5, mask.expand(8, -1, -1), orbit(8), torch.tensor([[focal, focal, 80.0, 80.0]] * 8))
-        grid = OccupancyGrid(32, 1.5)
-        inside = (grid.centres().norm(dim=1) < RADIUS).view(32, 32, 32)
-        assert hull[inside].all()
-        far = (grid.centres()[:, :2].norm(dim=1) > RADIUS + 0.4).view(32, 32, 32)
-        assert not hull[far].any()
-
     def test_one_mask_of_many_that_is_cut_short_does_not_cut_the_hull(self):
         size, focal, distance = 80, 50.0, 4.0
         y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
