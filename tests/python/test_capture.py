@@ -26,15 +26,14 @@ from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight, LightPyramid
 from splitnerf.files import LOCK, PARTIAL
 from splitnerf.training.losses import SeenLight
-from splitnerf_tools.capture import job as capture_job
-from splitnerf_tools.capture.exposure import find_exposures
-from splitnerf_tools.capture.job import PrepareSettings, _begin, _upright_copies, _without_camera
+from splitnerf_tools.capture import prepare as preparation
+from splitnerf_tools.capture.photometry import find_exposures
+from splitnerf_tools.capture.prepare import PrepareSettings, _begin, _upright_copies, _without_camera
 from splitnerf_tools.capture.masks import dots_of, given_masks
-from splitnerf_tools.capture.photographs import find_photographs, read_upright, sharpness, write_png
+from splitnerf_tools.capture.photographs import find_photographs, read_upright, sharpness, write_frames, write_png
 from splitnerf_tools.capture.poses import Lens, Reconstruction
 from splitnerf_tools.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
-from splitnerf_tools.capture.video import write_frames
 from splitnerf_tools.capture.world import CAMERA_DISTANCE, World, settle
 
 
@@ -360,17 +359,17 @@ def test_photos_of_two_sizes_are_refused_before_any_work(tmp_path, capsys):
 
 def test_data_whose_masks_are_not_found_are_not_left(tmp_path, monkeypatch):
     world, _ = seen_world()
-    monkeypatch.setattr(capture_job, "read_upright", lambda path: np.zeros((240, 320, 3), np.uint8))
+    monkeypatch.setattr(preparation, "read_upright", lambda path: np.zeros((240, 320, 3), np.uint8))
 
     def refused(*_):
         assert "mask_path" not in (tmp_path / "transforms.json").read_text()
         raise InputError("nothing stands out")
 
-    monkeypatch.setattr(capture_job, "find_masks", refused)
+    monkeypatch.setattr(preparation, "find_masks", refused)
     exposures = find_exposures(*[np.zeros(0, int)] * 2, *[np.zeros(0)] * 2, np.ones(len(world.scene.names)))
     photos = {name: SimpleNamespace(path=tmp_path) for name in world.scene.names}
     with pytest.raises(InputError, match="nothing stands out"):
-        capture_job.write_data(world, exposures, photos, tmp_path, PrepareSettings(), lambda step, share: None)
+        preparation.write_data(world, exposures, photos, tmp_path, PrepareSettings(), lambda step, share: None)
     assert not (tmp_path / "transforms.json").exists()
 
 

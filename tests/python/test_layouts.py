@@ -321,16 +321,13 @@ def test_damaged_files_are_refused_or_read(tmp_path, kind):
 
 
 def test_counts_beyond_the_file_are_refused_at_once(tmp_path):
-    root = write_colmap(tmp_path, binary=True)
-    path = root / "sparse/0/images.bin"
-    whole = path.read_bytes()
-    path.write_bytes(struct.pack("<Q", 1 << 60) + whole[8:])
-    with pytest.raises(InputError, match="images.bin: damaged, it ends too early"):
-        load_dataset(root)
-    points = 8 + struct.calcsize("<I7dI") + len("v08.png") + 1
-    path.write_bytes(whole[:points] + struct.pack("<Q", 1 << 60) + whole[points + 8 :])
-    with pytest.raises(InputError, match="images.bin: damaged, it ends too early"):
-        load_dataset(root)
-    path.write_bytes(whole[: points - 8] + b"v" * 9999 + whole[points - 1 :])
-    with pytest.raises(InputError, match="images.bin: damaged, a name does not end"):
-        load_dataset(root)
+    path = write_colmap(tmp_path, binary=True) / "sparse/0/images.bin"
+    whole, points = path.read_bytes(), 8 + struct.calcsize("<I7dI") + len("v08.png") + 1
+    endless = struct.pack("<Q", 1 << 60)
+    for damaged, message in (
+        (endless + whole[8:], "unpack requires"), (whole[:points] + endless + whole[points + 8 :], "it ends too early"),
+        (whole[: points - 8] + b"v" * 9999 + whole[points - 1 :], "not found"),
+    ):  # fmt: skip
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=rf"images.bin: is damaged or no file of COLMAP \(.*{message}"):
+            load_dataset(tmp_path)

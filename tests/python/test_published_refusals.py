@@ -70,7 +70,7 @@ def test_orb_takes_linear_photos_for_captures_in_8_bits(tmp_path):
     root = capture(tmp_path / "blender_LDR/a_scene001", ".png", linear_to_srgb(photo.clip(0, 1)))
     scores = stanford_orb.score(Painted(photo), root, Options())
     assert scores.means["view_psnr_h"] is None and scores.means["view_psnr_l"] > 25
-    assert scores.notes == ["no PSNR-H: blender_HDR with the photos' EXR files is not beside the data's folder"]
+    assert scores.notes == ["no PSNR-H: blender_HDR with the photos' EXR files is not next to the data's folder"]
     capture(tmp_path / "blender_HDR/a_scene001", ".exr", photo)
     scores = stanford_orb.score(Painted(photo), root, Options())
     assert scores.means["view_psnr_h"] > 50 and scores.notes == []

@@ -15,21 +15,20 @@ from tiny_runs import train
 
 from splitnerf.cli import main
 from splitnerf.data.dataset import load_dataset
-from splitnerf.data.ground import find_table
 from splitnerf.data.images import read_image, write_image
 from splitnerf.data.normalisation import box_of_views
 from splitnerf.data.photos import separated_mask
 from splitnerf.data.reading import SEPARATED, Reading
 from splitnerf.errors import InputError
 from splitnerf_tools.capture import masks as capture_masks
-from splitnerf_tools.separation import job, training
+from splitnerf_tools.separation import separate as separation, training
 from splitnerf_tools.separation.field import (
     RadianceField, RayMeasure, Rendered, contracted, resampled, search_loss, spread_loss, with_less_gradient,
 )  # fmt: skip
 from splitnerf_tools.separation.foot import find_foot
 from splitnerf_tools.separation.masks import _points, at_edges, find_mask, with_mirrors
 from splitnerf_tools.separation.region import CELLS, Region, find_region
-from splitnerf_tools.separation.table import Table
+from splitnerf_tools.separation.ground import Table, find_table
 
 SIZE, FOCAL = 40, 40.0
 
@@ -232,7 +231,7 @@ def overlap(run, masks: list[np.ndarray]) -> float:
 def test_from_photos_without_masks_to_an_asset(tmp_path, capsys, monkeypatch):
     """Trains with the masks by a field that is right, and scores the run again with them."""
     masks, run = write_ball_on_floor(tmp_path / "data"), tmp_path / "run"
-    monkeypatch.setattr(job, "train_field", lambda dataset, **_: TrueField(dataset.world_from_box))
+    monkeypatch.setattr(separation, "train_field", lambda dataset, **_: TrueField(dataset.world_from_box))
     assert train(tmp_path / "data", run, "--eval-mode", "all", "--steps", "30") == 0
     assert overlap(run, masks) > 0.9
     assert (run / SEPARATED / "sheet.jpg").is_file() and (run / "mesh.glb").is_file()
@@ -266,10 +265,10 @@ def test_photos_in_other_units_of_radiance(tmp_path, monkeypatch):
         given.append(dataset)
         return TrueField(dataset.world_from_box)
 
-    monkeypatch.setattr(job, "train_field", train_field)
+    monkeypatch.setattr(separation, "train_field", train_field)
     for factor in (1.0, 0.01):
         exposed = photos.exposed(factor * np.where(np.arange(len(photos)) % 2, 2.0, 0.5))
-        job.separate(exposed, exposed.select([0, 1]), tmp_path / "found", steps=1, minutes=0, seed=0)
+        separation.separate(exposed, exposed.select([0, 1]), tmp_path / "found", steps=1, minutes=0, seed=0)
         around.append(read_image(tmp_path / "found/surroundings.exr"))
     assert np.log(given[1].exposures).mean() == pytest.approx(0, abs=1e-9)
     np.testing.assert_allclose(given[1].exposures, given[0].exposures)

@@ -20,9 +20,9 @@ from splitnerf_tools.capture.photographs import read_upright
 from splitnerf_tools.capture.poses import FLIP
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort
 from splitnerf_tools.capture.world import World
-from splitnerf_tools.separation.job import find_object, table_under
+from splitnerf_tools.separation.separate import find_object, table_under
 from splitnerf_tools.separation.masks import find_mask, surface_points
-from splitnerf_tools.separation.table import Table
+from splitnerf_tools.separation.ground import Table
 from splitnerf_tools.separation.training import train_field
 
 STEPS = 5500  # of the field

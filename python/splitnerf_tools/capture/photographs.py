@@ -1,9 +1,10 @@
-"""The photographs of a folder: which there are, how they were exposed, how sharp they are."""
+"""The photographs of a folder, or the sharpest frames of a video: which there are, how they were exposed, how sharp they are."""
 
 from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from splitnerf.files import atomic_path
 COMMON = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
 HEIC = (".heic", ".heif")
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".raf", ".rw2")
+VIDEO = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm")
 SHARPNESS_WIDTH = 640  # pixels to which a photo is reduced before its sharpness is measured
 DIAGONAL_35MM = math.hypot(36.0, 24.0)  # millimetres
 MAX_PIXELS = 200_000_000
@@ -93,6 +95,39 @@ def sharpness(photo: np.ndarray) -> float:
     scale = min(1.0, SHARPNESS_WIDTH / max(grey.shape))
     small = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     return float(cv2.Laplacian(small, cv2.CV_32F).var())
+
+
+def write_frames(video: Path, folder: Path, n: int, report: Callable[[float], None]) -> None:
+    """Cuts a video into n windows of equal length and writes the sharpest frame of each as `frame_NNNNN.png`.
+
+    Args:
+        video: The file.
+        folder: The folder for the frames; frames that are there already are kept.
+        n: The number of frames, at least 1.
+        report: Called with the share done.
+
+    Raises:
+        InputError: The file is no video that can be read.
+    """
+    reader = cv2.VideoCapture(str(video))
+    total = int(reader.get(cv2.CAP_PROP_FRAME_COUNT))
+    if not reader.isOpened() or total < 1:
+        raise InputError(f"{video}: is no video that can be read; convert it to mp4, or give a folder of photos")
+    folder.mkdir(parents=True, exist_ok=True)
+    best, most, window = None, -1.0, 0
+    for number in range(total + 1):
+        read, frame = reader.read() if number < total else (False, None)
+        if best is not None and (not read or number * n // total > window):
+            write_png(folder / f"frame_{window + 1:05d}.png", best[..., ::-1])
+            best, most = None, -1.0
+        if not read:
+            break
+        window = number * n // total
+        sharp = sharpness(frame)
+        if sharp > most:
+            best, most = frame, sharp
+        report((number + 1) / total)
+    reader.release()
 
 
 def write_png(path: Path, image: np.ndarray) -> None:

@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from splitnerf.data.ground import TABLE_TOLERANCE, find_table
+from splitnerf_tools.separation.ground import TABLE_TOLERANCE, find_table
 from splitnerf_tools.capture.poses import Reconstruction
 
 CAMERA_DISTANCE = 3.0  # of the median camera from the centre, in the world's units

@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     if missing:
         raise InputError(f"prepare needs {' and '.join(missing)}; pip install 'splitnerf[photos]'")
     from splitnerf.progress import Progress, ended_by_signals
-    from splitnerf_tools.capture.job import PrepareSettings, prepare
+    from splitnerf_tools.capture.prepare import PrepareSettings, prepare
 
     settings = PrepareSettings(args.max_size, args.masks, args.frames, args.seed)
     with ended_by_signals(), Progress(0.0) as bar:  # again: pycolmap, just imported, has taken SIGTERM

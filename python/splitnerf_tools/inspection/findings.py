@@ -11,10 +11,9 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.frames import layout_of, split_rule
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
-from splitnerf_tools.inspection.brightness import differences
 from splitnerf_tools.inspection.directions import angles, largest_gap
-from splitnerf_tools.inspection.duplicates import duplicates
 from splitnerf_tools.inspection.hull import Fit, fit_masks
+from splitnerf_tools.inspection.pairs import differences, duplicates
 from splitnerf_tools.inspection.views import View, views_of
 
 WIDEST_GAP = 120.0  # degrees of azimuth without a camera

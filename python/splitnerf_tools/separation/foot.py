@@ -13,7 +13,7 @@ import torch
 from scipy import ndimage
 from torch import Tensor
 
-from splitnerf_tools.separation.table import Table
+from splitnerf_tools.separation.ground import Table
 from splitnerf_tools.separation.walker import random_walk
 
 HALF = 1.6  # half the edge of the map, scene units

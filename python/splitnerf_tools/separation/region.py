@@ -10,7 +10,7 @@ from scipy import ndimage
 from torch import Tensor
 
 from splitnerf_tools.separation.foot import LOW, Foot, find_foot
-from splitnerf_tools.separation.table import Table
+from splitnerf_tools.separation.ground import Table
 
 CELLS = 96  # along an edge of the cube
 HALF = 1.6  # of that edge, scene units; parts that reach out of the ball of radius 1 may reach so far above a table

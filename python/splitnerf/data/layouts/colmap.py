@@ -1,4 +1,4 @@
-"""COLMAP's sparse models: cameras and images, as text or binary.
+"""COLMAP's sparse models: cameras and images, as text or binary (little endian).
 
     sparse/0/ or sparse/, or either in colmap/   cameras.bin and images.bin, or cameras.txt and images.txt
     images/                                      the images that the model names
@@ -11,25 +11,38 @@ model_orientation_aligner`.
 from __future__ import annotations
 
 import os
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from splitnerf.data.colmap_files import read_cameras, read_images
 from splitnerf.data.layouts.frame import OPENCV_AXES, Frame, checked_pose, listed_image
-from splitnerf.data.lens import read_lens
+from splitnerf.data.lens import MODELS, read_lens
 from splitnerf.errors import InputError
 from splitnerf.files import is_file
 from splitnerf.notes import note_once
 
 PLACES = ("sparse", "colmap/sparse")
 IMAGES, MASKS = "images", "masks"
+PARAMETERS = {
+    "SIMPLE_PINHOLE": "fl_x cx cy", "PINHOLE": "fl_x fl_y cx cy", "SIMPLE_RADIAL": "fl_x cx cy k1",
+    "RADIAL": "fl_x cx cy k1 k2", "OPENCV": "fl_x fl_y cx cy k1 k2 p1 p2", "OPENCV_FISHEYE": "fl_x fl_y cx cy k1 k2 k3 k4",
+    "FULL_OPENCV": "", "FOV": "", "SIMPLE_RADIAL_FISHEYE": "fl_x cx cy k1", "RADIAL_FISHEYE": "fl_x cx cy k1 k2",
+    "THIN_PRISM_FISHEYE": "", "RAD_TAN_THIN_PRISM_FISHEYE": "",
+}  # fmt: skip
+"""The parameters of the camera models by a transforms file's names, in the order of COLMAP's numbers; "" is not read."""
+POINT_BYTES = 24  # of an image point: x, y and the number of its 3D point
+LONGEST_NAME = 4096  # bytes
+Image = tuple[str, int, tuple[float, ...]]  # name, camera, quaternion (w first) and translation of world to camera
 
 
 def present(root: Path) -> bool:
     """Whether a folder has a model."""
-    return model_files(root) is not None
+    return _model_files(root) is not None
 
 
 def splits(root: Path) -> None:
@@ -43,10 +56,13 @@ def read(root: Path, split: None = None) -> list[Frame]:
     Raises:
         InputError: The model or an image cannot be used.
     """
-    cameras_file, source = model_files(root)
-    cameras = dict(read_cameras(cameras_file))
+    cameras_file, source = _model_files(root)
+    with _opened(cameras_file) as file:
+        cameras = {number: _lens_numbers(*camera, cameras_file) for number, *camera in _cameras(file)}
+    with _opened(source) as file:
+        images = sorted(_images(file))
     lenses, frames = {}, []
-    for name, camera, motion in sorted(read_images(source)):
+    for name, camera, motion in images:
         if camera not in lenses:
             if camera not in cameras:
                 raise InputError(
@@ -54,7 +70,7 @@ def read(root: Path, split: None = None) -> list[Frame]:
                 )
             lenses[camera] = read_lens(cameras[camera], f"{cameras_file}: camera {camera}")
         image = listed_image(root / IMAGES, name, source)
-        pose = checked_pose(camera_to_world(motion), f"{source}: the pose of {name!r}")
+        pose = checked_pose(_camera_to_world(motion), f"{source}: the pose of {name!r}")
         candidates = (root / MASKS / f"{name}.png", (root / MASKS / name).with_suffix(".png"))
         mask = next((path for path in candidates if is_file(path)), None)
         frames.append(Frame(os.path.splitext(name)[0], image, pose, *lenses[camera], mask))
@@ -63,7 +79,7 @@ def read(root: Path, split: None = None) -> list[Frame]:
     return frames
 
 
-def model_files(root: Path) -> tuple[Path, Path] | None:
+def _model_files(root: Path) -> tuple[Path, Path] | None:
     """The files of cameras and images of the model with the most images, by the size of that file, or None; notes where
     there are several."""
     found: dict[Path, tuple[Path, Path]] = {}
@@ -82,7 +98,74 @@ def model_files(root: Path) -> tuple[Path, Path] | None:
     return found[largest]
 
 
-def camera_to_world(motion: tuple[float, ...]) -> np.ndarray:
+def _cameras(file: BinaryIO) -> Iterator[tuple[int, str, int, int, tuple[float, ...]]]:
+    """Number, model, width, height and parameters of each camera."""
+    if file.name.endswith(".txt"):
+        for number, model, width, height, *parameters in filter(None, map(str.split, _lines(file))):
+            yield int(number), model, int(width), int(height), tuple(map(float, parameters))
+        return
+    for _ in range(*_take(file, "Q")):
+        number, model, width, height = _take(file, "IiQQ")
+        name = list(PARAMETERS)[model] if 0 <= model < len(PARAMETERS) else f"number {model}"
+        yield number, name, width, height, _take(file, f"{len(PARAMETERS.get(name, '').split())}d")
+
+
+def _images(file: BinaryIO) -> Iterator[Image]:
+    """The images; in a text file each has a second line for its points, which may be empty."""
+    if file.name.endswith(".txt"):
+        lines = _lines(file)
+        for line in filter(str.strip, lines):
+            _, *motion, camera, name = line.split(maxsplit=9)
+            next(lines, None)
+            yield name.strip(), int(camera), tuple(map(float, motion))
+        return
+    for _ in range(*_take(file, "Q")):
+        _, *motion, camera = _take(file, "I7dI")
+        start, head = file.tell(), file.read(LONGEST_NAME + 1)
+        file.seek(start + head.index(b"\0") + 1)
+        (n_points,) = _take(file, "Q")
+        if n_points * POINT_BYTES > os.fstat(file.fileno()).st_size - file.tell():
+            raise ValueError("it ends too early")
+        file.seek(n_points * POINT_BYTES, os.SEEK_CUR)
+        yield os.fsdecode(head[: head.index(b"\0")]), camera, tuple(motion)
+
+
+def _lens_numbers(model: str, width: int, height: int, parameters: tuple[float, ...], path: Path) -> dict[str, object]:
+    """The numbers of a camera by the names of a transforms file."""
+    names = PARAMETERS.get(model, "").split()
+    if not names:
+        raise InputError(
+            f"{path}: COLMAP's camera model {model[:40]} is not read; undistort the photos with `colmap "
+            f"image_undistorter`, or use one of {', '.join(MODELS)}"
+        )
+    if len(names) != len(parameters):
+        raise InputError(f"{path}: a camera {model} has {len(parameters)} parameters, not {len(names)}; replace the model")
+    return dict(zip(names, parameters)) | {"camera_model": model, "w": width, "h": height}
+
+
+def _take(file: BinaryIO, form: str) -> tuple:
+    """The next values of a binary file, in the form of `struct`."""
+    return struct.unpack(f"<{form}", file.read(struct.calcsize(f"<{form}")))
+
+
+def _lines(file: BinaryIO) -> Iterator[str]:
+    """The lines of a text file but its comments."""
+    return (os.fsdecode(line.rstrip(b"\r\n")) for line in file if not line.startswith(b"#"))
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[BinaryIO]:
+    """A file of a model; what parsing it raises becomes an InputError."""
+    try:
+        with open(path, "rb") as file:
+            yield file
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the model") from None
+    except (ValueError, struct.error) as error:
+        raise InputError(f"{path}: is damaged or no file of COLMAP ({str(error)[:80]}); replace the model") from None
+
+
+def _camera_to_world(motion: tuple[float, ...]) -> np.ndarray:
     """[4, 4] with OpenGL axes, of the seven numbers of an image: quaternion (w first) and translation of world to
     camera, OpenCV axes; NaN where the quaternion is 0."""
     pose = np.eye(4)

@@ -12,17 +12,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.json_files import need, read_json
-from splitnerf.data.layouts.frame import Frame, checked_pose, folder_name, listed_image
+from splitnerf.data.json_files import need
+from splitnerf.data.layouts import transforms
+from splitnerf.data.layouts.frame import Frame, folder_name
 from splitnerf.data.layouts.lit import LitView, map_in_world
-from splitnerf.data.lens import read_lens
-from splitnerf.errors import InputError
 
-SPLITS = ("train", "test")
 NOVEL = "transforms_novel.json"
 HDR = "blender_HDR"  # the folder of the captures with linear photos
 MAP_FROM_CAMERA = np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]])  # x towards the centre, y to the left, z up
@@ -30,22 +29,15 @@ MAP_FROM_CAMERA = np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]])  # x towards t
 
 def present(root: Path) -> bool:
     """Whether a folder is a capture."""
-    return _file(root, "train").is_file() and (root / "train_mask").is_dir()
+    return (root / "transforms_train.json").is_file() and (root / "train_mask").is_dir()
 
 
-def splits(root: Path) -> list[str]:
-    """The splits that have a file."""
-    return [split for split in SPLITS if _file(root, split).is_file()]
+splits = transforms.splits
 
 
 def read(root: Path, split: str | None) -> list[Frame]:
-    """The frames of a split, or all.
-
-    Raises:
-        InputError: A file is missing or cannot be used.
-    """
-    names = splits(root) if split is None else [split]
-    return [frame for name in names for frame in (_frame(root, *entry) for entry in _entries(_file(root, name)))]
+    """The frames of a split, or all. Raises InputError where a file is missing or cannot be used."""
+    return [_with_mask(frame) for frame in transforms.read(root, split)]
 
 
 def relit(root: Path, maps: dict[str, Path], truth: Path | None = None) -> list[LitView]:
@@ -56,9 +48,10 @@ def relit(root: Path, maps: dict[str, Path], truth: Path | None = None) -> list[
         InputError: A file is missing or cannot be used.
     """
     path, views = root / NOVEL, []
-    for entry, meta, index, _ in _entries(path):
+    meta, entries = transforms.read_entries(path)
+    for index, entry in enumerate(entries):
         scene = folder_name(need(entry, "scene_name", path, f" in frame {index}"), f"{path}: 'scene_name' of frame {index}")
-        frame = _frame(root.absolute().parent / scene, entry, meta, index, path)
+        frame = _with_mask(transforms.read_frame(entry, meta, index, path, root.absolute().parent / scene))
         turn = MAP_FROM_CAMERA @ frame.pose[:3, :3].T
         light = (ground_truth(root, scene) if truth is None else truth / scene) / "env_map" / f"{frame.image_path.stem}.exr"
         views.append(LitView(frame, scene, map_in_world(light, turn)))
@@ -70,22 +63,6 @@ def ground_truth(root: Path, scene: str | None = None) -> Path:
     return root.absolute().parents[1] / "ground_truth" / (root.absolute().name if scene is None else scene)
 
 
-def _file(root: Path, split: str) -> Path:
-    return root / f"transforms_{split}.json"
-
-
-def _entries(path: Path) -> list[tuple[dict, dict, int, Path]]:
-    meta = read_json(path, "frames")
-    entries = need(meta, "frames", path)
-    if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
-        raise InputError(f"{path}: 'frames' must be a list of objects; repair it")
-    return [(entry, meta, index, path) for index, entry in enumerate(entries)]
-
-
-def _frame(folder: Path, entry: dict, meta: dict, index: int, path: Path) -> Frame:
-    where = f" in frame {index}"
-    image = listed_image(folder, str(need(entry, "file_path", path, where)), path)
-    pose = checked_pose(need(entry, "transform_matrix", path, where), f"{path}: transform_matrix of frame {index}")
-    angle = entry.get("camera_angle_x", meta.get("camera_angle_x"))
-    mask = image.parent.with_name(f"{image.parent.name}_mask") / f"{image.stem}.png"
-    return Frame(image.stem, image, pose, *read_lens({"camera_angle_x": angle}, str(path)), mask, "object")
+def _with_mask(frame: Frame) -> Frame:
+    image = frame.image_path
+    return replace(frame, mask_path=image.parent.with_name(f"{image.parent.name}_mask") / f"{image.stem}.png", mask_kind="object")

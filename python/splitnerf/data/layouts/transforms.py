@@ -50,7 +50,7 @@ def splits(root: Path) -> list[str] | None:
     """The splits that have a file of their own or a list in the single file; None for a single file without lists."""
     if any((root / _own(split)).is_file() for split in SPLITS):
         return [split for split in SPLITS if (root / _own(split)).is_file()]
-    meta, _ = _read_entries(root / SINGLE)
+    meta, _ = read_entries(root / SINGLE)
     listed = [split for split in SPLITS if _listed(meta, split) is not None]
     return listed or None
 
@@ -87,9 +87,7 @@ def read_camera_path(path: Path) -> list[tuple[np.ndarray, dict]]:
     Raises:
         InputError: The file has no frame, or one of them no usable pose or no lens.
     """
-    meta, entries = _read_entries(path)
-    if not entries:
-        raise InputError(f"{path}: has no frames; add some")
+    meta, entries = read_entries(path)
     return [_read_camera(entry, meta, i, path, f"frame {i}")[:2] for i, entry in enumerate(entries)]
 
 
@@ -105,26 +103,29 @@ def _listed(meta: dict, split: str) -> set[str] | None:
 
 def _frames(path: Path, split: str | None) -> list[Frame]:
     """The frames of a file; of a single file those that it lists for the split."""
-    meta, entries = _read_entries(path)
+    meta, entries = read_entries(path)
     names = None if split is None else _listed(meta, split)
-    frames = [_read_frame(entry, meta, i, path) for i, entry in enumerate(entries)
+    frames = [read_frame(entry, meta, i, path) for i, entry in enumerate(entries)
               if names is None or os.path.normpath(str(entry.get("file_path"))) in names]  # fmt: skip
     if not frames:
-        raise InputError(f"{path}: has no frames{'' if split is None else f' for the {split} split'}; add posed images")
+        raise InputError(f"{path}: has no frames for the {split} split; add posed images")
     return frames
 
 
-def _read_entries(path: Path) -> tuple[dict, list[dict]]:
-    """A transforms file and its frames."""
+def read_entries(path: Path) -> tuple[dict, list[dict]]:
+    """A transforms file and its frames. Raises InputError where it is none."""
     meta = read_json(path, "frames")
     entries = need(meta, "frames", path)
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise InputError(f"{path}: 'frames' must be a list of objects")
+        raise InputError(f"{path}: 'frames' must be a list of objects; repair it")
+    if not entries:
+        raise InputError(f"{path}: has no frames; add posed images")
     return meta, entries
 
 
-def _read_frame(entry: dict, meta: dict, index: int, path: Path) -> Frame:
-    image_path = listed_image(path.parent, str(need(entry, "file_path", path, f" in frame {index}")), path)
+def read_frame(entry: dict, meta: dict, index: int, path: Path, folder: Path | None = None) -> Frame:
+    """Frame `index` of a transforms file; its image is relative to `folder`, by default to the file's."""
+    image_path = listed_image(folder or path.parent, str(need(entry, "file_path", path, f" in frame {index}")), path)
     mask = entry.get("mask_path")
     mask_path = None if mask is None else listed_file(path.parent, str(mask), path)
     dynamic = image_path.with_name(f"dynamic_mask_{image_path.stem}.png")

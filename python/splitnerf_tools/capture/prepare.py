@@ -18,16 +18,15 @@ from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.errors import InputError
 from splitnerf.files import LOCK, atomic_path, locked, remove_partial
 from splitnerf.notes import note
-from splitnerf_tools.capture.exposure import Exposures, find_exposures
+from splitnerf_tools.capture.photometry import Exposures, find_exposures
 from splitnerf_tools.capture.masks import find_masks, given_masks
 from splitnerf_tools.capture.page import write_page
 from splitnerf_tools.capture.photographs import (
-    Photograph, find_photographs, is_upright, read_upright, sharpness, write_png,
+    VIDEO, Photograph, find_photographs, is_upright, read_upright, sharpness, write_frames, write_png,
 )  # fmt: skip
 from splitnerf_tools.capture.poses import Lens, Reconstruction, reconstruct
 from splitnerf_tools.capture.surroundings import Shot, surroundings
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
-from splitnerf_tools.capture.video import SUFFIXES, write_frames
 from splitnerf_tools.capture.world import World, settle
 
 FEW_LOST = 0.2  # share of the photos without a camera from which a note tells of them
@@ -101,7 +100,7 @@ def _photographs(
     source: Path, out: Path, settings: PrepareSettings, report: Callable[[str, float], None]
 ) -> list[Photograph]:
     """The photos of a folder, or the frames of a video, which are written into `out/frames`."""
-    if source.suffix.lower() not in SUFFIXES:
+    if source.suffix.lower() not in VIDEO:
         return find_photographs(source)
     write_frames(source, out / "frames", settings.frames, lambda share: report("frames", share))
     return find_photographs(out / "frames")

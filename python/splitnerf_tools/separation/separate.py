@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.dataset import SURROUNDINGS, Dataset, spread
-from splitnerf.data.ground import find_table
 from splitnerf.data.images import read_image, write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.data.photos import resized_mask, separated_mask
@@ -21,7 +20,7 @@ from splitnerf.progress import Progress, ended_by_signals, tracked
 from splitnerf_tools.separation.field import RadianceField
 from splitnerf_tools.separation.masks import find_mask, points_near, surface_points, surroundings
 from splitnerf_tools.separation.region import Region, find_region
-from splitnerf_tools.separation.table import Table
+from splitnerf_tools.separation.ground import Table, find_table
 from splitnerf_tools.separation.training import train_field
 
 SHEET = "sheet.jpg"
