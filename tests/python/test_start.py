@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import torch
 import trimesh
 from tiny_runs import tiny
+from torch.nn import functional as F
 
+from splitnerf.config import preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.fields import SdfField
 from splitnerf.ops import HashGridSpec
 from splitnerf.render import stereo
-from splitnerf.training import loop
+from splitnerf.training import loop, start
 from splitnerf.training.loop import begin_training, train
 from splitnerf.training.start import (
     CLEAR_SHARE,
@@ -39,26 +42,31 @@ def open_box() -> trimesh.Trimesh:
     return trimesh.util.concatenate(walls)
 
 
-def texture(points: np.ndarray) -> np.ndarray:
-    """[n] grey values in [0, 1] that vary over about a tenth of a unit."""
-    waves = np.random.default_rng(1).normal(size=(12, 3)) * 18
+def texture(points: np.ndarray, frequency: float = 18.0) -> np.ndarray:
+    """[n] grey values in [0, 1] that vary over about two units by the frequency."""
+    waves = np.random.default_rng(1).normal(size=(12, 3)) * frequency
     return 0.5 + 0.5 * np.tanh(np.sin(points @ waves.T + np.arange(12)).sum(1) / 2.5)
+
+
+def photographed(n: int, size: int, frequency: float) -> tuple[stereo.GreyPhotos, torch.Tensor]:
+    """n photos of the box, each pixel the texture where its ray hits, and the true depths [n, h, w]; 0 beside the box."""
+    mesh, poses = open_box(), torch.from_numpy(spiral(n, 3.0, (20, 80))).float()
+    focal = 0.5 * size / math.tan(0.35)
+    lens = torch.tensor([focal, focal, size / 2, size / 2])
+    grey, depths = np.zeros((n, size * size), np.float32), np.zeros((n, size * size), np.float32)
+    for i in range(n):
+        rays_o, rays_d = (x.numpy() for x in stereo.image_rays(poses[i], lens, size, size))
+        points, rays, _ = mesh.ray.intersects_location(rays_o, rays_d, multiple_hits=False)
+        grey[i, rays], depths[i, rays] = texture(points, frequency), np.linalg.norm(points - rays_o[rays], axis=1)
+    depths = torch.from_numpy(depths).view(n, size, size)
+    photos = stereo.GreyPhotos(torch.from_numpy(grey).view_as(depths), depths > 0, poses, lens.expand(n, 4))
+    return photos, depths
 
 
 @pytest.fixture(scope="module")
 def box_photos() -> tuple[stereo.GreyPhotos, torch.Tensor]:
-    """Photos of the box, each pixel the texture where its ray hits, and the true depths [n, h, w]; 0 beside the box."""
-    mesh, poses = open_box(), torch.from_numpy(spiral(VIEWS, 3.0, (20, 80))).float()
-    focal = 0.5 * SIZE / math.tan(0.35)
-    lens = torch.tensor([focal, focal, SIZE / 2, SIZE / 2])
-    grey, depths = np.zeros((VIEWS, SIZE * SIZE), np.float32), np.zeros((VIEWS, SIZE * SIZE), np.float32)
-    for i in range(VIEWS):
-        rays_o, rays_d = (x.numpy() for x in stereo.image_rays(poses[i], lens, SIZE, SIZE))
-        points, rays, _ = mesh.ray.intersects_location(rays_o, rays_d, multiple_hits=False)
-        grey[i, rays], depths[i, rays] = texture(points), np.linalg.norm(points - rays_o[rays], axis=1)
-    depths = torch.from_numpy(depths).view(VIEWS, SIZE, SIZE)
-    photos = stereo.GreyPhotos(torch.from_numpy(grey).view_as(depths), depths > 0, poses, lens.expand(VIEWS, 4))
-    return photos, depths
+    """Photos of the box, whose texture varies over a tenth of a unit, and the true depths."""
+    return photographed(VIEWS, SIZE, 18.0)
 
 
 def hull() -> torch.Tensor:
@@ -89,6 +97,26 @@ def test_depths_of_texture_stand_out_and_those_of_a_slow_gradient_do_not(box_pho
     rows = torch.linspace(0.4, 0.6, SIZE)[:, None].expand(SIZE, SIZE)
     plain = box_photos[0]._replace(grey=rows * box_photos[0].masks)
     assert (stereo.depth_maps(plain, hull(), BOX)[2] > MARGIN).sum() < 0.5 * CLEAR_SHARE * n_pixels
+
+
+@pytest.mark.parametrize("size", [199, 200])
+def test_grain_that_large_photos_show_alone_opens_a_cavity(size, monkeypatch):
+    """Photos of 50 pixels show a slow gradient only. Those of 200 pixels are asked, smaller ones are not."""
+    rows = torch.linspace(0.4, 0.6, 50)[:, None].expand(50, 50)
+
+    def sized(photos: object, device: torch.device, edge: int) -> stereo.GreyPhotos:
+        n = min(edge, size)
+        large = photographed(16, n, 60.0)[0]
+        return large if n > 50 else large._replace(grey=rows * large.masks)
+
+    monkeypatch.setattr(start, "grey_photos", sized)
+    monkeypatch.setattr(start, "FINE_PASSES", start.FINE_PASSES[-1:])
+    shape = start.start_shape(SimpleNamespace(height=300, width=size), hull(), preset("cpu"))
+    if size < 200:
+        assert shape is None
+        return
+    places = torch.tensor([[0.0, 0.0, 0.5], [0.0, 0.0, 0.0], [0.0, 0.0, -0.3], [0.0, 0.0, -0.5], [0.5, 0.0, 0.0]])
+    assert (shape.at(places) > 0).tolist() == [True, True, True, False, False]
 
 
 def test_windows_that_follow_a_surface_find_it_more_precisely(box_photos, found):

@@ -48,9 +48,9 @@ class GreyPhotos(NamedTuple):
     poses: Tensor
     intrinsics: Tensor
 
-    def spread(self) -> GreyPhotos:
-        """Those that get depths: at most :data:`MOST_VIEWS`, evenly spread."""
-        chosen = spread_out(len(self.grey), MOST_VIEWS)
+    def spread(self, most: int = MOST_VIEWS) -> GreyPhotos:
+        """Those that get depths: at most so many, evenly spread."""
+        chosen = spread_out(len(self.grey), most)
         return GreyPhotos(*(x[chosen] for x in self))
 
 
@@ -82,13 +82,16 @@ def _neighbours(angles: Tensor) -> list[int]:
 
 
 @torch.no_grad()
-def depth_maps(photos: GreyPhotos, hull: Tensor, box: float) -> tuple[Tensor, Tensor, Tensor]:
+def depth_maps(
+    photos: GreyPhotos, hull: Tensor, box: float, most: int = MOST_VIEWS
+) -> tuple[Tensor, Tensor, Tensor]:
     """The depth of each pixel of :meth:`GreyPhotos.spread` at which its window looks most like those of neighbours.
 
     Args:
         photos: All photos.
         hull: [r, r, r] bool, cells of the box in which the object may be.
         box: Half size of the box, scene units.
+        most: The largest number n of photos that get depths.
 
     Returns:
         depths: [n, h, w] distances from the camera, scene units; 0 where nothing is known.
@@ -99,7 +102,7 @@ def depth_maps(photos: GreyPhotos, hull: Tensor, box: float) -> tuple[Tensor, Te
     """
     cells = torch.where(hull, CELL_OCCUPIED, CELL_EMPTY).to(torch.uint8)
     maps = []
-    for i in spread_out(len(photos.grey), MOST_VIEWS).tolist():
+    for i in spread_out(len(photos.grey), most).tolist():
         rays = image_rays(photos.poses[i], photos.intrinsics[i], *photos.grey.shape[1:])
         first, last = (x.view_as(photos.grey[i]) for x in _limits(*rays, cells, box))
         maps.append(_swept(photos, i, rays, first, last - first, STEP))
@@ -107,7 +110,9 @@ def depth_maps(photos: GreyPhotos, hull: Tensor, box: float) -> tuple[Tensor, Te
 
 
 @torch.no_grad()
-def refined_depths(photos: GreyPhotos, base: Tensor, reach: float, step: float) -> tuple[Tensor, Tensor]:
+def refined_depths(
+    photos: GreyPhotos, base: Tensor, reach: float, step: float, most: int = MOST_VIEWS
+) -> tuple[Tensor, Tensor]:
     """Depths and scores as of :func:`depth_maps`, next to a surface that is known about: the windows follow it.
 
     Args:
@@ -115,9 +120,10 @@ def refined_depths(photos: GreyPhotos, base: Tensor, reach: float, step: float) 
         base: [n, h, w] the depths of that surface in all photos, scene units; 0 where it is not seen.
         reach: How far from it depths are compared, scene units; the outermost ones are no result.
         step: Between two depths, scene units.
+        most: As of :func:`depth_maps`.
     """
     maps = []
-    for i in spread_out(len(photos.grey), MOST_VIEWS).tolist():
+    for i in spread_out(len(photos.grey), most).tolist():
         rays = image_rays(photos.poses[i], photos.intrinsics[i], *photos.grey.shape[1:])
         span = torch.where(base[i] > 0, 2 * reach, 0.0)
         maps.append(_swept(photos, i, rays, base[i] - reach, span, step, base)[:2])

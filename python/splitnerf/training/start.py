@@ -34,7 +34,8 @@ FREE_CELLS = 0.5  # distance from the shape that costs nothing, in cells
 NEAR_CELLS = 4.0  # from the surface to the points at which the field is compared with it
 POINTS = 384  # such points in each step
 ALIKE = 0.5  # correlation from which a depth is trusted whole
-MARGIN, CLEAR_SHARE = 0.2, 0.25  # of correlations; the share of the object's pixels whose depth must stand out by it
+MARGIN = 0.2  # of correlations, by which a clear depth stands out
+CLEAR_SHARE, CLEAR_SHARE_FINE = 0.25, 0.4  # of the object's pixels that must be clear; finer windows are clear by chance, too
 GUESSED = 0.01  # weight of a depth that no correlation supports
 FIRST_TRUNCATION, FIRST_BLUR = 0.12, 1.0  # of the depths that are compared first, scene units and cells
 # Edge of the photos; reach of the depths around the surface, their step, the truncation, scene units; blur in cells.
@@ -43,6 +44,9 @@ PASSES = (
     (EDGE, 0.15, 0.025, 0.08, 0.7),
     (EDGE, 0.06, 0.0125, 0.06, 0.7),
 )
+# The same for surfaces whose texture shows near the photos' own size alone; the photos that get depths, and those that tell.
+FINE_EDGE, FINE_VIEWS, FINE_PROBES = 300, 25, 6
+FINE_PASSES = ((FINE_EDGE, 0.2, 0.03, 0.12, 1.0), (FINE_EDGE, 0.15, 0.025, 0.1, 1.0), (FINE_EDGE, 0.06, 0.0125, 0.06, 0.7))
 FIT_STEPS, FIT_POINTS, FIT_RATE = 200, 8192, 0.01
 
 
@@ -95,8 +99,9 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
     """The shape that photos suggest, inside of their visual hull; None where most of their pixels fit at many depths.
 
     First the depths of all pixels are compared, then those next to the surface that they make, more and more finely:
-    there the windows follow the surface. Objects without texture fit at all depths, and on glossy ones reflections look
-    like surfaces behind the object: both begin with a sphere, in which shading and outlines carve.
+    there the windows follow the surface. Where small photos show no clear depths, large ones are asked, a few at first:
+    the grain of clay shows near their own size alone. Objects without texture fit at all depths, and on glossy ones
+    reflections look like surfaces behind the object: both begin with a sphere, in which shading and outlines carve.
 
     Args:
         photos: The photos of the training.
@@ -105,20 +110,37 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
     """
     if not hull.any():
         return None
-    box, sizes = config.constants.box, {edge: grey_photos(photos, hull.device, edge) for edge in (FIRST_EDGE, EDGE)}
-    depths, scores, margins = depth_maps(sizes[FIRST_EDGE], hull, box)
-    spread = sizes[FIRST_EDGE].spread()
-    if (margins > MARGIN).sum() <= CLEAR_SHARE * spread.masks.sum():
-        return None
+    box, sizes = config.constants.box, {}
+
+    def photos_of(edge: int) -> GreyPhotos:
+        if edge not in sizes:
+            sizes[edge] = grey_photos(photos, hull.device, edge)
+        return sizes[edge]
+
+    def is_clear(margins: Tensor, most: int, edge: int, share: float) -> bool:
+        return bool((margins > MARGIN).sum() > share * photos_of(edge).spread(most).masks.sum())
+
+    edge, most, passes = FIRST_EDGE, MOST_VIEWS, PASSES
+    depths, scores, margins = depth_maps(photos_of(edge), hull, box)
+    if not is_clear(margins, most, edge, CLEAR_SHARE):
+        edge, most, passes = FINE_EDGE, FINE_VIEWS, FINE_PASSES
+        if min(photos.height, photos.width) < 2 * EDGE:
+            return None
+        margins = depth_maps(photos_of(edge), hull, box, FINE_PROBES)[2]
+        if not is_clear(margins, FINE_PROBES, edge, CLEAR_SHARE_FINE):
+            return None
+        depths, scores, _ = depth_maps(photos_of(edge), hull, box, most)
     weights = torch.where((depths > 0) & (scores > 0), scores, 0.0)
+    spread = photos_of(edge).spread(most)
     solid = blurred(fused_distances(spread, depths, weights, hull, box, FIRST_TRUNCATION)[0], FIRST_BLUR)
     try:
-        for edge, reach, step, truncation, blur in PASSES:
-            grey, base = sizes[edge], surface_depths(solid, box, sizes[edge])
-            depths, scores = refined_depths(grey, base, reach, step)
-            base, known = base[spread_out(len(base), MOST_VIEWS)], (depths > 0) & (scores > 0)
+        for edge, reach, step, truncation, blur in passes:
+            grey = photos_of(edge)
+            base = surface_depths(solid, box, grey)
+            depths, scores = refined_depths(grey, base, reach, step, most)
+            base, known = base[spread_out(len(base), most)], (depths > 0) & (scores > 0)
             depths, weights = torch.where(known, depths, base), torch.where(known, scores, GUESSED * (base > 0))
-            solid, trust = fused_distances(grey.spread(), depths, weights, hull, box, truncation, solid)
+            solid, trust = fused_distances(grey.spread(most), depths, weights, hull, box, truncation, solid)
             solid = blurred(solid, blur)
         return StartShape(exact_distances(solid, box), trust, box)
     except EmptyMesh:
