@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import os
 import struct
+from pathlib import Path
 
 import numpy as np
 
@@ -94,3 +97,17 @@ def triangle(**primitive) -> Gltf:
     gltf = Gltf()
     gltf.node(mesh=gltf.mesh(gltf.primitive(**primitive)))
     return gltf
+
+
+def beside(root: Path, uri: str) -> Path:
+    """The triangle with its buffer in a file of this name; another one lies beside the asset's folder."""
+    asset, folder = triangle(), root / "asset"
+    (folder / "sub").mkdir(parents=True)
+    (root / "secret.bin").write_bytes(asset.binary)
+    (folder / "link.bin").symlink_to(root / "secret.bin")
+    (folder / "sub/the data.bin").write_bytes(asset.binary)
+    (folder / "inside.bin").symlink_to("sub/the data.bin")
+    os.mkfifo(folder / "pipe.bin")
+    uri = uri.format(root=root, inline=base64.b64encode(asset.binary).decode())
+    (folder / "a.gltf").write_text(json.dumps(asset.json | {"buffers": [{"byteLength": len(asset.binary), "uri": uri}]}))
+    return folder / "a.gltf"

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import torch
 from test_files import no_more_than
-from test_hostile_files import Calls, first, repack
+from test_hostile_checkpoints import Calls, first, repack
 from tiny_runs import tiny
 
 from splitnerf.data import tensor_files

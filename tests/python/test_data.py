@@ -1,4 +1,4 @@
-"""Datasets: both layouts, the shared frame, the truth maps, and one clear line per kind of bad input."""
+"""Datasets: layouts, the shared frame, and the truth maps."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from blender_data import ANGLE, SIZE, edit, make_blender, poses_around, set_pose, sphere_alpha
+from blender_data import ANGLE, SIZE, edit, make_blender, make_folders, poses_around, sphere_alpha
 
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
 from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
-from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths, read_mesh
+from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths
 from splitnerf.errors import InputError
 from splitnerf.refinement.pixels import covered_pixels
 
@@ -38,20 +38,6 @@ def make_single(root, count=16):
 @pytest.fixture
 def scene(tmp_path):
     return make_blender(tmp_path / "ball")
-
-
-def make_folders(root):
-    """The same sphere in view folders."""
-    for i, pose in enumerate(poses_around(np.zeros(3), 1.0, 14)):
-        name = f"train_{i:03d}" if i < 12 else f"test_{2 * (i - 12) + 9:03d}"
-        image = np.full((SIZE, SIZE, 4), 0.5)
-        image[..., 3] = sphere_alpha(pose, np.zeros(3), 1.0)
-        write_image(root / name / "rgba.png", image)
-        matrix = ", ".join(str(value) for value in pose.ravel())
-        meta = {"cam_angle_x": ANGLE, "cam_transform_mat": matrix, "imw": SIZE, "imh": SIZE, "envmap": "sky"}
-        (root / name / "metadata.json").write_text(json.dumps(meta))
-    (root / "val_000").mkdir()
-    return root
 
 
 def test_blender_layout(scene):
@@ -93,38 +79,6 @@ def test_view_folders(tmp_path):
     assert truth.normal[centre, centre] == pytest.approx([0, -0.6, 0.8], abs=0.006)
     assert truth.normal_mask[centre, centre] and not truth.normal_mask[0, 0] and not truth.normal[0, 0].any()
     assert truth.albedo[centre, centre] == pytest.approx([128 / 255, 64 / 255, 1], abs=1e-4)  # linear
-
-
-BAD_FOLDERS = {
-    "no matrix": (lambda m: m.pop("cam_transform_mat"), "metadata.json: missing key 'cam_transform_mat'"),
-    "no angle": (lambda m: m.pop("cam_angle_x"), "metadata.json: missing key 'cam_angle_x'"),
-    "twelve numbers": (lambda m: m.update(cam_transform_mat=",".join("1" * 12)), "cam_transform_mat is not a 4x4"),
-    "words": (lambda m: m.update(cam_transform_mat=",".join(["one"] * 16)), "cam_transform_mat is not a 4x4"),
-    "all zero": (lambda m: m.update(cam_transform_mat=",".join("0" * 16)), "cam_transform_mat is not a rigid"),
-}
-
-
-@pytest.mark.parametrize("case", BAD_FOLDERS)
-def test_bad_view_folders(tmp_path, case):
-    root = make_folders(tmp_path)
-    change, message = BAD_FOLDERS[case]
-    edit(root, change, "train_003/metadata.json")
-    with pytest.raises(InputError, match=message) as caught:
-        load_dataset(root)
-    assert "train_003" in str(caught.value)
-
-
-def test_view_folders_that_lack_a_file(tmp_path):
-    root = make_folders(tmp_path)
-    (root / "train_003/rgba.png").unlink()
-    with pytest.raises(InputError, match="train_003/rgba.png: no such image"):
-        load_dataset(root)
-    (root / "train_003/metadata.json").unlink()
-    with pytest.raises(InputError, match="train_003/metadata.json: no such file"):
-        load_dataset(root)
-    for folder in root.glob("test_*"):
-        (folder / "metadata.json").unlink()
-    assert not has_test_split(root)
 
 
 def test_select_keeps_views_in_order(scene):
@@ -215,118 +169,6 @@ def test_clipped_normals_are_restored_where_one_component_is_unknown():
     assert not restored[2].any()
 
 
-def test_truth_of_another_size_is_named(scene):
-    write_image(scene / "test/r_0_albedo.png", np.ones((8, 8, 4)))
-    with pytest.raises(InputError, match="r_0_albedo.png: is 8x8"):
-        load_view_truths(load_dataset(scene, "test"))
-
-
-def test_degenerate_mesh_is_named(tmp_path):
-    trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False).export(tmp_path / "flat.ply")
-    with pytest.raises(InputError, match="flat.ply: degenerate or empty mesh"):
-        read_mesh(tmp_path / "flat.ply")
-    (tmp_path / "text.ply").write_text("no mesh")
-    with pytest.raises(InputError, match="text.ply"):
-        read_mesh(tmp_path / "text.ply")
-
-
-def nan_at_corner(pose):
-    pose[0, 3] = np.nan
-    return pose.tolist()
-
-
-BAD_JSON = {
-    "no frames key": (lambda m: m.pop("frames"), "transforms_train.json: missing key 'frames'"),
-    "no angle": (lambda m: m.pop("camera_angle_x"), "transforms_train.json: missing key 'camera_angle_x'"),
-    "bad angle": (lambda m: m.update(camera_angle_x="wide"), "'camera_angle_x' must be a positive number"),
-    "no file path": (lambda m: m["frames"][1].pop("file_path"), "missing key 'file_path' in frame 1"),
-    "no pose": (lambda m: m["frames"][1].pop("transform_matrix"), "missing key 'transform_matrix' in frame 1"),
-    "zero frames": (lambda m: m["frames"].clear(), "transforms_train.json: has no frames"),
-    "frames no list": (lambda m: m.update(frames={"a": 1}), "'frames' must be a list"),
-    "NaN pose": (set_pose(2, nan_at_corner), r"frame 2 \(r_2.png\) has NaN"),
-    "endless pose": (set_pose(2, lambda p: (p + 1e300 * np.eye(4, k=3)).tolist()), r"frame 2 \(r_2.png\) has NaN, inf"),
-    "scaled pose": (set_pose(2, lambda p: (p * [[2], [2], [2], [1]]).tolist()), r"frame 2 \(r_2.png\) is not a rigid"),
-    "mirrored pose": (set_pose(2, lambda p: (p * [-1, 1, 1, 1]).tolist()), r"frame 2 \(r_2.png\) is not a rigid"),
-    "3x3 pose": (set_pose(2, lambda p: p[:3, :3].tolist()), r"frame 2 \(r_2.png\) is not a 4x4"),
-    "text pose": (set_pose(2, lambda p: "identity"), r"frame 2 \(r_2.png\) is not a 4x4"),
-}
-
-
-@pytest.mark.parametrize("case", BAD_JSON)
-def test_bad_json_contents(scene, case):
-    change, message = BAD_JSON[case]
-    edit(scene, change)
-    with pytest.raises(InputError, match=message) as caught:
-        load_dataset(scene)
-    assert "\n" not in str(caught.value)
-
-
-def test_no_such_folder(tmp_path):
-    with pytest.raises(InputError, match="gone: no such folder"):
-        load_dataset(tmp_path / "gone")
-
-
-def test_folder_without_transforms(tmp_path):
-    with pytest.raises(InputError, match="has neither transforms_train.json nor transforms.json"):
-        load_dataset(tmp_path)
-
-
-@pytest.mark.parametrize("text", ["{not json", "[1, 2]", "\xff\xfe"])
-def test_json_that_is_not_json(scene, text):
-    (scene / "transforms_train.json").write_bytes(text.encode("latin-1"))
-    with pytest.raises(InputError, match="transforms_train.json: (is not valid json|must hold a json object)"):
-        load_dataset(scene)
-
-
-def test_missing_image(scene):
-    (scene / "train/r_4.png").unlink()
-    with pytest.raises(InputError, match="r_4: no such image"):
-        load_dataset(scene)
-
-
-def test_truncated_image(scene):
-    path = scene / "train/r_4.png"
-    path.write_bytes(path.read_bytes()[:100])
-    with pytest.raises(InputError, match="r_4.png: .*(truncated|cannot be read)"):
-        load_dataset(scene)
-
-
-def test_images_of_different_sizes(scene):
-    write_image(scene / "train/r_4.png", np.ones((SIZE, SIZE + 1, 4)))
-    with pytest.raises(InputError, match=f"r_4.png: is {SIZE + 1}x{SIZE}, but r_0.png is {SIZE}x{SIZE}"):
-        load_dataset(scene)
-
-
-def test_image_with_neither_alpha_nor_mask(scene):
-    write_image(scene / "train/r_4.png", np.ones((SIZE, SIZE, 3)))
-    with pytest.raises(InputError, match="r_4.png: has no alpha channel and its frame no mask_path"):
-        load_dataset(scene)
-
-
-def test_mask_of_another_size(tmp_path):
-    root = make_single(tmp_path)
-    write_image(root / "masks/f3.png", np.ones((SIZE, 8)))
-    with pytest.raises(InputError, match=f"f3.png: is 8x{SIZE}, its image f3.jpg is {SIZE}x{SIZE}"):
-        load_dataset(root)
-
-
-@pytest.mark.parametrize(("alpha", "reason"), [(0, "every mask is empty"), (1, "nothing says where the object is")])
-def test_masks_without_an_object(scene, alpha, reason):
-    for path in (scene / "train").iterdir():
-        write_image(path, np.full((SIZE, SIZE, 4), float(alpha)))
-    with pytest.raises(InputError, match=f"train: {reason}"):
-        load_dataset(scene)
-
-
-def test_masks_that_contradict_the_poses(scene):
-    for i, path in enumerate(sorted((scene / "train").iterdir())):
-        image = np.zeros((SIZE, SIZE, 4))
-        image[: 2 + i, -2:, 3] = 1
-        write_image(path, image)
-    with pytest.raises(InputError, match="masks and poses contradict each other"):
-        load_dataset(scene)
-
-
 @pytest.mark.parametrize(
     ("factor", "message"),
     [(0, "at least 1"), (-2, "at least 1"), (1.5, "whole number"), (SIZE + 1, "too small for downscale")],
@@ -363,10 +205,6 @@ def test_photos_are_brought_to_one_exposure(tmp_path):
         inside = found.images[i][found.images[i, ..., 3] > 0.99][:, :3]
         np.testing.assert_allclose(srgb_to_linear(inside), linear / exposure, rtol=0.01)
     assert found.select([2, 4]).exposures.tolist() == [2.0, 1.0]
-    for wrong in ("bright", -1, 0, float("nan")):
-        edit(root, lambda meta: meta["frames"][1].update(exposure=wrong))
-        with pytest.raises(InputError, match="'exposure' of frame 1 must be a positive number"):
-            load_dataset(root)
 
 
 def test_clipped_pixels_of_a_short_exposure_are_known(tmp_path):
@@ -396,9 +234,6 @@ def test_linear_photos_of_floats(tmp_path, peak):
         inside = truth[..., 3] > 0.4
         np.testing.assert_allclose(srgb_to_linear(found.images[i][inside][:, :3]), truth[inside][:, :3], rtol=5e-3, atol=1e-4 * peak)
         assert (found.images[i][inside][:, :3] < 0.99 * white[i]).all()
-    write_image(root / "train/r_0.exr", np.full((*linear[0].shape[:2], 4), -1.0, np.float32))
-    with pytest.raises(InputError, match="negative pixels"):
-        load_dataset(root)
 
 
 def test_photos_with_the_curve_of_their_camera(tmp_path):
@@ -409,7 +244,3 @@ def test_photos_with_the_curve_of_their_camera(tmp_path):
     for i, linear in ((0, (128 / 255) ** 2.2), (1, float(srgb_to_linear(np.float32(128 / 255))))):
         inside = found.images[i][found.images[i, ..., 3] > 0.99][:, :3]
         np.testing.assert_allclose(srgb_to_linear(inside), linear, rtol=1e-3)
-    for wrong in ("sRGB", -1, 0.5, float("nan")):
-        edit(root, lambda meta, wrong=wrong: meta.update(gamma=wrong))
-        with pytest.raises(InputError, match="'gamma' must be 0"):
-            load_dataset(root)

@@ -18,7 +18,7 @@ from PIL import Image
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config
 from splitnerf.data.asset import Asset, Material
-from splitnerf.data.images import linear_to_srgb, read_hdr, read_image
+from splitnerf.data.images import linear_to_srgb, read_radiance, read_image
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
@@ -211,11 +211,11 @@ def test_environment_keeps_rows_and_columns(tmp_path):
     radiance[0, 4] = [100, 50, 25]
     exr, hdr = write_environment(tmp_path, radiance)
     assert (exr.name, hdr.name) == ("environment.exr", "environment.hdr")
-    assert read_hdr(exr) == pytest.approx(radiance, rel=1e-3)
-    assert np.abs(read_hdr(hdr) - radiance).max() <= 100 / 128
-    assert np.unravel_index(read_hdr(hdr)[..., 0].argmax(), (8, 16)) == (0, 4)
+    assert read_radiance(exr) == pytest.approx(radiance, rel=1e-3)
+    assert np.abs(read_radiance(hdr) - radiance).max() <= 100 / 128
+    assert np.unravel_index(read_radiance(hdr)[..., 0].argmax(), (8, 16)) == (0, 4)
     bright = np.full((2, 4, 3), 1e6, np.float32)  # beyond halves
-    assert np.array_equal(read_hdr(write_environment(tmp_path, bright)[0]), bright)
+    assert np.array_equal(read_radiance(write_environment(tmp_path, bright)[0]), bright)
     for value in (np.nan, np.inf, -1.0):
         with pytest.raises(ValueError, match="finite and not negative"):
             write_environment(tmp_path / "none", np.full((2, 4, 3), value))

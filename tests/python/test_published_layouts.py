@@ -13,7 +13,7 @@ from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import directions_of_texels, turn_environment
 from splitnerf.data.frames import layout_of, read_frames
-from splitnerf.data.images import read_hdr, write_image
+from splitnerf.data.images import read_radiance, write_image
 from splitnerf.data.layouts import neus, stanford_orb, transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
@@ -61,7 +61,7 @@ def test_it_is_recognised_and_the_cameras_are_those_that_were_written(written):
 def test_the_truth_from_each_camera_looks_like_the_photo(written):
     """And not like it from a camera with other axes, with its motion the other way round, or seen in a mirror."""
     name, scene = written
-    light, worst = read_hdr(scene.root / "light.hdr"), 34
+    light, worst = read_radiance(scene.root / "light.hdr"), 34
     frames = read_frames(scene.root, "train", Reading("all"))[0]
     for frame in frames[1:4:2]:
         right = scene.render(light, frame.pose)

@@ -10,8 +10,7 @@ import pytest
 
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.images import linear_to_srgb, write_image
-from splitnerf.data.layouts import stanford_orb as orb_layout
-from splitnerf.data.layouts.frame import Frame, folder_name
+from splitnerf.data.layouts.frame import Frame
 from splitnerf.errors import InputError
 from splitnerf.evaluate.published import shiny, stanford_orb
 from splitnerf.evaluate.published.common import Delivered, Options
@@ -81,16 +80,6 @@ def test_orb_has_no_score_of_an_empty_mask():
     thin[4:6] = 1  # nothing is left of it
     assert stanford_orb.image_psnr(picture(), picture(1), thin, scaled=True) == (None, None)
     assert stanford_orb.normal_distance(picture(), picture(1), thin) is None
-
-
-@pytest.mark.parametrize("name", ["", ".", "..", "a/b", "/a", "a\\b", "a\0", 7, None])
-def test_names_of_folders_lead_nowhere_else(name, tmp_path):
-    assert folder_name("..a b", "it") == "..a b"
-    root = capture(tmp_path / "a_scene001", ".exr", picture(), "x")
-    entry = {"scene_name": name, "file_path": "test/0000", "transform_matrix": np.eye(4).tolist()}
-    (root / "transforms_novel.json").write_text(json.dumps({"frames": [entry]}))
-    with pytest.raises(InputError, match="'scene_name' of frame 0 is no folder's name"):
-        orb_layout.relit(root, {})
 
 
 # ---- Shiny Blender ----

@@ -103,30 +103,9 @@ def decode_image(data: bytes, name: str) -> np.ndarray:
         return _read(path, name)
 
 
-def read_hdr(path: str | os.PathLike) -> np.ndarray:
-    """Reads linear radiance from an EXR or HDR file.
-
-    Args:
-        path: The image file.
-
-    Returns:
-        [H, W, 3] float32, linear, finite and >= 0.
-
-    Raises:
-        InputError: The file is unreadable, or holds NaN, infinite or negative pixels.
-    """
-    radiance = read_radiance(path)
-    if radiance.min() < 0:
-        raise InputError(f"{path}: has negative pixels, radiance cannot be negative; clean or re-export it")
-    return radiance
-
-
 def read_radiance(path: str | os.PathLike) -> np.ndarray:
-    """Reads linear radiance [H, W, 3] float32 like `read_hdr`, but allows negative pixels.
-
-    Raises:
-        InputError: The file is unreadable, or holds NaN or infinite pixels.
-    """
+    """Linear radiance [H, W, 3] float32 of an EXR or HDR file; grey is repeated. Raises InputError where the file is unreadable,
+    or holds NaN or infinite pixels."""
     pixels = read_image(path)
     radiance = np.repeat(pixels[..., :1], 3, axis=2) if pixels.shape[2] < 3 else pixels[..., :3]
     if not np.isfinite(radiance).all():

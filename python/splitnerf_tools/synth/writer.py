@@ -20,7 +20,7 @@ from typing import Protocol
 import numpy as np
 
 from splitnerf.data.layouts import view_folders
-from splitnerf.data.images import linear_to_srgb, read_hdr, write_image
+from splitnerf.data.images import linear_to_srgb, read_radiance, write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.data.relit import PREFIX, relit_path
 from splitnerf.export.mesh import write_mesh_ply
@@ -82,7 +82,7 @@ class SceneWriter:
         """
         path = self.out / ("light.hdr" if name is None else f"{PREFIX}{name}.hdr")
         write_image(path, environment)
-        return read_hdr(path)
+        return read_radiance(path)
 
     def mesh(self, vertices: np.ndarray, triangles: np.ndarray) -> None:
         """Writes the true mesh, vertices [n, 3] in the world of the cameras, triangles [m, 3]."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.images import linear_to_srgb, read_hdr, write_image
+from splitnerf.data.images import linear_to_srgb, read_radiance, write_image
 from splitnerf.data.layouts.frame import OPENCV_AXES
 from splitnerf.export.mesh import write_mesh_ply
 from splitnerf_tools.synth.writer import Maps
@@ -40,7 +40,7 @@ class PhotoWriter:
         name as it is, which the set's own file may round."""
         if name is None:
             write_image(self.root / "light.hdr", environment)
-            environment = read_hdr(self.root / "light.hdr")
+            environment = read_radiance(self.root / "light.hdr")
         self._lights[name or ""] = environment
         return environment
 

@@ -1,0 +1,495 @@
+"""Damaged and hostile files in one table: the damage to a good one, and the line that names it. No crash, little memory."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import struct
+import zlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+import trimesh
+from blender_data import SIZE, edit, make_blender, make_folders, set_pose
+from gltf_builder import Gltf, beside, triangle
+from layout_scenes import COLMAP_CAMERAS, COUNT, write_binary_model, write_colmap, write_neus, write_text_model, write_transforms
+from PIL import Image
+
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.environment import read_environment
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import read_image, write_image
+from splitnerf.data.layouts import stanford_orb
+from splitnerf.data.truth import load_view_truths, read_mesh
+from splitnerf.errors import InputError
+
+ENDLESS = 10**400
+Damage = Callable[[Path], object]  # changes a folder; gives the path to be read where the form is one of files
+
+
+def meta(change: Callable[[dict], object], name: str = "transforms_train.json") -> Damage:
+    """A change of a JSON file."""
+    return lambda root: edit(root, change, name)
+
+
+def frame(**keys: object) -> Damage:
+    """Other keys of one frame."""
+    return meta(lambda m: m["frames"][1].update(keys))
+
+
+def pose(change: Callable[[np.ndarray], np.ndarray]) -> Damage:
+    """Another pose of frame 2."""
+    return meta(set_pose(2, lambda p: change(p).tolist()))
+
+
+def rewritten(name: str, change: Callable[[bytes], bytes]) -> Damage:
+    """Other bytes in a file."""
+
+    def write(root: Path) -> Path:
+        path = root / name
+        path.write_bytes(change(path.read_bytes() if path.exists() else b""))
+        return path
+
+    return write
+
+
+def file(name: str, content: bytes) -> Damage:
+    """A file of this content."""
+    return rewritten(name, lambda _: content)
+
+
+def picture(name: str, *shape: int, value: float = 1.0) -> Damage:
+    """Another image in its place."""
+    return lambda root: write_image(root / name, np.full(shape, value))
+
+
+def alpha(masks: Callable[[int], np.ndarray]) -> Damage:
+    """Other masks of all photos."""
+
+    def write(root: Path) -> None:
+        for i, path in enumerate(sorted((root / "train").iterdir())):
+            write_image(path, np.dstack([np.full((SIZE, SIZE, 3), 0.5), masks(i)]))
+
+    return write
+
+
+def negative_radiance(root: Path) -> None:
+    write_image(root / "train/r_0.exr", np.full((SIZE, SIZE, 4), -1.0, np.float32))
+    edit(root, lambda m: m["frames"][0].update(file_path="train/r_0.exr"))
+
+
+TRANSFORMS = {
+    "no frames key": (meta(lambda m: m.pop("frames")), "transforms_train.json: missing key 'frames'"),
+    "frames no list": (meta(lambda m: m.update(frames={"a": 1})), "'frames' must be a list"),
+    "zero frames": (meta(lambda m: m["frames"].clear()), "transforms_train.json: has no frames"),
+    "no angle": (meta(lambda m: m.pop("camera_angle_x")), "transforms_train.json: missing key 'camera_angle_x'"),
+    "bad angle": (meta(lambda m: m.update(camera_angle_x="wide")), "'camera_angle_x' must be a positive number"),
+    "endless angle": (meta(lambda m: m.update(camera_angle_x=ENDLESS)), "'camera_angle_x' must be a positive number"),
+    "endless focal length": (meta(lambda m: m.update(fl_x=ENDLESS)), "'fl_x' must be a positive number"),
+    "tiny width": (meta(lambda m: m.update(w=1e-300, fl_x=20)), "'w' must be a positive number"),
+    "no file path": (meta(lambda m: m["frames"][1].pop("file_path")), "missing key 'file_path' in frame 1"),
+    "no pose": (meta(lambda m: m["frames"][1].pop("transform_matrix")), "missing key 'transform_matrix' in frame 1"),
+    "NaN pose": (pose(lambda p: p * np.nan), r"frame 2 \(r_2.png\) has NaN"),
+    "endless pose": (pose(lambda p: p + 1e300 * np.eye(4, k=3)), r"frame 2 \(r_2.png\) has NaN, inf"),
+    "endless number": (meta(lambda m: m["frames"][2]["transform_matrix"][0].__setitem__(3, ENDLESS)), "is not a 4x4"),
+    "scaled pose": (pose(lambda p: p * [[2], [2], [2], [1]]), r"frame 2 \(r_2.png\) is not a rigid"),
+    "mirrored pose": (pose(lambda p: p * [-1, 1, 1, 1]), r"frame 2 \(r_2.png\) is not a rigid"),
+    "3x3 pose": (pose(lambda p: p[:3, :3]), r"frame 2 \(r_2.png\) is not a 4x4"),
+    "text pose": (frame(transform_matrix="identity"), r"frame 1 \(r_1.png\) is not a 4x4"),
+    "name too long": (frame(file_path="x" * 5000), "no such image"),
+    "name of a root": (frame(file_path="/"), "^/: no such image"),
+    "name of two lines": (frame(file_path="a\nb"), "a b: no such image"),
+    "name of half a character": (frame(file_path="\ud800"), "no such image"),
+    "mask's name too long": (frame(mask_path="x" * 5000), "no such image"),
+    "one image twice": (frame(file_path="train/../train/r_2"), "r_2.png: two frames have this image; remove one"),
+    **{f"exposure {x}": (frame(exposure=x), "'exposure' of frame 1 must be a positive number") for x in ("bright", -1, 0, float("nan"))},
+    **{f"gamma {x}": (frame(gamma=x), "'gamma' must be 0") for x in ("sRGB", -1, 0.5, float("nan"))},
+    "no json": (file("transforms_train.json", b"{not json"), "transforms_train.json: is not valid json"),
+    "a json list": (file("transforms_train.json", b"[1, 2]"), "transforms_train.json: must hold a json object"),
+    "no text": (file("transforms_train.json", b"\xff\xfe"), "transforms_train.json: is not valid json"),
+    "deep json": (file("transforms_train.json", b"[" * 100_000), "transforms_train.json: is not valid json"),
+    "no folder": (shutil.rmtree, "data: no such folder"),
+    "no transforms": (lambda root: [path.unlink() for path in root.glob("*.json")], "neither transforms_train.json nor .* cameras_sphere.npz, nor a COLMAP model"),
+    "missing image": (lambda root: (root / "train/r_4.png").unlink(), "r_4: no such image"),
+    "truncated image": (rewritten("train/r_4.png", lambda whole: whole[:100]), "r_4.png: .*(truncated|cannot be read)"),
+    "larger image": (picture("train/r_4.png", SIZE, SIZE + 1, 4), f"r_4.png: is {SIZE + 1}x{SIZE}, but r_0.png is {SIZE}x{SIZE}"),
+    "neither alpha nor mask": (picture("train/r_4.png", SIZE, SIZE, 3), "r_4.png: has no alpha channel and its frame no mask_path"),
+    "empty masks": (alpha(lambda i: np.zeros((SIZE, SIZE))), "train: every mask is empty"),
+    "full masks": (alpha(lambda i: np.ones((SIZE, SIZE))), "train: nothing says where the object is"),
+    "masks of no object": (alpha(lambda i: np.outer(np.arange(SIZE) < 2 + i, np.arange(SIZE) >= SIZE - 2)), "masks and poses contradict each other"),
+    "negative radiance": (negative_radiance, "r_0.exr: has NaN, infinite or negative pixels"),
+}  # fmt: skip
+
+
+def keys(**content: object) -> Damage:
+    return meta(lambda m: m.update(content), "transforms.json")
+
+
+NERFSTUDIO = {
+    "mask of another size": (picture("masks/v03.png.png", SIZE, 8), f"v03.png.png: is 8x{SIZE}, its image v03.png is {SIZE}x{SIZE}"),
+    "mask of another kind": (keys(mask_kind="depth"), "'mask_kind' must be one of auto, object, ignore"),
+    "lens without a model": (keys(camera_model="FOV"), "transforms.json: camera model 'FOV' is not read; undistort the photos"),
+    "lens of all sides": (keys(camera_model="EQUIRECTANGULAR"), "camera model 'EQUIRECTANGULAR' is not read"),
+    "list of lenses": (keys(camera_model=["OPENCV"]), "is not read"),
+    "decentred fisheye": (keys(camera_model="OPENCV_FISHEYE", p1=0.1), "a fisheye with 'p1' or 'p2' is not read"),
+    "coefficient in words": (keys(k1="strong"), "'k1' is no coefficient of a lens: strong"),
+    "coefficient NaN": (keys(k2=float("nan")), "'k2' is no coefficient of a lens: nan"),
+    "large coefficient": (keys(p2=1e9), "'p2' is no coefficient"),
+    "endless coefficient": (keys(k1=ENDLESS), "'k1' is no coefficient"),
+    "f-theta lens": (keys(ftheta_p1=0.3), "'ftheta_p1' is not read"),
+    "rolling shutter": (keys(rolling_shutter=[0, 0, 0.1]), "'rolling_shutter' is not read"),
+    "lens that folds": (keys(k1=-900.0), "its lens, undistorted, covers .% of the image"),
+}  # fmt: skip
+
+
+def view(change: Callable[[dict], object]) -> Damage:
+    return meta(change, "train_003/metadata.json")
+
+
+VIEW_FOLDERS = {
+    "no matrix": (view(lambda m: m.pop("cam_transform_mat")), "train_003/metadata.json: missing key 'cam_transform_mat'"),
+    "no angle": (view(lambda m: m.pop("cam_angle_x")), "train_003/metadata.json: missing key 'cam_angle_x'"),
+    "twelve numbers": (view(lambda m: m.update(cam_transform_mat=",".join("1" * 12))), "train_003.*: cam_transform_mat is not a 4x4"),
+    "words": (view(lambda m: m.update(cam_transform_mat=",".join(["one"] * 16))), "train_003.*: cam_transform_mat is not a 4x4"),
+    "all zero": (view(lambda m: m.update(cam_transform_mat=",".join("0" * 16))), "train_003.*: cam_transform_mat is not a rigid"),
+    "no photo": (lambda root: (root / "train_003/rgba.png").unlink(), "train_003/rgba.png: no such image"),
+    "no metadata": (lambda root: (root / "train_003/metadata.json").unlink(), "train_003/metadata.json: no such file"),
+}  # fmt: skip
+
+
+def cameras(content: dict) -> Damage:
+    """A model with other cameras, as text or binary as it was, and the images of before."""
+
+    def write(root: Path) -> None:
+        model = root / "sparse/0"
+        images = {path: path.read_bytes() for path in model.glob("images.*")}
+        (write_binary_model if (model / "images.bin").exists() else write_text_model)(model, content, [])
+        for path, old in images.items():
+            path.write_bytes(old)
+
+    return write
+
+
+COLMAP = {
+    "another camera model": (cameras(dict.fromkeys((1, 7), (7, "FOV", [9, 9], [1.0] * 5))), "camera model FOV is not read"),
+    "no camera": (cameras({5: COLMAP_CAMERAS[1], 6: COLMAP_CAMERAS[7]}), "has camera 1, which the model lacks"),
+    "no focal length": (cameras({1: (1, "PINHOLE", [9, 9], [0.0, 1, 1, 1]), 7: COLMAP_CAMERAS[7]}), "camera 1: 'fl_x' must be"),
+    "NaN": (cameras({1: (3, "RADIAL", [9, 9], [9, 4, 4, np.nan, 0]), 7: COLMAP_CAMERAS[7]}), "camera 1: 'k1' is no coefficient"),
+    "missing image": (lambda root: (root / "images/v05.png").unlink(), r"v05.png: no such image, though images.* lists it"),
+}  # fmt: skip
+POINTS = 8 + struct.calcsize("<I7dI") + len("v08.png") + 1  # where the first image's number of points stands
+
+
+def images_bin(start: int, content: bytes, end: int) -> Damage:
+    """Other bytes from one place to another."""
+    return rewritten("sparse/0/images.bin", lambda whole: whole[:start] + content + whole[end:])
+
+
+DAMAGED = "images.bin: is damaged or no file of COLMAP "
+BINARY = {
+    "no image": (file("sparse/0/images.bin", bytes(8)), "images.bin: has no registered image"),
+    "endless images": (images_bin(0, struct.pack("<Q", 1 << 60), 8), DAMAGED + ".unpack requires"),
+    "endless points": (images_bin(POINTS, struct.pack("<Q", 1 << 60), POINTS + 8), DAMAGED + ".it ends too early"),
+    "endless name": (images_bin(POINTS - 8, b"v" * 9999, POINTS - 1), DAMAGED),
+}
+
+
+def arrays(change: Callable[[dict], object]) -> Damage:
+    def write(root: Path) -> None:
+        found = dict(np.load(root / "cameras_sphere.npz"))
+        change(found)
+        np.savez(root / "cameras_sphere.npz", **found)
+
+    return write
+
+
+SKEWED = np.array([[9.0, 1, 0, 0], [0, 9, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+NO_MATRIX = r"cameras_sphere.npz: world_mat_2 is not a 4x4 matrix K \[R . t\] of finite numbers"
+NEUS = {
+    "words": (arrays(lambda a: a.update(world_mat_2=np.full((4, 4), "one"))), NO_MATRIX),
+    "3x3": (arrays(lambda a: a.update(world_mat_2=np.eye(3))), NO_MATRIX),
+    "NaN": (arrays(lambda a: a.update(world_mat_2=np.full((4, 4), np.nan))), NO_MATRIX),
+    "flat": (arrays(lambda a: a.update(world_mat_2=np.zeros((4, 4)))), NO_MATRIX),
+    "skewed": (arrays(lambda a: a.update(world_mat_2=SKEWED)), "world_mat_2 has skewed pixels"),
+    "a gap": (arrays(lambda a: a.pop("world_mat_2")), "cameras_sphere.npz: needs world_mat_0, world_mat_1 and so on"),
+    "too few": (arrays(lambda a: a.pop(f"world_mat_{COUNT - 1}")), "image: has 16 images, cameras_sphere.npz has 15"),
+    "none": (arrays(lambda a: [a.pop(f"world_mat_{i}") for i in range(COUNT)]), "needs world_mat_0"),
+    "large": (arrays(lambda a: a.update(world_mat_2=np.zeros((400, 400)))), "has more than 4096 bytes"),
+    "an object": (arrays(lambda a: a.update(world_mat_2=np.array([{}], object))), "cannot be read as a file of NumPy arrays"),
+}
+
+
+def write_capture(root: Path) -> None:
+    """A capture of Stanford-ORB whose one relit photo is in another capture's light."""
+    for name in ("a", "x"):
+        write_image(root / name / "test/0000.exr", np.ones((8, 8, 3), np.float32))
+    entry = {"scene_name": "x", "file_path": "test/0000", "transform_matrix": np.eye(4).tolist()}
+    (root / "a/transforms_novel.json").write_text(json.dumps({"camera_angle_x": 0.7, "frames": [entry]}))
+
+
+STANFORD_ORB = {
+    f"scene {name!r}": (
+        meta(lambda m, name=name: m["frames"][0].update(scene_name=name), "a/transforms_novel.json"),
+        "'scene_name' of frame 0 is no folder's name",
+    )
+    for name in ("", ".", "..", "a/b", "/a", "a\\b", "a\0", 7, None)
+} | {"missing photo": (lambda root: (root / "x/test/0000.exr").unlink(), "0000: no such image")}  # fmt: skip
+
+
+def png(width: int, height: int) -> bytes:
+    """A PNG that claims a size and holds next to nothing."""
+    parts = (b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0), b"IDAT" + zlib.compress(b""), b"IEND")
+    chunks = (struct.pack(">I", len(part) - 4) + part + struct.pack(">I", zlib.crc32(part)) for part in parts)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def write_images(root: Path) -> None:
+    for suffix in (".png", ".jpg", ".exr", ".hdr"):
+        write_image(root / f"cut{suffix}", np.random.default_rng(2).random((64, 64, 3)).astype(np.float32))
+
+
+CLAIMED = "is said to be 4000x4000, too large for its file"
+WORDLESS = struct.pack("<II", 20000630, 2) + b"displayWindow\0\xff\xff\xff\0" + struct.pack("<I4i", 16, 0, 0, 7, 3) + bytes(64)
+BITMAP = struct.pack("<2sIHHIIiiHHIIiiII", b"BM", 58, 0, 0, 54, 40, 1, 1, 1, 24, 0, 4, 1, 1, 0, 0) + bytes(4)
+IMAGES = {
+    **{
+        f"half {suffix}": (rewritten(f"cut{suffix}", lambda whole: whole[: len(whole) // 2]), f"cut{suffix}: .*(truncated|cannot be read)")
+        for suffix in (".png", ".jpg", ".exr", ".hdr")
+    },
+    "none": (lambda root: root / "gone.png", "gone.png: no such image"),
+    "text": (file("a.png", b"no image"), "a.png: cannot be read"),
+    "large PNG": (file("a.png", png(4000, 4000)), f"a.png: {CLAIMED}"),
+    "large HDR": (file("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4000 +X 4000\n"), f"a.hdr: {CLAIMED}"),
+    "too many pixels": (file("a.png", png(20_000, 20_000) + bytes(300_000)), "a.png: is 20000x20000, the most is 134 megapixels of 4"),
+    "error that is no text": (file("a.exr", WORDLESS), "a.exr: cannot be read as an image"),
+    "another format": (file("a.png", BITMAP), "a.png: cannot be read as an image"),
+}  # fmt: skip
+
+
+def floats(pixels: np.ndarray) -> Damage:
+    """An EXR file of any values, which `write_image` would look at."""
+
+    def write(root: Path) -> Path:
+        sink = oiio.ImageOutput.create(str(root / "a.exr"))
+        sink.open(str(root / "a.exr"), oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, oiio.FLOAT))
+        sink.write_image(pixels.astype(np.float32))
+        sink.close()
+        return root / "a.exr"
+
+    return write
+
+
+def with_texel(value: float) -> Damage:
+    pixels = np.ones((4, 8, 3))
+    pixels[1, 2] = value
+    return floats(pixels)
+
+
+MAPS = {
+    "NaN": (with_texel(np.nan), "a.exr: has NaN or infinite pixels"),
+    "infinite": (with_texel(np.inf), "a.exr: has NaN or infinite pixels"),
+    "negative": (with_texel(-1), "a.exr: has negative pixels, 3.2% of its light"),
+    "overflow": (with_texel(3e38), "a.exr: has pixels above 1e.12, whose sums overflow"),
+    "bright": (with_texel(2e12), "a.exr: has pixels above 1e.12, whose sums overflow"),
+    "upright": (floats(np.ones((8, 4, 3))), "a.exr: is 4x8; an equirectangular map is twice as wide as high"),
+    "square": (floats(np.ones((8, 8, 3))), "a.exr: is 8x8; an equirectangular map is twice as wide as high"),
+    "black": (floats(np.zeros((4, 8, 3))), "a.exr: is black and lights nothing"),
+    "PNG": (lambda root: [write_image(root / "a.png", np.ones((4, 8, 3))), root / "a.png"][1], "a.png: .* must hold linear radiance"),
+    "none": (lambda root: root / "b.hdr", "no such environment map"),
+}  # fmt: skip
+
+
+def flat(root: Path) -> Path:
+    trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False).export(root / "flat.ply")
+    return root / "flat.ply"
+
+
+MESHES = {
+    "flat": (flat, "flat.ply: degenerate or empty mesh"), "text": (file("a.ply", b"no mesh"), "a.ply: cannot be read as a mesh"),
+    "none": (lambda root: root / "b.ply", "no such mesh"),
+}  # fmt: skip
+TRUTH = {"another size": (picture("test/r_0_albedo.png", 8, 8, 4), "r_0_albedo.png: is 8x8, not the size of r_0.png")}
+
+
+# ---- glTF ----
+
+
+def gltf(change: Callable[[Gltf], object], **attributes: object) -> Damage:
+    """A changed triangle."""
+
+    def write(root: Path) -> Path:
+        asset = triangle(NORMAL=[[0, 0, 1]] * 3, **attributes)
+        change(asset)
+        return asset.write(root / "a.glb")
+
+    return write
+
+
+def content(**parts: object) -> Damage:
+    return gltf(lambda g: g.json.update(parts))
+
+
+def primitive(**parts: object) -> Damage:
+    return gltf(lambda g: g.json["meshes"][0]["primitives"][0].update(parts))
+
+
+def indices(*values: int) -> Damage:
+    return gltf(lambda g: g.json["meshes"][0]["primitives"][0].update(indices=g.accessor(values, "uint16")))
+
+
+def positions(values: np.ndarray) -> Damage:
+    return gltf(lambda g: g.json["meshes"][0]["primitives"][0]["attributes"].update(POSITION=g.accessor(values)))
+
+
+def accessor(**parts: object) -> Damage:
+    return gltf(lambda g: g.json["accessors"][0].update(parts))
+
+
+def texture(g: Gltf, **material: object) -> None:
+    """A texture without coordinates."""
+    slot = {"baseColorTexture": {"index": g.texture(np.ones((2, 2, 3)))}}
+    number = g.material(name="m", pbrMetallicRoughness=slot, **material)
+    g.json["meshes"][0]["primitives"][0]["material"] = number
+
+
+def broken_image(g: Gltf) -> None:
+    texture(g)
+    g.json["images"][0] = {"name": "bad", "bufferView": g.view(b"no image")}
+
+
+def endless_factor(g: Gltf) -> None:
+    pbr = {"roughnessFactor": float("nan")}
+    g.json["meshes"][0]["primitives"][0]["material"] = g.material(name="m", pbrMetallicRoughness=pbr)
+
+
+def one_vertex_for_all(g: Gltf) -> None:
+    g.json["accessors"][0]["count"] = 10**9
+    g.json["bufferViews"][0]["byteStride"] = 0
+
+
+def many_instances(g: Gltf) -> None:
+    """Of the largest mesh that the file's size allows."""
+    g.json["meshes"][0]["primitives"][0]["attributes"].pop("NORMAL")
+    g.json["accessors"][0] = {"componentType": 5126, "count": 3 * 10**5, "type": "VEC3"}
+    for _ in range(300):
+        g.node(mesh=0)
+
+
+UNPACKS = "unpacks to more than its size"
+GLTF = {
+    "Draco": (content(extensionsRequired=["KHR_draco_mesh_compression"]), "requires KHR_draco_mesh_compression"),
+    "extensions": (content(extensionsRequired=["KHR_texture_basisu", "EXT_a"]), "requires EXT_a, KHR_texture_basisu"),
+    "empty": (content(meshes=[], nodes=[], scenes=[{}]), "has no triangles; export a mesh"),
+    "points": (primitive(mode=0), "has no triangles, only points or lines"),
+    "no accessor": (primitive(indices=99), "is not valid glTF"),
+    "a circle": (content(nodes=[{"children": [0]}]), "node 0 stands in the scene twice"),
+    "flat": (content(nodes=[{"mesh": 0, "scale": [1, 0, 1]}]), "has no triangles"),
+    "glTF 1": (content(asset={"version": "1.0"}), "is glTF 1.0; only 2.0 is read"),
+    "NaN": (positions(np.full((3, 3), np.nan)), "mesh 'part' has NaN or infinite values in POSITION"),
+    "large scale": (content(nodes=[{"mesh": 0, "scale": [1e39] * 3}]), "has NaN or infinite coordinates after its tr"),
+    "far away": (content(nodes=[{"mesh": 0, "scale": [1e18] * 3}]), "has vertices farther than 1e.12 from the origin"),
+    "no area": (positions(np.zeros((3, 3))), "no triangle has an area"),
+    "four vertices": (positions(np.zeros((4, 3))), "has 3 values of NORMAL for 4 vertices"),
+    "index 3": (indices(0, 1, 3), "vertex indices out of range, 3 of 3"),
+    "two indices": (indices(0, 1), "has 2 indices, not three a triangle"),
+    "long accessor": (accessor(count=1000), "an accessor reaches beyond its buffer view"),
+    "negative count": (accessor(count=-3), "not valid glTF"),
+    "no coordinates": (gltf(texture), "material 'm' has textures, but a mesh with it has no TEXCOORD_0"),
+    "two coordinates": (gltf(lambda g: texture(g, emissiveTexture={"index": 0, "texCoord": 1})), "'m' have different coordinates"),
+    "NaN factor": (gltf(endless_factor), "material 'm' has a factor that is no usable number"),
+    "no image": (gltf(broken_image), "image 0 'bad': cannot be read as an image"),
+    "endless zeros": (gltf(lambda g: g.json["accessors"].__setitem__(0, {"componentType": 5126, "count": 10**9, "type": "VEC3"})), UNPACKS),
+    "one vertex for all": (gltf(one_vertex_for_all), f"{UNPACKS}|byteStride"),
+    "many instances": (gltf(many_instances), UNPACKS),
+    "no stride": (gltf(lambda g: g.json["bufferViews"][0].update(byteStride=0)), "byteStride"),
+    "half": (rewritten("a.glb", lambda whole: whole[: len(whole) // 2]), "truncated GLB"),
+    "ten bytes": (rewritten("a.glb", lambda whole: whole[:10]), "truncated GLB"),
+    "GLB 1": (rewritten("a.glb", lambda whole: whole[:4] + b"\1\0\0\0" + whole[8:]), "GLB version 1"),
+    "another container": (rewritten("a.glb", lambda whole: b"glTX" + whole[4:]), "is neither a GLB nor glTF's JSON"),
+    "nothing": (file("a.glb", b""), "is neither a GLB nor glTF's JSON"),
+    "a list": (file("a.glb", b"[]"), "is JSON but not glTF"),
+    "deep JSON": (file("a.gltf", b"[" * 100_000), "a.gltf: is neither"),
+    "no file": (lambda root: root / "b.glb", "b.glb: no such file"),
+    "no buffer": (lambda root: beside(root, "gone%20too.bin"), "gone too.bin: no such file, though a.gltf refers to it"),
+    "a pipe": (lambda root: beside(root, "pipe.bin"), "pipe.bin: no such file"),
+    **{
+        f"outside by {uri}": (lambda root, uri=uri: beside(root, uri), "a.gltf: refers to .*, outside its folder; put the file there")
+        for uri in ("../secret.bin", "%2e%2e/secret.bin", "sub/../../secret.bin", "{root}/secret.bin", "link.bin")
+    },
+}  # fmt: skip
+
+
+def load(folder: Path, _) -> object:
+    return load_dataset(folder)
+
+
+def of_file(read: Callable[[Path], object]) -> Callable[[Path, object], object]:
+    return lambda _, path: read(path)
+
+
+FORMS = {  # what writes a good folder, what reads it or the path that the damage gives, and the table of damages
+    "transforms": (make_blender, load, TRANSFORMS),
+    "nerfstudio": (lambda root: write_transforms(root, masks=True), load, NERFSTUDIO),
+    "view folders": (make_folders, load, VIEW_FOLDERS),
+    "COLMAP, binary": (lambda root: write_colmap(root, binary=True), load, COLMAP | BINARY),
+    "COLMAP, text": (lambda root: write_colmap(root, binary=False), load, COLMAP),
+    "NeuS": (write_neus, load, NEUS),
+    "Stanford-ORB": (write_capture, lambda root, _: stanford_orb.relit(root / "a", {}), STANFORD_ORB),
+    "image": (write_images, of_file(read_image), IMAGES),
+    "map": (Path.exists, of_file(read_environment), MAPS),
+    "mesh": (Path.exists, of_file(read_mesh), MESHES),
+    "truth": (make_blender, lambda root, _: load_view_truths(load_dataset(root, "test")), TRUTH),
+    "glTF": (lambda root: triangle().write(root / "a.glb"), of_file(read_asset), GLTF),
+}
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory) -> Callable[[str, Path], object]:
+    """Copies a form's good folder to a path."""
+
+    @cache
+    def written(form: str) -> Path:
+        folder = tmp_path_factory.mktemp("good")
+        FORMS[form][0](folder)
+        return folder
+
+    return lambda form, folder: shutil.copytree(written(form), folder)
+
+
+@pytest.mark.parametrize(("form", "case"), [(form, case) for form, (*_, table) in FORMS.items() for case in table])
+def test_bad_files_give_one_line_that_names_them(good, tmp_path, form, case):
+    _, read, table = FORMS[form]
+    damage, message = table[case]
+    good(form, tmp_path / "data")
+    path = damage(tmp_path / "data")
+    with pytest.raises(InputError, match=message) as caught:
+        read(tmp_path / "data", path)
+    line = str(caught.value)
+    assert line.startswith((str(tmp_path), "/: ")) and len(line) < 6000
+
+
+# ---- what looks bad and is not ----
+
+
+@pytest.mark.parametrize("uri", [
+    "sub/the%20data.bin", "./sub/../sub/the%20data.bin", "inside.bin", "data:application/octet-stream;base64,{inline}",
+])  # fmt: skip
+def test_gltf_below_its_folder_is_read(tmp_path, uri):
+    whole = read_asset(triangle().write(tmp_path / "a.glb"))
+    assert np.array_equal(read_asset(beside(tmp_path, uri)).vertices, whole.vertices)
+
+
+def test_a_buffer_that_nothing_uses_may_be_missing(tmp_path):
+    unused = {"uri": "x" * 5000, "byteLength": 4}
+    change = gltf(lambda g: g.json.update(buffers=[{"byteLength": len(g.binary)}, unused]))
+    assert len(read_asset(change(tmp_path)).triangles) == 1
+
+
+def test_a_black_mask_of_one_bit_a_pixel_is_as_small_as_that(tmp_path):
+    Image.new("1", (2000, 2000)).save(tmp_path / "mask.png", optimize=True)
+    assert (tmp_path / "mask.png").stat().st_size < 2000**2 / 4096
+    assert read_image(tmp_path / "mask.png").shape == (2000, 2000, 1)
